@@ -109,12 +109,6 @@ pub(super) const DEFECTS: &[Defect] = &[
     },
     Defect {
         file: "crates/cia402/src/power.rs",
-        text: "row(8, S::OperationEnabled, Command(C::Shutdown), S::ReadyToSwitchOn)",
-        instead: "row(8, S::OperationEnabled, Command(C::Shutdown), S::SwitchedOn)",
-        noticed_by: TABLES,
-    },
-    Defect {
-        file: "crates/cia402/src/power.rs",
         text: "matches!(state, PowerState::FaultReactionActive | PowerState::Fault);",
         instead: "matches!(state, PowerState::Fault);",
         noticed_by: CIA402,
@@ -180,12 +174,6 @@ pub(super) const DEFECTS: &[Defect] = &[
         noticed_by: PLANT_IT,
     },
     Defect {
-        file: "crates/devices/src/zltech/zlac8030l/objects/profile.rs",
-        text: ".range(1, 1000).default(120)",
-        instead: ".range(1, 1000).default(60)",
-        noticed_by: TABLES,
-    },
-    Defect {
         file: "crates/drives/src/engine/host_watchdog.rs",
         text: "now.nanos_since(last) >= timeout_ns",
         instead: "now.nanos_since(last) > timeout_ns",
@@ -220,24 +208,6 @@ pub(super) const DEFECTS: &[Defect] = &[
         text: "lost |= *empty_for >= PHASE_LOSS_DEBOUNCE_PERIODS;",
         instead: "lost |= *empty_for > PHASE_LOSS_DEBOUNCE_PERIODS;",
         noticed_by: DRIVES,
-    },
-    Defect {
-        file: "crates/drives/src/zlac8030l/protection.rs",
-        text: "[u, v, u + v].iter()",
-        instead: "[u, v, u - v].iter()",
-        noticed_by: WHEEL,
-    },
-    Defect {
-        file: "crates/drives/src/zlac8030l/protection.rs",
-        text: "matches!(sensors.hall & 7, 0 | 7)",
-        instead: "matches!(sensors.hall & 7, 7)",
-        noticed_by: WHEEL,
-    },
-    Defect {
-        file: "crates/drives/src/engine/cia402/stopping.rs",
-        text: "StopRamp::QuickStop => Braking::Ramp(parameters.quick_stop_ramp),",
-        instead: "StopRamp::QuickStop => Braking::Ramp(parameters.moves.deceleration),",
-        noticed_by: WHEEL,
     },
     Defect {
         file: "crates/sim/src/wire/confinement.rs",
@@ -305,5 +275,35 @@ pub(super) const DEFECTS: &[Defect] = &[
         text: "row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);",
         instead: "row[j + 1] = replaced.min(row[j] + 1);",
         noticed_by: TESTBENCH,
+    },
+    Defect {
+        file: "crates/cia402/src/power.rs",
+        text: "row(8, S::OperationEnabled, Command(C::Shutdown), S::ReadyToSwitchOn)",
+        instead: "row(8, S::OperationEnabled, Command(C::Shutdown), S::SwitchedOn)",
+        noticed_by: TABLES,
+    },
+    Defect {
+        file: "crates/devices/src/zltech/zlac8030l/objects/profile.rs",
+        text: ".range(1, 1000).default(120)",
+        instead: ".range(1, 1000).default(60)",
+        noticed_by: TABLES,
+    },
+    Defect {
+        file: "crates/drives/src/zlac8030l/protection.rs",
+        text: "[u, v, u + v].iter()",
+        instead: "[u, v, u - v].iter()",
+        noticed_by: WHEEL,
+    },
+    Defect {
+        file: "crates/drives/src/zlac8030l/protection.rs",
+        text: "matches!(sensors.hall & 7, 0 | 7)",
+        instead: "matches!(sensors.hall & 7, 7)",
+        noticed_by: WHEEL,
+    },
+    Defect {
+        file: "crates/drives/src/engine/cia402/stopping.rs",
+        text: "StopRamp::QuickStop => Braking::Ramp(parameters.quick_stop_ramp),",
+        instead: "StopRamp::QuickStop => Braking::Ramp(parameters.moves.deceleration),",
+        noticed_by: WHEEL,
     },
 ];
