@@ -6,6 +6,7 @@
 
 mod browser;
 mod debian;
+mod defects;
 mod dist;
 mod examples;
 mod idle;
@@ -43,6 +44,7 @@ The project's own chores.
   cargo xtask test .. --timings  the slowest tests, too
   cargo xtask vcan-test          the tests that need CAN interfaces, in a virtual machine that has them
   cargo xtask tidy               the style that a program can check
+  cargo xtask defects [--only NUMBER]..    do the tests notice what is wrong: defects put into a copy of the tree, one at a time
   cargo xtask wheel              the Python package, in dist/: the library, the binary, the interface for python-can
   cargo xtask dist               what is released, in dist/: binary, manual pages, completions, data sheets, licences, wheel
   cargo xtask pgo                the binary to release, optimised by what a training run does
@@ -56,6 +58,7 @@ fn main() -> ExitCode {
     match words.as_slice() {
         ["test", rest @ ..] => test::command(rest),
         ["tidy"] => tidy::command(),
+        ["defects", rest @ ..] => defects::command(rest),
         ["dist"] => dist::command(),
         ["wheel"] => wheel::command(),
         ["pgo"] => pgo::command(),

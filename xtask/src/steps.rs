@@ -126,12 +126,13 @@ fn clippy() -> Tally {
 }
 
 fn tests() -> Tally {
-    tests_of(&["--lib", "--bins", "--tests"])
+    tests_of(&["--lib", "--bins", "--tests"], &[])
 }
 
-/// The tests that `cargo test` selects by these words, in virtual time.
-pub(crate) fn tests_of(words: &[&str]) -> Tally {
-    test_programs::build(words).map_or_else(Tally::failed, |programs| test_programs::run(programs, COMPUTING))
+/// The tests that `cargo test` selects by these words, in virtual time. The programs get further arguments, such as a filter.
+pub(crate) fn tests_of(words: &[&str], arguments: &[&str]) -> Tally {
+    let how = How { arguments, ..COMPUTING };
+    test_programs::build(words).map_or_else(Tally::failed, |programs| test_programs::run(programs, how))
 }
 
 fn real_time() -> Tally {

@@ -30,6 +30,15 @@ pub(crate) struct Program {
     folder: PathBuf,
 }
 
+impl Program {
+    /// It, as cargo runs it.
+    pub(crate) fn command(&self) -> Command {
+        let mut command = Command::new(&self.path);
+        command.current_dir(&self.folder).env("CARGO_MANIFEST_DIR", &self.folder);
+        command
+    }
+}
+
 /// How they are run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct How<'a> {
@@ -46,7 +55,14 @@ pub(crate) struct How<'a> {
 /// # Errors
 /// A sentence; what the compiler says goes to standard error.
 pub(crate) fn build(words: &[&str]) -> Result<Vec<Program>, String> {
-    let mut cargo = workspace::cargo();
+    build_with(workspace::cargo(), words)
+}
+
+/// The same by a cargo that was told where.
+///
+/// # Errors
+/// A sentence; what the compiler says goes to standard error.
+pub(crate) fn build_with(mut cargo: Command, words: &[&str]) -> Result<Vec<Program>, String> {
     cargo.args(["test", "--quiet", "--no-run", "--message-format=json-render-diagnostics"]).args(words);
     let mut programs = Vec::new();
     let built = process::run(&mut cargo, |line| programs.extend(serde_json::from_str(line).ok().and_then(program_of)))?;
@@ -98,8 +114,7 @@ pub(crate) fn run(programs: Vec<Program>, how: How<'_>) -> Tally {
 
 fn run_one(program: &Program, how: How<'_>) -> (Tally, Vec<Timed>) {
     let name = program.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut command = Command::new(&program.path);
-    command.current_dir(&program.folder).env("CARGO_MANIFEST_DIR", &program.folder);
+    let mut command = program.command();
     command.arg(format!("--test-threads={}", how.threads)).args(how.arguments);
     let mut read = libtest::Reader::default();
     libtest::tell_times(&mut command);

@@ -32,7 +32,7 @@ type TextRule = fn(&str, &str) -> Vec<Finding>;
 const SOURCE_RULES: &[SourceRule] = &[
     banned::in_code,
     banned::left_undone,
-    banned::sleeps_of_tests,
+    banned::clocks_of_tests,
     banned::std_in_core,
     conventions::module_docs,
     conventions::test_names,

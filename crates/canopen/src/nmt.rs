@@ -241,6 +241,16 @@ mod tests {
         assert_eq!(NmtRequest::parse(&Frame::new(CanId::extended(0), &[1, 4])), Err(MalformedNmt::OtherFrame));
     }
 
+    /// CiA 301, table 37.
+    #[test]
+    fn each_state_has_its_services() {
+        use NmtState::*;
+        let services = [(Initialising, false, false), (PreOperational, true, false), (Operational, true, true)];
+        for (state, sdo, pdo) in services.into_iter().chain([(Stopped, false, false)]) {
+            assert_eq!((state.allows_sdo(), state.allows_pdo()), (sdo, pdo), "{state}");
+        }
+    }
+
     #[test]
     fn a_slave_moves_as_figure_48_shows() {
         use NmtState::*;

@@ -176,6 +176,16 @@ mod tests {
         }
     }
 
+    /// CiA 402-2, table 9, transition 13: a second fault does not begin the reaction anew.
+    #[test]
+    fn a_fault_leads_to_its_reaction_from_every_state_but_that_and_fault_itself() {
+        for state in PowerState::ALL {
+            let taken = transition(state, PowerEvent::FaultOccurred).map(|taken| (taken.number, taken.to));
+            let reacts = !matches!(state, PowerState::FaultReactionActive | PowerState::Fault);
+            assert_eq!(taken, reacts.then_some((13, PowerState::FaultReactionActive)), "{state:?}");
+        }
+    }
+
     #[test]
     fn every_state_is_told_by_its_statusword() {
         for state in PowerState::ALL {

@@ -309,13 +309,15 @@ mod tests {
 
     #[test]
     fn charging_at_the_limit_is_a_straight_line() {
-        let limited = SupplyModel { source_limit_a: 5.0, ..SUPPLY };
-        let mut data = SupplyData { connected: true, ..SupplyData::switched_off(48.0) };
-        for _ in 0..200 {
-            limited.step(&mut data, 50e-6, 0.0, false);
+        // 5 A for 10 ms into 2 mF, and with the capacitor of the source into 10 mF.
+        for (source_capacitance_f, expected_v) in [(0.0, 25.0), (8e-3, 5.0)] {
+            let limited = SupplyModel { source_limit_a: 5.0, source_capacitance_f, ..SUPPLY };
+            let mut data = SupplyData { connected: true, ..SupplyData::switched_off(48.0) };
+            for _ in 0..200 {
+                limited.step(&mut data, 50e-6, 0.0, false);
+            }
+            assert!((data.bus_v - expected_v).abs() < 1e-9, "{} V", data.bus_v);
         }
-        // 5 A for 10 ms into 2 mF.
-        assert!((data.bus_v - 25.0).abs() < 1e-9, "{} V", data.bus_v);
     }
 
     #[test]

@@ -34,6 +34,7 @@ fn main() -> ExitCode {
 
 /// Whether all was as the manuals say.
 fn run() -> Result<bool, String> {
+    // For the person who waits.
     let start = std::time::Instant::now();
     let shown = io::stderr().is_terminal();
     let section = move |section: &str| {

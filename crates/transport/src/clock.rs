@@ -335,7 +335,7 @@ mod tests {
         drop(clock);
         let patience = std::time::Instant::now();
         while queue.strong_count() > 0 {
-            assert!(patience.elapsed() < Duration::from_secs(10), "timer thread still runs");
+            assert!(patience.elapsed() < Duration::from_secs(600), "timer thread still runs");
             std::thread::yield_now();
         }
     }

@@ -1,5 +1,6 @@
 //! Runs the built `ferrodrive`, for a moment or for a while.
 
+mod patience;
 pub mod raw_bus;
 pub mod studio;
 
@@ -12,8 +13,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-/// Longest wait for a line of a simulator.
-const PATIENCE: Duration = Duration::from_secs(20);
+pub use patience::{PATIENCE, wait_for, wait_until};
 
 /// How a command ended, and what it printed.
 pub struct Ended {
@@ -45,9 +45,17 @@ pub fn program() -> &'static str {
     })
 }
 
-/// The program with these arguments, and nothing of this environment that it would listen to.
+/// Commands that ask nobody, or each node-ID whether somebody is there.
+const NOT_PATIENT: [&str; 3] = ["sim", "dump", "scan"];
+
+/// The program with these arguments, and nothing of this environment that it would listen to. Who asks on a served bus waits longer
+/// for an answer than a person would: on a busy machine the bus may be seconds behind.
 pub fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(program());
+    let served = arguments.windows(2).any(|pair| pair[0] == "--bus" && pair[1].contains("://"));
+    if served && !arguments.iter().any(|word| *word == "--timeout" || NOT_PATIENT.contains(word)) {
+        command.args(["--timeout", "60s"]);
+    }
     command.args(arguments).env_remove("FERRODRIVE_BUS").env_remove("FERRODRIVE_MACHINE").env("NO_COLOR", "1");
     command
 }
@@ -130,8 +138,8 @@ impl Simulator {
     pub fn error(&self, part: &str) -> String {
         let errors = self.errors.as_ref().expect("standard error is kept");
         loop {
-            let line =
-                errors.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("no {part:?} on standard error in time"));
+            // The watchdog's.
+            let line = errors.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("no {part:?} on standard error"));
             if line.contains(part) {
                 return line;
             }
@@ -156,7 +164,8 @@ impl Simulator {
 
     /// The next line that it prints.
     pub fn line(&self) -> String {
-        self.lines.recv_timeout(PATIENCE).expect("a line in time")
+        // The watchdog's.
+        self.lines.recv_timeout(PATIENCE).expect("a line")
     }
 
     /// All lines left on the standard output of one that ends.

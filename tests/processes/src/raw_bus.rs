@@ -2,10 +2,8 @@
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::time::Duration;
 
-/// Longest wait for a frame.
-const PATIENCE: Duration = Duration::from_secs(20);
+use crate::PATIENCE;
 
 /// A connection in raw mode.
 pub struct RawBus {
@@ -17,6 +15,7 @@ impl RawBus {
     /// Connects to `HOST:PORT` and enters raw mode.
     pub fn connect(address: &str) -> Self {
         let stream = TcpStream::connect(address).expect("it listens");
+        // The watchdog's.
         stream.set_read_timeout(Some(PATIENCE)).expect("a socket takes a timeout");
         stream.set_nodelay(true).expect("a socket takes an option");
         let mut bus = Self { stream, unread: String::new() };

@@ -3,14 +3,10 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Stdio};
-use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::command;
-
-/// Far more than any answer takes.
-pub const PATIENCE: Duration = Duration::from_secs(30);
+use crate::{PATIENCE, command, wait_for};
 
 /// A running studio; killed when dropped.
 pub struct Studio {
@@ -37,6 +33,7 @@ impl Studio {
     /// Sends a request and gives the whole answer.
     pub fn ask(&self, line: &str, headers: &str) -> String {
         let mut stream = TcpStream::connect(&self.address).unwrap();
+        // The watchdog's.
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         write!(stream, "{line} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n{headers}\r\n", self.address).unwrap();
         let mut answer = String::new();
@@ -54,16 +51,10 @@ impl Studio {
 
     /// Waits until what is shown is as wanted, and gives it.
     pub fn wait(&self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
-        let until = Instant::now() + PATIENCE;
-        loop {
+        wait_for(what, || {
             let state = self.state();
-            if wanted(&state) {
-                return state;
-            }
-            assert!(Instant::now() < until, "waited for {what}: {state}");
-            // Looked at again and again.
-            std::thread::sleep(Duration::from_millis(20));
-        }
+            if wanted(&state) { Ok(state) } else { Err(state.to_string()) }
+        })
     }
 
     /// Waits until the three drives of the embedded bus are known. Asking all node-IDs takes a while.

@@ -27,7 +27,7 @@ laws_hold! {
     an_slcan_stream_decodes_alike_however_it_is_cut: "slcan";
     sdo_bytes_read_back_as_written: "sdo_wire";
     a_node_under_any_frames_keeps_its_dictionary_lawful: "node";
-    a_joint_under_any_frames_and_sensors_keeps_its_objects_lawful_and_its_duty_cycles_shares: "mjoint";
+    an_mjoint_under_any_frames_and_sensors_keeps_its_objects_lawful_and_its_duty_cycles_shares: "mjoint";
     modbus_bytes_get_well_formed_responses_or_silence_and_the_next_request_its_answer: "modbus";
     a_zlac8030l_under_any_frames_and_sensors_keeps_its_objects_lawful: "zlac8030l";
     a_zlim42c_under_any_frames_and_sensors_keeps_its_objects_lawful: "zlim42c";

@@ -1,6 +1,5 @@
 //! The whole of Ferrodrive from outside: the manuals' data, conversations and laws. One program: a file each.
 
-mod any_data_sheet_runs;
 mod conversations;
 mod data_of_the_drives;
 mod data_of_the_mjoint;

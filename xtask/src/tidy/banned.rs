@@ -91,21 +91,26 @@ pub(super) fn std_in_core(source: &Source) -> Vec<Finding> {
     found
 }
 
-/// A sleep of a test without its reason in a comment on the line before. What virtual time can show needs none.
-pub(super) fn sleeps_of_tests(source: &Source) -> Vec<Finding> {
-    const WHY: &str = "a test that waits by the clock is slow, and fails where the machine is busy";
-    const REMEDY: &str =
-        "let virtual time pass, or ask until it is so; else say on the line before why it must be the clock";
-    if source.library().is_some() || source.path.starts_with("xtask/") {
+/// What reads or waits by the clock.
+const CLOCKS: [&str; 6] =
+    ["thread::sleep", "time::sleep", "time::timeout", "Instant::now", "recv_timeout", "set_read_timeout"];
+
+/// A clock in a test without its reason in a comment on the line before. What virtual time can show needs none.
+pub(super) fn clocks_of_tests(source: &Source) -> Vec<Finding> {
+    const WHY: &str =
+        "a test that waits by the clock is slow, and one with a bound by it fails where the machine is busy";
+    const REMEDY: &str = "let virtual time pass, or wait until it is so (`processes::wait_for`); \
+                          else say on the line before why it must be the clock";
+    if source.library().is_some() || ["xtask/", "benches/"].iter().any(|folder| source.path.starts_with(folder)) {
         return Vec::new();
     }
     let lines: Vec<&str> = source.text.lines().collect();
-    let calls = ["thread::sleep", "time::sleep"].iter().flat_map(|word| found_in(&source.code, word));
+    let calls = CLOCKS.iter().flat_map(|word| found_in(&source.code, word));
     let unexplained = calls.filter(|(at, _)| {
         let line = source.line_of(*at);
         !line.checked_sub(2).is_some_and(|before| lines[before].trim_start().starts_with("//"))
     });
-    unexplained.map(|(at, word)| finding(source, at, "sleep", word, WHY, REMEDY)).collect()
+    unexplained.map(|(at, word)| finding(source, at, "clock", word, WHY, REMEDY)).collect()
 }
 
 /// Work left undone: in code by macro, in comments by word.
@@ -179,10 +184,13 @@ mod tests {
     }
 
     #[test]
-    fn a_sleep_in_a_test_needs_its_reason_on_the_line_before() {
-        let found = |path: &str, text: &str| in_file(sleeps_of_tests, path, text).len();
+    fn a_clock_in_a_test_needs_its_reason_on_the_line_before() {
+        let found = |path: &str, text: &str| in_file(clocks_of_tests, path, text).len();
         assert_eq!(found("tests/a.rs", "fn f() {\n    std::thread::sleep(LONG);\n}"), 1);
         assert_eq!(found("tests/a.rs", "fn f() {\n    // It boots.\n    std::thread::sleep(LONG);\n}"), 0);
         assert_eq!(found("crates/cli/src/a.rs", "fn f() {\n    tokio::time::sleep(LONG);\n}"), 0);
+        for word in CLOCKS {
+            assert_eq!(found("crates/sim/tests/a.rs", &format!("fn f() {{\n    {word}(LONG);\n}}")), 1, "{word}");
+        }
     }
 }

@@ -57,7 +57,7 @@ mod tests {
     use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
     use transport::log::Format;
 
-    const SOON: Duration = Duration::from_secs(20);
+    const SOON: Duration = Duration::from_secs(600);
     const ROOM: usize = Pace::RealTime.room();
 
     /// A disk that takes nothing until it is allowed to, and hands out what it has taken.

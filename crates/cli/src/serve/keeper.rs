@@ -144,7 +144,7 @@ mod tests {
     use super::*;
     use crate::serve::scratch;
 
-    const SOON: Duration = Duration::from_secs(20);
+    const SOON: Duration = Duration::from_secs(600);
 
     fn image(generation: u64) -> StoredImage {
         StoredImage { number: 1, model: "a", generation, bytes: vec![generation as u8; 8] }

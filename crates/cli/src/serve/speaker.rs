@@ -153,7 +153,7 @@ mod tests {
     use super::*;
     use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-    const SOON: Duration = Duration::from_secs(20);
+    const SOON: Duration = Duration::from_secs(600);
 
     /// A stream that takes a write only when it is read.
     struct Pipe(SyncSender<Vec<u8>>);

@@ -2,13 +2,11 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, TcpStream};
-use std::time::Duration;
 
-use processes::{Simulator, command, done, ferrodrive, page, scratch};
+use processes::{PATIENCE, Simulator, command, done, ferrodrive, page, scratch};
 use serde_json::{Value, json};
 
 const DRIVE: [&str; 4] = ["--drive", "zlac8030l@4", "--control", "127.0.0.1:0"];
-const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A client that holds every line that it gets to the schema.
 struct Client {
@@ -63,6 +61,7 @@ impl Client {
 
 fn stream(simulator: &Simulator) -> TcpStream {
     let stream = TcpStream::connect(simulator.address("control")).expect("it listens");
+    // The watchdog's.
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
     stream
 }
@@ -99,6 +98,7 @@ fn a_unix_socket_serves_the_same_is_private_and_goes_with_the_simulator() {
     assert!(simulator.ready.contains(&format!("control+unix://{place}")), "{}", simulator.ready);
     assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
     let stream = UnixStream::connect(&path).unwrap();
+    // The watchdog's.
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
     let mut client = Client::over(stream.try_clone().unwrap(), stream);
     assert_eq!(client.ask(&json!({ "id": 1, "request": "get", "node": 4 })).0["model"], "zlac8030l");
@@ -139,7 +139,7 @@ fn garbage_endless_lines_and_half_lines_do_no_harm() {
     cut.read_to_string(&mut text).unwrap();
     assert_eq!(text.lines().count(), 1, "{text}");
     // The supply comes to its new voltage.
-    std::thread::sleep(Duration::from_millis(50));
+    std::thread::sleep(std::time::Duration::from_millis(50));
     let volts = simulator.ask("4 get")["supply_v"].as_f64().unwrap();
     assert!((volts - 33.0).abs() < 10.0, "{volts}");
 }
@@ -175,6 +175,7 @@ fn beyond_this_machine_a_token_is_asked_for() {
     assert_eq!(world(&["--control-token", &token]).status, Some(0));
     let simulator = Simulator::start(&[&DRIVE[..], &["--control-token", "secret"]].concat());
     let stream = TcpStream::connect(simulator.address("control")).unwrap();
+    // The watchdog's.
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
     let mut client = Client::over(stream.try_clone().unwrap(), stream);
     (0..3).for_each(|_| client.send("4 power cut"));

@@ -24,11 +24,14 @@ use fantoccini::elements::Element;
 use fantoccini::error::{CmdError, ErrorStatus};
 use fantoccini::key::Key;
 use fantoccini::{Client, ClientBuilder, Locator};
-use processes::Simulator;
-use processes::studio::{PATIENCE, Studio};
+use processes::studio::Studio;
+use processes::{PATIENCE, Simulator};
 use serde_json::{Value, json};
 
 const WHEEL: usize = 2;
+
+/// What a click has not brought by then, another one may.
+const RETRY: std::time::Duration = std::time::Duration::from_secs(5);
 
 /// A studio with a browser before it; both end with this.
 struct Stage {
@@ -103,6 +106,7 @@ impl Stage {
     async fn find(&self, css: &str) -> Element {
         self.client
             .wait()
+            // The watchdog's.
             .at_most(PATIENCE)
             .for_element(Locator::Css(css))
             .await
@@ -111,10 +115,12 @@ impl Stage {
 
     /// Clicks. What the page draws anew between finding and clicking it is looked for again.
     async fn click(&self, css: &str) {
+        // The watchdog's.
         let until = std::time::Instant::now() + PATIENCE;
         loop {
             match self.find(css).await.click().await {
                 Ok(()) => return,
+                // The watchdog's.
                 Err(error) if is_replaced(&error) && std::time::Instant::now() < until => {}
                 // Below the header or the news, which stay where they are.
                 Err(CmdError::Standard(error))
@@ -130,12 +136,14 @@ impl Stage {
 
     /// Clicks until something comes of it: what the page moves between looking and clicking is missed, as a person may miss it.
     async fn click_for(&self, css: &str, wanted: &str) {
+        // The watchdog's.
         let until = std::time::Instant::now() + PATIENCE;
         loop {
             self.click(css).await;
-            let found = self.client.wait().at_most(PATIENCE / 6).for_element(Locator::Css(wanted)).await;
+            let found = self.client.wait().at_most(RETRY).for_element(Locator::Css(wanted)).await;
             match found {
                 Ok(_) => return,
+                // The watchdog's.
                 Err(error) => assert!(std::time::Instant::now() < until, "{wanted} after {css}: {error}"),
             }
         }
@@ -159,6 +167,7 @@ impl Stage {
 
     /// Waits until an element says this, and gives all that it says.
     async fn says(&self, css: &str, part: &str) -> String {
+        // The watchdog's.
         let until = std::time::Instant::now() + PATIENCE;
         loop {
             let text = match self.find(css).await.text().await {
@@ -168,6 +177,7 @@ impl Stage {
             if text.contains(part) {
                 return text;
             }
+            // The watchdog's.
             assert!(std::time::Instant::now() < until, "{css} says {text:?}, not {part:?}");
             // Looked at again and again.
             tokio::time::sleep(std::time::Duration::from_millis(50)).await;
@@ -199,6 +209,7 @@ impl Stage {
         let path = format!("//*[contains(@class, 'trace-row') and contains(., '{text}')]");
         self.client
             .wait()
+            // The watchdog's.
             .at_most(PATIENCE)
             .for_element(Locator::XPath(&path))
             .await
@@ -207,8 +218,10 @@ impl Stage {
 
     /// Waits until something is so.
     async fn until(&self, what: &str, is_so: impl AsyncFn() -> bool) {
+        // The watchdog's.
         let until = std::time::Instant::now() + PATIENCE;
         while !is_so().await {
+            // The watchdog's.
             assert!(std::time::Instant::now() < until, "waited for {what}");
             // Looked at again and again.
             tokio::time::sleep(std::time::Duration::from_millis(50)).await;
@@ -218,8 +231,10 @@ impl Stage {
     /// Waits for a file that the browser saves; it has another name until it is whole.
     async fn saved(&self, name: &str) -> PathBuf {
         let file = self.profile.join(name);
+        // The watchdog's.
         let until = std::time::Instant::now() + PATIENCE;
         while !file.exists() {
+            // The watchdog's.
             assert!(std::time::Instant::now() < until, "no file is saved");
             // Looked at again and again.
             tokio::time::sleep(std::time::Duration::from_millis(50)).await;

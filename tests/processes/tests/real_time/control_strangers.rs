@@ -2,13 +2,11 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
-use std::time::{Duration, Instant};
 
-use processes::{Simulator, ferrodrive};
+use processes::{PATIENCE, Simulator, ferrodrive, wait_until};
 use serde_json::{Value, json};
 
 const DRIVE: [&str; 4] = ["--drive", "zlac8030l@4", "--control", "127.0.0.1:0"];
-const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A connection, by lines.
 struct Line(BufReader<TcpStream>);
@@ -16,6 +14,7 @@ struct Line(BufReader<TcpStream>);
 impl Line {
     fn connect(simulator: &Simulator) -> Self {
         let stream = TcpStream::connect(simulator.address("control")).expect("it listens");
+        // The watchdog's.
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         Self(BufReader::new(stream))
     }
@@ -121,16 +120,10 @@ fn a_run_ends_with_the_client_that_asked_for_it() {
     let mut one = Line::connect(&simulator);
     one.send(r#"{"request":"run","for":"1000min"}"#);
     let mut two = Line::connect(&simulator);
-    let deadline = Instant::now() + PATIENCE;
-    // Until then time has begun to move.
-    while two.ask("now")["t"] == 0.0 {
-        assert!(Instant::now() < deadline, "time does not move");
-    }
+    wait_until("time begins to move", || two.ask("now")["t"] != 0.0);
     assert_eq!(two.ask("run 1ms")["error"]["kind"], "clock");
     drop(one);
-    while two.ask("run 1ms")["ok"] == false {
-        assert!(Instant::now() < deadline, "the run goes on without its client");
-    }
+    wait_until("the run ends with its client", || two.ask("run 1ms")["ok"] == true);
     let (before, after) = (two.ask("now")["t"].clone(), two.ask("now")["t"].clone());
     assert_eq!(before, after, "time stands");
 }

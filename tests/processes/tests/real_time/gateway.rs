@@ -3,12 +3,8 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, ChildStderr, Stdio};
-use std::time::Duration;
 
-use processes::{Simulator, command, done, ferrodrive};
-
-/// Far more than any answer takes.
-const PATIENCE: Duration = Duration::from_secs(20);
+use processes::{PATIENCE, Simulator, command, done, ferrodrive, wait_until};
 
 /// A running gateway; killed when dropped.
 struct Gateway {
@@ -31,6 +27,7 @@ impl Gateway {
 
     fn client(&self) -> Client {
         let stream = TcpStream::connect(&self.address).unwrap();
+        // The watchdog's.
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         Client { lines: BufReader::new(stream.try_clone().unwrap()), stream }
     }
@@ -242,16 +239,6 @@ fn speed_of(simulator: &Simulator) -> f64 {
     done(&["--json", "world", "--control", &control, "4", "get"]).json()["velocity_rpm"].as_f64().expect("a speed")
 }
 
-#[track_caller]
-fn wait_for(what: &str, mut reached: impl FnMut() -> bool) {
-    let began = std::time::Instant::now();
-    while !reached() {
-        assert!(began.elapsed() < PATIENCE, "{what}");
-        // Looked at again and again.
-        std::thread::sleep(Duration::from_millis(100));
-    }
-}
-
 /// A drive that a client of a gateway has turn.
 fn turning() -> (Simulator, Gateway, Client) {
     let arguments = [&DRIVES[..], &["--serve", "socketcand://127.0.0.1:0", "--control", "127.0.0.1:0"]].concat();
@@ -259,7 +246,7 @@ fn turning() -> (Simulator, Gateway, Client) {
     let gateway = Gateway::start(&simulator.bus("socketcand"), &MODELS);
     let mut client = gateway.client();
     turn(&mut client);
-    wait_for("the drive turns", || speed_of(&simulator) > 50.0);
+    wait_until("the drive turns", || speed_of(&simulator) > 50.0);
     (simulator, gateway, client)
 }
 
@@ -275,7 +262,7 @@ fn a_client_that_goes_has_what_it_moved_stopped() {
     drop(client);
     let told = gateway.told("its client has gone");
     assert!(told.contains("node 4") && told.contains("quick-stopped"), "{told}");
-    wait_for("the drive stands", || speed_of(&simulator).abs() < 1.0);
+    wait_until("the drive stands", || speed_of(&simulator).abs() < 1.0);
 }
 
 #[test]
@@ -298,7 +285,7 @@ fn a_gateway_that_is_asked_to_end_stops_what_its_clients_moved() {
     let ended = std::process::Command::new("kill").args(["-TERM", &gateway.child.id().to_string()]).status();
     assert!(ended.is_ok_and(|status| status.success()));
     assert_eq!(gateway.child.wait().unwrap().code(), Some(143));
-    wait_for("the drive stands", || speed_of(&simulator).abs() < 1.0);
+    wait_until("the drive stands", || speed_of(&simulator).abs() < 1.0);
     let mut rest = String::new();
     let _ = client.lines.read_to_string(&mut rest);
 }

@@ -5,13 +5,10 @@
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use processes::{Ended, Simulator, done, ferrodrive};
+use processes::{Ended, Simulator, command, done, ferrodrive, wait_until};
 use serde_json::Value;
-
-/// Much longer than anything here takes on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(30);
 
 fn example(name: &str) -> String {
     let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "..", "..", "examples", name].iter().collect();
@@ -137,16 +134,16 @@ impl Bench {
         let drives = ["--drive", "zlac8030l@4", "--drive", "zlac8030l@5", "--serve", "socketcand://127.0.0.1:0"];
         let simulator = Simulator::start(&drives);
         let bus = simulator.bus("socketcand");
+        let mut bench = Self { simulator, bus };
         // A drive that boots hears nothing.
-        std::thread::sleep(Duration::from_secs(1));
-        Self { simulator, bus }
+        bench.simulator.pass(Duration::from_secs(1));
+        bench
     }
 
     /// A busy machine may be late by some hundred milliseconds: that is not what these tests are about.
     fn start(&self, arguments: &[&str]) -> Child {
-        Command::new(processes::program())
-            .args(["--bus", &self.bus, "--model", "4=zlac8030l", "--model", "5=zlac8030l", "--json"])
-            .args(arguments)
+        let on_bus = ["--bus", &self.bus, "--model", "4=zlac8030l", "--model", "5=zlac8030l", "--json"];
+        command(&[&on_bus, arguments].concat())
             .args(["--tolerance", "100"])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -166,12 +163,8 @@ impl Bench {
 
     #[track_caller]
     fn wait(&mut self, turning: bool) {
-        let begin = Instant::now();
-        while self.turns(4) != turning || self.turns(5) != turning {
-            assert!(begin.elapsed() < PATIENCE, "both turn: {}", !turning);
-            // Looked at again and again.
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        let what = if turning { "both turn" } else { "both stand" };
+        wait_until(what, || self.turns(4) == turning && self.turns(5) == turning);
     }
 }
 
@@ -205,22 +198,15 @@ fn a_base_stops_when_no_line_comes_and_drives_on_with_the_next() {
     let file = example("base.toml");
     let mut driving = bench.start(&["drive-base", &file]);
     let mut lines = driving.stdin.take().unwrap();
-    let begin = Instant::now();
-    while !(bench.turns(4) && bench.turns(5)) {
-        assert!(begin.elapsed() < PATIENCE, "it does not drive");
+    // A line with each look, as often as a program gives them.
+    let mut drives = |bench: &mut Bench| {
         writeln!(lines, "0.5 0").unwrap();
-        // As often as a program gives lines.
-        std::thread::sleep(Duration::from_millis(50));
-    }
+        bench.turns(4) && bench.turns(5)
+    };
+    wait_until("it drives", || drives(&mut bench));
     // The program that gives the lines hangs; its pipe is open.
     bench.wait(false);
-    let begin = Instant::now();
-    while !(bench.turns(4) && bench.turns(5)) {
-        assert!(begin.elapsed() < PATIENCE, "it does not drive on");
-        writeln!(lines, "0.5 0").unwrap();
-        // As often as a program gives lines.
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    wait_until("it drives on", || drives(&mut bench));
     drop(lines);
     let ended = driving.wait_with_output().unwrap();
     let (out, err) = (String::from_utf8(ended.stdout).unwrap(), String::from_utf8(ended.stderr).unwrap());

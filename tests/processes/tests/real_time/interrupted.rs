@@ -3,9 +3,9 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use processes::{Simulator, done, ferrodrive, is_heard};
+use processes::{Simulator, command, done, ferrodrive, is_heard, wait_until};
 
 const DRIVES: [(&str, &str, &str); 4] = [
     ("4", "zlac8030l", "4=zlac8030l"),
@@ -22,9 +22,7 @@ fn bench() -> Simulator {
 }
 
 fn start(bus: &str, model: &str, arguments: &[&str]) -> Child {
-    Command::new(processes::program())
-        .args(["--bus", bus, "--model", model])
-        .args(arguments)
+    command(&[&["--bus", bus, "--model", model], arguments].concat())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -41,25 +39,22 @@ fn speed(simulator: &mut Simulator, node: &str) -> f64 {
 }
 
 fn wait_until_it_turns(simulator: &mut Simulator, node: &str) {
-    let begin = Instant::now();
     // More than once: a stepper's rotor snaps to its field when the current comes, before anything moves it.
     let mut turning = 0;
-    while turning < 3 {
+    wait_until(&format!("node {node} turns"), || {
         turning = if speed(simulator, node).abs() < 50.0 { 0 } else { turning + 1 };
-        assert!(begin.elapsed() < Duration::from_secs(20), "node {node} does not turn");
-        // Looked at again and again.
-        std::thread::sleep(Duration::from_millis(20));
-    }
+        turning == 3
+    });
 }
 
 /// The commands that move a drive until they are ended: velocity and position on each model; torque where the model has it,
 /// home where it looks for a switch that is not there.
 fn motions(node: &str) -> [Vec<&str>; 3] {
-    let velocity = vec!["velocity", node, "100rpm", "--for", "60s"];
+    let velocity = vec!["velocity", node, "100rpm", "--for", "1h"];
     let position = vec!["move", node, "200turn", "--relative", "--profile-velocity", "100rpm"];
     let last = match node {
-        "4" => vec!["torque", node, "1A", "--for", "60s"],
-        "5" => vec!["torque", node, "100mA", "--for", "60s"],
+        "4" => vec!["torque", node, "1A", "--for", "1h"],
+        "5" => vec!["torque", node, "100mA", "--for", "1h"],
         _ => vec!["home", node, "--method", "17"],
     };
     [velocity, position, last]
@@ -87,8 +82,8 @@ fn every_motion_is_stopped_by(signal: &str, status: i32) {
             let ended = moving.wait_with_output().unwrap();
             let speed = speed(&mut simulator, node);
             assert!(speed.abs() < 20.0, "{motion:?}: still at {speed} r/min");
-            assert_eq!(ended.status.code(), Some(status), "{motion:?}");
             let said = String::from_utf8(ended.stderr).unwrap();
+            assert_eq!(ended.status.code(), Some(status), "{motion:?}: {said}");
             assert!(said.contains(&format!("node {node} was moving and has been quick-stopped")), "{motion:?}: {said}");
             done(&["--bus", &bus, "--model", model, "disable", node]);
         }
@@ -103,7 +98,7 @@ fn every_signal_that_asks_for_an_end_stops_the_drive_first() {
     let signals =
         [("HUP", 129, "SIGHUP"), ("INT", 130, "interrupted"), ("QUIT", 131, "SIGQUIT"), ("TERM", 143, "SIGTERM")];
     for (signal, status, said) in signals.into_iter().filter(|(signal, ..)| is_heard(signal)) {
-        let moving = start(&bus, "4=zlac8030l", &["velocity", "4", "100rpm", "--for", "60s"]);
+        let moving = start(&bus, "4=zlac8030l", &["velocity", "4", "100rpm", "--for", "1h"]);
         wait_until_it_turns(&mut simulator, "4");
         send(signal, &moving);
         let ended = moving.wait_with_output().unwrap();
@@ -189,12 +184,9 @@ fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
             .unwrap();
         let mut ready = String::new();
         BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut ready).unwrap();
-        let read = |node: &str| ferrodrive(&["--bus", &bus, "--timeout", "2s", "read", node, "1000"]);
-        let begin = Instant::now();
-        while read("4").status != Some(0) {
-            assert!(begin.elapsed() < Duration::from_secs(20), "node 4 never answers: {ready}");
-        }
-        let moving = start(&bus, "4=zlac8030l", &["velocity", "4", "100rpm", "--for", "60s"]);
+        let read = |node: &str| ferrodrive(&["--bus", &bus, "--timeout", "60s", "read", node, "1000"]);
+        wait_until("node 4 answers", || read("4").status == Some(0));
+        let moving = start(&bus, "4=zlac8030l", &["velocity", "4", "100rpm", "--for", "1h"]);
         // It drives for a while.
         std::thread::sleep(Duration::from_secs(1));
         send(signal, &child);
@@ -205,7 +197,7 @@ fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
         assert_eq!(told.status.code(), Some(1), "{}", String::from_utf8_lossy(&told.stderr));
         let told = String::from_utf8(told.stderr).unwrap();
         assert!(told.contains("node 4"), "{told}");
-        done(&["--bus", &bus, "--timeout", "10s", "read", "5", "1000"]);
+        done(&["--bus", &bus, "--timeout", "60s", "read", "5", "1000"]);
     }
 }
 

@@ -8,14 +8,15 @@ use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use processes::{Simulator, done};
+use processes::{Simulator, command, done, wait_until};
 use serde_json::{Value, json};
 
 const JOINT: (&str, &str) = ("1", "1=m4230e17b50");
 const STEPPER: (&str, &str) = ("2", "2=zlim42c");
 const SERVO: (&str, &str) = ("4", "4=zlac8030l");
 
-/// Stopping from 60 r/min with the ramps as delivered, and what was on its way.
+/// Stopping from 60 r/min with the ramps as delivered, and what was on its way. Times are of the drives; that they do not stop
+/// sooner is held in virtual time, since nobody here can say when a command that a busy machine kept waiting was last heard.
 const SLACK: Duration = Duration::from_millis(1500);
 
 /// Far longer than any of them takes to boot.
@@ -55,29 +56,30 @@ impl Bench {
     /// A command that moves a drive, once the drive turns.
     fn moving(&mut self, drive: (&str, &str), options: &[&str]) -> Child {
         let (node, _) = drive;
-        self.moving_by(drive, &["velocity", node, "60rpm", "--for", "60s"], options)
+        self.moving_by(drive, &["velocity", node, "60rpm", "--for", "1h"], options)
     }
 
     fn moving_by(&mut self, (node, model): (&str, &str), motion: &[&str], options: &[&str]) -> Child {
-        let child = Command::new(processes::program())
-            .args(["--bus", &self.bus, "--model", model])
-            .args(motion)
-            .args(options)
+        let child = command(&[&["--bus", &self.bus, "--model", model], motion, options].concat())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        self.wait(node, true, Duration::from_secs(60));
+        wait_until("it turns", || self.turns(node));
         child
     }
 
-    /// Waits until the drive turns, or stands; how long it took. In the drive's time, which a busy machine does not lengthen.
-    fn wait(&mut self, node: &str, turning: bool, longest: Duration) -> Duration {
+    /// Waits until the drive stands, which takes no longer than this. In the drive's time, which a busy machine does not lengthen.
+    #[track_caller]
+    fn stops(&mut self, node: &str, longest: Duration) {
         let begin = self.simulator.time();
-        while self.turns(node) != turning {
-            assert!(self.simulator.time() - begin < longest, "node {node} turns: {}", !turning);
+        loop {
+            let before = self.simulator.time();
+            if !self.turns(node) {
+                return;
+            }
+            assert!(before - begin < longest, "node {node} turns on");
         }
-        self.simulator.time() - begin
     }
 
     /// Kills the command; what it had said on standard error.
@@ -90,7 +92,7 @@ impl Bench {
     }
 
     fn json(&self, (_, model): (&str, &str), arguments: &[&str]) -> Value {
-        done(&[&["--json", "--timeout", "3s", "--bus", &self.bus, "--model", model], arguments].concat()).json()
+        done(&[&["--json", "--timeout", "60s", "--bus", &self.bus, "--model", model], arguments].concat()).json()
     }
 }
 
@@ -99,8 +101,7 @@ fn a_servo_stops_a_second_after_its_master_was_killed() {
     let mut bench = Bench::new();
     let child = bench.moving(SERVO, &[]);
     assert_eq!(bench.kill(child), "");
-    let took = bench.wait("4", false, Duration::from_millis(1000) + SLACK);
-    assert!(took > Duration::from_millis(700), "{took:?}");
+    bench.stops("4", Duration::from_millis(1000) + SLACK);
 }
 
 /// Whatever it was doing: the watch is the drive's, not a mode's.
@@ -110,15 +111,13 @@ fn a_drive_with_a_watch_ends_every_kind_of_motion_by_itself() {
     let longest = Duration::from_millis(2000) + SLACK;
     for (drive, motion) in [
         (SERVO, &["move", "4", "200turn", "--relative", "--profile-velocity", "60rpm"][..]),
-        (SERVO, &["torque", "4", "1A", "--for", "60s"]),
+        (SERVO, &["torque", "4", "1A", "--for", "1h"]),
         (JOINT, &["move", "1", "200turn", "--relative", "--profile-velocity", "60rpm"]),
         (JOINT, &["home", "1", "--method", "17"]),
     ] {
         let child = bench.moving_by(drive, motion, &[]);
         bench.kill(child);
-        let took = bench.wait(drive.0, false, longest);
-        // The shorter of the two watches, less what the command was silent before.
-        assert!(took > Duration::from_millis(300), "{motion:?}: {took:?}");
+        bench.stops(drive.0, longest);
         bench.json(drive, &["reset", drive.0]);
         bench.json(drive, &["disable", drive.0]);
     }
@@ -138,8 +137,7 @@ fn a_described_servo_stops_by_itself_where_it_was_given_a_watch_and_else_it_was_
     bench.json(DESCRIBED, &["stop", "5"]);
     let child = bench.moving(DESCRIBED, &["--guard"]);
     bench.kill(child);
-    let took = bench.wait("5", false, Duration::from_millis(2000) + SLACK);
-    assert!(took > Duration::from_millis(1300), "{took:?}");
+    bench.stops("5", Duration::from_millis(2000) + SLACK);
 }
 
 /// The watch is the node's, not a mode's.
@@ -151,13 +149,12 @@ fn a_described_servo_with_a_watch_ends_every_kind_of_motion_by_itself() {
     let mut bench = Bench::booted(simulator, bus);
     for motion in [
         &["move", "5", "200turn", "--relative", "--profile-velocity", "60rpm"][..],
-        &["torque", "5", "100mA", "--for", "60s"],
+        &["torque", "5", "100mA", "--for", "1h"],
         &["home", "5", "--method", "17"],
     ] {
         let child = bench.moving_by(DESCRIBED, motion, &["--guard"]);
         bench.kill(child);
-        let took = bench.wait("5", false, Duration::from_millis(2000) + SLACK);
-        assert!(took > Duration::from_millis(300), "{motion:?}: {took:?}");
+        bench.stops("5", Duration::from_millis(2000) + SLACK);
         bench.json(DESCRIBED, &["reset", "5"]);
         bench.json(DESCRIBED, &["disable", "5"]);
     }
@@ -168,9 +165,7 @@ fn a_joint_stops_two_seconds_after_its_master_was_killed_and_the_next_command_be
     let mut bench = Bench::new();
     let child = bench.moving(JOINT, &[]);
     assert_eq!(bench.kill(child), "");
-    // The last heartbeat is up to half a second old.
-    let took = bench.wait("1", false, Duration::from_millis(2000) + SLACK);
-    assert!(took > Duration::from_millis(1300), "{took:?}");
+    bench.stops("1", Duration::from_millis(2000) + SLACK);
     // Alarm 20h: heartbeat of the host lost (M joint manual, alarm table).
     assert_eq!(bench.json(JOINT, &["state", "1"])["fault_code"], 0x20);
     let moved = bench.json(JOINT, &["move", "1", "--relative", "10deg"]);
@@ -208,7 +203,7 @@ fn a_stepper_finishes_its_move_and_goes_on_with_its_homing_after_its_master_was_
     let child = bench.moving_by(STEPPER, &["move", "2", TURNS, "--relative", "--profile-velocity", "60rpm"], &[]);
     let said = bench.kill(child);
     assert!(said.contains("node 2: if this command dies"), "{said}");
-    bench.wait("2", false, Duration::from_secs(5) + SLACK);
+    bench.stops("2", Duration::from_secs(5) + SLACK);
     let moved = bench.position("2") - before;
     // An open-loop rotor stands within a fraction of a step of its field.
     assert!(moved.abs_diff(of_a_move) <= of_a_move.unsigned_abs() / 100, "{moved} instead of {of_a_move}");
@@ -280,7 +275,7 @@ fn a_watch_that_is_switched_off_is_told_and_switched_on_if_asked_for() {
     assert_eq!((&moved["guard"]["armed"], time(&bench)), (&json!(true), json!(0)));
     let child = bench.moving(SERVO, &["--guard", "on"]);
     bench.kill(child);
-    bench.wait("4", false, Duration::from_millis(1000) + SLACK);
+    bench.stops("4", Duration::from_millis(1000) + SLACK);
 }
 
 /// Whoever moves the drives: `supervise` keeps them content, and they stop when it dies. The ZLIM42-C has nothing for that, which it
@@ -294,7 +289,7 @@ fn drives_that_another_program_moves_stop_when_their_supervisor_is_killed() {
     let mut bench = Bench::booted(simulator, bus);
     let models = [JOINT, STEPPER, SERVO, DESCRIBED].map(|(_, model)| ["--model", model]);
     let mut supervisor = Command::new(processes::program())
-        .args(["--json", "--timeout", "5s", "--bus", &bench.bus])
+        .args(["--json", "--timeout", "60s", "--bus", &bench.bus])
         .args(models.concat())
         .arg("supervise")
         .stdin(Stdio::piped())
@@ -322,6 +317,6 @@ fn drives_that_another_program_moves_stop_when_their_supervisor_is_killed() {
     supervisor.kill().unwrap();
     supervisor.wait().unwrap();
     for (node, _) in [JOINT, SERVO, DESCRIBED] {
-        bench.wait(node, false, Duration::from_millis(2000) + SLACK);
+        bench.stops(node, Duration::from_millis(2000) + SLACK);
     }
 }

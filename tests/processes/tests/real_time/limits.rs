@@ -67,7 +67,7 @@ fn the_limit_in_force_and_what_it_follows_from_are_named() {
 
 #[test]
 fn limits_follow_what_is_written_to_the_objects_that_move_them() {
-    let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+    let mut simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
     let on_bus = |arguments: &[&str]| ferrodrive(&[&["--bus", &bus, "--model", "4=zlac8030l"], arguments].concat());
     let ended = on_bus(&["write", "4", "200A", "500"]);
@@ -91,7 +91,7 @@ fn limits_follow_what_is_written_to_the_objects_that_move_them() {
     assert!(error.contains("202Fh:05 has been written since the drive's last restart"), "{error}");
     assert_eq!(on_bus(&["save", "4"]).status, Some(0));
     // The store takes its time, and a reset would cut it short.
-    std::thread::sleep(std::time::Duration::from_millis(300));
+    simulator.pass(std::time::Duration::from_millis(300));
     assert_eq!(on_bus(&["nmt", "4", "reset"]).status, Some(0));
     let written = on_bus(&["--json", "write", "4", "60FF", "2.7rpm"]).json();
     assert_eq!((&written["value"], &written["quantity"], &written["unit"]), (&json!(27), &json!(2.7), &json!("r/min")));

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::Stdio;
 
-use processes::{Simulator, command, done, ferrodrive, scratch};
+use processes::{Simulator, command, done, ferrodrive, scratch, wait_until};
 use serde_json::Value;
 
 /// The extensions of what can be written.
@@ -149,8 +149,9 @@ fn a_log_of_a_killed_simulator_can_be_read_in_every_form() {
         let simulator =
             Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0", "--log", path]);
         done(&["--bus", &simulator.bus("socketcand"), "--model", "4=zlac8030l", "read", "4", "1018:01"]);
-        // What is older than a second is on the disk.
-        std::thread::sleep(std::time::Duration::from_secs(2));
+        // It need not be whole yet.
+        let shown = || ferrodrive(&["--json", "decode", path]).out;
+        wait_until("the answer is on the disk", || shown().contains("584#43181001"));
         simulator.signal("-KILL");
         drop(simulator);
         let frames = frames(&log);

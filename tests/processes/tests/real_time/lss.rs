@@ -20,7 +20,7 @@ impl Bus {
     }
 
     fn arguments<'a>(&'a self, of_command: &[&'a str]) -> Vec<&'a str> {
-        [&["--bus", self.address.as_str(), "--timeout", "10s", "--json"], of_command].concat()
+        [&["--bus", self.address.as_str(), "--timeout", "60s", "--json"], of_command].concat()
     }
 
     fn done(&self, of_command: &[&str]) -> Value {
@@ -95,7 +95,7 @@ fn what_is_no_node_id_or_bit_rate_is_refused_and_a_stranger_is_not_configured() 
 #[test]
 fn a_device_is_found_by_its_make_and_a_listener_reads_it_in_words() {
     let bus = Bus::of(&["cia402@4,1018:04=0xDEADBEEF"]);
-    let found = &bus.done(&["lss", "--within", "500ms", "identify", "0:192:10000"])["devices"];
+    let found = &bus.done(&["lss", "--within", "2s", "identify", "0:192:10000"])["devices"];
     assert_eq!((found.as_array().map(Vec::len), &found[0]["node_id"]), (Some(1), &json!(4)), "{found}");
     assert_eq!(found[0]["address"], json!("0:192:10000:DEADBEEF"));
     assert_eq!(bus.done(&["read", "4", "1018:04"])["value"], json!(0xDEAD_BEEF_u32));

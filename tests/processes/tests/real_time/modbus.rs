@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use processes::{Simulator, done, ferrodrive};
+use processes::{PATIENCE, Simulator, done, ferrodrive};
 use tokio_modbus::client::Context;
 use tokio_modbus::prelude::*;
 
@@ -31,9 +31,6 @@ const CONTROLWORD: u16 = 0x23;
 const STATUSWORD: u16 = 0x24;
 const MODE: u16 = 0x25;
 
-/// Far longer than any motion here, for a machine that is busy.
-const PATIENCE: Duration = Duration::from_secs(30);
-
 async fn client(simulator: &Simulator, unit: u8) -> Context {
     tcp::connect_slave(simulator.address("modbus").parse().unwrap(), Slave(unit)).await.unwrap()
 }
@@ -53,12 +50,14 @@ async fn position(client: &mut Context) -> i32 {
 
 /// Waits until `value` of the joint is in `range`.
 async fn until(what: &str, range: std::ops::RangeInclusive<i32>, mut value: impl AsyncFnMut() -> i32) {
+    // The watchdog's.
     let start = Instant::now();
     loop {
         let now = value().await;
         if range.contains(&now) {
             return;
         }
+        // The watchdog's.
         assert!(start.elapsed() < PATIENCE, "{what} is {now}, not in {range:?}");
         // Looked at again and again.
         tokio::time::sleep(Duration::from_millis(20)).await;

@@ -95,8 +95,10 @@ fn ten_times_as_fast_the_bus_is_ten_times_as_far() {
     const SPEED: f64 = 10.0;
     let mut simulator = Simulator::start(&["--drive", "zlac8030l@4", "--speed", "10"]);
     let number = |answer: &Value, key: &str| answer[key].as_f64().expect("a number");
+    // What the pace is of.
     let outer = Instant::now();
     let first = simulator.ask("now");
+    // What the pace is of.
     let inner = Instant::now();
     // Time of the clock that the two paces are compared over.
     std::thread::sleep(Duration::from_millis(300));

@@ -3,12 +3,9 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use processes::{Ended, Scratch, Simulator, command, done, ferrodrive, scratch};
-
-/// A busy machine may take this long for anything.
-const PATIENCE: Duration = Duration::from_secs(60);
+use processes::{Ended, Scratch, Simulator, command, done, ferrodrive, scratch, wait_until};
 
 struct Folder(Scratch);
 
@@ -149,10 +146,7 @@ impl Served {
         let simulator = Simulator::start(&[options, &["--serve", "socketcand://127.0.0.1:0"]].concat());
         let bus = simulator.bus("socketcand");
         let served = Self { simulator, bus, folder: Folder::new(name) };
-        let begin = Instant::now();
-        while served.run(&["read", served.node(), "1000"]).status != Some(0) {
-            assert!(begin.elapsed() < PATIENCE, "the drive does not boot");
-        }
+        wait_until("the drive boots", || served.run(&["read", served.node(), "1000"]).status == Some(0));
         served
     }
 
@@ -165,7 +159,7 @@ impl Served {
     }
 
     fn command(&self, arguments: &[&str]) -> std::process::Command {
-        let mut command = command(&[&["--bus", &self.bus, "--timeout", "10s"], arguments].concat());
+        let mut command = command(&[&["--bus", &self.bus, "--timeout", "60s"], arguments].concat());
         // Where journals are kept.
         command.current_dir(&self.folder.0).stdin(Stdio::null());
         command
@@ -233,15 +227,14 @@ fn a_power_cycle_proves_what_was_stored() {
         .spawn()
         .expect("the binary runs");
     // Power fails again and again until somebody has waited for it: when that is, only the command knows.
-    let mut child = Some(child);
-    let begin = Instant::now();
-    while child.as_mut().is_some_and(|child| child.try_wait().expect("a child").is_none()) {
-        assert!(begin.elapsed() < PATIENCE, "it waits for a boot-up that has come");
+    let mut child = child;
+    wait_until("it has waited for a boot-up", || {
         // Between two failures of the supply: longer than a boot.
-        std::thread::sleep(Duration::from_secs(3));
-        served.simulator.send("4 power cycle");
-    }
-    let output = child.take().expect("a child").wait_with_output().expect("it has ended");
+        served.simulator.pass(Duration::from_secs(3));
+        served.simulator.ask("4 power cycle");
+        child.try_wait().expect("a child").is_some()
+    });
+    let output = child.wait_with_output().expect("it has ended");
     let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     // A cut in the middle of the writes is told as such, and is no proof.
     assert!(
@@ -263,9 +256,7 @@ fn many_values(begin: i64) -> String {
 
 /// Waits for a journal that is whole: before its last line nothing is written to the node.
 fn wait_for(path: &Path, child: &mut Child) {
-    let begin = Instant::now();
     while !std::fs::read_to_string(path).is_ok_and(|text| text.contains("whole = true")) {
-        assert!(begin.elapsed() < PATIENCE, "no journal {}", path.display());
         if let Some(status) = child.try_wait().expect("a child") {
             panic!("it has ended: {status}");
         }
@@ -375,18 +366,11 @@ fn a_pdo_that_was_set_up_comes_and_before_it_was_said_why_not() {
     shown("TPDO1: it waits for SYNC, and none was heard");
     served.done(&["nmt", "4", "start"]);
     let mut sync = served.command(&["sync", "--every", "20ms"]).stdout(Stdio::null()).spawn().expect("it runs");
-    let begin = Instant::now();
-    let comes = loop {
+    wait_until("SYNC is heard, and nothing keeps the PDO away", || {
         let shown = served.done(&["pdo", "show", "4", "--json"]).json();
         let tpdo = &shown["nodes"][0]["pdos"][0];
-        if tpdo["pdo"] == "TPDO1" && tpdo["silent"] == serde_json::json!([]) {
-            break true;
-        }
-        if begin.elapsed() > PATIENCE {
-            break false;
-        }
-    };
+        tpdo["pdo"] == "TPDO1" && tpdo["silent"] == serde_json::json!([])
+    });
     sync.kill().expect("it was running");
     sync.wait().expect("it has ended");
-    assert!(comes, "SYNC is heard, and nothing keeps it away");
 }

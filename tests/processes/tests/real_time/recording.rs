@@ -1,13 +1,9 @@
 //! `--record` and `plot`: what is written while drives are served, and what is left of it when the simulator dies.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
 
-use processes::{Simulator, done, ferrodrive, scratch};
+use processes::{Simulator, done, ferrodrive, scratch, wait_for};
 use testbench::recording::{Kind, Recorded, read};
-
-/// Longest wait for something to be on the disk.
-const PATIENCE: Duration = Duration::from_secs(20);
 
 fn recorded(path: &Path) -> Recorded {
     let kind = Kind::of_name(path.to_str().unwrap()).unwrap();
@@ -62,16 +58,11 @@ fn what_is_on_the_disk_of_a_killed_simulator_is_a_record() {
     for name in ["run.mcap", "run.csv"] {
         let path = place.join(name);
         let mut simulator = simulator(&path, &["--record-period", "5ms", "--record-signals", "supply,4.position*"]);
-        let since = Instant::now();
-        let before = loop {
+        let before = wait_for("half a second of a record", || {
             let found = std::fs::read(&path).ok().and_then(|bytes| read(Kind::of_name(name)?, &bytes).ok());
-            match found.map(|recorded| last(&recorded)) {
-                Some(at) if at > 0.5 => break at,
-                _ => assert!(since.elapsed() < PATIENCE, "{name}: nothing is written"),
-            }
-            // Looked at again and again.
-            std::thread::sleep(Duration::from_millis(20));
-        };
+            let at = found.map(|recorded| last(&recorded));
+            at.filter(|at| *at > 0.5).ok_or_else(|| format!("{name}: {at:?}"))
+        });
         simulator.kill();
         let left = recorded(&path);
         assert!(last(&left) >= before && left.series.len() == 3, "{name}: {} of {before}", last(&left));

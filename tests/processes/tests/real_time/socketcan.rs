@@ -11,11 +11,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use processes::{Ended, Simulator, command, ferrodrive};
+use processes::{Ended, PATIENCE, Simulator, command, ferrodrive};
 use serde_json::Value;
-
-/// Longest wait for a line: a guest without hardware support is slow.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Runs a program of the system that has to succeed.
 #[track_caller]
@@ -50,6 +47,7 @@ impl Listener {
         // How long it takes to listen is not known; a frame that comes before is lost.
         loop {
             run("cansend", &[bus, "7E5#"]);
+            // Then it is sent again.
             match listener.lines.recv_timeout(Duration::from_millis(100)) {
                 Ok(line) => assert!(line.contains("7E5#"), "{line}"),
                 Err(_) if listener.child.try_wait().unwrap().is_none() => continue,
@@ -69,7 +67,8 @@ impl Listener {
     }
 
     fn line(&self) -> String {
-        self.lines.recv_timeout(PATIENCE).expect("a line in time")
+        // The watchdog's.
+        self.lines.recv_timeout(PATIENCE).expect("a line")
     }
 
     /// The next line of JSON that `wanted` holds for.
@@ -146,6 +145,7 @@ fn can_utils_talk_to_a_virtual_drive() {
     // Upload of the device type (1000h), expedited: CiA 301, 7.2.4.3.5. It takes candump a moment to listen.
     let answer = loop {
         run("cansend", &["vcan0", "604#4000100000000000"]);
+        // Then it is asked again.
         if let Ok(line) = candump.lines.recv_timeout(Duration::from_millis(500)) {
             break line;
         }
@@ -269,7 +269,7 @@ fn frames_that_are_not_read_in_time_are_counted() {
 #[ignore = "needs the interfaces of cargo xtask vcan-test"]
 fn a_dump_of_one_node_has_the_kernel_keep_back_the_others() {
     let dump = Listener::start(command(&["--bus", "vcan0", "dump", "--node", "4"]).stderr(Stdio::piped()));
-    // Until it listens; a boot-up message is heard by it and no answer to anything.
+    // Sent again until it listens; a boot-up message is heard by it and no answer to anything.
     while dump.lines.recv_timeout(Duration::from_millis(100)).is_err() {
         run("cansend", &["vcan0", "704#00"]);
     }
@@ -282,6 +282,7 @@ fn a_dump_of_one_node_has_the_kernel_keep_back_the_others() {
     // Its new identifier is no node's by the predefined connection set.
     let shown = loop {
         run("cansend", &["vcan0", "2BB#3706"]);
+        // Then it is sent again.
         if let Ok(line) = dump.lines.recv_timeout(Duration::from_millis(200))
             && line.contains("2BB#3706")
         {

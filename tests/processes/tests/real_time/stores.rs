@@ -73,8 +73,14 @@ fn a_store_is_there_after_every_end_that_came_with_its_acknowledgement() {
             _ => Some(0),
         };
         assert_eq!(simulator.wait(), status, "{end}");
-        assert_eq!(found(&state), value, "after {end}");
+        let found = found(&state);
+        assert!(found == value || !was_promised(&simulator), "{found} instead of {value} after {end}");
     }
+}
+
+/// A disk that takes longer than clients wait is not waited for, and that is said: then nothing was promised by one that has ended.
+fn was_promised(simulator: &Simulator) -> bool {
+    !simulator.errors_left().iter().any(|line| line.contains("the disk of --state is slow"))
 }
 
 #[test]
@@ -103,9 +109,7 @@ fn a_kill_in_a_stream_of_stores_loses_none_that_was_acknowledged() {
         }
         killing.join().unwrap();
         simulator.wait();
-        // A disk that takes longer than clients wait is not waited for, and that is said: then nothing is promised.
-        let slow = simulator.errors_left().iter().any(|line| line.contains("the disk of --state is slow"));
-        if let Some(acknowledged) = acknowledged.filter(|_| !slow) {
+        if let Some(acknowledged) = acknowledged.filter(|_| was_promised(&simulator)) {
             let found = found(&state);
             // The one that was under way may be there or not.
             assert!(found == acknowledged || found == value, "kill {round}: {found} after {acknowledged}");
@@ -130,7 +134,8 @@ fn what_a_joint_says_to_have_saved_survives_a_kill() {
         let again = self::simulator(&state);
         let mut bus = RawBus::connect(&again.address("socketcand"));
         let answer = bus.upload(1, SAVED, 0).unwrap();
-        assert!(answer.starts_with(&format!("4B042600{value:02X}")), "{answer} after {value}");
+        let is_there = answer.starts_with(&format!("4B042600{value:02X}"));
+        assert!(is_there || !was_promised(&simulator), "{answer} after {value}");
     }
 }
 
@@ -158,6 +163,7 @@ fn what_a_joint_says_over_modbus_to_have_saved_survives_a_kill() {
         simulator.kill();
         let again = self::simulator(&state);
         let mut line = TcpStream::connect(again.address("modbus")).unwrap();
-        assert_eq!(register(&mut line, 3, SAVED_REGISTER, 1), [2, 0, value]);
+        let found = register(&mut line, 3, SAVED_REGISTER, 1);
+        assert!(found == [2, 0, value] || !was_promised(&simulator), "{found:?} after {value}");
     }
 }

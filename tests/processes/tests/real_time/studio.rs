@@ -53,17 +53,13 @@ fn opened_with(path: &std::path::Path, what: &str, wanted: impl Fn() -> bool) ->
         .stderr(std::fs::File::create(&err).unwrap())
         .spawn()
         .unwrap();
-    let until = std::time::Instant::now() + processes::studio::PATIENCE;
-    while !wanted() && std::time::Instant::now() < until {
-        // Looked at again and again.
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
+    processes::wait_until(what, wanted);
     // It serves on, whether a browser was found or not.
     let ended = child.try_wait().unwrap();
     child.kill().unwrap();
     child.wait().unwrap();
     let texts = (std::fs::read_to_string(out).unwrap(), std::fs::read_to_string(err).unwrap());
-    assert!(ended.is_none() && wanted(), "waited for {what}: {ended:?} {texts:?}");
+    assert!(ended.is_none(), "{what}: {ended:?} {texts:?}");
     texts
 }
 

@@ -7,12 +7,9 @@ use std::io::{Read, Write};
 use std::num::NonZero;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use processes::{Simulator, ferrodrive};
-
-/// Far more than anything takes.
-const PATIENCE: Duration = Duration::from_secs(60);
+use processes::{Simulator, ferrodrive, wait_for, wait_until};
 
 const LINES: NonZero<u16> = NonZero::new(24).expect("it is not 0");
 const COLUMNS: NonZero<u16> = NonZero::new(80).expect("it is not 0");
@@ -68,36 +65,30 @@ impl Terminal {
 
     /// Waits until something is on the screen.
     fn wait_for(&self, text: &str) {
-        let until = Instant::now() + PATIENCE;
-        while !self.shows(text) {
+        wait_for(text, || {
             let seen = self.screen.lock().unwrap().screen().contents();
-            assert!(Instant::now() < until, "{text:?} is not on the screen:\n{seen}");
-            // Looked at again and again.
-            std::thread::sleep(Duration::from_millis(20));
-        }
+            if seen.contains(text) { Ok(()) } else { Err(format!("on the screen is\n{seen}")) }
+        });
     }
 
     /// Waits for a drive. One that boots while the bus is scanned may be missed: then it is scanned again.
     fn wait_for_drive(&mut self, model: &str) {
-        for _ in 0..5 {
-            let until = Instant::now() + PATIENCE / 5;
-            while Instant::now() < until {
-                if self.shows(model) {
-                    return;
-                }
-                // Looked at again and again.
-                std::thread::sleep(Duration::from_millis(20));
+        /// A scan takes some seconds; one in so many looks is followed by another.
+        const LOOKS_A_SCAN: u32 = 600;
+        let mut looks = 0;
+        wait_until(model, || {
+            looks += 1;
+            if looks % LOOKS_A_SCAN == 0 {
+                self.press("n");
             }
-            self.press("n");
-        }
-        self.wait_for(model);
+            self.shows(model)
+        });
     }
 
     /// Holds a key as a keyboard does until this is true. A machine that is busy may hold repeats up, which ends the hold: then
     /// it is let go, and held again.
     fn hold_until(&mut self, key: &str, mut done: impl FnMut() -> bool) {
-        let until = Instant::now() + PATIENCE;
-        while Instant::now() < until {
+        wait_until(&format!("what holding {key:?} does"), || {
             self.press(key);
             // A keyboard waits so long before it repeats.
             std::thread::sleep(Duration::from_millis(400));
@@ -106,13 +97,13 @@ impl Terminal {
                 // And so long between repeats.
                 std::thread::sleep(Duration::from_millis(30));
                 if repeat % 10 == 0 && done() {
-                    return;
+                    return true;
                 }
             }
             // Longer than a hold is kept without repeats.
             std::thread::sleep(Duration::from_millis(1_300));
-        }
-        panic!("holding {key:?} does nothing");
+            false
+        });
     }
 }
 
@@ -135,16 +126,11 @@ fn position(simulator: &mut Simulator) -> i64 {
 
 /// It stands: a tenth of a turn a second is far more than a shaft at rest is moved by.
 fn wait_until_it_stands(simulator: &mut Simulator) {
-    let until = Instant::now() + PATIENCE;
-    loop {
+    wait_until("it stands", || {
         let before = position(simulator);
-        // Between two looks at the position.
-        std::thread::sleep(Duration::from_millis(300));
-        if position(simulator).abs_diff(before) < 20 {
-            return;
-        }
-        assert!(Instant::now() < until, "it goes on turning");
-    }
+        simulator.pass(Duration::from_millis(300));
+        position(simulator).abs_diff(before) < 20
+    });
 }
 
 #[test]
@@ -167,15 +153,7 @@ fn a_key_that_is_held_jogs_and_let_go_stops() {
     wait_until_it_stands(&mut simulator);
     terminal.wait_for("stopped by a press of stop");
     terminal.press("q");
-    let until = Instant::now() + PATIENCE;
-    let status = loop {
-        if let Some(status) = terminal.script.try_wait().unwrap() {
-            break status;
-        }
-        assert!(Instant::now() < until, "q ends it");
-        // Looked at again and again.
-        std::thread::sleep(Duration::from_millis(20));
-    };
+    let status = wait_for("q ends it", || terminal.script.try_wait().unwrap().ok_or_else(|| "it runs".to_owned()));
     assert!(status.success(), "{status}");
     // The screen is given back.
     assert!(!terminal.screen.lock().unwrap().screen().alternate_screen());

@@ -1,6 +1,7 @@
 //! The standard's own servo, mode by mode.
 #![allow(unreachable_pub, dead_code, reason = "modules of one test")]
 
+mod any_data_sheet;
 mod axes;
 mod bench;
 mod connection;

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use super::{Locator, PATIENCE, Stage, Studio};
-use processes::{Simulator, command, done};
+use super::{Locator, Stage, Studio};
+use processes::{Simulator, command, done, wait_until};
 
 /// As long as it takes in the tests.
 const SHORT: Duration = Duration::from_secs(5);
@@ -67,12 +67,7 @@ fn busy_bus() -> Bus {
         let is_turning = |simulator: &mut Simulator| {
             simulator.ask(&format!("{node} get"))["velocity_rpm"].as_f64().is_some_and(|rpm| rpm > 50.0)
         };
-        let until = Instant::now() + PATIENCE;
-        while !is_turning(&mut simulator) {
-            assert!(Instant::now() < until, "node {node} does not turn");
-            // Looked at again and again.
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        wait_until(&format!("node {node} turns"), || is_turning(&mut simulator));
     }
     Bus { _simulator: simulator, address, turning }
 }
@@ -121,8 +116,10 @@ async fn figures_of_twelve_objects_a_thousand_times_a_second() {
     let asked = std::env::var("FERRODRIVE_FIGURES_S").ok().and_then(|text| text.parse().ok());
     let length = asked.map_or(SHORT, Duration::from_secs);
     let bus = busy_bus();
+    // A measurement over time.
     let start = Instant::now();
     drop(Studio::start(&["--bus", &bus.address]));
+    // A measurement over time.
     let address_ms = start.elapsed().as_secs_f64() * 1e3;
     let stage = Stage::open_on("figures", &["--bus", &bus.address]).await;
     let picture_ms = number(&stage, FIRST_PICTURE).await;
@@ -137,14 +134,17 @@ async fn figures_of_twelve_objects_a_thousand_times_a_second() {
     // Each minute, and at the end.
     stage.client.execute(COUNT_FRAMES, vec![]).await.expect("it runs");
     let (studio, browser) = (stage.studio.child.id(), stage.driver.id());
+    // A measurement over time.
     let began = Instant::now();
     let counted = async || (number(&stage, "return window.frames_").await, number(&stage, "return window.drawn").await);
     let mut before = (0.0, taken(studio).0, taken(browser).0, counted().await);
     let mut pictures_per_s = 0.0;
+    // A measurement over time.
     while began.elapsed() < length {
         // A measurement over time.
         tokio::time::sleep((length - began.elapsed()).min(Duration::from_mins(1))).await;
         let (of_studio, of_browser) = (taken(studio), taken(browser));
+        // A measurement over time.
         let now = (began.elapsed().as_secs_f64(), of_studio.0, of_browser.0, counted().await);
         let span_s = now.0 - before.0;
         let frames_per_s = (now.3.0 - before.3.0) / span_s;

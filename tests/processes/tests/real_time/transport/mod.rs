@@ -8,14 +8,12 @@ mod udp;
 
 use std::future::Future;
 use std::net::SocketAddr;
-use std::time::Duration;
 
 use can::Frame;
+use processes::PATIENCE;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use transport::{AsyncBus, Hub, HubOptions, Received, SlcanBus, SocketcandBus, WallClock};
-
-const PATIENCE: Duration = Duration::from_secs(30);
 
 /// The output of `future`, or a failed test.
 async fn soon<T>(clock: &WallClock, future: impl Future<Output = T>) -> T {
