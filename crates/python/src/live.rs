@@ -4,6 +4,7 @@
 //! motion is quick-stopped, and the guards of those that stand are released.
 
 use master::Network;
+use master::drive::Stopped;
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -11,7 +12,6 @@ use tokio::sync::{Notify, mpsc};
 use tokio::task::{JoinSet, LocalSet};
 use transport::{BusNotes, BusSpec, Note, WallClock, run_station};
 
-use crate::master::still_moving;
 use crate::world::Job;
 
 /// What the bus says that may wait for a program: each kind comes once, only a connection may come and go for ever.
@@ -174,6 +174,12 @@ async fn work_through(
     }
     running.shutdown().await;
     still_moving(network.stop_and_release().await)
+}
+
+/// What was not seen to stand, in words.
+pub(crate) fn still_moving(stopped: Vec<Stopped>) -> Vec<String> {
+    let failed = stopped.into_iter().filter_map(|stopped| Some((stopped.node, stopped.outcome.err()?)));
+    failed.map(|(node, error)| format!("node {node} may still be moving: {error}")).collect()
 }
 
 /// Has the runner look at the master again when a job has asked it for something.

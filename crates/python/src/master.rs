@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use canopen::{Mux, NmtCommand, NodeId};
-use master::drive::{Drive, HomingOptions, MotionOptions, Stopped, SwitchedOff};
+use master::drive::{Drive, HomingOptions, MotionOptions, SwitchedOff};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Error, Gear, Network as Core, Node};
 use pyo3::prelude::*;
@@ -27,7 +27,7 @@ use runner::Runner;
 use value::Value;
 
 use crate::failure::{bad_value, named, wrong_use};
-use crate::live::Live;
+use crate::live::{Live, still_moving};
 use crate::sheets::{model_of, node_id};
 use crate::world::World;
 
@@ -114,7 +114,12 @@ impl Network {
         let core = Core::new();
         let live = py.detach(|| Live::open(spec, core.clone()));
         let live = live.map_err(|reason| wrong_use(format!("bus {bus}: {reason}")))?;
-        Ok(Self { core, runner: Arc::new(Runner::Live(Mutex::new(Some(live)))), closed: AtomicBool::new(false), machine })
+        Ok(Self {
+            core,
+            runner: Arc::new(Runner::Live(Mutex::new(Some(live)))),
+            closed: AtomicBool::new(false),
+            machine,
+        })
     }
 
     /// Stops what this program has set in motion, and leaves the real bus; what was not seen to stand, in words.
@@ -282,12 +287,6 @@ impl Drop for Network {
             });
         }
     }
-}
-
-/// What was not seen to stand, in words.
-pub(crate) fn still_moving(stopped: Vec<Stopped>) -> Vec<String> {
-    let failed = stopped.into_iter().filter_map(|stopped| Some((stopped.node, stopped.outcome.err()?)));
-    failed.map(|(node, error)| format!("node {node} may still be moving: {error}")).collect()
 }
 
 impl Network {

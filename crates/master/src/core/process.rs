@@ -110,14 +110,11 @@ impl Core {
         self.supervision.loss(id)
     }
 
-    /// An axis is being stopped: no step moves it on.
-    pub(crate) fn stop_cyclic(&mut self, node: NodeId, controlword: Mux) {
+    /// An axis is being stopped: no step moves it on, and no frame that was sent before takes the stop back. The word that stops it
+    /// goes into every RPDO that carries its controlword and has been written to; by SDO it is the caller's.
+    pub(crate) fn stop_axis(&mut self, node: NodeId, controlword: Mux, stop: u16) {
         self.supervision.stop(node, controlword);
-    }
-
-    /// Sends this controlword in every RPDO of the node that carries it and has been written to.
-    pub(crate) fn overrule_rpdos(&mut self, node: NodeId, controlword: Mux, word: u16) {
-        self.image.overrule(node, controlword, word);
+        self.image.overrule(node, controlword, stop);
     }
 
     /// Writes an object by SDO; nobody waits for the answer.

@@ -8,9 +8,11 @@ use devices::{HomingRules, Quantity};
 
 use super::conclude::{Interference, Trigger};
 use super::handle::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL};
-use super::position::REACHED_TURNS;
 use super::power::STANDSTILL_RPM;
 use crate::error::Error;
+
+/// How near to the target bit 10 (target reached) is believed, in turns of the shaft.
+pub(super) const REACHED_TURNS: f64 = 0.01;
 
 /// What counts as reached.
 #[derive(Clone, Copy, Debug)]

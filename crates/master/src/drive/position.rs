@@ -7,7 +7,7 @@ use cia402::{Controlword, ModeOfOperation, Statusword};
 use devices::NewSetPoint;
 
 use super::conclude::{Interference, Trigger};
-use super::goal::{Goal, Sent};
+use super::goal::{Goal, REACHED_TURNS, Sent};
 use super::handle::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL, STEP_TIMEOUT, TARGET_POSITION};
 use super::motion::{LATE_FACTOR, LATE_MARGIN_S, MotionOptions, MotionReport};
 use super::scale::Commanded;
@@ -15,9 +15,6 @@ use crate::error::Error;
 use crate::units::{Angle, Rpm};
 
 const ENABLED: u16 = 0x0F;
-
-/// How near to the target bit 10 (target reached) is believed, in turns of the shaft.
-pub(super) const REACHED_TURNS: f64 = 0.01;
 
 /// Profile position moves with the set-point handshake. Source: CiA 402-2, clause 10.
 impl Drive {

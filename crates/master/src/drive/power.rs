@@ -5,7 +5,6 @@ use devices::{HomingStart, PowerStyle, Quantity};
 
 use super::conclude::Trigger;
 use super::handle::{CONTROLWORD, Drive, MODE, POLL, STEP_TIMEOUT};
-use super::safety::overrule;
 use crate::error::Error;
 
 /// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
@@ -111,8 +110,9 @@ impl Drive {
             self.note_stopped();
             return Ok(());
         }
-        self.node.network().with_core(|core| overrule(core, &[self.as_moved()]));
-        self.write_controlword(PowerCommand::QuickStop.controlword()).await?;
+        let (id, controlword, stop) = (self.node.id(), self.place(CONTROLWORD), PowerCommand::QuickStop.controlword());
+        self.node.network().with_core(|core| core.stop_axis(id, controlword, stop.0));
+        self.write_controlword(stop).await?;
         self.leave_homing().await?;
         let stopping = |state| state != PowerState::OperationEnabled;
         self.wait_for(INTENT, PowerCommand::QuickStop, STEP_TIMEOUT, stopping).await?;

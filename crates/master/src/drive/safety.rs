@@ -68,7 +68,7 @@ impl Network {
     /// The same for the axes of these nodes.
     pub async fn stop_moved(&self, nodes: NodeSet) -> Vec<Stopped> {
         let axes: Vec<_> = self.moved_axes().into_iter().filter(|axis| nodes.contains(axis.node)).collect();
-        self.with_core(|core| overrule(core, &axes));
+        self.overrule(&axes);
         let stops = axes.into_iter().map(|moved| async move {
             let outcome = self.drive_of(&moved).come_to_rest().await;
             Stopped { node: moved.node, controlword: moved.controlword, outcome }
@@ -89,7 +89,7 @@ impl Network {
     /// is not looked at: the nodes stay among [`moved`](Self::moved).
     pub fn quick_stop_moved(&self) -> NodeSet {
         let axes = self.moved_axes();
-        self.with_core(|core| overrule(core, &axes));
+        self.overrule(&axes);
         let stop = Payload::new(&STOP.0.to_le_bytes());
         for MovedAxis { node, controlword: mux, .. } in axes {
             let transfer = Transfer::Download(stop.clone());
@@ -112,17 +112,13 @@ impl Network {
         StopGuard { network: self.clone() }
     }
 
+    fn overrule(&self, axes: &[MovedAxis]) {
+        self.with_core(|core| axes.iter().for_each(|axis| core.stop_axis(axis.node, axis.controlword, STOP.0)));
+    }
+
     fn drive_of(&self, moved: &MovedAxis) -> Drive {
         let node = self.node(moved.node).with_timeout(ANSWER);
         Drive { node, axis: moved.axis, description: moved.description, guess: None, gear: Gear::DIRECT }
-    }
-}
-
-/// No step moves on what is being stopped, and no frame that was sent before takes the stop back.
-pub(super) fn overrule(core: &mut Core, axes: &[MovedAxis]) {
-    for axis in axes {
-        core.stop_cyclic(axis.node, axis.controlword);
-        core.overrule_rpdos(axis.node, axis.controlword, STOP.0);
     }
 }
 
@@ -203,7 +199,7 @@ impl Drive {
             rest.looks = 0;
             if told.is_some_and(|at| network.now() - at >= REPEAT) {
                 let (node, controlword) = (self.node.id(), self.place(CONTROLWORD));
-                network.with_core(|core| core.overrule_rpdos(node, controlword, STOP.0));
+                network.with_core(|core| core.stop_axis(node, controlword, STOP.0));
                 *told = None;
             }
             return Ok(false);

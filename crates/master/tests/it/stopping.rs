@@ -364,7 +364,7 @@ impl Bench {
             }
             End::CableCut => {
                 for number in self.moving.clone() {
-                    self.world.apply(Place::node(number), &Stimulus::CableCut(true)).unwrap();
+                    self.world.apply(Place::node(number), &Stimulus::CableCut(true)).unwrap().unwrap();
                 }
             }
         }
@@ -497,7 +497,7 @@ fn a_drive_that_was_not_seen_to_stand_keeps_its_watch_and_is_said_to_move() {
             bench.run(drive.guard(SwitchedOff::SwitchOn)).unwrap();
             bench.run(drive.velocity(Rpm(60.0), MotionOptions { wait: true, ..options() })).unwrap();
         }
-        bench.world.apply(Place::node(NODES[0]), &Stimulus::CableCut(true)).unwrap();
+        bench.world.apply(Place::node(NODES[0]), &Stimulus::CableCut(true)).unwrap().unwrap();
         let began = bench.world.now();
         let stopped = bench.run(bench.network.clone().stop_and_release());
         let outcomes: Vec<_> = stopped.iter().map(|stopped| stopped.outcome.is_ok()).collect();
@@ -507,7 +507,7 @@ fn a_drive_that_was_not_seen_to_stand_keeps_its_watch_and_is_said_to_move() {
         assert!(bench.network.moved().contains(node(NODES[0])) && !bench.network.moved().contains(node(NODES[1])));
         // Its cable is mended. What keeps it content has ended, and it has stopped by itself where it has a watch.
         bench.world.run_for(Duration::from_secs(3));
-        bench.world.apply(Place::node(NODES[0]), &Stimulus::CableCut(false)).unwrap();
+        bench.world.apply(Place::node(NODES[0]), &Stimulus::CableCut(false)).unwrap().unwrap();
         bench.world.run_for(Duration::from_secs(3));
         bench.moving = vec![NODES[0]];
         let has_watch = model(name).unwrap().host_watch != HostWatch::None;

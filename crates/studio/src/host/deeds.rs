@@ -2,7 +2,7 @@
 
 use can::Instant;
 use canopen::NodeId;
-use master::drive::{HomingOptions, MotionReport, Note, Stopped};
+use master::drive::{HomingOptions, MotionReport, Note};
 use master::explain::{Finding, Overheard, Weight};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Drive, Error, MotionOptions};
@@ -12,7 +12,7 @@ use tokio::sync::oneshot;
 use super::guarding::{UNGUARDED, guard};
 use super::parameters::STORING;
 use super::state::{Host, JOG_SPAN, PRESENCE_SPAN};
-use super::work::{Asked, Done, LISTENING_TIME, Listening, Outcome, Running, quietly, refusal_of, say};
+use super::work::{Asked, Done, LISTENING_TIME, Listening, Outcome, Running, STOPPING, quietly, refusal_of, say};
 use super::world::conclude_looking_around;
 use crate::authority::{Refusal, SessionId};
 use crate::dead_man::DeadMan;
@@ -234,13 +234,6 @@ impl Host {
             Done::WorldChanged(asked, done) => self.conclude_change(asked, done),
             Done::Deed(node, generation, outcome) => self.conclude(node, generation, outcome),
             Done::Group(generation, outcome) => self.conclude_group(generation, outcome),
-            Done::Told(told) => {
-                for Stopped { node, outcome, .. } in told {
-                    if let Err(error) = outcome {
-                        self.say_news(Some(node), &format!("it may still be moving: {error}"));
-                    }
-                }
-            }
             Done::Explained(seq, answer, explained) => {
                 let findings: Vec<_> = explained.findings.iter().map(shown).collect();
                 say(answer, Answer::known(seq, json!({ "node": explained.node.raw(), "findings": findings })));
@@ -261,6 +254,7 @@ impl Host {
             }
             Some(Ok(notes)) => running.tell(|seq| Answer::done(seq, notes)),
             Some(Err((kind, text))) => {
+                let text = if running.what == STOPPING { format!("it may still be moving: {text}") } else { text };
                 if kind == UNGUARDED {
                     // A question to whoever asked is not news to the others, and nothing has begun that would have to be stopped.
                     self.jogs.remove(&node);

@@ -8,7 +8,7 @@ use canopen::{Mux, NodeId};
 use cia402::PowerCommand;
 
 use super::state::Host;
-use super::work::{Asked, Done, quietly};
+use super::work::{Asked, STOPPING, quietly};
 
 /// Presses of stop that come within this time are told as one.
 const SAME_PRESS: Duration = Duration::from_secs(1);
@@ -53,11 +53,11 @@ impl Host {
 
     /// Quick-stops these nodes. What was asked of them before is not gone on with.
     pub(super) fn quick_stop(&mut self, nodes: BTreeSet<NodeId>, why: &'static str) {
-        // Where all that moves is to stop, it is told so first, in one go and without a question before.
+        // Where all that moves is to stop, that is sent first, in one go and without a question before. Whether each stands is
+        // looked at below.
         let moved = self.network.moved();
         if !moved.is_empty() && moved.iter().all(|node| nodes.contains(&node)) {
-            let network = self.network.clone();
-            self.work.push(Box::pin(async move { Done::Told(network.stop_all_moved().await) }));
+            self.network.quick_stop_moved();
         }
         for id in nodes {
             self.tell_stop(id, why);
@@ -86,7 +86,7 @@ impl Host {
         }
         let node = self.network.node(id).with_timeout(self.setting.timeout);
         let drive = self.nodes.get(&id).and_then(|node| node.drive.clone());
-        self.begin(id, "stopping", false, answer, async move {
+        self.begin(id, STOPPING, false, answer, async move {
             match drive {
                 Some(drive) => quietly(drive.quick_stop().await),
                 None => quietly(node.write(CONTROLWORD, PowerCommand::QuickStop.controlword().0).await),

@@ -7,7 +7,7 @@ use canopen::NodeId;
 use futures_util::future::{AbortHandle, LocalBoxFuture, abortable};
 use futures_util::stream::FuturesUnordered;
 use master::Error;
-use master::drive::{HostLoss, Stopped};
+use master::drive::HostLoss;
 use master::explain::{Explained, Overheard};
 use master::identify::Found;
 use master::plan::NodeTraffic;
@@ -26,6 +26,9 @@ pub(super) type Work = FuturesUnordered<LocalBoxFuture<'static, Done>>;
 /// Who waits for an answer to which message.
 pub(super) type Asked = (u64, oneshot::Sender<Answer>);
 
+/// What a drive is on while it is being quick-stopped.
+pub(super) const STOPPING: &str = "stopping";
+
 /// Something has come to its end.
 pub(super) enum Done {
     /// A drive was looked at.
@@ -36,8 +39,6 @@ pub(super) enum Done {
     Deed(NodeId, u64, Option<Outcome>),
     /// A motion of several drives has ended; `None` if it was cut short.
     Group(u64, Option<GroupOutcome>),
-    /// What was moved has stopped, or was not seen to.
-    Told(Vec<Stopped>),
     /// The PDO mappings of a node were read; `None` if it did not answer.
     Learned(NodeId, Option<Box<NodeTraffic>>),
     /// They were read for a page.
