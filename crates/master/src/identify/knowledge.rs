@@ -21,11 +21,21 @@ pub struct Identity {
 impl Identity {
     /// True if nothing that it says speaks against the model.
     pub fn matches(&self, model: &devices::Identity) -> bool {
-        let fits = |said: Option<u32>, expected| said.is_none_or(|said| said == expected);
-        fits(self.device_type, model.device_type)
-            && fits(self.vendor_id, model.vendor_id)
-            && fits(self.product_code, model.product_code)
-            && fits(self.revision_number, model.revision_number)
+        self.differences(model).next().is_none()
+    }
+
+    /// What it says otherwise than the model: name, what it says, and what the model does.
+    pub fn differences(&self, model: &devices::Identity) -> impl Iterator<Item = (&'static str, u32, u32)> {
+        let compared = [
+            ("device type (1000h)", self.device_type, model.device_type),
+            ("vendor (1018h:01)", self.vendor_id, model.vendor_id),
+            ("product (1018h:02)", self.product_code, model.product_code),
+            ("revision (1018h:03)", self.revision_number, model.revision_number),
+        ];
+        compared
+            .into_iter()
+            .filter_map(|(name, said, expected)| Some((name, said?, expected)))
+            .filter(|(_, a, b)| a != b)
     }
 }
 
