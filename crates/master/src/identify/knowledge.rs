@@ -163,3 +163,29 @@ pub(super) fn names(models: impl Iterator<Item = &'static Description>) -> (Stri
         None => ("no model".to_owned(), false),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+
+    #[test]
+    fn a_wrong_model_is_told_with_the_number_that_differs_and_no_other() {
+        let wanted =
+            devices::Identity { device_type: 0x0042_0192, vendor_id: 0x5A, product_code: 0xC1, revision_number: 1 };
+        let found = Identity {
+            device_type: Some(0x0042_0192),
+            vendor_id: None,
+            product_code: Some(0xC1),
+            revision_number: Some(0),
+        };
+        assert!(!found.matches(&wanted));
+        assert!(
+            Identity { revision_number: Some(1), ..found }.matches(&wanted),
+            "what is not given speaks against nothing"
+        );
+        let node = canopen::NodeId::new(32).unwrap();
+        let text = Error::WrongModel { node, model: "XLA-5", found, wanted }.to_string();
+        assert_eq!(text, "node 32 is not a XLA-5: its revision (1018h:03) is 0h, not 1h. Name the right model");
+    }
+}
