@@ -9,6 +9,10 @@ use plot::Paint;
 use testbench::models::Description;
 use testbench::words::unit::split_factor;
 
+/// Most bytes that a line shows whole: some lines of a terminal. Of more it shows the first.
+const SHOWN: usize = 128;
+const FIRST: usize = 16;
+
 /// A decoded value.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Decoded {
@@ -106,6 +110,11 @@ impl Decoded {
         self.bytes.split_whitespace().count()
     }
 
+    /// One line does not show all bytes.
+    pub(crate) fn is_cut(&self) -> bool {
+        self.value.is_none() && self.string.is_none() && self.length() > SHOWN
+    }
+
     /// One line.
     pub(crate) fn text(&self, paint: Paint) -> String {
         let number = match (self.value, self.quantity, self.unit, &self.string) {
@@ -113,6 +122,7 @@ impl Decoded {
             (Some(value), ..) if self.hexadecimal => format!("0x{value:X}"),
             (Some(value), ..) => value.to_string(),
             (None, _, _, Some(string)) => format!("{string:?}"),
+            (None, ..) if self.is_cut() => format!("{} bytes, {} ...", self.length(), &self.bytes[..3 * FIRST - 1]),
             (None, ..) => format!("bytes {}", self.bytes),
         };
         let plain = match self.value {
@@ -145,6 +155,17 @@ fn meaning(model: Option<&Description>, row: &Entry, value: i64) -> Option<Strin
 mod tests {
     use super::*;
     use canopen::od::Access;
+
+    #[test]
+    fn many_bytes_are_cut_with_their_number_and_few_are_shown_whole() {
+        let whole = decode(None, None, &[0xAB; SHOWN]);
+        assert_eq!(whole.text(Paint::OFF).matches("AB").count(), SHOWN);
+        let cut = decode(None, None, &[0xAB; 10_240]);
+        assert!(cut.is_cut() && !whole.is_cut());
+        let text = cut.text(Paint::OFF);
+        assert!(text.starts_with("10240 bytes, AB AB") && text.len() < 80, "{text}");
+        assert_eq!(cut.bytes.len(), 3 * 10_240 - 1, "JSON has them all");
+    }
 
     static SPEED: Entry =
         Entry::new(0x606C, 0, DataType::Integer32, Access::ReadOnly, "velocity_actual_value", "").unit("0.1 r/min");

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use canopen::od::Entry;
 use canopen::{AbortCode, Mux, NodeId};
-use master::decode::{common_name, common_type};
+use master::decode::{common_name, common_type, standard_row};
 use master::drive::Limits;
 use master::{Drive, Error};
 use serde::Serialize;
@@ -25,7 +25,8 @@ use testbench::words::value::{Typed, typed_alone, typed_for};
 #[command(after_help = "Values are decimal, 0x.., have a unit where the object has one, or are one of its words:\n  \
     ferrodrive write 4 60FF 60rpm\n  ferrodrive write 4 6060 'profile velocity'\n  ferrodrive write 4 6040 0x0F\n\
     ferrodrive write 5 1008 'left wheel'\n  ferrodrive write 5 1F50:01 --from firmware.bin\n\
-    An object that is in no known table takes its type with the value: u16:15, i32:-100, text:'left wheel', hex:01AAFF")]
+    An object of CiA 301 or CiA 402 has the standard's type where the model is not known:\n  ferrodrive write 32 6060 6\n\
+    Any other that is in no known table takes its type with the value: u16:15, i32:-100, text:'left wheel', hex:01AAFF")]
 pub(crate) struct Write {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -77,7 +78,7 @@ impl Write {
         let value = match (content, row) {
             (Some(bytes), _) => Typed::Bytes(bytes),
             (None, Some(row)) => typed_for(row, typed, counts_per_unit(limits.as_ref())).map_err(wrong)?,
-            (None, None) => typed_alone(typed).map_err(wrong)?,
+            (None, None) => without_a_row(mux, drive.description().is_some(), typed).map_err(wrong)?,
         };
         // Bytes may be a number that means something else on another model.
         drive.check_write(mux, value.number().unwrap_or_else(|| low_bytes(&value.bytes())))?;
@@ -93,6 +94,14 @@ impl Write {
         report.note = note(&drive, mux, value.number(), limits.as_ref());
         report.file = self.from.as_ref().map(|path| path.display().to_string());
         Ok(report)
+    }
+}
+
+/// The value of an object that no row is known of: with its type, or of the standard's where the model is not known.
+fn without_a_row(mux: Mux, model_known: bool, text: &str) -> Result<Typed, String> {
+    match standard_row(mux).filter(|_| !model_known && !text.contains(':')) {
+        Some(row) => typed_for(&row, text, 1),
+        None => typed_alone(text),
     }
 }
 
@@ -218,7 +227,26 @@ impl Report for ObjectReport {
             return format!("node {} {}{name}: {bytes} bytes {to} {file}", self.node, self.object);
         }
         let verb = if self.written { " written:" } else { " =" };
-        let note = self.note.as_ref().map(|note| format!("\n  note    {note}")).unwrap_or_default();
+        let cut = (self.value.is_cut() && !self.written).then(|| "--to FILE writes all of them into a file".to_owned());
+        let note = self.note.as_ref().or(cut.as_ref()).map(|note| format!("\n  note    {note}")).unwrap_or_default();
         format!("node {} {}{name}{verb} {}{note}", self.node, self.object, self.value.text(paint))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn objects_of_the_standard_need_no_type_where_the_model_is_not_known() {
+        let bytes = |index, text: &str| without_a_row(Mux::new(index, 0), false, text).map(|typed| typed.bytes());
+        assert_eq!(bytes(0x6060, "6"), Ok(vec![6]));
+        assert_eq!(bytes(0x6060, "-1"), Ok(vec![0xFF]), "a maker's mode");
+        assert_eq!(bytes(0x6060, "homing"), Ok(vec![6]));
+        assert_eq!(bytes(0x6040, "0x0F"), Ok(vec![0x0F, 0]));
+        assert_eq!(bytes(0x607A, "-2"), Ok(vec![0xFE, 0xFF, 0xFF, 0xFF]));
+        assert_eq!(bytes(0x6060, "i16:6"), Ok(vec![6, 0]), "a type that is given goes before");
+        assert!(bytes(0x6060, "200").is_err() && bytes(0x60FF, "60rpm").is_err() && bytes(0x2000, "6").is_err());
+        assert!(without_a_row(Mux::new(0x6060, 0), true, "6").is_err(), "a model that does not have it");
     }
 }

@@ -9,8 +9,9 @@ use canopen::{NmtCommand, NmtState, NodeId};
 use devices::variant::Variant;
 
 use super::lss::{Lss, Wanted};
+use super::memory::is_makers_mark;
 use super::services::{Services, Written};
-use super::{Memory, SERIAL_NUMBER, error_behaviour};
+use super::{Memory, error_behaviour};
 use crate::engine::device::{Application, Device, Reset};
 use crate::engine::storage::StoredImage;
 
@@ -90,13 +91,15 @@ impl<S: Storage> DescribedDevice<S> {
         self.stopped = false;
     }
 
-    /// With the table's values, and the serial number that its maker has given it.
+    /// With the table's values, and the numbers that its maker has given it.
     fn restart_as(&mut self, node_id: NodeId, bitrate: can::Bitrate, now: Instant) {
         self.device.restart(node_id, bitrate, now);
         let values = self.device.values_mut();
-        let slot = values.table().find(SERIAL_NUMBER).ok();
-        if let Some((slot, number)) = slot.zip(self.services.memory().0.serial_number()) {
-            values.set_raw(slot, number);
+        for (object, number) in self.services.memory().0.marks() {
+            let slot = values.table().find(object).ok();
+            if let Some(slot) = slot.filter(|slot| is_makers_mark(values.table().row(*slot))) {
+                values.set_raw(slot, number);
+            }
         }
     }
 

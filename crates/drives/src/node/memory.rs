@@ -8,6 +8,7 @@
 use canopen::Mux;
 use canopen::od::{Access, Dictionary, Entry, Slot, Storage, Table};
 
+use super::SERIAL_NUMBER;
 use crate::engine::storage::crc32;
 
 const MAGIC: [u8; 4] = *b"FDN2";
@@ -18,9 +19,11 @@ const RECORD_HEADER_SIZE: usize = 8;
 const CRC_SIZE: usize = 4;
 /// The record that LSS keeps, behind those of the objects: no multiplexor has this key.
 const LSS_KEY: u32 = u32::MAX;
-/// The record with the serial number of this one, which its maker has written: nothing on the bus changes it.
+/// Records with numbers of this one, which its maker has written: nothing on the bus changes them. The serial number has a key
+/// of its own; those of others are above all multiplexors.
 const SERIAL_KEY: u32 = u32::MAX - 1;
-const SERIAL_SIZE: usize = 4;
+const MARK_KEY: u32 = 1 << 30;
+const MARK_SIZE: usize = 4;
 /// Node-ID and index of the bit rate.
 const LSS_SIZE: usize = 2;
 
@@ -40,10 +43,12 @@ impl<S: Storage> core::fmt::Debug for Memory<S> {
 }
 
 /// Bytes of the image of a device with this table: each value that can be stored has its place, whatever its type, and so
-/// have what LSS stores and the serial number.
+/// have what LSS stores and the numbers of its maker.
 pub fn image_size(table: &Table) -> usize {
     let records = table.rows().iter().filter(|row| is_storable(row)).map(|row| RECORD_HEADER_SIZE + most_bytes(row));
-    let no_object = 2 * RECORD_HEADER_SIZE + LSS_SIZE + SERIAL_SIZE;
+    // Room for a serial number is there in any case.
+    let marks = table.rows().iter().filter(|row| is_makers_mark(row) && row.mux() != SERIAL_NUMBER).count() + 1;
+    let no_object = RECORD_HEADER_SIZE + LSS_SIZE + marks * (RECORD_HEADER_SIZE + MARK_SIZE);
     HEADER_SIZE + records.sum::<usize>() + no_object + CRC_SIZE
 }
 
@@ -93,14 +98,22 @@ impl<S: Storage> Memory<S> {
         self.store_record(LSS_KEY, &stored);
     }
 
-    /// The serial number of this one, 1018h:04; `None` where it is the table's.
-    pub fn serial_number(&self) -> Option<u32> {
-        self.record(SERIAL_KEY).map(u32::from_le_bytes)
+    /// What its maker has written of this one where it is not the table's: objects ([`is_makers_mark`]) and their values.
+    pub fn marks(&self) -> impl Iterator<Item = (Mux, u32)> + '_ {
+        records(self.checked().unwrap_or(&[])).filter_map(|(key, value)| {
+            let object = match key {
+                SERIAL_KEY => SERIAL_NUMBER,
+                _ if key & !OBJECT_KEYS == MARK_KEY => Mux::from_key(key),
+                _ => return None,
+            };
+            Some((object, u32::from_le_bytes(value.try_into().ok()?)))
+        })
     }
 
-    /// Writes the serial number of this one, as its maker does; the objects' values stay.
-    pub fn store_serial_number(&mut self, number: u32) {
-        self.store_record(SERIAL_KEY, &number.to_le_bytes());
+    /// Writes a number of this one, as its maker does; the objects' values stay. There is room for it if the table has the object.
+    pub fn store_mark(&mut self, object: Mux, number: u32) {
+        let key = if object == SERIAL_NUMBER { SERIAL_KEY } else { MARK_KEY | object.key() };
+        self.store_record(key, &number.to_le_bytes());
     }
 
     /// The record of no object that has this key.
@@ -226,9 +239,25 @@ pub const fn is_storable(row: &Entry) -> bool {
     matches!(row.access, Access::ReadWrite) && most_bytes(row) > 0
 }
 
+/// What the maker writes of one device, and no host: the serial number, and of what can only be read 1000h, 1018h, and the modes of
+/// an axis (6502h), which a data sheet often leaves to the device.
+pub const fn is_makers_mark(row: &Entry) -> bool {
+    let is_known = match row.index {
+        0x1000 => true,
+        0x1018 => row.sub_index > 0,
+        0x6000..=0x9FFF => row.index % 0x800 == 0x6502 % 0x800,
+        _ => false,
+    };
+    let is_serial = row.index == SERIAL_NUMBER.index && row.sub_index == SERIAL_NUMBER.sub_index;
+    is_serial || (is_known && !row.access.is_writable() && row.data_type.fits_cell())
+}
+
+/// The bits of a key that are a multiplexor.
+const OBJECT_KEYS: u32 = (1 << 24) - 1;
+
 /// The key of a record that is no object's.
 const fn is_no_object(key: u32) -> bool {
-    key >= SERIAL_KEY
+    key > OBJECT_KEYS
 }
 
 const fn most_bytes(row: &Entry) -> usize {
@@ -326,12 +355,13 @@ mod tests {
     fn the_serial_number_stays_whatever_is_stored_and_forgotten() {
         let mut memory = Store::empty(&TABLE);
         memory.store_lss([5, 3]);
-        memory.store_serial_number(0xDEAD_BEEF);
+        memory.store_mark(SERIAL_NUMBER, 0xDEAD_BEEF);
         memory.save(&values(), |_| true);
         memory.store_lss([6, 2]);
         memory.forget(|_| true);
         let memory = Store::from_bytes(&TABLE, memory.bytes());
-        assert_eq!((memory.serial_number(), memory.lss()), (Some(0xDEAD_BEEF), Some([6, 2])));
+        assert_eq!(memory.marks().collect::<std::vec::Vec<_>>(), [(SERIAL_NUMBER, 0xDEAD_BEEF)]);
+        assert_eq!(memory.lss(), Some([6, 2]));
     }
 
     const fn row(index: u16, data_type: DataType) -> Entry {

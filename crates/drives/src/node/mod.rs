@@ -11,7 +11,7 @@ mod services;
 
 pub use described::{DescribedDevice, Loss};
 pub use device::DescribedNode;
-pub use memory::{Memory, image_size, is_storable};
+pub use memory::{Memory, image_size, is_makers_mark, is_storable};
 pub use services::{Services, Written, conditions};
 
 use canopen::Mux;

@@ -6,7 +6,7 @@ mod pdo;
 mod records;
 
 use crate::document::Document;
-use crate::{Eds, Finding, Findings, Severity};
+use crate::{Eds, Finding, Findings, Severity, Value};
 
 /// All checks.
 pub(crate) fn all(document: &Document, eds: &Eds, findings: &mut Findings) {
@@ -16,6 +16,7 @@ pub(crate) fn all(document: &Document, eds: &Eds, findings: &mut Findings) {
         names::object(object, findings);
         records::object(object, findings);
     }
+    modes(eds, findings);
     pdo::identifiers(eds, findings);
     pdo::mappings(eds, findings);
 }
@@ -32,6 +33,26 @@ fn mandatory(eds: &Eds, findings: &mut Findings) {
                 what: format!("the mandatory object {index:04X}h is missing"),
                 taken_instead: Some("a device without it".into()),
             });
+        }
+    }
+}
+
+/// Which modes a drive has (6502h; CiA 402-2): a file that leaves it to the device leaves it to whoever reads the file.
+fn modes(eds: &Eds, findings: &mut Findings) {
+    // Each axis in a block of 800h (CiA 402-1).
+    for offset in (0..8).map(|axis| axis * 0x800) {
+        let is_drive = [0x6040, 0x6041].iter().all(|index| eds.variable(index + offset, 0).is_some());
+        let Some(said) = eds.variable(0x6502 + offset, 0).filter(|_| is_drive) else { continue };
+        let is_open = match said.value.as_ref().or(said.default.as_ref()) {
+            None => true,
+            Some(Value::Number(number)) => number.base == 0,
+            Some(_) => false,
+        };
+        if is_open {
+            let what = "says no mode of operation: tools that take the modes from it have none".to_owned();
+            let mut found = at::finding(Severity::Warning, said.line, 0x6502 + offset, None, what);
+            found.taken_instead = Some("the modes whose objects are there".into());
+            findings.push(found);
         }
     }
 }

@@ -65,3 +65,19 @@ fn names_that_other_tools_cut_and_letters_beyond_ascii_are_told() {
     let letters = (2, "letters beyond ASCII, which CiA 306 does not have".to_owned());
     assert_eq!(found, [(1, "some tools cut a name at '#'".to_owned()), letters]);
 }
+
+#[test]
+fn a_drive_that_names_no_mode_is_told() {
+    let drive = |modes: &str| {
+        let words =
+            "[6040]\nParameterName=C\nDataType=6\nAccessType=rw\n[6041]\nParameterName=S\nDataType=6\nAccessType=ro\n";
+        whats(&format!("{words}[6502]\nParameterName=Modes\nDataType=7\nAccessType=ro\n{modes}"))
+    };
+    let wanted = "says no mode of operation: tools that take the modes from it have none";
+    for open in ["", "DefaultValue=\n", "DefaultValue=0\n"] {
+        assert_eq!(drive(open), [(9, Severity::Warning, wanted.to_owned())], "{open:?}");
+    }
+    assert_eq!(drive("DefaultValue=0x25\n"), []);
+    let encoder = "[6502]\nParameterName=Total range\nDataType=7\nAccessType=ro\n";
+    assert_eq!(whats(encoder), [], "6502h of an encoder (CiA 406) is another object");
+}

@@ -5,6 +5,8 @@
 pub struct Startup(pub u32);
 
 impl Startup {
+    /// The device is the NMT master.
+    pub const MASTER: u32 = 1;
     /// Nodes are started all together by one command, when the last mandatory one has booted; without it each by itself.
     pub const START_ALL: u32 = 1 << 1;
     /// The master starts no node: somebody else does.

@@ -33,7 +33,8 @@ pub struct BootPlan {
     pub startup: Startup,
     /// The nodes, and what is expected of each.
     pub nodes: BTreeMap<NodeId, Expectation>,
-    /// How long a node may take until it answers (1F89h, where it is not 0).
+    /// How long a node may take until it answers (1F89h, CiA 302-2). The standard has a manager wait for ever where that is 0; this
+    /// boot-up ends with a report, and then keeps to its own time.
     pub boot_time: Duration,
     /// How long each SDO answer is waited for.
     pub timeout: Duration,
@@ -119,7 +120,7 @@ impl BootPlan {
     /// `None`; a number that is shorter than its type is filled up with zeros.
     ///
     /// # Errors
-    /// The concise DCF of a node that is not whole.
+    /// The concise DCF of a node that is not whole, and the dictionary of a device that is not the NMT master.
     pub fn from_objects(object: impl Fn(Mux) -> Option<Vec<u8>>) -> Result<Self, BadPlan> {
         let number = |index, sub_index| object(Mux::new(index, sub_index)).as_deref().map_or(0, number);
         let consumers: BTreeMap<NodeId, Duration> = (1..=127)
@@ -130,6 +131,10 @@ impl BootPlan {
             .collect();
         let mut plan = Self::new([]);
         plan.startup = Startup(number(0x1F80, 0));
+        // CiA 302-2, 1F80h: bit 0 makes the device the NMT master.
+        if object(Mux::new(0x1F80, 0)).is_some() && !plan.startup.has(Startup::MASTER) {
+            return Err(BadPlan::NoMaster(plan.startup));
+        }
         if let Some(time) = Some(number(0x1F89, 0)).filter(|ms| *ms != 0) {
             plan.boot_time = Duration::from_millis(time.into());
         }
@@ -142,7 +147,7 @@ impl BootPlan {
             }
             let concise = object(Mux::new(0x1F22, node.raw())).filter(|stream| !stream.is_empty());
             let configuration = match &concise {
-                Some(stream) => entries(stream).map_err(|why| BadPlan { node, why })?,
+                Some(stream) => entries(stream).map_err(|why| BadPlan::Concise { node, why })?,
                 None => Vec::new(),
             };
             let expectation = Expectation {
@@ -175,16 +180,40 @@ fn entries(stream: &[u8]) -> Result<Vec<(Mux, Vec<u8>)>, ConciseError> {
 
 /// A dictionary that no plan can be made of.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BadPlan {
-    /// Whose configuration it is.
-    pub node: NodeId,
-    /// What is wrong with it.
-    pub why: ConciseError,
+pub enum BadPlan {
+    /// A concise DCF that is not whole (1F22h).
+    Concise {
+        /// Whose configuration it is.
+        node: NodeId,
+        /// What is wrong with it.
+        why: ConciseError,
+    },
+    /// The dictionary of a device that does not boot a network: bit 0 of its 1F80h is 0.
+    NoMaster(Startup),
+}
+
+impl BadPlan {
+    /// The node that it is about.
+    pub const fn node(&self) -> Option<NodeId> {
+        match self {
+            Self::Concise { node, .. } => Some(*node),
+            Self::NoMaster(_) => None,
+        }
+    }
 }
 
 impl fmt::Display for BadPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "1F22h:{:02X}, the concise DCF of node {}, is not whole: {}", self.node.raw(), self.node, self.why)
+        match self {
+            Self::Concise { node, why } => {
+                write!(f, "1F22h:{:02X}, the concise DCF of node {node}, is not whole: {why}", node.raw())
+            }
+            Self::NoMaster(Startup(bits)) => write!(
+                f,
+                "1F80h is {bits:X}h: without its bit 0 the device is not the NMT master, and boots nobody. Set bit 0, or give \
+                 the file of the master"
+            ),
+        }
     }
 }
 

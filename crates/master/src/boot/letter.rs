@@ -19,7 +19,7 @@ pub enum ErrorStatus {
     NoHeartbeat,
     /// F: no answer to node guarding.
     NoGuarding,
-    /// G: a program is to be loaded, and there is none to load.
+    /// G: the program that it has cannot be compared with the one that it is to have, or is another and there is none to load.
     NoProgram,
     /// H: a program is to be loaded, which is not allowed.
     ProgramNotAllowed,
@@ -77,13 +77,13 @@ const TABLE: [Row; 15] = [
     (
         NoProgram,
         'G',
-        "it wants another program, and none is at hand",
-        "load the program with its maker's tool, or correct 1F55h",
+        "its program cannot be compared, or is another than expected (1F55h) and none is at hand",
+        "load the program with its maker's tool, or correct 1F55h and bit 5 of 1F81h",
     ),
     (
         ProgramNotAllowed,
         'H',
-        "its program is not the expected one (1F55h), and must not be replaced (1F81h, bit 6)",
+        "its program is not the expected one (1F55h), and must not be replaced (1F81h, bits 6 and 4)",
         "load the program with its maker's tool, or correct 1F55h",
     ),
     (ProgramFailed, 'I', "loading its program failed", "load it with its maker's tool"),

@@ -90,7 +90,8 @@ impl<'a> NodeBoot<'a> {
             Ok(()) => self.left_operational.then_some(ErrorStatus::InitiallyOperational),
         };
         let together = self.plan.startup.has(Startup::START_ALL);
-        if status.is_none() && !together && !self.plan.startup.has(Startup::STARTS_NONE) {
+        let booted = status.is_none() && self.expectation.assignment.has(Assignment::BOOT);
+        if booted && !together && !self.plan.startup.has(Startup::STARTS_NONE) {
             let before = self.node.network().now();
             self.node.nmt(NmtCommand::Start);
             self.await_start(before).await;
@@ -105,6 +106,13 @@ impl<'a> NodeBoot<'a> {
         if !assignment.has(Assignment::SLAVE) {
             let found = Found::Value(assignment.0);
             return self.fail(StepKind::Assignment, None, Expected::Listed, found, ErrorStatus::NotListed);
+        }
+        // CiA 302-2, 1F81h and the figure of the process: without bit 2 the steps are passed over up to error control.
+        if !assignment.has(Assignment::BOOT) {
+            let left =
+                Found::Told("a node that somebody else boots (1F81h, bit 2): its heartbeat is watched".to_owned());
+            self.note(StepKind::Assignment, None, Expected::Listed, left, Verdict::Noted);
+            return self.watch_heartbeat().await;
         }
         let keeps_alive = assignment.has(Assignment::KEEP_ALIVE);
         if !keeps_alive {
@@ -206,14 +214,26 @@ impl<'a> NodeBoot<'a> {
         Ok(())
     }
 
+    /// CiA 302-2, error status: G where there is nothing to compare, in the plan (1F55h) or in the node, H where the program may
+    /// not be replaced: without bit 6 of 1F81h, or with bit 4, which has the node left as it is. One that may be is not at hand
+    /// here, which is G again.
     async fn check_software(&mut self) -> Go {
         let assignment = self.expectation.assignment;
-        let Some(expected) = self.expectation.software.filter(|_| assignment.has(Assignment::VERIFY_SOFTWARE)) else {
+        if !assignment.has(Assignment::VERIFY_SOFTWARE) {
             return Ok(());
+        }
+        let Some(expected) = self.expectation.software else {
+            let found = Found::Told("a plan that does not say which (1F55h is 0)".to_owned());
+            return self.fail(StepKind::Software, Some(SOFTWARE), Expected::Answer, found, ErrorStatus::NoProgram);
         };
-        let allowed = assignment.has(Assignment::UPDATE_SOFTWARE);
-        let status = if allowed { ErrorStatus::NoProgram } else { ErrorStatus::ProgramNotAllowed };
-        self.check_value(StepKind::Software, SOFTWARE, expected, status).await
+        let allowed = assignment.has(Assignment::UPDATE_SOFTWARE) && !assignment.has(Assignment::KEEP_ALIVE);
+        let found = self.read(SOFTWARE).await;
+        let status = match found {
+            Found::Value(value) if value == expected => None,
+            Found::Value(_) if !allowed => Some(ErrorStatus::ProgramNotAllowed),
+            _ => Some(ErrorStatus::NoProgram),
+        };
+        self.judge(StepKind::Software, SOFTWARE, Expected::Value(expected), found, status)
     }
 
     /// Writes its configuration, unless it has it by date and time.
@@ -255,11 +275,11 @@ impl<'a> NodeBoot<'a> {
         self.judge(StepKind::Heartbeat, PRODUCER_HEARTBEAT_TIME, Expected::Heartbeat, found, status)
     }
 
-    /// Sees to it that it sends a heartbeat, if it can; the longest time between two.
+    /// Sees to it that it sends a heartbeat, if it can and is booted; the longest time between two.
     async fn produce_heartbeat(&mut self) -> Option<Duration> {
         let period = match self.read(PRODUCER_HEARTBEAT_TIME).await {
             Found::Value(0) => {
-                let period = self.plan.heartbeat?;
+                let period = self.plan.heartbeat.filter(|_| self.expectation.assignment.has(Assignment::BOOT))?;
                 let ms = u16::try_from(period.as_millis()).unwrap_or(u16::MAX);
                 let Found::Done = self.write(PRODUCER_HEARTBEAT_TIME, &ms.to_le_bytes()).await else { return None };
                 period

@@ -2,8 +2,9 @@
 //! and type that CiA 301 (7.5) and CiA 402-2 give it.
 
 use canopen::Mux;
-use canopen::od::{DataType, Entry};
+use canopen::od::{Access, DataType, Entry};
 use devices::all;
+use devices::servo::CIA402;
 
 use DataType::Unsigned32 as U32;
 use DataType::{Integer16 as I16, Integer32 as I32};
@@ -39,6 +40,17 @@ pub fn common_type(mux: Mux, length: usize) -> Option<DataType> {
         Some(first) => fitting.all(|other| other == first).then_some(first),
         None => standard(mux).and_then(|(_, _, data_type)| *data_type).filter(|data_type| data_type.size() == length),
     }
+}
+
+/// What CiA 301 and CiA 402-2 say of an object of a node whose model is not known, for a write: its type, and the meanings of its
+/// values. It has no unit and no limits, which are the node's own.
+pub fn standard_row(mux: Mux) -> Option<Entry> {
+    if let Some(row) = CIA402.row(mux) {
+        let bare = Entry::new(mux.index, mux.sub_index, row.data_type, Access::ReadWrite, row.name, row.title);
+        return Some(bare.values(row.values));
+    }
+    let (_, name, data_type) = standard(mux)?;
+    Some(Entry::new(mux.index, mux.sub_index, (*data_type)?, Access::ReadWrite, name, ""))
 }
 
 type Standard = (u16, &'static str, Option<DataType>);
@@ -99,5 +111,19 @@ mod tests {
         );
         assert_eq!(common_name(Mux::new(0x60C6, 0)), Some("max_deceleration"));
         assert_eq!(common_name(Mux::new(0x5FFF, 0)), None);
+    }
+
+    #[test]
+    fn the_standard_has_the_type_of_what_it_names() {
+        let data_type = |index, sub_index| standard_row(Mux::new(index, sub_index)).map(|row| row.data_type);
+        // CiA 402-2: 6060h is INTEGER8, 6040h UNSIGNED16, 607Ah INTEGER32, 6081h UNSIGNED32; CiA 301: 1017h UNSIGNED16.
+        assert_eq!(data_type(0x6060, 0), Some(DataType::Integer8));
+        assert_eq!(data_type(0x6040, 0), Some(DataType::Unsigned16));
+        assert_eq!([0x607A, 0x60FA].map(|index| data_type(index, 0)), [Some(I32); 2]);
+        assert_eq!((data_type(0x6081, 0), data_type(0x1017, 0)), (Some(U32), Some(DataType::Unsigned16)));
+        assert_eq!([(0x2000, 0), (0x6060, 1), (0x607B, 1)].map(|(index, sub)| data_type(index, sub)), [None; 3]);
+        let mode = standard_row(Mux::new(0x6060, 0)).unwrap();
+        assert_eq!(mode.meaning(6), Some("homing"));
+        assert!(standard_row(Mux::new(0x60FF, 0)).unwrap().unit.is_empty(), "the unit is the node's own");
     }
 }

@@ -37,7 +37,7 @@ use node_models::NodeModels;
 use pdo::PdoBook;
 use sdo::Conversations;
 
-pub use common::{common_name, common_row, common_type};
+pub use common::{common_name, common_row, common_type, standard_row};
 pub(crate) use motion::object_may_move;
 pub use number::Number;
 pub use pdo::Pdo;

@@ -130,7 +130,8 @@ impl Drive {
         let (node, model) = (self.node.id(), description.title);
         let found = crate::identify::identity(&self.node).await?;
         if !found.matches(&description.identity) {
-            return Err(Error::WrongModel { node, model, found });
+            let wanted = description.identity;
+            return Err(Error::WrongModel { node, model, found, wanted });
         }
         match description.distinguishing_object {
             Some(object) if !crate::identify::has(&self.node, object).await? => {

@@ -122,7 +122,7 @@ pub enum Error {
         guess: Guess,
     },
     /// The node says that it is something else than the model it was taken for.
-    #[error("node {node} is not a {model}: it says {found}. Name the right model")]
+    #[error("node {node} is not a {model}: {}. Name the right model", differences(found, wanted))]
     WrongModel {
         /// The node.
         node: NodeId,
@@ -130,6 +130,8 @@ pub enum Error {
         model: &'static str,
         /// What it says.
         found: Identity,
+        /// What the model says.
+        wanted: devices::Identity,
     },
     /// The node lacks an object that the model has, though both say the same identity.
     #[error(
@@ -316,6 +318,13 @@ impl Error {
             _ => None,
         }
     }
+}
+
+/// What a node says otherwise than the model that it was taken for.
+fn differences(found: &Identity, wanted: &devices::Identity) -> String {
+    let all =
+        found.differences(wanted).map(|(name, said, expected)| format!("its {name} is {said:X}h, not {expected:X}h"));
+    all.collect::<Vec<_>>().join(", ")
 }
 
 fn list(items: &[impl fmt::Display]) -> String {

@@ -21,11 +21,21 @@ pub struct Identity {
 impl Identity {
     /// True if nothing that it says speaks against the model.
     pub fn matches(&self, model: &devices::Identity) -> bool {
-        let fits = |said: Option<u32>, expected| said.is_none_or(|said| said == expected);
-        fits(self.device_type, model.device_type)
-            && fits(self.vendor_id, model.vendor_id)
-            && fits(self.product_code, model.product_code)
-            && fits(self.revision_number, model.revision_number)
+        self.differences(model).next().is_none()
+    }
+
+    /// What it says otherwise than the model: name, what it says, and what the model does.
+    pub fn differences(&self, model: &devices::Identity) -> impl Iterator<Item = (&'static str, u32, u32)> {
+        let compared = [
+            ("device type (1000h)", self.device_type, model.device_type),
+            ("vendor (1018h:01)", self.vendor_id, model.vendor_id),
+            ("product (1018h:02)", self.product_code, model.product_code),
+            ("revision (1018h:03)", self.revision_number, model.revision_number),
+        ];
+        compared
+            .into_iter()
+            .filter_map(|(name, said, expected)| Some((name, said?, expected)))
+            .filter(|(_, a, b)| a != b)
     }
 }
 
@@ -151,5 +161,31 @@ pub(super) fn names(models: impl Iterator<Item = &'static Description>) -> (Stri
         Some((last, [])) => ((*last).to_owned(), false),
         Some((last, others)) => (format!("{} and {last}", others.join(", ")), true),
         None => ("no model".to_owned(), false),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+
+    #[test]
+    fn a_wrong_model_is_told_with_the_number_that_differs_and_no_other() {
+        let wanted =
+            devices::Identity { device_type: 0x0042_0192, vendor_id: 0x5A, product_code: 0xC1, revision_number: 1 };
+        let found = Identity {
+            device_type: Some(0x0042_0192),
+            vendor_id: None,
+            product_code: Some(0xC1),
+            revision_number: Some(0),
+        };
+        assert!(!found.matches(&wanted));
+        assert!(
+            Identity { revision_number: Some(1), ..found }.matches(&wanted),
+            "what is not given speaks against nothing"
+        );
+        let node = canopen::NodeId::new(32).unwrap();
+        let text = Error::WrongModel { node, model: "XLA-5", found, wanted }.to_string();
+        assert_eq!(text, "node 32 is not a XLA-5: its revision (1018h:03) is 0h, not 1h. Name the right model");
     }
 }

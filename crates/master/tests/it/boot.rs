@@ -208,6 +208,11 @@ fn a_manager_s_dictionary_is_a_plan() {
     bench.world.run_for(Duration::from_secs(1));
     let handle = bench.network.node(node(SERVO));
     assert_eq!(block_on(&mut bench.world, handle.read::<u16>(mux(0x1017, 0))).unwrap().unwrap(), 200);
+    // 1F80h, bit 0: the dictionary of a device that is no master is no plan.
+    objects.insert((0x1F80, 0), 0x02_u32.to_le_bytes().to_vec());
+    let refused = plan(&objects).unwrap_err().to_string();
+    assert!(refused.starts_with("1F80h is 2h: without its bit 0 the device is not the NMT master"), "{refused}");
+    objects.insert((0x1F80, 0), 0x03_u32.to_le_bytes().to_vec());
     // Half a configuration is none.
     objects.get_mut(&(0x1F22, SERVO)).unwrap().pop();
     let refused = plan(&objects).unwrap_err().to_string();
@@ -237,7 +242,7 @@ fn a_node_whose_heartbeat_never_comes_ends_with_its_letter() {
     assert_eq!(letter(&report), Some('E'));
     assert!(last(&report).starts_with("state expected a heartbeat, got none within 850 ms"), "{}", last(&report));
     let mut plan = plan;
-    plan.nodes.get_mut(&node(7)).unwrap().assignment = Assignment(Assignment::SLAVE);
+    plan.nodes.get_mut(&node(7)).unwrap().assignment = Assignment(Assignment::SLAVE | Assignment::BOOT);
     let mut bus = Bus::new(vec![silent()]);
     let network = bus.network.clone();
     let report = bus.block_on(network.boot(&plan)).nodes.remove(0);

@@ -47,13 +47,17 @@ fn written(bus: &Bus, index: u16) -> bool {
         .any(|[command, low, high, ..]| command >> 5 == 1 && [*low, *high] == index.to_le_bytes())
 }
 
-/// CiA 302-2, error status: H where the update is not allowed, G where it is and there is no program to load.
+/// CiA 302-2, error status: H where the update is not allowed, which it never is of a node that is to be left as it is, G where it
+/// is and there is no program to load.
 #[test]
 fn another_program_version_ends_with_g_or_h_and_the_right_one_goes_on() {
+    const UPDATE: u32 = Assignment::VERIFY_SOFTWARE | Assignment::UPDATE_SOFTWARE;
     for (there, bits, expected) in [
         (0x1234, Assignment::VERIFY_SOFTWARE, None),
         (0x1235, Assignment::VERIFY_SOFTWARE, Some('H')),
-        (0x1235, Assignment::VERIFY_SOFTWARE | Assignment::UPDATE_SOFTWARE, Some('G')),
+        (0x1235, UPDATE, Some('G')),
+        (0x1235, UPDATE | Assignment::KEEP_ALIVE, Some('H')),
+        (0x1234, UPDATE | Assignment::KEEP_ALIVE, None),
         // Nobody asks.
         (0x1235, 0, None),
     ] {
@@ -63,6 +67,34 @@ fn another_program_version_ends_with_g_or_h_and_the_right_one_goes_on() {
         if expected.is_some() {
             assert!(report.to_string().contains("1F56h:01 expected 1234h, got 1235h"), "{report}");
         }
+    }
+}
+
+/// CiA 302-2, error status: G where there is nothing to compare the program with, in the plan or in the node.
+#[test]
+fn a_program_that_cannot_be_compared_ends_with_g() {
+    for (toy, software) in [(device().u32(0x1F56, 1, 0x1234), None), (device(), Some(0x1234))] {
+        for bits in [0, Assignment::UPDATE_SOFTWARE, Assignment::KEEP_ALIVE] {
+            let mut bus = bus_of(toy.clone());
+            let expectation = expecting(SLAVE | Assignment::VERIFY_SOFTWARE | bits);
+            let report = boot(&mut bus, 0, Expectation { software, ..expectation });
+            assert_eq!(letter(&report), Some('G'), "{software:?} {bits:X}h: {report}");
+        }
+    }
+}
+
+/// CiA 302-2, 1F81h: without bit 2 the node is not booted by this master, which only watches its heartbeat.
+#[test]
+fn a_slave_that_somebody_else_boots_is_neither_reset_nor_written_nor_started() {
+    for bits in [Assignment::SLAVE, Assignment::SLAVE | Assignment::MANDATORY | Assignment::VERIFY_SOFTWARE] {
+        let mut bus = bus_of(device().u32(0x2000, 0, 1));
+        let configuration = vec![(mux(0x2000, 0), 5_u32.to_le_bytes().to_vec())];
+        let expectation = Expectation { configuration, device_type: Some(1), ..expecting(bits) };
+        let report = boot(&mut bus, 0, expectation);
+        assert_eq!(letter(&report), None, "{report}");
+        assert!(bus.frames().iter().all(|frame| !frame.starts_with("000#")), "{:?}", bus.frames());
+        assert!([0x2000, 0x1017].iter().all(|index| !written(&bus, *index)));
+        assert!(bus.network.node(node(NODE)).facts().heartbeat_watch.is_some(), "its heartbeat is watched");
     }
 }
 

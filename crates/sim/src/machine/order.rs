@@ -9,7 +9,7 @@ use devices::Description;
 use devices::row::is_parameter;
 use devices::variant::{Preset, PresetError, Variant};
 use drives::engine::storage::StoredImage;
-use drives::node::{Memory, SERIAL_NUMBER, is_storable};
+use drives::node::{Memory, is_makers_mark, is_storable};
 
 /// What is wanted of a drive beside its model.
 #[derive(Clone, Debug)]
@@ -114,22 +114,22 @@ pub(super) fn memory(model: &'static Description, order: &Order) -> Result<Memor
         return Ok(memory);
     }
     let mut values = Dictionary::<Boxed>::new(model.dictionary, order.node);
-    let (marks, presets): (Vec<&Preset>, Vec<&Preset>) =
-        order.presets.iter().partition(|preset| preset.object == SERIAL_NUMBER);
+    let refused = |preset: &Preset, error| OrderError::Preset { preset: *preset, error };
+    // Not of the store: its maker's marks, by which LSS tells it from others of its make, and what a sheet leaves to the device.
+    let is_mark = |preset: &&Preset| model.row(preset.object).is_some_and(is_makers_mark);
+    let (marks, presets): (Vec<&Preset>, Vec<&Preset>) = order.presets.iter().partition(is_mark);
     for preset in presets {
         let can_be = |row: &Entry| is_parameter(row) && is_storable(row);
-        preset.store_if(&mut values, can_be).map_err(|error| OrderError::Preset { preset: *preset, error })?;
+        preset.store_if(&mut values, can_be).map_err(|error| refused(preset, error))?;
     }
     memory.save(&values, |row| order.presets.iter().any(|preset| preset.object == row.mux()));
-    // Not of the store: the maker's mark on this one, by which LSS tells it from others of its make.
     for preset in marks {
-        let refused = |error| OrderError::Preset { preset: *preset, error };
-        if model.row(SERIAL_NUMBER).is_none() {
-            return Err(refused(PresetError::NoSuchObject));
+        let Some(row) = model.row(preset.object) else { continue };
+        let (low, high) = row.data_type.range();
+        if !(low..=high).contains(&preset.value) {
+            return Err(refused(preset, PresetError::Refused(AbortCode::INVALID_VALUE)));
         }
-        let number = u32::try_from(preset.value);
-        let too_wide = |_| refused(PresetError::Refused(AbortCode::INVALID_VALUE));
-        memory.store_serial_number(number.map_err(too_wide)?);
+        memory.store_mark(preset.object, row.data_type.raw(preset.value));
     }
     Ok(memory)
 }

@@ -6,7 +6,8 @@ use can::{Bitrate, Frame, Instant, Station};
 use canopen::{AbortCode, Mux, NodeId};
 use devices::Description;
 use devices::servo::CIA402;
-use sim::machine::{Order, ServoMachine, servo};
+use devices::variant::Preset;
+use sim::machine::{Order, OrderError, ServoMachine, servo};
 use sim::{SwitchRange, VirtualDrive};
 
 /// Increments in a turn of the motor, which are the position units as delivered.
@@ -31,13 +32,19 @@ impl Bench {
     }
 
     pub fn of(description: &'static Description) -> Self {
+        Self::ordered(description, &[]).unwrap()
+    }
+
+    /// One with values of its own: of its store, or of its maker.
+    pub fn ordered(description: &'static Description, presets: &[Preset]) -> Result<Self, OrderError> {
         let node = NodeId::new(5).unwrap();
-        let machine = servo(description, &Order::new(description, node, Bitrate::K500)).unwrap();
+        let order = Order { presets: presets.to_vec(), ..Order::new(description, node, Bitrate::K500) };
+        let machine = servo(description, &order)?;
         let mut bench = Self { machine, now: Instant::ZERO, sent: Vec::new(), answers: VecDeque::new(), node: 5 };
         bench.machine.set_power(true, bench.now);
         bench.run_ms(300);
         bench.frame("000#0105");
-        bench
+        Ok(bench)
     }
 
     pub fn frame(&mut self, text: &str) {

@@ -3,6 +3,7 @@
 use canopen::od::{Access, DefaultValue};
 use canopen::{AbortCode, Mux};
 use devices::servo::CIA402;
+use devices::variant::Preset;
 use sim::VirtualDrive;
 
 use crate::virtual_cia402::bench::{Bench, TURN};
@@ -142,6 +143,26 @@ fn a_position_that_always_changes_is_sent_once_a_millisecond_without_an_inhibit_
     bench.run_ms(1000);
     let count = bench.sent.iter().filter(|frame| frame.id().raw() == 0x385).count();
     assert!((999..=1001).contains(&count), "{count}");
+}
+
+#[test]
+fn what_its_maker_writes_of_one_device_is_ordered_with_it_and_stays() {
+    let numbers = [(0x1000, 0, 0x0402_0192), (0x1018, 1, 0x5A), (0x1018, 3, 0xFFFF_FFFF), (0x6502, 0, 0x25)];
+    let presets: Vec<_> = numbers.iter().map(|(index, sub, value)| Preset::new(*index, *sub, *value)).collect();
+    let mut bench = Bench::ordered(&CIA402, &presets).unwrap();
+    for _ in 0..2 {
+        assert!(numbers.iter().all(|(index, sub, value)| bench.read(*index, *sub) == *value));
+        // pp, pv and hm are there, and nothing else.
+        let taken = [1, 3, 4, 6, 7, 8].map(|mode| bench.write(0x6060, 0, mode).is_ok());
+        assert_eq!(taken, [true, true, false, true, false, false]);
+        bench.set(&[(0x1010, 1, 0x6576_6173), (0x1011, 1, 0x6461_6F6C)]);
+        cycle(&mut bench);
+    }
+    let refused =
+        |index, value| Bench::ordered(&CIA402, &[Preset::new(index, 0, value)]).map(drop).unwrap_err().to_string();
+    assert!(refused(0x6041, 1).contains("the drive does not store it"), "{}", refused(0x6041, 1));
+    assert!(refused(0x1000, 1 << 32).contains("would be refused"), "{}", refused(0x1000, 1 << 32));
+    assert!(refused(0x5FFF, 1).contains("no such object"));
 }
 
 #[test]

@@ -59,7 +59,10 @@ impl Planned {
             }
             Self::Manager(values) => {
                 let plan = BootPlan::from_objects(|object| values.get(&object).cloned());
-                let mut plan = plan.map_err(|bad| Failure::usage(bad.to_string()).at_node(bad.node))?;
+                let mut plan = plan.map_err(|bad| match (Failure::usage(bad.to_string()), bad.node()) {
+                    (failure, Some(node)) => failure.at_node(node),
+                    (failure, None) => failure,
+                })?;
                 for (node, expectation) in &mut plan.nodes {
                     expectation.description = context.told_model(*node);
                 }
