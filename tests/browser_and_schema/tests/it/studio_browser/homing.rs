@@ -17,6 +17,8 @@ async fn homing_is_chosen_by_its_picture_and_ends_with_a_stop() {
     stage.says("#home-described", "looks for the home switch in positive direction, and turns round at a limit").await;
     stage.says("#home-missing", "No input of this drive is set to be its home switch").await;
     stage.find(".homing-picture circle.home").await;
+    let details = "document.querySelector('#homing').scrollIntoView({ block: 'start' })";
+    stage.client.execute(details, Vec::new()).await.expect("it scrolls");
     stage.shoot("homing").await;
     stage.choose("#home-method", "17").await;
     stage.says("#home-described", "negative limit goes on").await;

@@ -210,5 +210,7 @@ async fn measures_what_comes_each_millisecond(stage: &Stage) {
     let truth_s = (1.0 - 2.0 * 0.05_f64.sqrt()) * 60.0 / 500.0;
     // The shaft follows its loop, which takes some milliseconds of its own.
     assert!(grid_s < 0.01 && (rise_s - truth_s).abs() < grid_s + 0.003, "{told}, not {truth_s} s");
+    let readout = "document.querySelector('.readout').scrollIntoView({ block: 'end' })";
+    stage.client.execute(readout, Vec::new()).await.expect("it scrolls");
     stage.shoot("scope_step").await;
 }
