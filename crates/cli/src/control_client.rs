@@ -32,6 +32,8 @@ pub(crate) struct ControlClient {
     reader: BufReader<Socket>,
     place: ControlAddress,
     asked: u64,
+    /// The drives that are there, as they were told at the start.
+    nodes: Value,
 }
 
 enum Socket {
@@ -41,6 +43,17 @@ enum Socket {
 }
 
 impl ControlArgs {
+    /// Of this place, without a token.
+    #[cfg(test)]
+    pub(crate) const fn of(place: ControlAddress) -> Self {
+        Self { control: Some(place), control_token: None }
+    }
+
+    /// A simulator is named.
+    pub(crate) const fn is_given(&self) -> bool {
+        self.control.is_some()
+    }
+
     /// Connects, and gives the token if there is one.
     pub(crate) fn connect(&self) -> Result<ControlClient, Failure> {
         let place = self.control.clone().ok_or_else(|| {
@@ -54,15 +67,21 @@ impl ControlArgs {
                 .of_kind("control")
                 .next("is a simulator running with --control, and is this what its ready line names?")
         })?;
-        let mut client = ControlClient { reader: BufReader::new(socket), place, asked: 0 };
+        let mut client = ControlClient { reader: BufReader::new(socket), place, asked: 0, nodes: Value::Null };
         client.wait_at_most(Some(PATIENCE))?;
         let name = format!("ferrodrive {}", std::process::id());
-        client.ask(json!({ "request": "hello", "token": self.control_token, "name": name }))?;
+        let mut told = client.ask(json!({ "request": "hello", "token": self.control_token, "name": name }))?;
+        client.nodes = told["nodes"].take();
         Ok(client)
     }
 }
 
 impl ControlClient {
+    /// The numbers of the drives that are there.
+    pub(crate) fn nodes(&self) -> Vec<u64> {
+        self.nodes.as_array().into_iter().flatten().filter_map(|node| node["node"].as_u64()).collect()
+    }
+
     /// How long the next lines are waited for; `None` for ever.
     pub(crate) fn wait_at_most(&mut self, patience: Option<Duration>) -> Result<(), Failure> {
         self.reader.get_ref().set_patience(patience).map_err(|error| self.lost(&error))

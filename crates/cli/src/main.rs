@@ -11,6 +11,7 @@ mod control_client;
 mod decode;
 mod embedded;
 mod failure;
+mod far_world;
 mod frames;
 mod global;
 mod guard;

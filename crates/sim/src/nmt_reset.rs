@@ -18,11 +18,6 @@ pub(crate) fn is_asked_of(frame: &Frame, node: impl FnOnce() -> u8) -> bool {
         }
 }
 
-/// Whether a reset is one of the whole node.
-pub(crate) fn is_of_node(frame: &Frame) -> bool {
-    NmtRequest::parse(frame).is_ok_and(|request| request.command == NmtCommand::ResetNode)
-}
-
 /// The SDO answers of the predefined connection set (CiA 301, 7.3.5); no drive here moves them.
 pub(crate) fn is_sdo_answer(frame: &Frame) -> bool {
     let id = frame.id();

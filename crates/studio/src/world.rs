@@ -95,15 +95,26 @@ impl WorldDoor {
 }
 
 impl WorldAsks {
+    /// Waits for a question in a thread that may wait, and answers it; false when nobody will ask any more.
+    pub fn answer_next(&mut self, around: &mut impl Around) -> bool {
+        self.0.blocking_recv().map(|ask| ask.answer(around)).is_some()
+    }
+
     /// Answers what has been asked since.
     pub fn answer(&mut self, around: &mut impl Around) {
         while let Ok(ask) = self.0.try_recv() {
-            // Who asked may have gone.
-            match ask {
-                Ask::Forms(answer) => drop(answer.send(around.forms())),
-                Ask::Look(answer) => drop(answer.send(around.look())),
-                Ask::Change(line, answer) => drop(answer.send(around.change(&line))),
-            }
+            ask.answer(around);
+        }
+    }
+}
+
+impl Ask {
+    fn answer(self, around: &mut impl Around) {
+        // Who asked may have gone.
+        match self {
+            Self::Forms(answer) => drop(answer.send(around.forms())),
+            Self::Look(answer) => drop(answer.send(around.look())),
+            Self::Change(line, answer) => drop(answer.send(around.change(&line))),
         }
     }
 }

@@ -47,7 +47,20 @@ pub struct Changed {
 /// # Errors
 /// Why not, in a word that programs may rely on, and in words; nothing is changed then.
 pub fn change(world: &mut World, line: &str) -> Result<Changed, (&'static str, String)> {
-    let failed = |error: CommandError| (error.kind(), error.to_string());
+    let (command, changed) = understand(line)?;
+    let told = value(&perform(world, &command, Service::default()).map_err(failed)?);
+    Ok(Changed { note: told["note"].as_str().map(str::to_owned), ..changed })
+}
+
+fn failed(error: CommandError) -> (&'static str, String) {
+    (error.kind(), error.to_string())
+}
+
+/// What a line will have done, without its note, when whoever has the world has done it.
+///
+/// # Errors
+/// Those of [`change`] that need no world to be found.
+pub fn understand(line: &str) -> Result<(Command, Changed), (&'static str, String)> {
     let command: Command = line.parse().map_err(failed)?;
     let (node, line, back) = match &command {
         Command::Apply(place, stimulus) => {
@@ -60,8 +73,7 @@ pub fn change(world: &mut World, line: &str) -> Result<Changed, (&'static str, S
             return Err(("usage", "that changes nothing of the world: time passes by itself here".to_owned()));
         }
     };
-    let told = value(&perform(world, &command, Service::default()).map_err(failed)?);
-    Ok(Changed { node, line, back, note: told["note"].as_str().map(str::to_owned) })
+    Ok((command, Changed { node, line, back, note: None }))
 }
 
 /// A line that a world answered with.

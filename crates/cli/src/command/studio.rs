@@ -17,7 +17,9 @@ use transport::BusSpec;
 
 use super::params::journal::{Kept, default_path};
 use crate::context::Context;
+use crate::control_client::ControlArgs;
 use crate::failure::Failure;
+use crate::far_world;
 use crate::output::{Format, Report};
 use crate::recording::interface_of;
 use plot::Paint;
@@ -29,6 +31,7 @@ use plot::Paint;
 /// --bus it is a virtual machine whose time passes with the clock.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive studio --open\n  ferrodrive --bus can0 studio\n  \
+    ferrodrive --bus socketcand://127.0.0.1:29536/can0 studio --control 127.0.0.1:7001\n  \
     ferrodrive --bus can0 studio --listen 0.0.0.0:8402 --password-file studio.password")]
 pub(crate) struct Studio {
     /// Where to listen; port 0 takes a free one. Elsewhere than on this machine (127.0.0.1, [::1]) takes a password
@@ -49,6 +52,8 @@ pub(crate) struct Studio {
     /// Open the page in the browser of this machine
     #[arg(long)]
     open: bool,
+    #[command(flatten)]
+    control: ControlArgs,
 }
 
 /// Where the studio is.
@@ -86,7 +91,11 @@ impl Studio {
         let url = access.url();
         format.print(&Ready { studio: url.clone() }).map_err(Failure::of_stdout)?;
         context.traffic.listen();
-        let (host, desk) = Host::new(context.network.clone(), setting(context));
+        let mut setting = setting(context);
+        if self.control.is_given() && setting.world.is_none() {
+            setting.world = Some(far_world::open(&self.control)?);
+        }
+        let (host, desk) = Host::new(context.network.clone(), setting);
         let app = studio::app(desk, Arc::new(access));
         tokio::select! {
             served = studio::serve(listener, app) => served.map_err(cannot),

@@ -195,11 +195,9 @@ impl<A: Assembly> Machine<A> {
     fn hand_over(&mut self, frame: &Frame, now: Instant) {
         self.disturb();
         if let Some(own_time) = self.own_time.as_mut().filter(|_| frame.standard_data_id() == Some(NMT)) {
-            let times = own_time.reset_times();
-            self.firmware.set_reset_times(times);
+            self.firmware.set_reset_times(own_time.reset_times());
             if nmt_reset::is_asked_of(frame, || self.firmware.report(AxisId::FIRST).node_id.raw()) {
-                let takes_ns = if nmt_reset::is_of_node(frame) { times.node_ns } else { times.communication_ns };
-                own_time.reset(takes_ns, now);
+                own_time.chip.forget_answers();
             }
         }
         self.firmware.handle_frame(frame, now);

@@ -46,8 +46,6 @@ pub(super) struct OwnTime {
     timing: Timing,
     prng: Prng,
     waiting: VecDeque<Waiting>,
-    /// Until then the device resets, and hears nothing.
-    deaf_until: Instant,
     pub(super) chip: Chip,
 }
 
@@ -71,8 +69,7 @@ enum Kind {
 impl OwnTime {
     /// Nothing waits; the chip holds `image`.
     pub(super) fn new(timing: Timing, seed: u64, image: &[u8], generation: u64) -> Self {
-        let chip = Chip::new(image, generation);
-        Self { timing, prng: Prng::new(seed), waiting: VecDeque::new(), deaf_until: Instant::ZERO, chip }
+        Self { timing, prng: Prng::new(seed), waiting: VecDeque::new(), chip: Chip::new(image, generation) }
     }
 
     /// How long this boot takes.
@@ -87,16 +84,6 @@ impl OwnTime {
         ResetTimes { node_ns: self.draw(&reset_node), communication_ns: self.draw(&reset_communication) }
     }
 
-    /// A reset has begun: what waited is gone with it, and until its end the controller takes nothing.
-    pub(super) fn reset(&mut self, takes_ns: u64, now: Instant) {
-        // In the midst of one nobody hears of another.
-        if now >= self.deaf_until {
-            self.waiting.clear();
-            self.deaf_until = now.plus_nanos(takes_ns);
-            self.chip.forget_answers();
-        }
-    }
-
     /// How long this store takes.
     fn store_ns(&mut self) -> u64 {
         let store = self.timing.store;
@@ -108,7 +95,6 @@ impl OwnTime {
         let kind = kind(frame);
         let span = match kind {
             Kind::Management => return Some(*frame),
-            _ if now < self.deaf_until => return None,
             Kind::Request => self.timing.sdo_answer,
             Kind::Process => self.timing.pdo_reaction,
         };
@@ -149,7 +135,6 @@ impl OwnTime {
     /// The supply is gone, and with it what waited.
     pub(super) fn power_off(&mut self) {
         self.waiting.clear();
-        self.deaf_until = Instant::ZERO;
     }
 
     /// The first due, among equals the one that came first.

@@ -2,7 +2,7 @@
 
 use can::Instant;
 use canopen::emcy::{Emcy, EmcyErrorCode};
-use canopen::{NmtState, NodeId};
+use canopen::{Mux, NmtState, NodeId};
 use devices::Description;
 use devices::faults::FaultRow;
 use master::core::Event;
@@ -11,6 +11,10 @@ use master::{Drive, Error};
 use super::state::Host;
 use crate::snapshot::DriveView;
 use crate::timeline::{Happening, Kind};
+
+const STATUSWORD: Mux = Mux::new(0x6041, 0);
+/// The present code, where a model does not say another object (CiA 402-2).
+const ERROR_CODE: Mux = Mux::new(0x603F, 0);
 
 const CHECK_SUPPLY: &str =
     "Check its supply and its cable; it may also have restarted with another node-ID or bit rate.";
@@ -58,15 +62,21 @@ impl Host {
 
     /// A drive was looked at: what has changed since the last look.
     pub(super) fn note_look(&self, id: NodeId, view: &DriveView) {
-        let at = Instant::from_nanos((view.at_s * 1e9) as u64);
+        let looked_at = Instant::from_nanos((view.at_s * 1e9).round() as u64);
         let model = self.description(id);
+        // The frame that told, where it was an answer to the look.
+        let told_at = |object: Mux| {
+            let held = self.counter.trace.held();
+            held.answered_at(id, self.object_of_axis(id, object), looked_at).unwrap_or(looked_at)
+        };
+        let at = looked_at;
         self.counter.timeline.end_but(at, id, Kind::Silent, &[]);
         let before = self.nodes.get(&id).and_then(|node| node.view.as_ref());
         if let Some(before) = before.and_then(|before| before.state)
             && let Some(now) = view.state
             && before != now
         {
-            self.tell(Happening::new(at, id, Kind::State, format!("{before} → {now}")));
+            self.tell(Happening::new(told_at(STATUSWORD), id, Kind::State, format!("{before} → {now}")));
         }
         let rows: Vec<_> = model.map(|model| rows(model, view)).unwrap_or_default();
         let codes: Vec<_> = match rows.as_slice() {
@@ -75,6 +85,10 @@ impl Host {
             rows => rows.iter().map(|row| Some(row.code)).collect(),
         };
         self.counter.timeline.end_but(at, id, Kind::Fault, &codes);
+        if codes.is_empty() {
+            return;
+        }
+        let at = told_at(model.and_then(|model| model.faults.code).unwrap_or(ERROR_CODE));
         for code in codes {
             let row = rows.iter().copied().find(|row| Some(row.code) == code);
             let what = row.map_or("a fault that no table here explains", |row| row.name);
@@ -95,6 +109,21 @@ impl Host {
 
     fn tell(&self, happening: Happening) {
         self.counter.timeline.push(happening);
+    }
+
+    /// An object of the first axis, of the axis that the drive is looked at.
+    fn object_of_axis(&self, id: NodeId, object: Mux) -> Mux {
+        let drive = self.nodes.get(&id).and_then(|node| node.drive.as_ref());
+        drive.and_then(Drive::axis_description).map_or(object, |axis| axis.object(object))
+    }
+
+    /// An event in words: of an emergency message those of the model's fault table.
+    pub(super) fn words_of(&self, event: &Event) -> String {
+        let Event::Emcy(node, emcy) = event else { return event.to_string() };
+        match self.description(*node).and_then(|model| model.fault_told_by(emcy.code)) {
+            Some(row) => format!("node {node}: emergency {:04X}h ({})", emcy.code.0, row.name),
+            None => event.to_string(),
+        }
     }
 
     fn description(&self, id: NodeId) -> Option<&'static Description> {

@@ -186,7 +186,7 @@ impl Host {
                 Event::NoAnswer(..) | Event::Aborted(..) => continue,
                 _ => None,
             };
-            self.say_news(node, &event.to_string());
+            self.say_news(node, &self.words_of(&event));
         }
     }
 

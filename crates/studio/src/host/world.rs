@@ -76,8 +76,7 @@ pub(super) fn conclude_looking_around((seq, answer): Asked, seen: Result<Value, 
 }
 
 fn no_world((seq, answer): Asked) {
-    let text =
-        "the world around these drives is the real one, or another program's: `ferrodrive world` speaks to a simulator";
+    let text = "the world around these drives is the real one, or another program's: to a simulator that runs speaks `ferrodrive studio --control`";
     say(answer, Answer::failed(Some(seq), "no_world", text));
 }
 

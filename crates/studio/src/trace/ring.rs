@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use can::Instant;
-use canopen::NodeId;
+use canopen::sdo::wire::Reply;
+use canopen::{Mux, NodeId, connection_set};
 use devices::Description;
 use master::Models;
 use master::decode::{Decoded, Decoder};
@@ -156,6 +157,21 @@ impl Held {
         // It may be in the one before, behind its first frame.
         let Some(before) = chunk.checked_sub(1).map(|place| &self.chunks[place]) else { return self.oldest() };
         before.first + before.frames.partition_point(|passed| passed.at < at) as u64
+    }
+
+    /// When a node last said the value of an object by SDO, up to then and within a second before.
+    pub(crate) fn answered_at(&self, node: NodeId, object: Mux, until: Instant) -> Option<Instant> {
+        /// Longer than a drive is looked at.
+        const SECOND: u64 = 1_000_000_000;
+        let id = connection_set::sdo_reply(node);
+        let said = |passed: &&Passed| {
+            let reply = Reply::parse(passed.frame.padded());
+            passed.frame.id() == id && matches!(reply, Reply::InitiateUpload(of, _) if of == object)
+        };
+        let newest = self.chunks.iter().rev().flat_map(|chunk| chunk.frames.iter().rev());
+        let before = newest.skip_while(|passed| passed.at > until);
+        let mut recent = before.take_while(|passed| until.nanos_since(passed.at) < SECOND);
+        recent.find(said).map(|passed| passed.at)
     }
 
     /// Number of the frame with which the chunk of this one begins.

@@ -42,6 +42,15 @@ fn a_fault_is_told_with_its_remedy_and_where_that_is_written_until_it_is_over() 
                 assert_eq!(told["source"], "ZLAC8030L quick start guide V1.00, chapters 8 and 9");
             }
             assert_eq!(stage.find(WHEEL, "state")["what"], "Switch on disabled → Fault");
+            // Their times are those of the answers that told of them, as the page marks them.
+            for (kind, object) in [("fault", "603Fh"), ("state", "6041h")] {
+                let at_s = stage.find(WHEEL, kind)["at_s"].as_f64().expect("a time");
+                let around =
+                    serde_json::json!({ "from_s": at_s - 0.05, "until_s": at_s + 1e-6, "node": WHEEL.to_string() });
+                let lines = stage.lines(around);
+                let marked = lines.last().expect("a frame")["text"].as_str().expect("text").to_owned();
+                assert!(marked.contains(object), "{kind}: {marked}");
+            }
             let emcy = stage.find(WHEEL, "emcy");
             let at_s = emcy["at_s"].as_f64().expect("a time");
             let around = serde_json::json!({ "from_s": at_s - 0.05, "until_s": at_s + 0.05, "kind": "emcy" });
