@@ -169,6 +169,9 @@ impl DriveBase {
         };
         let watchdog = self.dead_man.unwrap_or(plan.limits.watchdog);
         let limits = BaseLimits { watchdog, ..plan.limits };
+        if self.duration.is_some() {
+            within_limits(self.twist(), &plan, &limits)?;
+        }
         let mut wheels = Vec::new();
         for (node, turns) in plan.wheels {
             wheels.push(wheel(context, &plan, node, turns).await?);
@@ -240,10 +243,29 @@ impl DriveBase {
     }
 
     fn source(&self) -> Source {
-        let twist =
-            Twist { linear_m_s: self.linear.unwrap_or_default(), angular_rad_s: self.angular.unwrap_or_default() };
-        self.duration.map_or_else(|| Source::Lines(lines_of_input()), |duration| Source::For(twist, duration))
+        self.duration.map_or_else(|| Source::Lines(lines_of_input()), |duration| Source::For(self.twist(), duration))
     }
+
+    fn twist(&self) -> Twist {
+        Twist { linear_m_s: self.linear.unwrap_or_default(), angular_rad_s: self.angular.unwrap_or_default() }
+    }
+}
+
+/// A twist on the command line is meant as it stands: one that the base would slow down is refused. Lines of a controller are held
+/// to the limits as they come.
+fn within_limits(asked: Twist, plan: &BasePlan, limits: &BaseLimits) -> Result<(), Failure> {
+    limits.check().map_err(failure)?;
+    let driven = plan.geometry.saturate(asked, limits);
+    if driven == asked {
+        return Ok(());
+    }
+    let shown = |twist: Twist| format!("{} m/s and {} rad/s", Shown(twist.linear_m_s), Shown(twist.angular_rad_s));
+    let [linear, angular, wheel] = [limits.linear_m_s, limits.angular_rad_s, limits.wheel_m_s].map(Shown);
+    Err(Failure::usage(format!(
+        "{} is more than this base is to do: [base] allows {linear} m/s, {angular} rad/s and {wheel} m/s at a wheel",
+        shown(asked)
+    ))
+    .next(format!("ask for {}, the most on the same way, or raise the limits in [base]", shown(driven))))
 }
 
 async fn wheel(context: &Context, plan: &BasePlan, node: NodeId, turns: f64) -> Result<WheelSetup, Failure> {

@@ -177,7 +177,16 @@ async fn with_limits(drive: &Drive, error: Error, number: Option<i64>) -> Failur
 /// The multiplexor, and the row if the node's model is known and has it.
 pub(super) fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), Failure> {
     let found = object.resolve(drive.description().map(|model| model.dictionary));
-    found.map_err(|reason| Failure::usage(reason).at_node(drive.node().id()))
+    found.map_err(|reason| {
+        let node = drive.node().id();
+        let failure = Failure::usage(reason).at_node(node);
+        match object {
+            ObjectArg::Name(_) => {
+                failure.next(format!("look for it: ferrodrive objects {node} WORD, or give its index, e.g. 6064"))
+            }
+            ObjectArg::Mux(_) => failure,
+        }
+    })
 }
 
 impl ObjectReport {

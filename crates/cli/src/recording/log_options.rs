@@ -21,10 +21,20 @@ pub(crate) struct LogPath {
 /// A log that has just been begun.
 pub(crate) type NewLog = LogWriter<std::io::BufWriter<std::fs::File>>;
 
-/// Reads the name of a log to be written: its extension tells the form, candump where it tells none.
+/// Reads the name of a log to be written: its extension tells the form, candump where it has none.
 pub(crate) fn log_path(text: &str) -> Result<LogPath, String> {
     let path = PathBuf::from(text);
-    let format = Format::of_name(&path).unwrap_or(Format::Candump);
+    let format = match (Format::of_name(&path), path.extension()) {
+        (Some(format), _) => format,
+        (None, None) => Format::Candump,
+        (None, Some(extension)) => {
+            let extension = extension.to_string_lossy();
+            return Err(format!(
+                "no form of log has the extension .{extension}; a log is written as {}",
+                Format::written_extensions()
+            ));
+        }
+    };
     if text.is_empty() || !format.is_written() {
         return Err(format!("a {format} file is only read; a log is written as {}", Format::written_extensions()));
     }

@@ -33,6 +33,7 @@ fn objects_and_values_are_checked() {
     refused(&["read", "4", "60644"], &["is no object", "position_actual_value"]);
     refused(&["read", "4", "6064:100"], &["sub-index", "00 to FF"]);
     refused(&["read", "4", "position_actual_vale"], &["did you mean position_actual_value?"]);
+    refused(&["read", "4", "zzzz"], &["no object named 'zzzz'", "ferrodrive objects 4 WORD"]);
     refused(&["write", "4", "6040", "65536"], &["0 to 65535"]);
     refused(&["write", "4", "6040", "on"], &["expected a number"]);
     refused(&["write", "4", "6060", "profile_velocty"], &["did you mean profile velocity?"]);
@@ -204,4 +205,37 @@ fn departures_from_the_standard_are_listed_with_their_object_and_what_to_do() {
     let of_node = done(&["--json", "objects", "2", "--departures"]).json();
     assert_eq!((&of_node["model"], &of_node["departures"]), (&list["model"], &list["departures"]));
     assert_eq!(ferrodrive(&["objects", "zlac8030l", "speed", "--departures"]).status, Some(2));
+}
+
+#[test]
+fn a_log_of_no_known_form_is_neither_written_nor_read() {
+    let folder = scratch("no_known_form");
+    let path = |name: &str| folder.join(name).display().to_string();
+    std::fs::write(path("a.log"), "(0.000000) can0 704#05\n").unwrap();
+    refused(&["convert", &path("a.log"), &path("b.xyz")], &["no form of log", ".xyz", ".log (candump)", ".blf (BLF)"]);
+    assert!(!folder.join("b.xyz").exists());
+    // MCAP begins with its name between two bytes that no text has.
+    std::fs::write(path("run.mcap"), b"\x89MCAP0\r\n\x01\x26\0\0\0\0\0\0\0").unwrap();
+    std::fs::write(path("random.bin"), [7, 0, 200, 0, 13, 10, 255, 1]).unwrap();
+    for (name, what) in
+        [("run.mcap", "this is an MCAP file, a record of signals"), ("random.bin", "its bytes are not text")]
+    {
+        let ended = ferrodrive(&["decode", &path(name)]);
+        assert_ne!(ended.status, Some(0), "{name}");
+        assert!(ended.out.is_empty() && ended.err.contains(what), "{name}: {} {}", ended.out, ended.err);
+    }
+}
+
+#[test]
+fn a_twist_beyond_the_limits_of_a_base_is_refused_with_the_most_that_there_is() {
+    let base = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/base.toml");
+    refused(
+        &["drive-base", base, "--linear", "30", "--for", "1s"],
+        &[
+            "30 m/s and 0 rad/s is more than this base is to do",
+            "[base] allows",
+            "ask for",
+            "raise the limits in [base]",
+        ],
+    );
 }

@@ -62,6 +62,13 @@ pub(super) fn gains(values: &Values, velocity_limit_rad_s: f32) -> ServoGains {
         proportional: count(CURRENT_KP) * CURRENT_KP_V_PER_A,
         integral_per_s: count(CURRENT_KI) * CURRENT_KI_V_PER_A_S,
     };
+    let tracking = TrackingGains {
+        position_per_s: count(VELOCITY_OBSERVER_1) * TRACKING.position_per_s,
+        velocity_per_s2: count(VELOCITY_OBSERVER_2) * TRACKING.velocity_per_s2,
+        acceleration_per_s3: count(VELOCITY_OBSERVER_3) * TRACKING.acceleration_per_s3,
+    };
+    // One that follows nothing would leave the velocity loop with what is not there.
+    let share = if tracking.follow(SUPERVISION_PERIOD_S) { count(VELOCITY_OBSERVER_4) * TRACKING_SHARE } else { 0.0 };
     let smoothing = |object, dt_s| LowPassGains::from_time_constant(count(object) * SMOOTHING_S, dt_s);
     ServoGains {
         foc: FocGains {
@@ -87,11 +94,7 @@ pub(super) fn gains(values: &Values, velocity_limit_rad_s: f32) -> ServoGains {
         velocity_filter: smoothing(VELOCITY_SMOOTHING, SUPERVISION_PERIOD_S),
         feed_forward_filter: smoothing(FEEDFORWARD_SMOOTHING, SUPERVISION_PERIOD_S),
         torque_filter: smoothing(TORQUE_SMOOTHING, CONTROL_PERIOD_S),
-        tracking: TrackingGains {
-            position_per_s: count(VELOCITY_OBSERVER_1) * TRACKING.position_per_s,
-            velocity_per_s2: count(VELOCITY_OBSERVER_2) * TRACKING.velocity_per_s2,
-            acceleration_per_s3: count(VELOCITY_OBSERVER_3) * TRACKING.acceleration_per_s3,
-        },
-        tracking_share: (count(VELOCITY_OBSERVER_4) * TRACKING_SHARE).min(1.0),
+        tracking,
+        tracking_share: share.min(1.0),
     }
 }

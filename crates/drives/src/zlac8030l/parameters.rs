@@ -157,10 +157,12 @@ fn overload(values: &Values, variant: &Variant) -> OverloadLimits {
 fn bleeder(values: &Values) -> BleederLimits {
     let resistance_ohm = tenths(values, BLEEDER_RESISTANCE);
     let rated_w = f32::from(values.get(BLEEDER_POWER));
+    let on_v = tenths(values, BLEEDER_ON_VOLTAGE);
     BleederLimits {
         enabled: values.get(BLEEDER_ENABLE) == 1,
-        on_v: tenths(values, BLEEDER_ON_VOLTAGE),
-        off_v: tenths(values, BLEEDER_OFF_VOLTAGE),
+        on_v,
+        // 202Eh:03 may have been lowered below it since.
+        off_v: tenths(values, BLEEDER_OFF_VOLTAGE).min(on_v),
         conductance_s: if resistance_ohm > 0.0 { 1.0 / resistance_ohm } else { 0.0 },
         rated_w,
         overload_j: rated_w * BLEEDER_OVERLOAD_S,

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::error::StimulusError;
 use super::range::SwitchRange;
-use super::words::{bound_word, number, range, value};
+use super::words::{bound_word, excerpt, number, range, value};
 
 /// One thing at an output shaft. Torques and angles are those of that shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,7 +129,11 @@ fn friction(words: &[&str]) -> Result<Friction, StimulusError> {
             ["viscous", text] => friction.viscous_nm_s = value(text, "viscous friction", FRICTION)?,
             ["static", text] => friction.static_nm = Some(value(text, "friction", FRICTION)?),
             ["stribeck", text] => friction.stribeck_rad_s = Some(value(text, "velocity", FRICTION)?),
-            _ => return Err(StimulusError::Usage(FRICTION)),
+            ["viscous" | "static" | "stribeck"] | [] => return Err(StimulusError::Usage(FRICTION)),
+            [word, ..] => {
+                let (text, what) = (excerpt(word), "'viscous', 'static' or 'stribeck' before a further number");
+                return Err(StimulusError::BadValue { text, what, usage: FRICTION });
+            }
         }
     }
     Ok(friction)

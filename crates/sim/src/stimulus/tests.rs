@@ -163,6 +163,11 @@ fn what_is_wrong_with_a_load_is_said_with_its_own_form() {
             "load friction 1 static",
             "expected: NODE load friction N·m [viscous N·m·s/rad] [static N·m] [stribeck rad/s], or NODE load friction off",
         ),
+        (
+            "load friction 0.2 0.02",
+            "\"0.02\" is no 'viscous', 'static' or 'stribeck' before a further number; expected: NODE load friction N·m \
+             [viscous N·m·s/rad] [static N·m] [stribeck rad/s], or NODE load friction off",
+        ),
         ("load none of it", "expected: NODE load none"),
     ] {
         assert_eq!(words.parse::<Stimulus>().unwrap_err().to_string(), error, "{words}");

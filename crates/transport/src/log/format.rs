@@ -74,6 +74,16 @@ impl Format {
         lines.find_map(|line| of_line(&line.to_ascii_lowercase()))
     }
 
+    /// What a file is that is no log, in a sentence, where its first bytes tell; `by_name` is the form of its extension.
+    pub(super) fn foreign(begin: &[u8], by_name: Option<Self>) -> Option<&'static str> {
+        if begin.starts_with(b"\x89MCAP") {
+            return Some("this is an MCAP file, a record of signals (ferrodrive plot), not a log of frames");
+        }
+        let is_text = !matches!(by_name, Some(Self::Blf | Self::Pcap | Self::Pcapng));
+        (is_text && begin.contains(&0))
+            .then_some("its bytes are not text, and do not begin as a BLF, pcap or pcapng file")
+    }
+
     /// Whether logs of this form can be written.
     pub fn is_written(self) -> bool {
         self.row().begin.is_some()

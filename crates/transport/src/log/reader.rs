@@ -48,7 +48,8 @@ impl AnyLogReader {
     /// extension, else candump's.
     ///
     /// # Errors
-    /// That of opening the file, or of reading its first bytes.
+    /// That of opening the file, or of reading its first bytes; [`io::ErrorKind::InvalidData`] for a file that they show to be
+    /// no log.
     pub fn open(path: &Path) -> io::Result<Self> {
         let mut input: Box<dyn BufRead + Send> = match path.to_str() {
             Some("-") => Box::new(BufReader::new(io::stdin())),
@@ -56,7 +57,14 @@ impl AnyLogReader {
         };
         let begin = input.fill_buf()?;
         let begin = &begin[..begin.len().min(ENOUGH_TO_TELL)];
-        let format = Format::of_content(begin).or_else(|| Format::of_name(path)).unwrap_or(Format::Candump);
+        let by_name = Format::of_name(path);
+        let format = match Format::of_content(begin) {
+            Some(format) => format,
+            None => match Format::foreign(begin, by_name) {
+                Some(what) => return Err(io::Error::new(io::ErrorKind::InvalidData, what)),
+                None => by_name.unwrap_or(Format::Candump),
+            },
+        };
         Ok(Self::new(input, format))
     }
 }

@@ -86,6 +86,17 @@ fn hard_braking_ends_in_over_voltage_without_a_bleeder_and_stays_between_the_two
     }
 }
 
+#[test]
+fn a_bleeder_does_not_go_off_above_where_it_goes_on() {
+    let mut bench = Bench::open();
+    // Delivered: on at 70.0 V, off at 62.0 V.
+    bench.set((0x202E, 3), 400).refuses((0x202E, 4), 401, 0x0609_0031).reads((0x202E, 4), 620);
+    // :03 was lowered alone: 400 is what it goes off at, and the bus is held there.
+    bench.set((0x202E, 5), 1).set_supply(39.0).run_ms(50).set_load_torque(-2.0);
+    assert_within("V", highest_bus_v(&mut bench, 2000), 39.9, 40.5);
+    bench.set((0x202E, 4), 400).set((0x202E, 4), 350).set((0x202E, 3), 700).set((0x202E, 4), 620);
+}
+
 /// One body of 2 K/W and 630 J/K: 10 A warm it by 3/2 R i^2.
 #[test]
 fn a_steady_current_warms_the_winding_as_its_time_constant_says() {

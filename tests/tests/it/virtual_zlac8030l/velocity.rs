@@ -147,3 +147,26 @@ fn a_target_written_before_enabling_is_followed_when_operation_is_enabled() {
     let seconds = bench.seconds_until(1.0, LOOK, |report| report.velocity_rpm > 59.0);
     assert_within("seconds of the ramp of 500 ms", seconds, 0.4, 0.56);
 }
+
+/// 202Ah to 202Dh: coefficients of a speed observer, without units in the manual.
+#[test]
+fn no_coefficients_of_the_speed_observer_make_the_motor_turn_at_another_speed() {
+    for coefficients in [
+        [0, 0, 0, 1000],
+        [1000, 0, 0, 1000],
+        [0, 750, 0, 1000],
+        [1000, 750, 0, 1000],
+        [1000, 750, 350, 1000],
+        [30000, 30000, 30000, 30000],
+    ] {
+        let mut bench = Bench::new();
+        for (object, value) in (0x202A..).zip(coefficients) {
+            bench.set(object, value);
+        }
+        bench.enable_in(3).set(0x60FF, 100).run_ms(2000);
+        for _ in 0..20 {
+            let speed = bench.run_ms(50).report().velocity_rpm;
+            assert!((speed - 100.0).abs() < 5.0, "{coefficients:?}: {speed} r/min");
+        }
+    }
+}

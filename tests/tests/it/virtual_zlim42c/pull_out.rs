@@ -98,3 +98,33 @@ fn no_setting_above_the_factorys_loses_the_rotor_between_the_corner_speed_and_th
         }
     }
 }
+
+/// Pulses lost by an emergency stop (605Ah = 7) at this speed.
+fn lost_by_stopping(mut bench: Bench, setting: i64, rpm: i64, ramp_ms: i64) -> i64 {
+    bench.set(0x2005, setting).set(0x605A, 7).set(0x6085, ramp_ms).set(0x6083, 1000).enable_in(3).set(0x60FF, rpm);
+    bench.run_ms(2000).set(0x6040, 0x02).run_ms(2000);
+    let report = bench.report();
+    assert_eq!(report.error_code, 0, "{rpm} r/min");
+    (report.position - report.rotor_position.expect("known here")).abs()
+}
+
+#[test]
+fn the_ramp_of_an_emergency_stop_loses_no_more_than_a_vector_that_stands_at_once_and_nothing_where_the_torque_suffices()
+{
+    let motor = StepperMotorModel::ZLIM42_C_70;
+    for (setting, current_a) in [(3, 1.2), (7, 2.2)] {
+        for rpm in [1000, 1500, 2000, 2500] {
+            // An S is steepest in its middle: one and a half times the mean.
+            let asked_nm = |ramp_s: f64| 1.5 * motor.rotor.inertia_kg_m2 * rad_s(rpm) / ramp_s;
+            let bound_nm = bound_nm(&motor, current_a, rad_s(rpm));
+            let case = format!("2005h = {setting}, {rpm} r/min");
+            assert!(asked_nm(0.05) < bound_nm, "{case}");
+            assert_eq!(lost_by_stopping(Bench::new(), setting, rpm, 50) / FOUR_STEPS, 0, "{case}, 50 ms");
+            let (ramp, at_once) = (
+                lost_by_stopping(Bench::new(), setting, rpm, 10),
+                lost_by_stopping(Bench::choosing("Z092", "brake"), setting, rpm, 10),
+            );
+            assert!(ramp <= at_once, "{case}: {ramp} pulses in 10 ms, {at_once} at once");
+        }
+    }
+}

@@ -17,6 +17,29 @@ pub struct TrackingGains {
     pub acceleration_per_s3: f32,
 }
 
+impl TrackingGains {
+    /// Whether an observer with these follows at all when it is updated so often: Jury's criterion for its error,
+    ///
+    /// ```text
+    /// w³ + (L1 + L2 + L3) w² + (L2 + 2 L3) w + L3 = 0        w = z - 1        Ln = ln dt^n
+    /// ```
+    pub fn follow(&self, dt_s: f32) -> bool {
+        let first = self.position_per_s * dt_s;
+        let second = self.velocity_per_s2 * dt_s * dt_s;
+        let third = self.acceleration_per_s3 * dt_s * dt_s * dt_s;
+        if !(first > 0.0 && first < 2.0 && second > 0.0 && third >= 0.0) {
+            return false;
+        }
+        if third == 0.0 {
+            return 4.0 - 2.0 * first - second > 0.0;
+        }
+        let sum = first + second + third;
+        let (quadratic, linear, constant) = (sum - 3.0, 3.0 - 2.0 * sum + second + 2.0 * third, first - 1.0);
+        8.0 - 4.0 * first - 2.0 * second - third > 0.0
+            && 1.0 - constant * constant > (constant * quadratic - linear).abs()
+    }
+}
+
 /// State: what the observer believes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tracking {
@@ -55,6 +78,38 @@ impl Tracking {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_observer_that_is_said_to_follow_does_and_another_does_not() {
+        const DT_S: f32 = 0.5e-3;
+        // Third order near 300 rad/s, second order, each coefficient alone, and what is too much for the period.
+        let near = |share: f32| TrackingGains {
+            position_per_s: 900.0 * share,
+            velocity_per_s2: 0.27e6 * share * share,
+            acceleration_per_s3: 27e6 * share * share * share,
+        };
+        let second = TrackingGains { acceleration_per_s3: 0.0, ..near(1.0) };
+        let only_first = TrackingGains { velocity_per_s2: 0.0, ..second };
+        let only_second = TrackingGains { position_per_s: 0.0, ..second };
+        let undamped = TrackingGains { position_per_s: 90.0, ..near(1.0) };
+        for (gains, follows) in [
+            (TrackingGains::default(), false),
+            (near(1.0), true),
+            (near(0.3), true),
+            (near(10.0), false),
+            (second, true),
+            (only_first, false),
+            (only_second, false),
+            (undamped, false),
+        ] {
+            assert_eq!(gains.follow(DT_S), follows, "{gains:?}");
+            let mut tracking = Tracking::resting(0);
+            let mut velocity = 0.0;
+            // 2000 counts/s.
+            (0..20_000).for_each(|period| velocity = tracking.update(&gains, period, DT_S));
+            assert_eq!((velocity - 2000.0).abs() < 20.0, follows, "{gains:?}: {velocity} counts/s");
+        }
+    }
 
     #[test]
     fn follows_a_steady_velocity_without_error() {

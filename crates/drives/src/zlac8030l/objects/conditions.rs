@@ -3,9 +3,14 @@
 use canopen::AbortCode;
 use canopen::od::{Condition, Conditions, Slot, View, condition_numbers};
 
-use super::{CONTROLWORD, MODES_OF_OPERATION_DISPLAY, ROW_COUNT, TARGET_POSITION};
+use super::{
+    BLEEDER_OFF_VOLTAGE, BLEEDER_ON_VOLTAGE, CONTROLWORD, MODES_OF_OPERATION_DISPLAY, ROW_COUNT, TARGET_POSITION,
+};
 
-static LIST: [(Slot, Condition); 1] = [(CONTROLWORD.slot(), Condition::Check(set_point_in_range))];
+static LIST: [(Slot, Condition); 2] = [
+    (BLEEDER_OFF_VOLTAGE.slot(), Condition::Check(off_not_above_on)),
+    (CONTROLWORD.slot(), Condition::Check(set_point_in_range)),
+];
 static NUMBERS: [u16; ROW_COUNT] = condition_numbers(&LIST);
 
 /// The conditions of this firmware.
@@ -13,6 +18,11 @@ pub static CONDITIONS: Conditions = Conditions::new(&LIST, &NUMBERS);
 
 /// Largest absolute target position (607Ah: ±3FFFFFFFh absolute, ±7FFFFFFFh relative).
 pub const ABSOLUTE_TARGET_LIMIT: i32 = 0x3FFF_FFFF;
+
+/// 202Eh:04: a bleeder that goes off above where it goes on would never go on. A host that writes both writes :03 first.
+fn off_not_above_on(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    if raw > u32::from(values.get(BLEEDER_ON_VOLTAGE)) { Err(AbortCode::VALUE_TOO_HIGH) } else { Ok(()) }
+}
 
 /// 6040h: refuses the controlword that would take an absolute set-point out of range.
 ///
