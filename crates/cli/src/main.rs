@@ -46,7 +46,7 @@ use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
 use crate::global::Global;
 use crate::output::{Format, Report};
-use crate::plain::plain;
+use crate::plain::{plain, short};
 use plot::Paint;
 
 fn main() -> ExitCode {
@@ -116,7 +116,7 @@ fn refuse_command_line(error: &clap::Error) -> ExitCode {
 /// commands for the terminal along, which are spelled out.
 fn show_usage(error: &clap::Error) -> ExitCode {
     let text = error.render().to_string();
-    let shown = plain(&text);
+    let shown = short(&plain(&text));
     if shown == text {
         error.exit();
     }
@@ -133,7 +133,7 @@ fn complain(format: Format, failure: &Failure) {
     if format.json {
         // Nobody may be listening any more; the exit status still tells.
         if let Ok(line) = sim::json::to_string(&FailureReport::from(failure)) {
-            let _ = writeln!(io::stdout(), "{line}");
+            let _ = writeln!(io::stdout(), "{}", short(&line));
         }
         return;
     }
@@ -142,7 +142,7 @@ fn complain(format: Format, failure: &Failure) {
     }
     let error = Paint::for_stream(&io::stderr()).bad("error:");
     // Nobody may be listening any more; the exit status still tells.
-    let _ = writeln!(io::stderr(), "{error} {}", plain(&failure.to_string()));
+    let _ = writeln!(io::stderr(), "{error} {}", short(&plain(&failure.to_string())));
 }
 
 /// What was given on the command line, not by the environment.

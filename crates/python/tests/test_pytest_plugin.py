@@ -158,3 +158,38 @@ def test_the_served_simulator_is_ready(pytester):
         """
     )
     pytester.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)
+
+
+def test_the_marker_says_the_timing_and_the_machine(pytester):
+    pytester.makefile(".toml", machine="[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nunits = { gear_ratio = 10 }\n")
+    pytester.makepyfile(
+        """
+        import ferrodrive
+        import pytest
+
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4"])
+        def test_ideal(ferrodrive_world):
+            ferrodrive_world.run_for(0.1)
+            assert ferrodrive_world[4].statusword is not None
+
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4"], timing="device")
+        def test_device(ferrodrive_world):
+            # It boots in 0.9 s or more, and has no power for its statusword before.
+            ferrodrive_world.run_for(0.1)
+            assert ferrodrive_world.frames(10) == []
+            ferrodrive_world.run_for(2)
+            assert any("704#00" in frame for frame in ferrodrive_world.frames(10))
+
+        @pytest.mark.ferrodrive(machine="machine.toml", timing="device")
+        def test_machine(ferrodrive_world):
+            assert ferrodrive_world.nodes == [4]
+            assert ferrodrive_world.frames(10) == []
+
+        @pytest.mark.ferrodrive(machine="machine.toml", bitrate=250_000)
+        def test_both(ferrodrive_world):
+            pass
+        """
+    )
+    result = pytester.runpytest()
+    result.assert_outcomes(passed=3, errors=1)
+    result.stdout.fnmatch_lines(["*a machine file says its bit rate*"])

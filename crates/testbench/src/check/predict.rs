@@ -189,10 +189,8 @@ fn of_boot(intended: &Intended, booted: &BootReport, report: &mut Reporter<'_>) 
         }
         if let (Some(ErrorStatus::InitiallyOperational), Some(first)) = (node.status, place.writes.first()) {
             report.node = Some(node.node);
-            let what = format!(
-                "it is operational by itself, and a boot-up leaves it so: its {} writes are not made",
-                place.writes.len()
-            );
+            let what =
+                "it is operational by itself, and a boot-up leaves it so: what the file sets of it is not written";
             let next =
                 "boot it with `ferrodrive boot FILE --reset`, which says with status 1 what is missing without that";
             report.say(Severity::Warning, first.at, what, next);
