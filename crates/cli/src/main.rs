@@ -38,7 +38,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, FromArgMatches};
 use clap_complete::env::CompleteEnv;
 
-use crate::args::{Cli, Command, command_line};
+use crate::args::{Cli, Command};
 use crate::command::completions::ASKED_BY;
 use crate::command::departures::DepartureList;
 use crate::command::objects::{Objects, Whose};
@@ -47,6 +47,7 @@ use crate::failure::{Failure, FailureReport};
 use crate::global::Global;
 use crate::output::{Format, Report};
 use crate::plain::{plain, short};
+use crate::scope::command_line;
 use plot::Paint;
 
 fn main() -> ExitCode {
