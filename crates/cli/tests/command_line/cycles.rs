@@ -16,7 +16,7 @@ fn arm(folder: &Scratch, period: &str) -> String {
         )
     };
     let (drives, axes): (String, String) = ((1..=6).map(drive).collect(), (1..=6).map(axis).collect());
-    let file = folder.join(&format!("arm_{period}.toml"));
+    let file = folder.join(format!("arm_{period}.toml"));
     let text = format!("bitrate = '1M'\n{drives}[[group]]\nname = 'arm'\nperiod = '{period}'\n{axes}");
     std::fs::write(&file, text).unwrap();
     file.to_str().unwrap().to_owned()
