@@ -1,6 +1,6 @@
 //! The command line as a whole: what every command takes, and the list of commands, each from its own file.
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 
 use crate::command::{
     boot, check, completions, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, events, explain, export,
@@ -8,7 +8,6 @@ use crate::command::{
     record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time, top, watch, world,
 };
 use crate::global::Global;
-use crate::scope;
 
 /// CANopen motor drives, virtual and real: simulate them, look into them, move them.
 #[derive(Parser)]
@@ -20,11 +19,6 @@ pub(crate) struct Cli {
     pub(crate) global: Global,
     #[command(subcommand)]
     pub(crate) command: Command,
-}
-
-/// The command line as it is parsed and shown: of each command the options that it heeds.
-pub(crate) fn command_line() -> clap::Command {
-    scope::only_heeded(Cli::command())
 }
 
 /// All commands.

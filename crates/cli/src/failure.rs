@@ -6,6 +6,7 @@ use canopen::{AbortCode, Mux, NodeId};
 use clap::error::{ContextKind, ErrorKind};
 use serde::Serialize;
 
+use crate::plain::short;
 use crate::signals::Signal;
 use crate::status::Status;
 use testbench::models::how_to_say;
@@ -83,7 +84,7 @@ impl Failure {
 
     /// What the parser of the command line found, for programs; people get its own text.
     pub(crate) fn of_command_line(error: &clap::Error) -> Self {
-        let text = error.render().to_string();
+        let text = short(&error.render().to_string());
         let (what, rest) = text.split_once("\n\n").unwrap_or((&text, ""));
         let what: Vec<&str> = what.lines().map(str::trim).collect();
         let failure = Self::usage(what.join(" ").trim_start_matches("error: "));

@@ -39,7 +39,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, FromArgMatches};
 use clap_complete::env::CompleteEnv;
 
-use crate::args::{Cli, Command, command_line};
+use crate::args::{Cli, Command};
 use crate::command::completions::ASKED_BY;
 use crate::command::departures::DepartureList;
 use crate::command::objects::{Objects, Whose};
@@ -47,8 +47,9 @@ use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
 use crate::global::Global;
 use crate::output::{Format, Report};
-use crate::plain::plain;
+use crate::plain::{plain, short};
 use crate::recording::LogPath;
+use crate::scope::command_line;
 use plot::Paint;
 
 fn main() -> ExitCode {
@@ -124,7 +125,7 @@ fn refuse_command_line(error: &clap::Error) -> ExitCode {
 /// commands for the terminal along, which are spelled out.
 fn show_usage(error: &clap::Error) -> ExitCode {
     let text = error.render().to_string();
-    let shown = plain(&text);
+    let shown = short(&plain(&text));
     if shown == text {
         error.exit();
     }
@@ -141,7 +142,7 @@ fn complain(format: Format, failure: &Failure) {
     if format.json {
         // Nobody may be listening any more; the exit status still tells.
         if let Ok(line) = sim::json::to_string(&FailureReport::from(failure)) {
-            let _ = writeln!(io::stdout(), "{line}");
+            let _ = writeln!(io::stdout(), "{}", short(&line));
         }
         return;
     }
@@ -150,7 +151,7 @@ fn complain(format: Format, failure: &Failure) {
     }
     let error = Paint::for_stream(&io::stderr()).bad("error:");
     // Nobody may be listening any more; the exit status still tells.
-    let _ = writeln!(io::stderr(), "{error} {}", plain(&failure.to_string()));
+    let _ = writeln!(io::stderr(), "{error} {}", short(&plain(&failure.to_string())));
 }
 
 /// What was given on the command line, not by the environment.

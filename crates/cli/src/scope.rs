@@ -3,11 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use clap::ArgMatches;
 use clap::parser::ValueSource;
+use clap::{ArgMatches, CommandFactory};
 use transport::BusSpec;
 
-use crate::args::Command;
+use crate::args::{Cli, Command};
 use crate::command::objects::Whose;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -132,8 +132,9 @@ const CHECK_OF_A_FILE: Unheeded = Unheeded {
     next: "leave it away, or give --bus to have the drives asked that are there",
 };
 
-/// The command line with help that shows of each command what it heeds.
-pub(crate) fn only_heeded(mut command: clap::Command) -> clap::Command {
+/// The command line as it is parsed and shown: of each command the options that it heeds.
+pub(crate) fn command_line() -> clap::Command {
+    let mut command = Cli::command();
     for row in UNHEEDED {
         for option in row.options {
             // As the parser hands it down to every command, but not shown.
@@ -198,10 +199,9 @@ fn refuse_two_models(global: &Global) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use clap::{CommandFactory, FromArgMatches};
+    use clap::FromArgMatches;
 
     use super::*;
-    use crate::args::Cli;
 
     const REAL_BUS: &str = "socketcand://127.0.0.1:1/can0";
 
@@ -280,7 +280,7 @@ mod tests {
     /// Whether a line with an option is taken, on this bus.
     fn is_taken(line: &[&str], bus: &[&str], option: &str) -> bool {
         let all = [&["ferrodrive"], bus, line].concat();
-        let matches = only_heeded(Cli::command()).try_get_matches_from(&all).unwrap_or_else(|e| panic!("{all:?}: {e}"));
+        let matches = command_line().try_get_matches_from(&all).unwrap_or_else(|e| panic!("{all:?}: {e}"));
         let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| panic!("{all:?}: {e}"));
         let refused = refuse_unheeded(&cli.global, &cli.command, &matches).err();
         let said = refused.as_ref().map(|failure| failure.what.as_str());
@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn every_option_that_the_help_of_a_command_shows_is_taken_by_it_and_no_other() {
-        let mut built = only_heeded(Cli::command());
+        let mut built = command_line();
         built.build();
         let options: Vec<_> = Cli::command()
             .get_arguments()

@@ -42,6 +42,10 @@ pub(crate) fn stimulus_forms() -> Vec<&'static str> {
     FORMS.to_vec()
 }
 
+fn timing_mode(timing: &str) -> PyResult<TimingMode> {
+    timing.parse().map_err(|_| bad_value(format!("{timing:?} is no timing; expected ideal or device")))
+}
+
 /// A bus with everything on it, in virtual time; `ferrodrive.World` is what users have.
 #[pyclass(frozen, subclass, weakref, module = "ferrodrive._native")]
 pub(crate) struct World {
@@ -223,16 +227,15 @@ impl World {
 
     /// How long boot, answers and stores take of drives that are added from here on: `ideal`, or `device`.
     fn set_timing(&self, py: Python<'_>, timing: &str) -> PyResult<()> {
-        let mode: TimingMode =
-            timing.parse().map_err(|_| bad_value(format!("{timing:?} is no timing; expected ideal or device")))?;
-        self.shared.lock(py)?.world.set_timing(mode);
+        self.shared.lock(py)?.world.set_timing(timing_mode(timing)?);
         Ok(())
     }
 
     /// Becomes the world that a machine file describes; data sheets that it names are looked for beside it.
-    fn become_machine(&self, py: Python<'_>, path: PathBuf, seed: Option<u64>) -> PyResult<()> {
+    fn become_machine(&self, py: Python<'_>, path: PathBuf, seed: Option<u64>, timing: Option<&str>) -> PyResult<()> {
         let mut machine = machine_file::read(&path).map_err(|reason| bad_value(named(&path, reason)))?;
         machine.seed = seed.or(machine.seed);
+        machine.timing = timing.map(timing_mode).transpose()?.or(machine.timing);
         let world = machine.build().map_err(|bad| bad_value(bad.named(path.display().to_string())))?;
         *self.shared.lock(py)? = State { machine: Some(Arc::new(machine)), ..State::new(world) };
         Ok(())

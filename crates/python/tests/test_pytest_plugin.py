@@ -158,3 +158,39 @@ def test_the_served_simulator_is_ready(pytester):
         """
     )
     pytester.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)
+
+
+def test_the_marker_says_the_timing_and_the_machine(pytester):
+    pytester.makefile(".toml", machine="[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nunits = { gear_ratio = 10 }\n")
+    pytester.makepyfile(
+        """
+        import ferrodrive
+        import pytest
+
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4"])
+        def test_ideal(ferrodrive_world):
+            ferrodrive_world.run_for(0.1)
+            assert ferrodrive_world[4].statusword
+
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4"], timing="device")
+        def test_device(ferrodrive_world):
+            # It boots in about a second, and has no statusword before.
+            ferrodrive_world.run_for(0.1)
+            assert not ferrodrive_world[4].statusword
+            ferrodrive_world.run_for(2)
+            assert ferrodrive_world[4].statusword
+
+        @pytest.mark.ferrodrive(machine="machine.toml", timing="device")
+        def test_machine(ferrodrive_world):
+            assert ferrodrive_world.nodes == [4]
+            ferrodrive_world.run_for(0.1)
+            assert not ferrodrive_world[4].statusword
+
+        @pytest.mark.ferrodrive(machine="machine.toml", bitrate=250_000)
+        def test_both(ferrodrive_world):
+            pass
+        """
+    )
+    result = pytester.runpytest()
+    result.assert_outcomes(passed=3, errors=1)
+    result.stdout.fnmatch_lines(["*a machine file says its bit rate*"])

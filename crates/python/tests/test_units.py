@@ -60,16 +60,23 @@ def test_a_drive_of_the_file_is_moved_by_what_its_output_does(world, network):
     # What is said at the call overrules the file.
     network.drive(1, "cia402", gear_ratio=1).move(30, relative=True)
     assert turned(world, 1, before) == pytest.approx(180, abs=1)
-    # A copy of a world is of the same file.
-    with ferrodrive.Network(world.snapshot()) as copy:
-        copy.drive(1).move(3, relative=True)
+
+
+def test_a_copy_of_a_world_is_of_the_same_file(world):
+    copy = world.snapshot()
+    with ferrodrive.Network(copy) as network:
+        network.wait_for(1)
+        network.sleep(0.5)
+        before = copy[1].shaft_angle_rad
+        network.drive(1).move(3, relative=True)
+        assert turned(copy, 1, before) == pytest.approx(150, abs=1)
 
 
 def test_a_group_and_a_base_are_behind_the_same_gears(world, network):
     limits = {"mode": "csp", "velocity_rpm": 12, "acceleration_rpm_s": 60, "following_error_deg": 10}
     before = world[1].shaft_angle_rad
     with network.group([ferrodrive.Axis(1, "cia402", **limits)], period=0.002) as group:
-        group.move([group.state()["axes"][0]["position_deg"] + 3])
+        group.move([group.state()["axes"][0]["set_point_deg"] + 3])
         network.sleep(0.2)
     assert turned(world, 1, before) == pytest.approx(150, abs=1)
     before = world[4].shaft_angle_rad

@@ -27,7 +27,8 @@ use plot::Paint;
 /// that; where not, it says so. Then it tells what happens: lost heartbeats, states, emergency messages with fault and remedy,
 /// another master. A node whose supply or cable was away is stopped, identified and configured again; the word `resume NODE` on
 /// standard input starts it (NMT). While a drive that watches this command's heartbeat is out of reach, the heartbeat is held
-/// back, so that nothing goes on by itself: that stops every drive that watches it. It never moves a motor. Ctrl-C ends it, and the
+/// back, so that nothing goes on by itself: that stops every drive that watches it. A node that was operational is left as it is; if it
+/// does not have what the file says, the command ends with status 1. It never moves a motor. Ctrl-C ends it, and the
 /// drives no longer watch it then.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -81,7 +82,13 @@ impl Supervise {
         context.progress.show(format!("booting {} nodes", plan.nodes.len()));
         let mut others = context.traffic.of_others();
         let report = context.network.boot(&plan).await;
-        format.print(&BootReport::new(&plan, &report)).map_err(Failure::not_printed)?;
+        let unconfigured = context.network.unconfigured(&plan, &report).await;
+        let booted = BootReport::new(&plan, &report, &unconfigured);
+        format.print(&booted).map_err(Failure::not_printed)?;
+        if let Some(failure) = booted.failure().filter(|_| !unconfigured.is_empty()) {
+            // What is watched had better be what was planned.
+            return Err(failure);
+        }
         while context.network.poll_event().is_some() {}
         let mut supervisor = Supervisor::new(context.network.clone(), plan);
         context.progress.show("watching; Ctrl-C ends it");

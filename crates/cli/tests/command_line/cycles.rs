@@ -16,7 +16,7 @@ fn arm(folder: &Scratch, period: &str) -> String {
         )
     };
     let (drives, axes): (String, String) = ((1..=6).map(drive).collect(), (1..=6).map(axis).collect());
-    let file = folder.join(&format!("arm_{period}.toml"));
+    let file = folder.join(format!("arm_{period}.toml"));
     let text = format!("bitrate = '1M'\n{drives}[[group]]\nname = 'arm'\nperiod = '{period}'\n{axes}");
     std::fs::write(&file, text).unwrap();
     file.to_str().unwrap().to_owned()
@@ -52,7 +52,9 @@ fn plan_check_and_group_say_the_same_of_a_cycle() {
             continue;
         }
         // The cause, the period that fits and nothing that only a programmer knows; and nothing was written or moved.
-        let finding = &check.json()["findings"][0];
+        let check = check.json();
+        let mut findings = check["findings"].as_array().unwrap().iter();
+        let finding = findings.find(|finding| finding["rule"] == "cycle-load").unwrap();
         assert!(finding["what"].as_str().unwrap().contains("does not fit the bus"), "{finding}");
         assert!(finding["next"].as_str().unwrap().contains("1.5 ms"), "{finding}");
         assert_eq!(moved.json()["error"]["kind"], "bus_load");
@@ -82,4 +84,25 @@ fn a_group_is_spoken_of_in_degrees() {
     let beyond = ferrodrive(&["group", "move", &file, "1=200deg"]);
     assert_eq!(beyond.status, Some(2));
     assert!(beyond.err.contains("at 200 deg") && beyond.err.contains("-170 to 170 deg"), "{}", beyond.err);
+}
+
+/// Joints are operational by themselves and left so: their heartbeats are not written, which is no success.
+#[test]
+fn a_boot_up_that_leaves_the_configuration_of_the_file_unwritten_does_not_end_with_0() {
+    let folder = scratch("unconfigured");
+    let file = arm(&folder, "5ms");
+    for command in [&["boot", &file][..], &["supervise", &file, "--for", "1s"]] {
+        let ended = ferrodrive(&[&["--json"], command].concat());
+        let node = &ended.json()["nodes"][0];
+        let said = (ended.status, &node["letter"], &node["unconfigured"][0]);
+        assert_eq!(said, (Some(1), &"L".into(), &"1017h:00".into()));
+        let text = ferrodrive(command).out;
+        assert!(text.contains("not configured: 1017h:00") && text.contains("--reset"), "{text}");
+    }
+    let reset = ferrodrive(&["--json", "boot", &file, "--reset"]);
+    assert_eq!((reset.status, &reset.json()["ok"]), (Some(0), &true.into()), "{}", reset.out);
+    let check = ferrodrive(&["--json", "check", &file]).json();
+    let findings = check["findings"].as_array().unwrap().iter();
+    let warned = findings.filter(|finding| finding["what"].as_str().unwrap().contains("is not written"));
+    assert_eq!(warned.count(), 6, "{check}");
 }

@@ -239,3 +239,29 @@ fn a_twist_beyond_the_limits_of_a_base_is_refused_with_the_most_that_there_is() 
         ],
     );
 }
+
+#[test]
+fn an_overlong_argument_is_not_repeated_as_a_whole() {
+    let long = "x".repeat(10_000);
+    let set = format!("a={long}");
+    for arguments in [&["read", &long, "6064"][..], &[&long], &["--bus", &long, "scan"], &["run", &long, "--set", &set]]
+    {
+        let ended = ferrodrive(arguments);
+        assert_eq!(ended.status, Some(2));
+        assert!(ended.err.len() < 2_000 && ended.err.contains("10000 characters"), "{}", &ended.err[..500]);
+        let json = ferrodrive(&[&["--json"], arguments].concat());
+        assert!(json.out.len() < 2_000, "{}", json.out.len());
+    }
+}
+
+/// Editors and shells of Windows put a byte order mark before UTF-8.
+#[test]
+fn a_byte_order_mark_before_a_machine_file_and_a_log_is_passed_over() {
+    let directory = scratch("byte_order_mark");
+    let (machine, log) = (directory.join("machine.toml"), directory.join("trace.log"));
+    std::fs::write(&machine, "\u{feff}[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n").unwrap();
+    done(&["--bus", &format!("sim:{}", machine.display()), "state", "4"]);
+    std::fs::write(&log, "\u{feff}(0.001) can0 000#0104\n(0.002) can0 080#\n").unwrap();
+    let decoded = done(&["decode", log.to_str().unwrap()]);
+    assert!(decoded.out.contains("NMT") && !decoded.err.contains("line 1"), "{}{}", decoded.out, decoded.err);
+}

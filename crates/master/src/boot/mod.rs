@@ -29,6 +29,7 @@ mod letter;
 mod node;
 mod report;
 mod step;
+mod unconfigured;
 
 use canopen::NmtCommand;
 
@@ -37,6 +38,7 @@ pub use expectation::{BadPlan, BootPlan, Expectation};
 pub use letter::ErrorStatus;
 pub use report::{BootReport, NodeReport};
 pub use step::{Expected, Found, Heard, Step, StepKind, Verdict};
+pub use unconfigured::Unconfigured;
 
 use crate::network::{Network, join_all};
 use node::NodeBoot;

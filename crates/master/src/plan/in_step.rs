@@ -18,7 +18,7 @@
 //! precedence relations in the schedulability analysis of distributed real-time systems", 1999, with all offsets but those of
 //! precedence left open. Both analyses are bounds, so that the smaller one is.
 
-use super::response_time::{Queued, after, nanos, wire_ns};
+use super::queued::{Queued, after, nanos, wire_ns};
 
 /// Rounds in which the times settle. What has not by then is taken for having no bound.
 const ROUNDS: usize = 100;
@@ -100,9 +100,8 @@ impl<'a> InStep<'a> {
     /// bound.
     fn end_of_cycle(&self, root: usize, times: &Times) -> Option<u64> {
         let cycle = || self.members.iter().filter(|member| member.root == root);
-        if cycle().nth(1).is_none() {
-            return None;
-        }
+        // Of one alone the other way is the better one.
+        cycle().nth(1)?;
         let period_ns = self.members[root].period_ns;
         let late_ns = cycle().map(|member| member.jitter_ns).max()?;
         let answer_ns = cycle().filter_map(|member| member.frame.trigger).map(|trigger| nanos(trigger.most)).max();

@@ -26,11 +26,13 @@
 //! ```
 
 mod in_step;
+mod queued;
 mod read;
 mod response_time;
 mod traffic;
 
-pub use response_time::{Bound, ErrorRate, Queued, Trigger, load, response_times};
+pub use queued::{Queued, Trigger};
+pub use response_time::{Bound, ErrorRate, load, response_times};
 pub use traffic::{
     HostQueue, NodeTraffic, Plan, PlannedFrame, Purpose, Remark, Settings, most_nodes, plan, shortest_cycle,
 };

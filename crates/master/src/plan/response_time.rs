@@ -8,7 +8,7 @@
 //!   has to win arbitration first, so that it waits at the priority of the least urgent of them. As Davis, Kollmann, Pollex and
 //!   Slomka, "Controller Area Network (CAN) schedulability analysis with FIFO queues", 2011, with the frames ahead
 //!   known by name in place of all of the queue.
-//! - Frames that answer others ([`Trigger`]): a TPDO comes after SYNC, as much later as its device takes.
+//! - Frames that answer others ([`Trigger`](super::Trigger)): a TPDO comes after SYNC, as much later as its device takes.
 //!
 //! Where that finds a frame late, a second analysis counts what comes in step once (`in_step.rs`), and the smaller bound is told.
 //!
@@ -16,39 +16,10 @@
 
 use std::time::Duration;
 
+use can::{Bitrate, Frame};
+
 use super::in_step::InStep;
-use can::{Bitrate, CanId, Frame, INTERFRAME_SPACE_BITS, fewest_frame_bits, most_frame_bits};
-
-/// A frame that comes again and again.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Queued {
-    /// Its identifier: its priority.
-    pub id: CanId,
-    /// Data bytes, 0 to 8.
-    pub length: u8,
-    /// Shortest time between two; not zero.
-    pub period: Duration,
-    /// How much later than its period it may be offered to the bus.
-    pub jitter: Duration,
-    /// What of the other frames, by number, may stand before it in the queue of its sender's controller.
-    pub ahead: Vec<usize>,
-    /// The frame at the beginning of whose period it is offered, period for period, as a host sends its set-points with SYNC.
-    /// `None`: it comes when it likes.
-    pub with: Option<usize>,
-    /// The frame that it answers.
-    pub trigger: Option<Trigger>,
-}
-
-/// Offered a while after another frame has come.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Trigger {
-    /// Which of the frames.
-    pub by: usize,
-    /// Shortest time from its last bit.
-    pub least: Duration,
-    /// Longest.
-    pub most: Duration,
-}
+use super::queued::{HORIZON_NS, Queued, after, nanos, wire_ns};
 
 /// How often the bus destroys a frame, at most: one in this time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,9 +38,6 @@ pub struct Bound {
 /// An error flag with its echo, the delimiter and interframe space, and what an error-passive sender waits: bits lost by a
 /// destroyed frame beside the frame.
 const ERROR_BITS: u64 = 31;
-
-/// No frame of a machine waits that long; an analysis that gets there has no bound.
-const HORIZON_NS: u64 = 100_000_000_000;
 
 /// Rounds in which triggers, queues and jitters settle. Each raises a bound or ends it.
 const ROUNDS: usize = 200;
@@ -148,12 +116,6 @@ pub fn load(frames: &[Queued], bitrate: Bitrate) -> f64 {
     frames.iter().map(|frame| Sent::new(frame, bit_ns)).map(|sent| sent.time_ns as f64 / sent.period_ns as f64).sum()
 }
 
-/// When a triggered frame may be offered at the earliest, from the beginning of the trigger's period.
-pub(super) fn after(trigger: &Trigger, frames: &[Queued], bit_ns: u64) -> u64 {
-    let by = &frames[trigger.by];
-    u64::from(fewest_frame_bits(by.id.is_extended(), by.length)) * bit_ns + nanos(trigger.least)
-}
-
 /// The jitter with which a frame is offered: its own, and that of its trigger's coming.
 fn offered_late(frame: &Queued, frames: &[Queued], known: &[Known], bit_ns: u64) -> u64 {
     let own_ns = nanos(frame.jitter);
@@ -161,15 +123,6 @@ fn offered_late(frame: &Queued, frames: &[Queued], known: &[Known], bit_ns: u64)
     let Some(response_ns) = known[trigger.by].response_ns else { return HORIZON_NS };
     let latest_ns = response_ns + nanos(trigger.most);
     own_ns + latest_ns.saturating_sub(after(&trigger, frames, bit_ns))
-}
-
-pub(super) fn nanos(time: Duration) -> u64 {
-    u64::try_from(time.as_nanos()).map_or(HORIZON_NS, |ns| ns.min(HORIZON_NS))
-}
-
-/// Time on the wire with the most stuff bits, interframe space included.
-pub(super) fn wire_ns(frame: &Queued, bit_ns: u64) -> u64 {
-    u64::from(most_frame_bits(frame.id.is_extended(), frame.length) + INTERFRAME_SPACE_BITS) * bit_ns
 }
 
 impl<'a> Sent<'a> {
@@ -310,7 +263,10 @@ impl Work<'_> {
 
 #[cfg(test)]
 mod tests {
+    use can::CanId;
+
     use super::*;
+    use crate::plan::Trigger;
 
     fn frame(id: u16, length: u8, period_us: u64) -> Queued {
         let period = Duration::from_micros(period_us);

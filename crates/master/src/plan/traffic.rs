@@ -8,7 +8,8 @@ use canopen::pdo::{Direction, EventTrigger, PdoId, PdoNumber};
 use canopen::{CobId, NodeId, connection_set};
 use devices::Timing;
 
-use super::response_time::{Bound, ErrorRate, Queued, Trigger, load, response_times};
+use super::queued::{Queued, Trigger};
+use super::response_time::{Bound, ErrorRate, load, response_times};
 use crate::network::DEFAULT_TIMEOUT;
 use crate::pdo::{PdoConfig, TransmissionType};
 

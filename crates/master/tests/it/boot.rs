@@ -14,7 +14,9 @@ use canopen::{Mux, NmtState, NodeId};
 use devices::model;
 use drives::mjoint::Model;
 use master::Network;
-use master::boot::{Assignment, BootPlan, BootReport, ErrorStatus, Expectation, NodeReport, StepKind, Verdict};
+use master::boot::{
+    Assignment, BootPlan, BootReport, ErrorStatus, Expectation, NodeReport, StepKind, Unconfigured, Verdict,
+};
 use sim::machine::{mjoint, zlac8030l, zlim42c};
 use sim::{Place, World, block_on};
 
@@ -42,6 +44,10 @@ impl Bench {
 
     fn boot(&mut self, plan: &BootPlan) -> BootReport {
         block_on(&mut self.world, self.network.boot(plan)).unwrap()
+    }
+
+    fn unconfigured(&mut self, plan: &BootPlan, report: &BootReport) -> Vec<Unconfigured> {
+        block_on(&mut self.world, self.network.unconfigured(plan, report)).unwrap()
     }
 
     fn one(&mut self, id: u8, expectation: Expectation) -> NodeReport {
@@ -268,4 +274,29 @@ fn nobody_on_the_bus_is_said_within_the_time_of_the_plan() {
     assert_eq!(letter(&report), Some('B'));
     assert!(last(&report).contains("check supply, cable, termination and bit rate"), "{}", last(&report));
     assert!(bus.now - began <= plan.boot_time + plan.timeout * 2);
+}
+
+/// A joint starts operational by itself (M joint manual, 4.2), and is left so (CiA 302-2, 1F81h bit 4): its configuration is not
+/// written. That is told of it as long as it is so, and no longer.
+#[test]
+fn a_node_that_was_left_operational_without_its_configuration_is_told() {
+    let mut bench = Bench::new();
+    let heartbeat = Mux::new(0x1017, 0);
+    let of_joint = Expectation { configuration: vec![(heartbeat, vec![200, 0])], ..expected("m4230e17b50") };
+    let others = all().into_iter().filter(|(id, _)| *id != node(JOINT));
+    let plan = BootPlan::new(others.chain([(node(JOINT), of_joint)]));
+    let report = bench.boot(&plan);
+    assert!(report.is_whole());
+    let missing = bench.unconfigured(&plan, &report);
+    assert_eq!(missing, [Unconfigured { node: node(JOINT), objects: vec![heartbeat] }]);
+    // Reset and booted it is configured; and left so the next time, nothing is missing.
+    let mut reset = plan.clone();
+    for expectation in reset.nodes.values_mut() {
+        expectation.assignment = expectation.assignment.without(Assignment::KEEP_ALIVE);
+    }
+    let report = bench.boot(&reset);
+    assert_eq!(bench.unconfigured(&reset, &report), []);
+    let report = bench.boot(&plan);
+    assert_eq!(letter(&report.nodes[0]), Some('L'));
+    assert_eq!(bench.unconfigured(&plan, &report), []);
 }

@@ -3,8 +3,15 @@
 ``ferrodrive_world`` is an empty world whose virtual time is in use; ``ferrodrive_sim`` is the served simulator as a process, its
 drives booted. What they begin with is said by a marker::
 
-    @pytest.mark.ferrodrive(drives=["zlac8030l@4"], bitrate=500_000, seed=7)
+    @pytest.mark.ferrodrive(drives=["zlac8030l@4"], bitrate=500_000, seed=7, timing="device")
     def test_wheel(ferrodrive_world): ...
+
+    @pytest.mark.ferrodrive(machine="examples/machine.toml")
+    def test_machine(ferrodrive_world): ...
+
+``timing`` says whether the drives take the time that such drives take to boot, to answer and to store: ``device`` is what ``ferrodrive
+sim`` and real drives have; without it a world has ``ideal``, in which none of that takes time, and a served simulator ``device``. A machine
+file is looked for in pytest's root; its own bit rate, seed and timing count.
 
 A test that fails shows, of each world among its fixtures, the last frames, the state of the drives, and a plot of the last seconds:
 in the report of pytest-html if there is one, else as an SVG file that the report names.
@@ -13,6 +20,7 @@ in the report of pytest-html if there is one, else as an SVG file that the repor
 from __future__ import annotations
 
 import importlib
+import os
 import pathlib
 import re
 from collections.abc import Iterator
@@ -33,7 +41,11 @@ WORLDS = pytest.StashKey[dict[str, World]]()
 
 def pytest_configure(config: pytest.Config) -> None:
     """Makes the marker known."""
-    words = "ferrodrive(drives=[], bitrate=500000, seed=1, extra=[]): what ferrodrive_world and ferrodrive_sim begin with"
+    words = (
+        "ferrodrive(drives=[], machine=FILE, bitrate=500000, seed=1, timing='ideal', extra=[]): what ferrodrive_world and "
+        "ferrodrive_sim begin with; timing is 'device' (as real drives) for ferrodrive_sim, and 'ideal' (boot, answers and stores take no "
+        "time) for ferrodrive_world"
+    )
     config.addinivalue_line("markers", words)
 
 
@@ -41,7 +53,10 @@ def pytest_configure(config: pytest.Config) -> None:
 def ferrodrive_world(request: pytest.FixtureRequest) -> Iterator[World]:
     """A virtual bus with the drives of the marker, its virtual time in use: sleeping and waiting moves it, and nothing else."""
     wanted = marked(request)
-    world = World(wanted.get("bitrate", 500_000), wanted.get("seed", 1))
+    if "machine" in wanted:
+        world = World.machine(machine_file(request, wanted), wanted.get("seed"), timing=wanted.get("timing"))
+    else:
+        world = World(wanted.get("bitrate", 500_000), wanted.get("seed", 1), wanted.get("timing", "ideal"))
     with virtual_time(world):
         for place in wanted.get("drives", ()):
             model, _, node = place.rpartition("@")
@@ -53,7 +68,12 @@ def ferrodrive_world(request: pytest.FixtureRequest) -> Iterator[World]:
 def ferrodrive_sim(request: pytest.FixtureRequest) -> Iterator[Simulator]:
     """``ferrodrive sim`` with the drives of the marker as a process of its own, in real time, its drives booted."""
     wanted = marked(request)
-    with Simulator(wanted.get("drives", ()), wanted.get("seed", 1), wanted.get("extra", ())) as simulator:
+    extra = list(wanted.get("extra", ()))
+    if "machine" in wanted:
+        extra += ["--machine", os.fspath(machine_file(request, wanted))]
+    if "timing" in wanted:
+        extra += ["--timing", wanted["timing"]]
+    with Simulator(wanted.get("drives", ()), wanted.get("seed", 1), extra) as simulator:
         # A clock that only moves when it is told to boots no drive by waiting.
         if "manual" not in simulator.command_line:
             simulator.wait_until_booted()
@@ -64,6 +84,13 @@ def marked(request: pytest.FixtureRequest) -> dict[str, Any]:
     """What the test's marker says."""
     marker = request.node.get_closest_marker("ferrodrive")
     return {} if marker is None else marker.kwargs
+
+
+def machine_file(request: pytest.FixtureRequest, wanted: dict[str, Any]) -> pathlib.Path:
+    """The machine file of the marker, from pytest's root."""
+    if "bitrate" in wanted:
+        raise ValueError("a machine file says its bit rate: leave bitrate away, or say it there")
+    return request.config.rootpath / wanted["machine"]
 
 
 @pytest.hookimpl(hookwrapper=True)

@@ -51,15 +51,16 @@ class World(_native.World):
         return world
 
     @classmethod
-    def machine(cls, path: Union[str, os.PathLike[str]], seed: Optional[int] = None) -> World:
+    def machine(cls, path: Union[str, os.PathLike[str]], seed: Optional[int] = None, *, timing: Optional[str] = None) -> World:
         """The world that a machine file describes: its drives and what is around them. Data sheets that it names are looked for beside
         it. A file that makes no sense raises :class:`ValueError` with everything that is wrong in it.
 
         :param seed: instead of the file's
+        :param timing: ``ideal`` or ``device`` instead of the file's; drives that say it for themselves keep theirs
         """
         os.stat(path)
         world = cls()
-        world.become_machine(os.fspath(path), seed)
+        world.become_machine(os.fspath(path), seed, timing)
         return world
 
     def add(

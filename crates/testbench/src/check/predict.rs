@@ -187,6 +187,14 @@ fn of_boot(intended: &Intended, booted: &BootReport, report: &mut Reporter<'_>) 
             );
             report.say(Severity::Error, place.place_of(step.object), what, status.advice());
         }
+        if let (Some(ErrorStatus::InitiallyOperational), Some(first)) = (node.status, place.writes.first()) {
+            report.node = Some(node.node);
+            let what =
+                "it is operational by itself, and a boot-up leaves it so: what the file sets of it is not written";
+            let next =
+                "boot it with `ferrodrive boot FILE --reset`, which says with status 1 what is missing without that";
+            report.say(Severity::Warning, first.at, what, next);
+        }
     }
     report.node = None;
 }

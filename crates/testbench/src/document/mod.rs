@@ -25,5 +25,12 @@ pub fn read_text(path: &Path) -> Result<String, String> {
     let mut text = String::new();
     let file = File::open(path).map_err(|error| error.to_string())?;
     let read = file.take(LARGEST + 1).read_to_string(&mut text).map_err(|_| "it is no text".to_owned())?;
-    if read as u64 > LARGEST { Err("it has more than 1 MB; nobody needs that".into()) } else { Ok(text) }
+    if read as u64 > LARGEST {
+        return Err("it has more than 1 MB; nobody needs that".into());
+    }
+    // A byte order mark of an editor is no part of the text.
+    if text.starts_with('\u{feff}') {
+        text.remove(0);
+    }
+    Ok(text)
 }

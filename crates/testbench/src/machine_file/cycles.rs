@@ -1,14 +1,15 @@
-//! What a master does cycle by cycle with the machine of a file: each of its groups and its base, as a bus carries them.
+//! What a master does with the machine of a file: its drives behind their gears, and cycle by cycle each of its groups and its base,
+//! as a bus carries them.
 
 use std::time::Duration;
 
 use can::Bitrate;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
-use master::Drive;
 use master::group::{AxisSetup, GroupError};
 use master::plan::{NodeTraffic, Plan, Settings, plan, shortest_cycle};
 use master::units::Shown;
+use master::{Drive, Gear, Node};
 
 use super::{BasePlan, GroupPlan, Machine};
 
@@ -125,6 +126,22 @@ pub fn too_full_at(nodes: &[NodeTraffic], cycle: Duration, bitrate: Bitrate) -> 
 }
 
 impl Machine {
+    /// What stands behind the shaft of a drive: `units`. [`Gear::DIRECT`] for a node that is not in the file.
+    pub fn gear(&self, node: NodeId) -> Gear {
+        self.drives.iter().find(|drive| drive.spec.node == node).map_or(Gear::DIRECT, |drive| drive.gear)
+    }
+
+    /// The drive at a node as the file has it: its model, and what stands behind its shaft. Whoever moves a drive of a machine file
+    /// by its model takes it from here, so that the same intent is the same counts.
+    pub fn drive(&self, node: Node) -> Drive {
+        let gear = self.gear(node.id());
+        let drive = match self.models().find(|(id, _)| *id == node.id()) {
+            Some((_, model)) => Drive::new(node, model),
+            None => Drive::of_unknown_model(node),
+        };
+        drive.behind(gear)
+    }
+
     /// What is moved in cycles: each group, then the base.
     pub fn cycles(&self) -> impl Iterator<Item = CyclePlan> + '_ {
         self.groups.iter().map(CyclePlan::from).chain(self.base.iter().map(CyclePlan::from))

@@ -1,11 +1,9 @@
 //! What stands behind the shaft of a drive, in a machine file: `units`. A master counts by it; to the simulator a drive is the
 //! same with it.
 
-use canopen::NodeId;
+use master::Gear;
 use master::units::parse_length;
-use master::{Drive, Gear, Node};
 
-use super::Machine;
 use crate::document::Problem;
 use crate::document::reader::{Field, Table};
 
@@ -16,24 +14,6 @@ const UNITS: &str = "a table of gear_ratio and feed_constant, e.g. { gear_ratio 
 const RATIO: &str =
     "turns of the drive's shaft for one turn of the output: a number, or both as [shaft, output], e.g. [160, 3]";
 const FEED: &str = "the way for one turn of the output as text, e.g. \"10mm\"";
-
-impl Machine {
-    /// What stands behind the shaft of a drive: `units`. [`Gear::DIRECT`] for a node that is not in the file.
-    pub fn gear(&self, node: NodeId) -> Gear {
-        self.drives.iter().find(|drive| drive.spec.node == node).map_or(Gear::DIRECT, |drive| drive.gear)
-    }
-
-    /// The drive at a node as the file has it: its model, and what stands behind its shaft. Whoever moves a drive of a machine file
-    /// by its model takes it from here, so that the same intent is the same counts.
-    pub fn drive(&self, node: Node) -> Drive {
-        let gear = self.gear(node.id());
-        let drive = match self.models().find(|(id, _)| *id == node.id()) {
-            Some((_, model)) => Drive::new(node, model),
-            None => Drive::of_unknown_model(node),
-        };
-        drive.behind(gear)
-    }
-}
 
 /// The gear of a drive; [`Gear::DIRECT`] of one whose table says nothing of it.
 pub(super) fn gear(drive: &Table<'_>) -> Result<Gear, Problem> {
@@ -62,6 +42,9 @@ fn ratio(field: &Field<'_>) -> Result<f64, Problem> {
 
 #[cfg(test)]
 mod tests {
+    use canopen::NodeId;
+
+    use super::super::Machine;
     use super::*;
 
     const DRIVE: &str = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\n";

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::Path;
 
+use super::lines::BYTE_ORDER_MARK;
+
 /// A form of log files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Format {
@@ -69,7 +71,7 @@ impl Format {
             | [0xA1, 0xB2, 0x3C, 0x4D, ..] => return Some(Self::Pcap),
             _ => {}
         }
-        let text = String::from_utf8_lossy(begin);
+        let text = String::from_utf8_lossy(begin.strip_prefix(BYTE_ORDER_MARK).unwrap_or(begin));
         let mut lines = text.lines().map(str::trim_start);
         lines.find_map(|line| of_line(&line.to_ascii_lowercase()))
     }

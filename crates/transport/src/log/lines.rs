@@ -5,6 +5,9 @@ use std::io::{self, BufRead, Read};
 /// Longest line that is read, in bytes; those of logs with classical frames stay below 200.
 pub(super) const MAX_LINE_LENGTH: u64 = 1024;
 
+/// What some editors and shells put before a text of UTF-8; no part of its first line.
+pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
 #[derive(Debug)]
 pub(super) struct Lines<R> {
     input: R,
@@ -28,6 +31,9 @@ impl<R: BufRead> Lines<R> {
         if !self.buffer.ends_with(b"\n") && read as u64 == MAX_LINE_LENGTH {
             self.input.skip_until(b'\n')?;
         }
+        if self.number == 1 && self.buffer.starts_with(BYTE_ORDER_MARK) {
+            self.buffer.drain(..BYTE_ORDER_MARK.len());
+        }
         Ok(Some((self.number, String::from_utf8_lossy(&self.buffer))))
     }
 }
@@ -44,6 +50,14 @@ mod tests {
         assert_eq!(lines.next().unwrap().unwrap().1.len() as u64, MAX_LINE_LENGTH);
         assert_eq!(lines.next().unwrap().unwrap(), (3, "b".into()));
         assert_eq!(lines.next().unwrap(), None);
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_passed_over_where_it_begins_the_text_and_nowhere_else() {
+        let text = "\u{feff}(1.0) can0 123#\n\u{feff}x\n";
+        let mut lines = Lines::new(text.as_bytes());
+        assert_eq!(lines.next().unwrap().unwrap(), (1, "(1.0) can0 123#\n".into()));
+        assert_eq!(lines.next().unwrap().unwrap(), (2, "\u{feff}x\n".into()));
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub(crate) use report::BootReport;
 /// says what it expected and found, and a node that fails has the standard's letter. What is expected is said by the file: a
 /// machine file, or the DCF of a CANopen manager (1F80h to 1F8Ah, 1F22h). Without one, whoever is on the bus is booted as what it says that
 /// it is. A node that is operational is left as it is, unless --reset is given. No motor is moved. Ends with status 1 if a
-/// mandatory node has failed.
+/// mandatory node has failed, or if one that was left as it is does not have what the file says.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive boot examples/machine.toml\n  \
@@ -51,10 +51,7 @@ impl Boot {
         let global = planned.global(global);
         let report = session::run(&global, async |context| self.boot(context, &planned).await)?;
         format.print(&report).map_err(Failure::of_stdout)?;
-        if report.is_whole() {
-            return Ok(());
-        }
-        Err(Failure { told: true, ..Failure::new("a mandatory node has not booted") })
+        report.failure().map_or(Ok(()), Err)
     }
 
     async fn boot(&self, context: &Context, planned: &Planned) -> Result<BootReport, Failure> {
@@ -65,7 +62,8 @@ impl Boot {
         context.progress.show(format!("booting {} nodes", plan.nodes.len()));
         let report = context.network.boot(&plan).await;
         context.settle().await;
-        Ok(BootReport::new(&plan, &report))
+        let unconfigured = context.network.unconfigured(&plan, &report).await;
+        Ok(BootReport::new(&plan, &report, &unconfigured))
     }
 
     fn apply(&self, plan: &mut BootPlan) {

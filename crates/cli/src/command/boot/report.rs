@@ -1,8 +1,10 @@
 //! What `ferrodrive boot` prints.
 
-use master::boot::{self, BootPlan, ErrorStatus, Step, Verdict};
+use canopen::NodeId;
+use master::boot::{self, BootPlan, ErrorStatus, Step, Unconfigured, Verdict};
 use serde::Serialize;
 
+use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
 use plot::Table;
@@ -26,6 +28,8 @@ struct BootedNode {
     /// What it means.
     meaning: Option<&'static str>,
     state: Option<String>,
+    /// Objects of its configuration that have another value, of a node that was operational and was left as it is.
+    unconfigured: Vec<String>,
     steps: Vec<Row>,
 }
 
@@ -41,7 +45,8 @@ struct Row {
 }
 
 impl BootReport {
-    pub(crate) fn new(plan: &BootPlan, report: &boot::BootReport) -> Self {
+    pub(crate) fn new(plan: &BootPlan, report: &boot::BootReport, unconfigured: &[Unconfigured]) -> Self {
+        let of_node = |node: NodeId| unconfigured.iter().filter(move |it| it.node == node).flat_map(|it| &it.objects);
         let nodes = report.nodes.iter().map(|node| BootedNode {
             node: node.node.raw(),
             model: plan.nodes.get(&node.node).and_then(|expected| expected.description).map(|model| model.name),
@@ -49,14 +54,20 @@ impl BootReport {
             letter: node.status.map(ErrorStatus::letter),
             meaning: node.status.map(ErrorStatus::meaning),
             state: node.state.map(|state| state.to_string()),
+            unconfigured: of_node(node.node).map(ToString::to_string).collect(),
             steps: node.steps.iter().map(Row::new).collect(),
         });
-        Self { ok: report.is_whole(), nodes: nodes.collect(), notes: report.notes.clone() }
+        Self { ok: report.is_whole() && unconfigured.is_empty(), nodes: nodes.collect(), notes: report.notes.clone() }
     }
 
-    /// No mandatory node has failed.
-    pub(crate) const fn is_whole(&self) -> bool {
-        self.ok
+    /// Why the command fails, if it does: a mandatory node has, or one does not have what is planned for it.
+    pub(crate) fn failure(&self) -> Option<Failure> {
+        let what = match self.nodes.iter().any(|node| !node.unconfigured.is_empty()) {
+            _ if self.ok => return None,
+            true => "a node is not configured as the file says",
+            false => "a mandatory node has not booted",
+        };
+        Some(Failure { told: true, ..Failure::new(what) })
     }
 }
 
@@ -92,6 +103,14 @@ impl Report for BootReport {
         let mut text = table.text(paint, coloured);
         for node in &self.nodes {
             text.push_str(&format!("\nnode {}: {}", node.node, node.outcome(paint)));
+            if !node.unconfigured.is_empty() {
+                let what = format!("not configured: {} has another value than the file", shown(&node.unconfigured));
+                text.push_str(&format!("\n  {}", paint.bad(&what)));
+                text.push_str(&format!(
+                    "\n  ferrodrive boot FILE --node {} --reset configures it: a motor that turns may stop at once, or go on",
+                    node.node
+                ));
+            }
             for next in node.steps.iter().filter_map(|step| step.next) {
                 text.push_str(&format!("\n  {next}"));
             }
@@ -102,6 +121,16 @@ impl Report for BootReport {
         text
     }
 }
+
+/// The first of some objects, and how many more there are.
+fn shown(objects: &[String]) -> String {
+    let first = objects.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
+    let more = objects.len().saturating_sub(SHOWN);
+    if more == 0 { first } else { format!("{first} and {more} more") }
+}
+
+/// Objects that are named to people.
+const SHOWN: usize = 4;
 
 impl BootedNode {
     fn outcome(&self, paint: Paint) -> String {
