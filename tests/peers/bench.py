@@ -10,7 +10,7 @@ import canopen
 from canopen.objectdictionary import ODVariable
 from ferrodrive import Simulator
 
-from checks import eventually
+from checks import PATIENCE_S, eventually
 
 
 class Remote:
@@ -22,7 +22,7 @@ class Remote:
         self.node_id = node_id
         self.node = drive.node(node_id)
         self.sdo = self.node.sdo
-        self.sdo.RESPONSE_TIMEOUT = 3.0
+        self.sdo.RESPONSE_TIMEOUT = 60.0
 
     def world(self, command):
         """A world command for the drive that was started as this node."""
@@ -54,9 +54,9 @@ class Remote:
     def statusword(self):
         return self.read(0x6041)
 
-    def status_becomes(self, mask, expected, what, timeout_s=5.0):
+    def status_becomes(self, mask, expected, what):
         """Waits for bits of the statusword."""
-        return eventually(self.statusword, lambda word: word & mask == expected, what, timeout_s)
+        return eventually(self.statusword, lambda word: word & mask == expected, what)
 
     def write_all(self, objects):
         """Writes objects with their values: index, sub-index, value."""
@@ -66,10 +66,10 @@ class Remote:
     def values(self, objects):
         return [self.read(index, sub) for index, sub, _ in objects]
 
-    def becomes(self, index, value, tolerance=0, timeout_s=10.0):
+    def becomes(self, index, value, tolerance=0):
         """Waits until an object reads a value, give or take."""
         fits = lambda now: abs(now - value) <= tolerance
-        return eventually(lambda: self.read(index), fits, f"{index:04X}h becomes {value} ± {tolerance}", timeout_s)
+        return eventually(lambda: self.read(index), fits, f"{index:04X}h becomes {value} ± {tolerance}")
 
     def enable(self, mode):
         """Selects a mode and enables operation: by canopen-python's profile where the drive has its power states."""
@@ -99,7 +99,7 @@ class Remote:
         self.write(0x6040, ready | 0x10)
         self.status_becomes(acknowledged, acknowledged, "bit 12 acknowledges the set-point")
         self.write(0x6040, ready)
-        self.status_becomes(acknowledged | 1 << 10, 1 << 10, "bit 10 tells that the target is reached", 20)
+        self.status_becomes(acknowledged | 1 << 10, 1 << 10, "bit 10 tells that the target is reached")
 
     def save(self):
         """The drive's command to store, and the time that a real EEPROM takes."""
@@ -111,12 +111,12 @@ class Remote:
     def nmt(self, command, node=None):
         self.bench.send(0x000, [command, self.node_id if node is None else node])
 
-    def ask(self, request, timeout_s=3.0):
+    def ask(self, request):
         """Sends a raw SDO request to the drive and returns the raw answer."""
         mark = self.bench.trace.mark()
         self.bench.send(0x600 + self.node_id, request)
         what = f"an answer to {bytes(request).hex(' ')}"
-        return bytes(self.bench.trace.wait(0x580 + self.node_id, mark, timeout_s, what).data)
+        return bytes(self.bench.trace.wait(0x580 + self.node_id, mark, what).data)
 
     def answers(self):
         """Whether the drive answers 1000h as its model does."""
@@ -132,7 +132,7 @@ class Remote:
         """Takes the supply away and gives it back, and waits for the boot-up."""
         mark = self.bench.trace.mark()
         self.world("power cycle")
-        self.bench.trace.wait(0x700 + self.node_id, mark, 8.0, "boot-up after the power cycle", lambda frame: frame.data == b"\0")
+        self.bench.trace.wait(0x700 + self.node_id, mark, "boot-up after the power cycle", lambda frame: frame.data == b"\0")
         time.sleep(0.05)
 
 
@@ -191,7 +191,7 @@ class Bench(Remote):
             self.network.add_node(self.node)
             if not self.absent:
                 # The boot-up may have gone before we were on the bus, so ask until the node answers.
-                eventually(self.answers, bool, "the drive answers 1000h", timeout_s=10)
+                eventually(self.answers, bool, "the drive answers 1000h")
         except BaseException:
             self.simulator.__exit__(None, None, None)
             raise
@@ -258,9 +258,9 @@ class Trace(can.Listener):
         with self.arrived:
             return self.messages[-count:]
 
-    def wait(self, cob_id, mark, timeout_s, what, accept=lambda message: True):
+    def wait(self, cob_id, mark, what, accept=lambda message: True):
         """The first accepted frame with that identifier after the mark."""
-        end = time.monotonic() + timeout_s
+        end = time.monotonic() + PATIENCE_S
         with self.arrived:
             while True:
                 for message in self.messages[mark:]:
@@ -268,5 +268,5 @@ class Trace(can.Listener):
                         return message
                 left = end - time.monotonic()
                 if left <= 0:
-                    raise AssertionError(f"{what}: no such frame {cob_id:03X}h within {timeout_s} s")
+                    raise AssertionError(f"{what}: no such frame {cob_id:03X}h")
                 self.arrived.wait(left)

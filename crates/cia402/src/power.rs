@@ -181,7 +181,7 @@ mod tests {
     fn a_fault_leads_to_its_reaction_from_every_state_but_that_and_fault_itself() {
         for state in PowerState::ALL {
             let taken = transition(state, PowerEvent::FaultOccurred).map(|taken| (taken.number, taken.to));
-            let reacts = !matches!(state, PowerState::FaultReactionActive | PowerState::Fault);
+            let reacts = ![PowerState::FaultReactionActive, PowerState::Fault].contains(&state);
             assert_eq!(taken, reacts.then_some((13, PowerState::FaultReactionActive)), "{state:?}");
         }
     }

@@ -56,7 +56,7 @@ def servo(program, path):
 
 
 def supported(node):
-    eventually(lambda: node.sdo.upload(0x1000, 0), bool, "it answers", timeout_s=10)
+    eventually(lambda: node.sdo.upload(0x1000, 0), bool, "it answers")
     bits = int.from_bytes(node.sdo.upload(0x6502, 0), "little")
     return [mode for mode, bit in MODES.items() if bits >> bit & 1]
 
@@ -99,7 +99,7 @@ def drive(simulator, node, mode):
     elif mode == "PROFILED POSITION":
         write(node, 0x607A, start + 1000)
         write(node, 0x6040, 0x1F)
-        eventually(lambda: number(node, 0x6064), lambda at: abs(at - start - 1000) <= 20, "6064h", timeout_s=20)
+        eventually(lambda: number(node, 0x6064), lambda at: abs(at - start - 1000) <= 20, "6064h")
     elif mode == "HOMING":
         write(node, 0x6098, 35)
         write(node, 0x6040, 0x1F)

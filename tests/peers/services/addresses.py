@@ -25,7 +25,7 @@ def has_identifiers_of(remote, node):
 def power_cycle(bench, boots_as):
     mark = bench.trace.mark()
     bench.world("power cycle")
-    bench.trace.wait(0x700 + boots_as, mark, 8.0, f"boot-up of node {boots_as}", lambda frame: frame.data == b"\0")
+    bench.trace.wait(0x700 + boots_as, mark, f"boot-up of node {boots_as}", lambda frame: frame.data == b"\0")
 
 
 @check("node {node}: the drive is there, with the identifiers of that node, and the switches go before 2008h", ZLIM42C, rows=NODES)
@@ -79,6 +79,6 @@ def rate_over_runs(bench):
 def together(bench):
     others = [bench.other(node) for node in (2, 3, 77)]
     for other in others:
-        eventually(other.answers, bool, f"node {other.node_id} answers", 10)
+        eventually(other.answers, bool, f"node {other.node_id} answers")
         other.write(0x6081, 100 + other.node_id)
     equal([remote.read(0x6081) for remote in (bench, *others)], [120, 102, 103, 177], "6081h of each")

@@ -45,7 +45,7 @@ def masked(got, pattern):
 def answer_to(bench, row):
     mark = bench.trace.mark()
     bench.send(int(row["request_cob"], 16), bytes.fromhex(row["request"]))
-    frame = bench.trace.wait(int(row["response_cob"], 16), mark, 3.0, f"an answer to {row['request']}")
+    frame = bench.trace.wait(int(row["response_cob"], 16), mark, f"an answer to {row['request']}")
     return masked(bytes(frame.data).hex(" ").upper(), row["answer"])
 
 
@@ -74,9 +74,9 @@ def section(bench, row):
     if row["world"]:
         bench.world(row["world"])
     replay(bench, row["section"], row["patience"])
-    bench.becomes(row["index"], row["value"], row["tolerance"], timeout_s=20)
+    bench.becomes(row["index"], row["value"], row["tolerance"])
     if row["section"] == "5.3.6":
-        bench.status_becomes(1 << 8, 1 << 8, "bit 8 tells that homing is done", 10)
+        bench.status_becomes(1 << 8, 1 << 8, "bit 8 tells that homing is done")
 
 
 @check("manual 5.10.3: the datagrams of RPDO4 wait for SYNC on three joints", MJOINT, drives=THREE)
@@ -91,7 +91,7 @@ def three_joints(bench):
     equal([abs(joint.read(0x6064)) <= 30 for joint in joints], [True] * 3, "no joint moves before SYNC")
     bench.send(int(sync["request_cob"], 16))
     for joint in joints:
-        joint.becomes(0x6064, 50_000, 30, timeout_s=20)
+        joint.becomes(0x6064, 50_000, 30)
 
 
 @check("manual 6.1: TPDO0 carries 606Ch on its timer after NMT start, and closes", ZLAC8030L)
@@ -99,7 +99,7 @@ def mapped_speed(bench):
     replay(bench, "6.1")
     bench.send(0x000, b"\x01\x04")
     mark = bench.trace.mark()
-    equal(bench.trace.wait(0x184, mark, 1.5, "TPDO0").dlc, 4, "bytes of TPDO0")
+    equal(bench.trace.wait(0x184, mark, "TPDO0").dlc, 4, "bytes of TPDO0")
     bench.send(0x000, b"\x80\x04")
     bench.sleep(0.1)
     mark = bench.trace.mark()

@@ -33,7 +33,7 @@ def fault(bench, row):
     bench.turn(100)
     mark, emcy = bench.trace.mark(), 0x80 + bench.node_id
     bench.world(row["cause"])
-    frame = bench.trace.wait(emcy, mark, 10.0, "an EMCY")
+    frame = bench.trace.wait(emcy, mark, "an EMCY")
     bench.becomes(0x603F, row["code"])
     bench.status_becomes(0xFF, 0x98, "fault")
     register = bench.read(0x1001)
@@ -119,6 +119,6 @@ def silence(bench):
         bench.world(away)
         true(not bench.answers(), f"no answer after {away}")
         bench.world(back)
-        eventually(bench.answers, bool, f"an answer after {back}", timeout_s=10)
+        eventually(bench.answers, bool, f"an answer after {back}")
         bench.sleep(0.5)  # what nobody took from the wire meanwhile is answered now
         bench.turn(60)

@@ -75,7 +75,7 @@ def moves(bench):
         unit.write(CONTROLWORD, 0x2F)
         for target in (100_000, -70_000):
             unit.write_long(TARGET, target)
-            eventually(lambda: unit.read(STATUSWORD)[0], lambda word: word == 0x0437, "the status word", 12)
+            eventually(lambda: unit.read(STATUSWORD)[0], lambda word: word == 0x0437, "the status word")
             near(unit.long(ACTUAL), target, 60, "actual position")
             bench.becomes(0x6064, target, bench.drive.close)
         unit.write(MODE, 3)
@@ -185,7 +185,7 @@ def serial(bench):
             equal(unit.read(GEAR, 2), [32768, 8192], "the electronic gear")
             unit.write(CONTROLWORD, 0x2F)
             unit.write_long(TARGET, 40_000)
-            eventually(lambda: unit.read(STATUSWORD)[0], lambda word: word == 0x0437, "the status word", 12)
+            eventually(lambda: unit.read(STATUSWORD)[0], lambda word: word == 0x0437, "the status word")
             near(unit.long(ACTUAL), 40_000, 30, "actual position")
             answer = client.read_holding_registers(0x1000, count=1, device_id=1)
             equal(answer.exception_code, 2, "exception of a read far off")

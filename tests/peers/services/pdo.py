@@ -125,7 +125,7 @@ def exchange(joint, number, form, *values):
     mark = joint.bench.trace.mark()
     joint.bench.send(0x100 + 0x100 * number + joint.node_id, struct.pack(form, *values))
     cob_id = 0x080 + 0x100 * number + joint.node_id
-    frame = joint.bench.trace.wait(cob_id, mark, 3.0, f"the answer to RPDO{number}")
+    frame = joint.bench.trace.wait(cob_id, mark, f"the answer to RPDO{number}")
     return struct.unpack("<iH", frame.data)
 
 

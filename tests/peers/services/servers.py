@@ -4,7 +4,7 @@ import subprocess
 
 import can
 
-from checks import check, equal, table, true
+from checks import PATIENCE_S, check, equal, table, true
 from drive import ALL, ZLAC8030L, ZLIM42C
 
 SLCAN = ("--serve", "slcan://127.0.0.1:0")
@@ -14,12 +14,12 @@ def slcan(bench):
     return can.Bus(interface="slcan", channel=f"socket://127.0.0.1:{bench.simulator.port('slcan')}", bitrate=500_000)
 
 
-def received(bus, cob_id, timeout_s=3.0):
+def received(bus, cob_id):
     """The next frame with that identifier."""
-    while message := bus.recv(timeout_s):
+    while message := bus.recv(PATIENCE_S):
         if message.arbitration_id == cob_id:
             return message
-    raise AssertionError(f"no frame {cob_id:03X}h within {timeout_s} s")
+    raise AssertionError(f"no frame {cob_id:03X}h")
 
 
 def request(bench, *data):
@@ -33,9 +33,9 @@ def clients(bench):
         bus.send(request(bench, 0x40, 0, 0x10, 0, 0, 0, 0, 0))
         answer = received(bus, 0x580 + bench.node_id)
         equal(bytes(answer.data), b"\x43\x00\x10\x00" + bench.drive.device_type.to_bytes(4, "little"), "1000h")
-        heard = bench.trace.wait(0x600 + bench.node_id, mark, 3.0, "the slcan client's frame at the socketcand client")
+        heard = bench.trace.wait(0x600 + bench.node_id, mark, "the slcan client's frame at the socketcand client")
         equal(heard.data[0], 0x40, "the frame that was heard")
-        bench.trace.wait(0x580 + bench.node_id, mark, 3.0, "the drive's answer at the socketcand client")
+        bench.trace.wait(0x580 + bench.node_id, mark, "the drive's answer at the socketcand client")
         mark = bench.trace.mark()
         bench.send(0x123, b"\x01\x02")
         equal(bytes(received(bus, 0x123).data), b"\x01\x02", "the socketcand client's frame at the slcan client")
@@ -43,7 +43,7 @@ def clients(bench):
         received(bus, 0x580 + bench.node_id)
         # The same answer must have passed here, or canopen-python takes it for that of its own request.
         written = lambda frame: frame.data[0] == 0x60
-        bench.trace.wait(0x580 + bench.node_id, mark, 3.0, "the answer at the socketcand client", written)
+        bench.trace.wait(0x580 + bench.node_id, mark, "the answer at the socketcand client", written)
         equal(bench.trace.since(mark, 0x123), [], "its own frame at the socketcand client")
         equal(bench.read(0x6081), 77, "6081h by socketcand after a write by slcan")
 

@@ -16,11 +16,10 @@ import canopen
 import ears
 from ferrodrive import Simulator
 
-from checks import Skip, check, equal, eventually, true
+from checks import PATIENCE_S, Skip, check, equal, eventually, true
 from drive import ZLAC8030L
 
 GROUP = "239.74.163.2"
-PATIENCE_S = 20.0
 
 #: Data of every length, an identifier of 29 bits, remote frames.
 MESSAGES = [can.Message(arbitration_id=0x100 + length, data=bytes(range(length)), is_extended_id=False) for length in range(9)]
@@ -94,12 +93,12 @@ def multicast_frames(bench):
                 bus.send(can.Message(arbitration_id=0x7E5, is_extended_id=False))
                 return lines()
 
-            eventually(begin, bool, "dump listens", PATIENCE_S)
+            eventually(begin, bool, "dump listens")
             for message in MESSAGES:
                 bus.send(message)
             expected = [text(message) for message in MESSAGES]
             others = lambda: [frame for frame in lines() if frame != "7E5#"]
-            eventually(others, lambda frames: len(frames) >= len(expected), "all frames are shown", PATIENCE_S)
+            eventually(others, lambda frames: len(frames) >= len(expected), "all frames are shown")
             equal(others(), expected, "the frames as they were sent")
         finally:
             dump.kill()

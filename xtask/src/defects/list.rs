@@ -249,7 +249,7 @@ pub(super) const DEFECTS: &[Defect] = &[
         file: "crates/master/src/core/facts.rs",
         text: "watch.deadline = (!booted).then(|| now + watch.time);",
         instead: "watch.deadline = Some(now + watch.time);",
-        noticed_by: MASTER_IT,
+        noticed_by: MASTER,
     },
     Defect {
         file: "crates/master/src/gear.rs",

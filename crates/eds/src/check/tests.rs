@@ -32,6 +32,26 @@ fn what_is_mapped_must_be_there_with_its_length_and_access() {
 }
 
 #[test]
+fn a_pdo_has_64_bits() {
+    let mapped = |records: &[&str]| {
+        let count = records.len();
+        let head = format!("{TARGET}[1600]\nParameterName=RPDO1\nObjectType=9\nSubNumber={}\n", count + 1);
+        let counted = format!("[1600sub0]\nParameterName=Count\nDataType=5\nAccessType=rw\nDefaultValue={count}\n");
+        let records = records.iter().enumerate().map(|(place, record)| {
+            let sub_index = place + 1;
+            format!(
+                "[1600sub{sub_index}]\nParameterName=R{sub_index}\nDataType=7\nAccessType=rw\nDefaultValue={record}\n"
+            )
+        });
+        let text = head + &counted + &records.collect::<String>() + "[DummyUsage]\nDummy0005=1\n";
+        whats(&text).into_iter().map(|(_, _, what)| what).collect::<Vec<_>>()
+    };
+    let (long, byte) = ("0x607A0020", "0x00050008");
+    assert_eq!(mapped(&[long, long]), [""; 0]);
+    assert_eq!(mapped(&[long, long, byte]), ["72 bits are mapped as delivered; a PDO has 64"]);
+}
+
+#[test]
 fn identifiers_that_every_node_would_have_are_told() {
     let emcy = |default: &str| {
         whats(&format!("[1014]\nParameterName=COB-ID EMCY\nDataType=7\nAccessType=ro\nDefaultValue={default}\n"))

@@ -203,6 +203,20 @@ mod tests {
     }
 
     #[test]
+    fn before_the_first_sync_of_a_source_no_cycle_can_be_missed() {
+        let mut sync = SyncClock::default();
+        sync.produce(PERIOD, ms(100));
+        // Three ticks of the grid late; then the source is another, and 1900 is 86 periods later.
+        let late = sync.handle_timeout(ms(165));
+        assert!(matches!(late, Some(Tick::Begun(Cycle { number: 1, missed: 0, .. }))), "{late:?}");
+        assert_eq!(sync.next(), Some(ms(180)));
+        sync.follow(PERIOD, ms(1890));
+        let other = sync.handle_sync(ms(1900));
+        assert!(matches!(other, Some(Tick::Begun(Cycle { number: 2, missed: 0, .. }))), "{other:?}");
+        assert_eq!(sync.missed(), 0);
+    }
+
+    #[test]
     fn the_sync_of_another_producer_is_counted_by_its_period() {
         let mut sync = SyncClock::default();
         assert_eq!(sync.handle_sync(ms(0)), None);

@@ -128,3 +128,29 @@ const fn state_after(command: NmtCommand) -> Option<NmtState> {
         NmtCommand::ResetNode | NmtCommand::ResetCommunication => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn ms(at: u64) -> Instant {
+        Instant::from_millis(at)
+    }
+
+    /// CiA 301, 7.2.8.3.2.2: monitoring begins with the first heartbeat.
+    #[test]
+    fn a_heartbeat_arms_the_watch_and_a_boot_up_message_does_not() {
+        let watch = HeartbeatWatch { time: Duration::from_millis(100), deadline: None, lost: false };
+        let mut facts = NodeFacts { heartbeat_watch: Some(watch), ..NodeFacts::default() };
+        assert!(!facts.note_heartbeat(NmtState::Initialising, ms(0)));
+        assert!(!facts.check_heartbeat(ms(1000)), "it need not send any");
+        assert!(!facts.note_heartbeat(NmtState::Operational, ms(1000)));
+        assert!(!facts.check_heartbeat(ms(1099)));
+        // One that boots may have lost its heartbeat time.
+        assert!(!facts.note_heartbeat(NmtState::Initialising, ms(1099)));
+        assert!(!facts.check_heartbeat(ms(5000)));
+        facts.note_heartbeat(NmtState::PreOperational, ms(5000));
+        assert!(facts.check_heartbeat(ms(5100)) && !facts.check_heartbeat(ms(6000)), "lost, once");
+        assert!(facts.note_heartbeat(NmtState::PreOperational, ms(6000)), "it is back");
+    }
+}

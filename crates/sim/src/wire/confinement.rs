@@ -113,6 +113,14 @@ mod tests {
         assert_eq!(after(10_000, ErrorCounters::acknowledge_error).tec(), 128);
     }
 
+    /// Rules 1 and 2: 1 for the error, and 8 for the dominant bit behind the receiver's own flag; 15 of them are 135.
+    #[test]
+    fn who_sees_an_error_first_counts_nine() {
+        assert_eq!(after(1, ErrorCounters::first_receive_error).rec(), 9);
+        assert_eq!(after(14, ErrorCounters::first_receive_error).state(), ErrorState::ErrorActive);
+        assert_eq!(after(15, ErrorCounters::first_receive_error).state(), ErrorState::ErrorPassive);
+    }
+
     #[test]
     fn receive_errors_alone_never_make_bus_off() {
         assert_eq!(after(127, ErrorCounters::receive_error).state(), ErrorState::ErrorActive);

@@ -55,6 +55,7 @@ mod tests {
     #[test]
     fn distances_are_edits() {
         assert_eq!(distance("kitten", "sitting"), 3);
+        assert_eq!(distance("sitting", "kitten"), 3);
         assert_eq!(distance("", "ab"), 2);
     }
 }
