@@ -272,7 +272,7 @@ fn a_stop_gets_in_however_many_connections_are_idle() {
     let idle: Vec<Client> = (0..70).map(|_| gateway.client()).collect();
     let mut stopper = gateway.client();
     assert_eq!(stopper.ask("[1] 4 w 0x6040 0 u16 2"), "[1] OK");
-    wait_for("the drive stands", || speed_of(&simulator).abs() < 1.0);
+    wait_until("the drive stands", || speed_of(&simulator).abs() < 1.0);
     // Who has moved a drive does not make room for who has not.
     assert!(mover.ask("[50] 4 r 0x606C 0 i32").starts_with("[50] "));
     gateway.told("has made room");
