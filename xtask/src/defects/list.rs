@@ -38,6 +38,7 @@ const MOTION_IT: Tests = Tests::of("ferrodrive-motion", "it");
 const PLANT: Tests = Tests::of("ferrodrive-plant", "--lib");
 const PLANT_IT: Tests = Tests::of("ferrodrive-plant", "it");
 const DRIVES: Tests = Tests::of("ferrodrive-drives", "--lib");
+const DRIVES_IT: Tests = Tests::of("ferrodrive-drives", "it");
 const SIM: Tests = Tests::of("ferrodrive-sim", "--lib");
 const MASTER: Tests = Tests::of("ferrodrive-master", "--lib");
 const MASTER_IT: Tests = Tests::of("ferrodrive-master", "it");
@@ -292,13 +293,13 @@ pub(super) const DEFECTS: &[Defect] = &[
         file: "crates/drives/src/zlac8030l/protection.rs",
         text: "[u, v, u + v].iter()",
         instead: "[u, v, u - v].iter()",
-        noticed_by: WHEEL,
+        noticed_by: DRIVES_IT,
     },
     Defect {
         file: "crates/drives/src/zlac8030l/protection.rs",
         text: "matches!(sensors.hall & 7, 0 | 7)",
         instead: "matches!(sensors.hall & 7, 7)",
-        noticed_by: WHEEL,
+        noticed_by: DRIVES_IT,
     },
     Defect {
         file: "crates/drives/src/engine/cia402/stopping.rs",

@@ -3,5 +3,6 @@
 mod bench;
 mod mjoint_motion;
 mod mjoint_registers;
+mod zlac8030l_faults;
 mod zlac8030l_motion;
 mod zlim42c_faults;
