@@ -76,7 +76,8 @@ fn a_bus_that_is_not_there_and_a_log_that_cannot_be_written_are_failures_of_the_
     let picture = directory.join("no such folder").join("demo.svg");
     let error = failed(&["demo", "--drive", "zlim42c", "--svg", picture.to_str().unwrap()], 1);
     is(&error, "file", None, None, None);
-    let error = failed(&["sim", "--drive", "zlac8030l@4", "--log", picture.to_str().unwrap()], 1);
+    let log = picture.with_extension("log");
+    let error = failed(&["sim", "--drive", "zlac8030l@4", "--log", log.to_str().unwrap()], 1);
     assert!(error["message"].as_str().unwrap().contains("cannot write the log"), "{error}");
 }
 

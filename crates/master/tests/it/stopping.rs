@@ -278,6 +278,7 @@ fn models() -> impl Iterator<Item = &'static str> {
 
 #[test]
 fn whatever_moves_stops_within_its_ramp_however_its_program_ends() {
+    let mut times = Vec::new();
     for name in models() {
         for motion in MOTIONS {
             for end in ENDS {
@@ -288,10 +289,68 @@ fn whatever_moves_stops_within_its_ramp_however_its_program_ends() {
                 let Some(moving) = bench.set_in_motion(motion) else { continue };
                 let speed = bench.fastest();
                 assert!(speed > 5.0, "{name} {motion:?}: {speed} r/min before its end");
-                bench.end((name, motion, end), moving, speed);
+                let stood = bench.end((name, motion, end), moving, speed);
+                times.push(((name, motion), end, stood));
             }
         }
     }
+    let page = std::fs::read_to_string(PAGE).unwrap();
+    let (before, rest) = page.split_once(TABLE_BEGINS).expect("the page has the table");
+    let (_, after) = rest.split_once("\n\n").expect("something follows it");
+    let made = format!("{before}{}\n\n{after}", table(&times));
+    if std::env::var_os("FERRODRIVE_WRITE_PAGES").is_some() {
+        std::fs::write(PAGE, &made).unwrap();
+    }
+    assert_eq!(page, made, "docs/safety.md says how its table is made");
+}
+
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/safety.md");
+const TABLE_BEGINS: &str = "| motion | drive |";
+
+/// What the page has: how long after each end the shaft stands.
+fn table(times: &[((&'static str, Motion), End, Stood)]) -> String {
+    let columns = [End::StopAll, End::StopGuard, End::Forgotten, End::Killed, End::Frozen, End::CableCut];
+    let mut lines = vec![
+        format!(
+            "{TABLE_BEGINS} signal, failure, `close` | `StopGuard` | no longer stepped | killed | frozen 4 s | cable |"
+        ),
+        "|---|---|---|---|---|---|---|---|".to_owned(),
+    ];
+    let mut rows: Vec<(&str, Motion)> = times.iter().map(|(row, ..)| *row).collect();
+    rows.dedup();
+    rows.sort_by_key(|(_, motion)| MOTIONS.iter().position(|other| other == motion));
+    for row in rows {
+        let cell = |end: &End| match times.iter().find(|(of, other, _)| *of == row && other == end) {
+            Some((.., Stood::After(time))) => format!("{:.2} s", time.as_secs_f64()),
+            Some((.., Stood::Never)) => "**never**".to_owned(),
+            Some((.., Stood::AsAsked)) | None => "goes on, as asked".to_owned(),
+        };
+        let cells: Vec<_> = columns.iter().map(cell).collect();
+        lines.push(format!("| {} | {} | {} |", row.1.words(), row.0, cells.join(" | ")));
+    }
+    lines.join("\n")
+}
+
+impl Motion {
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Velocity => "`velocity`",
+            Self::Move => "`move`",
+            Self::Torque => "`torque`",
+            Self::Home => "`home`",
+            Self::GroupMove => "`group move`",
+            Self::Base => "`drive-base`",
+        }
+    }
+}
+
+/// What became of a motion after its end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stood {
+    After(Duration),
+    Never,
+    /// It was asked to go on alone.
+    AsAsked,
 }
 
 /// The last set-points may still be on their way, may wait in the drive for SYNC, or have been taken.
@@ -328,17 +387,20 @@ impl Bench {
         }
     }
 
-    fn end(&mut self, (name, motion, end): (&str, Motion, End), moving: Moving, speed: f64) {
+    fn end(&mut self, (name, motion, end): (&str, Motion, End), moving: Moving, speed: f64) -> Stood {
         let what = format!("{name} {motion:?} {end:?}");
         let network = self.network.clone();
         let mut kept = None;
+        let mut said = None;
+        let ended_at = self.world.now();
         match end {
             End::StopAll | End::Close => {
                 let began = self.world.now();
                 let stopped = self.run(network.stop_and_release());
                 assert_eq!(stopped.len(), self.moving.len(), "{what}");
                 for stopped in &stopped {
-                    assert!(stopped.outcome.is_ok(), "{what}: {stopped:?}");
+                    let time = stopped.outcome.as_ref().unwrap_or_else(|_| panic!("{what}: {stopped:?}"));
+                    said = said.max(Some(*time));
                 }
                 assert!(self.fastest() < 2.0, "{what}: said to stand at {} r/min", self.fastest());
                 assert!(network.moved().is_empty(), "{what}");
@@ -355,7 +417,7 @@ impl Bench {
                 kept = Some(moving);
             }
             // A motion that goes on alone is what its program asked for.
-            End::Forgotten if matches!(moving, Moving::Alone) => return,
+            End::Forgotten if matches!(moving, Moving::Alone) => return Stood::AsAsked,
             End::Forgotten => drop(moving),
             End::Killed => self.process().killed = true,
             End::Frozen => {
@@ -370,7 +432,7 @@ impl Bench {
         }
         if is_beyond_software(name, motion, end) {
             assert_eq!(self.time_to_standstill(Duration::from_secs(8)), None, "{what}: stopped by nothing known");
-            return;
+            return Stood::Never;
         }
         let watch = match end {
             End::StopAll | End::StopGuard | End::Close => Duration::ZERO,
@@ -384,12 +446,14 @@ impl Bench {
             let after = self.fastest();
             assert!(after < 0.95 * speed || after < 1.0, "{what}: {after} r/min 100 ms later, {speed} before");
         }
+        let waited = self.world.now() - ended_at;
         let stood = self.time_to_standstill(Duration::from_secs(10));
         assert!(stood.is_some_and(|time| time <= watch + Duration::from_secs(1)), "{what}: {stood:?}");
         // And stays so, whatever is still sent.
         self.world.run_for(Duration::from_secs(6));
         assert!(self.fastest() < 1.0, "{what}: turns again at {} r/min", self.fastest());
         drop(kept);
+        Stood::After(said.unwrap_or(waited + stood.unwrap()))
     }
 }
 

@@ -122,7 +122,7 @@ impl Stage {
                 Ok(()) => return,
                 // The watchdog's.
                 Err(error) if is_replaced(&error) && std::time::Instant::now() < until => {}
-                // Below the header or the news, which stay where they are.
+                // Below the header or the news, which stay where they are. The watchdog's clock, as above.
                 Err(CmdError::Standard(error))
                     if error.error == ErrorStatus::ElementClickIntercepted && std::time::Instant::now() < until =>
                 {

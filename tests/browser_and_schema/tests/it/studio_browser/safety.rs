@@ -23,6 +23,7 @@ impl Stage {
         let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 1000 });
         let body = json!({ "cmd": "Emulation.setDeviceMetricsOverride", "params": metrics }).to_string();
         let stream = TcpStream::connect(&self.driver_address).expect("the driver listens");
+        // The watchdog's clock: a driver that hangs ends the test.
         stream.set_read_timeout(Some(PATIENCE)).expect("it takes it");
         let head = format!(
             "POST /session/{session}/goog/cdp/execute HTTP/1.1\r\nHost: {}\r\nContent-Length: {}\r\n\r\n",
