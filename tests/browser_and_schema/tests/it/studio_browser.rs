@@ -118,14 +118,13 @@ impl Stage {
         // The watchdog's.
         let until = std::time::Instant::now() + PATIENCE;
         loop {
+            // The watchdog's clock: a page that hangs ends the test.
+            let is_late = std::time::Instant::now() >= until;
             match self.find(css).await.click().await {
                 Ok(()) => return,
-                // The watchdog's.
-                Err(error) if is_replaced(&error) && std::time::Instant::now() < until => {}
-                // Below the header or the news, which stay where they are. The watchdog's clock, as above.
-                Err(CmdError::Standard(error))
-                    if error.error == ErrorStatus::ElementClickIntercepted && std::time::Instant::now() < until =>
-                {
+                Err(error) if is_replaced(&error) && !is_late => {}
+                // Below the header or the news, which stay where they are.
+                Err(CmdError::Standard(error)) if error.error == ErrorStatus::ElementClickIntercepted && !is_late => {
                     let scroll = "document.querySelector(arguments[0])?.scrollIntoView({ block: 'center' })";
                     self.client.execute(scroll, vec![css.into()]).await.expect("it scrolls");
                 }
