@@ -241,8 +241,11 @@ fn only_zero(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if raw == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
 }
 
+/// What refuses a value of an object.
+type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
+
 /// The checks know no sub-index: one for each entry of 1016h.
-const WATCH_CHECKS: [fn(&View<'_>, u32) -> Result<(), AbortCode>; CONSUMERS as usize] = [
+const WATCH_CHECKS: [Check; CONSUMERS as usize] = [
     watched_once::<1>,
     watched_once::<2>,
     watched_once::<3>,

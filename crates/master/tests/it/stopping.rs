@@ -157,7 +157,7 @@ const MOTIONS: [Motion; 6] =
 
 enum Moving {
     Alone,
-    Group(Group),
+    Group(Box<Group>),
     Base(Box<Base>),
 }
 
@@ -171,7 +171,7 @@ impl Bench {
             Motion::Move => self.run(drive.move_relative(Turns(100.0), options())).map(drop),
             Motion::Torque => self.run(drive.torque(Amperes(0.5))).map(drop),
             Motion::Home => self.start_homing(&drive),
-            Motion::GroupMove => return Some(Moving::Group(self.group())),
+            Motion::GroupMove => return Some(Moving::Group(Box::new(self.group()))),
             Motion::Base => return self.base().map(|base| Moving::Base(Box::new(base))),
         };
         match moved {

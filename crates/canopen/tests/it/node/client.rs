@@ -208,7 +208,7 @@ fn dribbled(first: &str) -> (Instant, Failure, Client) {
     assert_eq!(client.handle_frame(&first.parse().unwrap(), &mut buffer, now), None);
     for segment in 0.. {
         let toggle = if segment % 2 == 0 { "0C" } else { "1C" };
-        now = now + Duration::from_millis(49);
+        now += Duration::from_millis(49);
         let due = client.poll_timeout().unwrap();
         if due <= now {
             return (due, client.handle_timeout(due).unwrap(), client);
