@@ -115,6 +115,11 @@ impl Core {
     pub(crate) fn stop_axis(&mut self, node: NodeId, controlword: Mux, stop: u16) {
         self.supervision.stop(node, controlword);
         self.image.overrule(node, controlword, stop);
+        // The stop by SDO does not wait behind what nobody waits for: words of earlier cycles, and questions to keep a drive content.
+        let now = self.now;
+        while self.member_mut(node).channel.cancel(FEED, now) {}
+        self.settle(node);
+        self.find_due();
     }
 
     /// Writes an object by SDO; nobody waits for the answer.

@@ -3,7 +3,7 @@
 use cia402::PowerCommand;
 
 use super::demand::Refusal;
-use crate::drive::{Drive, Trigger};
+use crate::drive::{ANSWER, Drive, Trigger};
 use crate::error::Error;
 
 const INTENT: &str = "follow its set-points cycle by cycle";
@@ -15,7 +15,11 @@ impl Drive {
         let trigger = match refusal {
             Refusal::Fault(_) => Trigger::Fault,
             Refusal::LostOperation(_) => Trigger::LostOperation,
-            Refusal::NotHeard => Trigger::Ignored(PowerCommand::EnableOperation),
+            Refusal::NotHeard => {
+                // It may be dead, and others wait to be stopped.
+                let drive = self.asked_within(ANSWER);
+                return Some(drive.not_reached(INTENT, Trigger::Ignored(PowerCommand::EnableOperation)).await);
+            }
             Refusal::OutOfLimits { asked, bound } => return self.check_effect(bound.object, asked).await.err(),
             _ => return None,
         };

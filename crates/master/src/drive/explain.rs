@@ -33,7 +33,11 @@ impl Drive {
     /// Turns silence of the drive into an explanation; hands everything else on.
     pub(super) async fn answered<T>(&self, intent: &'static str, result: Result<T, Error>) -> Result<T, Error> {
         match result {
-            Err(error @ Error::NoAnswer { .. }) => Err(self.not_reached(intent, Trigger::Silent(error)).await),
+            Err(error @ Error::NoAnswer { .. }) => {
+                // A program that was held up has missed the answer itself.
+                let lapse = self.node.network().lapse(self.node.id());
+                Err(self.not_reached(intent, lapse.map_or(Trigger::Silent(error), Trigger::HeldUp)).await)
+            }
             other => other,
         }
     }

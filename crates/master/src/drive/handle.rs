@@ -95,6 +95,11 @@ impl Drive {
         self.gear
     }
 
+    /// The same, whose answers are awaited for this long.
+    pub(crate) fn asked_within(&self, timeout: Duration) -> Self {
+        Self { node: self.node.clone().with_timeout(timeout), ..self.clone() }
+    }
+
     /// Which axis this is.
     pub const fn axis_id(&self) -> AxisId {
         self.axis

@@ -33,7 +33,7 @@ pub(crate) use handle::{CONTROLWORD, MODE, POSITION_ACTUAL, STATUSWORD, TARGET_P
 pub use homing::HomingOptions;
 pub use motion::{MotionOptions, MotionReport, Note};
 pub(crate) use power::STANDSTILL_RPM;
-pub(crate) use safety::STOP;
+pub(crate) use safety::{ANSWER, STOP};
 pub use safety::{StopGuard, Stopped};
 pub use scale::Commanded;
 pub use state::DriveState;

@@ -23,13 +23,13 @@ pub(crate) const STOP: Controlword = Controlword(PowerCommand::QuickStop.control
 
 /// How long an answer is awaited while a drive is being stopped. Drives answer within milliseconds, and the next question may
 /// get through where this one was lost.
-const ANSWER: Duration = Duration::from_millis(250);
+pub(crate) const ANSWER: Duration = Duration::from_millis(150);
 
 /// How long a drive is asked for its state that may not be told to stop without.
 const GLANCE: Duration = Duration::from_millis(50);
 
 /// How long a drive may leave everything unanswered before its stop counts as not seen.
-const SILENCE: Duration = Duration::from_millis(500);
+const SILENCE: Duration = Duration::from_millis(300);
 
 /// How long a drive may go on in Operation enabled before it is told again: somebody else may have enabled it since.
 const REPEAT: Duration = Duration::from_millis(100);
@@ -59,7 +59,7 @@ impl Network {
     /// Quick-stops every axis that this program has set in motion, all at the same time, and says how each came to rest. What
     /// else this program asks of these drives has to have ended: a future that goes on enabling one would undo this.
     ///
-    /// Ends when each was seen to stand, or within the time of the drive's own ramps, or half a second after a drive has
+    /// Ends when each was seen to stand, or within the time of the drive's own ramps, or a third of a second after a drive has
     /// fallen silent.
     pub async fn stop_all_moved(&self) -> Vec<Stopped> {
         self.stop_moved(self.moved()).await

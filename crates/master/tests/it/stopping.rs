@@ -578,3 +578,54 @@ fn a_drive_that_was_not_seen_to_stand_keeps_its_watch_and_is_said_to_move() {
         assert_eq!(bench.fastest() < 1.0, has_watch, "{name}");
     }
 }
+
+/// As a command does it: the motion fails, what stopped it is asked, all is closed, and what may still move is stopped.
+#[test]
+fn after_a_failure_with_a_dead_drive_everything_ends_soon_after_the_others_stand() {
+    for name in models() {
+        for motion in [Motion::GroupMove, Motion::Base] {
+            let mut bench = Bench::new(name);
+            for drive in bench.drives.clone() {
+                bench.run(drive.guard(SwitchedOff::SwitchOn)).unwrap();
+            }
+            let Some(mut moving) = bench.set_in_motion(motion) else { continue };
+            bench.world.apply(Place::node(NODES[1]), &Stimulus::CableCut(true)).unwrap().unwrap();
+            let cut_at = bench.world.now();
+            let failed = |moving: &Moving| match moving {
+                Moving::Alone => false,
+                Moving::Group(group) => group.state().cause.is_some(),
+                Moving::Base(base) => base.state().cause.is_some(),
+            };
+            while !failed(&moving) {
+                match &mut moving {
+                    Moving::Base(base) => {
+                        let _ = base.command(Twist { linear_m_s: 0.6, angular_rad_s: 0.0 });
+                        let _ = bench.run(base.cycle()).unwrap();
+                    }
+                    Moving::Group(group) => drop(bench.run(group.cycle()).unwrap()),
+                    Moving::Alone => {}
+                }
+                assert!(bench.world.now() - cut_at < Duration::from_millis(200), "{name} {motion:?}");
+            }
+            match moving {
+                Moving::Base(mut base) => {
+                    bench.run(base.stop()).unwrap_err();
+                    bench.run(base.explain_stop());
+                    let _ = bench.run(base.close());
+                }
+                Moving::Group(mut group) => {
+                    bench.run(group.rest()).unwrap_err();
+                    bench.run(group.explain_stop());
+                    let _ = bench.run(group.close());
+                }
+                Moving::Alone => {}
+            }
+            let stopped = bench.run(bench.network.clone().stop_and_release());
+            assert!(stopped.iter().any(|stopped| stopped.node == node(NODES[1]) && stopped.outcome.is_err()));
+            // Both ways to rest within the limits take 0.3 s at least: 0.6 m/s at 2 m/s^2, 1 turn/s at 4 turns/s^2 and 40 turns/s^3.
+            let ended = bench.world.now() - cut_at;
+            assert!(ended < Duration::from_millis(300 + 1000), "{name} {motion:?}: {ended:?}");
+            assert!(bench.speed(NODES[0]).abs() < 1.0, "{name} {motion:?}");
+        }
+    }
+}

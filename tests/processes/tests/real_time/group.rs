@@ -70,7 +70,7 @@ fn a_group_of_the_file_holds_the_axes_that_are_not_named_and_keeps_to_its_softwa
     assert!((number(&joint["at_deg"]) - number(&joint["from_deg"])).abs() < 0.5, "{joint}");
     assert!((number(&stepper["at_deg"]) + 45.0).abs() < 1.0, "{stepper}");
     assert_eq!(stepper["limits"]["range_deg"], serde_json::json!([-360.0, 360.0]));
-    refused(&["group", "move", &file, "1=181deg"], 2, "outside its software limits of -0.5 to 0.5 turns");
+    refused(&["group", "move", &file, "1=181deg"], 2, "outside its software limits of -180 to 180 deg");
     refused(&["group", "move", &file, "1=1deg", "--group", "legs"], 2, "the machine file has: pair");
     refused(&["group", "move", &file, "4=1deg"], 1, "node 4");
     refused(&["group", "move", &file, "1=90deg", "--within", "10ms"], 2, "give more time, or raise a limit");

@@ -123,19 +123,19 @@ fn a_drive_with_a_watch_ends_every_kind_of_motion_by_itself() {
     }
 }
 
-/// A servo of CiA 402 is delivered without a watch (1016h is 0, as CiA 301, 7.5.2.19 has it), which is said; `--guard` gives it
-/// one of 2000 ms for the command, and what 6007h makes of its loss ends the motion.
+/// A servo of CiA 402 is delivered without a watch (1016h is 0, as CiA 301, 7.5.2.19 has it); a command gives it one of 2000 ms
+/// while it moves it, and what 6007h makes of its loss ends the motion. With `--no-guard` it has none, which is said.
 #[test]
 fn a_described_servo_stops_by_itself_where_it_was_given_a_watch_and_else_it_was_said() {
     const DESCRIBED: (&str, &str) = ("5", "5=cia402");
     let simulator = Simulator::start(&["--drive", "cia402@5", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
     let mut bench = Bench::booted(simulator, bus);
-    let child = bench.moving(DESCRIBED, &[]);
+    let child = bench.moving(DESCRIBED, &["--no-guard"]);
     let said = bench.kill(child);
-    assert!(said.contains("node 5: if this command dies") && said.contains("--guard gives it"), "{said}");
+    assert!(said.contains("node 5: if this command dies") && said.contains("emergency stop"), "{said}");
     bench.json(DESCRIBED, &["stop", "5"]);
-    let child = bench.moving(DESCRIBED, &["--guard"]);
+    let child = bench.moving(DESCRIBED, &[]);
     bench.kill(child);
     bench.stops("5", Duration::from_millis(2000) + SLACK);
 }
