@@ -80,7 +80,7 @@ fn the_data_sheet_of_another_device_is_told_with_what_differs_and_nothing_is_wri
         .expect("a file");
     let simulator = processes::Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
-    let on = |words: &[&str]| ferrodrive(&[&["--bus", &bus, "--timeout", "20s"], words].concat());
+    let on = |words: &[&str]| ferrodrive(&[&["--bus", &bus, "--timeout", "10s"], words].concat());
     // A hub motor driver of this maker says 40192h of itself, a servo 20192h (CiA 402-1): device type is letter C.
     let ended = on(&["boot", machine.to_str().expect("UTF-8"), "--json"]);
     assert_eq!((ended.status, letter(&ended.json(), 4).as_deref()), (Some(1), Some("C")), "{}{}", ended.out, ended.err);

@@ -63,8 +63,8 @@ fn several_objects_are_read_at_once() {
     // Without a table too: what is there is found by asking.
     let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
-    done(&["--bus", &bus, "--timeout", "20s", "nmt", "4", "reset", "--wait", "60s"]);
-    let found = lines(&done(&["--bus", &bus, "--timeout", "20s", "--json", "read", "4", "1000..1018"]).out);
+    done(&["--bus", &bus, "--timeout", "10s", "nmt", "4", "reset", "--wait", "60s"]);
+    let found = lines(&done(&["--bus", &bus, "--timeout", "10s", "--json", "read", "4", "1000..1018"]).out);
     let listed = lines(&done(&["--json", "read", "4", "1000..1018"]).out);
     let of =
         |lines: &[Value]| lines.iter().map(|line| (line["object"].clone(), line["bytes"].clone())).collect::<Vec<_>>();
@@ -128,7 +128,7 @@ fn what_is_on_a_bus_is_shown_as_it_comes() {
     let simulator = Simulator::start(&["--drive", "m4230e17b50@1", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
     let on = |arguments: &[&str]| {
-        done(&[&["--bus", &bus, "--timeout", "20s", "--model", "1=m4230e17b50"], arguments].concat())
+        done(&[&["--bus", &bus, "--timeout", "10s", "--model", "1=m4230e17b50"], arguments].concat())
     };
     on(&["nmt", "1", "reset", "--wait", "60s"]);
     // An own frame is seen too: EMCY of node 9, over-current by its class (CiA 301, table 26).
@@ -195,7 +195,7 @@ fn a_motion_that_takes_longer_than_it_may_is_given_up_and_stopped() {
     let mut simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
     let on = |arguments: &[&str]| {
-        ferrodrive(&[&["--bus", &bus, "--timeout", "20s", "--model", "4=zlac8030l"], arguments].concat())
+        ferrodrive(&[&["--bus", &bus, "--timeout", "10s", "--model", "4=zlac8030l"], arguments].concat())
     };
     on(&["nmt", "4", "reset", "--wait", "60s"]);
     let late = on(&["move", "4", "200turn", "--relative", "--profile-velocity", "60rpm", "--within", "2s"]);
@@ -227,14 +227,14 @@ fn words_in_another_order_are_understood_where_that_does_no_harm() {
 fn served_servo() -> (Simulator, String) {
     let simulator = Simulator::start(&["--drive", "cia402@5", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
-    done(&["--bus", &bus, "--timeout", "20s", "nmt", "5", "reset", "--wait", "60s"]);
+    done(&["--bus", &bus, "--timeout", "10s", "nmt", "5", "reset", "--wait", "60s"]);
     (simulator, bus)
 }
 
 #[test]
 fn errors_that_a_node_remembers_are_shown_with_their_meaning() {
     let (_simulator, bus) = served_servo();
-    let on = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "20s", "--json"], arguments].concat()).json();
+    let on = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "10s", "--json"], arguments].concat()).json();
     assert_eq!(on(&["emcy", "show", "5"])["errors"], json!([]));
     // CiA 301, 7.5.2.19: node 7Fh within 100 ms. One heartbeat begins the watch, and none follows.
     on(&["write", "5", "1016:01", "0x7F0064"]);
@@ -245,14 +245,14 @@ fn errors_that_a_node_remembers_are_shown_with_their_meaning() {
     });
     // CiA 301, table 26: 8130h is the life guard or heartbeat error.
     assert_eq!((&errors[0]["code"], &errors[0]["node"]), (&json!(0x8130), &json!(5)), "{errors}");
-    let text = done(&["--bus", &bus, "--timeout", "20s", "emcy", "show", "5"]).out;
+    let text = done(&["--bus", &bus, "--timeout", "10s", "emcy", "show", "5"]).out;
     assert!(text.starts_with("node 5: 8130h ") && text.to_lowercase().contains("heartbeat"), "{text}");
 }
 
 #[test]
 fn pdos_that_come_are_shown_with_their_objects() {
     let (_simulator, bus) = served_servo();
-    let bus = ["--bus", &bus, "--timeout", "20s"];
+    let bus = ["--bus", &bus, "--timeout", "10s"];
     // CiA 301, 7.5.2.37: an event timer of 50 ms.
     done(&[&bus[..], &["write", "5", "1800:05", "50"]].concat());
     done(&[&bus[..], &["nmt", "5", "start"]].concat());

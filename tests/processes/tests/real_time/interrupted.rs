@@ -184,7 +184,7 @@ fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
             .unwrap();
         let mut ready = String::new();
         BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut ready).unwrap();
-        let read = |node: &str| ferrodrive(&["--bus", &bus, "--timeout", "20s", "read", node, "1000"]);
+        let read = |node: &str| ferrodrive(&["--bus", &bus, "--timeout", "10s", "read", node, "1000"]);
         wait_until("node 4 answers", || read("4").status == Some(0));
         let moving = start(&bus, "4=zlac8030l", &["velocity", "4", "100rpm", "--for", "1h"]);
         // It drives for a while.
@@ -197,7 +197,7 @@ fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
         assert_eq!(told.status.code(), Some(1), "{}", String::from_utf8_lossy(&told.stderr));
         let told = String::from_utf8(told.stderr).unwrap();
         assert!(told.contains("node 4"), "{told}");
-        done(&["--bus", &bus, "--timeout", "20s", "read", "5", "1000"]);
+        done(&["--bus", &bus, "--timeout", "10s", "read", "5", "1000"]);
     }
 }
 

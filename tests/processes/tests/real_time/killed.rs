@@ -92,7 +92,7 @@ impl Bench {
     }
 
     fn json(&self, (_, model): (&str, &str), arguments: &[&str]) -> Value {
-        done(&[&["--json", "--timeout", "20s", "--bus", &self.bus, "--model", model], arguments].concat()).json()
+        done(&[&["--json", "--timeout", "10s", "--bus", &self.bus, "--model", model], arguments].concat()).json()
     }
 }
 
@@ -289,7 +289,7 @@ fn drives_that_another_program_moves_stop_when_their_supervisor_is_killed() {
     let mut bench = Bench::booted(simulator, bus);
     let models = [JOINT, STEPPER, SERVO, DESCRIBED].map(|(_, model)| ["--model", model]);
     let mut supervisor = Command::new(processes::program())
-        .args(["--json", "--timeout", "20s", "--bus", &bench.bus])
+        .args(["--json", "--timeout", "10s", "--bus", &bench.bus])
         .args(models.concat())
         .arg("supervise")
         .stdin(Stdio::piped())

@@ -38,8 +38,8 @@ fn on_a_virtual_bus_an_answer_takes_what_its_frame_takes_and_sync_is_even() {
 fn answers_and_sync_are_measured_over_tcp_and_the_text_has_its_bars() {
     let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
-    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "20s"], arguments].concat());
-    done(&["--bus", &bus, "--timeout", "20s", "read", "4", "1000"]);
+    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "2s"], arguments].concat());
+    done(&["--bus", &bus, "--timeout", "10s", "read", "4", "1000"]);
     let report = on_bus(&["--json", "latency", "4", "--count", "30"]).json();
     assert_eq!(figure(&report, "sdo", "count"), 30.0);
     assert!(figure(&report, "sync", "count") >= 30.0, "{report}");
@@ -51,7 +51,7 @@ fn answers_and_sync_are_measured_over_tcp_and_the_text_has_its_bars() {
 fn a_tpdo_that_follows_sync_is_measured_and_is_no_faster_than_its_wire() {
     let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
-    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "20s"], arguments].concat());
+    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "10s"], arguments].concat());
     on_bus(&["read", "4", "1000"]);
     // TPDO1 with 6041h behind each SYNC (1800h:02 = 1).
     for (object, value) in [("1A00:01", "0x60410010"), ("1A00:00", "1"), ("1800:02", "1")] {
@@ -74,8 +74,8 @@ fn a_tpdo_that_follows_sync_is_measured_and_is_no_faster_than_its_wire() {
 fn a_bus_with_a_motor_switched_on_is_sent_no_sync() {
     let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
-    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "20s"], arguments].concat());
-    done(&["--bus", &bus, "--timeout", "20s", "read", "4", "1000"]);
+    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "2s"], arguments].concat());
+    done(&["--bus", &bus, "--timeout", "10s", "read", "4", "1000"]);
     on_bus(&["--model", "4=zlac8030l", "enable", "4"]);
     // Not only the node that is asked counts.
     let report = on_bus(&["--json", "latency", "4", "--count", "10"]).json();
@@ -95,7 +95,7 @@ fn real_time_is_entered_or_refused_with_what_to_do() {
     let bus = simulator.bus("socketcand");
     // A command with an answer, one without, and one that moves and is stopped when it fails.
     let commands: [(&[&str], i32); 3] = [
-        (&["--timeout", "20s", "read", "4", "1000"], 0),
+        (&["--timeout", "10s", "read", "4", "1000"], 0),
         (&["nmt", "4", "start"], 0),
         (&["--model", "4=zlac8030l", "velocity", "4", "30rpm", "--within", "1ms"], 1),
     ];
@@ -140,5 +140,5 @@ fn a_user_who_may_not_run_in_real_time_is_told_how_to_allow_it() {
         assert!(text.lines().count() < 8 && !text.contains("panicked"), "{text}");
     }
     // The drive has heard nothing of it, and answers others.
-    done(&["--bus", &bus, "--timeout", "20s", "read", "4", "1000"]);
+    done(&["--bus", &bus, "--timeout", "10s", "read", "4", "1000"]);
 }

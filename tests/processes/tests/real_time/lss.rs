@@ -20,7 +20,7 @@ impl Bus {
     }
 
     fn arguments<'a>(&'a self, of_command: &[&'a str]) -> Vec<&'a str> {
-        [&["--bus", self.address.as_str(), "--timeout", "20s", "--json"], of_command].concat()
+        [&["--bus", self.address.as_str(), "--timeout", "10s", "--json"], of_command].concat()
     }
 
     fn done(&self, of_command: &[&str]) -> Value {

@@ -159,7 +159,7 @@ impl Served {
     }
 
     fn command(&self, arguments: &[&str]) -> std::process::Command {
-        let mut command = command(&[&["--bus", &self.bus, "--timeout", "20s"], arguments].concat());
+        let mut command = command(&[&["--bus", &self.bus, "--timeout", "10s"], arguments].concat());
         // Where journals are kept.
         command.current_dir(&self.folder.0).stdin(Stdio::null());
         command
