@@ -151,9 +151,17 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
                 Shown(*at),
                 Shown(*target)
             ),
-            "The load may be too heavy or the motor blocked: look at its current; check its speed limit, current limit \
-             and ramp times"
-                .to_owned(),
+            match *unit {
+                "r/min" => {
+                    "The load may be too heavy, the motor blocked, or its supply too low for this speed: look at its current and \
+                     voltage; check its speed limit, current limit and ramp times"
+                }
+                _ => {
+                    "The load may be too heavy or the motor blocked: look at its current; check its speed limit, current limit \
+                     and ramp times"
+                }
+            }
+            .to_owned(),
         ),
         Trigger::Elsewhere { at, target, unit, by } => elsewhere(*at, *target, unit, by),
         Trigger::Fault | Trigger::LostOperation | Trigger::HeldUp(_) | Trigger::Silent(_) => text(

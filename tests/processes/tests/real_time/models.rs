@@ -203,7 +203,10 @@ fn a_data_sheet_stands_for_a_model_wherever_one_is_asked_for() {
     assert_eq!((&four["model"], &four["remark"]), (&json!("wheel"), &Value::Null));
     assert!(four["models"].as_array().unwrap().contains(&json!("wheel")), "{four}");
     // 1000h of the joint is another one.
-    bench.refused(&["--model", &format!("1={sheet}"), "read", "1", "6041"], &["Somebody Wheel", "device type (1000h) is 20192h"]);
+    bench.refused(
+        &["--model", &format!("1={sheet}"), "read", "1", "6041"],
+        &["Somebody Wheel", "device type (1000h) is 20192h"],
+    );
 
     std::fs::write(sheet, "no data sheet").unwrap();
     let ended = ferrodrive(&["objects", sheet]);
