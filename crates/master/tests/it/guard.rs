@@ -234,16 +234,23 @@ fn a_watch_that_was_off_is_off_again_when_its_guard_ends_though_the_heartbeat_go
     assert_eq!(bench.run(own.read::<u32>(watch)).unwrap(), 0);
 }
 
-/// Nobody has decided against a watch that is delivered switched off (CiA 301, 7.5.2.19: 0 is the default of 1016h).
-#[test]
-fn a_servo_with_a_heartbeat_consumer_is_guarded_without_being_asked() {
-    const GENERIC: u8 = 5;
+const GENERIC: u8 = 5;
+
+/// The bench with a servo of CiA 402, as delivered.
+fn with_servo() -> (Bench, Drive) {
     let mut bench = Bench::new();
     let description = model("cia402").unwrap();
     let servo = order(description, &Order::new(description, node(GENERIC), Bitrate::K500)).unwrap();
     bench.world.add_drive(GENERIC, servo).unwrap();
     bench.wait(500);
     let drive = Drive::new(bench.network.node(node(GENERIC)), description);
+    (bench, drive)
+}
+
+/// Nobody has decided against a watch that is delivered switched off (CiA 301, 7.5.2.19: 0 is the default of 1016h).
+#[test]
+fn a_servo_with_a_heartbeat_consumer_is_guarded_without_being_asked() {
+    let (mut bench, drive) = with_servo();
     let loss = bench.run(drive.guard(SwitchedOff::Leave)).unwrap();
     assert_eq!(loss.stops_after(), Some(Duration::from_secs(2)));
     bench.run(drive.release_guard()).unwrap();
@@ -253,13 +260,7 @@ fn a_servo_with_a_heartbeat_consumer_is_guarded_without_being_asked() {
 /// CiA 402 has 6007h for it, and a servo is delivered with 1016h:01 = 0: it would watch nobody.
 #[test]
 fn a_servo_that_is_delivered_without_a_watch_is_given_one_and_stops_when_the_program_dies() {
-    const GENERIC: u8 = 5;
-    let mut bench = Bench::new();
-    let description = model("cia402").unwrap();
-    let servo = order(description, &Order::new(description, node(GENERIC), Bitrate::K500)).unwrap();
-    bench.world.add_drive(GENERIC, servo).unwrap();
-    bench.wait(500);
-    let drive = Drive::new(bench.network.node(node(GENERIC)), description);
+    let (mut bench, drive) = with_servo();
     let loss = bench.run(drive.guard(SwitchedOff::SwitchOn)).unwrap();
     assert_eq!(loss.stops_after(), Some(Duration::from_secs(2)));
     bench.run(drive.velocity(Rpm(60.0), MotionOptions::default())).unwrap();
