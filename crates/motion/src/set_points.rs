@@ -1,7 +1,7 @@
 //! A path through set-points that arrive one a period: csp, csv, cst and ip (CiA 402-2; period: object 60C2h).
 //!
 //! Each [`SetPoints::push`] plans from where the path is to the new set-point, which is reached one period later
-//! ([`Course::Linear`]) or two ([`Course::Cubic`]). [`SetPoints::at`] is the plan: any time after the last set-point.
+//! ([`Interpolation::Linear`]) or two ([`Interpolation::Cubic`]). [`SetPoints::at`] is the plan: any time after the last set-point.
 //!
 //! A set-point that does not come leaves the path going on as it last went, for as many periods as are forgiven; then it slows
 //! down, and comes back to rest on the last set-point. The standard leaves this to makers; going on is what keeps a single lost
@@ -16,7 +16,7 @@ use crate::trapezoid::PositionMove;
 
 /// How the path runs from set-point to set-point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Course {
+pub enum Interpolation {
     /// Straight; velocity steps at each set-point.
     #[default]
     Linear,
@@ -28,7 +28,7 @@ pub enum Course {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Following {
     /// Straight or cubic.
-    pub course: Course,
+    pub interpolation: Interpolation,
     /// Time from one set-point to the next, s; 0 goes to each at once.
     pub period_s: f64,
     /// Periods without a set-point that the path goes on for.
@@ -61,16 +61,16 @@ impl SetPoints {
     pub fn push(&mut self, target: f64, age_s: f64, following: &Following) {
         let in_time = self.is_in_time(age_s, following);
         let steady = in_time && self.in_time;
-        match following.course {
-            Course::Linear => {
+        match following.interpolation {
+            Interpolation::Linear => {
                 let here = self.at(age_s, following).position;
                 *self = Self { before: self.from, from: here, to: target, after: target, in_time, steady };
             }
-            Course::Cubic if in_time => {
+            Interpolation::Cubic if in_time => {
                 *self = Self { before: self.from, from: self.to, to: self.after, after: target, in_time, steady };
             }
             // Late: the path has left its set-points, and starts over from where and as fast as it goes.
-            Course::Cubic => {
+            Interpolation::Cubic => {
                 let Point { position, velocity, .. } = self.at(age_s, following);
                 let step = velocity * following.period_s;
                 // With these neighbours the slope at the start is `velocity`: (to - before) / 2 = step.
@@ -118,11 +118,11 @@ impl SetPoints {
 
     /// After the period of a path that does not go on: at its end, which for the cubic is one period further.
     fn catching_up(&self, end: Point, age_s: f64, following: &Following) -> Point {
-        match following.course {
-            Course::Cubic if age_s < 2.0 * following.period_s => {
+        match following.interpolation {
+            Interpolation::Cubic if age_s < 2.0 * following.period_s => {
                 linear(end.position, self.after, following.period_s, age_s - following.period_s)
             }
-            Course::Cubic | Course::Linear => Point { position: self.after, ..Point::default() },
+            Interpolation::Cubic | Interpolation::Linear => Point { position: self.after, ..Point::default() },
         }
     }
 
@@ -150,9 +150,9 @@ impl SetPoints {
 
     fn within(&self, age_s: f64, following: &Following) -> Point {
         let period_s = following.period_s;
-        match following.course {
-            Course::Linear => linear(self.from, self.to, period_s, age_s),
-            Course::Cubic => cubic(self.before, self.from, self.to, self.after, period_s, age_s),
+        match following.interpolation {
+            Interpolation::Linear => linear(self.from, self.to, period_s, age_s),
+            Interpolation::Cubic => cubic(self.before, self.from, self.to, self.after, period_s, age_s),
         }
     }
 
@@ -168,8 +168,8 @@ mod tests {
 
     const PERIOD_S: f64 = 2e-3;
     const LINEAR: Following =
-        Following { course: Course::Linear, period_s: PERIOD_S, forgiven: 2.0, deceleration: 50_000.0 };
-    const CUBIC: Following = Following { course: Course::Cubic, ..LINEAR };
+        Following { interpolation: Interpolation::Linear, period_s: PERIOD_S, forgiven: 2.0, deceleration: 50_000.0 };
+    const CUBIC: Following = Following { interpolation: Interpolation::Cubic, ..LINEAR };
 
     fn close(left: f64, right: f64) -> bool {
         (left - right).abs() < 1e-9 * (1.0 + right.abs())
@@ -303,7 +303,7 @@ mod tests {
             path.push(9.0, 2.2 * PERIOD_S, &following);
             let after = path.at(0.0, &following);
             assert!(close(before.position, after.position), "{following:?}");
-            if following.course == Course::Cubic {
+            if following.interpolation == Interpolation::Cubic {
                 assert!(close(before.velocity, after.velocity));
             }
         }

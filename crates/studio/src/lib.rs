@@ -1,7 +1,7 @@
-//! The upper computer in the browser: who is on the bus, what each drive says of itself, and moving it, by any number of
+//! A web front end to a CANopen bus: who is on the bus, what each drive says of itself, and moving it, by any number of
 //! people who look and one who moves.
 //!
-//! [`Host`] owns the master's [`Network`](master::Network) and everything that moves: it takes wishes from a bounded channel,
+//! [`Host`] owns the master's [`Network`](master::Network) and everything that moves: it takes requests from a bounded channel,
 //! carries them out, and publishes what it knows. It has no clock, no thread and no socket: its time is that of the bus, so
 //! that the same host runs in virtual time in a test. [`app`] is the web part, an [`axum::Router`] that can be called
 //! without a socket; its handlers hold no knowledge of motion.
@@ -17,11 +17,11 @@
 mod access;
 mod authority;
 mod dead_man;
-mod desk;
 mod glossary;
+mod handle;
 mod host;
+mod local_client;
 mod message;
-mod seat;
 mod snapshot;
 mod timeline;
 mod trace;
@@ -31,10 +31,10 @@ mod world;
 
 pub use access::{Access, AccessError, Password};
 pub use dead_man::DeadMan;
-pub use desk::Desk;
+pub use handle::HostHandle;
 pub use host::{Host, JOG_SPAN, Journals, PRESENCE_SPAN, Setting};
-pub use seat::{Seat, Shown};
-pub use trace::Passed;
+pub use local_client::{LocalClient, Shown};
+pub use trace::BusFrame;
 pub use web::{app, serve};
 pub use wire::{Health, Wire};
 pub use world::{Around, Changed, WorldAsks, WorldDoor, world_door};

@@ -16,13 +16,13 @@ pub(crate) struct Message {
     /// The word that the session was welcomed with.
     pub(crate) word: String,
     /// What is to be done.
-    pub(crate) deed: Deed,
+    pub(crate) command: Command,
 }
 
 /// What a page may ask for.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
-pub(crate) enum Deed {
+pub(crate) enum Command {
     /// The page is there; whoever has moved something says so at least every [`crate::PRESENCE_SPAN`].
     Alive {},
     /// Takes control where nobody has it.
@@ -355,7 +355,7 @@ impl BaseJog {
     }
 }
 
-impl Deed {
+impl Command {
     /// Whether only the session that has control may ask for it.
     pub(crate) const fn needs_control(&self) -> bool {
         !matches!(
@@ -409,9 +409,9 @@ impl Message {
             Some(Value::String(word)) => word,
             _ => return Err(malformed(Some(seq), "expected as session the word of the welcome message".into())),
         };
-        let deed = serde_json::from_value(Value::Object(fields));
-        let deed = deed.map_err(|error| malformed(Some(seq), error.to_string()))?;
-        Ok(Self { seq, word, deed })
+        let command = serde_json::from_value(Value::Object(fields));
+        let command = command.map_err(|error| malformed(Some(seq), error.to_string()))?;
+        Ok(Self { seq, word, command })
     }
 }
 
@@ -501,10 +501,10 @@ mod tests {
     fn a_message_is_its_number_its_session_and_a_deed() {
         let message = Message::parse(r#"{"seq":7,"session":"w","do":"jog","node":4,"rpm":-60}"#).expect("whole");
         let node = NodeId::new(4).expect("a node-ID");
-        assert_eq!(message, Message { seq: 7, word: "w".into(), deed: Deed::Jog { node, rpm: -60.0 } });
-        assert!(message.deed.needs_control());
+        assert_eq!(message, Message { seq: 7, word: "w".into(), command: Command::Jog { node, rpm: -60.0 } });
+        assert!(message.command.needs_control());
         let stop = Message::parse(r#"{"seq":8,"session":"w","do":"stop_all"}"#).expect("whole");
-        assert!(!stop.deed.needs_control());
+        assert!(!stop.command.needs_control());
     }
 
     #[test]

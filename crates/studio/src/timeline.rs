@@ -39,7 +39,7 @@ impl Kind {
 
 /// Something that happened.
 #[derive(Clone, Debug)]
-pub(crate) struct Happening {
+pub(crate) struct TimelineEvent {
     pub(crate) at: Instant,
     pub(crate) node: NodeId,
     pub(crate) kind: Kind,
@@ -53,14 +53,14 @@ pub(crate) struct Happening {
     pub(crate) source: Option<String>,
 }
 
-impl Happening {
+impl TimelineEvent {
     /// Something that explains itself.
     pub(crate) fn new(at: Instant, node: NodeId, kind: Kind, what: impl Into<String>) -> Self {
         Self { at, node, kind, what: what.into(), code: None, remedy: None, source: None }
     }
 }
 
-/// A happening as it is shown.
+/// A event as it is shown.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Entry {
     /// Numbers them from 0.
@@ -107,8 +107,8 @@ pub(crate) struct News {
 
 impl Timeline {
     /// Something happens. What goes on already is not told again; an emergency message is counted.
-    pub(crate) fn push(&self, happening: Happening) {
-        self.lock().push(happening);
+    pub(crate) fn push(&self, event: TimelineEvent) {
+        self.lock().push(event);
     }
 
     /// Things of this kind are over on a node, but for those with these codes.
@@ -136,8 +136,8 @@ impl Timeline {
 }
 
 impl Kept {
-    fn push(&mut self, happening: Happening) {
-        let Happening { at, node, kind, what, code, remedy, source } = happening;
+    fn push(&mut self, event: TimelineEvent) {
+        let TimelineEvent { at, node, kind, what, code, remedy, source } = event;
         let at_s = seconds(at);
         let mut open = self.entries.iter_mut().rev().filter(|entry| entry.goes_on(node, kind));
         if let Some(known) = open.find(|entry| entry.code == code) {
@@ -194,9 +194,12 @@ fn seconds(at: Instant) -> f64 {
 mod tests {
     use super::*;
 
-    fn emcy(at_s: u64, node: u8, code: u16) -> Happening {
+    fn emcy(at_s: u64, node: u8, code: u16) -> TimelineEvent {
         let node = NodeId::new(node).expect("a node-ID");
-        Happening { code: Some(code), ..Happening::new(Instant::from_secs(at_s), node, Kind::Emcy, "over-voltage") }
+        TimelineEvent {
+            code: Some(code),
+            ..TimelineEvent::new(Instant::from_secs(at_s), node, Kind::Emcy, "over-voltage")
+        }
     }
 
     #[test]
@@ -237,7 +240,7 @@ mod tests {
         let timeline = Timeline::default();
         for round in 0..3 * KEPT as u64 {
             let node = NodeId::new(4).expect("a node-ID");
-            timeline.push(Happening::new(Instant::from_secs(round), node, Kind::State, "to Fault"));
+            timeline.push(TimelineEvent::new(Instant::from_secs(round), node, Kind::State, "to Fault"));
         }
         let news = timeline.since(0);
         assert_eq!((news.entries.len(), news.oldest), (KEPT, 2 * KEPT as u64));

@@ -23,9 +23,9 @@ struct Inner {
 pub struct Health {
     /// Fault confinement of the controller (ISO 11898-1): `error-active`, `bus-off`; `None` where nothing was told.
     pub state: Option<&'static str>,
-    /// Its transmit error counter.
+    /// Its transmit error inbox.
     pub transmit_errors: Option<u16>,
-    /// Its receive error counter.
+    /// Its receive error inbox.
     pub receive_errors: Option<u16>,
     /// Error frames so far.
     pub error_frames: u64,

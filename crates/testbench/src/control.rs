@@ -11,7 +11,7 @@
 
 mod address;
 mod answer;
-mod desk;
+mod clients;
 mod id;
 mod lines;
 mod outbox;
@@ -20,7 +20,7 @@ mod subscription;
 
 pub use address::{ControlAddress, NoAddress};
 pub use answer::{ControlError, ERROR_KINDS};
-pub use desk::{ClientNumber, Control, Outcome, PROTOCOL, Pending, Sink};
+pub use clients::{ClientNumber, Control, Outcome, PROTOCOL, Pending, Sink};
 pub use id::Id;
 pub use lines::{LineBuffer, MAX_LINE_LENGTH, ReadLine};
 pub use outbox::{Class, Outbox};

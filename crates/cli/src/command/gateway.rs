@@ -2,7 +2,7 @@
 
 mod client;
 mod places;
-mod wish;
+mod request;
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -17,9 +17,9 @@ use serde::Serialize;
 use tokio::net::TcpListener;
 use tokio::sync::{broadcast, mpsc};
 
-use client::Desk;
+use client::Handle;
 use places::{MAX_CLIENTS, Places};
-use wish::{Gone, Guard};
+use request::{Gone, Guard};
 
 use crate::context::Context;
 use crate::failure::Failure;
@@ -121,13 +121,13 @@ async fn let_in(
                          whoever comes further is let in in the same way"
                     ));
                 }
-                let desk = Desk {
+                let handle = Handle {
                     frames: context.traffic.of_others(),
                     events: events.subscribe(),
                     guards: guards.clone(),
                     gone: gone.clone(),
                 };
-                tokio::spawn(client::serve(stream, context.network.clone(), desk, place));
+                tokio::spawn(client::serve(stream, context.network.clone(), handle, place));
             }
             () = context.network.sleep(EVENT_INTERVAL) => {
                 while let Some((_, event)) = context.network.poll_event() {

@@ -24,7 +24,7 @@ use crate::failure::Failure;
 use crate::output::Report;
 use crate::recording::{ObjectBatch, ObjectRecord};
 use crate::serve::files::create_record;
-use crate::serve::speaker::Speaker;
+use crate::serve::messages::Messages;
 use plot::Paint;
 
 /// Record objects of a node over time
@@ -129,7 +129,7 @@ impl Record {
         let cannot =
             |error: std::io::Error| Failure::new(format!("cannot write the record {}", path.display())).because(error);
         let file = create_record(path, *kind).map_err(cannot)?;
-        let mut file = ObjectRecord::start(*kind, file, &columns, Speaker::of_warnings()).map_err(cannot)?;
+        let mut file = ObjectRecord::start(*kind, file, &columns, Messages::of_warnings()).map_err(cannot)?;
         let mut report = RecordReport {
             file: path.display().to_string(),
             node: self.node.raw(),

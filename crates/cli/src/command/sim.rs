@@ -21,12 +21,12 @@ use crate::plain::plain;
 use crate::recording::{FrameLog, LogPath, NewLog, Pace, RecordFile, RecordOptions};
 use crate::serve::control::{ControlOptions, ControlServer};
 use crate::serve::eeprom::{EepromError, Eeproms};
-use crate::serve::keeper::{Keeper, file_name};
+use crate::serve::messages::Messages;
 use crate::serve::pacer::{Clock, Pacer, Speed};
 use crate::serve::service::{
     PARTING_PATIENCE, REQUESTS_WAITING, Request, Service, listen_to_signals, read_lines, runtime_of_clients, tick,
 };
-use crate::serve::speaker::Speaker;
+use crate::serve::store_writer::{StoreWriter, file_name};
 use crate::serve::world::ServedWorld;
 use crate::session::{bus_failure, enter_real_time, failure_of, start_clock};
 use described::notes;
@@ -167,7 +167,7 @@ impl Sim {
         }
         // All that its drives do not take is told at once, before any of them is made.
         file.map(Machine::build).transpose().map_err(unusable)?;
-        let warnings = Speaker::of_warnings();
+        let warnings = Messages::of_warnings();
         let eeproms = self.state.as_deref().map(Eeproms::open).transpose()?;
         let mut world = machine.world();
         for placed in &machine.drives {
@@ -220,14 +220,14 @@ impl Sim {
         mut world: ServedWorld,
         eeproms: Option<Eeproms>,
         (log, record): (Option<NewLog>, Option<RecordFile>),
-        warnings: Speaker,
+        warnings: Messages,
         global: &Global,
         bridge: Option<&BusSpec>,
     ) -> Result<(), Failure> {
         let clock = start_clock(global)?;
         let (requests, mut incoming) = mpsc::channel(REQUESTS_WAITING);
         listen_to_signals(requests.clone());
-        let answers = Speaker::of_answers(warnings.clone());
+        let answers = Messages::of_answers(warnings.clone());
         // A bus whose time is moved by hand has no time of day, and its log is the same each time.
         let unix_zero = if self.clock == Clock::Manual { Duration::ZERO } else { clock.unix_zero() };
         let log = log.map(|file| FrameLog::start(file, unix_zero, self.pace(), warnings.clone()));
@@ -247,7 +247,7 @@ impl Sim {
         if let Some(eeproms) = eeproms {
             let stored = requests.clone();
             // A full queue wakes the loop as well.
-            world.keep_stores(Keeper::start(eeproms, warnings, move || drop(stored.try_send(Request::Stored))));
+            world.keep_stores(StoreWriter::start(eeproms, warnings, move || drop(stored.try_send(Request::Stored))));
         }
         let over = requests.clone();
         world.on_run_over(move || over.try_send(Request::RunIsOver).is_ok());
@@ -301,7 +301,12 @@ impl Sim {
 }
 
 /// Adds a drive with what it remembers and what is around it.
-fn add_drive(world: &mut World, placed: &Placed, eeproms: Option<&Eeproms>, warnings: &Speaker) -> Result<(), Failure> {
+fn add_drive(
+    world: &mut World,
+    placed: &Placed,
+    eeproms: Option<&Eeproms>,
+    warnings: &Messages,
+) -> Result<(), Failure> {
     let spec = &placed.spec;
     let mut drive = embedded::ordered_drive(spec.model, &spec.order(world.bitrate()))?;
     placed.supply(drive.as_mut()).map_err(unusable)?;
@@ -334,7 +339,7 @@ fn note_what_the_image_changes(
     of_bus: Bitrate,
     number: u8,
     name: &str,
-    warnings: &Speaker,
+    warnings: &Messages,
 ) {
     drive.set_power(true, Instant::ZERO);
     let (bitrate, node) = (drive.bitrate(), drive.report().node);
@@ -366,7 +371,7 @@ impl From<EepromError> for Failure {
 
 /// Joins another bus to this one. A bus that goes away and comes back is waited for, and the drives go on meanwhile; its end
 /// ends the simulator.
-fn join(hub: &Hub, outer: AnyBus, requests: mpsc::Sender<Request>, global: Global, warnings: Speaker) {
+fn join(hub: &Hub, outer: AnyBus, requests: mpsc::Sender<Request>, global: Global, warnings: Messages) {
     let mut notes = BusNotes::of(&global.bus);
     let joined = hub.join(outer, move |note| {
         notes.news(note).iter().for_each(|text| warnings.say(&plain(&format!("note: {text}"))));

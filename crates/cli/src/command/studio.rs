@@ -1,4 +1,4 @@
-//! `ferrodrive studio`: the upper computer in the browser.
+//! `ferrodrive studio`: the web front end to the bus.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -95,11 +95,11 @@ impl Studio {
         if self.control.is_given() && setting.world.is_none() {
             setting.world = Some(far_world::open(&self.control)?);
         }
-        let (host, desk) = Host::new(context.network.clone(), setting);
-        let app = studio::app(desk, Arc::new(access));
+        let (host, handle) = Host::new(context.network.clone(), setting);
+        let app = studio::app(handle, Arc::new(access));
         tokio::select! {
             served = studio::serve(listener, app) => served.map_err(cannot),
-            // Not before the router is gone, which holds the desk.
+            // Not before the router is gone, which holds the handle.
             () = host.run(|| passed(context)) => Ok(()),
             never = self.keep_open(context, &url) => match never {},
         }
@@ -144,9 +144,9 @@ pub(super) fn setting(context: &Context) -> Setting {
 }
 
 /// The next frame that has passed, for the host.
-pub(super) fn passed(context: &Context) -> Option<studio::Passed> {
+pub(super) fn passed(context: &Context) -> Option<studio::BusFrame> {
     let passed = context.traffic.take_passed()?;
-    Some(studio::Passed { at: passed.at, frame: passed.frame, own: passed.own })
+    Some(studio::BusFrame { at: passed.at, frame: passed.frame, own: passed.own })
 }
 
 /// Journals in the working folder, as `params apply` keeps them. A virtual bus of this command ends with it.

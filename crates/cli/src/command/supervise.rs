@@ -7,7 +7,7 @@ use std::time::Duration;
 use can::Instant;
 use canopen::NodeId;
 use master::core::NodeSet;
-use master::supervise::{EmcyRecord, Happening, Supervisor};
+use master::supervise::{EmcyRecord, Supervisor, SupervisorEvent};
 use master::units::parse_duration;
 use serde::Serialize;
 use testbench::words::node::node;
@@ -144,8 +144,8 @@ async fn obey(supervisor: &mut Supervisor, context: &Context, line: &str) {
 }
 
 impl Told {
-    fn new(at: Instant, happening: &Happening) -> Self {
-        let code = if let Happening::Emcy(record) = happening { Some(record.emcy.code.0) } else { None };
+    fn new(at: Instant, happening: &SupervisorEvent) -> Self {
+        let code = if let SupervisorEvent::Emcy(record) = happening { Some(record.emcy.code.0) } else { None };
         Self {
             t: at.as_secs_f64(),
             kind: happening.kind(),

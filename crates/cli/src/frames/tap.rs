@@ -53,13 +53,13 @@ struct Shown {
 /// Frames for a command.
 #[derive(Default)]
 struct Heard {
-    frames: VecDeque<Passed>,
+    frames: VecDeque<BusFrame>,
     waker: Option<Waker>,
 }
 
 /// A frame that has passed.
 #[derive(Clone, Copy)]
-pub(crate) struct Passed {
+pub(crate) struct BusFrame {
     pub(crate) at: Instant,
     pub(crate) frame: Frame,
     /// This command has sent it.
@@ -129,7 +129,7 @@ impl Traffic {
     }
 
     /// As [`take`](Self::take), with whose it was.
-    pub(crate) fn take_passed(&self) -> Option<Passed> {
+    pub(crate) fn take_passed(&self) -> Option<BusFrame> {
         self.lock().heard.as_mut()?.frames.pop_front()
     }
 
@@ -144,7 +144,7 @@ impl Traffic {
         if heard.frames.len() == KEPT {
             heard.frames.pop_front();
         }
-        heard.frames.push_back(Passed { at: now, frame: *frame, own });
+        heard.frames.push_back(BusFrame { at: now, frame: *frame, own });
         let waker = heard.waker.take();
         drop(passing);
         if let Some(waker) = waker {

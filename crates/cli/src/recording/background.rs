@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, chan
 use std::time::Duration;
 
 use crate::failure::Failure;
-use crate::serve::speaker::Speaker;
+use crate::serve::messages::Messages;
 
 /// Whether somebody's time passes while a batch waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,22 +46,22 @@ pub(super) struct Background<B> {
     missing: u64,
     /// Pieces that are missing before the file was written again.
     lost: u64,
-    speaker: Speaker,
+    messages: Messages,
 }
 
 impl<B: Send + 'static> Background<B> {
-    /// Hands batches to `write` until it fails or all are written, then calls `end`. What goes wrong is told to `speaker`.
+    /// Hands batches to `write` until it fails or all are written, then calls `end`. What goes wrong is told to `messages`.
     pub(super) fn start<W: Send + 'static>(
         words: Words,
         writer: W,
         write: impl Fn(&mut W, B) -> io::Result<()> + Send + 'static,
         end: impl FnOnce(W) -> io::Result<()> + Send + 'static,
         pace: Pace,
-        speaker: Speaker,
+        messages: Messages,
     ) -> Self {
         let (batches, incoming) = sync_channel(pace.room());
         let (done, written) = channel();
-        let told = speaker.clone();
+        let told = messages.clone();
         std::thread::spawn(move || {
             let mut writer = writer;
             let all = incoming.iter().try_for_each(|batch| write(&mut writer, batch));
@@ -74,7 +74,7 @@ impl<B: Send + 'static> Background<B> {
             let _ = done.send(ended);
             drop(incoming);
         });
-        Self { batches, written, words, pace, missing: 0, lost: 0, speaker }
+        Self { batches, written, words, pace, missing: 0, lost: 0, messages }
     }
 
     /// Takes a batch of so many pieces; one that the disk has no time for is left out, and that is said, or waited for: as the pace is.
@@ -89,13 +89,13 @@ impl<B: Send + 'static> Background<B> {
             Ok(()) if self.missing > 0 => {
                 let missing = std::mem::take(&mut self.missing);
                 self.lost += missing;
-                self.speaker.say(&format!("warning: {file} is written again; {missing} {what} are missing in it"));
+                self.messages.say(&format!("warning: {file} is written again; {missing} {what} are missing in it"));
             }
             // When the file has ended for good, that has been said.
             Ok(()) | Err(TrySendError::Disconnected(_)) => {}
             Err(TrySendError::Full(_)) => {
                 if self.missing == 0 {
-                    self.speaker.say(&format!(
+                    self.messages.say(&format!(
                         "warning: {file} cannot be written as fast as the bus goes; {what} are left out"
                     ));
                 }
@@ -124,7 +124,7 @@ impl<B: Send + 'static> Background<B> {
             Ok(Ok(())) if lost == 0 => Ok(()),
             Ok(Ok(())) if self.missing == 0 => Err(torn(format!("the disk was too slow: {lost} {pieces} are missing"))),
             Ok(Ok(())) | Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
-                self.speaker
+                self.messages
                     .say(&format!("warning: the end of {file} is missing, and {} {pieces} before", self.missing));
                 Err(torn(format!("the disk was too slow: its end is missing, and {lost} {pieces} before")))
             }

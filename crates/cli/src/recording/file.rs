@@ -11,7 +11,7 @@ use testbench::recording::{Column, Kind, Mark, Record};
 
 use super::background::{Background, Pace, Words};
 use crate::failure::Failure;
-use crate::serve::speaker::Speaker;
+use crate::serve::messages::Messages;
 
 /// What happened since the batch before, each kind in the order of its times.
 #[derive(Default)]
@@ -28,14 +28,20 @@ pub(crate) struct Batch {
 pub(crate) struct RecordFile(Background<Batch>);
 
 impl RecordFile {
-    /// Writes to `file` from now on. What goes wrong later is told to `speaker`.
+    /// Writes to `file` from now on. What goes wrong later is told to `messages`.
     ///
     /// # Errors
     /// That of writing the begin.
-    pub(crate) fn start(kind: Kind, file: File, columns: &[Column], pace: Pace, speaker: Speaker) -> io::Result<Self> {
+    pub(crate) fn start(
+        kind: Kind,
+        file: File,
+        columns: &[Column],
+        pace: Pace,
+        messages: Messages,
+    ) -> io::Result<Self> {
         let words = Words { file: "the record", pieces: "samples" };
         let record = Record::begin(kind, Box::new(file), columns)?;
-        Ok(Self(Background::start(words, record, write, Record::finish, pace, speaker)))
+        Ok(Self(Background::start(words, record, write, Record::finish, pace, messages)))
     }
 
     /// Takes a batch.

@@ -8,7 +8,7 @@ use transport::log::{LogWriter, Record};
 
 use super::background::{Background, Pace, Words};
 use crate::failure::Failure;
-use crate::serve::speaker::Speaker;
+use crate::serve::messages::Messages;
 
 /// Frames, and when the bus carried them.
 type Batch = Vec<(Instant, Frame)>;
@@ -17,12 +17,12 @@ type Batch = Vec<(Instant, Frame)>;
 pub(crate) struct FrameLog(Background<Batch>);
 
 impl FrameLog {
-    /// Writes to `log` from now on, with times counted from `unix_zero`. What goes wrong is told to `speaker`.
+    /// Writes to `log` from now on, with times counted from `unix_zero`. What goes wrong is told to `messages`.
     pub(crate) fn start<W: Write + Seek + Send + 'static>(
         log: LogWriter<W>,
         unix_zero: Duration,
         pace: Pace,
-        speaker: Speaker,
+        messages: Messages,
     ) -> Self {
         let words = Words { file: "the log", pieces: "frames" };
         let write = move |log: &mut LogWriter<W>, batch: Batch| {
@@ -30,7 +30,7 @@ impl FrameLog {
             log.flush()
         };
         let end = |log: LogWriter<W>| log.finish().map(drop);
-        Self(Background::start(words, log, write, end, pace, speaker))
+        Self(Background::start(words, log, write, end, pace, messages))
     }
 
     /// Takes frames that were carried.
@@ -95,7 +95,7 @@ mod tests {
         let (allow, allowed) = channel();
         let (taken, disk) = sync_channel(1000);
         let mut log =
-            FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Pace::RealTime, Speaker::of_warnings());
+            FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Pace::RealTime, Messages::of_warnings());
         for second in 0..ROOM + 50 {
             log.write(batch(second));
         }
@@ -115,7 +115,7 @@ mod tests {
     fn a_bus_that_can_wait_does_and_nothing_is_left_out() {
         let (allow, allowed) = channel();
         let (taken, disk) = sync_channel(1000);
-        let mut log = FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Pace::Free, Speaker::of_warnings());
+        let mut log = FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Pace::Free, Messages::of_warnings());
         let batches = 3 * ROOM;
         // The disk takes a piece when the bus has had to wait for it, or a little later.
         let slow = std::thread::spawn(move || {
@@ -140,7 +140,7 @@ mod tests {
         let (taken, disk) = sync_channel(0);
         drop((allow, disk));
         let mut log =
-            FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Pace::RealTime, Speaker::of_warnings());
+            FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Pace::RealTime, Messages::of_warnings());
         for second in 0..3 * ROOM {
             log.write(batch(second));
         }

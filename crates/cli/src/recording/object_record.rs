@@ -9,7 +9,7 @@ use testbench::recording::{Column, Kind, Mark, Record};
 
 use super::background::{Background, Pace, Words};
 use crate::failure::Failure;
-use crate::serve::speaker::Speaker;
+use crate::serve::messages::Messages;
 
 /// What came since the batch before, each kind in the order of its times.
 #[derive(Default)]
@@ -26,14 +26,14 @@ pub(crate) struct ObjectBatch {
 pub(crate) struct ObjectRecord(Background<ObjectBatch>);
 
 impl ObjectRecord {
-    /// Writes to `file` from now on. What goes wrong later is told to `speaker`.
+    /// Writes to `file` from now on. What goes wrong later is told to `messages`.
     ///
     /// # Errors
     /// That of writing the begin.
-    pub(crate) fn start(kind: Kind, file: File, columns: &[Column], speaker: Speaker) -> io::Result<Self> {
+    pub(crate) fn start(kind: Kind, file: File, columns: &[Column], messages: Messages) -> io::Result<Self> {
         let words = Words { file: "the record", pieces: "samples" };
         let record = Record::begin(kind, Box::new(file), columns)?;
-        Ok(Self(Background::start(words, record, write, Record::finish, Pace::RealTime, speaker)))
+        Ok(Self(Background::start(words, record, write, Record::finish, Pace::RealTime, messages)))
     }
 
     /// Takes a batch; one that the disk has no time for is left out, and that is said.

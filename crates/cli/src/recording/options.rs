@@ -13,7 +13,7 @@ use super::background::Pace;
 use super::file::RecordFile;
 use crate::failure::Failure;
 use crate::serve::files::create_record;
-use crate::serve::speaker::Speaker;
+use crate::serve::messages::Messages;
 use master::units::parse_duration;
 
 /// Sample rate and choice of signals of a record.
@@ -55,7 +55,12 @@ impl RecordOptions {
     }
 
     /// Begins to record the drives of `world` as asked for; `None` if it is not.
-    pub(crate) fn start(&self, world: &mut World, pace: Pace, speaker: Speaker) -> Result<Option<RecordFile>, Failure> {
+    pub(crate) fn start(
+        &self,
+        world: &mut World,
+        pace: Pace,
+        messages: Messages,
+    ) -> Result<Option<RecordFile>, Failure> {
         let Some(path) = self.path() else { return Ok(None) };
         let mut places = Vec::new();
         let numbers: Vec<u8> = world.drive_numbers().collect();
@@ -84,7 +89,7 @@ impl RecordOptions {
         let of_axes = channels.iter().map(|channel| Column::of_axis(*channel));
         let columns: Vec<Column> = of_axes.chain(bodies.iter().flat_map(Column::of_body)).collect();
         let period = self.record_period.unwrap_or(Duration::from_millis(1));
-        let file = create(path).and_then(|(kind, file)| RecordFile::start(kind, file, &columns, pace, speaker));
+        let file = create(path).and_then(|(kind, file)| RecordFile::start(kind, file, &columns, pace, messages));
         let file = file.map_err(|error| cannot_write(path, &error))?;
         world.start_recording(Recorder::new(period, channels).with_bodies(&bodies));
         world.watch(true);

@@ -4,15 +4,15 @@ pub(crate) mod control;
 pub(crate) mod eeprom;
 pub(crate) mod files;
 mod input;
-pub(crate) mod keeper;
 mod kept;
 mod lag;
+pub(crate) mod messages;
 pub(crate) mod pacer;
 mod registers;
+mod round_robin;
 pub(crate) mod service;
-pub(crate) mod speaker;
+pub(crate) mod store_writer;
 mod stores;
-mod turns;
 pub(crate) mod world;
 
 /// An empty directory of a test's own.

@@ -12,7 +12,7 @@ use transport::{ModbusRequest, WallClock};
 
 use super::control::ControlMessage;
 use super::input::next_line;
-use super::speaker::Speaker;
+use super::messages::Messages;
 use super::world::{Commanded, ServedWorld};
 use crate::failure::Failure;
 use crate::recording::{Batch, FrameLog, RecordFile};
@@ -89,16 +89,16 @@ impl From<ModbusRequest> for Request {
 /// What a running simulation says and writes.
 pub(crate) struct Service {
     /// Answers to world commands.
-    pub(crate) answers: Speaker,
+    pub(crate) answers: Messages,
     /// Everything else that people should know.
-    pub(crate) warnings: Speaker,
+    pub(crate) warnings: Messages,
     /// The log, if one is asked for.
     pub(crate) log: Option<FrameLog>,
     /// The record, if one is asked for.
     pub(crate) record: Option<RecordFile>,
     /// Lines that came while a run was under way: each is answered in its turn.
     pub(crate) waiting: VecDeque<String>,
-    /// Turns of keeping after which a `quit` that waits ends the run.
+    /// RoundRobin of keeping after which a `quit` that waits ends the run.
     pub(crate) quit_in: Option<u32>,
     /// Time is moved by hand.
     pub(crate) by_hand: bool,
@@ -172,7 +172,7 @@ impl Service {
 
     /// One turn less until a `quit` that waits ends the run.
     fn count_down(&mut self, world: &mut ServedWorld) -> ControlFlow<Result<(), Failure>> {
-        self.quit_in = self.quit_in.and_then(|turns| turns.checked_sub(1));
+        self.quit_in = self.quit_in.and_then(|round_robin| round_robin.checked_sub(1));
         if self.quit_in == Some(0) { self.quit_in_a_run(world) } else { ControlFlow::Continue(()) }
     }
 
@@ -260,7 +260,7 @@ fn asks_to_quit(line: &str) -> bool {
 }
 
 /// Hands over the lines of standard input; ends with it. A reader of `answers` that is slow is waited for here.
-pub(crate) fn read_lines(requests: &mpsc::Sender<Request>, answers: &Speaker) {
+pub(crate) fn read_lines(requests: &mpsc::Sender<Request>, answers: &Messages) {
     let mut input = io::stdin().lock();
     while let Ok(Some(line)) = next_line(&mut input) {
         if sim::command::asks_for_an_answer(&line) {
@@ -336,11 +336,12 @@ mod tests {
         world.watch(true);
         let file = std::fs::File::create(&path).unwrap();
         let columns = [Column::of_axis(channel)];
-        let file = RecordFile::start(kind, file, &columns, Pace::Free, Speaker::silent()).unwrap();
-        let mut served = ServedWorld::new(world, Pacer::new(Clock::Manual, Speed::Times(1.0)), true, Speaker::silent());
+        let file = RecordFile::start(kind, file, &columns, Pace::Free, Messages::silent()).unwrap();
+        let mut served =
+            ServedWorld::new(world, Pacer::new(Clock::Manual, Speed::Times(1.0)), true, Messages::silent());
         let mut service = Service {
-            answers: Speaker::silent(),
-            warnings: Speaker::silent(),
+            answers: Messages::silent(),
+            warnings: Messages::silent(),
             log: None,
             record: Some(file),
             waiting: VecDeque::new(),

@@ -12,22 +12,22 @@ use sim::World;
 use transport::{ModbusRequest, RegisterAnswer};
 
 use super::eeprom::EepromError;
-use super::keeper::Keeper;
+use super::messages::Messages;
 use super::registers;
-use super::speaker::Speaker;
+use super::store_writer::StoreWriter;
 
 /// How long an answer waits for the disk. Less than the 300 ms after which canopen-python gives up on an SDO answer.
 const DISK_PATIENCE: Duration = Duration::from_millis(250);
 
 /// See the [module](self).
 pub(crate) struct Stores {
-    keeper: Keeper,
+    store_writer: StoreWriter,
     held: VecDeque<HeldAnswer>,
     /// What is waited for, by drive and store, and what the clock showed when that began.
     since: BTreeMap<(u8, u64), Instant>,
     /// The disk was slow at the last store: said once.
     slow: bool,
-    speaker: Speaker,
+    messages: Messages,
 }
 
 /// A Modbus answer that waits for a store.
@@ -40,9 +40,9 @@ struct HeldAnswer {
 
 impl Stores {
     /// Begins with the drives of `world` as kept.
-    pub(crate) fn guard(world: &mut World, keeper: Keeper, speaker: Speaker) -> Self {
+    pub(crate) fn guard(world: &mut World, store_writer: StoreWriter, messages: Messages) -> Self {
         world.guard_stores();
-        Self { keeper, held: VecDeque::new(), since: BTreeMap::new(), slow: false, speaker }
+        Self { store_writer, held: VecDeque::new(), since: BTreeMap::new(), slow: false, messages }
     }
 
     /// Has a Modbus request answered, at once or when the store that the answer stands for is on the disk; the clock shows
@@ -62,9 +62,9 @@ impl Stores {
     /// Hands new contents to the disk, and lets out the answers that need wait no longer; the clock shows `clock`.
     pub(crate) fn settle(&mut self, world: &mut World, clock: Instant) {
         while let Some(image) = world.poll_store() {
-            self.keeper.hand_over(image);
+            self.store_writer.hand_over(image);
         }
-        for (number, generation) in self.keeper.take_settled() {
+        for (number, generation) in self.store_writer.take_settled() {
             world.confirm_store(number, generation);
             self.slow &= self.is_waiting(world);
         }
@@ -72,7 +72,7 @@ impl Stores {
         self.note_what_waits(world, clock);
         while let Some((number, needs)) = self.overdue(clock) {
             if !self.slow {
-                self.speaker.say(&format!(
+                self.messages.say(&format!(
                     "warning: the disk of --state is slow: drive {number} acknowledges a store that has not reached it \
                      after {} ms",
                     DISK_PATIENCE.as_millis()
@@ -95,12 +95,12 @@ impl Stores {
         !self.held.is_empty() || world.held_answers().next().is_some()
     }
 
-    /// Returns when everything is on the disk, at most after `patience`; see [`Keeper::finish`].
+    /// Returns when everything is on the disk, at most after `patience`; see [`StoreWriter::finish`].
     pub(crate) fn finish(self, world: &mut World, patience: Duration) -> Option<Result<(), EepromError>> {
         while let Some(image) = world.poll_store() {
-            self.keeper.hand_over(image);
+            self.store_writer.hand_over(image);
         }
-        self.keeper.finish(patience)
+        self.store_writer.finish(patience)
     }
 
     /// What has begun to wait does so since now; what waits no longer is forgotten.
@@ -156,8 +156,8 @@ mod tests {
     fn a_disk_has_its_time_by_the_clock_however_fast_the_bus_goes() {
         let at = Instant::from_millis;
         let (mut world, probe) = waiting();
-        let (keeper, kept) = Keeper::by_hand();
-        let mut stores = Stores::guard(&mut world, keeper, Speaker::silent());
+        let (store_writer, kept) = StoreWriter::by_hand();
+        let mut stores = Stores::guard(&mut world, store_writer, Messages::silent());
         let write = |world: &mut World| world.send(probe, WRITE_700.parse().unwrap()).unwrap();
         write(&mut world);
         world.run_for(Duration::from_millis(5));

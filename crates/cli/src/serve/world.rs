@@ -1,7 +1,7 @@
 //! A virtual world whose bus is served to other programs: its wire's frames go to clients, theirs go onto its wire.
 //!
 //! All clients share one CAN adapter of the virtual bus. It is given one frame at a time, each client's in turn, so that
-//! who sends much waits and who sends little does not. As an adapter with one mailbox does it takes the next frame when the
+//! who sends much waits and who sends little does not. As an adapter with one shared_outbox does it takes the next frame when the
 //! one before is out, which is too late for the arbitration that follows: a station that waits has its turn then, whatever
 //! the identifiers are.
 
@@ -19,26 +19,26 @@ use sim::recorder::Recorder;
 use sim::wire::{ErrorCause, WireEvent};
 use sim::{StationId, World};
 use testbench::control::{ClientNumber, Control, Outcome, Pending};
-use testbench::scenario::Course;
-use testbench::scenario::happening::Happening;
+use testbench::scenario::Execution;
+use testbench::scenario::occurrence::Occurrence;
 use transport::{ClientId, ErrorFrame, ErrorKind, ErrorKinds, Heard, LeaveReason, ModbusRequest, RealTimeWorld};
 
-use super::control::{ControlMessage, Letters};
+use super::control::{ControlMessage, OutboxSender};
 use super::eeprom::EepromError;
-use super::keeper::Keeper;
 use super::kept::Kept;
 use super::lag::{Lag, LagNews};
+use super::messages::Messages;
 use super::pacer::Pacer;
 use super::registers;
-use super::speaker::Speaker;
+use super::round_robin::RoundRobin;
+use super::store_writer::StoreWriter;
 use super::stores::Stores;
-use super::turns::Turns;
 
 /// See the [module](self).
 pub(crate) struct ServedWorld {
     world: World,
     adapter: StationId,
-    turns: Turns<ClientId>,
+    round_robin: RoundRobin<ClientId>,
     /// Whose frame the adapter has.
     offered: Option<ClientId>,
     /// When the adapter takes another.
@@ -47,10 +47,10 @@ pub(crate) struct ServedWorld {
     /// What a log or a record has not been given yet.
     kept: Option<Kept>,
     stores: Option<Stores>,
-    control: Control<Letters>,
+    control: Control<OutboxSender>,
     /// The scenario that the world goes through, if it does, and its end.
-    course: Option<FollowedCourse>,
-    /// Events that the course has seen and the record has not.
+    execution: Option<FollowedCourse>,
+    /// Events that the execution has seen and the record has not.
     events: Vec<Event>,
     /// Who is behind the lines of standard input, to those who hear of stimuli.
     own_name: Arc<str>,
@@ -64,7 +64,7 @@ pub(crate) struct ServedWorld {
     lag: Lag,
     frames_lost: u64,
     displaced: u64,
-    speaker: Speaker,
+    messages: Messages,
 }
 
 /// A run that somebody has asked for.
@@ -78,7 +78,7 @@ struct UnderWay {
 
 /// A scenario under way.
 struct FollowedCourse {
-    course: Course,
+    execution: Execution,
     /// Tells that it is over; false if that could not be taken, and is to be told again.
     is_over: Box<dyn Fn() -> bool>,
     told: bool,
@@ -96,8 +96,8 @@ pub(crate) enum Commanded {
 
 impl ServedWorld {
     /// Adds the adapter to `world`, whose time passes as `pacer` says. `logged` keeps carried frames for [`Self::take_carried`]; what is to be said of the
-    /// service goes to `speaker`.
-    pub(crate) fn new(mut world: World, pacer: Pacer, logged: bool, speaker: Speaker) -> Self {
+    /// service goes to `messages`.
+    pub(crate) fn new(mut world: World, pacer: Pacer, logged: bool, messages: Messages) -> Self {
         let adapter = world.add_probe();
         let mut control = Control::new(None);
         if world.is_watched() {
@@ -106,14 +106,14 @@ impl ServedWorld {
         Self {
             world,
             adapter,
-            turns: Turns::new(),
+            round_robin: RoundRobin::new(),
             offered: None,
             free_at: Instant::ZERO,
             heard: VecDeque::new(),
             kept: logged.then(Kept::new),
             stores: None,
             control,
-            course: None,
+            execution: None,
             events: Vec::new(),
             own_name: "standard input".into(),
             pacer,
@@ -123,28 +123,28 @@ impl ServedWorld {
             lag: Lag::default(),
             frames_lost: 0,
             displaced: 0,
-            speaker,
+            messages,
         }
     }
 
     /// Goes through a scenario with the clients as its host; calls `is_over` at its end, until that returns true. Time then stands.
-    pub(crate) fn follow(&mut self, mut course: Course, is_over: impl Fn() -> bool + 'static) {
-        course.is_served_by(self.adapter, &mut self.world);
+    pub(crate) fn follow(&mut self, mut execution: Execution, is_over: impl Fn() -> bool + 'static) {
+        execution.is_served_by(self.adapter, &mut self.world);
         if self.world.is_watched() {
             self.control.keep_events();
         }
-        course.go_on(&mut self.world);
-        self.course = Some(FollowedCourse { course, is_over: Box::new(is_over), told: false });
+        execution.go_on(&mut self.world);
+        self.execution = Some(FollowedCourse { execution, is_over: Box::new(is_over), told: false });
     }
 
     /// The world and its scenario, as they stand.
-    pub(crate) fn into_course(self) -> (World, Option<Course>) {
-        (self.world, self.course.map(|followed| followed.course))
+    pub(crate) fn into_course(self) -> (World, Option<Execution>) {
+        (self.world, self.execution.map(|followed| followed.execution))
     }
 
     /// From now on what drives store is kept, and acknowledged when it is.
-    pub(crate) fn keep_stores(&mut self, keeper: Keeper) {
-        self.stores = Some(Stores::guard(&mut self.world, keeper, self.speaker.clone()));
+    pub(crate) fn keep_stores(&mut self, store_writer: StoreWriter) {
+        self.stores = Some(Stores::guard(&mut self.world, store_writer, self.messages.clone()));
     }
 
     /// Clients of the control connection have to give this token from now on.
@@ -155,7 +155,7 @@ impl ServedWorld {
     /// A client of the control connection comes, speaks or goes.
     pub(crate) fn serve_control(&mut self, message: ControlMessage) {
         match message {
-            ControlMessage::Joined(number, mailbox) => self.control.join(number, Letters(mailbox)),
+            ControlMessage::Joined(number, shared_outbox) => self.control.join(number, OutboxSender(shared_outbox)),
             ControlMessage::Left(number) => self.see_off(number),
             ControlMessage::Line(number, line) => {
                 let service = self.service();
@@ -326,8 +326,8 @@ impl ServedWorld {
     /// Sorts out what the wire did, and gives the adapter its next frame.
     fn collect(&mut self) {
         while let Some(event) = self.world.log_mut().pull() {
-            if let Some(FollowedCourse { course, .. }) = &mut self.course {
-                course.hear(&mut self.world, Happening::Wire(&event));
+            if let Some(FollowedCourse { execution, .. }) = &mut self.execution {
+                execution.hear(&mut self.world, Occurrence::Wire(&event));
             }
             if let WireEvent::Error { at, cause, .. } = event
                 && self.hears()
@@ -352,32 +352,32 @@ impl ServedWorld {
 
     /// Hands on to the scenario what the world tells of itself, and has it do what it can do now.
     fn follow_course(&mut self) {
-        let Some(FollowedCourse { course, .. }) = &mut self.course else { return };
+        let Some(FollowedCourse { execution, .. }) = &mut self.execution else { return };
         if self.world.is_watched() {
             for event in self.control.take_events(&mut self.world) {
-                course.hear(&mut self.world, Happening::Told(&event));
+                execution.hear(&mut self.world, Occurrence::Told(&event));
                 if self.kept.is_some() && self.events.len() < MAX_WAITING {
                     self.events.push(event);
                 }
             }
         }
-        course.go_on(&mut self.world);
+        execution.go_on(&mut self.world);
     }
 
     /// The scenario is at its end.
     fn is_over(&self) -> bool {
-        self.course.as_ref().is_some_and(|followed| followed.course.is_over())
+        self.execution.as_ref().is_some_and(|followed| followed.execution.is_over())
     }
 
     /// When the scenario wants to look at values.
     fn next_look(&self) -> Option<Instant> {
-        self.course.as_ref()?.course.next_time(self.world.now())
+        self.execution.as_ref()?.execution.next_time(self.world.now())
     }
 
     /// Has the scenario look at values, and at what comes of that.
     fn look(&mut self) {
-        if let Some(FollowedCourse { course, .. }) = &mut self.course {
-            course.look(&mut self.world);
+        if let Some(FollowedCourse { execution, .. }) = &mut self.execution {
+            execution.look(&mut self.world);
             self.collect();
         }
     }
@@ -432,7 +432,7 @@ impl ServedWorld {
 
     /// When the adapter takes the frame that waits for it.
     fn next_offer(&self) -> Option<Instant> {
-        let waits = self.offered.is_none() && !self.turns.is_empty();
+        let waits = self.offered.is_none() && !self.round_robin.is_empty();
         waits.then(|| self.free_at.max(self.world.now()))
     }
 
@@ -444,7 +444,7 @@ impl ServedWorld {
             self.heard.push_back(Heard::Lost { from });
         }
         while self.offered.is_none() && self.free_at <= self.world.now() {
-            let Some((client, frame)) = self.turns.pop() else { return };
+            let Some((client, frame)) = self.round_robin.pop() else { return };
             match self.world.send(self.adapter, frame) {
                 Ok(()) => self.offered = Some(client),
                 Err(_) => self.heard.push_back(Heard::Lost { from: client }),
@@ -454,7 +454,7 @@ impl ServedWorld {
 
     fn give_up(&mut self, frames: usize) {
         if frames > 0 && self.frames_lost == 0 {
-            self.speaker.say(
+            self.messages.say(
                 "warning: clients that are gone have left more frames behind than the bus can carry; those are given up \
                  and counted in the answer to `now`",
             );
@@ -513,7 +513,7 @@ impl RealTimeWorld for ServedWorld {
                 break;
             }
         }
-        if let Some(followed) = self.course.as_mut().filter(|followed| followed.course.is_over()) {
+        if let Some(followed) = self.execution.as_mut().filter(|followed| followed.execution.is_over()) {
             // A run of longer ends with it: time goes no further.
             self.run.iter_mut().for_each(|run| run.end = run.end.min(self.world.now()));
             followed.told = followed.told || (followed.is_over)();
@@ -529,7 +529,7 @@ impl RealTimeWorld for ServedWorld {
     }
 
     fn inject(&mut self, client: ClientId, frame: &Frame) {
-        self.turns.push(client, *frame);
+        self.round_robin.push(client, *frame);
         self.offer_next();
     }
 
@@ -543,11 +543,11 @@ impl RealTimeWorld for ServedWorld {
 
     fn left(&mut self, client: ClientId, reason: LeaveReason) {
         self.pacer.left();
-        let given_up = self.turns.leave(client);
+        let given_up = self.round_robin.leave(client);
         self.give_up(given_up);
         if reason == LeaveReason::Displaced {
             if self.displaced == 0 {
-                self.speaker.say("warning: too many clients; those that are idle make room for new ones");
+                self.messages.say("warning: too many clients; those that are idle make room for new ones");
             }
             self.displaced += 1;
         }
@@ -556,7 +556,7 @@ impl RealTimeWorld for ServedWorld {
     fn set_lag(&mut self, lag: Duration) {
         let lag = if self.pacer.follows_the_clock() { lag } else { Duration::ZERO };
         if let Some(news) = self.lag.update(lag) {
-            self.speaker.say(&news.to_string());
+            self.messages.say(&news.to_string());
             let kind = match news {
                 LagNews::Behind(lag) => EventKind::Behind(lag),
                 LagNews::CaughtUp { worst } => EventKind::CaughtUp { worst },

@@ -5,7 +5,7 @@ use cia402::{
     AbortConnectionOption, DisableOperationOption, FaultReactionOption, HaltOption, HomingMethod, InterpolationPeriod,
     InterpolationSubMode, QuickStopOption, ShutdownOption, StopRamp, Window,
 };
-use motion::set_points::{Course, Following};
+use motion::set_points::{Following, Interpolation};
 use motion::travel::{Bounds, Travel};
 
 use super::motor::Motor;
@@ -199,7 +199,11 @@ impl<S: Storage> Reader<'_, S> {
         };
         let sub_mode = InterpolationSubMode(self.read(slots.interpolation_sub_mode, 0) as i16);
         Following {
-            course: if sub_mode == InterpolationSubMode::CUBIC { Course::Cubic } else { Course::Linear },
+            interpolation: if sub_mode == InterpolationSubMode::CUBIC {
+                Interpolation::Cubic
+            } else {
+                Interpolation::Linear
+            },
             period_s: period.nanos().unwrap_or_default() as f64 * 1e-9,
             forgiven: FORGIVEN_PERIODS,
             deceleration,

@@ -24,8 +24,8 @@
 //! ```
 
 mod assignment;
+mod error_status;
 mod expectation;
-mod letter;
 mod node;
 mod report;
 mod step;
@@ -34,8 +34,8 @@ mod unconfigured;
 use canopen::NmtCommand;
 
 pub use assignment::{Assignment, Startup};
+pub use error_status::ErrorStatus;
 pub use expectation::{BadPlan, BootPlan, Expectation};
-pub use letter::ErrorStatus;
 pub use report::{BootReport, NodeReport};
 pub use step::{Expected, Found, Heard, Step, StepKind, Verdict};
 pub use unconfigured::Unconfigured;

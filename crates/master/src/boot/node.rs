@@ -11,8 +11,8 @@ use canopen::{Mux, NmtCommand, NmtState, NodeId};
 use devices::HostWatch;
 
 use super::assignment::{Assignment, Startup};
+use super::error_status::ErrorStatus;
 use super::expectation::{BootPlan, Expectation};
-use super::letter::ErrorStatus;
 use super::report::NodeReport;
 use super::step::{Expected, Found, Heard, Step, StepKind, Verdict};
 use crate::Drive;

@@ -4,7 +4,7 @@ use core::fmt;
 
 use canopen::{NmtState, NodeId};
 
-use super::letter::ErrorStatus;
+use super::error_status::ErrorStatus;
 use super::step::{Step, Verdict};
 
 /// What came of the boot-up of a network.

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use canopen::{AbortCode, Mux, NmtState};
 
-use super::letter::ErrorStatus;
+use super::error_status::ErrorStatus;
 use crate::error::Hints;
 
 /// One step of the boot-up of a node.

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use canopen::{Mux, NodeId};
 
+use super::error_status::ErrorStatus;
 use super::expectation::BootPlan;
-use super::letter::ErrorStatus;
 use super::report::BootReport;
 use crate::network::Network;
 use crate::parameters::{is_command, verify};

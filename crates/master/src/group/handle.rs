@@ -5,9 +5,9 @@ use core::time::Duration;
 
 use can::Instant;
 
-use super::course::{Course, Runner};
 use super::error::GroupError;
 use super::limits::PathPoint;
+use super::runner::{Activity, Runner};
 use super::state::{GroupState, Phase, StopCause};
 use super::stream::{Stream, StreamOptions};
 use super::trajectory::Trajectory;
@@ -75,9 +75,9 @@ impl Group {
 
     /// Has all drives enabled from the next cycle on.
     pub fn start_enabling(&mut self) {
-        if matches!(self.runner.course, Course::Off) {
+        if matches!(self.runner.activity, Activity::Off) {
             self.runner.cause = None;
-            self.runner.course = Course::Enabling;
+            self.runner.activity = Activity::Enabling;
         }
     }
 
@@ -87,7 +87,7 @@ impl Group {
     /// [`GroupError::Stopped`] when a drive is at fault, [`GroupError::NotEnabled`] when one takes too long, those of
     /// [`cycle`](Self::cycle). The drives are then without power.
     pub async fn enable(&mut self) -> Result<(), GroupError> {
-        if !matches!(self.runner.course, Course::Off) {
+        if !matches!(self.runner.activity, Activity::Off) {
             return self.check_going();
         }
         // What an earlier stop has left behind ends without power, and all axes get theirs together.
@@ -102,7 +102,7 @@ impl Group {
         }
         let late = self.runner.states.iter().position(|state| !state.follows).unwrap_or(0);
         let (node, shows) = (self.runner.axes[late].drive.node(), self.runner.states[late].to_string());
-        self.runner.course = Course::Off;
+        self.runner.activity = Activity::Off;
         self.cycle().await?;
         Err(GroupError::NotEnabled { axis: late + 1, node, limit: POWER_LIMIT, shows })
     }
@@ -115,13 +115,13 @@ impl Group {
     /// [`GroupError::Path`], [`GroupError::Stopped`], [`GroupError::Phase`]; then nothing changes.
     pub fn start_move(&mut self, to: &[Turns], within: Option<Duration>) -> Result<Duration, GroupError> {
         self.check_going()?;
-        if !matches!(self.runner.course, Course::Holding | Course::Moving { .. }) {
+        if !matches!(self.runner.activity, Activity::Holding | Activity::Moving { .. }) {
             return Err(self.not_now());
         }
         let to: Vec<_> = to.iter().map(|Turns(turns)| *turns).collect();
         let path = Trajectory::to_rest_at(&self.runner.points, &to, &self.runner.limits, within)?;
         let time = Duration::from_secs_f64(path.duration_s());
-        self.runner.course = Course::Moving { path, time_s: 0.0 };
+        self.runner.activity = Activity::Moving { path, time_s: 0.0 };
         Ok(time)
     }
 
@@ -142,7 +142,7 @@ impl Group {
         while matches!(self.state().phase, Phase::Moving | Phase::Streaming | Phase::Stopping) {
             self.cycle().await?;
             // A quick stop has no end that the group plans: its drives stand when they say so, and are not waited for for ever.
-            if let Course::QuickStop { cycles } = self.runner.course
+            if let Activity::QuickStop { cycles } = self.runner.activity
                 && (self.runner.has_quick_stopped() || cycles > self.cycles(POWER_LIMIT))
             {
                 break;
@@ -157,17 +157,17 @@ impl Group {
     /// [`GroupError::Stopped`], [`GroupError::Phase`] for a group that does not hold, [`GroupError::StreamOption`].
     pub fn start_stream(&mut self, options: StreamOptions) -> Result<(), GroupError> {
         self.check_going()?;
-        if !matches!(self.runner.course, Course::Holding) {
+        if !matches!(self.runner.activity, Activity::Holding) {
             return Err(self.not_now());
         }
         options.check(self.runner.period_s)?;
-        self.runner.course = Course::Streaming(Stream::new(&self.runner.points, self.runner.period_s, options));
+        self.runner.activity = Activity::Streaming(Stream::new(&self.runner.points, self.runner.period_s, options));
         Ok(())
     }
 
     /// The stream, while there is one: how many points wait, for how many there is room.
     pub const fn stream(&self) -> Option<&Stream> {
-        if let Course::Streaming(stream) = &self.runner.course { Some(stream) } else { None }
+        if let Activity::Streaming(stream) = &self.runner.activity { Some(stream) } else { None }
     }
 
     /// Gives a stream its next point.
@@ -177,20 +177,20 @@ impl Group {
     /// [`GroupError::Stopped`], [`GroupError::Phase`].
     pub fn push(&mut self, point: &[Turns]) -> Result<(), GroupError> {
         self.check_going()?;
-        let Course::Streaming(stream) = &mut self.runner.course else { return Err(self.not_now()) };
+        let Activity::Streaming(stream) = &mut self.runner.activity else { return Err(self.not_now()) };
         stream.push(point, &self.runner.limits)?.map_err(|_| GroupError::StreamFull)
     }
 
     /// Says that no further points come. The group comes to rest after the last one, within its limits.
     pub const fn end_stream(&mut self) {
-        if let Course::Streaming(stream) = &mut self.runner.course {
+        if let Activity::Streaming(stream) = &mut self.runner.activity {
             stream.end();
         }
     }
 
     /// Has all axes come to rest within their limits, from the next cycle on.
     pub fn start_stop(&mut self) {
-        if matches!(self.runner.course, Course::Moving { .. } | Course::Streaming(_)) {
+        if matches!(self.runner.activity, Activity::Moving { .. } | Activity::Streaming(_)) {
             self.runner.stop(StopCause::Asked);
         }
     }
@@ -231,7 +231,7 @@ impl Group {
 
     /// Cycles until every drive shows that it has no power, or the limit has passed.
     async fn switch_off(&mut self) -> Result<(), GroupError> {
-        self.runner.course = Course::Off;
+        self.runner.activity = Activity::Off;
         for cycle in 0..self.cycles(POWER_LIMIT) {
             self.cycle().await?;
             // One that is not heard is not waited for: nothing is known of it, and nothing it does can be seen.

@@ -9,12 +9,12 @@
 //! [`Group::step`] is one cycle and reads no clock; the async intents wait for SYNC and step.
 
 mod axis;
-mod course;
 mod error;
 mod handle;
 mod home;
 mod limits;
 mod open;
+mod runner;
 mod state;
 mod stream;
 mod trajectory;

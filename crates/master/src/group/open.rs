@@ -6,10 +6,10 @@ use canopen::Mux;
 use cia402::ModeOfOperation;
 
 use super::axis::Axis;
-use super::course::Runner;
 use super::error::{GroupError, PERIODS};
 use super::handle::Group;
 use super::limits::AxisLimits;
+use super::runner::Runner;
 use crate::cyclic::{CyclicDrive, CyclicOptions};
 use crate::drive::{CONTROLWORD, Drive};
 use crate::units::Rpm;

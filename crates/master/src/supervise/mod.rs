@@ -1,6 +1,6 @@
 //! The watch over a booted network: what happens to its nodes, and the boot-up of those that come back.
 //!
-//! In: the events of the network, and the frames of others ([`Supervisor::hear`]). Out: [`Happening`]s. A node whose supply or cable
+//! In: the events of the network, and the frames of others ([`Supervisor::hear`]). Out: [`SupervisorEvent`]s. A node whose supply or cable
 //! was away is stopped, identified, configured and watched anew; it is not started, and nothing moves, until somebody says so
 //! ([`Supervisor::resume`]).
 //!
@@ -10,8 +10,8 @@
 //! before the drive notices the loss of its master: by a shorter heartbeat of its own (1017h) than the watch that it has (1016h).
 
 mod emcy_log;
+mod event;
 mod foreign;
-mod happening;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -27,8 +27,8 @@ use crate::error::Error;
 use crate::network::Network;
 
 pub use emcy_log::{EmcyLog, EmcyRecord};
+pub use event::SupervisorEvent;
 pub use foreign::Foreign;
-pub use happening::Happening;
 
 /// How often events are looked for: quick to a person.
 const POLL: Duration = Duration::from_millis(20);
@@ -48,7 +48,7 @@ pub struct Supervisor {
     away: NodeSet,
     /// The heartbeat is held back.
     held: bool,
-    to_tell: VecDeque<(Instant, Happening)>,
+    to_tell: VecDeque<(Instant, SupervisorEvent)>,
 }
 
 /// How a node came back.
@@ -86,12 +86,12 @@ impl Supervisor {
     pub fn hear(&mut self, at: Instant, frame: &Frame) {
         let nodes = &self.plan.nodes;
         let foreign = self.foreign.note(frame, self.plan.own, |node| nodes.contains_key(&node));
-        self.to_tell.extend(foreign.map(|foreign| (at, Happening::Foreign(foreign))));
+        self.to_tell.extend(foreign.map(|foreign| (at, SupervisorEvent::Foreign(foreign))));
     }
 
     /// The next thing that happens, with its time; `None` if nothing does for 20 ms. To be awaited to its end, again and again: a node
     /// that comes back is stopped and booted by it.
-    pub async fn next(&mut self) -> Option<(Instant, Happening)> {
+    pub async fn next(&mut self) -> Option<(Instant, SupervisorEvent)> {
         if let Some(happening) = self.to_tell.pop_front() {
             return Some(happening);
         }
@@ -123,13 +123,13 @@ impl Supervisor {
         Ok(())
     }
 
-    fn take(&mut self, at: Instant, event: Event) -> Option<Happening> {
+    fn take(&mut self, at: Instant, event: Event) -> Option<SupervisorEvent> {
         // What a boot-up by this master brings about is in its report.
         let is_known = |node: NodeId| self.settled.get(&node).is_some_and(|settled| at <= *settled);
         match event {
             Event::Emcy(node, emcy) => {
                 let model = self.plan.nodes.get(&node).and_then(|expectation| expectation.description);
-                return Some(Happening::Emcy(self.emcys.push(at, node, emcy, model)));
+                return Some(SupervisorEvent::Emcy(self.emcys.push(at, node, emcy, model)));
             }
             Event::BootUp(node) | Event::HeartbeatBack(node) | Event::NmtState(node, _) if is_known(node) => {
                 return None;
@@ -146,7 +146,7 @@ impl Supervisor {
             Event::NoAnswer(..) | Event::Aborted(..) => return None,
             _ => {}
         }
-        Some(Happening::Event(event))
+        Some(SupervisorEvent::Event(event))
     }
 
     /// A drive that this master's heartbeat keeps content is out of reach.
@@ -160,7 +160,7 @@ impl Supervisor {
             self.network.hold_heartbeats(true);
             let mut nodes = NodeSet::EMPTY;
             self.plan.nodes.keys().filter(|node| self.watches_heartbeat(**node)).for_each(|node| nodes.insert(*node));
-            self.to_tell.push_back((at, Happening::Held(nodes)));
+            self.to_tell.push_back((at, SupervisorEvent::Held(nodes)));
         }
     }
 
@@ -178,7 +178,7 @@ impl Supervisor {
     }
 
     /// Stops a node that has come back, boots it alone, and lets the heartbeat go out again if nobody is missing.
-    async fn recover(&mut self, node: NodeId, how: Return) -> Happening {
+    async fn recover(&mut self, node: NodeId, how: Return) -> SupervisorEvent {
         let stopped = match how {
             Return::HeartbeatBack => self.stop(node).await,
             Return::Booted => {
@@ -192,13 +192,13 @@ impl Supervisor {
         if let Err(error) = stopped
             && !report.has_failed()
         {
-            return Happening::NotStopped(node, error.to_string());
+            return SupervisorEvent::NotStopped(node, error.to_string());
         }
         self.away.remove(node);
         if let Err(error) = self.release_if_all_stand().await {
-            return Happening::NotStopped(node, error.to_string());
+            return SupervisorEvent::NotStopped(node, error.to_string());
         }
-        Happening::Recovered(report)
+        SupervisorEvent::Recovered(report)
     }
 
     /// Up to, and without, NMT start. While the heartbeat is held back nothing is armed by it.
@@ -239,7 +239,7 @@ impl Supervisor {
         }
         self.held = false;
         self.network.hold_heartbeats(false);
-        self.to_tell.push_back((self.network.now(), Happening::Released));
+        self.to_tell.push_back((self.network.now(), SupervisorEvent::Released));
         if self.plan.guard {
             // Those that booted meanwhile.
             for drive in nodes

@@ -12,7 +12,7 @@ use devices::model;
 use drives::mjoint::Model;
 use master::boot::{BootPlan, Expectation};
 use master::drive::SwitchedOff;
-use master::supervise::{Foreign, Happening, Supervisor};
+use master::supervise::{Foreign, Supervisor, SupervisorEvent};
 use master::units::Rpm;
 use master::{Drive, MotionOptions, Network};
 use sim::machine::{Order, mjoint, order, zlac8030l};
@@ -27,7 +27,7 @@ struct Bench {
     world: World,
     network: Network,
     supervisor: Supervisor,
-    told: Vec<Happening>,
+    told: Vec<SupervisorEvent>,
 }
 
 impl Bench {
@@ -250,7 +250,7 @@ fn a_second_master_is_told_once_with_what_it_does() {
     let foreign: Vec<_> = bench
         .told
         .iter()
-        .filter_map(|happening| if let Happening::Foreign(foreign) = happening { Some(*foreign) } else { None })
+        .filter_map(|happening| if let SupervisorEvent::Foreign(foreign) = happening { Some(*foreign) } else { None })
         .collect();
     assert_eq!(foreign, [Foreign::SdoRequest(node(SERVO)), Foreign::Nmt]);
 }

@@ -72,7 +72,7 @@ struct Node {
 }
 
 #[derive(Serialize)]
-struct Passed {
+struct RunReport {
     ok: bool,
     t: f64,
     frames: u64,
@@ -91,7 +91,7 @@ impl Before {
         let now = nodes(world);
         let changes = now.into_iter().filter(|node| !self.nodes.contains(node)).collect();
         let frames = world.statistics().frames - self.frames;
-        json::line(&Passed { ok: true, t: world.now().as_nanos() as f64 / 1e9, frames, changes })
+        json::line(&RunReport { ok: true, t: world.now().as_nanos() as f64 / 1e9, frames, changes })
     }
 }
 

@@ -10,7 +10,7 @@ use master::{Drive, Error};
 
 use super::state::Host;
 use crate::snapshot::DriveView;
-use crate::timeline::{Happening, Kind};
+use crate::timeline::{Kind, TimelineEvent};
 
 const STATUSWORD: Mux = Mux::new(0x6041, 0);
 /// The present code, where a model does not say another object (CiA 402-2).
@@ -26,29 +26,32 @@ impl Host {
             Event::Emcy(node, emcy) => self.note_emcy(at, *node, *emcy),
             Event::BootUp(node) => {
                 // A device begins without errors (CiA 301, 7.2.7.1).
-                self.counter.timeline.end_but(at, *node, Kind::Emcy, &[]);
-                self.tell(Happening::new(at, *node, Kind::Nmt, "booted"));
+                self.inbox.timeline.end_but(at, *node, Kind::Emcy, &[]);
+                self.tell(TimelineEvent::new(at, *node, Kind::Nmt, "booted"));
             }
             Event::NmtState(node, state) => self.note_nmt(at, *node, *state),
             Event::HeartbeatLost(node, time) => {
                 let what = format!("no heartbeat for {} ms", time.as_millis());
-                self.tell(Happening { remedy: Some(CHECK_SUPPLY), ..Happening::new(at, *node, Kind::Silent, what) });
+                self.tell(TimelineEvent {
+                    remedy: Some(CHECK_SUPPLY),
+                    ..TimelineEvent::new(at, *node, Kind::Silent, what)
+                });
             }
-            Event::HeartbeatBack(node) => self.counter.timeline.end_but(at, *node, Kind::Silent, &[]),
+            Event::HeartbeatBack(node) => self.inbox.timeline.end_but(at, *node, Kind::Silent, &[]),
             _ => {}
         }
     }
 
     fn note_emcy(&self, at: Instant, node: NodeId, emcy: Emcy) {
         if emcy.code == EmcyErrorCode::NO_ERROR {
-            return self.counter.timeline.end_but(at, node, Kind::Emcy, &[]);
+            return self.inbox.timeline.end_but(at, node, Kind::Emcy, &[]);
         }
         let model = self.description(node);
         let row = model.and_then(|model| model.fault_told_by(emcy.code));
         let name = row.map_or_else(|| emcy.code.to_string(), |row| row.name.to_owned());
         let what = format!("{name}, error register {:02X}h", emcy.error_register);
-        let happening = Happening { code: Some(emcy.code.0), ..Happening::new(at, node, Kind::Emcy, what) };
-        self.tell(explained(happening, model, row));
+        let event = TimelineEvent { code: Some(emcy.code.0), ..TimelineEvent::new(at, node, Kind::Emcy, what) };
+        self.tell(explained(event, model, row));
     }
 
     fn note_nmt(&self, at: Instant, node: NodeId, state: NmtState) {
@@ -57,7 +60,7 @@ impl Host {
             true => "its heartbeat tells an alarm".to_owned(),
             false => format!("NMT state {state}"),
         };
-        self.tell(Happening::new(at, node, Kind::Nmt, what));
+        self.tell(TimelineEvent::new(at, node, Kind::Nmt, what));
     }
 
     /// A drive was looked at: what has changed since the last look.
@@ -66,17 +69,17 @@ impl Host {
         let model = self.description(id);
         // The frame that told, where it was an answer to the look.
         let told_at = |object: Mux| {
-            let held = self.counter.trace.held();
+            let held = self.inbox.trace.held();
             held.answered_at(id, self.object_of_axis(id, object), looked_at).unwrap_or(looked_at)
         };
         let at = looked_at;
-        self.counter.timeline.end_but(at, id, Kind::Silent, &[]);
+        self.inbox.timeline.end_but(at, id, Kind::Silent, &[]);
         let before = self.nodes.get(&id).and_then(|node| node.view.as_ref());
         if let Some(before) = before.and_then(|before| before.state)
             && let Some(now) = view.state
             && before != now
         {
-            self.tell(Happening::new(told_at(STATUSWORD), id, Kind::State, format!("{before} → {now}")));
+            self.tell(TimelineEvent::new(told_at(STATUSWORD), id, Kind::State, format!("{before} → {now}")));
         }
         let rows: Vec<_> = model.map(|model| rows(model, view)).unwrap_or_default();
         let codes: Vec<_> = match rows.as_slice() {
@@ -84,7 +87,7 @@ impl Host {
             [] => Some(view.fault_code).filter(|code| *code != 0).into_iter().map(Some).collect(),
             rows => rows.iter().map(|row| Some(row.code)).collect(),
         };
-        self.counter.timeline.end_but(at, id, Kind::Fault, &codes);
+        self.inbox.timeline.end_but(at, id, Kind::Fault, &codes);
         if codes.is_empty() {
             return;
         }
@@ -92,23 +95,23 @@ impl Host {
         for code in codes {
             let row = rows.iter().copied().find(|row| Some(row.code) == code);
             let what = row.map_or("a fault that no table here explains", |row| row.name);
-            self.tell(explained(Happening { code, ..Happening::new(at, id, Kind::Fault, what) }, model, row));
+            self.tell(explained(TimelineEvent { code, ..TimelineEvent::new(at, id, Kind::Fault, what) }, model, row));
         }
     }
 
     /// A drive does not answer.
     pub(super) fn note_silence(&self, id: NodeId, error: &Error) {
-        let happening = Happening::new(self.network.now(), id, Kind::Silent, error.to_string());
-        self.tell(Happening { remedy: Some(CHECK_SUPPLY), ..happening });
+        let event = TimelineEvent::new(self.network.now(), id, Kind::Silent, error.to_string());
+        self.tell(TimelineEvent { remedy: Some(CHECK_SUPPLY), ..event });
     }
 
     /// This studio stops a drive.
     pub(super) fn note_stop(&self, id: NodeId, why: &str) {
-        self.tell(Happening::new(self.network.now(), id, Kind::Stop, why));
+        self.tell(TimelineEvent::new(self.network.now(), id, Kind::Stop, why));
     }
 
-    fn tell(&self, happening: Happening) {
-        self.counter.timeline.push(happening);
+    fn tell(&self, event: TimelineEvent) {
+        self.inbox.timeline.push(event);
     }
 
     /// An object of the first axis, of the axis that the drive is looked at.
@@ -137,7 +140,7 @@ fn rows(model: &'static Description, view: &DriveView) -> Vec<&'static FaultRow>
     model.faults.table.iter().filter(shown).collect()
 }
 
-fn explained(happening: Happening, model: Option<&Description>, row: Option<&'static FaultRow>) -> Happening {
+fn explained(event: TimelineEvent, model: Option<&Description>, row: Option<&'static FaultRow>) -> TimelineEvent {
     let source = model.filter(|_| row.is_some()).map(|model| format!("{}, {}", model.manual, model.faults.section));
-    Happening { remedy: row.map(|row| row.remedy), source, ..happening }
+    TimelineEvent { remedy: row.map(|row| row.remedy), source, ..event }
 }

@@ -24,7 +24,7 @@ use super::state::{Host, JOG_SPAN};
 use super::transactions::Refusal;
 use super::work::{Asked, Running, say};
 use crate::dead_man::DeadMan;
-use crate::message::{Answer, AxisSpeed, AxisTarget, BaseJog, Deed, GroupMove};
+use crate::message::{Answer, AxisSpeed, AxisTarget, BaseJog, Command, GroupMove};
 
 /// From one SYNC to the next: at 500 kbit/s eight drives take half of it.
 const PERIOD: Duration = Duration::from_millis(10);
@@ -46,26 +46,26 @@ const READY: usize = 2;
 
 impl Host {
     /// Begins a motion of several drives, or holds one.
-    pub(super) fn take_group(&mut self, deed: Deed, asked: Asked) {
-        match deed {
-            Deed::GroupHold {} => self.hold_group(asked, |_| {}),
-            Deed::BaseTwist { linear_m_s, angular_rad_s } => {
+    pub(super) fn take_group(&mut self, command: Command, asked: Asked) {
+        match command {
+            Command::GroupHold {} => self.hold_group(asked, |_| {}),
+            Command::BaseTwist { linear_m_s, angular_rad_s } => {
                 self.hold_group(asked, |wanted| wanted.twist = Twist { linear_m_s, angular_rad_s });
             }
-            Deed::GroupEnd {} => self.hold_group(asked, |wanted| wanted.let_go = true),
-            Deed::GroupMove(asked_for) => {
+            Command::GroupEnd {} => self.hold_group(asked, |wanted| wanted.let_go = true),
+            Command::GroupMove(asked_for) => {
                 let nodes: Vec<_> = asked_for.axes.iter().map(|axis| axis.node).collect();
                 self.begin_group(&nodes, "moving together", false, asked, move |drives, _| {
                     Box::pin(move_together(drives, asked_for))
                 });
             }
-            Deed::GroupJog { axes, rpm_per_s } => {
+            Command::GroupJog { axes, rpm_per_s } => {
                 let nodes: Vec<_> = axes.iter().map(|axis| axis.node).collect();
                 self.begin_group(&nodes, "turning together", true, asked, move |drives, wanted| {
                     Box::pin(turn_together(drives, axes, rpm_per_s, wanted))
                 });
             }
-            Deed::BaseJog(asked_for) => {
+            Command::BaseJog(asked_for) => {
                 self.begin_group(&asked_for.wheels.clone(), "driving", true, asked, move |drives, wanted| {
                     wanted.set(Wanted { twist: asked_for.twist(), let_go: false });
                     Box::pin(drive_base(drives, asked_for, wanted))

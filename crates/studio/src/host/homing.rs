@@ -1,9 +1,9 @@
 //! What the homing wizard shows of a drive: its methods with what each does (CiA 402-2, clause 11, or the drive's own),
-//! how it is set, what its switches are now, and how far a run has come. Reads only; the run is [`Deed::Home`].
+//! how it is set, what its switches are now, and how far a run has come. Reads only; the run is [`Command::Home`].
 //!
 //! What a method does stands in the description ([`HomingRules::sequence`]), and the page draws it from what is told here.
 //!
-//! [`Deed::Home`]: crate::message::Deed::Home
+//! [`Command::Home`]: crate::message::Command::Home
 
 use canopen::{Mux, NodeId};
 use cia402::{Direction, HomingMethod, HomingSequence, HomingSwitch, ModeOfOperation, Statusword, SwitchEdge};

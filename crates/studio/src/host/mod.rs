@@ -1,10 +1,10 @@
-//! The one task that owns the network: it takes wishes, moves drives, stops them, and publishes what it knows.
+//! The one task that owns the network: it takes requests, moves drives, stops them, and publishes what it knows.
 //!
 //! Time is that of the bus, told by the master's core. Nothing here waits: work is a set of futures that are polled together,
 //! so that a stop is never behind something slow. What comes first in each round is what stops.
 
 mod changes;
-mod deeds;
+mod commands;
 mod faults;
 mod group;
 mod group_run;

@@ -195,7 +195,7 @@ impl Host {
         let time_s = (self.network.now() - Instant::ZERO).as_secs_f64();
         let news = json!({ "type": "news", "time_s": time_s, "node": node.map(NodeId::raw), "text": text });
         // Nobody may listen.
-        let _ = self.counter.news.send(news.to_string().into());
+        let _ = self.inbox.news.send(news.to_string().into());
     }
 }
 

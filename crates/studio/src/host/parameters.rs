@@ -23,7 +23,7 @@ use super::object_rows::{bytes_text, row_json, value_text};
 use super::state::Host;
 use super::transactions::{Change, MOST_KEPT, Refusal, Written};
 use super::work::{Asked, Done, quietly, say};
-use crate::message::{Answer, Deed, FileForm, NewValue};
+use crate::message::{Answer, Command, FileForm, NewValue};
 
 /// Objects that one request may read.
 const MOST_READ: usize = 64;
@@ -33,28 +33,29 @@ pub(super) const STORING: &str = "storing";
 
 impl Host {
     /// Does what is asked about the parameters of a drive, or begins it.
-    pub(super) fn take_parameters(&mut self, deed: Deed, asked: Asked) {
-        let Some(node) = node_of(&deed) else { return };
+    pub(super) fn take_parameters(&mut self, command: Command, asked: Asked) {
+        let Some(node) = node_of(&command) else { return };
         let (drive, model) = match self.known_model(node) {
             Ok(known) => known,
             Err(refusal) => return refuse(asked, refusal),
         };
-        match deed {
-            Deed::Objects { .. } => answer(asked, Ok(dictionary(node, model))),
-            Deed::WriteParameters { values, file, .. } => self.begin_writing(&drive, model, values, file, asked),
-            Deed::Store { .. } => self.begin_storing(drive, asked),
-            Deed::RollBack { .. } => self.begin_rolling_back(&drive, model, asked),
+        match command {
+            Command::Objects { .. } => answer(asked, Ok(dictionary(node, model))),
+            Command::WriteParameters { values, file, .. } => self.begin_writing(&drive, model, values, file, asked),
+            Command::Store { .. } => self.begin_storing(drive, asked),
+            Command::RollBack { .. } => self.begin_rolling_back(&drive, model, asked),
             _ if !self.parameters.begin_reading() => refuse(asked, busy("others are reading objects")),
             reading => {
                 self.work.push(Box::pin(async move {
                     let outcome = match reading {
-                        Deed::ReadObjects { objects, .. } => read(&drive, model, &objects).await,
-                        Deed::PlanParameters { values, file, .. } => match wanted(&drive, model, values, file).await {
+                        Command::ReadObjects { objects, .. } => read(&drive, model, &objects).await,
+                        Command::PlanParameters { values, file, .. } => match wanted(&drive, model, values, file).await
+                        {
                             Ok(wanted) => plan(&drive, model, &wanted).await.map(|plan| plan_json(&plan, model)),
                             Err(refusal) => Err(refusal),
                         },
-                        Deed::CompareParameters { file, .. } => compare(&drive, model, &file).await,
-                        Deed::BackUp { form, .. } => back_up(&drive, model, form).await,
+                        Command::CompareParameters { file, .. } => compare(&drive, model, &file).await,
+                        Command::BackUp { form, .. } => back_up(&drive, model, form).await,
                         _ => Err(("malformed", "this reads nothing".into())),
                     };
                     Done::Looked(asked, outcome)
@@ -178,17 +179,17 @@ impl Host {
     }
 }
 
-/// The node whose parameters a deed is about.
-const fn node_of(deed: &Deed) -> Option<NodeId> {
-    match deed {
-        Deed::Objects { node }
-        | Deed::ReadObjects { node, .. }
-        | Deed::PlanParameters { node, .. }
-        | Deed::CompareParameters { node, .. }
-        | Deed::WriteParameters { node, .. }
-        | Deed::RollBack { node }
-        | Deed::Store { node }
-        | Deed::BackUp { node, .. } => Some(*node),
+/// The node whose parameters a command is about.
+const fn node_of(command: &Command) -> Option<NodeId> {
+    match command {
+        Command::Objects { node }
+        | Command::ReadObjects { node, .. }
+        | Command::PlanParameters { node, .. }
+        | Command::CompareParameters { node, .. }
+        | Command::WriteParameters { node, .. }
+        | Command::RollBack { node }
+        | Command::Store { node }
+        | Command::BackUp { node, .. } => Some(*node),
         _ => None,
     }
 }

@@ -27,7 +27,7 @@ use super::pdo_rows::{config_json, pdo_json};
 use super::state::Host;
 use super::transactions::{Change, Refusal};
 use super::work::{Asked, Done};
-use crate::message::{Deed, NewEntry, NewPdo, NmtWish};
+use crate::message::{Command, NewEntry, NewPdo, NmtWish};
 
 /// PDOs that one request may set up.
 const MOST_PDOS: usize = 64;
@@ -37,13 +37,13 @@ const CYCLES: std::ops::RangeInclusive<Duration> = Duration::from_micros(250)..=
 
 impl Host {
     /// Does what is asked about the PDOs of a node, or begins it.
-    pub(super) fn take_pdos(&mut self, deed: Deed, asked: Asked) {
-        match deed {
-            Deed::Pdos { node } => self.begin_reading_pdos(node, asked),
-            Deed::PlanPdos { node, pdos, cycle_ms, bitrate } => {
+    pub(super) fn take_pdos(&mut self, command: Command, asked: Asked) {
+        match command {
+            Command::Pdos { node } => self.begin_reading_pdos(node, asked),
+            Command::PlanPdos { node, pdos, cycle_ms, bitrate } => {
                 self.begin_planning_pdos(node, pdos, (cycle_ms, bitrate), asked);
             }
-            Deed::WritePdos { node, pdos } => match self.known_model(node) {
+            Command::WritePdos { node, pdos } => match self.known_model(node) {
                 Err(refusal) => refuse(asked, refusal),
                 Ok((drive, model)) => {
                     let journals = self.setting.journals.clone();
@@ -53,7 +53,7 @@ impl Host {
                     });
                 }
             },
-            Deed::Nmt { node, command } => self.command_nmt(node, command, asked),
+            Command::Nmt { node, command } => self.command_nmt(node, command, asked),
             _ => {}
         }
     }

@@ -9,10 +9,10 @@ use super::state::{Host, PRESENCE_SPAN, TICK};
 use super::work::say;
 use crate::authority::SessionId;
 use crate::dead_man::DeadMan;
-use crate::desk::{Picture, Wish};
+use crate::handle::{Request, StateUpdate};
 use crate::message::Answer;
 use crate::snapshot::{BusView, Snapshot};
-use crate::trace::Passed;
+use crate::trace::BusFrame;
 
 /// How often a picture is made while somebody looks, and while nobody does.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(50);
@@ -22,25 +22,25 @@ const UNSEEN_INTERVAL: Duration = Duration::from_millis(500);
 const MAX_SESSIONS: usize = 256;
 
 impl Host {
-    /// Serves until every desk is gone. `passed` gives the frames that have passed since it was last asked.
-    pub async fn run(mut self, mut passed: impl FnMut() -> Option<Passed>) {
+    /// Serves until every handle is gone. `passed` gives the frames that have passed since it was last asked.
+    pub async fn run(mut self, mut passed: impl FnMut() -> Option<BusFrame>) {
         self.begin_scan(None);
         let mut tick = self.network.sleep(TICK);
         loop {
             tokio::select! {
                 biased;
-                stop = self.counter.stops.changed() => match stop {
+                stop = self.inbox.stops.changed() => match stop {
                     Ok(()) => self.stop_everything("stopped by a press of stop"),
                     Err(_) => return,
                 },
                 Some(session) = self.lifelines.next(), if !self.lifelines.is_empty() => self.leave(session),
-                // Before wishes: whoever floods the desk keeps no dead man from being noticed.
+                // Before requests: a flood of requests does not keep a dead man from being noticed.
                 () = &mut tick => {
                     tick = self.network.sleep(TICK);
                     self.tick(&mut passed);
                 }
-                wish = self.counter.wishes.recv() => match wish {
-                    Some(wish) => self.take(wish),
+                request = self.inbox.requests.recv() => match request {
+                    Some(request) => self.take(request),
                     None => return,
                 },
                 Some(done) = self.work.next(), if !self.work.is_empty() => self.finish(done),
@@ -48,13 +48,13 @@ impl Host {
         }
     }
 
-    fn tick(&mut self, passed: &mut impl FnMut() -> Option<Passed>) {
+    fn tick(&mut self, passed: &mut impl FnMut() -> Option<BusFrame>) {
         let now = self.network.now();
         self.stop_what_is_not_held(now);
         while let Some(passed) = passed() {
             self.meter.note(&passed.frame);
             self.heard_ids.note(&passed.frame, passed.at);
-            self.counter.trace.append(passed);
+            self.inbox.trace.append(passed);
             if !passed.own {
                 self.listening.iter_mut().for_each(|listening| listening.heard.note(&passed.frame, passed.at));
             }
@@ -72,9 +72,9 @@ impl Host {
         }
     }
 
-    fn take(&mut self, wish: Wish) {
-        match wish {
-            Wish::Join { lifeline, welcome } => {
+    fn take(&mut self, request: Request) {
+        match request {
+            Request::Join { liveness, welcome } => {
                 if self.authority.sessions() == MAX_SESSIONS {
                     return;
                 }
@@ -82,11 +82,11 @@ impl Host {
                 // A session that has gone before it was welcomed ends at once.
                 let _ = welcome.send(session);
                 self.lifelines.push(Box::pin(async move {
-                    let _ = lifeline.await;
+                    let _ = liveness.await;
                     session
                 }));
             }
-            Wish::Do { session, seq, deed, answer } => {
+            Request::Do { session, seq, command, answer } => {
                 if let Err(refusal) = self.authority.accept(session, seq) {
                     say(answer, Answer::failed(Some(seq), refusal.kind(), refusal.to_string()));
                     return;
@@ -94,7 +94,7 @@ impl Host {
                 if self.authority.controller() == Some(session) {
                     self.presence = Some(DeadMan::new(PRESENCE_SPAN, self.network.now()));
                 }
-                self.take_deed(session, seq, deed, answer);
+                self.take_command(session, seq, command, answer);
             }
         }
     }
@@ -125,14 +125,14 @@ impl Host {
             sessions: self.authority.sessions(),
             controller: self.authority.controller(),
             asking: self.authority.asking(),
-            happenings: self.counter.timeline.revision(),
-            logs_saved: self.counter.trace.logs_saved(),
+            happenings: self.inbox.timeline.revision(),
+            logs_saved: self.inbox.trace.logs_saved(),
             changes: self.changes.count(),
             nodes: self.nodes.iter().map(|(id, node)| self.view(*id, node, now)).collect(),
         };
         // Names, numbers and lists alone: there is nothing in it that JSON cannot say.
         let json = serde_json::to_string(&snapshot).unwrap_or_default();
         // Somebody may look or nobody.
-        let _ = self.counter.pictures.send(Picture { number: self.pictures, json: json.into() });
+        let _ = self.inbox.pictures.send(StateUpdate { number: self.pictures, json: json.into() });
     }
 }

@@ -21,7 +21,7 @@ use super::transactions::Transactions;
 use super::work::{Listening, Running, Work};
 use crate::authority::{Authority, SessionId};
 use crate::dead_man::DeadMan;
-use crate::desk::{Counter, Desk, desk};
+use crate::handle::{HostHandle, Inbox, channel};
 use crate::trace::{Origin, Trace};
 use crate::wire::Wire;
 use crate::world::WorldDoor;
@@ -65,7 +65,7 @@ pub struct Setting {
 pub struct Host {
     pub(super) network: Network,
     pub(super) setting: Setting,
-    pub(super) counter: Counter,
+    pub(super) inbox: Inbox,
     pub(super) authority: Authority,
     /// Whose motions these are.
     pub(super) held_by: Option<SessionId>,
@@ -111,16 +111,16 @@ impl core::fmt::Debug for Host {
 pub(super) type Lifeline = futures_util::future::BoxFuture<'static, SessionId>;
 
 impl Host {
-    /// A host on a network that somebody runs, and the desk at which it is asked.
-    pub fn new(network: Network, setting: Setting) -> (Self, Desk) {
+    /// A host on a network that the caller runs, and a handle to it.
+    pub fn new(network: Network, setting: Setting) -> (Self, HostHandle) {
         let origin = Origin { interface: setting.interface.clone(), unix_zero: setting.unix_zero };
-        let (desk, counter) = desk(Trace::new(network.models(), origin));
+        let (handle, inbox) = channel(Trace::new(network.models(), origin));
         let now = network.now();
         let host = Self {
             meter: Meter::new(now, setting.bitrate),
             network,
             setting,
-            counter,
+            inbox,
             authority: Authority::default(),
             held_by: None,
             presence: None,
@@ -144,6 +144,6 @@ impl Host {
             pictures: 0,
             shown_at: now,
         };
-        (host, desk)
+        (host, handle)
     }
 }

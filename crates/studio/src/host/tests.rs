@@ -24,9 +24,9 @@ use sim::machine::{TimingMode, zlac8030l, zlim42c};
 
 use super::state::TICK;
 use super::{Host, JOG_SPAN, Journals, PRESENCE_SPAN, Setting};
-use crate::desk::{Desk, Session};
-use crate::message::{Answer, Deed};
-use crate::trace::Passed;
+use crate::handle::{HostHandle, Session};
+use crate::message::{Answer, Command};
+use crate::trace::BusFrame;
 use crate::wire::Wire;
 
 const WHEEL: NodeId = node(4);
@@ -45,7 +45,7 @@ const fn node(raw: u8) -> NodeId {
 /// Pages before a studio on a bus with two drives.
 struct Stage {
     network: Network,
-    desk: Desk,
+    handle: HostHandle,
 }
 
 /// A page that numbers its messages.
@@ -55,27 +55,27 @@ struct Page {
 }
 
 impl Page {
-    async fn ask(&mut self, deed: Deed) -> Answer {
+    async fn ask(&mut self, command: Command) -> Answer {
         self.seq += 1;
-        let answered = self.session.ask(self.seq, deed).expect("there is room");
+        let answered = self.session.ask(self.seq, command).expect("there is room");
         answered.await.expect("every message is answered")
     }
 
     /// Takes control, and accepts that nothing stops the stepper when the program dies.
     async fn take_control_of_all(&mut self) {
-        self.must(Deed::TakeControl {}).await;
-        self.must(Deed::AcceptUnguarded { node: ARM }).await;
+        self.must(Command::TakeControl {}).await;
+        self.must(Command::AcceptUnguarded { node: ARM }).await;
     }
 
-    async fn must(&mut self, deed: Deed) {
-        let answer = self.ask(deed.clone()).await;
-        assert!(answer.is_ok(), "{deed:?}: {}", answer.json());
+    async fn must(&mut self, command: Command) {
+        let answer = self.ask(command.clone()).await;
+        assert!(answer.is_ok(), "{command:?}: {}", answer.json());
     }
 }
 
 impl Stage {
     async fn page(&self) -> Page {
-        Page { session: self.desk.join().await.expect("there is room"), seq: 0 }
+        Page { session: self.handle.join().await.expect("there is room"), seq: 0 }
     }
 
     async fn sleep(&self, ms: u64) {
@@ -83,7 +83,7 @@ impl Stage {
     }
 
     fn state(&self) -> Value {
-        serde_json::from_str(&self.desk.pictures().borrow().json).expect("JSON")
+        serde_json::from_str(&self.handle.pictures().borrow().json).expect("JSON")
     }
 
     /// The speed of a shaft by its 606Ch, in r/min of the motor.
@@ -131,16 +131,16 @@ impl Stage {
 #[derive(Clone)]
 struct Tap {
     network: Network,
-    passed: Arc<Mutex<VecDeque<Passed>>>,
+    passed: Arc<Mutex<VecDeque<BusFrame>>>,
 }
 
 impl Tap {
-    fn take(&self) -> Option<Passed> {
+    fn take(&self) -> Option<BusFrame> {
         self.passed.lock().expect("nobody panicked").pop_front()
     }
 
     fn note(&self, frame: &Frame, at: Instant, own: bool) {
-        self.passed.lock().expect("nobody panicked").push_back(Passed { at, frame: *frame, own });
+        self.passed.lock().expect("nobody panicked").push_back(BusFrame { at, frame: *frame, own });
     }
 }
 
@@ -224,8 +224,8 @@ fn play_in(
     let models: BTreeMap<_, _> =
         models.into_iter().map(|(node, name)| (node, devices::model(name).expect("a model"))).collect();
     let setting = Setting { bitrate: Some(Bitrate::K500), models, ..setting };
-    let (host, desk) = Host::new(network.clone(), setting);
-    let stage = Stage { network, desk };
+    let (host, handle) = Host::new(network.clone(), setting);
+    let stage = Stage { network, handle };
     let mut serving = pin!(host.run(|| tap.take()));
     act(&mut world, serving.as_mut(), async {
         stage.scanned().await;
@@ -240,15 +240,15 @@ fn play_in(
 fn act(world: &mut World, serving: Pin<&mut impl Future<Output = ()>>, scene: impl Future<Output = ()>) {
     let playing = async {
         tokio::select! {
-            () = serving => panic!("a host runs as long as there is a desk"),
+            () = serving => panic!("a host runs as long as there is a handle"),
             () = scene => {}
         }
     };
     sim::block_on_for(world, Duration::from_secs(120), playing).expect("the scene ends");
 }
 
-fn jog(rpm: f64) -> Deed {
-    Deed::Jog { node: WHEEL, rpm }
+fn jog(rpm: f64) -> Command {
+    Command::Jog { node: WHEEL, rpm }
 }
 
 #[test]
@@ -256,12 +256,12 @@ fn who_has_no_control_moves_nothing_and_stops_everything() {
     play(async |stage| {
         let (mut first, mut second) = (stage.page().await, stage.page().await);
         assert_eq!(first.ask(jog(60.0)).await.error_kind(), "not_in_control");
-        first.must(Deed::TakeControl {}).await;
-        assert_eq!(second.ask(Deed::TakeControl {}).await.error_kind(), "not_in_control");
-        assert_eq!(second.ask(Deed::Enable { node: WHEEL }).await.error_kind(), "not_in_control");
-        first.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        first.must(Command::TakeControl {}).await;
+        assert_eq!(second.ask(Command::TakeControl {}).await.error_kind(), "not_in_control");
+        assert_eq!(second.ask(Command::Enable { node: WHEEL }).await.error_kind(), "not_in_control");
+        first.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
         stage.turns(WHEEL, 60.0).await;
-        second.must(Deed::StopAll {}).await;
+        second.must(Command::StopAll {}).await;
         assert!(stage.rests(WHEEL).await < STOPPED_WITHIN);
         assert_ne!(stage.power_state(WHEEL).await, cia402::PowerState::OperationEnabled);
     });
@@ -271,11 +271,11 @@ fn who_has_no_control_moves_nothing_and_stops_everything() {
 fn a_jog_that_is_held_goes_on_and_one_that_is_not_stops() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         page.must(jog(60.0)).await;
         for _ in 0..30 {
             stage.sleep(100).await;
-            page.must(Deed::JogHold { node: WHEEL }).await;
+            page.must(Command::JogHold { node: WHEEL }).await;
         }
         assert!((stage.speed(WHEEL).await - 60.0).abs() < 5.0, "held for 3 s it turns");
         let let_go = stage.network.now();
@@ -286,7 +286,7 @@ fn a_jog_that_is_held_goes_on_and_one_that_is_not_stops() {
         let limit = Duration::from_millis(200);
         assert!(told > JOG_SPAN - TICK && told < limit + Duration::from_millis(5), "quick stop after {told:?}");
         stage.rests(WHEEL).await;
-        assert_eq!(page.ask(Deed::JogHold { node: WHEEL }).await.error_kind(), "not_held", "too late");
+        assert_eq!(page.ask(Command::JogHold { node: WHEEL }).await.error_kind(), "not_held", "too late");
         stage.sleep(500).await;
         assert!(stage.speed(WHEEL).await < 2.0, "what comes too late moves nothing");
     });
@@ -297,12 +297,12 @@ fn a_jog_that_is_held_goes_on_and_one_that_is_not_stops() {
 fn a_jog_stays_held_whatever_else_is_asked_of_the_drive() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
-        for other in [Deed::Enable { node: WHEEL }, Deed::ResetFault { node: WHEEL }] {
+        page.must(Command::TakeControl {}).await;
+        for other in [Command::Enable { node: WHEEL }, Command::ResetFault { node: WHEEL }] {
             page.must(jog(60.0)).await;
             for _ in 0..10 {
                 stage.sleep(60).await;
-                page.must(Deed::JogHold { node: WHEEL }).await;
+                page.must(Command::JogHold { node: WHEEL }).await;
             }
             assert!(stage.speed(WHEEL).await > 50.0);
             // An answer that a fault was reset where there is none is not what this is about.
@@ -317,16 +317,16 @@ fn a_jog_stays_held_whatever_else_is_asked_of_the_drive() {
 fn a_jog_that_is_let_go_stops_by_its_ramp_and_stays_enabled() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         page.must(jog(-60.0)).await;
         for _ in 0..10 {
             stage.sleep(60).await;
-            page.must(Deed::JogHold { node: WHEEL }).await;
+            page.must(Command::JogHold { node: WHEEL }).await;
         }
-        page.must(Deed::JogEnd { node: WHEEL }).await;
+        page.must(Command::JogEnd { node: WHEEL }).await;
         assert!(stage.speed(WHEEL).await < 2.0, "answered at standstill");
         assert_eq!(stage.power_state(WHEEL).await, cia402::PowerState::OperationEnabled);
-        assert_eq!(page.ask(Deed::JogEnd { node: WHEEL }).await.error_kind(), "not_held");
+        assert_eq!(page.ask(Command::JogEnd { node: WHEEL }).await.error_kind(), "not_held");
     });
 }
 
@@ -335,13 +335,13 @@ fn a_page_that_goes_stops_all_that_it_moved_and_gives_control_up() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
-        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
-        page.must(Deed::Velocity { node: ARM, rpm: 30.0, rpm_per_s: None }).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        page.must(Command::Velocity { node: ARM, rpm: 30.0, rpm_per_s: None }).await;
         stage.turns(ARM, 30.0).await;
         drop(page);
         assert!(stage.rests(WHEEL).await < STOPPED_WITHIN);
         assert!(stage.rests(ARM).await < STOPPED_WITHIN);
-        stage.page().await.must(Deed::TakeControl {}).await;
+        stage.page().await.must(Command::TakeControl {}).await;
     });
 }
 
@@ -349,11 +349,11 @@ fn a_page_that_goes_stops_all_that_it_moved_and_gives_control_up() {
 fn a_page_that_falls_silent_stops_what_it_moved() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
-        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        page.must(Command::TakeControl {}).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
         for _ in 0..8 {
             stage.sleep(500).await;
-            page.must(Deed::Alive {}).await;
+            page.must(Command::Alive {}).await;
         }
         stage.turns(WHEEL, 60.0).await;
         stage.sleep((PRESENCE_SPAN + STOPPED_WITHIN).as_millis() as u64).await;
@@ -365,13 +365,13 @@ fn a_page_that_falls_silent_stops_what_it_moved() {
 fn control_that_is_handed_over_takes_no_motion_along() {
     play(async |stage| {
         let (mut first, mut second) = (stage.page().await, stage.page().await);
-        first.must(Deed::TakeControl {}).await;
-        first.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
-        second.must(Deed::AskControl {}).await;
-        first.must(Deed::HandOver { to: second.session.id().0 }).await;
+        first.must(Command::TakeControl {}).await;
+        first.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        second.must(Command::AskControl {}).await;
+        first.must(Command::HandOver { to: second.session.id().0 }).await;
         stage.rests(WHEEL).await;
         assert_eq!(first.ask(jog(60.0)).await.error_kind(), "not_in_control");
-        second.must(Deed::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None }).await;
+        second.must(Command::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None }).await;
     });
 }
 
@@ -379,11 +379,11 @@ fn control_that_is_handed_over_takes_no_motion_along() {
 fn a_message_that_is_sent_again_moves_nothing() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
-        page.must(Deed::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None }).await;
+        page.must(Command::TakeControl {}).await;
+        page.must(Command::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None }).await;
         let before: i32 = stage.network.node(WHEEL).read(Mux::new(0x6064, 0)).await.expect("it answers");
         page.seq -= 1;
-        let again = page.ask(Deed::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None }).await;
+        let again = page.ask(Command::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None }).await;
         assert_eq!(again.error_kind(), "replayed");
         stage.sleep(1000).await;
         let after: i32 = stage.network.node(WHEEL).read(Mux::new(0x6064, 0)).await.expect("it answers");
@@ -396,17 +396,17 @@ fn a_message_that_is_sent_again_moves_nothing() {
 fn a_stop_during_the_start_of_a_motion_keeps_it_from_beginning() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         // At any time between the first request and the target written.
         for delay_ms in [0, 5, 10, 20, 30, 40, 60, 80] {
             page.seq += 1;
             let begun = page.session.ask(page.seq, jog(60.0)).expect("there is room");
             stage.sleep(delay_ms).await;
-            page.must(Deed::StopAll {}).await;
+            page.must(Command::StopAll {}).await;
             begun.await.expect("answered");
             stage.sleep(700).await;
             assert!(stage.speed(WHEEL).await < 2.0, "stopped {delay_ms} ms after the start");
-            page.must(Deed::Alive {}).await;
+            page.must(Command::Alive {}).await;
         }
     });
 }
@@ -425,7 +425,7 @@ fn every_drive_that_has_power_is_stopped_whoever_moves_it() {
         stage.turns(ARM, 30.0).await;
         assert!(stage.network.moved().is_empty());
         let mut page = stage.page().await;
-        page.must(Deed::StopAll {}).await;
+        page.must(Command::StopAll {}).await;
         assert!(stage.rests(ARM).await < STOPPED_WITHIN);
     });
 }
@@ -434,8 +434,8 @@ fn every_drive_that_has_power_is_stopped_whoever_moves_it() {
 fn what_is_shown_is_what_the_drive_says() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
-        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        page.must(Command::TakeControl {}).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
         stage.sleep(300).await;
         let state = stage.state();
         let shown = &state["nodes"].as_array().expect("nodes")[1];
@@ -455,7 +455,8 @@ fn a_drive_that_does_not_move_is_explained() {
     play(async |stage| {
         let mut page = stage.page().await;
         let before = stage.network.now();
-        let answer: Value = serde_json::from_str(&page.ask(Deed::Explain { node: WHEEL }).await.json()).expect("JSON");
+        let answer: Value =
+            serde_json::from_str(&page.ask(Command::Explain { node: WHEEL }).await.json()).expect("JSON");
         assert!(stage.network.now() - before >= Duration::from_millis(1500), "others are listened to first");
         let findings = answer["result"]["findings"].as_array().expect("findings");
         let not_enabled = findings.iter().find(|finding| finding["rule"] == "not_enabled").expect("it is not enabled");
@@ -467,10 +468,10 @@ fn a_drive_that_does_not_move_is_explained() {
 fn a_drive_that_loses_power_is_told_and_one_that_comes_back_too() {
     play(async |stage| {
         let mut page = stage.page().await;
-        let mut news = stage.desk.news();
-        assert_eq!(page.ask(Deed::Enable { node: ARM }).await.error_kind(), "not_in_control");
-        page.must(Deed::TakeControl {}).await;
-        assert_eq!(page.ask(Deed::Enable { node: node(9) }).await.error_kind(), "no_such_drive");
+        let mut news = stage.handle.news();
+        assert_eq!(page.ask(Command::Enable { node: ARM }).await.error_kind(), "not_in_control");
+        page.must(Command::TakeControl {}).await;
+        assert_eq!(page.ask(Command::Enable { node: node(9) }).await.error_kind(), "no_such_drive");
         stage.network.node(ARM).nmt(canopen::NmtCommand::ResetNode);
         stage.sleep(1500).await;
         let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
@@ -491,11 +492,11 @@ fn who_boots_while_others_are_asked_is_found() {
     world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the second");
     let timeout = Duration::from_millis(300);
     let setting = Setting { timeout, ..setting() };
-    let (host, desk) = Host::new(network.clone(), setting);
-    let stage = Stage { network, desk };
+    let (host, handle) = Host::new(network.clone(), setting);
+    let stage = Stage { network, handle };
     let playing = async {
         tokio::select! {
-            () = host.run(|| None) => panic!("a host runs as long as there is a desk"),
+            () = host.run(|| None) => panic!("a host runs as long as there is a handle"),
             () = async {
                 while stage.state()["nodes"][1]["drive"].is_null() {
                     stage.sleep(100).await;

@@ -13,7 +13,7 @@ impl Host {
     pub(super) fn learn_pdos(&mut self, id: NodeId) {
         let Some(node) = self.nodes.get(&id) else { return };
         if let Some(model) = node.drive.as_ref().and_then(Drive::description) {
-            self.counter.trace.set_model(id, model);
+            self.inbox.trace.set_model(id, model);
         }
         // What changes while it is being read has to be read once more.
         if let Some(again) = self.learning.get_mut(&id) {

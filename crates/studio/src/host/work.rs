@@ -35,8 +35,8 @@ pub(super) enum Done {
     Read(NodeId, Result<Box<Look>, Error>),
     /// All node-IDs were asked.
     Scanned(Vec<Found>, Option<Asked>),
-    /// A deed on a drive has ended; `None` if it was cut short.
-    Deed(NodeId, u64, Option<Outcome>),
+    /// A command on a drive has ended; `None` if it was cut short.
+    Command(NodeId, u64, Option<Outcome>),
     /// A motion of several drives has ended; `None` if it was cut short.
     Group(u64, Option<GroupOutcome>),
     /// The PDO mappings of a node were read; `None` if it did not answer.
@@ -67,7 +67,7 @@ pub(super) struct Look {
     pub(super) loss: Option<HostLoss>,
 }
 
-/// A deed on a drive that is under way. There is one for each node: a further one replaces it.
+/// A command on a drive that is under way. There is one for each node: a further one replaces it.
 pub(super) struct Running {
     pub(super) generation: u64,
     /// For people: "moving".
@@ -91,17 +91,17 @@ pub(super) struct Listening {
 pub(super) const LISTENING_TIME: Duration = Duration::from_millis(1500);
 
 impl Running {
-    /// A deed, and the future to poll for it.
+    /// A command, and the future to poll for it.
     pub(super) fn new(
         node: NodeId,
         generation: u64,
         what: &'static str,
         moves: bool,
         answer: Option<Asked>,
-        deed: impl Future<Output = Outcome> + 'static,
+        command: impl Future<Output = Outcome> + 'static,
     ) -> (Self, LocalBoxFuture<'static, Done>) {
-        let (deed, abort) = abortable(deed);
-        let future = Box::pin(async move { Done::Deed(node, generation, deed.await.ok()) });
+        let (command, abort) = abortable(command);
+        let future = Box::pin(async move { Done::Command(node, generation, command.await.ok()) });
         (Self { generation, what, moves, abort, answer }, future)
     }
 

@@ -9,7 +9,7 @@ use canopen::pdo::Direction;
 use master::decode::{Decoded, Sdo, SdoStep, Side};
 use serde::Serialize;
 
-use super::passed::Passed;
+use super::bus_frame::BusFrame;
 
 /// A line of the trace.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -36,7 +36,7 @@ pub(super) struct Line {
 
 impl Line {
     /// A frame.
-    pub(super) fn of_frame(number: u64, passed: &Passed, decoded: &Decoded) -> Self {
+    pub(super) fn of_frame(number: u64, passed: &BusFrame, decoded: &Decoded) -> Self {
         Self {
             number,
             at_s: (passed.at - Instant::ZERO).as_secs_f64(),
@@ -53,7 +53,7 @@ impl Line {
     /// A whole transfer, from the frame that ends it; `None` from any other.
     pub(super) fn of_transfer(
         number: u64,
-        passed: &Passed,
+        passed: &BusFrame,
         decoded: &Decoded,
         sdo: &Sdo,
         begun: Option<Begun>,
@@ -121,7 +121,7 @@ pub(super) struct Begun {
 
 impl Transfers {
     /// Takes a frame, and tells how the transfer began that it is part of, if that was seen.
-    pub(super) fn follow(&mut self, passed: &Passed, sdo: &Sdo) -> Option<Begun> {
+    pub(super) fn follow(&mut self, passed: &BusFrame, sdo: &Sdo) -> Option<Begun> {
         if sdo.step.is_end() {
             return self.0.remove(&sdo.node);
         }

@@ -1,6 +1,6 @@
 //! What is kept as a log in the form of candump, which `ferrodrive dump` and can-utils read.
 
-use super::passed::Origin;
+use super::bus_frame::Origin;
 use super::query::Query;
 use super::ring::{CHUNK, Held};
 

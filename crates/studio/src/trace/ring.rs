@@ -11,7 +11,7 @@ use devices::Description;
 use master::Models;
 use master::decode::{Decoded, Decoder};
 
-use super::passed::{Origin, Passed};
+use super::bus_frame::{BusFrame, Origin};
 
 /// Frames that are kept at least: some seven minutes of a bus with three drives, half a minute of a full one at 1 Mbit/s.
 pub(super) const KEPT: usize = 200_000;
@@ -48,7 +48,7 @@ pub(super) struct Chunk {
     first: u64,
     /// As it was before the first one.
     before: Arc<Decoder>,
-    frames: Arc<Vec<Passed>>,
+    frames: Arc<Vec<BusFrame>>,
 }
 
 impl Trace {
@@ -70,7 +70,7 @@ impl Trace {
     }
 
     /// Takes a frame; times must not go back.
-    pub(crate) fn append(&self, passed: Passed) {
+    pub(crate) fn append(&self, passed: BusFrame) {
         self.lock().append(passed);
     }
 
@@ -104,7 +104,7 @@ impl Trace {
 }
 
 impl Ring {
-    fn append(&mut self, passed: Passed) {
+    fn append(&mut self, passed: BusFrame) {
         if self.chunks.back().is_none_or(|chunk| chunk.frames.len() == CHUNK) {
             self.begin_chunk();
         }
@@ -164,7 +164,7 @@ impl Held {
         /// Longer than a drive is looked at.
         const SECOND: u64 = 1_000_000_000;
         let id = connection_set::sdo_reply(node);
-        let said = |passed: &&Passed| {
+        let said = |passed: &&BusFrame| {
             let reply = Reply::parse(passed.frame.padded());
             passed.frame.id() == id && matches!(reply, Reply::InitiateUpload(of, _) if of == object)
         };
@@ -180,7 +180,7 @@ impl Held {
     }
 
     /// Gives each frame with a number from `from` to below `to`, in words.
-    pub(super) fn decode(&self, from: u64, to: u64, mut each: impl FnMut(u64, &Passed, &Decoded)) {
+    pub(super) fn decode(&self, from: u64, to: u64, mut each: impl FnMut(u64, &BusFrame, &Decoded)) {
         for chunk in self.overlapping(from, to) {
             let mut decoder = (*chunk.before).clone();
             for (number, passed) in (chunk.first..to).zip(chunk.frames.iter()) {
@@ -213,7 +213,7 @@ mod tests {
         let trace = Trace::new(Models::default(), Origin::default());
         for number in 0..count {
             let at = Instant::ZERO + SPACING * number as u32;
-            trace.append(Passed { at, frame: "080#".parse().expect("a frame"), own: false });
+            trace.append(BusFrame { at, frame: "080#".parse().expect("a frame"), own: false });
         }
         trace
     }
@@ -225,7 +225,7 @@ mod tests {
         let kept = (held.next() - held.oldest()) as usize;
         assert_eq!(held.next(), count);
         assert!((KEPT..KEPT + CHUNK).contains(&kept), "{kept}");
-        assert!(size_of::<Passed>() * (KEPT + CHUNK) <= 10 << 20, "{} bytes a frame", size_of::<Passed>());
+        assert!(size_of::<BusFrame>() * (KEPT + CHUNK) <= 10 << 20, "{} bytes a frame", size_of::<BusFrame>());
         let mut numbers = Vec::new();
         held.decode(held.oldest(), held.next(), |number, _, _| numbers.push(number));
         assert!(numbers.len() == kept && numbers.is_sorted(), "each once, in order");
@@ -246,7 +246,7 @@ mod tests {
     fn what_is_held_stays_while_more_comes() {
         let trace = trace_of(10);
         let held = trace.held();
-        trace.append(Passed { at: Instant::from_secs(9), frame: "704#05".parse().expect("a frame"), own: false });
+        trace.append(BusFrame { at: Instant::from_secs(9), frame: "704#05".parse().expect("a frame"), own: false });
         let mut count = 0;
         held.decode(0, u64::MAX, |_, _, _| count += 1);
         assert_eq!((count, held.next(), trace.held().next()), (10, 10, 11));
@@ -282,7 +282,7 @@ mod tests {
                 whole.set_model(node, model);
             }
             let frame = random_frame(&mut random);
-            trace.append(Passed { at: Instant::from_millis(number as u64), frame, own: false });
+            trace.append(BusFrame { at: Instant::from_millis(number as u64), frame, own: false });
             told.push(whole.decode(&frame).to_string());
         }
         let held = trace.held();
@@ -303,7 +303,7 @@ mod tests {
         let models = ["zlac8030l", "zlim42c"].map(|name| devices::model(name).expect("a model"));
         for round in 0..3 * MOST_CHUNKS {
             trace.set_model(node, models[round % 2]);
-            trace.append(Passed { at: Instant::from_secs(9), frame: "704#05".parse().expect("a frame"), own: false });
+            trace.append(BusFrame { at: Instant::from_secs(9), frame: "704#05".parse().expect("a frame"), own: false });
         }
         assert!(trace.held().chunks.len() <= MOST_CHUNKS);
     }

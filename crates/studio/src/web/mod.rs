@@ -33,7 +33,7 @@ use serde_json::json;
 use tokio::sync::Semaphore;
 
 use crate::access::Access;
-use crate::desk::Desk;
+use crate::handle::HostHandle;
 use answer::{json_text, trouble};
 use door::Visitor;
 pub use door::serve;
@@ -60,7 +60,7 @@ const HEADERS: [(HeaderName, &str); 5] = [
 /// What the handlers share.
 #[derive(Clone)]
 struct Web {
-    desk: Desk,
+    handle: HostHandle,
     access: Arc<Access>,
     /// Who has just said a wrong password.
     guessers: Arc<Guessers>,
@@ -70,9 +70,9 @@ struct Web {
 }
 
 /// The server of a studio: everything under one router, which needs no socket to be called.
-pub fn app(desk: Desk, access: Arc<Access>) -> Router {
+pub fn app(handle: HostHandle, access: Arc<Access>) -> Router {
     let one = || Arc::new(Semaphore::new(1));
-    let web = Web { desk, access, guessers: Arc::default(), doors: trace::Doors::default(), records: one() };
+    let web = Web { handle, access, guessers: Arc::default(), doors: trace::Doors::default(), records: one() };
     let api = ROUTES.iter().fold(Router::new(), |router, route| router.route(route.path, handler(route.operation)));
     api.route("/", get(async || page::file("index.html")))
         .route("/page/{file}", get(async |Path(file): Path<String>| page::file(&file)))
@@ -92,9 +92,11 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
         Operation::Login => post(login),
         Operation::Socket => get(socket),
         Operation::Faults => get(faults),
-        Operation::Trace => get(async |State(web): State<Web>, asked| trace::lines(web.desk, web.doors, asked).await),
-        Operation::Series => get(async |State(web): State<Web>, asked| trace::series(web.desk, web.doors, asked).await),
-        Operation::TraceLog => get(async |State(web): State<Web>, asked| trace::log(web.desk, &web.doors, asked)),
+        Operation::Trace => get(async |State(web): State<Web>, asked| trace::lines(web.handle, web.doors, asked).await),
+        Operation::Series => {
+            get(async |State(web): State<Web>, asked| trace::series(web.handle, web.doors, asked).await)
+        }
+        Operation::TraceLog => get(async |State(web): State<Web>, asked| trace::log(web.handle, &web.doors, asked)),
         Operation::RecordingMcap => {
             post(async |State(web): State<Web>, body: axum::body::Bytes| recording::mcap(web.records, body).await)
                 .layer(DefaultBodyLimit::max(recording::LARGEST))
@@ -207,7 +209,7 @@ fn refuse(access: &Access, request: &Request) -> Option<Refusal> {
 }
 
 async fn state(State(web): State<Web>) -> Response {
-    let json = web.desk.pictures().borrow().json.to_string();
+    let json = web.handle.pictures().borrow().json.to_string();
     json_text(json)
 }
 
@@ -223,7 +225,7 @@ async fn faults(State(web): State<Web>, asked: Result<Query<Since>, QueryRejecti
     match asked {
         // Numbers and texts alone: there is nothing in it that JSON cannot say.
         Ok(Query(Since { since })) => {
-            json_text(serde_json::to_string(&web.desk.timeline().since(since)).unwrap_or_default())
+            json_text(serde_json::to_string(&web.handle.timeline().since(since)).unwrap_or_default())
         }
         Err(rejection) => trouble(StatusCode::BAD_REQUEST, "malformed", &rejection.body_text()),
     }
@@ -231,7 +233,7 @@ async fn faults(State(web): State<Web>, asked: Result<Query<Since>, QueryRejecti
 
 /// Needs no control, as the button of the page does not.
 async fn stop(State(web): State<Web>) -> Response {
-    if web.desk.stop_all() {
+    if web.handle.stop_all() {
         (StatusCode::ACCEPTED, json_text(json!({ "ok": true }).to_string())).into_response()
     } else {
         trouble(StatusCode::SERVICE_UNAVAILABLE, "over", "the studio is ending: use the emergency stop")
@@ -265,7 +267,7 @@ async fn login(State(web): State<Web>, request: Request) -> Response {
 }
 
 async fn socket(State(web): State<Web>, upgrade: WebSocketUpgrade) -> Response {
-    let desk = web.desk;
+    let handle = web.handle;
     let upgrade = upgrade.max_message_size(LARGEST_MESSAGE).max_frame_size(LARGEST_MESSAGE);
-    upgrade.on_upgrade(async move |socket| socket::serve(socket, desk).await)
+    upgrade.on_upgrade(async move |socket| socket::serve(socket, handle).await)
 }

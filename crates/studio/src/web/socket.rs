@@ -15,9 +15,9 @@ use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{mpsc, oneshot};
 
 use crate::access::{is_same, secret};
-use crate::desk::{Desk, Session};
+use crate::handle::{HostHandle, Session};
 use crate::host::{JOG_SPAN, PRESENCE_SPAN};
-use crate::message::{Answer, Deed, Malformed, Message};
+use crate::message::{Answer, Command, Malformed, Message};
 
 /// Requests of one page that may be under way.
 const UNDER_WAY: usize = 64;
@@ -31,8 +31,8 @@ const READING_PATIENCE: Duration = Duration::from_secs(10);
 type Sink = SplitSink<WebSocket, Frame>;
 
 /// Serves a page until it goes.
-pub(super) async fn serve(mut socket: WebSocket, desk: Desk) {
-    let (Some(session), Ok(word)) = (desk.join().await, secret()) else {
+pub(super) async fn serve(mut socket: WebSocket, handle: HostHandle) {
+    let (Some(session), Ok(word)) = (handle.join().await, secret()) else {
         let close = CloseFrame { code: close_code::AGAIN, reason: "too many pages are open".into() };
         let _ = socket.send(Frame::Close(Some(close))).await;
         return;
@@ -48,7 +48,7 @@ pub(super) async fn serve(mut socket: WebSocket, desk: Desk) {
     let (answers, waiting) = mpsc::channel(ANSWERS);
     tokio::select! {
         () = read(stream, &session, &word, answers) => {}
-        () = write(sink, &desk, welcome.to_string(), waiting) => {}
+        () = write(sink, &handle, welcome.to_string(), waiting) => {}
     }
 }
 
@@ -82,22 +82,22 @@ async fn read(mut stream: SplitStream<WebSocket>, session: &Session, word: &str,
 }
 
 fn take(text: &str, session: &Session, word: &str, is_full: bool) -> Result<oneshot::Receiver<Answer>, Answer> {
-    let Message { seq, word: shown, deed } =
+    let Message { seq, word: shown, command } =
         Message::parse(text).map_err(|Malformed { seq, why }| Answer::failed(seq, "malformed", why))?;
     if !is_same(&shown, word) {
         let text = "the word is not that of this session: the message was meant for another";
         return Err(Answer::failed(Some(seq), "foreign_session", text));
     }
     // A stop finds room always.
-    if is_full && deed != (Deed::StopAll {}) {
+    if is_full && command != (Command::StopAll {}) {
         return Err(Answer::failed(Some(seq), "busy", "too many of this page's requests are under way"));
     }
-    session.ask(seq, deed)
+    session.ask(seq, command)
 }
 
 /// Tells the page what it is to know. Ends when that cannot be told.
-async fn write(mut sink: Sink, desk: &Desk, welcome: String, mut answers: mpsc::Receiver<String>) {
-    let (mut pictures, mut news) = (desk.pictures(), desk.news());
+async fn write(mut sink: Sink, handle: &HostHandle, welcome: String, mut answers: mpsc::Receiver<String>) {
+    let (mut pictures, mut news) = (handle.pictures(), handle.news());
     let mut last = pictures.borrow_and_update().number;
     if !send(&mut sink, welcome).await {
         return;

@@ -1,4 +1,4 @@
-//! Who is let in, and what a socket bears. Behind the desk stands a test in place of the host.
+//! Who may connect, and what a socket withstands. The test stands in for the host.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -21,9 +21,9 @@ use super::door::Visitor;
 use super::{LARGEST_MESSAGE, ROUTES, app, openapi, serve};
 use crate::access::{Access, Password};
 use crate::authority::Authority;
-use crate::desk::{Counter, Desk, Picture, Wish, desk};
+use crate::handle::{HostHandle, Inbox, Request as HostRequest, StateUpdate, channel};
 use crate::message::Answer;
-use crate::trace::{Origin, Passed, Trace};
+use crate::trace::{BusFrame, Origin, Trace};
 
 /// A watchdog against hangs.
 const PATIENCE: Duration = Duration::from_secs(600);
@@ -32,11 +32,11 @@ const ADDRESS: &str = "127.0.0.1:8402";
 
 type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
 
-fn server(password: Option<&str>) -> (Router, Arc<Access>, Counter) {
+fn server(password: Option<&str>) -> (Router, Arc<Access>, Inbox) {
     let password = password.map(|text| Password::new(text).expect("long enough"));
     let access = Arc::new(Access::new(ADDRESS.parse().expect("an address"), password).expect("loopback"));
-    let (desk, counter) = desk(Trace::new(master::Models::default(), Origin::default()));
-    (app(desk, Arc::clone(&access)), access, counter)
+    let (handle, inbox) = channel(Trace::new(master::Models::default(), Origin::default()));
+    (app(handle, Arc::clone(&access)), access, inbox)
 }
 
 fn token(access: &Access) -> String {
@@ -85,7 +85,7 @@ async fn nothing_but_the_token_of_this_launch_opens_the_page() {
 
 #[tokio::test]
 async fn a_page_of_another_site_changes_nothing_even_with_the_cookie() {
-    let (app, access, mut counter) = server(None);
+    let (app, access, mut inbox) = server(None);
     let bearer = format!("Bearer {}", token(&access));
     let of = |origin: &'static str| [("authorization", bearer.clone()), ("origin", origin.to_owned())];
     for origin in [
@@ -106,24 +106,24 @@ async fn a_page_of_another_site_changes_nothing_even_with_the_cookie() {
     }
     let without = ask(&app, "POST", "/api/stop", &[("authorization", &bearer)], "").await;
     assert_eq!(without.status(), StatusCode::FORBIDDEN, "no Origin at all");
-    assert!(!counter.stops.has_changed().expect("there is a desk"), "nothing was stopped");
+    assert!(!inbox.stops.has_changed().expect("there is a handle"), "nothing was stopped");
     let own = of("http://127.0.0.1:8402");
     let own: Vec<_> = own.iter().map(|(name, value)| (*name, value.as_str())).collect();
     assert_eq!(ask(&app, "POST", "/api/stop", &own, "").await.status(), StatusCode::ACCEPTED);
-    assert!(counter.stops.has_changed().expect("there is a desk"));
-    counter.stops.mark_unchanged();
+    assert!(inbox.stops.has_changed().expect("there is a handle"));
+    inbox.stops.mark_unchanged();
     let renamed = [("authorization", bearer.as_str()), ("host", "evil.example:8402")];
     assert_eq!(ask(&app, "GET", "/api/state", &renamed, "").await.status(), StatusCode::FORBIDDEN);
 }
 
 #[tokio::test]
 async fn a_get_moves_and_stops_nothing() {
-    let (app, access, counter) = server(None);
+    let (app, access, inbox) = server(None);
     let bearer = format!("Bearer {}", token(&access));
     let headers = [("authorization", bearer.as_str()), ("origin", "http://127.0.0.1:8402")];
     let stop = ask(&app, "GET", "/api/stop", &headers, "").await;
     assert_eq!(stop.status(), StatusCode::METHOD_NOT_ALLOWED);
-    assert!(!counter.stops.has_changed().expect("there is a desk"));
+    assert!(!inbox.stops.has_changed().expect("there is a handle"));
 }
 
 #[tokio::test]
@@ -210,8 +210,8 @@ async fn elsewhere_a_name_has_to_be_one_that_was_said() {
     let here = access.url();
     assert!(here.starts_with("http://127.0.0.1:8402/?token="), "an address that can be opened: {here}");
     let access = Arc::new(access.with_hosts(vec!["drives.local".to_owned()]));
-    let (desk, _counter) = desk(Trace::new(master::Models::default(), Origin::default()));
-    let app = app(desk, access);
+    let (handle, _counter) = channel(Trace::new(master::Models::default(), Origin::default()));
+    let app = app(handle, access);
     for host in
         ["192.168.1.5:8402", "[2001:db8::1]:8402", "[::1]", "localhost:8402", "drives.local:8402", "Drives.LOCAL"]
     {
@@ -285,13 +285,13 @@ async fn half_a_header_has_five_seconds() {
 
 #[tokio::test]
 async fn the_trace_is_asked_for_in_parts_and_saved_by_few_at_a_time() {
-    let (app, access, counter) = server(None);
+    let (app, access, inbox) = server(None);
     let bearer = format!("Bearer {}", token(&access));
     let headers = [("authorization", bearer.as_str())];
     let frames = 10_000;
     for number in 0..frames {
         let at = can::Instant::from_millis(number);
-        counter.trace.append(Passed { at, frame: "704#05".parse().expect("a frame"), own: false });
+        inbox.trace.append(BusFrame { at, frame: "704#05".parse().expect("a frame"), own: false });
     }
     let part = text(ask(&app, "GET", "/api/trace?after=9990&node=4&kind=heartbeat", &headers, "").await).await;
     let part: Value = serde_json::from_str(&part).expect("JSON");
@@ -319,22 +319,22 @@ async fn the_trace_is_asked_for_in_parts_and_saved_by_few_at_a_time() {
 }
 
 /// A server at a port of its own, whose host answers that everything is done.
-async fn listening() -> (Arc<Access>, Desk, tokio::sync::watch::Sender<Picture>) {
+async fn listening() -> (Arc<Access>, HostHandle, tokio::sync::watch::Sender<StateUpdate>) {
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
     let access = Arc::new(Access::new(listener.local_addr().expect("bound"), None).expect("loopback"));
-    let (desk, counter) = desk(Trace::new(master::Models::default(), Origin::default()));
-    let Counter { mut wishes, pictures, .. } = counter;
-    let served = app(desk.clone(), Arc::clone(&access));
+    let (handle, inbox) = channel(Trace::new(master::Models::default(), Origin::default()));
+    let Inbox { mut requests, pictures, .. } = inbox;
+    let served = app(handle.clone(), Arc::clone(&access));
     tokio::spawn(serve(listener, served));
     tokio::spawn(async move {
         let mut authority = Authority::default();
-        while let Some(wish) = wishes.recv().await {
-            match wish {
-                Wish::Join { lifeline, welcome } => {
+        while let Some(request) = requests.recv().await {
+            match request {
+                HostRequest::Join { liveness, welcome } => {
                     let _ = welcome.send(authority.join());
-                    drop(lifeline);
+                    drop(liveness);
                 }
-                Wish::Do { session, seq, answer, .. } => {
+                HostRequest::Do { session, seq, answer, .. } => {
                     let _ = answer.send(match authority.accept(session, seq) {
                         Ok(()) => Answer::done(seq, Vec::new()),
                         Err(refusal) => Answer::failed(Some(seq), refusal.kind(), refusal.to_string()),
@@ -343,7 +343,7 @@ async fn listening() -> (Arc<Access>, Desk, tokio::sync::watch::Sender<Picture>)
             }
         }
     });
-    (access, desk, pictures)
+    (access, handle, pictures)
 }
 
 fn host_of(access: &Access) -> String {
@@ -429,7 +429,7 @@ async fn two_hundred_pages_are_all_shown_the_newest_picture() {
     for _ in 0..200 {
         pages.push(page(&access).await.0);
     }
-    pictures.send_replace(Picture { number: 7, json: r#"{"type":"state","number":7}"#.into() });
+    pictures.send_replace(StateUpdate { number: 7, json: r#"{"type":"state","number":7}"#.into() });
     for socket in &mut pages {
         // What came before the page did is no loss of its.
         let told = next(socket).await.expect("a picture");
@@ -440,17 +440,17 @@ async fn two_hundred_pages_are_all_shown_the_newest_picture() {
 
 #[tokio::test]
 async fn a_page_that_reads_slowly_is_told_how_much_it_missed_and_costs_no_more_memory() {
-    let (access, desk, pictures) = listening().await;
+    let (access, handle, pictures) = listening().await;
     let (mut socket, _) = page(&access).await;
     // More than what lies in the buffers of two sockets, by far.
     let filling = "x".repeat(256 << 10);
     let count = 200;
     for number in 1..=count {
         let json = format!(r#"{{"type":"state","number":{number},"filling":"{filling}"}}"#);
-        pictures.send_replace(Picture { number, json: json.into() });
+        pictures.send_replace(StateUpdate { number, json: json.into() });
         tokio::task::yield_now().await;
     }
-    assert_eq!(desk.pictures().borrow().number, count, "nobody waited for the page");
+    assert_eq!(handle.pictures().borrow().number, count, "nobody waited for the page");
     let (mut shown, mut missed) = (0, 0);
     loop {
         let told = next(&mut socket).await.expect("a picture, or how many were missed");
@@ -471,12 +471,12 @@ async fn a_page_that_reads_slowly_is_told_how_much_it_missed_and_costs_no_more_m
 /// One that never reads keeps its place from nobody; what it has of it ends.
 #[tokio::test(start_paused = true)]
 async fn who_takes_nothing_of_a_log_loses_its_place() {
-    let (app, access, counter) = server(None);
+    let (app, access, inbox) = server(None);
     let bearer = format!("Bearer {}", token(&access));
     let headers = [("authorization", bearer.as_str())];
     for number in 0..10_000 {
         let at = can::Instant::from_millis(number);
-        counter.trace.append(Passed { at, frame: "704#05".parse().expect("a frame"), own: false });
+        inbox.trace.append(BusFrame { at, frame: "704#05".parse().expect("a frame"), own: false });
     }
     let mut idle = Vec::new();
     loop {

@@ -14,7 +14,7 @@ use futures_util::stream;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::answer::{json_text, trouble};
-use crate::desk::Desk;
+use crate::handle::HostHandle;
 use crate::trace::{Asked, AskedSeries, Held, Query};
 
 /// Readers whose lines are decoded at the same time; others wait for their turn. However many read, a second core is left to
@@ -44,13 +44,13 @@ impl Default for Doors {
 pub(super) type InQuery = Result<InAddress<Asked>, QueryRejection>;
 
 /// The newest lines that are wanted.
-pub(super) async fn lines(desk: Desk, doors: Doors, asked: InQuery) -> Response {
+pub(super) async fn lines(handle: HostHandle, doors: Doors, asked: InQuery) -> Response {
     let query = match understand(asked) {
         Ok(query) => query,
         Err(refusal) => return *refusal,
     };
     let Ok(_decoding) = doors.decoding.acquire().await else { return over() };
-    let held = desk.trace().held();
+    let held = handle.trace().held();
     let selected = tokio::task::spawn_blocking(move || serde_json::to_string(&query.select(&held))).await;
     match selected {
         Ok(Ok(json)) => json_text(json),
@@ -60,7 +60,7 @@ pub(super) async fn lines(desk: Desk, doors: Doors, asked: InQuery) -> Response 
 
 /// The values of objects over time.
 pub(super) async fn series(
-    desk: Desk,
+    handle: HostHandle,
     doors: Doors,
     asked: Result<InAddress<AskedSeries>, QueryRejection>,
 ) -> Response {
@@ -70,7 +70,7 @@ pub(super) async fn series(
         Err(why) => return trouble(StatusCode::BAD_REQUEST, "malformed", &why),
     };
     let Ok(_decoding) = doors.decoding.acquire().await else { return over() };
-    let held = desk.trace().held();
+    let held = handle.trace().held();
     match tokio::task::spawn_blocking(move || serde_json::to_string(&query.values(&held))).await {
         Ok(Ok(json)) => json_text(json),
         _ => over(),
@@ -78,7 +78,7 @@ pub(super) async fn series(
 }
 
 /// All frames of the nodes and kinds that are wanted, in the form of candump.
-pub(super) fn log(desk: Desk, doors: &Doors, asked: InQuery) -> Response {
+pub(super) fn log(handle: HostHandle, doors: &Doors, asked: InQuery) -> Response {
     let query = match understand(asked) {
         Ok(query) => query,
         Err(refusal) => return *refusal,
@@ -86,15 +86,15 @@ pub(super) fn log(desk: Desk, doors: &Doors, asked: InQuery) -> Response {
     let Ok(door) = Arc::clone(&doors.saving).try_acquire_owned() else {
         return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "others are saving the trace: try again");
     };
-    desk.trace().note_saved();
-    let held = Arc::new(desk.trace().held());
+    handle.trace().note_saved();
+    let held = Arc::new(handle.trace().held());
     let place = Arc::new(Place { kept: Mutex::new(Some((held, door))), asked: AtomicU64::new(0) });
     tokio::spawn(give_up_idle(Arc::downgrade(&place)));
-    let saving = Saving { desk, place, query: Arc::new(query), next: 0 };
+    let saving = Saving { handle, place, query: Arc::new(query), next: 0 };
     let parts = stream::unfold(saving, async |saving| {
-        let Saving { desk, place, query, next } = &saving;
-        let (desk, held, query, next) = (desk.clone(), place.held()?, Arc::clone(query), *next);
-        let work = tokio::task::spawn_blocking(move || query.log_part(&held, desk.trace().origin(), next));
+        let Saving { handle, place, query, next } = &saving;
+        let (handle, held, query, next) = (handle.clone(), place.held()?, Arc::clone(query), *next);
+        let work = tokio::task::spawn_blocking(move || query.log_part(&held, handle.trace().origin(), next));
         let part = work.await.ok()??;
         Some((Ok::<_, std::convert::Infallible>(part.text), Saving { next: part.next, ..saving }))
     });
@@ -105,7 +105,7 @@ pub(super) fn log(desk: Desk, doors: &Doors, asked: InQuery) -> Response {
 
 /// A log on its way.
 struct Saving {
-    desk: Desk,
+    handle: HostHandle,
     place: Arc<Place>,
     query: Arc<Query>,
     next: u64,

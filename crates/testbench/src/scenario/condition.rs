@@ -11,7 +11,7 @@ use sim::recorder::Signal;
 use sim::wire::{ErrorState, WireEvent};
 use sim::{Brake, Place, Report, World};
 
-use super::happening::{EventPattern, Happening, code, spelled};
+use super::occurrence::{EventPattern, Occurrence, code, spelled};
 use crate::words::suggest::{did_you_mean, near};
 
 /// Every form of a condition, for messages and the manual.
@@ -160,7 +160,7 @@ pub struct View<'a> {
     /// The world as it is now.
     pub world: &'a mut World,
     /// What has just happened, if this is asked because of it.
-    pub happening: Option<Happening<'a>>,
+    pub occurrence: Option<Occurrence<'a>>,
     /// Whether the step or host of a name is done.
     pub done: &'a dyn Fn(&str) -> bool,
 }
@@ -228,10 +228,10 @@ impl Condition {
     pub fn holds(&self, view: &mut View<'_>) -> bool {
         match self {
             Self::Frame(pattern) => {
-                matches!(view.happening, Some(Happening::Wire(WireEvent::Frame { frame, .. })) if pattern.matches(frame))
+                matches!(view.occurrence, Some(Occurrence::Wire(WireEvent::Frame { frame, .. })) if pattern.matches(frame))
             }
-            Self::ErrorFrame => matches!(view.happening, Some(Happening::Wire(WireEvent::Error { .. }))),
-            Self::Event(pattern) => matches!(view.happening, Some(Happening::Told(event)) if pattern.matches(event)),
+            Self::ErrorFrame => matches!(view.occurrence, Some(Occurrence::Wire(WireEvent::Error { .. }))),
+            Self::Event(pattern) => matches!(view.occurrence, Some(Occurrence::Told(event)) if pattern.matches(event)),
             Self::Body(name, signal, comparison) => {
                 of_body(view.world, name, signal).is_some_and(|value| comparison.holds(value))
             }
@@ -274,8 +274,8 @@ impl Condition {
     /// What is to be seen of it now, for people.
     pub fn seen(&self, view: &mut View<'_>) -> String {
         match self {
-            Self::Frame(_) | Self::ErrorFrame | Self::Event(_) => match (view.happening, self) {
-                (Some(happening), _) => happening.to_string(),
+            Self::Frame(_) | Self::ErrorFrame | Self::Event(_) => match (view.occurrence, self) {
+                (Some(occurrence), _) => occurrence.to_string(),
                 (None, Self::Event(_)) => "no such event".into(),
                 (None, _) => "no such frame".into(),
             },

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use master::units::parse_duration;
-use sim::command::Command;
+use sim::command::Command as WorldCommand;
 
+use super::command::{Command, PdoCommand};
 use super::condition::{Condition, signal};
-use super::deed::{Deed, PdoDeed};
 use super::plan::{Act, Base, Expect, Figure, Host, HostLine, Law, Measure, Statistic, Step, Until, Wanted};
 use crate::document::Problem;
 use crate::document::reader::{Field, Table};
@@ -159,10 +159,10 @@ fn act(field: &Field<'_>, words: &str) -> Result<Act, Problem> {
         ["host", ..] => return Err(field.problem("expected: host cut, host join, or host die")),
         _ => {}
     }
-    match words.parse::<Command>() {
-        Ok(Command::Apply(place, stimulus)) => Ok(Act::World(place, stimulus)),
-        Ok(Command::Disturb(fault)) => Ok(Act::Wire(fault)),
-        Ok(Command::ApplyToBody(name, stimulus)) => Ok(Act::Body(name, stimulus)),
+    match words.parse::<WorldCommand>() {
+        Ok(WorldCommand::Apply(place, stimulus)) => Ok(Act::World(place, stimulus)),
+        Ok(WorldCommand::Disturb(fault)) => Ok(Act::Wire(fault)),
+        Ok(WorldCommand::ApplyToBody(name, stimulus)) => Ok(Act::Body(name, stimulus)),
         Ok(_) => Err(field.problem(format!("'{words}' does nothing to the machine; [[expect]] looks at it"))),
         Err(error) => Err(field.problem(error.to_string())),
     }
@@ -182,22 +182,22 @@ pub(super) fn host(table: &Table<'_>, n: usize) -> Many<Host> {
 
 fn line(field: &Field<'_>) -> Result<HostLine, Problem> {
     const EXPECTED: &str = "what the host does as text, or a table, e.g. { do = \"4 read 603F\", is = 0x3220 }";
-    let deed = |field: &Field<'_>| {
+    let command = |field: &Field<'_>| {
         let asked = field.words(EXPECTED)?;
-        let deed = asked.parse().map_err(|reason: String| field.problem(reason))?;
-        Ok((asked, deed))
+        let command = asked.parse().map_err(|reason: String| field.problem(reason))?;
+        Ok((asked, command))
     };
     if !field.is_table() {
-        let (asked, deed) = deed(field)?;
+        let (asked, command) = command(field)?;
         let place = field.problem("").locate(field.source_text());
-        return Ok(HostLine { deed, name: None, wanted: Wanted::default(), asked, place });
+        return Ok(HostLine { command, name: None, wanted: Wanted::default(), asked, place });
     }
     let table = field.table("a line of a host", EXPECTED)?;
     table.takes_only(LINE_KEYS)?;
-    let (asked, deed) = deed(&table.need("do", EXPECTED)?)?;
+    let (asked, command) = command(&table.need("do", EXPECTED)?)?;
     let value = table.get("is").map(|field| field.number("a number, which is read")).transpose()?;
     let tolerance = table.get("tolerance").map(|field| field.number("a number, e.g. 5")).transpose()?;
-    let reads = matches!(deed, Deed::Read(..) | Deed::Pdo(_, PdoDeed::Read(_)));
+    let reads = matches!(command, Command::Read(..) | Command::Pdo(_, PdoCommand::Read(_)));
     if let (Some(is), false) = (table.get("is"), reads) {
         return Err(is.problem("'is' needs something that is read: NODE read OBJECT, or NODE pdo read OBJECT"));
     }
@@ -210,7 +210,13 @@ fn line(field: &Field<'_>) -> Result<HostLine, Problem> {
     };
     let shown = value.map(|value| format!("{asked} is {}", master::units::Shown(value))).unwrap_or(asked);
     let asked = if wanted.fails.is_some() { format!("{shown} fails") } else { shown };
-    Ok(HostLine { deed, name: name_of(&table)?, wanted, asked, place: field.problem("").locate(field.source_text()) })
+    Ok(HostLine {
+        command,
+        name: name_of(&table)?,
+        wanted,
+        asked,
+        place: field.problem("").locate(field.source_text()),
+    })
 }
 
 pub(super) fn expect(table: &Table<'_>, n: usize) -> Many<Expect> {

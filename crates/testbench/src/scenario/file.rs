@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use sim::Place;
 
+use super::command::Command;
 use super::condition::Condition;
-use super::deed::Deed;
 use super::entries::{MOST, Many, bounded, entries, expect, figures, host, kept, single, step};
 use super::plan::{Act, Base, Expect, Figure, Host, Measure, Step};
 use crate::document::reader::{self, Parameters, Table};
@@ -240,8 +240,8 @@ impl Scenario {
     /// Every condition of it, and where it stands.
     fn conditions(&self) -> impl Iterator<Item = (&Condition, &Located)> {
         let steps = self.steps.iter().filter_map(|step| Some((step.when.as_ref()?, &step.place)));
-        let lines = self.hosts.iter().flat_map(|host| &host.lines).filter_map(|line| match &line.deed {
-            Deed::WaitFor(condition, _) => Some((condition, &line.place)),
+        let lines = self.hosts.iter().flat_map(|host| &host.lines).filter_map(|line| match &line.command {
+            Command::WaitFor(condition, _) => Some((condition, &line.place)),
             _ => None,
         });
         steps.chain(lines).chain(self.expects.iter().map(|expect| (&expect.condition, &expect.place)))

@@ -1,6 +1,6 @@
 //! The host of a scenario at work: its lines, one after the other, as one future over a [`Network`].
 //!
-//! What it waits for beyond the bus (a condition, a time) it asks of the [`Desk`], which whoever steps the world looks at.
+//! What it waits for beyond the bus (a condition, a time) it asks of the [`Shared`], which whoever steps the world looks at.
 
 use std::cell::RefCell;
 use std::future::{Future, poll_fn};
@@ -20,7 +20,7 @@ use master::units::{Along, Angle, Shown};
 use master::{Drive, Network};
 use sim::Place;
 
-use super::deed::{Deed, Intent, Manner, PdoDeed};
+use super::command::{Command, Intent, Manner, PdoCommand};
 use super::outcome::{Row, RowKind, Verdict};
 use super::plan::{HostLine, Wanted};
 use crate::machine_file::Machine;
@@ -35,7 +35,7 @@ const SETTLING_TIME: Duration = Duration::from_millis(200);
 
 /// What hosts and the one who steps the world tell each other.
 #[derive(Default)]
-pub(super) struct Desk {
+pub(super) struct Shared {
     /// What hosts wait for.
     pub(super) waits: Vec<Waiting>,
     /// What hosts have done.
@@ -53,34 +53,34 @@ pub(super) struct Waiting {
 }
 
 /// What a host needs to know.
-pub(super) struct Post {
+pub(super) struct HostTask {
     /// Its number among the hosts.
     pub(super) number: usize,
     pub(super) name: String,
     pub(super) network: Network,
     pub(super) machine: Rc<Machine>,
-    pub(super) desk: Rc<RefCell<Desk>>,
+    pub(super) shared: Rc<RefCell<Shared>>,
 }
 
 /// Runs the lines of a host; gives up at the first that does not go as the scenario says.
-pub(super) async fn run(post: Post, start: Option<Duration>, lines: Vec<HostLine>) {
+pub(super) async fn run(task: HostTask, start: Option<Duration>, lines: Vec<HostLine>) {
     match start {
-        Some(start) => post.network.sleep(start).await,
-        None => post.wait_until_booted().await,
+        Some(start) => task.network.sleep(start).await,
+        None => task.wait_until_booted().await,
     }
     let mut failed = false;
     for (n, line) in lines.iter().enumerate() {
-        let began = post.network.now();
+        let began = task.network.now();
         let (verdict, seen) = if failed {
             (Verdict::Skipped, "not reached".to_owned())
         } else {
-            line.wanted.judge(post.perform(n, &line.deed).await, began, post.network.now())
+            line.wanted.judge(task.perform(n, &line.command).await, began, task.network.now())
         };
         failed |= verdict == Verdict::Failed;
-        let at = (verdict != Verdict::Skipped).then(|| post.network.now());
-        let name = line.name.clone().unwrap_or_else(|| post.name.clone());
+        let at = (verdict != Verdict::Skipped).then(|| task.network.now());
+        let name = line.name.clone().unwrap_or_else(|| task.name.clone());
         let asked = line.asked.clone();
-        post.desk.borrow_mut().rows.push(Row {
+        task.shared.borrow_mut().rows.push(Row {
             kind: RowKind::Host,
             name,
             asked,
@@ -91,7 +91,7 @@ pub(super) async fn run(post: Post, start: Option<Duration>, lines: Vec<HostLine
         });
     }
     if !failed {
-        post.desk.borrow_mut().done.push(post.name);
+        task.shared.borrow_mut().done.push(task.name);
     }
 }
 
@@ -122,7 +122,7 @@ impl Wanted {
     }
 }
 
-impl Post {
+impl HostTask {
     /// Waits until each drive has booted and looked about; not for ever for one that does not.
     async fn wait_until_booted(&self) {
         let boots = self
@@ -143,33 +143,33 @@ impl Post {
         self.machine.models().find(|(node, _)| *node == id).map(|(_, model)| model)
     }
 
-    async fn perform(&self, line: usize, deed: &Deed) -> Done {
+    async fn perform(&self, line: usize, command: &Command) -> Done {
         let done = |seen: &str| Ok((seen.to_owned(), None));
         let network = &self.network;
-        match deed {
-            Deed::Drive(place, intent) => self.intend(*place, *intent).await,
-            Deed::Velocity(place, speed, manner) => {
+        match command {
+            Command::Drive(place, intent) => self.intend(*place, *intent).await,
+            Command::Velocity(place, speed, manner) => {
                 let drive = self.drive(*place)?;
                 let turn = async { drive.velocity(drive.turning(*speed)?, manner.motion(&drive)?).await };
                 moved(turn.await)
             }
-            Deed::Move { place, to, relative, manner } => {
+            Command::Move { place, to, relative, manner } => {
                 moved(move_drive(&self.drive(*place)?, *to, *relative, manner).await)
             }
-            Deed::Torque(place, current) => moved(self.drive(*place)?.torque(*current).await),
-            Deed::Home { place, method, within, manner } => {
+            Command::Torque(place, current) => moved(self.drive(*place)?.torque(*current).await),
+            Command::Home { place, method, within, manner } => {
                 let drive = self.drive(*place)?;
                 let home = async { drive.home(*method, manner.homing(&drive, *within)?).await };
                 moved(home.await)
             }
-            Deed::Read(node, object) => self.read(*node, object).await,
-            Deed::Write(node, object, text) => self.write(*node, object, text).await,
-            Deed::Pdo(node, pdo) => self.exchange(*node, pdo).await,
-            Deed::Nmt(None, command) => {
+            Command::Read(node, object) => self.read(*node, object).await,
+            Command::Write(node, object, text) => self.write(*node, object, text).await,
+            Command::Pdo(node, pdo) => self.exchange(*node, pdo).await,
+            Command::Nmt(None, command) => {
                 network.nmt_all(*command);
                 done("sent")
             }
-            Deed::Nmt(Some(node), command) => {
+            Command::Nmt(Some(node), command) => {
                 use canopen::NmtCommand::{ResetCommunication, ResetNode};
                 let node = network.node(*node);
                 let booted = node.wait_boot_up(BOOT_PATIENCE);
@@ -180,27 +180,27 @@ impl Post {
                 booted.await.map_err(|error| error.to_string())?;
                 done("booted")
             }
-            Deed::Watch(node, time) => {
+            Command::Watch(node, time) => {
                 network.node(*node).watch_heartbeat(Some(*time));
                 done("watching")
             }
-            Deed::Heartbeat(own, period) => {
+            Command::Heartbeat(own, period) => {
                 network.heartbeat(*own, Some(*period));
                 done("producing")
             }
-            Deed::Sync(period) => {
+            Command::Sync(period) => {
                 network.sync(*period);
                 done(if period.is_some() { "producing" } else { "ended" })
             }
-            Deed::Send(frame) => {
+            Command::Send(frame) => {
                 network.transmit(*frame);
                 done("sent")
             }
-            Deed::Wait(duration) => {
+            Command::Wait(duration) => {
                 network.sleep(*duration).await;
                 done("waited")
             }
-            Deed::WaitFor(_, within) => self.wait_for(line, *within).await,
+            Command::WaitFor(_, within) => self.wait_for(line, *within).await,
         }
     }
 
@@ -239,24 +239,24 @@ impl Post {
     }
 
     /// Does something with process data.
-    async fn exchange(&self, id: NodeId, deed: &PdoDeed) -> Done {
+    async fn exchange(&self, id: NodeId, command: &PdoCommand) -> Done {
         let node = self.network.node(id);
         let done = |seen: String| Ok((seen, None));
-        match deed {
-            PdoDeed::Map(pdo, objects, transmission) => {
+        match command {
+            PdoCommand::Map(pdo, objects, transmission) => {
                 let records = objects.iter().map(|object| self.record(id, object)).collect::<Result<_, _>>()?;
                 let config = PdoConfig::new(*pdo, PdoMap(records)).transmission(*transmission);
                 let mapped = node.configure_pdo(&config, TimerUnits::STANDARD).await;
                 mapped.map_err(|error| error.to_string())?;
                 done(format!("{pdo} carries {} bytes", config.map.bytes()))
             }
-            PdoDeed::Adopt(pdo) => {
+            PdoCommand::Adopt(pdo) => {
                 let adopted = node.adopt_pdo(*pdo, TimerUnits::STANDARD).await.map_err(|error| error.to_string())?;
                 let objects: Vec<_> = adopted.map.0.iter().map(|record| record.mux.to_string()).collect();
                 let objects = if objects.is_empty() { "nothing".into() } else { objects.join(", ") };
                 done(format!("{pdo} carries {objects}"))
             }
-            PdoDeed::Write(object, text) => {
+            PdoCommand::Write(object, text) => {
                 let (mux, row) = self.resolve(id, object)?;
                 let (data_type, number) = typed(row, text)?;
                 if !node.send_by_pdo(mux, data_type.raw(number).into()) {
@@ -266,7 +266,7 @@ impl Post {
                 }
                 done(format!("{number} put into the process data"))
             }
-            PdoDeed::Read(object) => {
+            PdoCommand::Read(object) => {
                 let (mux, row) = self.resolve(id, object)?;
                 let received = self.network.received(id, mux).ok_or_else(|| {
                     format!("no TPDO of node {id} has brought {mux}; `{id} pdo map tpdo 1 ..` or `pdo adopt` and `nmt start` first")
@@ -298,11 +298,11 @@ impl Post {
     /// Waits until the one who steps the world says that the condition of this line was so.
     async fn wait_for(&self, line: usize, within: Duration) -> Done {
         let key = (self.number, line);
-        self.desk.borrow_mut().waits.push(Waiting { line: key, so: false, waker: None });
+        self.shared.borrow_mut().waits.push(Waiting { line: key, so: false, waker: None });
         let mut patience = std::pin::pin!(self.network.sleep(within));
         let so = poll_fn(|context| {
-            let mut desk = self.desk.borrow_mut();
-            let Some(waiting) = desk.waits.iter_mut().find(|waiting| waiting.line == key) else {
+            let mut shared = self.shared.borrow_mut();
+            let Some(waiting) = shared.waits.iter_mut().find(|waiting| waiting.line == key) else {
                 return Poll::Ready(false);
             };
             if waiting.so {
@@ -312,7 +312,7 @@ impl Post {
             patience.as_mut().poll(context).map(|()| false)
         })
         .await;
-        self.desk.borrow_mut().waits.retain(|waiting| waiting.line != key);
+        self.shared.borrow_mut().waits.retain(|waiting| waiting.line != key);
         if so {
             Ok(("it is so".into(), None))
         } else {

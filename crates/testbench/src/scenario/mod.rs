@@ -2,7 +2,7 @@
 //!
 //! A [`Scenario`] is read from a text, a [`Runner`] goes through it in virtual time, and an [`Outcome`] has a row for each
 //! thing that was asked. The same text and the same seed give the same outcome, to the last frame. Who moves a world by other rules
-//! (a served bus) has a [`Course`] go along with it.
+//! (a served bus) has a [`Execution`] go along with it.
 //!
 //! ```
 //! use std::path::Path;
@@ -25,20 +25,20 @@
 //! that an expectation names; what is about frames is decided at the last bit of the frame, and what is about events when the world
 //! tells of them.
 
+pub mod command;
 pub mod condition;
-mod course;
-pub mod deed;
 pub mod entries;
+mod execution;
 pub mod file;
-pub mod happening;
 mod host;
 mod junit;
+pub mod occurrence;
 mod outcome;
 mod plan;
 mod runner;
 mod script;
 
-pub use course::Course;
+pub use execution::Execution;
 pub use file::Scenario;
 pub use junit::junit;
 pub use outcome::{Outcome, OutcomeReport, Row, RowKind, Verdict};

@@ -6,8 +6,8 @@ use sim::recorder::Signal;
 use sim::stimulus::{BodyStimulus, WireFault};
 use sim::{Place, Stimulus};
 
+use super::command::Command;
 use super::condition::Condition;
-use super::deed::Deed;
 use crate::document::Located;
 
 /// What the outer world does.
@@ -57,7 +57,7 @@ pub(super) struct Host {
 /// One line of it.
 #[derive(Clone, Debug)]
 pub(super) struct HostLine {
-    pub(super) deed: Deed,
+    pub(super) command: Command,
     pub(super) name: Option<String>,
     pub(super) wanted: Wanted,
     pub(super) asked: String,

@@ -5,16 +5,16 @@ use sim::World;
 use sim::events::Event;
 use sim::wire::WireEvent;
 
-use super::course::Course;
+use super::execution::Execution;
 use super::file::Scenario;
-use super::happening::Happening;
+use super::occurrence::Occurrence;
 use super::outcome::Outcome;
 use crate::document::BadFile;
 
 /// A run of a scenario: stepped by whoever wants to look in between, or [run](Self::run) to its end.
 pub struct Runner {
     world: World,
-    course: Course,
+    execution: Execution,
     /// What has happened since it was taken last, for a record.
     kept: Option<Kept>,
 }
@@ -34,8 +34,8 @@ impl Runner {
     /// # Errors
     /// What a drive of the machine does not take.
     pub fn new(scenario: &Scenario, seed: Option<u64>) -> Result<Self, BadFile> {
-        let (world, course) = Course::begin(scenario, seed)?;
-        Ok(Self { world, course, kept: None })
+        let (world, execution) = Execution::begin(scenario, seed)?;
+        Ok(Self { world, execution, kept: None })
     }
 
     /// The present of the run.
@@ -45,7 +45,7 @@ impl Runner {
 
     /// When it ends at the latest.
     pub fn limit(&self) -> Instant {
-        self.course.limit()
+        self.execution.limit()
     }
 
     /// The world as it stands.
@@ -76,8 +76,8 @@ impl Runner {
 
     /// Goes on to the next event; false at the end of the run.
     pub fn step(&mut self) -> bool {
-        let going = self.course.go_on(&mut self.world);
-        let Some(own) = self.course.next_time(self.world.now()).filter(|_| going) else { return false };
+        let going = self.execution.go_on(&mut self.world);
+        let Some(own) = self.execution.next_time(self.world.now()).filter(|_| going) else { return false };
         match self.world.next_event() {
             Some(at) if at <= own => {
                 self.world.step();
@@ -85,7 +85,7 @@ impl Runner {
             }
             _ => {
                 self.world.run_until(own);
-                self.course.look(&mut self.world);
+                self.execution.look(&mut self.world);
                 self.hear();
             }
         }
@@ -94,7 +94,7 @@ impl Runner {
 
     /// Ends the run where it stands, and tells what came of it.
     pub fn conclude(mut self) -> Outcome {
-        self.course.conclude(&mut self.world)
+        self.execution.conclude(&mut self.world)
     }
 
     /// Hands on what has happened, with what comes of that.
@@ -103,10 +103,10 @@ impl Runner {
             if let (WireEvent::Frame { end, frame, .. }, Some(kept)) = (event, &mut self.kept) {
                 kept.frames.push((end, frame));
             }
-            self.course.hear(&mut self.world, Happening::Wire(&event));
+            self.execution.hear(&mut self.world, Occurrence::Wire(&event));
         }
         while let Some(event) = self.world.poll_event() {
-            self.course.hear(&mut self.world, Happening::Told(&event));
+            self.execution.hear(&mut self.world, Occurrence::Told(&event));
             if let Some(kept) = &mut self.kept {
                 kept.events.push(event);
             }

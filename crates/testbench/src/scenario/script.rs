@@ -8,7 +8,7 @@ use sim::World;
 
 use super::condition::{View, of_body};
 use super::file::Scenario;
-use super::happening::Happening;
+use super::occurrence::Occurrence;
 use super::outcome::{Row, RowKind, Verdict};
 use super::plan::{Act, Base, Expect, Figure, Law, Measure, Statistic, Step, Until};
 
@@ -144,12 +144,12 @@ impl Script {
         scenario: &Scenario,
         world: &mut World,
         host: StationId,
-        happening: Option<Happening<'_>>,
+        occurrence: Option<Occurrence<'_>>,
     ) {
         // What one step does may be what another waits for, at the same instant.
-        while self.look_at_steps(scenario, world, host, happening) {}
-        self.look_at_expectations(scenario, world, happening);
-        if happening.is_none() {
+        while self.look_at_steps(scenario, world, host, occurrence) {}
+        self.look_at_expectations(scenario, world, occurrence);
+        if occurrence.is_none() {
             self.looked = Some(world.now());
             self.measure(scenario, world);
         }
@@ -160,13 +160,13 @@ impl Script {
         scenario: &Scenario,
         world: &mut World,
         host: StationId,
-        happening: Option<Happening<'_>>,
+        occurrence: Option<Occurrence<'_>>,
     ) -> bool {
         let now = world.now();
         let mut changed = false;
         for (n, step) in scenario.steps.iter().enumerate() {
             if self.steps[n] == Progress::Waiting {
-                self.arm(n, step, world, happening);
+                self.arm(n, step, world, occurrence);
             }
             if matches!(self.steps[n], Progress::Due(at) if at <= now) {
                 self.steps[n] = Progress::Done;
@@ -183,23 +183,23 @@ impl Script {
     }
 
     /// Decides whether a step that waits is due, and when; or that it has waited too long.
-    fn arm(&mut self, n: usize, step: &Step, world: &mut World, happening: Option<Happening<'_>>) {
+    fn arm(&mut self, n: usize, step: &Step, world: &mut World, occurrence: Option<Occurrence<'_>>) {
         let now = world.now();
         let Some(begin) = self.begin(&step.base).filter(|begin| *begin <= now) else { return };
         let Some(when) = &step.when else {
             self.steps[n] = Progress::Due(begin + step.delay);
             return;
         };
-        if when.is_event() == happening.is_some() {
+        if when.is_event() == occurrence.is_some() {
             let done = |name: &str| self.is_done(name);
-            if when.holds(&mut View { world, happening, done: &done }) {
+            if when.holds(&mut View { world, occurrence, done: &done }) {
                 self.steps[n] = Progress::Due(now + step.delay);
                 return;
             }
         }
         if step.within.is_some_and(|within| now >= begin + within) {
             let done = |name: &str| self.is_done(name);
-            let seen = when.seen(&mut View { world, happening: None, done: &done });
+            let seen = when.seen(&mut View { world, occurrence: None, done: &done });
             self.steps[n] = Progress::Done;
             self.row_of_step(step, Some(now), Verdict::Failed, format!("its condition was not so in time: {seen}"));
         }
@@ -239,7 +239,7 @@ impl Script {
         self.rows.push(Row { kind: RowKind::Step, name, asked, at, seen, verdict, place: step.place.line });
     }
 
-    fn look_at_expectations(&mut self, scenario: &Scenario, world: &mut World, happening: Option<Happening<'_>>) {
+    fn look_at_expectations(&mut self, scenario: &Scenario, world: &mut World, occurrence: Option<Occurrence<'_>>) {
         let now = world.now();
         for (n, expect) in scenario.expects.iter().enumerate() {
             let begun = self.begin(&expect.from).is_some_and(|begin| begin <= now);
@@ -248,17 +248,17 @@ impl Script {
             }
             let end = self.end(expect);
             let over = end.is_some_and(|end| now >= end);
-            let asked = expect.condition.is_event() == happening.is_some();
+            let asked = expect.condition.is_event() == occurrence.is_some();
             let done = |name: &str| self.is_done(name);
-            let mut view = View { world, happening, done: &done };
+            let mut view = View { world, occurrence, done: &done };
             let in_time = end.is_none_or(|end| now <= end);
             let holds = asked && in_time && expect.condition.holds(&mut view);
             let verdict = match (expect.law, asked && in_time, holds) {
                 (Law::Once, _, true) => Some(Verdict::Passed),
                 (Law::Always, true, false) | (Law::Never, _, true) => Some(Verdict::Failed),
                 // An event at this very instant may still come: what is about instants ends when values are looked at.
-                (Law::Once, ..) if over && happening.is_none() => Some(Verdict::Failed),
-                (Law::Always | Law::Never, ..) if over && happening.is_none() => Some(Verdict::Passed),
+                (Law::Once, ..) if over && occurrence.is_none() => Some(Verdict::Failed),
+                (Law::Always | Law::Never, ..) if over && occurrence.is_none() => Some(Verdict::Passed),
                 _ => None,
             };
             if let Some(verdict) = verdict {
@@ -320,7 +320,7 @@ impl Script {
         for (n, step) in scenario.steps.iter().enumerate() {
             if self.steps[n] != Progress::Done {
                 let done = |name: &str| self.is_done(name);
-                let mut view = View { world, happening: None, done: &done };
+                let mut view = View { world, occurrence: None, done: &done };
                 let seen = step.when.as_ref().map(|when| format!(": {}", when.seen(&mut view))).unwrap_or_default();
                 self.row_of_step(step, None, Verdict::Failed, format!("its time never came{seen}"));
             }
@@ -331,7 +331,7 @@ impl Script {
             }
             let begun = self.begin(&expect.from).is_some_and(|begin| begin <= world.now());
             let done = |name: &str| self.is_done(name);
-            let seen = expect.condition.seen(&mut View { world, happening: None, done: &done });
+            let seen = expect.condition.seen(&mut View { world, occurrence: None, done: &done });
             let now = world.now();
             match (begun, expect.law, expect.until) {
                 (false, ..) => self.decide(n, expect, None, Verdict::Failed, "its time never began".into()),

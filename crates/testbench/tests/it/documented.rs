@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use testbench::control::ERROR_KINDS;
 use testbench::machine_file::{BUS_KEYS, DRIVE_KEYS, Machine};
 use testbench::scenario::entries::{EXPECT_KEYS, HOST_KEYS, LINE_KEYS, STEP_KEYS};
-use testbench::scenario::{Runner, Scenario, condition, deed, file};
+use testbench::scenario::{Runner, Scenario, command, condition, file};
 
 fn folder(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..").join(name)
@@ -66,7 +66,7 @@ fn the_page_of_scenarios_has_every_key_and_form_and_its_examples_are_scenarios()
     table_has(&page, "Hosts", HOST_KEYS);
     table_has(&page, "Lines of a host", LINE_KEYS);
     table_has(&page, "Expectations", EXPECT_KEYS);
-    for form in condition::FORMS.iter().chain(deed::FORMS) {
+    for form in condition::FORMS.iter().chain(command::FORMS) {
         assert!(page.contains(form), "{form} is not on the page");
     }
     for (kind, _) in testbench::events::KINDS {

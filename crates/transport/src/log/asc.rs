@@ -77,7 +77,7 @@ impl Parser {
         let interface = interface(channel)?;
         let (id, way, rest) = match words {
             [error, ..] if error.eq_ignore_ascii_case("ErrorFrame") => {
-                return Ok(Some((interface, None, Content::Error(RawErrorFrame::UNTOLD))));
+                return Ok(Some((interface, None, Content::Error(RawErrorFrame::UNSPECIFIED))));
             }
             [event, ..] if event.ends_with(':') || event.eq_ignore_ascii_case("OverloadFrame") => return Ok(None),
             // A request to send is not yet on the bus.
@@ -102,7 +102,7 @@ impl Parser {
         let way = direction(way)?;
         let (id, rest) = rest.split_first().ok_or(FORM)?;
         if id.eq_ignore_ascii_case("ErrorFrame") {
-            return Ok(Some((interface, Some(way), Content::Error(RawErrorFrame::UNTOLD))));
+            return Ok(Some((interface, Some(way), Content::Error(RawErrorFrame::UNSPECIFIED))));
         }
         let id = self.id(id)?;
         let unnamed = matches!(rest, ["0" | "1", ..]);
@@ -274,7 +274,7 @@ mod tests {
         assert_eq!(frames, ["064#0001020304050607", "18EBFF00#AABB", "0C8#R0", "0C8#R8"]);
         assert_eq!(records[0].at, Some(Instant::from_millis(1_506_783_973_191 + 2_501)));
         assert_eq!((records[1].interface.name(), records[1].direction), ("can1", Some(Direction::Transmitted)));
-        assert_eq!(records[4].content, Content::Error(RawErrorFrame::UNTOLD));
+        assert_eq!(records[4].content, Content::Error(RawErrorFrame::UNSPECIFIED));
         assert_eq!(records.len(), 5);
     }
 

@@ -269,12 +269,12 @@ fn read_object(object: &[u8], begin: Instant) -> Result<Option<Record>, &'static
             let frame = frame(u32_at(body, 4), body[3], body[2] & FLAG_REMOTE != 0, &body[8..16]);
             (u16_at(body, 0), Some(body[2] & FLAG_TRANSMITTED != 0), Content::Frame(frame))
         }
-        kind::ERROR => (u16_at(long(4)?, 0), None, Content::Error(RawErrorFrame::UNTOLD)),
+        kind::ERROR => (u16_at(long(4)?, 0), None, Content::Error(RawErrorFrame::UNSPECIFIED)),
         kind::ERROR_EXT => {
             let body = long(32)?;
             (u16_at(body, 0), None, Content::Error(error_frame(body)))
         }
-        kind::FD_ERROR_64 => (u16::from(long(1)?[0]), None, Content::Error(RawErrorFrame::UNTOLD)),
+        kind::FD_ERROR_64 => (u16::from(long(1)?[0]), None, Content::Error(RawErrorFrame::UNSPECIFIED)),
         kind::FD_MESSAGE => {
             let body = long(20)?;
             let (id, remote, length) = (u32_at(body, 4), body[2] & FLAG_REMOTE != 0, body[14]);
@@ -328,7 +328,7 @@ fn error_frame(body: &[u8]) -> RawErrorFrame {
         return RawErrorFrame { class, data };
     }
     if ecc == 0 {
-        return RawErrorFrame::UNTOLD;
+        return RawErrorFrame::UNSPECIFIED;
     }
     // The error code capture of the SJA1000, in the bits that Linux gives it: kind, direction, place in the frame.
     let kind = [0x01, 0x02, 0x04, 0x00][usize::from(ecc >> 6)];

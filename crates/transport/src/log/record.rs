@@ -63,7 +63,7 @@ pub struct RawErrorFrame {
 
 impl RawErrorFrame {
     /// What a log means that says "error frame" and no more: class `CAN_ERR_BUSERROR`.
-    pub const UNTOLD: Self = Self { class: 0x80, data: [0; 8] };
+    pub const UNSPECIFIED: Self = Self { class: 0x80, data: [0; 8] };
 
     /// What it says.
     pub fn notes(self) -> impl Iterator<Item = Note> {

@@ -97,7 +97,7 @@ impl Parser {
             (Some("DT"), _) => fields.data_frame()?,
             (Some("RR"), _) => fields.remote_frame()?,
             (Some("FD" | "FB" | "FE" | "BI"), _) => Content::FdFrame { id: fields.id()?, length: fields.fd_length()? },
-            (Some("ER"), _) | (None, Some("Error")) => Content::Error(RawErrorFrame::UNTOLD),
+            (Some("ER"), _) | (None, Some("Error")) => Content::Error(RawErrorFrame::UNSPECIFIED),
             (Some("ST" | "EC" | "EV"), _) | (None, Some("Warng" | "Event")) => return Ok(None),
             (Some(_), _) => return Err("the type of message is none of DT, FD, FB, FE, BI, RR, ST, ER, EC, EV"),
             (None, None) if fields.id == NO_ID => return Ok(None),
@@ -265,7 +265,7 @@ mod tests {
         let records: Vec<Record> = read(v20).into_iter().map(Result::unwrap).collect();
         assert_eq!(records.len(), 4);
         assert_eq!(records[2].content, Content::FdFrame { id: CanId::standard(0x300), length: 12 });
-        assert_eq!(records[3].content, Content::Error(RawErrorFrame::UNTOLD));
+        assert_eq!(records[3].content, Content::Error(RawErrorFrame::UNSPECIFIED));
         let v21 = ";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n      1      1059.900 DT 1      0300 Rx -  7    00 00 00 00 04 00 00\n";
         assert_eq!(frames(v21), ["300#00000000040000"]);
     }

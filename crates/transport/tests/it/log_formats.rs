@@ -38,7 +38,7 @@ fn as_said_by(format: Format, record: &Record) -> Record {
     if let Content::Error(error) = &mut said.content {
         match format {
             Format::Asc => {
-                *error = RawErrorFrame::UNTOLD;
+                *error = RawErrorFrame::UNSPECIFIED;
                 said.direction = None;
             }
             Format::Blf => said.direction = None,

@@ -15,13 +15,13 @@ use tokio::sync::{broadcast, mpsc, oneshot};
 use transport::Vitals;
 
 use super::places::Place;
-use super::wish::{Gone, Guard};
+use super::request::{Gone, Guard};
 
 /// How long a client may take to read what it is sent; one that never reads is let go.
 const READER_PATIENCE: Duration = Duration::from_secs(10);
 
 /// What a client has of the gateway.
-pub(super) struct Desk {
+pub(super) struct Handle {
     pub(super) frames: broadcast::Receiver<(Instant, Frame)>,
     pub(super) events: broadcast::Receiver<Event>,
     pub(super) guards: mpsc::Sender<Guard>,
@@ -29,19 +29,19 @@ pub(super) struct Desk {
 }
 
 /// Serves a client until its connection ends or another needs its place, then has stopped what it moved.
-pub(super) async fn serve(stream: TcpStream, network: Network, mut desk: Desk, place: Place) {
+pub(super) async fn serve(stream: TcpStream, network: Network, mut handle: Handle, place: Place) {
     let mut session = Session::new(network);
     tokio::select! {
         // Whatever ended it, what it moved is stopped.
-        _ = converse(stream, &mut session, &mut desk, &place.vitals) => {}
+        _ = converse(stream, &mut session, &mut handle, &place.vitals) => {}
         _ = place.stay => {}
     }
     if !session.moved().is_empty() {
-        let _ = desk.gone.send(Gone(session.moved()));
+        let _ = handle.gone.send(Gone(session.moved()));
     }
 }
 
-async fn converse(stream: TcpStream, session: &mut Session, desk: &mut Desk, vitals: &Vitals) -> io::Result<()> {
+async fn converse(stream: TcpStream, session: &mut Session, handle: &mut Handle, vitals: &Vitals) -> io::Result<()> {
     // Answers are small and waited for.
     stream.set_nodelay(true)?;
     let (input, mut output) = stream.into_split();
@@ -56,19 +56,19 @@ async fn converse(stream: TcpStream, session: &mut Session, desk: &mut Desk, vit
                     Read::End => return Ok(()),
                     Read::Unreadable => Some(Session::unreadable()),
                     Read::Line(text) => {
-                        guard(session, &text, &mut guarded, &desk.guards).await;
+                        guard(session, &text, &mut guarded, &handle.guards).await;
                         let answer = session.answer(&text).await;
                         vitals.set_engaged(!session.moved().is_empty());
                         answer
                     }
                 }
             }
-            frame = desk.frames.recv() => match frame {
+            frame = handle.frames.recv() => match frame {
                 Ok((_, frame)) => session.told_frame(&frame),
                 Err(RecvError::Lagged(_)) => None,
                 Err(RecvError::Closed) => return Ok(()),
             },
-            event = desk.events.recv() => match event {
+            event = handle.events.recv() => match event {
                 Ok(event) => session.told_event(&event),
                 Err(RecvError::Lagged(_)) => None,
                 Err(RecvError::Closed) => return Ok(()),

@@ -17,7 +17,7 @@ use crate::failure::Failure;
 use crate::output::Format;
 use crate::progress::Progress;
 use crate::recording::{Batch, Pace, RecordOptions};
-use crate::serve::speaker::Speaker;
+use crate::serve::messages::Messages;
 use crate::session::exit_on_signal;
 use loaded::{Loaded, unbuildable, write};
 use report::RunReport;
@@ -137,7 +137,7 @@ impl Run {
         exit_on_signal();
         let progress = Progress::new(format.json);
         let mut runner = Runner::new(scenario, self.seed).map_err(|bad| unbuildable(file, bad))?;
-        let warnings = Speaker::of_warnings();
+        let warnings = Messages::of_warnings();
         let mut record = self.recording.start(runner.world_mut(), Pace::Free, warnings.clone())?;
         if record.is_some() {
             runner.keep();

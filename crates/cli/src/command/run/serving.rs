@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use testbench::scenario::{Course, Outcome, Scenario};
+use testbench::scenario::{Execution, Outcome, Scenario};
 use tokio::sync::mpsc;
 use transport::{Hub, HubOptions, ServeSpec, WallClock, run_world};
 
@@ -11,11 +11,11 @@ use super::loaded::unbuildable;
 use crate::failure::Failure;
 use crate::recording::{Pace, RecordOptions};
 use crate::serve::control::ControlOptions;
+use crate::serve::messages::Messages;
 use crate::serve::pacer::{Clock, Pacer, Speed};
 use crate::serve::service::{
     PARTING_PATIENCE, REQUESTS_WAITING, Request, Service, listen_to_signals, runtime_of_clients, tick,
 };
-use crate::serve::speaker::Speaker;
 use crate::serve::world::ServedWorld;
 use crate::session::failure_of;
 
@@ -60,23 +60,23 @@ impl ServeOptions {
             return Err(Failure::usage("nobody can move the time of --clock manual")
                 .next("give --control 127.0.0.1:0: its clients move time by `run 20ms`"));
         }
-        let (mut world, course) = Course::begin(scenario, seed).map_err(|bad| unbuildable(file, bad))?;
-        let warnings = Speaker::of_warnings();
+        let (mut world, execution) = Execution::begin(scenario, seed).map_err(|bad| unbuildable(file, bad))?;
+        let warnings = Messages::of_warnings();
         let real_time = self.clock == Clock::Real && self.speed.is_none();
         let pace = if real_time { Pace::RealTime } else { Pace::Free };
         let record = recording.start(&mut world, pace, warnings.clone())?;
         let pacer = Pacer::new(self.clock, self.speed.unwrap_or(Speed::Times(1.0))).waiting_for_a_client();
         let world = ServedWorld::new(world, pacer, record.is_some(), warnings.clone());
-        let answers = Speaker::of_answers(warnings.clone());
+        let answers = Messages::of_answers(warnings.clone());
         let (waiting, by_hand) = (VecDeque::new(), self.clock == Clock::Manual);
         let service = Service { answers, warnings, log: None, record, waiting, quit_in: None, by_hand };
-        runtime_of_clients()?.block_on(self.serve(world, course, service))
+        runtime_of_clients()?.block_on(self.serve(world, execution, service))
     }
 
     async fn serve(
         &self,
         mut world: ServedWorld,
-        course: Course,
+        execution: Execution,
         mut service: Service,
     ) -> Result<(Outcome, Result<(), Failure>), Failure> {
         let clock = WallClock::start();
@@ -88,7 +88,7 @@ impl ServeOptions {
         let (run_is_over, scenario_is_over, full) = (requests.clone(), requests.clone(), requests.clone());
         world.on_run_over(move || run_is_over.try_send(Request::RunIsOver).is_ok());
         world.on_full_piece(move || full.try_send(Request::PieceIsFull).is_ok());
-        world.follow(course, move || scenario_is_over.try_send(Request::ScenarioIsOver).is_ok());
+        world.follow(execution, move || scenario_is_over.try_send(Request::ScenarioIsOver).is_ok());
         let listeners = hub.listeners().iter().map(|listener| format!(" {listener}"));
         let place = control.iter().map(|server| format!(" {}", server.place()));
         service.answers.say(&["ready".to_owned()].into_iter().chain(listeners).chain(place).collect::<String>());
@@ -97,11 +97,11 @@ impl ServeOptions {
             run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| service.serve(world, request));
         let ended = serving.await;
         let ended = service.part(&mut world, ended);
-        let (mut world, course) = world.into_course();
+        let (mut world, execution) = world.into_course();
         if let Some(control) = control {
             control.part(PARTING_PATIENCE).await;
         }
-        let course = course.ok_or_else(|| Failure::new("the scenario was lost on the way"))?;
-        Ok((course.conclude(&mut world), ended))
+        let execution = execution.ok_or_else(|| Failure::new("the scenario was lost on the way"))?;
+        Ok((execution.conclude(&mut world), ended))
     }
 }

@@ -1,9 +1,9 @@
 //! `ferrodrive top`: drives in a terminal, for whoever sits on the robot's SSH session.
 //!
 //! It is a page of the studio without a browser: the same [`Host`] owns the bus and everything that moves, and this terminal is one of
-//! its sessions. [`hold`] tells a key that is held, [`desk`] what keys mean, [`screen`] draws; this file joins them to a terminal.
+//! its sessions. [`hold`] tells a key that is held, [`app`] what keys mean, [`screen`] draws; this file joins them to a terminal.
 
-mod desk;
+mod app;
 mod hold;
 mod samples;
 mod screen;
@@ -23,7 +23,7 @@ use crossterm::{execute, terminal};
 use master::drive::Stopped;
 use ratatui::DefaultTerminal;
 use serde_json::Value;
-use studio::{Host, Seat, Shown};
+use studio::{Host, LocalClient, Shown};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 
@@ -31,7 +31,7 @@ use super::studio::{passed, setting};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Format;
-use desk::{Desk, Wish};
+use app::{Action, App};
 use screen::Look;
 
 /// Show and move drives in this terminal: states, plots, faults, and keys to enable, jog and stop
@@ -69,10 +69,10 @@ impl Top {
         }
         context.progress.clear();
         context.traffic.listen();
-        let (host, desk) = Host::new(context.network.clone(), setting(context));
+        let (host, app) = Host::new(context.network.clone(), setting(context));
         let mut host = pin!(host.run(|| passed(context)));
         tokio::select! {
-            ended = show(context, desk, format) => ended?,
+            ended = show(context, app, format) => ended?,
             () = &mut host => {}
         }
         stop(context).await
@@ -135,68 +135,68 @@ fn listen() -> mpsc::Receiver<Event> {
     receiver
 }
 
-async fn show(context: &Context, desk_of_host: studio::Desk, format: Format) -> Result<(), Failure> {
+async fn show(context: &Context, host: studio::HostHandle, format: Format) -> Result<(), Failure> {
     let gone = || Failure::new("the host of the drives has ended");
-    let mut seat = Seat::take(&desk_of_host).await.ok_or_else(gone)?;
+    let mut client = LocalClient::take(&host).await.ok_or_else(gone)?;
     let cannot = |error: std::io::Error| Failure::new("cannot draw on this terminal").because(error);
     let mut screen = Screen::take().map_err(cannot)?;
     let look = Look { colour: format.paint.is_on() };
     let mut events = listen();
-    let mut desk = Desk::new(seat.number());
+    let mut app = App::new(client.number());
     let mut answers = JoinSet::new();
-    let say = |seat: &mut Seat, answers: &mut JoinSet<(Option<u64>, Value)>, message: Value| {
+    let say = |client: &mut LocalClient, answers: &mut JoinSet<(Option<u64>, Value)>, message: Value| {
         let node = message["node"].as_u64();
-        let answer = seat.say(message);
+        let answer = client.say(message);
         answers.spawn(async move { (node, answer.await) });
     };
-    say(&mut seat, &mut answers, serde_json::json!({ "do": "take_control" }));
+    say(&mut client, &mut answers, serde_json::json!({ "do": "take_control" }));
     let (mut tick, mut alive) = (tokio::time::interval(TICK), tokio::time::interval(ALIVE));
     let mut is_new = true;
     loop {
         if is_new {
-            screen.terminal.draw(|frame| screen::draw(frame, &desk, look)).map_err(cannot)?;
+            screen.terminal.draw(|frame| screen::draw(frame, &app, look)).map_err(cannot)?;
             is_new = false;
         }
         let now = context.network.now();
-        let wishes = tokio::select! {
+        let actions = tokio::select! {
             biased;
             event = events.recv() => {
                 is_new = true;
                 match event {
-                    Some(Event::Key(key)) => desk.key(key, now),
-                    Some(Event::FocusLost) => desk.lose_focus(now),
+                    Some(Event::Key(key)) => app.key(key, now),
+                    Some(Event::FocusLost) => app.lose_focus(now),
                     Some(_) => Vec::new(),
                     // The terminal has gone: what is held by it stops with the session.
                     None => return Ok(()),
                 }
             }
-            _ = tick.tick() => desk.look(context.network.now()),
-            _ = alive.tick() => vec![Wish::Say(serde_json::json!({ "do": "alive" }))],
-            shown = seat.shown() => {
+            _ = tick.tick() => app.look(context.network.now()),
+            _ = alive.tick() => vec![Action::Say(serde_json::json!({ "do": "alive" }))],
+            shown = client.shown() => {
                 is_new = true;
                 match shown {
                     Shown::State(state) => match serde_json::from_str(&state) {
-                        Ok(state) => desk.take(state),
-                        Err(error) => desk.tell(None, format!("the host says what cannot be read: {error}")),
+                        Ok(state) => app.take(state),
+                        Err(error) => app.tell(None, format!("the host says what cannot be read: {error}")),
                     },
                     Shown::News(news) => match serde_json::from_str(&news) {
-                        Ok(news) => desk.note(news),
-                        Err(error) => desk.tell(None, format!("the host says what cannot be read: {error}")),
+                        Ok(news) => app.note(news),
+                        Err(error) => app.tell(None, format!("the host says what cannot be read: {error}")),
                     },
-                    Shown::Missed(missed) => desk.tell(None, format!("{missed} news came too fast to be shown")),
+                    Shown::Missed(missed) => app.tell(None, format!("{missed} news came too fast to be shown")),
                     Shown::Over => return Err(gone()),
                 }
                 Vec::new()
             }
             Some(Ok((node, answer))) = answers.join_next() => {
-                is_new |= desk.answered(node, &answer);
+                is_new |= app.answered(node, &answer);
                 Vec::new()
             }
         };
-        for wish in wishes {
-            match wish {
-                Wish::Quit => return Ok(()),
-                Wish::Say(message) => say(&mut seat, &mut answers, message),
+        for action in actions {
+            match action {
+                Action::Quit => return Ok(()),
+                Action::Say(message) => say(&mut client, &mut answers, message),
             }
         }
     }

@@ -8,7 +8,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Borders, Chart, Clear, Dataset, GraphType, Paragraph, Wrap};
 
-use super::desk::Desk;
+use super::app::App;
 use super::samples::{SIGNALS, SPAN_S, bounds};
 use super::seen::{Node, State};
 
@@ -61,7 +61,7 @@ impl Look {
 }
 
 /// Draws everything.
-pub(super) fn draw(frame: &mut Frame<'_>, desk: &Desk, look: Look) {
+pub(super) fn draw(frame: &mut Frame<'_>, app: &App, look: Look) {
     let area = frame.area();
     if area.width < LEAST.0 || area.height < LEAST.1 {
         let text = format!(
@@ -70,26 +70,26 @@ pub(super) fn draw(frame: &mut Frame<'_>, desk: &Desk, look: Look) {
         );
         return frame.render_widget(Paragraph::new(text).wrap(Wrap { trim: true }), area);
     }
-    let listed = (desk.state.nodes.len() as u16).clamp(1, MOST_NODES);
+    let listed = (app.state.nodes.len() as u16).clamp(1, MOST_NODES);
     let rows = [1, listed + 1, 0, 4, NEWS + 1, 1];
     let rows = rows.map(|rows| if rows == 0 { Constraint::Min(7) } else { Constraint::Length(rows) });
     let [title, nodes, plots, chosen, news, keys] = Layout::vertical(rows).areas(area);
-    frame.render_widget(title_line(desk, look), title);
-    draw_nodes(frame, nodes, desk, look);
-    draw_plots(frame, plots, desk, look);
-    frame.render_widget(chosen_lines(desk, look), chosen);
-    draw_news(frame, news, desk);
+    frame.render_widget(title_line(app, look), title);
+    draw_nodes(frame, nodes, app, look);
+    draw_plots(frame, plots, app, look);
+    frame.render_widget(chosen_lines(app, look), chosen);
+    draw_news(frame, news, app);
     frame.render_widget(Line::from(KEYS).style(Style::new().add_modifier(Modifier::DIM)), keys);
-    if desk.help {
+    if app.help {
         draw_help(frame, area);
     }
-    if let Some(node) = desk.question {
-        draw_question(frame, area, desk.state.node(node), look);
+    if let Some(node) = app.question {
+        draw_question(frame, area, app.state.node(node), look);
     }
 }
 
-fn title_line<'a>(desk: &'a Desk, look: Look) -> Line<'a> {
-    let State { bus, scanning, .. } = &desk.state;
+fn title_line<'a>(app: &'a App, look: Look) -> Line<'a> {
+    let State { bus, scanning, .. } = &app.state;
     let rate = bus.bitrate.map_or_else(String::new, |rate| format!("  {} kbit/s", rate / 1000));
     let load = bus.load_percent.map_or_else(String::new, |load| format!("  load {load:.1} %"));
     let mut line = vec![
@@ -99,7 +99,7 @@ fn title_line<'a>(desk: &'a Desk, look: Look) -> Line<'a> {
     if *scanning {
         line.push(Span::from("  scanning"));
     }
-    if !desk.has_control() && desk.state.controller.is_some() {
+    if !app.has_control() && app.state.controller.is_some() {
         line.push(Span::from("  another session has control").style(look.bad()));
     }
     line.into()
@@ -109,16 +109,16 @@ fn title_line<'a>(desk: &'a Desk, look: Look) -> Line<'a> {
 const COLUMNS: [(&str, usize); 8] =
     [("  node", 7), ("model", 12), ("NMT", 16), ("heard", 8), ("state", 19), ("speed", 8), ("A", 6), ("V", 4)];
 
-fn draw_nodes(frame: &mut Frame<'_>, area: Rect, desk: &Desk, look: Look) {
+fn draw_nodes(frame: &mut Frame<'_>, area: Rect, app: &App, look: Look) {
     let head: String = COLUMNS.iter().map(|(name, width)| format!("{name:width$}")).collect();
     let mut lines = vec![Line::from(head).style(Style::new().add_modifier(Modifier::DIM))];
     let room = usize::from(area.height.saturating_sub(1));
-    let at = desk.state.nodes.iter().position(|node| Some(node.node) == desk.chosen).unwrap_or(0);
+    let at = app.state.nodes.iter().position(|node| Some(node.node) == app.chosen).unwrap_or(0);
     let first = (at + 1).saturating_sub(room);
-    for node in desk.state.nodes.iter().skip(first).take(room) {
-        lines.push(node_line(node, Some(node.node) == desk.chosen, look));
+    for node in app.state.nodes.iter().skip(first).take(room) {
+        lines.push(node_line(node, Some(node.node) == app.chosen, look));
     }
-    if desk.state.nodes.is_empty() {
+    if app.state.nodes.is_empty() {
         lines.push(Line::from("  nobody has been heard: is there power, is the bit rate right? n scans the bus"));
     }
     frame.render_widget(Paragraph::new(lines), area);
@@ -164,11 +164,11 @@ fn fitted(text: &str, width: usize) -> String {
     format!("{cut:width$}")
 }
 
-fn draw_plots(frame: &mut Frame<'_>, area: Rect, desk: &Desk, look: Look) {
-    let Some(node) = desk.chosen else { return };
+fn draw_plots(frame: &mut Frame<'_>, area: Rect, app: &App, look: Look) {
+    let Some(node) = app.chosen else { return };
     let areas = Layout::horizontal([Constraint::Ratio(1, 3); 3]).spacing(1).areas::<3>(area);
     for (signal, area) in areas.into_iter().enumerate() {
-        let values = desk.past.of(node, signal, desk.state.time_s);
+        let values = app.past.of(node, signal, app.state.time_s);
         let [low, high] = bounds(&values);
         let line = Dataset::default()
             .marker(Marker::Braille)
@@ -191,8 +191,8 @@ fn shown(bound: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-fn chosen_lines<'a>(desk: &'a Desk, look: Look) -> Paragraph<'a> {
-    let Some(node) = desk.node() else { return Paragraph::new("") };
+fn chosen_lines<'a>(app: &'a App, look: Look) -> Paragraph<'a> {
+    let Some(node) = app.node() else { return Paragraph::new("") };
     let mut lines = Vec::new();
     if let Some(drive) = &node.drive {
         let parts = [
@@ -210,17 +210,17 @@ fn chosen_lines<'a>(desk: &'a Desk, look: Look) -> Paragraph<'a> {
     if let Some(trouble) = node.trouble.as_ref().or(node.remark.as_ref()) {
         lines.push(Line::from(format!("! {trouble}")).style(look.bad()));
     }
-    let jog = if desk.is_jogging() { "jogging" } else { "jog" };
+    let jog = if app.is_jogging() { "jogging" } else { "jog" };
     let without =
         node.without_us.as_deref().map_or_else(String::new, |without| format!("; without this program {without}"));
-    let jog = format!("{jog} at {} r/min, + and - change that", desk.jog_rpm());
+    let jog = format!("{jog} at {} r/min, + and - change that", app.jog_rpm());
     let style = if node.goes_on { look.bad() } else { Style::new() };
     lines.push(Line::from(vec![Span::from(jog), Span::from(without).style(style)]));
     Paragraph::new(lines).wrap(Wrap { trim: true }).block(Block::new().borders(Borders::TOP))
 }
 
-fn draw_news(frame: &mut Frame<'_>, area: Rect, desk: &Desk) {
-    let news = desk.news.iter().rev().take(usize::from(NEWS)).rev();
+fn draw_news(frame: &mut Frame<'_>, area: Rect, app: &App) {
+    let news = app.news.iter().rev().take(usize::from(NEWS)).rev();
     let lines = news.map(|news| {
         let node = news.node.map(|node| format!("node {node}")).filter(|node| !news.text.starts_with(node));
         let node = node.map_or_else(String::new, |node| format!("{node}: "));

@@ -6,7 +6,7 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use serde_json::{Value, json};
 
-use super::desk::{Desk, Wish};
+use super::app::{Action, App};
 use super::screen::{Look, draw};
 use super::seen::{News, State};
 
@@ -31,16 +31,16 @@ fn state() -> State {
     .expect("a state as the host shows it")
 }
 
-fn desk() -> Desk {
-    let mut desk = Desk::new(NUMBER);
-    desk.take(state());
-    desk
+fn app() -> App {
+    let mut app = App::new(NUMBER);
+    app.take(state());
+    app
 }
 
 /// The lines of the screen, without what is blank behind them.
-fn drawn(desk: &Desk, width: u16, height: u16) -> Vec<String> {
+fn drawn(app: &App, width: u16, height: u16) -> Vec<String> {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("a screen");
-    terminal.draw(|frame| draw(frame, desk, Look { colour: false })).expect("drawn");
+    terminal.draw(|frame| draw(frame, app, Look { colour: false })).expect("drawn");
     let cells = terminal.backend().buffer().content();
     let lines = cells.chunks(usize::from(width));
     lines.map(|line| line.iter().map(|cell| cell.symbol()).collect::<String>().trim_end().to_owned()).collect()
@@ -48,10 +48,10 @@ fn drawn(desk: &Desk, width: u16, height: u16) -> Vec<String> {
 
 #[test]
 fn eighty_columns_and_24_lines_show_everything() {
-    let mut desk = desk();
-    desk.note(News { time_s: 1.0, node: Some(4), text: "node 4 booted".into() });
-    desk.note(News { time_s: 11.25, node: Some(4), text: "over-voltage".into() });
-    let lines = drawn(&desk, 80, 24);
+    let mut app = app();
+    app.note(News { time_s: 1.0, node: Some(4), text: "node 4 booted".into() });
+    app.note(News { time_s: 11.25, node: Some(4), text: "over-voltage".into() });
+    let lines = drawn(&app, 80, 24);
     assert_eq!(lines[0], "ferrodrive top  can0  500 kbit/s  load 12.3 %  842 frames/s");
     assert_eq!(
         lines[1..5],
@@ -75,49 +75,49 @@ fn eighty_columns_and_24_lines_show_everything() {
 
 #[test]
 fn the_chosen_drive_says_its_fault_and_what_to_do() {
-    let mut desk = desk();
-    assert_eq!(desk.key(key(KeyCode::Down), at(0)), []);
-    let lines = drawn(&desk, 80, 24);
+    let mut app = app();
+    assert_eq!(app.key(key(KeyCode::Down), at(0)), []);
+    let lines = drawn(&app, 80, 24);
     assert!(lines[3].starts_with("> 4"), "{}", lines[3]);
     assert!(lines.iter().any(|line| line == "! over-voltage: Lower the supply."), "{lines:#?}");
-    desk.key(key(KeyCode::Char('j')), at(0));
-    let lines = drawn(&desk, 80, 24);
+    app.key(key(KeyCode::Char('j')), at(0));
+    let lines = drawn(&app, 80, 24);
     assert!(lines.iter().any(|line| line == "! no answer within 200 ms"), "{lines:#?}");
     // No further than the last, and back to the first.
     for code in [KeyCode::Down, KeyCode::Down, KeyCode::Up, KeyCode::Char('k'), KeyCode::Up] {
-        desk.key(key(code), at(0));
+        app.key(key(code), at(0));
     }
-    assert_eq!(desk.chosen, Some(1));
+    assert_eq!(app.chosen, Some(1));
 }
 
 #[test]
 fn more_room_goes_to_the_plots_and_more_nodes_than_lines_are_scrolled_to() {
-    let mut desk = desk();
+    let mut app = app();
     let mut many = state();
     many.nodes = (1..=20).map(|node| super::seen::Node { node, ..Default::default() }).collect();
-    desk.take(many);
-    let lines = drawn(&desk, 120, 40);
+    app.take(many);
+    let lines = drawn(&app, 120, 40);
     assert_eq!(lines.len(), 40);
     let listed = |lines: &[String]| lines[2..8].iter().map(|line| line[2..4].trim().to_owned()).collect::<Vec<_>>();
     assert_eq!(listed(&lines), ["1", "2", "3", "4", "5", "6"]);
     for _ in 0..11 {
-        desk.key(key(KeyCode::Down), at(0));
+        app.key(key(KeyCode::Down), at(0));
     }
-    assert_eq!(listed(&drawn(&desk, 120, 40)), ["7", "8", "9", "10", "11", "12"]);
+    assert_eq!(listed(&drawn(&app, 120, 40)), ["7", "8", "9", "10", "11", "12"]);
 }
 
 /// A ramp from 0 to 100 r/min within the last minute is a line from the lower left to the upper right.
 #[test]
 fn a_plot_shows_the_last_minute() {
-    let mut desk = Desk::new(NUMBER);
+    let mut app = App::new(NUMBER);
     for step in 0..=60 {
         let mut state = state();
         state.time_s = f64::from(step);
         let drive = state.nodes[0].drive.as_mut().expect("a drive");
         (drive.at_s, drive.velocity_rpm) = (f64::from(step), Some(f64::from(step) / 60.0 * 100.0));
-        desk.take(state);
+        app.take(state);
     }
-    let lines = drawn(&desk, 80, 24);
+    let lines = drawn(&app, 80, 24);
     let plot: Vec<Vec<char>> = lines[6..13].iter().map(|line| line.chars().take(26).collect()).collect();
     assert!(plot[0].iter().collect::<String>().starts_with("120"), "{lines:#?}");
     assert!(plot[6].iter().collect::<String>().starts_with('0'), "{lines:#?}");
@@ -128,31 +128,31 @@ fn a_plot_shows_the_last_minute() {
 
 #[test]
 fn a_window_that_is_too_small_says_so_and_an_empty_bus_what_to_do() {
-    let text = drawn(&desk(), 60, 10).join(" ");
+    let text = drawn(&app(), 60, 10).join(" ");
     assert!(text.contains("too small: 60 x 10, and 80 x 24 are needed") && text.contains("SPACE stops all"), "{text}");
     for (width, height) in [(1, 1), (80, 23), (79, 24), (2, 200)] {
-        drawn(&desk(), width, height);
+        drawn(&app(), width, height);
     }
-    let empty = Desk::new(NUMBER);
+    let empty = App::new(NUMBER);
     assert!(drawn(&empty, 80, 24).iter().any(|line| line.contains("nobody has been heard")));
 }
 
 #[test]
 fn help_is_over_everything_and_stops_all_the_same() {
-    let mut desk = desk();
-    desk.key(key(KeyCode::Char('?')), at(0));
-    let lines = drawn(&desk, 80, 24);
+    let mut app = app();
+    app.key(key(KeyCode::Char('?')), at(0));
+    let lines = drawn(&app, 80, 24);
     assert!(lines.iter().any(|line| line.contains("SPACE, Esc       quick stop of every drive")), "{lines:#?}");
     assert!(lines.iter().all(|line| line.chars().count() <= 80));
     // No key does something that is not seen to be about, but for the stop.
-    assert_eq!(desk.key(key(KeyCode::Char(' ')), at(0)), [say(json!({ "do": "stop_all" }))]);
-    assert_eq!(desk.key(key(KeyCode::Char('e')), at(0)), []);
-    assert!(!desk.help, "it goes back");
+    assert_eq!(app.key(key(KeyCode::Char(' ')), at(0)), [say(json!({ "do": "stop_all" }))]);
+    assert_eq!(app.key(key(KeyCode::Char('e')), at(0)), []);
+    assert!(!app.help, "it goes back");
 }
 
 #[test]
 fn each_key_says_what_it_is_for() {
-    let mut desk = desk();
+    let mut app = app();
     let node = 1;
     for (code, message) in [
         (KeyCode::Char('e'), json!({ "do": "enable", "node": node })),
@@ -165,60 +165,60 @@ fn each_key_says_what_it_is_for() {
         (KeyCode::Char(' '), json!({ "do": "stop_all" })),
         (KeyCode::Esc, json!({ "do": "stop_all" })),
     ] {
-        assert_eq!(desk.key(key(code), at(0)), [say(message)], "{code:?}");
+        assert_eq!(app.key(key(code), at(0)), [say(message)], "{code:?}");
     }
-    assert_eq!(desk.key(key(KeyCode::Char('q')), at(0)), [Wish::Quit]);
+    assert_eq!(app.key(key(KeyCode::Char('q')), at(0)), [Action::Quit]);
     let interrupt = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
-    assert_eq!(desk.key(interrupt, at(0)), [Wish::Quit]);
-    assert_eq!(desk.key(key(KeyCode::Char('z')), at(0)), []);
-    assert!(desk.news.last().is_some_and(|news| news.text.contains("? shows those that do")));
+    assert_eq!(app.key(interrupt, at(0)), [Action::Quit]);
+    assert_eq!(app.key(key(KeyCode::Char('z')), at(0)), []);
+    assert!(app.news.last().is_some_and(|news| news.text.contains("? shows those that do")));
 }
 
 #[test]
 fn a_held_key_jogs_and_every_other_ends_it_first() {
-    let mut desk = desk();
+    let mut app = app();
     let jog = |rpm: f64| say(json!({ "do": "jog", "node": 1, "rpm": rpm }));
     let end = || say(json!({ "do": "jog_end", "node": 1 }));
-    desk.key(key(KeyCode::Char('+')), at(0));
-    assert_eq!([0, 500, 533].map(|ms| desk.key(key(KeyCode::Left), at(ms))), [vec![], vec![], vec![jog(-20.0)]]);
-    assert_eq!(desk.key(key(KeyCode::Left), at(566)), [say(json!({ "do": "jog_hold", "node": 1 }))]);
+    app.key(key(KeyCode::Char('+')), at(0));
+    assert_eq!([0, 500, 533].map(|ms| app.key(key(KeyCode::Left), at(ms))), [vec![], vec![], vec![jog(-20.0)]]);
+    assert_eq!(app.key(key(KeyCode::Left), at(566)), [say(json!({ "do": "jog_hold", "node": 1 }))]);
     // Another node is chosen: what is told is the one that turns.
-    assert_eq!(desk.key(key(KeyCode::Down), at(580)), [end()]);
-    assert_eq!(desk.chosen, Some(4));
-    desk.key(key(KeyCode::Up), at(590));
+    assert_eq!(app.key(key(KeyCode::Down), at(580)), [end()]);
+    assert_eq!(app.chosen, Some(4));
+    app.key(key(KeyCode::Up), at(590));
     // To the other side.
-    assert_eq!([2000, 2500, 2533].map(|ms| desk.key(key(KeyCode::Right), at(ms))), [vec![], vec![], vec![jog(20.0)]]);
-    assert_eq!(desk.key(key(KeyCode::Left), at(2540)), [end()]);
-    assert_eq!([3000, 3033].map(|ms| desk.key(key(KeyCode::Left), at(ms))), [vec![], vec![jog(-20.0)]]);
-    assert_eq!(desk.key(key(KeyCode::Char(' ')), at(3040)), [end(), say(json!({ "do": "stop_all" }))]);
+    assert_eq!([2000, 2500, 2533].map(|ms| app.key(key(KeyCode::Right), at(ms))), [vec![], vec![], vec![jog(20.0)]]);
+    assert_eq!(app.key(key(KeyCode::Left), at(2540)), [end()]);
+    assert_eq!([3000, 3033].map(|ms| app.key(key(KeyCode::Left), at(ms))), [vec![], vec![jog(-20.0)]]);
+    assert_eq!(app.key(key(KeyCode::Char(' ')), at(3040)), [end(), say(json!({ "do": "stop_all" }))]);
     // Let go: told at the next look, within the 190 ms of the host.
-    assert_eq!([6000, 6500, 6533].map(|ms| desk.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
-    assert_eq!((desk.look(at(6682)), desk.look(at(6683))), (vec![], vec![end()]));
+    assert_eq!([6000, 6500, 6533].map(|ms| app.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
+    assert_eq!((app.look(at(6682)), app.look(at(6683))), (vec![], vec![end()]));
     // A terminal that tells releases, and one that loses the keyboard.
-    assert_eq!([8000, 8500, 8533].map(|ms| desk.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
+    assert_eq!([8000, 8500, 8533].map(|ms| app.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
     let release = KeyEvent { kind: KeyEventKind::Release, ..key(KeyCode::Right) };
-    assert_eq!(desk.key(release, at(8540)), [end()]);
-    assert_eq!([8600, 9100, 9133].map(|ms| desk.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
-    assert_eq!(desk.lose_focus(at(9140)), [end()]);
+    assert_eq!(app.key(release, at(8540)), [end()]);
+    assert_eq!([8600, 9100, 9133].map(|ms| app.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
+    assert_eq!(app.lose_focus(at(9140)), [end()]);
 }
 
 /// A drive that goes on without this program is moved once that was accepted, by a key of its own.
 #[test]
 fn what_nothing_stops_is_asked_about_in_full_before_it_moves() {
-    let held = |desk: &mut Desk, from: u64| {
-        [from, from + 500, from + 533].map(|ms| desk.key(key(KeyCode::Right), at(ms))).concat()
+    let held = |app: &mut App, from: u64| {
+        [from, from + 500, from + 533].map(|ms| app.key(key(KeyCode::Right), at(ms))).concat()
     };
-    let mut desk = desk();
+    let mut app = app();
     let mut state = state();
     state.nodes[0].goes_on = true;
     state.nodes[0].without_us =
         Some("nothing stops it: this model has no watch over its host and goes on as it was told".into());
-    desk.take(state.clone());
-    assert_eq!(held(&mut desk, 0), [], "nothing is begun");
+    app.take(state.clone());
+    assert_eq!(held(&mut app, 0), [], "nothing is begun");
     // The key is still held, and so is the question.
-    assert_eq!([566, 600, 633].map(|ms| desk.key(key(KeyCode::Right), at(ms))).concat(), []);
-    assert_eq!(desk.look(at(640)), []);
-    let lines = drawn(&desk, 80, 24);
+    assert_eq!([566, 600, 633].map(|ms| app.key(key(KeyCode::Right), at(ms))).concat(), []);
+    assert_eq!(app.look(at(640)), []);
+    let lines = drawn(&app, 80, 24);
     let text = lines.join(" ").replace('│', " ");
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     for part in [
@@ -229,38 +229,38 @@ fn what_nothing_stops_is_asked_about_in_full_before_it_moves() {
     ] {
         assert!(text.contains(part), "{part}: {lines:#?}");
     }
-    assert_eq!(desk.key(key(KeyCode::Char(' ')), at(700)), [say(json!({ "do": "stop_all" }))]);
-    assert_eq!(desk.question, None);
-    assert_eq!(held(&mut desk, 3000), []);
-    assert_eq!(desk.key(key(KeyCode::Char('e')), at(3600)), [], "goes back and does nothing else");
-    assert_eq!(held(&mut desk, 6000), []);
-    assert_eq!(desk.key(key(KeyCode::Char('y')), at(6600)), [say(json!({ "do": "accept_unguarded", "node": 1 }))]);
-    assert_eq!(desk.key(key(KeyCode::Right), at(6640)), [], "what was held all the while begins nothing");
+    assert_eq!(app.key(key(KeyCode::Char(' ')), at(700)), [say(json!({ "do": "stop_all" }))]);
+    assert_eq!(app.question, None);
+    assert_eq!(held(&mut app, 3000), []);
+    assert_eq!(app.key(key(KeyCode::Char('e')), at(3600)), [], "goes back and does nothing else");
+    assert_eq!(held(&mut app, 6000), []);
+    assert_eq!(app.key(key(KeyCode::Char('y')), at(6600)), [say(json!({ "do": "accept_unguarded", "node": 1 }))]);
+    assert_eq!(app.key(key(KeyCode::Right), at(6640)), [], "what was held all the while begins nothing");
     state.nodes[0].accepted = true;
-    desk.take(state);
-    assert_eq!(held(&mut desk, 9000), [say(json!({ "do": "jog", "node": 1, "rpm": 10.0 }))], "asked once");
-    desk.look(at(9900));
+    app.take(state);
+    assert_eq!(held(&mut app, 9000), [say(json!({ "do": "jog", "node": 1, "rpm": 10.0 }))], "asked once");
+    app.look(at(9900));
     // The host knows it better than the last state.
     let refused = json!({ "ok": false, "error": { "kind": "unguarded", "message": "node 4 was not moved" } });
-    assert!(desk.answered(Some(4), &refused));
-    assert_eq!(desk.question, Some(4));
+    assert!(app.answered(Some(4), &refused));
+    assert_eq!(app.question, Some(4));
 }
 
 #[test]
 fn answers_are_told_where_they_say_something() {
-    let mut desk = desk();
+    let mut app = app();
     let refused = json!({ "ok": false, "error": { "kind": "no_control", "message": "session 2 has control" } });
-    assert!(desk.answered(Some(4), &refused));
-    assert_eq!(desk.news.last().map(|news| (news.node, news.text.as_str())), Some((Some(4), "session 2 has control")));
+    assert!(app.answered(Some(4), &refused));
+    assert_eq!(app.news.last().map(|news| (news.node, news.text.as_str())), Some((Some(4), "session 2 has control")));
     for kind in ["stopped", "replaced", "not_held"] {
-        assert!(!desk.answered(Some(4), &json!({ "ok": false, "error": { "kind": kind, "message": "." } })));
+        assert!(!app.answered(Some(4), &json!({ "ok": false, "error": { "kind": kind, "message": "." } })));
     }
-    assert!(!desk.answered(None, &json!({ "ok": true })));
+    assert!(!app.answered(None, &json!({ "ok": true })));
     let finding = json!({ "cause": true, "follows": "It waits for its enable", "remedy": "Enable it" });
-    assert!(desk.answered(Some(1), &json!({ "ok": true, "result": { "findings": [finding] } })));
-    assert_eq!(desk.news.last().map(|news| news.text.as_str()), Some("It waits for its enable. Enable it"));
-    assert!(desk.answered(Some(1), &json!({ "ok": true, "result": { "findings": [] } })));
-    assert!(desk.news.last().is_some_and(|news| news.text.contains("nothing is found")));
+    assert!(app.answered(Some(1), &json!({ "ok": true, "result": { "findings": [finding] } })));
+    assert_eq!(app.news.last().map(|news| news.text.as_str()), Some("It waits for its enable. Enable it"));
+    assert!(app.answered(Some(1), &json!({ "ok": true, "result": { "findings": [] } })));
+    assert!(app.news.last().is_some_and(|news| news.text.contains("nothing is found")));
 }
 
 fn key(code: KeyCode) -> KeyEvent {
@@ -271,6 +271,6 @@ fn at(ms: u64) -> Instant {
     Instant::from_millis(ms)
 }
 
-fn say(message: Value) -> Wish {
-    Wish::Say(message)
+fn say(message: Value) -> Action {
+    Action::Say(message)
 }

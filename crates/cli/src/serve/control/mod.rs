@@ -4,9 +4,9 @@
 //! and values kept and the others counted, and is not listened to while many answers wait for it. Where a token is asked for, who has
 //! not given it is a stranger: there are few of them at a time, they come slowly, and they do not stay.
 
-mod mailbox;
 mod options;
 mod rate;
+mod shared_outbox;
 #[cfg(unix)]
 mod unix;
 
@@ -22,9 +22,9 @@ use tokio::sync::{Semaphore, mpsc};
 use transport::WallClock;
 
 use crate::failure::Failure;
-pub(crate) use mailbox::{Letters, Mailbox};
 pub(crate) use options::ControlOptions;
 use rate::Rate;
+pub(crate) use shared_outbox::{OutboxSender, SharedOutbox};
 
 /// Clients served at a time.
 const MAX_CLIENTS: usize = 256;
@@ -50,8 +50,8 @@ const WRITE_SIZE: usize = 16 * 1024;
 
 /// What the world's loop hears of the clients.
 pub(crate) enum ControlMessage {
-    /// One has come. Lines for it go into the mailbox.
-    Joined(ClientNumber, Arc<Mailbox>),
+    /// One has come. Lines for it go into the shared_outbox.
+    Joined(ClientNumber, Arc<SharedOutbox>),
     /// It says something.
     Line(ClientNumber, ReadLine),
     /// It is gone.
@@ -188,7 +188,7 @@ where
 {
     let clock = WallClock::start();
     let mut rate = Rate::new(STRANGERS_A_SECOND, STRANGERS_AT_ONCE);
-    let mut strangers: VecDeque<Arc<Mailbox>> = VecDeque::new();
+    let mut strangers: VecDeque<Arc<SharedOutbox>> = VecDeque::new();
     let mut number = 0;
     loop {
         let Ok(mut stream) = listener.accept().await else {
@@ -208,9 +208,9 @@ where
             continue;
         };
         number += 1;
-        let client = Client { number, requests: requests.clone(), mailbox: Arc::default() };
+        let client = Client { number, requests: requests.clone(), shared_outbox: Arc::default() };
         if entry == Entry::ByToken {
-            strangers.push_back(Arc::clone(&client.mailbox));
+            strangers.push_back(Arc::clone(&client.shared_outbox));
         }
         tokio::spawn(async move {
             client.serve(stream, entry).await;
@@ -223,16 +223,16 @@ where
 struct Client<T> {
     number: ClientNumber,
     requests: mpsc::Sender<T>,
-    mailbox: Arc<Mailbox>,
+    shared_outbox: Arc<SharedOutbox>,
 }
 
 impl<T: From<ControlMessage>> Client<T> {
     async fn serve(&self, stream: Box<dyn Socket>, entry: Entry) {
-        if !self.tell(ControlMessage::Joined(self.number, Arc::clone(&self.mailbox))).await {
+        if !self.tell(ControlMessage::Joined(self.number, Arc::clone(&self.shared_outbox))).await {
             return;
         }
         let (reader, writer) = tokio::io::split(stream);
-        let mut writing = std::pin::pin!(write_lines(writer, &self.mailbox));
+        let mut writing = std::pin::pin!(write_lines(writer, &self.shared_outbox));
         tokio::select! {
             _ = self.read_lines(reader) => {
                 // What it has asked for is answered before this is heard.
@@ -243,17 +243,17 @@ impl<T: From<ControlMessage>> Client<T> {
                 self.tell(ControlMessage::Left(self.number)).await;
             }
             () = self.turned_away(), if entry == Entry::ByToken => {
-                self.mailbox.put(Class::Answer, SENT_AWAY.to_owned());
+                self.shared_outbox.put(Class::Answer, SENT_AWAY.to_owned());
                 self.tell(ControlMessage::Left(self.number)).await;
                 let _ = tokio::time::timeout(LINGER, writing).await;
             }
         }
-        self.mailbox.send_away();
+        self.shared_outbox.send_away();
     }
 
     /// Returns when the client is not to stay: it has not been admitted in time, or must make room.
     async fn turned_away(&self) {
-        if let Ok(true) = tokio::time::timeout(TOKEN_PATIENCE, self.mailbox.is_admitted()).await {
+        if let Ok(true) = tokio::time::timeout(TOKEN_PATIENCE, self.shared_outbox.is_admitted()).await {
             std::future::pending::<()>().await;
         }
     }
@@ -275,7 +275,7 @@ impl<T: From<ControlMessage>> Client<T> {
             let mut lines = Vec::new();
             buffer.take(&bytes[..count], |line| lines.push(line));
             for line in lines {
-                self.mailbox.wait_for_room().await;
+                self.shared_outbox.wait_for_room().await;
                 if !self.tell(ControlMessage::Line(self.number, line)).await {
                     return Ok(());
                 }
@@ -284,10 +284,10 @@ impl<T: From<ControlMessage>> Client<T> {
     }
 }
 
-/// Writes what comes into the mailbox until it is closed and empty.
-async fn write_lines(mut writer: WriteHalf<Box<dyn Socket>>, mailbox: &Mailbox) -> io::Result<()> {
+/// Writes what comes into the shared_outbox until it is closed and empty.
+async fn write_lines(mut writer: WriteHalf<Box<dyn Socket>>, shared_outbox: &SharedOutbox) -> io::Result<()> {
     let mut text = String::with_capacity(WRITE_SIZE);
-    while mailbox.fetch(&mut text, WRITE_SIZE).await {
+    while shared_outbox.fetch(&mut text, WRITE_SIZE).await {
         writer.write_all(text.as_bytes()).await?;
         text.clear();
     }

@@ -5,7 +5,7 @@ use tokio::sync::mpsc;
 
 use super::{ControlMessage, ControlServer, Entry};
 use crate::failure::Failure;
-use crate::serve::speaker::Speaker;
+use crate::serve::messages::Messages;
 use crate::serve::world::ServedWorld;
 
 /// Where the world can be commanded from, and by whom.
@@ -37,7 +37,7 @@ impl ControlOptions {
         &self,
         world: &mut ServedWorld,
         requests: &mpsc::Sender<T>,
-        warnings: &Speaker,
+        warnings: &Messages,
     ) -> Result<Option<ControlServer>, Failure>
     where
         T: From<ControlMessage> + Send + 'static,

@@ -16,9 +16,9 @@ fn moved_by_hand_time_stands_while_an_answer_waits_for_the_disk_so_that_none_sho
         let host = world.add_probe();
         world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the first");
         let pacer = Pacer::new(Clock::Manual, Speed::Times(1.0));
-        let mut served = ServedWorld::new(world, pacer, false, Speaker::silent());
-        let (keeper, kept) = Keeper::by_hand();
-        served.keep_stores(keeper);
+        let mut served = ServedWorld::new(world, pacer, false, Messages::silent());
+        let (store_writer, kept) = StoreWriter::by_hand();
+        served.keep_stores(store_writer);
         let turn = |served: &mut ServedWorld, clock_ms: u64| {
             let target = served.target(Instant::from_millis(clock_ms)).max(served.now());
             served.advance_to(target);
@@ -53,7 +53,7 @@ fn an_error_on_the_wire_is_heard_by_clients() {
     world.add_probe();
     world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the first");
     let pacer = Pacer::new(Clock::Manual, Speed::Times(1.0));
-    let mut served = ServedWorld::new(world, pacer, false, Speaker::silent());
+    let mut served = ServedWorld::new(world, pacer, false, Messages::silent());
     assert!(matches!(served.command("bus corrupt 0.5"), Commanded::Done(_)));
     // Its boot-up message goes out until it gets through.
     assert!(matches!(served.command("run 3s"), Commanded::Begun));

@@ -184,11 +184,15 @@ impl Waiting {
 mod tests {
     use super::*;
     use crate::servo::parameters::PATIENCE_S;
-    use motion::set_points::Course;
+    use motion::set_points::Interpolation;
 
     const MS: f64 = 1e-3;
-    const FOLLOWING: Following =
-        Following { course: Course::Linear, period_s: 4.0 * MS, forgiven: FORGIVEN_PERIODS, deceleration: 0.0 };
+    const FOLLOWING: Following = Following {
+        interpolation: Interpolation::Linear,
+        period_s: 4.0 * MS,
+        forgiven: FORGIVEN_PERIODS,
+        deceleration: 0.0,
+    };
 
     #[test]
     fn first_in_is_first_out_and_a_full_buffer_takes_no_more() {

@@ -3,7 +3,7 @@
 use canopen::od::{Dictionary, Storage};
 use cia402::{Controlword, ModeOfOperation};
 use motion::profile::Point;
-use motion::set_points::{Course, Following};
+use motion::set_points::{Following, Interpolation};
 
 use super::{SUPERVISION_PERIOD_S, Shaft, TargetHold};
 use crate::engine::axis::{Cyclic, Feedback, TrajectoryPoint};
@@ -138,7 +138,7 @@ impl Shaft {
             Some(_) => self.parameters.following.period_s,
             None => 0.0,
         };
-        Following { course: Course::Linear, period_s, ..self.parameters.following }
+        Following { interpolation: Interpolation::Linear, period_s, ..self.parameters.following }
     }
 
     /// 60FFh, increments/s.

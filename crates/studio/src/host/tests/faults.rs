@@ -5,12 +5,12 @@ use serde_json::Value;
 use sim::{Place, World};
 
 use super::{ARM, Stage, WHEEL, play, play_acts};
-use crate::message::Deed;
+use crate::message::Command;
 
 impl Stage {
     /// Everything that has happened, oldest first.
     pub(super) fn happened(&self) -> Vec<Value> {
-        let news = serde_json::to_value(self.desk.timeline().since(0)).expect("JSON");
+        let news = serde_json::to_value(self.handle.timeline().since(0)).expect("JSON");
         news["entries"].as_array().expect("entries").clone()
     }
 
@@ -61,8 +61,8 @@ fn a_fault_is_told_with_its_remedy_and_where_that_is_written_until_it_is_over() 
         async |stage| {
             stage.sleep(500).await;
             let mut page = stage.page().await;
-            page.must(Deed::TakeControl {}).await;
-            page.must(Deed::ResetFault { node: WHEEL }).await;
+            page.must(Command::TakeControl {}).await;
+            page.must(Command::ResetFault { node: WHEEL }).await;
             stage.sleep(500).await;
             for kind in ["emcy", "fault"] {
                 let told = stage.find(WHEEL, kind);
@@ -102,9 +102,9 @@ fn what_was_there_before_a_page_came_is_known_and_so_are_stops_and_boot_ups() {
         let before = stage.state()["happenings"].as_u64().expect("a number");
         let mut page = stage.page().await;
         assert!(stage.happened().iter().any(|entry| entry["node"] == 2 && entry["what"] == "booted"));
-        page.must(Deed::TakeControl {}).await;
-        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
-        page.must(Deed::StopAll {}).await;
+        page.must(Command::TakeControl {}).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        page.must(Command::StopAll {}).await;
         stage.rests(WHEEL).await;
         assert_eq!(stage.find(WHEEL, "stop")["what"], "stopped by a press of stop");
         stage.sleep(500).await;

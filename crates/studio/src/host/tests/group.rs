@@ -7,16 +7,16 @@ use serde_json::Value;
 use sim::{Place, World};
 
 use super::{ARM, Page, STOPPED_WITHIN, Stage, TICK, WHEEL, node, play, play_acts};
-use crate::message::{Answer, AxisSpeed, AxisTarget, BaseJog, Deed, GroupMove};
+use crate::message::{Answer, AxisSpeed, AxisTarget, BaseJog, Command, GroupMove};
 
-fn to(wheel: f64, arm: f64) -> Deed {
+fn to(wheel: f64, arm: f64) -> Command {
     let axes = vec![AxisTarget { node: WHEEL, degrees: wheel }, AxisTarget { node: ARM, degrees: arm }];
-    Deed::GroupMove(GroupMove { axes, relative: false, rpm: None, rpm_per_s: None, within_s: None })
+    Command::GroupMove(GroupMove { axes, relative: false, rpm: None, rpm_per_s: None, within_s: None })
 }
 
-fn jog(wheel: f64, arm: f64) -> Deed {
+fn jog(wheel: f64, arm: f64) -> Command {
     let axes = vec![AxisSpeed { node: WHEEL, rpm: wheel }, AxisSpeed { node: ARM, rpm: arm }];
-    Deed::GroupJog { axes, rpm_per_s: Some(120.0) }
+    Command::GroupJog { axes, rpm_per_s: Some(120.0) }
 }
 
 fn base() -> BaseJog {
@@ -36,16 +36,16 @@ type Answered = tokio::sync::oneshot::Receiver<Answer>;
 
 impl Page {
     /// Asks, and does not wait for the answer.
-    fn begin(&mut self, deed: Deed) -> Answered {
+    fn begin(&mut self, command: Command) -> Answered {
         self.seq += 1;
-        self.session.ask(self.seq, deed).expect("there is room")
+        self.session.ask(self.seq, command).expect("there is room")
     }
 
-    /// Holds a group with a deed every 100 ms.
-    async fn hold(&mut self, stage: &Stage, deed: &Deed, times: u32) {
+    /// Holds a group with a command every 100 ms.
+    async fn hold(&mut self, stage: &Stage, command: &Command, times: u32) {
         for _ in 0..times {
             stage.sleep(100).await;
-            self.must(deed.clone()).await;
+            self.must(command.clone()).await;
         }
     }
 }
@@ -80,7 +80,7 @@ fn drives_move_together_to_their_positions_and_have_no_power_then() {
         let answer = loop {
             tokio::select! {
                 answer = &mut moved => break answer.expect("answered"),
-                () = stage.network.sleep(Duration::from_millis(500)) => page.must(Deed::Alive {}).await,
+                () = stage.network.sleep(Duration::from_millis(500)) => page.must(Command::Alive {}).await,
             }
         };
         assert!(answer.is_ok() && answer.json().contains("2 drives moved together in"), "{}", answer.json());
@@ -92,7 +92,7 @@ fn drives_move_together_to_their_positions_and_have_no_power_then() {
         }
         assert_eq!(stage.state()["nodes"][0]["doing"], Value::Null);
         // And alone again.
-        page.must(Deed::Move { node: WHEEL, degrees: 10.0, relative: true, rpm: None }).await;
+        page.must(Command::Move { node: WHEEL, degrees: 10.0, relative: true, rpm: None }).await;
     });
 }
 
@@ -103,7 +103,7 @@ fn what_is_no_group_is_refused() {
         page.take_control_of_all().await;
         let of = |nodes: &[u8]| {
             let axes = nodes.iter().map(|raw| AxisTarget { node: node(*raw), degrees: 1.0 }).collect();
-            Deed::GroupMove(GroupMove { axes, relative: true, rpm: None, rpm_per_s: None, within_s: None })
+            Command::GroupMove(GroupMove { axes, relative: true, rpm: None, rpm_per_s: None, within_s: None })
         };
         for (nodes, kind) in
             [(&[][..], "malformed"), (&[4], "malformed"), (&[4, 4], "malformed"), (&[4, 9], "no_such_drive")]
@@ -112,13 +112,13 @@ fn what_is_no_group_is_refused() {
         }
         let mut fast = base();
         fast.wheel_radius_m = 0.0;
-        assert_eq!(page.ask(Deed::BaseJog(fast)).await.error_kind(), "group");
-        assert_eq!(page.ask(Deed::GroupHold {}).await.error_kind(), "not_held");
-        let Deed::GroupMove(mut soon) = to(3600.0, 0.0) else { unreachable!("it is one") };
+        assert_eq!(page.ask(Command::BaseJog(fast)).await.error_kind(), "group");
+        assert_eq!(page.ask(Command::GroupHold {}).await.error_kind(), "not_held");
+        let Command::GroupMove(mut soon) = to(3600.0, 0.0) else { unreachable!("it is one") };
         soon.within_s = Some(-1.0);
-        assert_eq!(page.ask(Deed::GroupMove(soon.clone())).await.error_kind(), "malformed");
+        assert_eq!(page.ask(Command::GroupMove(soon.clone())).await.error_kind(), "malformed");
         soon.within_s = Some(0.5);
-        let answer = page.ask(Deed::GroupMove(soon)).await;
+        let answer = page.ask(Command::GroupMove(soon)).await;
         assert!(answer.json().contains("were given: give more time"), "{}", answer.json());
         page.must(to(5.0, 5.0)).await;
     });
@@ -130,10 +130,10 @@ fn speeds_that_are_held_go_on_together_and_end_by_their_ramps() {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
         let turned = page.begin(jog(60.0, -30.0));
-        page.hold(stage, &Deed::GroupHold {}, 30).await;
+        page.hold(stage, &Command::GroupHold {}, 30).await;
         let (wheel, arm) = (stage.velocity(WHEEL), stage.velocity(ARM));
         assert!((wheel - 60.0).abs() < 5.0 && (arm + 30.0).abs() < 3.0, "{wheel} and {arm}");
-        page.must(Deed::GroupEnd {}).await;
+        page.must(Command::GroupEnd {}).await;
         let answer = turned.await.expect("answered");
         assert!(answer.is_ok(), "{}", answer.json());
         assert!(stage.speed(WHEEL).await < 2.0 && stage.speed(ARM).await < 2.0);
@@ -146,14 +146,14 @@ fn a_group_that_is_not_held_stops_within_200_ms() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
-        for deed in [jog(60.0, 30.0), Deed::BaseJog(base())] {
-            let begun = page.begin(deed);
-            page.hold(stage, &Deed::GroupHold {}, 30).await;
+        for command in [jog(60.0, 30.0), Command::BaseJog(base())] {
+            let begun = page.begin(command);
+            page.hold(stage, &Command::GroupHold {}, 30).await;
             assert!(stage.velocity(WHEEL).abs() > 15.0 && stage.velocity(ARM).abs() > 15.0);
             let told = stop_of_both(stage, stage.network.now()).await;
             assert!(told < Duration::from_millis(200) + TICK, "told after {told:?}");
             assert_eq!(begun.await.expect("answered").error_kind(), "stopped");
-            assert_eq!(page.ask(Deed::GroupHold {}).await.error_kind(), "not_held", "too late");
+            assert_eq!(page.ask(Command::GroupHold {}).await.error_kind(), "not_held", "too late");
         }
     });
 }
@@ -190,7 +190,7 @@ fn a_page_that_goes_and_a_press_of_stop_end_a_group() {
         let begun = page.begin(to(-3600.0, -3600.0));
         stage.sleep(1500).await;
         assert!(stage.velocity(WHEEL) < -20.0);
-        other.must(Deed::StopAll {}).await;
+        other.must(Command::StopAll {}).await;
         stop_of_both(stage, stage.network.now()).await;
         assert_eq!(begun.await.expect("answered").error_kind(), "stopped");
     });
@@ -201,11 +201,11 @@ fn who_stops_one_of_a_group_stops_all_of_it() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
-        for deed in [Deed::QuickStop { node: ARM }, Deed::Disable { node: ARM }] {
+        for command in [Command::QuickStop { node: ARM }, Command::Disable { node: ARM }] {
             let begun = page.begin(to(7200.0, 7200.0));
             stage.sleep(1500).await;
             assert!(stage.velocity(WHEEL) > 20.0);
-            page.must(deed).await;
+            page.must(command).await;
             stop_of_both(stage, stage.network.now()).await;
             assert!(!begun.await.expect("answered").is_ok());
         }
@@ -219,12 +219,12 @@ fn a_drive_of_a_group_does_nothing_else_meanwhile() {
         page.take_control_of_all().await;
         let _begun = page.begin(to(7200.0, 7200.0));
         stage.sleep(1500).await;
-        for deed in [
-            Deed::Enable { node: ARM },
-            Deed::Jog { node: ARM, rpm: 10.0 },
-            Deed::Velocity { node: WHEEL, rpm: 10.0, rpm_per_s: None },
+        for command in [
+            Command::Enable { node: ARM },
+            Command::Jog { node: ARM, rpm: 10.0 },
+            Command::Velocity { node: WHEEL, rpm: 10.0, rpm_per_s: None },
         ] {
-            assert_eq!(page.ask(deed).await.error_kind(), "busy");
+            assert_eq!(page.ask(command).await.error_kind(), "busy");
         }
         assert_eq!(page.ask(to(1.0, 1.0)).await.error_kind(), "busy", "there is one group at a time");
         stage.sleep(500).await;
@@ -271,17 +271,17 @@ fn a_base_is_driven_by_its_twist() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
-        let driven = page.begin(Deed::BaseJog(base()));
-        page.hold(stage, &Deed::GroupHold {}, 20).await;
+        let driven = page.begin(Command::BaseJog(base()));
+        page.hold(stage, &Command::GroupHold {}, 20).await;
         // 0.2 m/s on a wheel of 0.1 m: 0.2 / (2 pi 0.1) turns a second.
         let rpm = 0.2 / (core::f64::consts::TAU * 0.1) * 60.0;
         let (wheel, arm) = (stage.velocity(WHEEL), stage.velocity(ARM));
         assert!((wheel - rpm).abs() < 2.0 && (arm + rpm).abs() < 2.0, "{wheel} and {arm}, not {rpm}");
-        page.hold(stage, &Deed::BaseTwist { linear_m_s: 0.0, angular_rad_s: 0.8 }, 20).await;
+        page.hold(stage, &Command::BaseTwist { linear_m_s: 0.0, angular_rad_s: 0.8 }, 20).await;
         // To the left: the left wheel goes back.
         let (wheel, arm) = (stage.velocity(WHEEL), stage.velocity(ARM));
         assert!((wheel + rpm).abs() < 2.0 && (arm + rpm).abs() < 2.0, "{wheel} and {arm}, not {rpm}");
-        page.must(Deed::GroupEnd {}).await;
+        page.must(Command::GroupEnd {}).await;
         let answer = driven.await.expect("answered");
         assert!(answer.is_ok() && answer.json().contains("m along"), "{}", answer.json());
         assert!(stage.speed(WHEEL).await < 2.0);

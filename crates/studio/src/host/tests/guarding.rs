@@ -4,7 +4,7 @@ use cia402::PowerState;
 use serde_json::Value;
 
 use super::{ARM, Page, Stage, WHEEL, play};
-use crate::message::{AxisSpeed, AxisTarget, Deed, GroupMove};
+use crate::message::{AxisSpeed, AxisTarget, Command, GroupMove};
 
 impl Stage {
     fn shown(&self, at: usize) -> Value {
@@ -13,26 +13,30 @@ impl Stage {
 }
 
 /// Whatever moves the stepper.
-fn motions() -> Vec<Deed> {
+fn motions() -> Vec<Command> {
     let both = |rpm| [WHEEL, ARM].map(|node| AxisSpeed { node, rpm }).to_vec();
     let axes = [WHEEL, ARM].map(|node| AxisTarget { node, degrees: 90.0 }).to_vec();
     vec![
-        Deed::Jog { node: ARM, rpm: 30.0 },
-        Deed::Velocity { node: ARM, rpm: 30.0, rpm_per_s: None },
-        Deed::Move { node: ARM, degrees: 90.0, relative: true, rpm: None },
-        Deed::Torque { node: ARM, amperes: 0.1 },
-        Deed::Home { node: ARM, method: 17, rpm: None },
-        Deed::GroupMove(GroupMove { axes, relative: true, rpm: None, rpm_per_s: None, within_s: None }),
-        Deed::GroupJog { axes: both(30.0), rpm_per_s: None },
+        Command::Jog { node: ARM, rpm: 30.0 },
+        Command::Velocity { node: ARM, rpm: 30.0, rpm_per_s: None },
+        Command::Move { node: ARM, degrees: 90.0, relative: true, rpm: None },
+        Command::Torque { node: ARM, amperes: 0.1 },
+        Command::Home { node: ARM, method: 17, rpm: None },
+        Command::GroupMove(GroupMove { axes, relative: true, rpm: None, rpm_per_s: None, within_s: None }),
+        Command::GroupJog { axes: both(30.0), rpm_per_s: None },
     ]
 }
 
-async fn is_refused(stage: &Stage, page: &mut Page, deed: Deed) {
-    let answer = page.ask(deed.clone()).await;
-    assert_eq!(answer.error_kind(), "unguarded", "{deed:?}: {}", answer.json());
+async fn is_refused(stage: &Stage, page: &mut Page, command: Command) {
+    let answer = page.ask(command.clone()).await;
+    assert_eq!(answer.error_kind(), "unguarded", "{command:?}: {}", answer.json());
     assert!(answer.json().contains("node 2 was not moved") && answer.json().contains("nothing stops it"));
     for node in [WHEEL, ARM] {
-        assert_eq!(stage.power_state(node).await, PowerState::SwitchOnDisabled, "{deed:?} has not even enabled {node}");
+        assert_eq!(
+            stage.power_state(node).await,
+            PowerState::SwitchOnDisabled,
+            "{command:?} has not even enabled {node}"
+        );
     }
     assert!(stage.network.moved().is_empty());
 }
@@ -48,21 +52,21 @@ fn what_goes_on_without_the_program_is_shown_before_it_moves_and_refused_until_t
         assert!(arm["without_us"].as_str().is_some_and(|told| told.contains("nothing stops it")), "{arm}");
         assert_eq!(wheel["goes_on"], false, "{wheel}");
         assert!(wheel["without_us"].as_str().is_some_and(|told| told.contains("1000 ms")), "{wheel}");
-        assert_eq!(page.ask(Deed::AcceptUnguarded { node: ARM }).await.error_kind(), "not_in_control");
-        page.must(Deed::TakeControl {}).await;
-        let mut news = stage.desk.news();
-        for deed in motions() {
-            is_refused(stage, &mut page, deed).await;
+        assert_eq!(page.ask(Command::AcceptUnguarded { node: ARM }).await.error_kind(), "not_in_control");
+        page.must(Command::TakeControl {}).await;
+        let mut news = stage.handle.news();
+        for command in motions() {
+            is_refused(stage, &mut page, command).await;
         }
         assert!(news.try_recv().is_err(), "a question to one page is not news to all");
-        page.must(Deed::AcceptUnguarded { node: ARM }).await;
-        for deed in motions() {
+        page.must(Command::AcceptUnguarded { node: ARM }).await;
+        for command in motions() {
             page.seq += 1;
-            let begun = page.session.ask(page.seq, deed.clone()).expect("there is room");
+            let begun = page.session.ask(page.seq, command.clone()).expect("there is room");
             stage.sleep(300).await;
-            page.must(Deed::StopAll {}).await;
+            page.must(Command::StopAll {}).await;
             let answer = begun.await.expect("answered");
-            assert_ne!(answer.error_kind(), "unguarded", "{deed:?}: asked once");
+            assert_ne!(answer.error_kind(), "unguarded", "{command:?}: asked once");
             stage.sleep(700).await;
         }
     });
@@ -74,22 +78,22 @@ fn who_takes_over_is_asked_anew_and_so_is_who_finds_a_watch_switched_off() {
     play(async |stage| {
         let (mut first, mut second) = (stage.page().await, stage.page().await);
         first.take_control_of_all().await;
-        first.must(Deed::HandOver { to: second.session.id().0 }).await;
-        is_refused(stage, &mut second, Deed::Jog { node: ARM, rpm: 30.0 }).await;
-        second.must(Deed::AcceptUnguarded { node: ARM }).await;
+        first.must(Command::HandOver { to: second.session.id().0 }).await;
+        is_refused(stage, &mut second, Command::Jog { node: ARM, rpm: 30.0 }).await;
+        second.must(Command::AcceptUnguarded { node: ARM }).await;
         drop(second);
         stage.sleep(100).await;
-        first.must(Deed::TakeControl {}).await;
-        is_refused(stage, &mut first, Deed::Jog { node: ARM, rpm: 30.0 }).await;
+        first.must(Command::TakeControl {}).await;
+        is_refused(stage, &mut first, Command::Jog { node: ARM, rpm: 30.0 }).await;
         // ZLAC8030L, 2000h: 0 is off.
         let wheel = stage.network.node(WHEEL);
         wheel.write(canopen::Mux::new(0x2000, 0), 0_u16).await.expect("it takes it");
-        assert_eq!(first.ask(Deed::Jog { node: WHEEL, rpm: 30.0 }).await.error_kind(), "unguarded");
+        assert_eq!(first.ask(Command::Jog { node: WHEEL, rpm: 30.0 }).await.error_kind(), "unguarded");
         // Looked at every two seconds.
         stage.sleep(2500).await;
         assert_eq!(stage.shown(1)["goes_on"], true);
         wheel.write(canopen::Mux::new(0x2000, 0), 1000_u16).await.expect("it takes it");
-        first.must(Deed::Jog { node: WHEEL, rpm: 30.0 }).await;
+        first.must(Command::Jog { node: WHEEL, rpm: 30.0 }).await;
     });
 }
 
@@ -98,22 +102,22 @@ fn who_takes_over_is_asked_anew_and_so_is_who_finds_a_watch_switched_off() {
 fn a_stop_that_comes_by_two_ways_is_told_once() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
-        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
-        let mut news = stage.desk.news();
+        page.must(Command::TakeControl {}).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        let mut news = stage.handle.news();
         let mut told = || {
             let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
             heard.iter().filter(|news| news.contains("a press of stop")).count()
         };
         let stops = |stage: &Stage| stage.happened().iter().filter(|entry| entry["kind"] == "stop").count();
-        page.must(Deed::StopAll {}).await;
+        page.must(Command::StopAll {}).await;
         stage.sleep(5).await;
-        stage.desk.stop_all();
+        stage.handle.stop_all();
         stage.sleep(600).await;
         assert_eq!((told(), stops(stage)), (1, 1));
         // Another press, later, is another one.
-        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
-        page.must(Deed::StopAll {}).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        page.must(Command::StopAll {}).await;
         stage.sleep(600).await;
         assert_eq!((told(), stops(stage)), (1, 2));
     });

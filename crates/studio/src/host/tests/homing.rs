@@ -5,11 +5,11 @@ use serde_json::{Value, json};
 use sim::{Place, World};
 
 use super::{ARM, Page, Stage, WHEEL, play_acts};
-use crate::message::{Deed, NewValue};
+use crate::message::{Command, NewValue};
 
 impl Page {
     async fn homing(&mut self, node: NodeId) -> Value {
-        let answer = self.ask(Deed::Homing { node }).await.json();
+        let answer = self.ask(Command::Homing { node }).await.json();
         serde_json::from_str::<Value>(&answer).expect("JSON")["result"].clone()
     }
 }
@@ -53,7 +53,7 @@ fn a_drive_tells_its_methods_its_switches_and_how_it_is_set() {
             let told = page.homing(ARM).await;
             assert_eq!(method(&told, 24)["missing"], json!([]));
             assert_eq!(told["inputs"][0], json!({ "name": "X0", "signal": "home switch", "active": false }));
-            assert_eq!(page.ask(Deed::Homing { node: WHEEL }).await.error_kind(), "no_such_mode");
+            assert_eq!(page.ask(Command::Homing { node: WHEEL }).await.error_kind(), "no_such_mode");
         },
         |world| change(world, ARM, "input X0 1"),
         async |stage| {
@@ -77,9 +77,9 @@ fn a_run_is_told_on_its_way_and_at_its_end() {
             let mut page = stage.page().await;
             page.take_control_of_all().await;
             let speed = NewValue { object: "6099:01".into(), value: "60".into() };
-            page.must(Deed::WriteParameters { node: ARM, values: vec![speed], file: None }).await;
+            page.must(Command::WriteParameters { node: ARM, values: vec![speed], file: None }).await;
             page.seq += 1;
-            let homed = page.session.ask(page.seq, Deed::Home { node: ARM, method: 17, rpm: None }).expect("room");
+            let homed = page.session.ask(page.seq, Command::Home { node: ARM, method: 17, rpm: None }).expect("room");
             stage.sleep(1000).await;
             let told = page.homing(ARM).await;
             assert_eq!(told["running"], true, "{told}");
@@ -94,7 +94,7 @@ fn a_run_is_told_on_its_way_and_at_its_end() {
                         assert!(answer.is_ok(), "{}", answer.json());
                         break;
                     }
-                    () = stage.network.sleep(std::time::Duration::from_millis(500)) => page.must(Deed::Alive {}).await,
+                    () = stage.network.sleep(std::time::Duration::from_millis(500)) => page.must(Command::Alive {}).await,
                 }
             }
             let told = page.homing(ARM).await;
@@ -113,7 +113,7 @@ fn a_page_that_goes_ends_a_search() {
             let mut page = stage.page().await;
             page.take_control_of_all().await;
             page.seq += 1;
-            let _homed = page.session.ask(page.seq, Deed::Home { node: ARM, method: 17, rpm: None }).expect("room");
+            let _homed = page.session.ask(page.seq, Command::Home { node: ARM, method: 17, rpm: None }).expect("room");
             stage.sleep(1000).await;
             assert!(stage.speed(ARM).await > 50.0, "it looks for a switch that is not there");
             drop(page);

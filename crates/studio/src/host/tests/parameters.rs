@@ -11,14 +11,14 @@ use testbench::parameters::journal::Journal;
 
 use super::{Page, Stage, WHEEL, play, play_with};
 use crate::host::Journals;
-use crate::message::{Deed, FileForm, NewValue};
+use crate::message::{Command, FileForm, NewValue};
 
 const MAX_SPEED: Mux = Mux::new(0x6081, 0);
 const ACCELERATION: Mux = Mux::new(0x6083, 0);
 
-fn setting(object: &str, value: &str) -> Deed {
+fn setting(object: &str, value: &str) -> Command {
     let values = vec![NewValue { object: object.into(), value: value.into() }];
-    Deed::WriteParameters { node: WHEEL, values, file: None }
+    Command::WriteParameters { node: WHEEL, values, file: None }
 }
 
 impl Stage {
@@ -32,20 +32,20 @@ impl Stage {
 }
 
 impl Page {
-    async fn told(&mut self, deed: Deed) -> Value {
-        serde_json::from_str(&self.ask(deed).await.json()).expect("JSON")
+    async fn told(&mut self, command: Command) -> Value {
+        serde_json::from_str(&self.ask(command).await.json()).expect("JSON")
     }
 
     /// The result of what has to be done.
-    pub(super) async fn knows(&mut self, deed: Deed) -> Value {
-        let told = self.told(deed).await;
+    pub(super) async fn knows(&mut self, command: Command) -> Value {
+        let told = self.told(command).await;
         assert_eq!(told["ok"], true, "{told}");
         told["result"].clone()
     }
 
     /// The kind and the words of a refusal.
-    pub(super) async fn refused(&mut self, deed: Deed) -> (String, String) {
-        let told = self.told(deed).await;
+    pub(super) async fn refused(&mut self, command: Command) -> (String, String) {
+        let told = self.told(command).await;
         assert_eq!(told["ok"], false, "{told}");
         let text = |name: &str| told["error"][name].as_str().expect("text").to_owned();
         (text("kind"), text("message"))
@@ -56,13 +56,13 @@ impl Page {
 fn a_parameter_is_changed_read_back_and_rolled_back() {
     play(async |stage| {
         let mut page = stage.page().await;
-        let read = |objects: &[&str]| Deed::ReadObjects {
+        let read = |objects: &[&str]| Command::ReadObjects {
             node: WHEEL,
             objects: objects.iter().map(|&object| object.to_owned()).collect(),
         };
         let (kind, _) = page.refused(setting("6081h:00", "60rpm")).await;
         assert_eq!((kind.as_str(), stage.has(MAX_SPEED).await), ("not_in_control", 120));
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         let done = page.knows(setting("6081h:00", "60rpm")).await;
         assert_eq!((&done["steps"][0]["object"], stage.has(MAX_SPEED).await), (&"6081h:00".into(), 60));
         page.knows(setting("6083", "700")).await;
@@ -73,11 +73,11 @@ fn a_parameter_is_changed_read_back_and_rolled_back() {
             [Some(false), Some(false), Some(true)],
             "{values}"
         );
-        assert_eq!(page.knows(Deed::RollBack { node: WHEEL }).await["can_roll_back"], 1);
+        assert_eq!(page.knows(Command::RollBack { node: WHEEL }).await["can_roll_back"], 1);
         assert_eq!((stage.has(MAX_SPEED).await, stage.has(ACCELERATION).await), (60, 500));
-        page.knows(Deed::RollBack { node: WHEEL }).await;
+        page.knows(Command::RollBack { node: WHEEL }).await;
         assert_eq!(stage.has(MAX_SPEED).await, 120);
-        assert_eq!(page.refused(Deed::RollBack { node: WHEEL }).await.0, "nothing_to_roll_back");
+        assert_eq!(page.refused(Command::RollBack { node: WHEEL }).await.0, "nothing_to_roll_back");
     });
 }
 
@@ -85,7 +85,7 @@ fn a_parameter_is_changed_read_back_and_rolled_back() {
 fn what_a_drive_cannot_have_and_what_would_move_it_is_not_written() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         for (object, value, kind, words) in [
             ("6081", "1001", "unfit_parameters", "1 to 1000"),
             ("6081", "-1", "bad_value", "does not fit"),
@@ -101,12 +101,12 @@ fn what_a_drive_cannot_have_and_what_would_move_it_is_not_written() {
             assert!(found == kind && text.contains(words), "{object}: {found}: {text}");
         }
         assert_eq!(stage.has(MAX_SPEED).await, 120);
-        let neither = Deed::WriteParameters { node: WHEEL, values: Vec::new(), file: None };
+        let neither = Command::WriteParameters { node: WHEEL, values: Vec::new(), file: None };
         assert_eq!(page.refused(neither).await.0, "malformed");
-        page.must(Deed::Enable { node: WHEEL }).await;
+        page.must(Command::Enable { node: WHEEL }).await;
         assert_eq!(page.refused(setting("6081", "60")).await.0, "at_work");
         assert_eq!(stage.has(MAX_SPEED).await, 120);
-        page.must(Deed::Disable { node: WHEEL }).await;
+        page.must(Command::Disable { node: WHEEL }).await;
         page.knows(setting("6081", "60")).await;
     });
 }
@@ -116,7 +116,7 @@ fn a_file_is_kept_compared_shown_before_and_applied_as_a_whole() {
     play(async |stage| {
         let mut page = stage.page().await;
         let mut backed_up = async |form| {
-            let answer = page.knows(Deed::BackUp { node: WHEEL, form }).await;
+            let answer = page.knows(Command::BackUp { node: WHEEL, form }).await;
             answer["file"].as_str().expect("text").to_owned()
         };
         let file = backed_up(FileForm::Toml).await;
@@ -124,22 +124,22 @@ fn a_file_is_kept_compared_shown_before_and_applied_as_a_whole() {
         let other = testbench::parameters::of_dcf(backed_up(FileForm::Dcf).await.as_bytes(), WHEEL).expect("a DCF");
         let model = &devices::zltech::zlac8030l::ZLAC8030L;
         assert_eq!(other.values, testbench::parameters::sheet::parse(&file, Some(model)).expect("parameters").values);
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         page.knows(setting("2008", "60rpm")).await;
-        let compared = page.knows(Deed::CompareParameters { node: WHEEL, file: file.clone() }).await;
+        let compared = page.knows(Command::CompareParameters { node: WHEEL, file: file.clone() }).await;
         let others: Vec<_> =
             compared["objects"].as_array().expect("rows").iter().filter(|row| row["drive_is_file"] == false).collect();
         assert_eq!((others.len(), &others[0]["object"]), (1, &"2008h:00".into()), "{others:?}");
-        let plan = Deed::PlanParameters { node: WHEEL, values: Vec::new(), file: Some(file.clone()) };
+        let plan = Command::PlanParameters { node: WHEEL, values: Vec::new(), file: Some(file.clone()) };
         let plan = page.knows(plan).await;
         assert_eq!((plan["steps"].as_array().map(Vec::len), stage.initial_speed().await), (Some(1), 60), "{plan}");
-        page.knows(Deed::WriteParameters { node: WHEEL, values: Vec::new(), file: Some(file) }).await;
+        page.knows(Command::WriteParameters { node: WHEEL, values: Vec::new(), file: Some(file) }).await;
         assert_eq!(stage.initial_speed().await, 1);
-        let broken = |file: &str| Deed::CompareParameters { node: WHEEL, file: file.into() };
+        let broken = |file: &str| Command::CompareParameters { node: WHEEL, file: file.into() };
         assert_eq!(page.refused(broken("[values]\nno_such_object = 1")).await.0, "bad_parameters");
         // One value of two is beyond its limits: neither is written.
         let file = "[values]\n\"6083\" = 700\n\"6081\" = 5000".to_owned();
-        let both = Deed::WriteParameters { node: WHEEL, values: Vec::new(), file: Some(file) };
+        let both = Command::WriteParameters { node: WHEEL, values: Vec::new(), file: Some(file) };
         assert_eq!(page.refused(both).await.0, "bad_parameters");
         assert_eq!((stage.has(MAX_SPEED).await, stage.has(ACCELERATION).await), (120, 500));
     });
@@ -149,12 +149,12 @@ fn a_file_is_kept_compared_shown_before_and_applied_as_a_whole() {
 fn a_transaction_goes_on_without_its_page_and_the_drive_is_not_enabled_meanwhile() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         let file = "[values]\n\"6083\" = 700\n\"6084\" = 700\n\"6081\" = 60".to_owned();
-        let write = Deed::WriteParameters { node: WHEEL, values: Vec::new(), file: Some(file) };
+        let write = Command::WriteParameters { node: WHEEL, values: Vec::new(), file: Some(file) };
         page.seq += 1;
         let unheard = page.session.ask(page.seq, write).expect("there is room");
-        assert_eq!(page.refused(Deed::Enable { node: WHEEL }).await.0, "busy");
+        assert_eq!(page.refused(Command::Enable { node: WHEEL }).await.0, "busy");
         assert_eq!(page.refused(setting("6081", "70")).await.0, "busy");
         drop((unheard, page));
         stage.sleep(2000).await;
@@ -190,18 +190,18 @@ fn what_leads_back_is_kept_from_the_first_write_to_the_last_and_without_it_nothi
     let keeper = Arc::new(Keeper::default());
     play_with(keeper.clone(), async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         page.knows(setting("6081h:00", "60rpm")).await;
         // Nothing to write, and nothing that may be written.
         page.knows(setting("6081h:00", "60rpm")).await;
         page.refused(setting("6081h:00", "5000")).await;
-        page.knows(Deed::RollBack { node: WHEEL }).await;
+        page.knows(Command::RollBack { node: WHEEL }).await;
     });
     let told = keeper.told.lock().expect("whole").clone();
     assert_eq!(told, ["4 leads back by 1", "4 is done", "4 leads back by 1", "4 is done"]);
     play_with(Arc::new(Keeper { is_full: true, ..Keeper::default() }), async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         let (kind, text) = page.refused(setting("6081h:00", "60rpm")).await;
         assert_eq!((kind.as_str(), text.as_str()), ("journal", "nothing was written: the disk is full"));
         assert_eq!(stage.has(MAX_SPEED).await, 120);
@@ -211,8 +211,8 @@ fn what_leads_back_is_kept_from_the_first_write_to_the_last_and_without_it_nothi
 #[test]
 fn a_journal_that_stays_behind_is_news_for_every_page_and_the_write_holds() {
     play_with(Arc::new(Keeper { keeps_all: true, ..Keeper::default() }), async |stage| {
-        let (mut page, mut news) = (stage.page().await, stage.desk.news());
-        page.must(Deed::TakeControl {}).await;
+        let (mut page, mut news) = (stage.page().await, stage.handle.news());
+        page.must(Command::TakeControl {}).await;
         let done = page.knows(setting("6081h:00", "60rpm")).await;
         assert_eq!((&done["journal"], stage.has(MAX_SPEED).await), (&"the journal could not be deleted".into(), 60));
         let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
@@ -226,22 +226,22 @@ fn a_journal_that_stays_behind_is_news_for_every_page_and_the_write_holds() {
 fn what_the_tour_asks_for_happens_and_is_told_in_the_state() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         let shown = |stage: &Stage, field: &str| stage.state()["nodes"][1][field].clone();
         let threshold = NewValue { object: "2013:01".into(), value: "100".into() };
-        page.must(Deed::WriteParameters { node: WHEEL, values: vec![threshold], file: None }).await;
+        page.must(Command::WriteParameters { node: WHEEL, values: vec![threshold], file: None }).await;
         stage.sleep(500).await;
         assert_eq!(shown(stage, "can_roll_back"), 1);
         assert_ne!(shown(stage, "drive")["fault_code"], 0, "the motor is warmer than 10 degC");
-        page.must(Deed::RollBack { node: WHEEL }).await;
-        page.must(Deed::ResetFault { node: WHEEL }).await;
+        page.must(Command::RollBack { node: WHEEL }).await;
+        page.must(Command::ResetFault { node: WHEEL }).await;
         stage.sleep(500).await;
         assert_eq!((shown(stage, "can_roll_back"), &shown(stage, "drive")["fault_code"]), (0.into(), &0.into()));
-        page.must(Deed::Velocity { node: WHEEL, rpm: 30.0, rpm_per_s: None }).await;
-        assert_eq!(page.ask(Deed::Store { node: WHEEL }).await.error_kind(), "busy", "it turns");
-        page.must(Deed::Disable { node: WHEEL }).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 30.0, rpm_per_s: None }).await;
+        assert_eq!(page.ask(Command::Store { node: WHEEL }).await.error_kind(), "busy", "it turns");
+        page.must(Command::Disable { node: WHEEL }).await;
         assert_eq!(shown(stage, "stored"), 0);
-        page.must(Deed::Store { node: WHEEL }).await;
+        page.must(Command::Store { node: WHEEL }).await;
         stage.sleep(500).await;
         assert_eq!(shown(stage, "stored"), 1);
     });

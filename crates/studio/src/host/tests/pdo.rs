@@ -6,7 +6,7 @@ use canopen::{Mux, NmtState};
 use serde_json::{Value, json};
 
 use super::{Stage, WHEEL, play};
-use crate::message::{Deed, NewEntry, NewPdo, NmtWish};
+use crate::message::{Command, NewEntry, NewPdo, NmtWish};
 
 const COUNT: Mux = Mux::new(0x1A00, 0);
 const FIRST: Mux = Mux::new(0x1A00, 1);
@@ -29,12 +29,12 @@ fn state_and_position() -> NewPdo {
     pdo("TPDO1", &[("6041h:00", 16), ("6064h:00", 32)])
 }
 
-fn planned(pdos: Vec<NewPdo>) -> Deed {
-    Deed::PlanPdos { node: WHEEL, pdos, cycle_ms: 10.0, bitrate: None }
+fn planned(pdos: Vec<NewPdo>) -> Command {
+    Command::PlanPdos { node: WHEEL, pdos, cycle_ms: 10.0, bitrate: None }
 }
 
-fn written(pdos: Vec<NewPdo>) -> Deed {
-    Deed::WritePdos { node: WHEEL, pdos }
+fn written(pdos: Vec<NewPdo>) -> Command {
+    Command::WritePdos { node: WHEEL, pdos }
 }
 
 impl Stage {
@@ -54,7 +54,7 @@ fn every_pdo_is_told_with_what_keeps_it_away_and_what_may_be_changed() {
     play(async |stage| {
         let mut page = stage.page().await;
         stage.sleep(1100).await;
-        let told = page.knows(Deed::Pdos { node: WHEEL }).await;
+        let told = page.knows(Command::Pdos { node: WHEEL }).await;
         let names: Vec<&str> =
             told["pdos"].as_array().expect("a list").iter().filter_map(|pdo| pdo["pdo"].as_str()).collect();
         assert_eq!(names, ["TPDO1", "TPDO2", "TPDO3", "TPDO4", "RPDO1", "RPDO2", "RPDO3", "RPDO4"]);
@@ -119,11 +119,11 @@ fn a_mapping_is_written_seen_in_the_trace_by_name_and_undone() {
     play(async |stage| {
         let mut page = stage.page().await;
         assert_eq!(page.refused(written(vec![state_and_position()])).await.0, "not_in_control");
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         page.knows(written(vec![state_and_position()])).await;
         assert_eq!((stage.cell(COUNT).await, stage.cell(FIRST).await), (2, 0x6041_0010));
         assert_eq!(stage.cell(COB_ID).await & 0xBFFF_FFFF, 0x184);
-        page.must(Deed::Nmt { node: WHEEL, command: NmtWish::Start }).await;
+        page.must(Command::Nmt { node: WHEEL, command: NmtWish::Start }).await;
         stage.sleep(600).await;
         assert_eq!(stage.network.facts(WHEEL).probable_state(devices::model("zlac8030l")), Some(NmtState::Operational));
         stage.network.transmit(can::Frame::new(canopen::connection_set::SYNC, &[]));
@@ -131,12 +131,12 @@ fn a_mapping_is_written_seen_in_the_trace_by_name_and_undone() {
         let lines = stage.lines(json!({ "kind": "pdo", "text": "position_actual_value" }));
         let text = lines.last().and_then(|line| line["text"].as_str()).unwrap_or_default();
         assert!(text.contains("TPDO1") && text.contains("statusword"), "{lines:?}");
-        let told = page.knows(Deed::Pdos { node: WHEEL }).await;
+        let told = page.knows(Command::Pdos { node: WHEEL }).await;
         assert_eq!((&told["can_undo"], &named(&told, "TPDO1")["silent"]), (&json!(true), &json!([])));
         assert_eq!(stage.state()["nodes"][1]["mapped"], 1);
-        page.knows(Deed::RollBack { node: WHEEL }).await;
+        page.knows(Command::RollBack { node: WHEEL }).await;
         assert_eq!((stage.cell(COUNT).await, stage.cell(FIRST).await), (0, 0));
-        assert_eq!(page.knows(Deed::Pdos { node: WHEEL }).await["can_undo"], false);
+        assert_eq!(page.knows(Command::Pdos { node: WHEEL }).await["can_undo"], false);
     });
 }
 
@@ -144,13 +144,13 @@ fn a_mapping_is_written_seen_in_the_trace_by_name_and_undone() {
 fn a_write_that_is_refused_half_way_leaves_every_pdo_as_it_was() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
-        let before = page.knows(Deed::Pdos { node: WHEEL }).await["pdos"].clone();
+        page.must(Command::TakeControl {}).await;
+        let before = page.knows(Command::Pdos { node: WHEEL }).await["pdos"].clone();
         // Entries longer than their object are taken by this drive; that a shorter one is not, it alone says.
         let half = pdo("TPDO2", &[("6064h:00", 16)]);
         let (kind, text) = page.refused(written(vec![state_and_position(), half])).await;
         assert!(kind == "rolled_back" && text.contains("1A01h:01"), "{kind}: {text}");
-        assert_eq!(page.knows(Deed::Pdos { node: WHEEL }).await["pdos"], before);
+        assert_eq!(page.knows(Command::Pdos { node: WHEEL }).await["pdos"], before);
         assert_eq!(stage.cell(COUNT).await, 0);
         assert_eq!(stage.state()["nodes"][1]["mapped"], 0);
     });
@@ -160,7 +160,7 @@ fn a_write_that_is_refused_half_way_leaves_every_pdo_as_it_was() {
 fn what_a_pdo_cannot_be_is_refused_with_the_reason_and_writes_nothing() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         let id = |id| NewPdo { id: Some(id), ..state_and_position() };
         let cases = [
             (pdo("TPDO9", &[]), "unfit_pdo", "has no TPDO9; it has TPDO1"),
@@ -185,12 +185,12 @@ fn what_a_pdo_cannot_be_is_refused_with_the_reason_and_writes_nothing() {
             (vec![state_and_position()], f64::NAN, None, "0.25 to 60000"),
             (vec![state_and_position()], 10.0, Some(0), "bit rate"),
         ] {
-            let (kind, text) = page.refused(Deed::PlanPdos { node: WHEEL, pdos, cycle_ms, bitrate }).await;
+            let (kind, text) = page.refused(Command::PlanPdos { node: WHEEL, pdos, cycle_ms, bitrate }).await;
             assert!(kind == "malformed" && text.contains(words), "{kind}: {text}");
         }
-        page.must(Deed::Enable { node: WHEEL }).await;
+        page.must(Command::Enable { node: WHEEL }).await;
         assert_eq!(page.refused(written(vec![state_and_position()])).await.0, "at_work");
-        page.must(Deed::Disable { node: WHEEL }).await;
+        page.must(Command::Disable { node: WHEEL }).await;
         assert_eq!(stage.cell(COUNT).await, 0);
     });
 }
@@ -202,7 +202,7 @@ fn the_load_is_told_for_the_cycle_and_the_bit_rate_that_were_asked_for() {
         let mut page = stage.page().await;
         let mut load = async |cycle_ms, bitrate| {
             let pdos = vec![state_and_position()];
-            let told = page.knows(Deed::PlanPdos { node: WHEEL, pdos, cycle_ms, bitrate }).await["bus"].clone();
+            let told = page.knows(Command::PlanPdos { node: WHEEL, pdos, cycle_ms, bitrate }).await["bus"].clone();
             told["cycle_load_percent"]["after"].as_f64().expect("a number")
         };
         let (usual, twice, half) = (load(10.0, None).await, load(5.0, None).await, load(10.0, Some(1_000_000)).await);
@@ -215,23 +215,23 @@ fn the_load_is_told_for_the_cycle_and_the_bit_rate_that_were_asked_for() {
 fn a_node_goes_to_operational_and_back_and_not_while_it_turns() {
     play(async |stage| {
         let mut page = stage.page().await;
-        let nmt = |command| Deed::Nmt { node: WHEEL, command };
+        let nmt = |command| Command::Nmt { node: WHEEL, command };
         assert_eq!(page.refused(nmt(NmtWish::Start)).await.0, "not_in_control");
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         let is = async || {
             stage.sleep(100).await;
             stage.network.facts(WHEEL).probable_state(devices::model("zlac8030l"))
         };
         page.must(nmt(NmtWish::Start)).await;
         assert_eq!(is().await, Some(NmtState::Operational));
-        page.must(Deed::Velocity { node: WHEEL, rpm: 30.0, rpm_per_s: None }).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 30.0, rpm_per_s: None }).await;
         assert_eq!(page.refused(nmt(NmtWish::PreOperational)).await.0, "busy");
-        page.must(Deed::Disable { node: WHEEL }).await;
+        page.must(Command::Disable { node: WHEEL }).await;
         page.must(nmt(NmtWish::PreOperational)).await;
         assert_eq!(is().await, Some(NmtState::PreOperational));
-        let nobody = Deed::Nmt { node: super::node(9), command: NmtWish::Start };
+        let nobody = Command::Nmt { node: super::node(9), command: NmtWish::Start };
         assert_eq!(page.refused(nobody).await.0, "no_such_drive");
-        assert_eq!(page.refused(Deed::Pdos { node: super::node(9) }).await.0, "no_such_drive");
+        assert_eq!(page.refused(Command::Pdos { node: super::node(9) }).await.0, "no_such_drive");
     });
 }
 
@@ -239,7 +239,7 @@ fn a_node_goes_to_operational_and_back_and_not_while_it_turns() {
 fn a_pdo_is_switched_off_and_what_is_not_said_stays() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         page.knows(written(vec![NewPdo { event_ms: Some(250.0), ..state_and_position() }])).await;
         // The event timer counts 0.5 ms (6.1).
         assert_eq!(stage.cell(Mux::new(0x1800, 5)).await, 500);

@@ -6,14 +6,14 @@ use canopen::Mux;
 use serde_json::{Value, json};
 
 use super::{Stage, WHEEL, play};
-use crate::message::Deed;
+use crate::message::Command;
 use crate::trace::AskedSeries;
 
 impl Stage {
     fn series(&self, asked: Value) -> Value {
         let asked: AskedSeries = serde_json::from_value(asked).expect("parameters");
         let query = asked.understand().expect("it makes sense");
-        serde_json::to_value(query.values(&self.desk.trace().held())).expect("JSON")
+        serde_json::to_value(query.values(&self.handle.trace().held())).expect("JSON")
     }
 }
 
@@ -35,8 +35,8 @@ fn a_mapped_object_is_a_series_with_each_frame_and_any_that_is_read_is_one() {
         wheel.write(Mux::new(0x1800, 1), 0x0184_u32).await.expect("on");
         wheel.nmt(canopen::NmtCommand::Start);
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
-        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        page.must(Command::TakeControl {}).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
         let begin = stage.series(json!({}))["to"].clone();
         let before = stage.network.now();
         stage.network.sync(Some(Duration::from_millis(5)));

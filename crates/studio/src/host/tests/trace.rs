@@ -5,14 +5,14 @@ use canopen::Mux;
 use serde_json::{Value, json};
 
 use super::{ARM, Stage, WHEEL, play};
-use crate::trace::{Asked, Origin, Passed, Trace};
+use crate::trace::{Asked, BusFrame, Origin, Trace};
 
 impl Stage {
     /// What is selected by a request.
     fn trace(&self, asked: Value) -> Value {
         let asked: Asked = serde_json::from_value(asked).expect("parameters");
         let query = asked.understand().expect("it makes sense");
-        serde_json::to_value(query.select(&self.desk.trace().held())).expect("JSON")
+        serde_json::to_value(query.select(&self.handle.trace().held())).expect("JSON")
     }
 
     pub(super) fn lines(&self, asked: Value) -> Vec<Value> {
@@ -69,7 +69,7 @@ fn segments_of_a_transfer_are_one_line_with_the_time_from_the_first_to_the_last(
     ];
     for (at_ms, frame) in frames.iter().enumerate() {
         let at = Instant::from_millis(at_ms as u64);
-        trace.append(Passed { at, frame: frame.parse().expect("a frame"), own: false });
+        trace.append(BusFrame { at, frame: frame.parse().expect("a frame"), own: false });
     }
     let select = |asked: Value| {
         let asked: Asked = serde_json::from_value(asked).expect("parameters");
@@ -188,11 +188,11 @@ fn a_pdo_is_split_by_the_mapping_that_is_in_the_drive() {
 fn the_log_reads_back_frame_by_frame() {
     play(async |stage| {
         stage.settle().await;
-        let held = stage.desk.trace().held();
+        let held = stage.handle.trace().held();
         let log = |asked: Value| {
             let query = serde_json::from_value::<Asked>(asked).expect("parameters").understand().expect("sense");
             let (mut log, mut next) = (String::new(), 0);
-            while let Some(part) = query.log_part(&held, stage.desk.trace().origin(), next) {
+            while let Some(part) = query.log_part(&held, stage.handle.trace().origin(), next) {
                 log += &part.text;
                 next = part.next;
             }

@@ -36,11 +36,11 @@ fn play_around(scene: impl AsyncFnOnce(&Stage)) {
     let models = [(WHEEL, "zlac8030l"), (ARM, "zlim42c")];
     let models = models.into_iter().map(|(node, name)| (node, devices::model(name).expect("a model"))).collect();
     let (door, mut asks) = world_door();
-    let (host, desk) = Host::new(network.clone(), Setting { models, world: Some(door), ..setting() });
-    let stage = Stage { network, desk };
+    let (host, handle) = Host::new(network.clone(), Setting { models, world: Some(door), ..setting() });
+    let stage = Stage { network, handle };
     let whole = async {
         tokio::select! {
-            () = host.run(|| None) => panic!("a host runs as long as there is a desk"),
+            () = host.run(|| None) => panic!("a host runs as long as there is a handle"),
             () = async { stage.scanned().await; scene(&stage).await } => {}
         }
     };
@@ -62,12 +62,12 @@ fn run(world: &mut World, asks: &mut WorldAsks, whole: impl Future<Output = ()>)
     panic!("the scene does not end");
 }
 
-fn doing(line: &str) -> Deed {
-    Deed::ChangeWorld { line: line.into() }
+fn doing(line: &str) -> Command {
+    Command::ChangeWorld { line: line.into() }
 }
 
 async fn seen(page: &mut Page, after: Option<u64>) -> Value {
-    let answer = page.ask(Deed::LookAround { after }).await.json();
+    let answer = page.ask(Command::LookAround { after }).await.json();
     let answer: Value = serde_json::from_str(&answer).expect("JSON");
     assert_eq!(answer["ok"], true, "{answer}");
     answer["result"].clone()
@@ -83,8 +83,8 @@ fn a_load_is_felt_by_the_drive_and_taken_back() {
     play_around(async |stage| {
         let mut page = stage.page().await;
         assert_eq!(page.ask(doing("4 load torque 2")).await.error_kind(), "not_in_control");
-        page.must(Deed::TakeControl {}).await;
-        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        page.must(Command::TakeControl {}).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
         stage.turns(WHEEL, 60.0).await;
         stage.sleep(500).await;
         let light = node_seen(&seen(&mut page, None).await, "4")["current_a"].as_f64().expect("a current");
@@ -110,9 +110,9 @@ fn a_load_is_felt_by_the_drive_and_taken_back() {
 #[test]
 fn what_happens_to_a_drive_is_seen_on_the_bus_and_in_the_news() {
     play_around(async |stage| {
-        let mut news = stage.desk.news();
+        let mut news = stage.handle.news();
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         assert_eq!(node_seen(&seen(&mut page, None).await, "2")["inputs"]["X0"], 0);
         page.must(doing("2 input x0 1")).await;
         assert_eq!(node_seen(&seen(&mut page, None).await, "2")["inputs"]["X0"], 1);
@@ -141,7 +141,7 @@ fn what_happens_to_a_drive_is_seen_on_the_bus_and_in_the_news() {
 fn what_makes_no_sense_is_refused_with_what_was_expected_and_leaves_no_trace() {
     play_around(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         for (line, kind, part) in [
             ("4 supply much", "usage", "NODE supply VOLTS"),
             ("quit", "usage", "changes nothing of the world"),
@@ -166,7 +166,7 @@ fn what_makes_no_sense_is_refused_with_what_was_expected_and_leaves_no_trace() {
 fn what_was_done_is_bounded() {
     play_around(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         for tenths in 0..250 {
             page.must(doing(&format!("4 temperature motor {}", f64::from(tenths) / 10.0))).await;
         }
@@ -181,10 +181,10 @@ fn what_was_done_is_bounded() {
 fn without_a_world_that_is_said() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.must(Command::TakeControl {}).await;
         assert_eq!(page.ask(doing("4 cable cut")).await.error_kind(), "no_world");
-        assert_eq!(page.ask(Deed::LookAround { after: None }).await.error_kind(), "no_world");
-        let forms: Value = serde_json::from_str(&page.ask(Deed::WorldForms {}).await.json()).expect("JSON");
+        assert_eq!(page.ask(Command::LookAround { after: None }).await.error_kind(), "no_world");
+        let forms: Value = serde_json::from_str(&page.ask(Command::WorldForms {}).await.json()).expect("JSON");
         assert_eq!(forms["result"]["is_virtual"], false);
     });
 }
@@ -197,7 +197,7 @@ fn what_the_bus_says_beside_frames_is_shown_and_told() {
     play_in(
         setting,
         async |stage| {
-            let mut news = stage.desk.news();
+            let mut news = stage.handle.news();
             let _page = stage.page().await;
             assert_eq!(stage.state()["bus"]["health"]["state"], Value::Null);
             told.update(|health| (health.state, health.transmit_errors) = (Some("error-passive"), Some(136)));

@@ -16,7 +16,7 @@ use crate::words::suggest::{did_you_mean, near};
 
 /// Something that has just happened.
 #[derive(Clone, Copy, Debug)]
-pub enum Happening<'a> {
+pub enum Occurrence<'a> {
     /// On the wire.
     Wire(&'a WireEvent),
     /// What the world tells of a drive, the bus or a hand from outside.
@@ -24,7 +24,7 @@ pub enum Happening<'a> {
 }
 
 /// For people: `frame 704#00`, `node 4: fault 0020h, over-current`.
-impl fmt::Display for Happening<'_> {
+impl fmt::Display for Occurrence<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Wire(WireEvent::Frame { frame, .. }) => write!(f, "frame {frame}"),

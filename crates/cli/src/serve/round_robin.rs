@@ -12,14 +12,14 @@ const MAX_LEFT_BEHIND: usize = 4096;
 
 /// Frames that wait for the wire. `K` names a client.
 #[derive(Debug)]
-pub(crate) struct Turns<K> {
+pub(crate) struct RoundRobin<K> {
     /// By client; under `None` what is left of those that are gone.
     waiting: BTreeMap<Option<K>, VecDeque<(K, Frame)>>,
     /// Who has frames waiting, the next first.
     order: VecDeque<Option<K>>,
 }
 
-impl<K: Copy + Ord> Turns<K> {
+impl<K: Copy + Ord> RoundRobin<K> {
     /// With nobody in it.
     pub(crate) fn new() -> Self {
         Self { waiting: BTreeMap::new(), order: VecDeque::new() }
@@ -83,33 +83,33 @@ mod tests {
         Frame::new(CanId::standard(client), &[number])
     }
 
-    fn drained(turns: &mut Turns<u16>) -> Vec<(u16, Frame)> {
-        std::iter::from_fn(|| turns.pop()).collect()
+    fn drained(round_robin: &mut RoundRobin<u16>) -> Vec<(u16, Frame)> {
+        std::iter::from_fn(|| round_robin.pop()).collect()
     }
 
     #[test]
     fn an_honest_client_waits_for_one_frame_of_each_flooder() {
-        let mut turns = Turns::new();
+        let mut round_robin = RoundRobin::new();
         for flooder in 1..=200 {
-            (0..64).for_each(|number| turns.push(flooder, frame(flooder, number)));
+            (0..64).for_each(|number| round_robin.push(flooder, frame(flooder, number)));
         }
-        turns.push(7, frame(7, 64));
-        turns.push(999, frame(999, 0));
-        let place = drained(&mut turns).iter().position(|(client, _)| *client == 999);
+        round_robin.push(7, frame(7, 64));
+        round_robin.push(999, frame(999, 0));
+        let place = drained(&mut round_robin).iter().position(|(client, _)| *client == 999);
         assert_eq!(place, Some(200));
     }
 
     #[test]
     fn each_clients_frames_keep_their_order_and_none_is_lost() {
-        let mut turns = Turns::new();
+        let mut round_robin = RoundRobin::new();
         let mut out = Vec::new();
         for number in 0..100 {
             for client in 1..=(1 + u16::from(number) % 5) {
-                turns.push(client, frame(client, number));
+                round_robin.push(client, frame(client, number));
             }
-            out.extend((0..2).filter_map(|_| turns.pop()));
+            out.extend((0..2).filter_map(|_| round_robin.pop()));
         }
-        out.extend(drained(&mut turns));
+        out.extend(drained(&mut round_robin));
         assert_eq!(out.len(), 300);
         for client in 1..=5 {
             let numbers: Vec<u8> =
@@ -120,20 +120,20 @@ mod tests {
 
     #[test]
     fn what_the_departed_leave_goes_out_in_one_turn_and_within_a_bound() {
-        let mut turns = Turns::new();
+        let mut round_robin = RoundRobin::new();
         let mut given_up = 0;
         for client in 1..=100 {
-            (0..64).for_each(|number| turns.push(client, frame(client, number)));
-            given_up += turns.leave(client);
+            (0..64).for_each(|number| round_robin.push(client, frame(client, number)));
+            given_up += round_robin.leave(client);
         }
         assert_eq!(given_up, 100 * 64 - MAX_LEFT_BEHIND);
-        turns.push(999, frame(999, 0));
-        turns.push(999, frame(999, 1));
+        round_robin.push(999, frame(999, 0));
+        round_robin.push(999, frame(999, 1));
         assert_eq!(
-            [turns.pop(), turns.pop(), turns.pop()].map(|next| next.map(|(client, _)| client)),
+            [round_robin.pop(), round_robin.pop(), round_robin.pop()].map(|next| next.map(|(client, _)| client)),
             [Some(1), Some(999), Some(1)]
         );
-        assert_eq!(drained(&mut turns).len(), MAX_LEFT_BEHIND + 2 - 3);
-        assert_eq!(turns.leave(5), 0);
+        assert_eq!(drained(&mut round_robin).len(), MAX_LEFT_BEHIND + 2 - 3);
+        assert_eq!(round_robin.leave(5), 0);
     }
 }

@@ -7,7 +7,7 @@ use can::{Frame, Instant};
 
 /// A frame that passed.
 #[derive(Clone, Copy, Debug)]
-pub struct Passed {
+pub struct BusFrame {
     /// When, in the time of the bus.
     pub at: Instant,
     /// Which.
@@ -33,7 +33,7 @@ impl Default for Origin {
 
 impl Origin {
     /// `(1700000000.123456) can0 604#4041600000000000 T`.
-    pub(super) fn push_line(&self, out: &mut String, passed: &Passed) {
+    pub(super) fn push_line(&self, out: &mut String, passed: &BusFrame) {
         let at = passed.at + self.unix_zero;
         let (seconds, micros) = (at.as_nanos() / 1_000_000_000, at.as_nanos() % 1_000_000_000 / 1_000);
         let direction = if passed.own { 'T' } else { 'R' };

@@ -11,7 +11,7 @@ use crate::core::{Event, NodeSet};
 
 /// Something that happened on a network that is watched.
 #[derive(Clone, Debug)]
-pub enum Happening {
+pub enum SupervisorEvent {
     /// As the network tells it.
     Event(Event),
     /// An emergency message.
@@ -29,7 +29,7 @@ pub enum Happening {
     Foreign(Foreign),
 }
 
-impl Happening {
+impl SupervisorEvent {
     /// What kind it is, in a word that programs may rely on.
     pub const fn kind(&self) -> &'static str {
         match self {
@@ -71,7 +71,7 @@ impl Happening {
 }
 
 /// A sentence, or several lines for a boot-up.
-impl fmt::Display for Happening {
+impl fmt::Display for SupervisorEvent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Event(event @ Event::HeartbeatLost(..)) => {

@@ -16,80 +16,86 @@ use super::work::{Asked, Done, LISTENING_TIME, Listening, Outcome, Running, STOP
 use super::world::conclude_looking_around;
 use crate::authority::{Refusal, SessionId};
 use crate::dead_man::DeadMan;
-use crate::message::{Answer, Deed};
+use crate::message::{Answer, Command};
 
 /// Questions for an explanation that may be under way.
 const MOST_LISTENING: usize = 32;
 
 impl Host {
     /// Does what a session asks for, or begins it.
-    pub(super) fn take_deed(&mut self, session: SessionId, seq: u64, deed: Deed, answer: oneshot::Sender<Answer>) {
-        if deed.needs_control()
+    pub(super) fn take_command(
+        &mut self,
+        session: SessionId,
+        seq: u64,
+        command: Command,
+        answer: oneshot::Sender<Answer>,
+    ) {
+        if command.needs_control()
             && let Err(refusal) = self.authority.may_move(session)
         {
             return say(answer, refused(seq, refusal));
         }
         let asked = (seq, answer);
-        match deed {
+        match command {
             // The stop itself went another way, past whatever waits here.
-            Deed::Alive {} | Deed::StopAll {} => done(asked),
-            Deed::TakeControl {} => {
+            Command::Alive {} | Command::StopAll {} => done(asked),
+            Command::TakeControl {} => {
                 let taken = self.authority.take(session);
                 self.change_control(asked, taken);
             }
-            Deed::AskControl {} => settle(asked, self.authority.ask(session)),
-            Deed::HandOver { to } => {
+            Command::AskControl {} => settle(asked, self.authority.ask(session)),
+            Command::HandOver { to } => {
                 let handed = self.authority.hand_over(session, SessionId(to));
                 self.change_control(asked, handed);
             }
-            Deed::ReleaseControl {} => {
+            Command::ReleaseControl {} => {
                 let released = self.authority.release(session).then_some(()).ok_or(Refusal::NothingToGive);
                 self.change_control(asked, released);
             }
-            Deed::Scan {} => self.begin_scan(Some(asked)),
-            Deed::WorldForms {} => self.tell_world_forms(asked),
-            Deed::LookAround { after } => self.look_around(after, asked),
-            Deed::ChangeWorld { line } => self.change_world(line, asked),
-            Deed::Explain { node } => self.listen_for(node, asked),
-            Deed::GroupMove(_)
-            | Deed::GroupJog { .. }
-            | Deed::BaseJog(_)
-            | Deed::BaseTwist { .. }
-            | Deed::GroupHold {}
-            | Deed::GroupEnd {} => self.take_group(deed, asked),
-            Deed::Help { node, topic, name } => self.help(node.and_then(NodeId::new), topic, &name, asked),
-            Deed::Homing { node } => self.look_at_homing(node, asked),
-            Deed::QuickStop { node } => {
+            Command::Scan {} => self.begin_scan(Some(asked)),
+            Command::WorldForms {} => self.tell_world_forms(asked),
+            Command::LookAround { after } => self.look_around(after, asked),
+            Command::ChangeWorld { line } => self.change_world(line, asked),
+            Command::Explain { node } => self.listen_for(node, asked),
+            Command::GroupMove(_)
+            | Command::GroupJog { .. }
+            | Command::BaseJog(_)
+            | Command::BaseTwist { .. }
+            | Command::GroupHold {}
+            | Command::GroupEnd {} => self.take_group(command, asked),
+            Command::Help { node, topic, name } => self.help(node.and_then(NodeId::new), topic, &name, asked),
+            Command::Homing { node } => self.look_at_homing(node, asked),
+            Command::QuickStop { node } => {
                 self.note_stop(node, "stopped by a quick stop");
                 self.quick_stop_one(node, "stopped by a quick stop", Some(asked));
             }
-            Deed::JogHold { node } => {
+            Command::JogHold { node } => {
                 let now = self.network.now();
                 match self.jogs.get_mut(&node).is_some_and(|held| held.renew(now)) {
                     true => done(asked),
                     false => not_held(asked, node),
                 }
             }
-            Deed::JogEnd { node } => self.end_jog(node, asked),
-            Deed::AcceptUnguarded { node } => self.accept_unguarded(node, asked),
-            Deed::Objects { .. }
-            | Deed::ReadObjects { .. }
-            | Deed::PlanParameters { .. }
-            | Deed::CompareParameters { .. }
-            | Deed::WriteParameters { .. }
-            | Deed::RollBack { .. }
-            | Deed::Store { .. }
-            | Deed::BackUp { .. } => self.take_parameters(deed, asked),
-            Deed::Pdos { .. } | Deed::PlanPdos { .. } | Deed::WritePdos { .. } | Deed::Nmt { .. } => {
-                self.take_pdos(deed, asked);
+            Command::JogEnd { node } => self.end_jog(node, asked),
+            Command::AcceptUnguarded { node } => self.accept_unguarded(node, asked),
+            Command::Objects { .. }
+            | Command::ReadObjects { .. }
+            | Command::PlanParameters { .. }
+            | Command::CompareParameters { .. }
+            | Command::WriteParameters { .. }
+            | Command::RollBack { .. }
+            | Command::Store { .. }
+            | Command::BackUp { .. } => self.take_parameters(command, asked),
+            Command::Pdos { .. } | Command::PlanPdos { .. } | Command::WritePdos { .. } | Command::Nmt { .. } => {
+                self.take_pdos(command, asked);
             }
-            _ => self.take_motion(deed, asked),
+            _ => self.take_motion(command, asked),
         }
     }
 
     /// Begins what a drive is asked to do.
-    fn take_motion(&mut self, deed: Deed, asked: Asked) {
-        let Some((id, drive)) = subject(&deed).and_then(|id| Some((id, self.nodes.get(&id)?.drive.clone()?))) else {
+    fn take_motion(&mut self, command: Command, asked: Asked) {
+        let Some((id, drive)) = subject(&command).and_then(|id| Some((id, self.nodes.get(&id)?.drive.clone()?))) else {
             let (seq, answer) = asked;
             let text = "no drive is known at this node: scan the bus, and see whether it has power";
             return say(answer, Answer::failed(Some(seq), "no_such_drive", text));
@@ -100,48 +106,48 @@ impl Host {
             let text = "its parameters are being written: try again when that is done";
             return say(answer, Answer::failed(Some(seq), "busy", text));
         }
-        let stops = matches!(deed, Deed::Stop { .. } | Deed::Disable { .. });
+        let stops = matches!(command, Command::Stop { .. } | Command::Disable { .. });
         if !stops && self.is_in_group(id) {
             let (seq, answer) = asked;
             let text = "it belongs to a group that is under way: stop that first";
             return say(answer, Answer::failed(Some(seq), "busy", text));
         }
-        match deed {
+        match command {
             // Held from its beginning: what is let go while the drive is being enabled never turns.
-            Deed::Jog { .. } => drop(self.jogs.insert(id, DeadMan::new(JOG_SPAN, self.network.now()))),
+            Command::Jog { .. } => drop(self.jogs.insert(id, DeadMan::new(JOG_SPAN, self.network.now()))),
             // These change nothing of how it turns: a jog goes on, and so does its dead man.
-            Deed::Enable { .. } | Deed::ResetFault { .. } => {}
+            Command::Enable { .. } | Command::ResetFault { .. } => {}
             _ => drop(self.jogs.remove(&id)),
         }
         let (asked, accepted) = (Some(asked), self.accepted.contains(&id));
-        match deed {
-            Deed::Enable { .. } => self.begin(id, "enabling", true, asked, enable(drive)),
-            Deed::Disable { .. } => {
+        match command {
+            Command::Enable { .. } => self.begin(id, "enabling", true, asked, enable(drive)),
+            Command::Disable { .. } => {
                 self.begin(id, "disabling", true, asked, async move { quietly(drive.disable().await) });
             }
-            Deed::ResetFault { .. } => {
+            Command::ResetFault { .. } => {
                 self.begin(id, "resetting", false, asked, async move { quietly(drive.reset_fault().await) });
             }
-            Deed::Stop { .. } => self.begin(id, "stopping", true, asked, stop(drive)),
-            Deed::Jog { rpm, .. } => {
+            Command::Stop { .. } => self.begin(id, "stopping", true, asked, stop(drive)),
+            Command::Jog { rpm, .. } => {
                 let options = MotionOptions { wait: false, ..MotionOptions::default() };
                 self.begin(id, "jogging", true, asked, turn(drive, accepted, rpm, options));
             }
-            Deed::Velocity { rpm, rpm_per_s, .. } => {
+            Command::Velocity { rpm, rpm_per_s, .. } => {
                 let ramp = rpm_per_s.map(Ramp::RpmPerSecond);
                 let options = MotionOptions { acceleration: ramp, deceleration: ramp, ..MotionOptions::default() };
                 self.begin(id, "turning", true, asked, turn(drive, accepted, rpm, options));
             }
-            Deed::Move { degrees, relative, rpm, .. } => {
+            Command::Move { degrees, relative, rpm, .. } => {
                 self.begin(id, "moving", true, asked, position(drive, accepted, degrees, relative, rpm));
             }
-            Deed::Torque { amperes, .. } => {
+            Command::Torque { amperes, .. } => {
                 self.begin(id, "pushing", true, asked, async move {
                     guard(&drive, accepted).await?;
                     told(drive.torque(Amperes(amperes)).await)
                 });
             }
-            Deed::Home { method, rpm, .. } => {
+            Command::Home { method, rpm, .. } => {
                 self.begin(id, "homing", true, asked, home(drive, accepted, method, rpm));
             }
             // The others concern no drive, or have been done.
@@ -149,19 +155,19 @@ impl Host {
         }
     }
 
-    /// Begins a deed on a node, in place of the one that is under way there.
+    /// Begins a command on a node, in place of the one that is under way there.
     pub(super) fn begin(
         &mut self,
         node: NodeId,
         what: &'static str,
         moves: bool,
         asked: Option<Asked>,
-        deed: impl Future<Output = Outcome> + 'static,
+        command: impl Future<Output = Outcome> + 'static,
     ) {
         // Who goes on alone leaves the others of its group without their set-points.
         let others = self.leave_group(node);
         self.generation += 1;
-        let (running, future) = Running::new(node, self.generation, what, moves, asked, deed);
+        let (running, future) = Running::new(node, self.generation, what, moves, asked, command);
         if let Some(before) = self.running.insert(node, running) {
             before.cut_short("replaced", "something else was asked of the drive before this was done");
         }
@@ -232,7 +238,7 @@ impl Host {
             Done::PdosPlanned(asked, planned) => self.conclude_planning_pdos(asked, *planned),
             Done::LookedAround(asked, seen) => conclude_looking_around(asked, seen),
             Done::WorldChanged(asked, done) => self.conclude_change(asked, done),
-            Done::Deed(node, generation, outcome) => self.conclude(node, generation, outcome),
+            Done::Command(node, generation, outcome) => self.conclude(node, generation, outcome),
             Done::Group(generation, outcome) => self.conclude_group(generation, outcome),
             Done::Explained(seq, answer, explained) => {
                 let findings: Vec<_> = explained.findings.iter().map(shown).collect();
@@ -273,18 +279,18 @@ impl Host {
     }
 }
 
-/// The node that a deed is about.
-const fn subject(deed: &Deed) -> Option<NodeId> {
-    match deed {
-        Deed::Enable { node }
-        | Deed::Disable { node }
-        | Deed::ResetFault { node }
-        | Deed::Stop { node }
-        | Deed::Jog { node, .. }
-        | Deed::Velocity { node, .. }
-        | Deed::Move { node, .. }
-        | Deed::Torque { node, .. }
-        | Deed::Home { node, .. } => Some(*node),
+/// The node that a command is about.
+const fn subject(command: &Command) -> Option<NodeId> {
+    match command {
+        Command::Enable { node }
+        | Command::Disable { node }
+        | Command::ResetFault { node }
+        | Command::Stop { node }
+        | Command::Jog { node, .. }
+        | Command::Velocity { node, .. }
+        | Command::Move { node, .. }
+        | Command::Torque { node, .. }
+        | Command::Home { node, .. } => Some(*node),
         _ => None,
     }
 }

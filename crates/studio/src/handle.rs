@@ -1,7 +1,7 @@
-//! Where the web part and the host meet: wishes in by a bounded channel, pictures out by one that keeps the newest.
+//! The channels between the web part and the host: requests in through a bounded one, snapshots out through one that keeps the newest.
 //!
-//! Nothing here grows with a client that is slow or greedy: a wish that finds no room is refused, a picture that nobody
-//! fetched is replaced, and news that were not fetched are counted. A stop has a way of its own, which is never full.
+//! Nothing here grows with a client that is slow or greedy: a request that finds no room is refused, a snapshot that was
+//! not fetched is replaced, and news that were not fetched are counted. A stop has a channel of its own, which is never full.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -9,32 +9,32 @@ use std::sync::Arc;
 use tokio::sync::{broadcast, mpsc, oneshot, watch};
 
 use crate::authority::SessionId;
-use crate::message::{Answer, Deed};
+use crate::message::{Answer, Command};
 use crate::timeline::Timeline;
 use crate::trace::Trace;
 
-/// Wishes that may wait for the host, of all sessions together: it takes them far faster than they come.
-const WISHES: usize = 256;
+/// Requests that may wait for the host, of all sessions together: it takes them far faster than they come.
+const REQUESTS: usize = 256;
 
 /// News that may wait for a session; a slower one misses the oldest.
 const NEWS: usize = 256;
 
 /// A handle on the host: a cheap clone for each task of the web part.
 #[derive(Clone, Debug)]
-pub struct Desk {
-    wishes: mpsc::Sender<Wish>,
+pub struct HostHandle {
+    requests: mpsc::Sender<Request>,
     stops: Arc<watch::Sender<u64>>,
-    pictures: watch::Receiver<Picture>,
+    pictures: watch::Receiver<StateUpdate>,
     news: broadcast::Sender<Arc<str>>,
     trace: Arc<Trace>,
     timeline: Arc<Timeline>,
 }
 
-/// What the host has in its hands.
-pub(crate) struct Counter {
-    pub(crate) wishes: mpsc::Receiver<Wish>,
+/// The host's ends of the channels.
+pub(crate) struct Inbox {
+    pub(crate) requests: mpsc::Receiver<Request>,
     pub(crate) stops: watch::Receiver<u64>,
-    pub(crate) pictures: watch::Sender<Picture>,
+    pub(crate) pictures: watch::Sender<StateUpdate>,
     pub(crate) news: broadcast::Sender<Arc<str>>,
     pub(crate) trace: Arc<Trace>,
     pub(crate) timeline: Arc<Timeline>,
@@ -42,7 +42,7 @@ pub(crate) struct Counter {
 
 /// The state of everything, as JSON.
 #[derive(Clone, Debug)]
-pub(crate) struct Picture {
+pub(crate) struct StateUpdate {
     /// Counts the pictures.
     pub(crate) number: u64,
     pub(crate) json: Arc<str>,
@@ -50,52 +50,52 @@ pub(crate) struct Picture {
 
 /// What a session wants.
 #[derive(Debug)]
-pub(crate) enum Wish {
+pub(crate) enum Request {
     /// To be one.
     Join {
         /// Is dropped with the session, however it ends.
-        lifeline: oneshot::Receiver<Infallible>,
+        liveness: oneshot::Receiver<Infallible>,
         /// Its number; dropped if there are too many.
         welcome: oneshot::Sender<SessionId>,
     },
     /// Something done.
-    Do { session: SessionId, seq: u64, deed: Deed, answer: oneshot::Sender<Answer> },
+    Do { session: SessionId, seq: u64, command: Command, answer: oneshot::Sender<Answer> },
 }
 
 /// Both ends, with the trace and the timeline between them.
-pub(crate) fn desk(trace: Trace) -> (Desk, Counter) {
+pub(crate) fn channel(trace: Trace) -> (HostHandle, Inbox) {
     let (trace, timeline) = (Arc::new(trace), Arc::<Timeline>::default());
-    let (wishes, wished) = mpsc::channel(WISHES);
+    let (requests, requested) = mpsc::channel(REQUESTS);
     let (stops, stopped) = watch::channel(0);
-    let (shown, pictures) = watch::channel(Picture { number: 0, json: "{}".into() });
+    let (shown, pictures) = watch::channel(StateUpdate { number: 0, json: "{}".into() });
     let (news, _) = broadcast::channel(NEWS);
-    let desk = Desk {
-        wishes,
+    let handle = HostHandle {
+        requests,
         stops: Arc::new(stops),
         pictures,
         news: news.clone(),
         trace: Arc::clone(&trace),
         timeline: Arc::clone(&timeline),
     };
-    (desk, Counter { wishes: wished, stops: stopped, pictures: shown, news, trace, timeline })
+    (handle, Inbox { requests: requested, stops: stopped, pictures: shown, news, trace, timeline })
 }
 
-/// A session at the desk. The host stops what it moved when this is dropped.
+/// A session with the host. The host stops what it moved when this is dropped.
 #[derive(Debug)]
 pub(crate) struct Session {
     id: SessionId,
-    desk: Desk,
+    handle: HostHandle,
     _lifeline: oneshot::Sender<Infallible>,
 }
 
-impl Desk {
+impl HostHandle {
     /// A further session; `None` if there are too many, or no host any more.
     pub(crate) async fn join(&self) -> Option<Session> {
-        let (held, lifeline) = oneshot::channel();
+        let (held, liveness) = oneshot::channel();
         let (welcome, welcomed) = oneshot::channel();
-        self.wishes.send(Wish::Join { lifeline, welcome }).await.ok()?;
+        self.requests.send(Request::Join { liveness, welcome }).await.ok()?;
         let id = welcomed.await.ok()?;
-        Some(Session { id, desk: self.clone(), _lifeline: held })
+        Some(Session { id, handle: self.clone(), _lifeline: held })
     }
 
     /// Has every drive quick-stopped. Never waits and never fails while there is a host; false without one.
@@ -105,7 +105,7 @@ impl Desk {
     }
 
     /// The pictures from now on.
-    pub(crate) fn pictures(&self) -> watch::Receiver<Picture> {
+    pub(crate) fn pictures(&self) -> watch::Receiver<StateUpdate> {
         self.pictures.clone()
     }
 
@@ -132,13 +132,13 @@ impl Session {
     }
 
     /// Asks for something; where the answer will come, or the answer if there is no room.
-    pub(crate) fn ask(&self, seq: u64, deed: Deed) -> Result<oneshot::Receiver<Answer>, Answer> {
-        if deed == (Deed::StopAll {}) {
-            self.desk.stop_all();
+    pub(crate) fn ask(&self, seq: u64, command: Command) -> Result<oneshot::Receiver<Answer>, Answer> {
+        if command == (Command::StopAll {}) {
+            self.handle.stop_all();
         }
         let (answer, answered) = oneshot::channel();
-        let wish = Wish::Do { session: self.id, seq, deed, answer };
-        match self.desk.wishes.try_send(wish) {
+        let request = Request::Do { session: self.id, seq, command, answer };
+        match self.handle.requests.try_send(request) {
             Ok(()) => Ok(answered),
             Err(mpsc::error::TrySendError::Full(_)) => {
                 Err(Answer::failed(Some(seq), "busy", "too many requests are waiting: try again"))

@@ -6,15 +6,15 @@ use std::sync::Arc;
 use serde_json::Value;
 use tokio::sync::{broadcast, watch};
 
-use crate::desk::{Desk, Picture, Session};
-use crate::message::{Answer, Deed};
+use crate::handle::{HostHandle, Session, StateUpdate};
+use crate::message::{Answer, Command};
 
 /// A session, its pictures and its news.
 #[derive(Debug)]
-pub struct Seat {
+pub struct LocalClient {
     session: Session,
     seq: u64,
-    pictures: watch::Receiver<Picture>,
+    pictures: watch::Receiver<StateUpdate>,
     news: broadcast::Receiver<Arc<str>>,
 }
 
@@ -31,11 +31,11 @@ pub enum Shown {
     Over,
 }
 
-impl Seat {
-    /// A seat at the desk; `None` if there are too many, or no host any more.
-    pub async fn take(desk: &Desk) -> Option<Self> {
-        let session = desk.join().await?;
-        Some(Self { session, seq: 0, pictures: desk.pictures(), news: desk.news() })
+impl LocalClient {
+    /// A new session; `None` if there are too many, or the host has ended.
+    pub async fn take(handle: &HostHandle) -> Option<Self> {
+        let session = handle.join().await?;
+        Some(Self { session, seq: 0, pictures: handle.pictures(), news: handle.news() })
     }
 
     /// Its number: whether the state names it as the one that has control.
@@ -47,8 +47,8 @@ impl Seat {
     /// when it is done: `{"ok":false,"error":{"kind":"..","message":".."}}`.
     pub fn say(&mut self, message: Value) -> impl Future<Output = Value> + Send + 'static + use<> {
         self.seq += 1;
-        let asked = match serde_json::from_value::<Deed>(message) {
-            Ok(deed) => self.session.ask(self.seq, deed),
+        let asked = match serde_json::from_value::<Command>(message) {
+            Ok(command) => self.session.ask(self.seq, command),
             Err(error) => Err(Answer::failed(Some(self.seq), "malformed", error.to_string())),
         };
         let seq = self.seq;

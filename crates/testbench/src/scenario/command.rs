@@ -44,7 +44,7 @@ const PATIENCE: Duration = Duration::from_secs(10);
 
 /// One thing that a host does.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Deed {
+pub enum Command {
     /// An intent without a value.
     Drive(Place, Intent),
     /// Turns at a speed.
@@ -78,7 +78,7 @@ pub enum Deed {
     /// Downloads an object.
     Write(NodeId, ObjectArg, String),
     /// Something with process data.
-    Pdo(NodeId, PdoDeed),
+    Pdo(NodeId, PdoCommand),
     /// A network management command to a node, or to all.
     Nmt(Option<NodeId>, NmtCommand),
     /// Watches the heartbeat of a node.
@@ -136,7 +136,7 @@ impl Manner {
 
 /// What is done with process data.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PdoDeed {
+pub enum PdoCommand {
     /// Sets up a PDO of the device with these objects and this transmission type, and sends or receives it.
     Map(PdoId, Vec<ObjectArg>, TransmissionType),
     /// Sends or receives a PDO as the device has it set up.
@@ -190,7 +190,7 @@ const NMT: [(&str, NmtCommand); 5] = [
     ("reset-communication", NmtCommand::ResetCommunication),
 ];
 
-impl FromStr for Deed {
+impl FromStr for Command {
     type Err = String;
 
     fn from_str(line: &str) -> Result<Self, String> {
@@ -218,39 +218,41 @@ impl FromStr for Deed {
     }
 }
 
-fn of_node(place_word: &str, words: &[&str]) -> Result<Deed, String> {
+fn of_node(place_word: &str, words: &[&str]) -> Result<Command, String> {
     let place: Place = place_word.parse().map_err(|()| format!("'{place_word}' is no node"))?;
     let id = || node(&place.node.to_string());
     match *words {
         [word] if INTENTS.iter().any(|(name, _)| *name == word) => {
             let found = INTENTS.iter().find(|(name, _)| *name == word);
-            found.map(|(_, intent)| Deed::Drive(place, *intent)).ok_or_else(|| unknown(words))
+            found.map(|(_, intent)| Command::Drive(place, *intent)).ok_or_else(|| unknown(words))
         }
-        ["nmt", command] => Ok(Deed::Nmt(Some(id()?), nmt(command)?)),
-        ["watch", period] => Ok(Deed::Watch(id()?, time(period)?)),
-        ["read", name] => Ok(Deed::Read(id()?, object(name)?)),
-        ["pdo", ref rest @ ..] => pdo(rest).map(|deed| Ok(Deed::Pdo(id()?, deed)))?,
-        ["write", name, ref value @ ..] if !value.is_empty() => Ok(Deed::Write(id()?, object(name)?, value.join(" "))),
+        ["nmt", command] => Ok(Command::Nmt(Some(id()?), nmt(command)?)),
+        ["watch", period] => Ok(Command::Watch(id()?, time(period)?)),
+        ["read", name] => Ok(Command::Read(id()?, object(name)?)),
+        ["pdo", ref rest @ ..] => pdo(rest).map(|command| Ok(Command::Pdo(id()?, command)))?,
+        ["write", name, ref value @ ..] if !value.is_empty() => {
+            Ok(Command::Write(id()?, object(name)?, value.join(" ")))
+        }
         ["velocity", speed, ref rest @ ..] => {
             let (manner @ Manner { speed: None, .. }, None) = manner(rest)? else { return Err(unknown(words)) };
-            Ok(Deed::Velocity(place, quantity(speed)?, manner))
+            Ok(Command::Velocity(place, quantity(speed)?, manner))
         }
         ["move", "by", to, ref rest @ ..] => movement(place, to, true, rest),
         ["move", to, ref rest @ ..] => movement(place, to, false, rest),
-        ["torque", current] => Ok(Deed::Torque(place, quantity::<Amperes>(current)?)),
+        ["torque", current] => Ok(Command::Torque(place, quantity::<Amperes>(current)?)),
         ["home", method, ref rest @ ..] => {
             let method = method
                 .parse()
                 .map_err(|_| format!("'{method}' is no homing method; expected a number, as in: home 17"))?;
             let (manner, within) = manner(rest)?;
-            Ok(Deed::Home { place, method, within, manner })
+            Ok(Command::Home { place, method, within, manner })
         }
         _ => Err(unknown(words)),
     }
 }
 
 /// What stands behind `pdo`.
-fn pdo(words: &[&str]) -> Result<PdoDeed, String> {
+fn pdo(words: &[&str]) -> Result<PdoCommand, String> {
     match *words {
         ["map", direction, number, ref rest @ ..] if !rest.is_empty() => {
             let (objects, transmission) = match rest {
@@ -258,11 +260,11 @@ fn pdo(words: &[&str]) -> Result<PdoDeed, String> {
                 _ => (rest, TransmissionType::EVENT_PROFILE),
             };
             let objects = objects.iter().map(|name| object(name)).collect::<Result<_, _>>()?;
-            Ok(PdoDeed::Map(pdo_id(direction, number)?, objects, transmission))
+            Ok(PdoCommand::Map(pdo_id(direction, number)?, objects, transmission))
         }
-        ["adopt", direction, number] => Ok(PdoDeed::Adopt(pdo_id(direction, number)?)),
-        ["write", name, ref value @ ..] if !value.is_empty() => Ok(PdoDeed::Write(object(name)?, value.join(" "))),
-        ["read", name] => Ok(PdoDeed::Read(object(name)?)),
+        ["adopt", direction, number] => Ok(PdoCommand::Adopt(pdo_id(direction, number)?)),
+        ["write", name, ref value @ ..] if !value.is_empty() => Ok(PdoCommand::Write(object(name)?, value.join(" "))),
+        ["read", name] => Ok(PdoCommand::Read(object(name)?)),
         _ => {
             let forms: Vec<_> = FORMS.iter().filter(|form| form.starts_with("NODE pdo")).copied().collect();
             Err(format!("'pdo {}' is nothing that a host does; expected one of: {}", words.join(" "), forms.join("; ")))
@@ -293,9 +295,9 @@ fn unknown(words: &[&str]) -> String {
     format!("'{}' is nothing that a host does with a node; expected one of: {}", words.join(" "), forms.join("; "))
 }
 
-fn movement(place: Place, to: &str, relative: bool, rest: &[&str]) -> Result<Deed, String> {
+fn movement(place: Place, to: &str, relative: bool, rest: &[&str]) -> Result<Command, String> {
     let (manner, None) = manner(rest)? else { return Err(unknown(rest)) };
-    Ok(Deed::Move { place, to: quantity(to)?, relative, manner })
+    Ok(Command::Move { place, to: quantity(to)?, relative, manner })
 }
 
 /// What may stand behind an intent: how, and for how long at most.
@@ -376,7 +378,7 @@ mod tests {
             "wait 20ms",
             "wait for 4 velocity > 50 and 4 powered within 2s",
         ] {
-            assert!(line.parse::<Deed>().is_ok(), "{line}: {:?}", line.parse::<Deed>());
+            assert!(line.parse::<Command>().is_ok(), "{line}: {:?}", line.parse::<Command>());
         }
         for (line, said) in [
             ("", "expected one of"),
@@ -398,7 +400,7 @@ mod tests {
             ("wait for", "a condition is missing"),
             ("0 enable", "expected one of"),
         ] {
-            let refused = line.parse::<Deed>().err().unwrap_or_default();
+            let refused = line.parse::<Command>().err().unwrap_or_default();
             assert!(refused.contains(said), "{line}: {refused}");
         }
     }

@@ -14,7 +14,7 @@ use crate::network::Exchange;
 
 /// What the axes are on.
 #[derive(Debug)]
-pub(super) enum Course {
+pub(super) enum Activity {
     Off,
     Enabling,
     Holding,
@@ -41,7 +41,7 @@ pub(super) struct Runner {
     /// Where each axis is on its path.
     pub(super) points: Vec<PathPoint>,
     pub(super) states: Vec<CyclicState>,
-    pub(super) course: Course,
+    pub(super) activity: Activity,
     pub(super) cause: Option<StopCause>,
     pub(super) period_s: f64,
     seen: Option<Cycle>,
@@ -69,7 +69,7 @@ impl Runner {
             limits,
             points: vec![PathPoint::default(); count],
             states: vec![UNSEEN; count],
-            course: Course::Off,
+            activity: Activity::Off,
             cause: None,
             period_s,
             seen: None,
@@ -79,13 +79,13 @@ impl Runner {
     }
 
     pub(super) const fn phase(&self) -> Phase {
-        match self.course {
-            Course::Off => Phase::Off,
-            Course::Enabling => Phase::Enabling,
-            Course::Holding => Phase::Holding,
-            Course::Moving { .. } => Phase::Moving,
-            Course::Streaming(_) => Phase::Streaming,
-            Course::Stopping { .. } | Course::QuickStop { .. } => Phase::Stopping,
+        match self.activity {
+            Activity::Off => Phase::Off,
+            Activity::Enabling => Phase::Enabling,
+            Activity::Holding => Phase::Holding,
+            Activity::Moving { .. } => Phase::Moving,
+            Activity::Streaming(_) => Phase::Streaming,
+            Activity::Stopping { .. } | Activity::QuickStop { .. } => Phase::Stopping,
         }
     }
 
@@ -104,12 +104,13 @@ impl Runner {
         if let Some(cause) = self.find_trouble() {
             self.stop(cause);
         }
-        if matches!(self.course, Course::Enabling) && self.states.iter().all(|state| state.follows) {
+        if matches!(self.activity, Activity::Enabling) && self.states.iter().all(|state| state.follows) {
             self.begin();
         }
         // Drives that a quick stop has left without power can be enabled again; those that it holds stay in it.
-        if matches!(self.course, Course::QuickStop { .. }) && self.states.iter().all(CyclicState::is_without_power) {
-            self.course = Course::Off;
+        if matches!(self.activity, Activity::QuickStop { .. }) && self.states.iter().all(CyclicState::is_without_power)
+        {
+            self.activity = Activity::Off;
         }
         self.state()
     }
@@ -118,20 +119,20 @@ impl Runner {
     /// up for them would take a leap.
     fn advance(&mut self, now: Instant) {
         let period_s = self.period_s;
-        match &mut self.course {
-            Course::Off | Course::Enabling | Course::Holding => {}
-            Course::QuickStop { cycles } => *cycles += 1,
-            Course::Moving { path, time_s } | Course::Stopping { path, time_s } => {
+        match &mut self.activity {
+            Activity::Off | Activity::Enabling | Activity::Holding => {}
+            Activity::QuickStop { cycles } => *cycles += 1,
+            Activity::Moving { path, time_s } | Activity::Stopping { path, time_s } => {
                 if *time_s == 0.0 {
                     self.began = Some(now);
                 }
                 *time_s += period_s;
                 path.at(*time_s, &mut self.points);
                 if *time_s >= path.duration_s() {
-                    self.course = Course::Holding;
+                    self.activity = Activity::Holding;
                 }
             }
-            Course::Streaming(stream) => match stream.take(&mut self.points, &self.limits) {
+            Activity::Streaming(stream) => match stream.take(&mut self.points, &self.limits) {
                 Due::Point | Due::Late | Due::Wait => {}
                 Due::Underrun => {
                     let cycles = stream.grace();
@@ -148,7 +149,7 @@ impl Runner {
                 }
             },
         }
-        if matches!(self.course, Course::Holding) {
+        if matches!(self.activity, Activity::Holding) {
             for point in &mut self.points {
                 *point = PathPoint { position_turns: point.position_turns, ..PathPoint::default() };
             }
@@ -159,7 +160,7 @@ impl Runner {
     /// The way to rest of a stop, or the way on of a stream that is late, may lead over a software limit. There the limit
     /// counts more than a smooth stop. An axis that began outside is let come back.
     fn keep_in_range(&mut self) {
-        if !matches!(self.course, Course::Streaming(_) | Course::Stopping { .. }) {
+        if !matches!(self.activity, Activity::Streaming(_) | Activity::Stopping { .. }) {
             return;
         }
         for (point, limits) in self.points.iter_mut().zip(&self.limits) {
@@ -174,10 +175,10 @@ impl Runner {
     }
 
     fn drive(&mut self, io: &mut Exchange<'_>) {
-        let demand = match self.course {
-            Course::Off => Some(Demand::Off),
-            Course::Enabling => Some(Demand::Hold),
-            Course::QuickStop { .. } => Some(Demand::QuickStop),
+        let demand = match self.activity {
+            Activity::Off => Some(Demand::Off),
+            Activity::Enabling => Some(Demand::Hold),
+            Activity::QuickStop { .. } => Some(Demand::QuickStop),
             _ => None,
         };
         let axes = self.axes.iter_mut().zip(&self.points).zip(&self.limits);
@@ -193,10 +194,10 @@ impl Runner {
     fn find_trouble(&self) -> Option<StopCause> {
         // What went wrong first is told; a stop that was asked for is nothing wrong.
         let is_told = self.cause.is_some_and(|cause| cause != StopCause::Asked);
-        if is_told || matches!(self.course, Course::Off | Course::QuickStop { .. }) {
+        if is_told || matches!(self.activity, Activity::Off | Activity::QuickStop { .. }) {
             return None;
         }
-        let enabling = matches!(self.course, Course::Enabling);
+        let enabling = matches!(self.activity, Activity::Enabling);
         for ((number, axis), (state, limits)) in (1..).zip(&self.axes).zip(self.states.iter().zip(&self.limits)) {
             let node = axis.drive.node();
             match state.refused {
@@ -224,17 +225,17 @@ impl Runner {
             }
         }
         if known {
-            self.course = Course::Holding;
+            self.activity = Activity::Holding;
         }
     }
 
     /// Brings all axes to rest, for this reason.
     pub(super) fn stop(&mut self, cause: StopCause) {
         self.note(cause);
-        match self.course {
-            Course::Enabling => self.course = Course::Off,
-            Course::Moving { .. } | Course::Streaming(_) => self.come_to_rest(),
-            Course::Off | Course::Holding | Course::Stopping { .. } | Course::QuickStop { .. } => {}
+        match self.activity {
+            Activity::Enabling => self.activity = Activity::Off,
+            Activity::Moving { .. } | Activity::Streaming(_) => self.come_to_rest(),
+            Activity::Off | Activity::Holding | Activity::Stopping { .. } | Activity::QuickStop { .. } => {}
         }
     }
 
@@ -256,11 +257,11 @@ impl Runner {
     }
 
     fn come_to_rest(&mut self) {
-        self.course = match Trajectory::to_rest(&self.points, &self.limits) {
-            Ok(path) => Course::Stopping { path, time_s: 0.0 },
+        self.activity = match Trajectory::to_rest(&self.points, &self.limits) {
+            Ok(path) => Activity::Stopping { path, time_s: 0.0 },
             Err(_) => {
                 self.note(StopCause::NoPathToRest);
-                Course::QuickStop { cycles: 0 }
+                Activity::QuickStop { cycles: 0 }
             }
         };
     }
@@ -271,19 +272,19 @@ mod tests {
     use super::*;
 
     /// A group without axes, for which the planner finds no path.
-    fn runner(course: Course) -> Runner {
-        Runner { course, ..Runner::new(Vec::new(), Vec::new(), 0.001) }
+    fn runner(activity: Activity) -> Runner {
+        Runner { activity, ..Runner::new(Vec::new(), Vec::new(), 0.001) }
     }
 
-    fn stream() -> Course {
-        Course::Streaming(Stream::new(&[], 0.001, super::super::stream::StreamOptions::default()))
+    fn stream() -> Activity {
+        Activity::Streaming(Stream::new(&[], 0.001, super::super::stream::StreamOptions::default()))
     }
 
     #[test]
     fn a_quick_stop_has_a_cause_also_where_somebody_asked_for_a_stop() {
         let mut asked = runner(stream());
         asked.stop(StopCause::Asked);
-        assert!(matches!(asked.course, Course::QuickStop { .. }), "{:?}", asked.course);
+        assert!(matches!(asked.activity, Activity::QuickStop { .. }), "{:?}", asked.activity);
         assert_eq!(asked.state().cause, Some(StopCause::NoPathToRest));
         // At the end of a stream nobody asked.
         let mut ended = runner(stream());

@@ -14,11 +14,11 @@ use master::Network;
 use sim::wire::WireEvent;
 use sim::{StationId, World};
 
+use super::command::Command;
 use super::condition::{Condition, View};
-use super::deed::Deed;
 use super::file::Scenario;
-use super::happening::Happening;
-use super::host::{Desk, Post, run};
+use super::host::{HostTask, Shared, run};
+use super::occurrence::Occurrence;
 use super::outcome::{Outcome, Row, RowKind, Verdict};
 use super::script::Script;
 use crate::document::BadFile;
@@ -30,14 +30,14 @@ const FRAMES_TOLD: usize = 24;
 
 /// A scenario that goes along with a world which somebody else moves.
 ///
-/// Whoever moves the world goes no further than [`Course::next_time`] and calls [`Course::look`] there, hands on what happens with
-/// [`Course::hear`], and calls [`Course::go_on`] after each of these.
-pub struct Course {
+/// Whoever moves the world goes no further than [`Execution::next_time`] and calls [`Execution::look`] there, hands on what happens with
+/// [`Execution::hear`], and calls [`Execution::go_on`] after each of these.
+pub struct Execution {
     scenario: Scenario,
     seed: u64,
     host: StationId,
     tasks: Vec<Task>,
-    desk: Rc<RefCell<Desk>>,
+    shared: Rc<RefCell<Shared>>,
     script: Script,
     next_sample: Instant,
     frames: VecDeque<(Instant, can::Frame)>,
@@ -59,8 +59,8 @@ impl Wake for Woken {
     }
 }
 
-impl Course {
-    /// The world of a scenario at time zero, with the power just come on, and its course. Without a seed it is that of the scenario,
+impl Execution {
+    /// The world of a scenario at time zero, with the power just come on, and its execution. Without a seed it is that of the scenario,
     /// of its machine, or 1.
     ///
     /// The scenario's hosts are one master on the bus. A scenario without any has a master too, which says nothing; or, if it
@@ -74,12 +74,12 @@ impl Course {
         let network = Network::new();
         network.set_models(with_told(scenario.machine.models().map(|(_, model)| model)));
         let host = world.add_station(network.clone());
-        let desk = Rc::new(RefCell::new(Desk::default()));
+        let shared = Rc::new(RefCell::new(Shared::default()));
         let machine = Rc::new(scenario.machine.clone());
         let tasks = scenario.hosts.iter().enumerate().map(|(number, it)| {
-            let (machine, desk) = (Rc::clone(&machine), Rc::clone(&desk));
-            let post = Post { number, name: it.name.clone(), network: network.clone(), machine, desk };
-            let future = run(post, it.start, it.lines.clone());
+            let (machine, shared) = (Rc::clone(&machine), Rc::clone(&shared));
+            let task = HostTask { number, name: it.name.clone(), network: network.clone(), machine, shared };
+            let future = run(task, it.start, it.lines.clone());
             Task { future: Some(Box::pin(future)), woken: Arc::new(Woken(AtomicBool::new(true))) }
         });
         let tasks = tasks.collect();
@@ -87,18 +87,18 @@ impl Course {
         if scenario.needs_events() {
             world.watch(true);
         }
-        let course = Self {
+        let execution = Self {
             scenario: scenario.clone(),
             seed,
             host,
             tasks,
-            desk,
+            shared,
             script: Script::new(scenario),
             next_sample: Instant::ZERO,
             frames: VecDeque::with_capacity(FRAMES_TOLD),
             finished: false,
         };
-        Ok((world, course))
+        Ok((world, execution))
     }
 
     /// A host outside of the world, at this adapter, plays with it. In a scenario without hosts of its own it takes their place: it is
@@ -151,17 +151,17 @@ impl Course {
     }
 
     /// Takes in what has just happened.
-    pub fn hear(&mut self, world: &mut World, happening: Happening<'_>) {
+    pub fn hear(&mut self, world: &mut World, occurrence: Occurrence<'_>) {
         if self.finished {
             return;
         }
-        if let Happening::Wire(WireEvent::Frame { end, frame, .. }) = happening {
+        if let Occurrence::Wire(WireEvent::Frame { end, frame, .. }) = occurrence {
             if self.frames.len() == FRAMES_TOLD {
                 self.frames.pop_front();
             }
             self.frames.push_back((*end, *frame));
         }
-        self.look_at(world, Some(happening));
+        self.look_at(world, Some(occurrence));
     }
 
     /// Ends the run where it stands, and tells what came of it.
@@ -169,7 +169,7 @@ impl Course {
         self.script.conclude(&self.scenario, world);
         self.conclude_hosts();
         let mut rows = std::mem::take(&mut self.script.rows);
-        rows.append(&mut self.desk.borrow_mut().rows);
+        rows.append(&mut self.shared.borrow_mut().rows);
         rows.sort_by_key(|row| (row.at.unwrap_or(Instant::FAR_FUTURE), row.place));
         let mut outcome = Outcome {
             title: self.scenario.title.clone(),
@@ -195,10 +195,10 @@ impl Course {
         if self.script.host_died {
             return;
         }
-        let mut desk = self.desk.borrow_mut();
+        let mut shared = self.shared.borrow_mut();
         for host in &self.scenario.hosts {
             let lines = host.lines.iter().filter(|line| {
-                !desk
+                !shared
                     .rows
                     .iter()
                     .any(|row| row.kind == RowKind::Host && row.place == line.place.line && row.asked == line.asked)
@@ -211,7 +211,7 @@ impl Course {
                 };
                 let name = line.name.unwrap_or_else(|| host.name.clone());
                 let (asked, place) = (line.asked, line.place.line);
-                desk.rows.push(Row { kind: RowKind::Host, name, asked, at: None, seen: seen.into(), verdict, place });
+                shared.rows.push(Row { kind: RowKind::Host, name, asked, at: None, seen: seen.into(), verdict, place });
             }
         }
     }
@@ -243,7 +243,7 @@ impl Course {
                 world.refresh();
             }
         }
-        let done = std::mem::take(&mut self.desk.borrow_mut().done);
+        let done = std::mem::take(&mut self.shared.borrow_mut().done);
         if !done.is_empty() {
             let now = world.now();
             done.iter().for_each(|name| self.script.note_done(name, now));
@@ -251,33 +251,33 @@ impl Course {
         }
     }
 
-    fn look_at(&mut self, world: &mut World, happening: Option<Happening<'_>>) {
-        self.script.look(&self.scenario, world, self.host, happening);
-        self.look_for_hosts(world, happening);
+    fn look_at(&mut self, world: &mut World, occurrence: Option<Occurrence<'_>>) {
+        self.script.look(&self.scenario, world, self.host, occurrence);
+        self.look_for_hosts(world, occurrence);
     }
 
     /// The condition of a line of a host that waits for one.
     fn condition_of(scenario: &Scenario, (host, line): (usize, usize)) -> Option<&Condition> {
-        match &scenario.hosts.get(host)?.lines.get(line)?.deed {
-            Deed::WaitFor(condition, _) => Some(condition),
+        match &scenario.hosts.get(host)?.lines.get(line)?.command {
+            Command::WaitFor(condition, _) => Some(condition),
             _ => None,
         }
     }
 
     fn hosts_wait_for_values(&self) -> bool {
-        let desk = self.desk.borrow();
-        let mut waiting = desk.waits.iter().filter(|waiting| !waiting.so);
+        let shared = self.shared.borrow();
+        let mut waiting = shared.waits.iter().filter(|waiting| !waiting.so);
         waiting.any(|waiting| Self::condition_of(&self.scenario, waiting.line).is_some_and(|it| !it.is_event()))
     }
 
     /// Tells hosts that what they wait for is so.
-    fn look_for_hosts(&mut self, world: &mut World, happening: Option<Happening<'_>>) {
-        let mut desk = self.desk.borrow_mut();
-        for waiting in desk.waits.iter_mut().filter(|waiting| !waiting.so) {
+    fn look_for_hosts(&mut self, world: &mut World, occurrence: Option<Occurrence<'_>>) {
+        let mut shared = self.shared.borrow_mut();
+        for waiting in shared.waits.iter_mut().filter(|waiting| !waiting.so) {
             let Some(condition) = Self::condition_of(&self.scenario, waiting.line) else { continue };
             let done = |name: &str| self.script.is_done(name);
-            if condition.is_event() == happening.is_some()
-                && condition.holds(&mut View { world, happening, done: &done })
+            if condition.is_event() == occurrence.is_some()
+                && condition.holds(&mut View { world, occurrence, done: &done })
             {
                 waiting.so = true;
                 waiting.waker.take().into_iter().for_each(Waker::wake);

@@ -1,7 +1,7 @@
-//! Lines for a stream that somebody else reads, or does not: written by a thread of its own, so that nobody waits.
+//! Lines for a stream whose reader may be slow or absent: written by a thread of its own, so that the caller never waits.
 //!
 //! Lines keep their order. When 4 MiB wait unread, further ones are dropped and counted; the count stands in their place as
-//! soon as there is room, and is told to a second speaker if there is one.
+//! soon as there is room, and is written to a second stream if there is one.
 
 use std::collections::VecDeque;
 use std::io::{self, Write};
@@ -15,15 +15,15 @@ const MAX_BYTES: usize = 4 << 20;
 
 /// Speaks to one stream. A copy speaks to the same.
 #[derive(Clone)]
-pub(crate) struct Speaker(Arc<Desk>);
+pub(crate) struct Messages(Arc<Shared>);
 
-struct Desk {
+struct Shared {
     queue: Mutex<Queue>,
     changed: Condvar,
     /// The line that stands for as many dropped ones.
     gap: fn(u64) -> String,
     /// Who is told of them too.
-    warned: Option<Speaker>,
+    warned: Option<Messages>,
 }
 
 #[derive(Default)]
@@ -37,9 +37,9 @@ struct Queue {
     stalled: bool,
 }
 
-impl Speaker {
+impl Messages {
     /// Standard output, of lines that answer world commands.
-    pub(crate) fn of_answers(warned: Speaker) -> Self {
+    pub(crate) fn of_answers(warned: Messages) -> Self {
         let gap = |dropped| {
             let error = format!("{dropped} answers are missing here: nobody read them in time");
             format!(r#"{{"ok":false,"error":"{error}","dropped":{dropped}}}"#)
@@ -59,10 +59,10 @@ impl Speaker {
     }
 
     fn start(stream: impl Write + Send + 'static, gap: fn(u64) -> String, warned: Option<Self>) -> Self {
-        let desk = Arc::new(Desk { queue: Mutex::default(), changed: Condvar::new(), gap, warned });
-        let served = Arc::clone(&desk);
+        let shared = Arc::new(Shared { queue: Mutex::default(), changed: Condvar::new(), gap, warned });
+        let served = Arc::clone(&shared);
         std::thread::spawn(move || served.write_all(stream));
-        Self(desk)
+        Self(shared)
     }
 
     /// Says a line. Characters that would steer a terminal are shown instead.
@@ -108,7 +108,7 @@ impl Queue {
     }
 }
 
-impl Desk {
+impl Shared {
     fn lock(&self) -> MutexGuard<'_, Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -186,42 +186,42 @@ mod tests {
     fn what_nobody_reads_is_dropped_and_the_count_stands_in_its_place() {
         let (warnings, warned) = pipe();
         let (answers, reader) = pipe();
-        let warner = Speaker::start(warnings, |_| String::new(), None);
-        let speaker = Speaker::start(answers, |dropped| format!("{dropped} missing"), Some(warner));
+        let warner = Messages::start(warnings, |_| String::new(), None);
+        let messages = Messages::start(answers, |dropped| format!("{dropped} missing"), Some(warner));
         let filler = "x".repeat(1 << 20);
-        (0..3).for_each(|_| speaker.say(&filler));
-        speaker.say("small");
-        (0..7).for_each(|_| speaker.say(&filler));
+        (0..3).for_each(|_| messages.say(&filler));
+        messages.say("small");
+        (0..7).for_each(|_| messages.say(&filler));
         let lines = read_until(&reader, "7 missing");
         assert_eq!(lines.iter().map(String::len).collect::<Vec<_>>(), [1 << 20, 1 << 20, 1 << 20, 5, 9]);
-        speaker.say("after");
+        messages.say("after");
         assert_eq!(read_until(&reader, "after"), ["after"]);
         assert!(read_until(&warned, "being dropped")[0].contains("nobody reads standard output"));
         assert!(read_until(&warned, "were dropped")[0].contains("7 answers were dropped"));
-        assert!(speaker.finish(SOON));
+        assert!(messages.finish(SOON));
     }
 
     #[test]
     fn who_waits_for_room_waits_once_for_a_reader_that_is_not_there() {
         let (answers, reader) = pipe();
-        let speaker = Speaker::start(answers, |_| String::new(), None);
-        speaker.say(&"x".repeat(3 << 20));
-        assert!(!speaker.finish(Duration::from_millis(1)));
-        speaker.wait_for_room(Duration::from_millis(1));
+        let messages = Messages::start(answers, |_| String::new(), None);
+        messages.say(&"x".repeat(3 << 20));
+        assert!(!messages.finish(Duration::from_millis(1)));
+        messages.wait_for_room(Duration::from_millis(1));
         // Would hang if it waited again.
-        speaker.wait_for_room(Duration::from_secs(u64::MAX >> 32));
-        speaker.say("read");
+        messages.wait_for_room(Duration::from_secs(u64::MAX >> 32));
+        messages.say("read");
         read_until(&reader, "read");
-        speaker.wait_for_room(Duration::from_secs(u64::MAX >> 32));
+        messages.wait_for_room(Duration::from_secs(u64::MAX >> 32));
     }
 
     #[test]
     fn a_reader_that_is_gone_holds_up_nobody() {
         let (answers, reader) = pipe();
         drop(reader);
-        let speaker = Speaker::start(answers, |_| String::new(), None);
-        speaker.say("a");
-        assert!(speaker.finish(SOON));
-        assert!(speaker.0.lock().lines.is_empty());
+        let messages = Messages::start(answers, |_| String::new(), None);
+        messages.say("a");
+        assert!(messages.finish(SOON));
+        assert!(messages.0.lock().lines.is_empty());
     }
 }

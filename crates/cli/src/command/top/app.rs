@@ -20,7 +20,7 @@ const MOST_NEWS: usize = 50;
 
 /// What is shown and chosen.
 #[derive(Debug)]
-pub(super) struct Desk {
+pub(super) struct App {
     /// The host's number for this terminal.
     number: u64,
     pub(super) state: State,
@@ -41,14 +41,14 @@ pub(super) struct Desk {
 
 /// What a key leads to.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Wish {
+pub(super) enum Action {
     /// To be said to the host.
     Say(Value),
     /// The end.
     Quit,
 }
 
-impl Desk {
+impl App {
     pub(super) fn new(number: u64) -> Self {
         Self {
             number,
@@ -142,7 +142,7 @@ impl Desk {
     }
 
     /// A key.
-    pub(super) fn key(&mut self, key: KeyEvent, now: Instant) -> Vec<Wish> {
+    pub(super) fn key(&mut self, key: KeyEvent, now: Instant) -> Vec<Action> {
         let side = match key.code {
             KeyCode::Left | KeyCode::Char('h') => Some(-1.0),
             KeyCode::Right | KeyCode::Char('l') => Some(1.0),
@@ -156,11 +156,11 @@ impl Desk {
             let given_up = self.hold.give_up(now);
             return [self.jog(given_up), self.answer(node, key)].concat();
         }
-        let mut wishes = Vec::new();
+        let mut actions = Vec::new();
         // Any other key lets go of what was held.
         if side != Some(self.side) {
             let given_up = self.hold.give_up(now);
-            wishes.extend(self.jog(given_up));
+            actions.extend(self.jog(given_up));
             if side.is_some() {
                 self.hold = Hold::Free;
             }
@@ -169,35 +169,35 @@ impl Desk {
             self.side = side;
             if !self.help {
                 let act = self.hold.press(now);
-                wishes.extend(self.jog(act));
+                actions.extend(self.jog(act));
             }
-            return wishes;
+            return actions;
         }
-        wishes.extend(self.other_key(key));
-        wishes
+        actions.extend(self.other_key(key));
+        actions
     }
 
     /// A key while the question is on the screen.
-    fn answer(&mut self, node: u8, key: KeyEvent) -> Vec<Wish> {
+    fn answer(&mut self, node: u8, key: KeyEvent) -> Vec<Action> {
         // The key that led to it may still be held.
         if matches!(key.code, KeyCode::Left | KeyCode::Right | KeyCode::Char('h' | 'l')) {
             return Vec::new();
         }
         self.question = None;
         match key.code {
-            KeyCode::Char('y') => vec![Wish::Say(json!({ "do": "accept_unguarded", "node": node }))],
+            KeyCode::Char('y') => vec![Action::Say(json!({ "do": "accept_unguarded", "node": node }))],
             KeyCode::Esc | KeyCode::Char(' ' | 'q' | 'c') => self.other_key(key),
             _ => Vec::new(),
         }
     }
 
-    fn other_key(&mut self, key: KeyEvent) -> Vec<Wish> {
+    fn other_key(&mut self, key: KeyEvent) -> Vec<Action> {
         let control = key.modifiers.contains(KeyModifiers::CONTROL);
         match key.code {
             // What stops comes first, whatever is on the screen.
-            KeyCode::Esc | KeyCode::Char(' ') => vec![Wish::Say(json!({ "do": "stop_all" }))],
-            KeyCode::Char('c') if control => vec![Wish::Quit],
-            KeyCode::Char('q') => vec![Wish::Quit],
+            KeyCode::Esc | KeyCode::Char(' ') => vec![Action::Say(json!({ "do": "stop_all" }))],
+            KeyCode::Char('c') if control => vec![Action::Quit],
+            KeyCode::Char('q') => vec![Action::Quit],
             KeyCode::Char('?') => {
                 self.help = !self.help;
                 Vec::new()
@@ -215,8 +215,8 @@ impl Desk {
             KeyCode::Char('s') => self.say("stop"),
             KeyCode::Char('r') => self.say("reset_fault"),
             KeyCode::Char('x') => self.say("explain"),
-            KeyCode::Char('n') => vec![Wish::Say(json!({ "do": "scan" }))],
-            KeyCode::Char('t') => vec![Wish::Say(json!({ "do": "take_control" }))],
+            KeyCode::Char('n') => vec![Action::Say(json!({ "do": "scan" }))],
+            KeyCode::Char('t') => vec![Action::Say(json!({ "do": "take_control" }))],
             _ => {
                 self.tell(None, "this key does nothing here; ? shows those that do");
                 Vec::new()
@@ -225,18 +225,18 @@ impl Desk {
     }
 
     /// Time has passed.
-    pub(super) fn look(&mut self, now: Instant) -> Vec<Wish> {
+    pub(super) fn look(&mut self, now: Instant) -> Vec<Action> {
         let act = self.hold.look(now);
         self.jog(act)
     }
 
     /// The terminal has lost the keyboard.
-    pub(super) fn lose_focus(&mut self, now: Instant) -> Vec<Wish> {
+    pub(super) fn lose_focus(&mut self, now: Instant) -> Vec<Action> {
         let act = self.hold.give_up(now);
         self.jog(act)
     }
 
-    fn jog(&mut self, act: Option<Act>) -> Vec<Wish> {
+    fn jog(&mut self, act: Option<Act>) -> Vec<Action> {
         let Some(act) = act else { return Vec::new() };
         if act == Act::Begin {
             let asks = |node: &Node| self.has_control() && node.goes_on && !node.accepted;
@@ -249,18 +249,18 @@ impl Desk {
             Act::Renew => json!({ "do": "jog_hold", "node": node }),
             Act::End => json!({ "do": "jog_end", "node": node }),
         };
-        vec![Wish::Say(message)]
+        vec![Action::Say(message)]
     }
 
-    fn say(&mut self, deed: &str) -> Vec<Wish> {
+    fn say(&mut self, deed: &str) -> Vec<Action> {
         let Some(node) = self.chosen else {
             self.tell(None, "no node has been heard: n scans the bus");
             return Vec::new();
         };
-        vec![Wish::Say(json!({ "do": deed, "node": node }))]
+        vec![Action::Say(json!({ "do": deed, "node": node }))]
     }
 
-    fn choose(&mut self, by: isize) -> Vec<Wish> {
+    fn choose(&mut self, by: isize) -> Vec<Action> {
         let at = self.state.nodes.iter().position(|node| Some(node.node) == self.chosen).unwrap_or(0);
         let last = self.state.nodes.len().saturating_sub(1);
         let to = at.saturating_add_signed(by).min(last);
@@ -268,7 +268,7 @@ impl Desk {
         Vec::new()
     }
 
-    fn faster(&mut self, by: isize) -> Vec<Wish> {
+    fn faster(&mut self, by: isize) -> Vec<Action> {
         self.jog_step = self.jog_step.saturating_add_signed(by).min(JOG_RPM.len() - 1);
         Vec::new()
     }

@@ -12,26 +12,26 @@ use std::time::Duration;
 use sim::StoredImage;
 
 use super::eeprom::{EepromError, Eeproms};
-use super::speaker::Speaker;
+use super::messages::Messages;
 
 /// How long after a failed attempt the next one is made.
 const RETRY_INTERVAL: Duration = Duration::from_millis(500);
 
 /// See the [module](self).
-pub(crate) struct Keeper {
-    desk: Arc<Desk>,
+pub(crate) struct StoreWriter {
+    shared: Arc<Shared>,
     /// How the last attempts went, when it is over.
     outcome: Receiver<Result<(), EepromError>>,
 }
 
 #[derive(Default)]
-struct Desk {
-    papers: Mutex<Papers>,
+struct Shared {
+    state: Mutex<State>,
     changed: Condvar,
 }
 
 #[derive(Default)]
-struct Papers {
+struct State {
     /// To be written, by drive number.
     waiting: BTreeMap<u8, StoredImage>,
     /// Written, or told to be unwritable: drive number and which store.
@@ -39,41 +39,41 @@ struct Papers {
     over: bool,
 }
 
-impl Keeper {
+impl StoreWriter {
     /// Writes to `eeproms` from now on. `settled` is called when there is something for [`take_settled`](Self::take_settled).
-    pub(crate) fn start(eeproms: Eeproms, speaker: Speaker, settled: impl Fn() + Send + 'static) -> Self {
-        let desk = Arc::new(Desk::default());
+    pub(crate) fn start(eeproms: Eeproms, messages: Messages, settled: impl Fn() + Send + 'static) -> Self {
+        let shared = Arc::new(Shared::default());
         let (done, outcome) = channel();
-        let served = Arc::clone(&desk);
-        std::thread::spawn(move || done.send(served.write_all(&eeproms, &speaker, settled)));
-        Self { desk, outcome }
+        let served = Arc::clone(&shared);
+        std::thread::spawn(move || done.send(served.write_all(&eeproms, &messages, settled)));
+        Self { shared, outcome }
     }
 
     /// One whose disk is whoever holds the other value: it calls that with what is kept, by drive number and store.
     #[cfg(test)]
     pub(crate) fn by_hand() -> (Self, impl Fn(u8, u64)) {
-        let desk = Arc::new(Desk::default());
+        let shared = Arc::new(Shared::default());
         let (_, outcome) = channel();
-        let held = Arc::clone(&desk);
-        (Self { desk, outcome }, move |number, generation| held.lock().settled.push((number, generation)))
+        let held = Arc::clone(&shared);
+        (Self { shared, outcome }, move |number, generation| held.lock().settled.push((number, generation)))
     }
 
     /// Has an image brought to the disk.
     pub(crate) fn hand_over(&self, image: StoredImage) {
-        self.desk.lock().waiting.insert(image.number, image);
-        self.desk.changed.notify_one();
+        self.shared.lock().waiting.insert(image.number, image);
+        self.shared.changed.notify_one();
     }
 
     /// The stores that need not be waited for any more, by drive number.
     pub(crate) fn take_settled(&self) -> Vec<(u8, u64)> {
-        std::mem::take(&mut self.desk.lock().settled)
+        std::mem::take(&mut self.shared.lock().settled)
     }
 
     /// Returns when everything is on the disk, or with the reason why it is not, at most after `patience`; `None` if nothing
     /// is known by then.
     pub(crate) fn finish(self, patience: Duration) -> Option<Result<(), EepromError>> {
-        self.desk.lock().over = true;
-        self.desk.changed.notify_one();
+        self.shared.lock().over = true;
+        self.shared.changed.notify_one();
         self.outcome.recv_timeout(patience).ok()
     }
 }
@@ -83,12 +83,12 @@ pub(crate) fn file_name(model: &str, number: u8) -> String {
     format!("{model}@{number}")
 }
 
-impl Desk {
-    fn lock(&self) -> MutexGuard<'_, Papers> {
-        self.papers.lock().unwrap_or_else(PoisonError::into_inner)
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn write_all(&self, eeproms: &Eeproms, speaker: &Speaker, settled: impl Fn()) -> Result<(), EepromError> {
+    fn write_all(&self, eeproms: &Eeproms, messages: &Messages, settled: impl Fn()) -> Result<(), EepromError> {
         let mut failed = None;
         let mut reported = String::new();
         loop {
@@ -103,7 +103,7 @@ impl Desk {
                     // Said once for each reason, not twice a second.
                     if error.to_string() != reported {
                         reported = error.to_string();
-                        speaker.say(&format!(
+                        messages.say(&format!(
                             "warning: {reported}; the file keeps its old contents, trying again. The drive acknowledges \
                              the store all the same"
                         ));
@@ -123,18 +123,18 @@ impl Desk {
     /// Waits for something to write, after a failure for some time in any case; `None` when it is over: after a failure
     /// that is one last attempt later.
     fn next(&self, after_failure: bool) -> Option<BTreeMap<u8, StoredImage>> {
-        let mut papers = self.lock();
-        let was_over = papers.over;
+        let mut state = self.lock();
+        let was_over = state.over;
         if after_failure {
             if was_over {
                 return None;
             }
-            let waited = self.changed.wait_timeout_while(papers, RETRY_INTERVAL, |papers| !papers.over);
-            papers = waited.unwrap_or_else(PoisonError::into_inner).0;
+            let waited = self.changed.wait_timeout_while(state, RETRY_INTERVAL, |state| !state.over);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
-        let idle = |papers: &mut Papers| papers.waiting.is_empty() && !papers.over;
-        papers = self.changed.wait_while(papers, idle).unwrap_or_else(PoisonError::into_inner);
-        let images = std::mem::take(&mut papers.waiting);
+        let idle = |state: &mut State| state.waiting.is_empty() && !state.over;
+        state = self.changed.wait_while(state, idle).unwrap_or_else(PoisonError::into_inner);
+        let images = std::mem::take(&mut state.waiting);
         (!images.is_empty()).then_some(images)
     }
 }
@@ -155,24 +155,25 @@ mod tests {
         let place = scratch("settled");
         let eeproms = Eeproms::open(&place).unwrap();
         let (wake, woken) = channel();
-        let keeper = Keeper::start(eeproms, Speaker::of_warnings(), move || wake.send(()).expect("the test waits"));
+        let store_writer =
+            StoreWriter::start(eeproms, Messages::of_warnings(), move || wake.send(()).expect("the test waits"));
         for generation in 1..20 {
-            keeper.hand_over(image(generation));
+            store_writer.hand_over(image(generation));
             woken.recv_timeout(SOON).unwrap();
-            assert_eq!(keeper.take_settled(), [(1, generation)]);
+            assert_eq!(store_writer.take_settled(), [(1, generation)]);
             let kept = std::fs::read(place.join("a@1.eeprom")).unwrap();
             assert_eq!(kept[kept.len() - 8..], [generation as u8; 8]);
         }
-        assert!(matches!(keeper.finish(SOON), Some(Ok(()))));
+        assert!(matches!(store_writer.finish(SOON), Some(Ok(()))));
         std::fs::remove_dir_all(place).unwrap();
     }
 
     #[test]
     fn the_last_image_handed_over_is_on_the_disk_at_the_end() {
         let place = scratch("newest");
-        let keeper = Keeper::start(Eeproms::open(&place).unwrap(), Speaker::of_warnings(), || {});
-        (1..=100).for_each(|generation| keeper.hand_over(image(generation)));
-        assert!(matches!(keeper.finish(SOON), Some(Ok(()))));
+        let store_writer = StoreWriter::start(Eeproms::open(&place).unwrap(), Messages::of_warnings(), || {});
+        (1..=100).for_each(|generation| store_writer.hand_over(image(generation)));
+        assert!(matches!(store_writer.finish(SOON), Some(Ok(()))));
         assert!(std::fs::read(place.join("a@1.eeprom")).unwrap().ends_with(&[100; 8]));
         std::fs::remove_dir_all(place).unwrap();
     }
@@ -181,14 +182,14 @@ mod tests {
     fn what_cannot_be_written_is_settled_and_told_at_the_end() {
         let place = scratch("unwritable");
         let (wake, woken) = channel();
-        let keeper = Keeper::start(Eeproms::open(&place).unwrap(), Speaker::of_warnings(), move || {
+        let store_writer = StoreWriter::start(Eeproms::open(&place).unwrap(), Messages::of_warnings(), move || {
             wake.send(()).expect("the test waits")
         });
         std::fs::create_dir(place.join("a@1.new")).unwrap();
-        keeper.hand_over(image(3));
+        store_writer.hand_over(image(3));
         woken.recv_timeout(SOON).unwrap();
-        assert_eq!(keeper.take_settled(), [(1, 3)]);
-        assert!(matches!(keeper.finish(SOON), Some(Err(EepromError::File(..)))));
+        assert_eq!(store_writer.take_settled(), [(1, 3)]);
+        assert!(matches!(store_writer.finish(SOON), Some(Err(EepromError::File(..)))));
         std::fs::remove_dir_all(place).unwrap();
     }
 }

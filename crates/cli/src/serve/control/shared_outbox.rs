@@ -7,7 +7,7 @@ use tokio::sync::{Notify, watch};
 
 /// Lines for one client, and whether more will come.
 #[derive(Debug, Default)]
-pub(crate) struct Mailbox {
+pub(crate) struct SharedOutbox {
     content: Mutex<Content>,
     filled: Notify,
     emptied: Notify,
@@ -29,11 +29,11 @@ struct Content {
     closed: bool,
 }
 
-/// The world's end of a mailbox. Dropped, it closes it: what is there is still sent.
+/// The world's end of a shared_outbox. Dropped, it closes it: what is there is still sent.
 #[derive(Debug)]
-pub(crate) struct Letters(pub(crate) Arc<Mailbox>);
+pub(crate) struct OutboxSender(pub(crate) Arc<SharedOutbox>);
 
-impl Sink for Letters {
+impl Sink for OutboxSender {
     fn put(&mut self, class: Class, line: String) {
         self.0.put(class, line);
     }
@@ -43,14 +43,14 @@ impl Sink for Letters {
     }
 }
 
-impl Drop for Letters {
+impl Drop for OutboxSender {
     fn drop(&mut self) {
         self.0.content().closed = true;
         self.0.filled.notify_one();
     }
 }
 
-impl Mailbox {
+impl SharedOutbox {
     fn content(&self) -> MutexGuard<'_, Content> {
         self.content.lock().unwrap_or_else(PoisonError::into_inner)
     }
