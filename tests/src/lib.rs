@@ -20,8 +20,3 @@ pub mod seeded;
 pub mod side_by_side;
 pub mod zlac8030l;
 pub mod zlim42c;
-
-/// The README's Rust, compiled and run.
-#[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
-pub struct Readme;

@@ -1,8 +1,8 @@
-//! `cargo xtask dist`: what is released, in one folder: the stripped binary with manual pages and completions, the data sheets
-//! of the models, the licences of everything that is in it, the Python wheel, and the checksums of all of it.
+//! `cargo xtask dist`: what is released, in one folder: an archive of the stripped binary with manual pages, completions, the data
+//! sheets of the models and the licences of everything that is in it; the Python wheel; the checksums of both.
 //!
 //! The binary is the one of `cargo xtask pgo` where its tools can be had, and the same is in the wheel. The test makes all of it
-//! in the profile of the tests, and uses binary and wheel from an empty folder.
+//! in the profile of the tests, unpacks the archive in an empty folder, and uses binary and wheel from there.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -68,10 +68,17 @@ fn release_binary() -> Result<(PathBuf, String), String> {
     }
 }
 
+/// The name of the archive without its ending, and of the folder in it: `ferrodrive-0.1.0-x86_64-linux`.
+fn archive_name() -> String {
+    let (version, architecture, system) = (env!("CARGO_PKG_VERSION"), std::env::consts::ARCH, std::env::consts::OS);
+    format!("ferrodrive-{version}-{architecture}-{system}")
+}
+
 /// Makes the folder anew; returns what could not be in it, and why.
-fn make(program: &Path, profile: &str, folder: &Path) -> Result<Vec<String>, String> {
-    let _ = fs::remove_dir_all(folder);
+fn make(program: &Path, profile: &str, release: &Path) -> Result<Vec<String>, String> {
+    let _ = fs::remove_dir_all(release);
     let mut notes = Vec::new();
+    let folder = &release.join(archive_name());
     let binary = folder.join("bin").join(program.file_name().unwrap_or_default());
     copy(program, &binary)?;
     // The names of functions are most of a binary; what a panic says needs none.
@@ -92,19 +99,25 @@ fn make(program: &Path, profile: &str, folder: &Path) -> Result<Vec<String>, Str
     let mut packages = foreign_packages("Cargo.toml", "ferrodrive")?;
     match python::environment(python::VENV, python::REQUIREMENTS) {
         Ok(python) => {
-            let wheel = add_wheel(&python, profile, &binary, &folder.join("python"))?;
+            let wheel = add_wheel(&python, profile, &binary, release)?;
+            packages.extend(foreign_packages("crates/python/Cargo.toml", "ferrodrive-python")?);
             notes.extend(
                 wheel::tag(&wheel).err().map(|reason| format!("the wheel is for machines like this one: {reason}")),
             );
         }
         Err(reason) => notes.push(format!("no wheel: {reason}")),
     }
-    if folder.join("python").is_dir() {
-        packages.extend(foreign_packages("crates/python/Cargo.toml", "ferrodrive-python")?);
-    }
     licences(packages, &folder.join("licences"))?;
-    write(&folder.join(CHECKSUMS), &checksums(folder)?)?;
+    pack(release)?;
+    write(&release.join(CHECKSUMS), &checksums(release)?)?;
     Ok(notes)
+}
+
+/// The folder of the archive becomes the archive.
+fn pack(release: &Path) -> Result<(), String> {
+    let (name, archive) = (archive_name(), format!("{}.tar.gz", archive_name()));
+    process::output(Command::new("tar").current_dir(release).args(["-czf", &archive, &name]))?;
+    fs::remove_dir_all(release.join(&name)).map_err(|error| format!("{name}: {error}"))
 }
 
 /// The wheel around this binary, in `folder`.
@@ -207,13 +220,24 @@ fn try_it(folder: &Path) -> Vec<(&'static str, Result<(), String>)> {
     }
     let mut tried = vec![
         ("every file is listed, with its sum", sums_agree(&dist)),
-        ("the program moves a virtual drive from an empty folder", program_works(&dist, &empty)),
-        ("manual pages, completions, data sheets and licences have words", parts_have_words(&dist)),
+        ("the archive is unpacked in an empty folder", unpack(&dist, &empty)),
     ];
-    if dist.join("python").is_dir() {
-        tried.push(("the wheel works in a new environment", wheel_works(&dist, &empty)));
+    let unpacked = empty.join(archive_name());
+    tried.push(("its program reads a virtual drive", program_works(&unpacked, &empty)));
+    tried.push(("manual pages, completions, data sheets and licences have words", parts_have_words(&unpacked)));
+    if let Some(wheel) = wheel_in(&dist) {
+        tried.push(("the wheel works in a new environment", wheel_works(&wheel, &unpacked, &empty)));
     }
     tried
+}
+
+fn unpack(dist: &Path, empty: &Path) -> Result<(), String> {
+    let archive = dist.join(format!("{}.tar.gz", archive_name()));
+    process::output(Command::new("tar").current_dir(empty).arg("-xzf").arg(archive)).map(|_| ())
+}
+
+fn wheel_in(dist: &Path) -> Option<PathBuf> {
+    files_in(dist).into_iter().find(|path| path.extension().is_some_and(|extension| extension == "whl"))
 }
 
 fn sums_agree(dist: &Path) -> Result<(), String> {
@@ -221,14 +245,14 @@ fn sums_agree(dist: &Path) -> Result<(), String> {
     if checksums(dist)? == listed { Ok(()) } else { Err("the sums are not those of the files".into()) }
 }
 
-fn program_works(dist: &Path, empty: &Path) -> Result<(), String> {
-    let mut program = Command::new(dist.join("bin").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX)));
+fn program_works(unpacked: &Path, empty: &Path) -> Result<(), String> {
+    let mut program = Command::new(unpacked.join("bin").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX)));
     program.current_dir(empty).env_clear().args(["--json", "read", "4", "6041h"]);
     let answer = process::output(&mut program)?;
     if answer.contains("6041") { Ok(()) } else { Err(format!("it answered {answer}")) }
 }
 
-fn parts_have_words(dist: &Path) -> Result<(), String> {
+fn parts_have_words(unpacked: &Path) -> Result<(), String> {
     for (path, words) in [
         ("man/man1/ferrodrive.1", ".TH"),
         ("man/man1/ferrodrive-sim.1", "\\-\\-drive"),
@@ -237,7 +261,7 @@ fn parts_have_words(dist: &Path) -> Result<(), String> {
         ("eds/zlac8030l.eds", "[FileInfo]"),
         ("licences/LICENCES.txt", "clap-"),
     ] {
-        let text = fs::read_to_string(dist.join(path)).map_err(|error| format!("{path}: {error}"))?;
+        let text = fs::read_to_string(unpacked.join(path)).map_err(|error| format!("{path}: {error}"))?;
         if !text.contains(words) {
             return Err(format!("{path} has no {words:?}"));
         }
@@ -245,10 +269,9 @@ fn parts_have_words(dist: &Path) -> Result<(), String> {
     Ok(())
 }
 
-fn wheel_works(dist: &Path, empty: &Path) -> Result<(), String> {
-    let wheel = files_in(&dist.join("python")).pop().ok_or("there is no wheel")?;
+fn wheel_works(wheel: &Path, unpacked: &Path, empty: &Path) -> Result<(), String> {
     // It is made of more than the program is.
-    let licences = fs::read_to_string(dist.join("licences/LICENCES.txt")).map_err(|error| error.to_string())?;
+    let licences = fs::read_to_string(unpacked.join("licences/LICENCES.txt")).map_err(|error| error.to_string())?;
     if !licences.contains("pyo3-") {
         return Err("the licences do not name what is in the wheel alone".into());
     }

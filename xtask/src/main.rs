@@ -46,7 +46,7 @@ The project's own chores.
   cargo xtask tidy               the style that a program can check
   cargo xtask defects [--only NUMBER]..    do the tests notice what is wrong: defects put into a copy of the tree, one at a time
   cargo xtask wheel              the Python package, in dist/: the library, the binary, the interface for python-can
-  cargo xtask dist               what is released, in dist/: binary, manual pages, completions, data sheets, licences, wheel
+  cargo xtask dist               what is released, in dist/: an archive of the program, the wheel, checksums
   cargo xtask pgo                the binary to release, optimised by what a training run does
   cargo xtask times [ROW..]      how long the first commands, the tests and pip take, each from a fresh clone
   cargo xtask idle [SECONDS]     what a simulator costs that waits, in per cent of a core

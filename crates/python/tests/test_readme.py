@@ -37,9 +37,17 @@ def test_a_test_of_the_page_passes(code, tmp_path):
     assert made.returncode == 0 and "1 passed" in made.stdout, made.stdout
 
 
-def test_the_client_of_the_project_s_page_turns_a_drive_that_has_just_been_started():
+def test_the_program_of_the_project_s_page_turns_a_drive():
     page = (ROOT / "README.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    made = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert made.returncode == 0, made.stderr
+    # What its last line says in its comment.
+    assert made.stdout.strip() == code.strip().rsplit("# ", 1)[1]
+
+
+def test_the_client_of_the_handbook_turns_a_drive_that_has_just_been_started():
+    code = (ROOT / "examples" / "socketcand_client.py").read_text(encoding="utf-8")
     assert "port=29536" in code
     # As the page starts it, but at a port that is free.
     with ferrodrive.Simulator(["zlac8030l@4"]) as simulator:

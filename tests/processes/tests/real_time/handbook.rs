@@ -82,7 +82,11 @@ fn follow_in(name: &str, folder: &Path) -> usize {
 }
 
 /// The pages whose commands are run here, and how many they are.
-const FOLLOWED: [(&str, usize); 14] = [
+const FOLLOWED: [(&str, usize); 18] = [
+    ("install.md", 2),
+    ("first-steps.md", 15),
+    ("simulate.md", 10),
+    ("ci.md", 1),
     ("test-your-software.md", 10),
     ("logs.md", 11),
     ("configure-a-drive.md", 12),
@@ -100,7 +104,10 @@ const FOLLOWED: [(&str, usize); 14] = [
 ];
 
 /// The pages whose commands are not run here, and why.
-const NOT_FOLLOWED: [(&str, &str); 5] = [
+const NOT_FOLLOWED: [(&str, &str); 8] = [
+    ("README.md", "the list of the pages"),
+    ("faq.md", "it has no commands"),
+    ("library.md", "its command is cargo's: the examples' step"),
     ("gateway.md", "it serves until a signal, and a client speaks to it: gateway.rs"),
     ("python-can.md", "it has no commands: tests/peers"),
     ("socketcan.md", "it needs CAN interfaces of Linux: socketcan.rs, in a virtual machine"),
@@ -139,6 +146,20 @@ fn every_command_of_the_page_on_parameters_ends_well() {
     std::fs::create_dir(folder.join("examples")).unwrap();
     std::fs::copy(root().join("examples/machine.toml"), folder.join("examples/machine.toml")).unwrap();
     follows("configure-a-drive.md", follow_in("configure-a-drive.md", &folder));
+}
+
+#[test]
+fn every_command_of_the_first_pages_ends_well() {
+    // Some write files where they are run: manual pages, a report.
+    let folder = scratch("handbook_first");
+    std::fs::create_dir_all(folder.join("examples/scenarios")).unwrap();
+    for file in ["examples/machine.toml", "examples/scenarios/brown_out.toml"] {
+        std::fs::copy(root().join(file), folder.join(file)).unwrap();
+    }
+    follows("install.md", follow_in("install.md", &folder));
+    follows("first-steps.md", follow_in("first-steps.md", &folder));
+    follows("simulate.md", follow_in("simulate.md", &folder));
+    follows("ci.md", follow_in("ci.md", &folder));
 }
 
 #[test]
