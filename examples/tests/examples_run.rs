@@ -6,6 +6,8 @@ mod arm_group;
 mod base_square;
 #[path = "../embed_in_your_test.rs"]
 mod embed_in_your_test;
+#[path = "../first_light.rs"]
+mod first_light;
 #[path = "../hello_drive.rs"]
 mod hello_drive;
 #[path = "../stepper_axis.rs"]
@@ -48,4 +50,15 @@ fn base_square_runs() {
 #[test]
 fn stepper_axis_runs() {
     stepper_axis::main().unwrap();
+}
+
+/// `FERRODRIVE_WRITE_PAGES=1 cargo test -p ferrodrive-examples` draws it anew.
+#[test]
+fn the_picture_of_the_front_page_is_what_first_light_draws() {
+    let picture = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/first-light.svg");
+    let drawn = first_light::watch().unwrap().to_svg();
+    if std::env::var_os("FERRODRIVE_WRITE_PAGES").is_some() {
+        std::fs::write(&picture, &drawn).unwrap();
+    }
+    assert!(std::fs::read_to_string(picture).unwrap() == drawn, "docs/first-light.svg is not what the program draws");
 }
