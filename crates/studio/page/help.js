@@ -33,11 +33,12 @@ export const term = (topic, name, node = null) => helped(h("button", { type: "bu
 /** Words with commas between them. */
 export const terms = (topic, names, node) => names.flatMap((name, at) => [...(at ? [", "] : []), term(topic, name, node)]);
 
-export function helpPanel(shared) {
+/** `settings` stands at its end, whatever it shows. */
+export function helpPanel(shared, settings) {
   const title = h("h3");
   const body = h("div");
   const close = h("button", { type: "button", id: "help-close", onclick: () => hide() }, "Close");
-  const root = h("aside", { id: "help", role: "dialog", "aria-label": "What it means", hidden: true }, h("div", { class: "bar" }, title, close), body);
+  const root = h("aside", { id: "help", role: "dialog", "aria-label": "What it means", hidden: true }, h("div", { class: "bar" }, title, close), body, h("div", { class: "bar" }, settings));
   let before = null;
   /** What else is offered: its name, whether it is there now, and what to call. */
   const offers = [];

@@ -2,11 +2,12 @@
 
 import { ask, connect, inControl, link, on, stopAll } from "./link.js";
 import { closeChoice } from "./choice.js";
-import { h, number, renew, say } from "./dom.js";
+import { h, number, renew, say, toggle } from "./dom.js";
 import { busView } from "./bus.js";
 import { driveView } from "./drive.js";
 import { motionView } from "./motion.js";
 import { helpPanel } from "./help.js";
+import { meaningOf } from "./keys.js";
 import { scopeView } from "./scope.js";
 import { lostSight } from "./sight.js";
 import { parametersView } from "./parameters.js";
@@ -28,7 +29,10 @@ const OPENING_MS = 1500;
 /** What the views share: which node is looked at. */
 const shared = { node: null };
 
-const help = helpPanel(shared);
+// Keys of one character, until somebody switches them off.
+const keepKeys = () => localStorage.setItem("character-keys", characters.checked ? "on" : "off");
+const characters = toggle("character-keys", "Keys of one character (1 to 9, ?, d, r, s, p)", localStorage.getItem("character-keys") !== "off", keepKeys);
+const help = helpPanel(shared, characters);
 document.body.append(help.root);
 byId("what").addEventListener("click", help.overview);
 
@@ -90,7 +94,9 @@ const isText = (target) =>
 addEventListener(
   "keydown",
   (event) => {
-    if (event.key === "Escape" || (event.key === " " && !isText(event.target))) {
+    const types = event.target.matches("input, textarea, [aria-expanded=true]");
+    const meaning = meaningOf(event, { in_text: isText(event.target), types, characters: characters.checked });
+    if (meaning === "stop") {
       // Wherever the focus is: no button is pressed with a space.
       event.preventDefault();
       event.stopPropagation();
@@ -99,12 +105,9 @@ addEventListener(
       if (event.key === "Escape") help.hide();
       return;
     }
-    const typing = event.target.matches("input, textarea, [aria-expanded=true]");
-    if (typing || event.ctrlKey || event.altKey || event.metaKey) return;
-    const view = views[Number(event.key) - 1];
-    if (event.key === "?") help.key();
-    else if (view) show(view.name);
-    else shown?.view.key?.(event);
+    if (meaning === "help") help.key();
+    else if (meaning === "view") show(views[Number(event.key) - 1].name);
+    else if (meaning === "own") shown?.view.key?.(event);
   },
   true,
 );

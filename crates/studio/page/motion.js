@@ -5,6 +5,7 @@ import { h, say, toggle } from "./dom.js";
 import { VALUES, chooser, tiles } from "./drive.js";
 import { groupMotion } from "./group.js";
 import { guarding } from "./guarding.js";
+import { speedLimit } from "./limit.js";
 import { homingWizard } from "./homing.js";
 import { series } from "./kept.js";
 import { motionForm } from "./motion_form.js";
@@ -162,7 +163,7 @@ export function motionView(shared, report) {
     homing.root,
     group.root,
   );
-  const root = h("section", { class: "motion" }, h("div", { class: "bar" }, title, choose.root), large.root, status, risk.root, controls);
+  const root = h("section", { class: "motion" }, h("div", { class: "bar" }, title, choose.root), large.root, status, risk.root, speedLimit(report), controls);
 
   function update(state) {
     choose.update(state);

@@ -36,6 +36,12 @@ pub(crate) enum Command {
     },
     /// Gives control up.
     ReleaseControl {},
+    /// Limits the speed of what this session asks for, in r/min; `null` takes the limit away. What it has in motion is stopped by a
+    /// limit that is lower than before.
+    LimitSpeed {
+        /// Above 0.
+        rpm: Option<f64>,
+    },
     /// Quick-stops every drive. Open to all.
     StopAll {},
     /// Looks who is on the bus.
@@ -365,6 +371,7 @@ impl Command {
                 | Self::AskControl {}
                 | Self::HandOver { .. }
                 | Self::ReleaseControl {}
+                | Self::LimitSpeed { .. }
                 | Self::StopAll {}
                 | Self::Scan {}
                 | Self::WorldForms {}

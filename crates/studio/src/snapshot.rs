@@ -29,6 +29,8 @@ pub(crate) struct Snapshot<'a> {
     pub(crate) controller: Option<SessionId>,
     /// Who asked for that last.
     pub(crate) asking: Option<SessionId>,
+    /// The highest speed that whoever has control may ask for; `null` without a limit.
+    pub(crate) speed_limit_rpm: Option<f64>,
     /// Rises when there is something new at `/api/faults`.
     pub(crate) happenings: u64,
     /// How often the trace was saved since the studio began.

@@ -35,6 +35,9 @@ impl Host {
         {
             return say(answer, refused(seq, refusal));
         }
+        if let Err((kind, text)) = self.within_speed_limit(session, &command) {
+            return say(answer, Answer::failed(Some(seq), kind, text));
+        }
         let asked = (seq, answer);
         match command {
             // The stop itself went another way, past whatever waits here.
@@ -52,6 +55,7 @@ impl Host {
                 let released = self.authority.release(session).then_some(()).ok_or(Refusal::NothingToGive);
                 self.change_control(asked, released);
             }
+            Command::LimitSpeed { rpm } => self.limit_speed(session, rpm, asked),
             Command::Scan {} => self.begin_scan(Some(asked)),
             Command::WorldForms {} => self.tell_world_forms(asked),
             Command::LookAround { after } => self.look_around(after, asked),
@@ -349,7 +353,7 @@ fn refused(seq: u64, refusal: Refusal) -> Answer {
     Answer::failed(Some(seq), refusal.kind(), refusal.to_string())
 }
 
-fn done((seq, answer): Asked) {
+pub(super) fn done((seq, answer): Asked) {
     say(answer, Answer::done(seq, Vec::new()));
 }
 

@@ -22,6 +22,7 @@ mod pdo;
 mod pdo_load;
 mod pdo_rows;
 mod run;
+mod speed_limit;
 mod state;
 mod stopping;
 #[cfg(test)]

@@ -100,6 +100,7 @@ impl Host {
     }
 
     fn leave(&mut self, session: SessionId) {
+        self.speed_limits.remove(&session);
         if self.authority.leave(session) {
             (self.presence, self.held_by) = (None, None);
             self.accepted.clear();
@@ -125,6 +126,7 @@ impl Host {
             sessions: self.authority.sessions(),
             controller: self.authority.controller(),
             asking: self.authority.asking(),
+            speed_limit_rpm: self.authority.controller().and_then(|session| self.speed_limits.get(&session).copied()),
             happenings: self.inbox.timeline.revision(),
             logs_saved: self.inbox.trace.logs_saved(),
             changes: self.changes.count(),

@@ -77,6 +77,8 @@ pub struct Host {
     pub(super) scans_again: bool,
     pub(super) running: BTreeMap<NodeId, Running>,
     pub(super) jogs: BTreeMap<NodeId, DeadMan>,
+    /// What each session has limited itself to, in r/min.
+    pub(super) speed_limits: BTreeMap<SessionId, f64>,
     /// Drives that may be moved although nothing stops them when this program dies.
     pub(super) accepted: BTreeSet<NodeId>,
     /// What was last told of a stop of each node, and when.
@@ -129,6 +131,7 @@ impl Host {
             scans_again: false,
             running: BTreeMap::new(),
             jogs: BTreeMap::new(),
+            speed_limits: BTreeMap::new(),
             accepted: BTreeSet::new(),
             stops_told: BTreeMap::new(),
             group: None,

@@ -7,6 +7,7 @@ mod homing;
 mod parameters;
 mod pdo;
 mod series;
+mod speed_limit;
 mod trace;
 mod world;
 

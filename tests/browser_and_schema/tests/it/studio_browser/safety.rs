@@ -118,6 +118,35 @@ async fn a_studio_that_freezes_or_dies_is_said_to_and_so_is_a_stop_that_nobody_c
 
 #[tokio::test]
 #[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_speed_limit_and_keys_that_are_off_are_kept_by_the_browser() {
+    let stage = Stage::open("limits").await;
+    stage.click("#tabs [data-name=motion]").await;
+    stage.find("#speed-limit").await.send_keys("30").await.expect("typed");
+    stage.key(Key::Enter).await;
+    stage.says(".motion [role=status].quiet", "refuses what this page asks for beyond it").await;
+    stage.click("#what").await;
+    stage.click_for("#character-keys", "#character-keys[aria-pressed=false]").await;
+    stage.client.refresh().await.expect("loaded anew");
+    stage.take_the_wheel().await;
+    // A session of its own, which has been given the limit before it had control.
+    stage.studio.wait("a limit", |state| state["speed_limit_rpm"] == 30.0);
+    stage.click("#go-turn").await;
+    stage.says("#news", "speed limit of this session, 30 r/min").await;
+    stage.wheel("no power", |wheel| wheel["drive"]["state"] == "Switch on disabled");
+    for key in ['1', '?', 'd'] {
+        stage.key(key).await;
+    }
+    assert_eq!(stage.script("return location.hash + document.querySelector('#help').hidden").await, "#motiontrue");
+    stage.click("#enable").await;
+    stage.wheel("power", |wheel| wheel["drive"]["state"] == "Operation enabled");
+    stage.key('d').await;
+    stage.key(' ').await;
+    stage.wheel("no power", |wheel| wheel["drive"]["state"] != "Operation enabled");
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
 async fn esc_and_space_stop_with_any_list_open() {
     let stage = Stage::open("lists").await;
     stage.take_the_wheel().await;

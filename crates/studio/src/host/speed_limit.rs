@@ -1,0 +1,92 @@
+//! The speed limit of a session: what it asks for beyond that is refused before anything is sent. Kept here and not by the page,
+//! which may be an old one, or a program.
+
+use std::f64::consts::TAU;
+
+use master::group::AxisLimits;
+
+use super::commands::done;
+use super::state::Host;
+use super::transactions::Refusal;
+use super::work::{Asked, say};
+use crate::authority::SessionId;
+use crate::message::{Answer, BaseJog, Command};
+
+/// The kind of the refusal, for programs.
+pub(super) const TOO_FAST: &str = "speed_limit";
+
+impl Host {
+    /// A session limits what it asks for, in r/min of the shaft, or takes its limit away. What this studio has in motion for it was
+    /// begun under another limit: a lower one stops it.
+    pub(super) fn limit_speed(&mut self, session: SessionId, rpm: Option<f64>, asked: Asked) {
+        if let Some(rpm) = rpm.filter(|rpm| !(rpm.is_finite() && *rpm > 0.0)) {
+            let (seq, answer) = asked;
+            let text = format!("expected a speed limit above 0 r/min, got {rpm}");
+            return say(answer, Answer::failed(Some(seq), "malformed", text));
+        }
+        let before = match rpm {
+            Some(rpm) => self.speed_limits.insert(session, rpm),
+            None => self.speed_limits.remove(&session),
+        };
+        let is_lower = rpm.is_some_and(|rpm| before.is_none_or(|before| rpm < before));
+        if is_lower && self.authority.controller() == Some(session) {
+            self.stop_moved("a lower speed limit was set");
+        }
+        done(asked);
+    }
+
+    /// Whether what a session asks for keeps to its limit.
+    pub(super) fn within_speed_limit(&self, session: SessionId, command: &Command) -> Result<(), Refusal> {
+        self.speed_limits.get(&session).map_or(Ok(()), |limit_rpm| keeps_to(command, *limit_rpm))
+    }
+}
+
+/// What a command lets a shaft turn at.
+enum Speed {
+    /// At this at most, in r/min.
+    Rpm(f64),
+    /// At what the drive is set to.
+    AsSet,
+    /// At whatever its load allows.
+    UpToTheLoad,
+    /// It sets nothing in motion.
+    None,
+}
+
+fn keeps_to(command: &Command, limit_rpm: f64) -> Result<(), Refusal> {
+    let limit = format!("beyond the speed limit of this session, {limit_rpm} r/min");
+    match fastest(command) {
+        // A speed that is not a number is not within it.
+        Speed::Rpm(rpm) if rpm.abs() <= limit_rpm => Ok(()),
+        Speed::Rpm(rpm) => {
+            Err((TOO_FAST, format!("{:.1} r/min is {limit}: ask for less, or raise the limit", rpm.abs())))
+        }
+        Speed::AsSet => Err((TOO_FAST, format!("the speed that the drive is set to may be {limit}: name a speed"))),
+        Speed::UpToTheLoad => Err((
+            TOO_FAST,
+            format!("with a current the speed is up to the load and may be {limit}: take the limit away first"),
+        )),
+        Speed::None => Ok(()),
+    }
+}
+
+fn fastest(command: &Command) -> Speed {
+    match command {
+        Command::Jog { rpm, .. } | Command::Velocity { rpm, .. } => Speed::Rpm(*rpm),
+        Command::Move { rpm, .. } | Command::Home { rpm, .. } => rpm.map_or(Speed::AsSet, Speed::Rpm),
+        Command::Torque { .. } => Speed::UpToTheLoad,
+        Command::GroupMove(group) => Speed::Rpm(group.rpm.unwrap_or(AxisLimits::careful().velocity_turns_s * 60.0)),
+        Command::GroupJog { axes, .. } => Speed::Rpm(axes.iter().map(|axis| axis.rpm).fold(0.0, faster)),
+        Command::BaseJog(BaseJog { turns, wheel_radius_m, most_m_s, .. }) => {
+            // No twist that follows is faster: these are the limits of the base.
+            let wheel_rpm = most_m_s / (TAU * wheel_radius_m) * 60.0;
+            Speed::Rpm(turns.iter().map(|turns| turns * wheel_rpm).fold(0.0, faster))
+        }
+        _ => Speed::None,
+    }
+}
+
+/// The larger of two amounts, and what is not a number where one of them is not.
+fn faster(one: f64, other: f64) -> f64 {
+    if one.is_nan() || one.abs() > other.abs() { one } else { other }
+}

@@ -1,0 +1,111 @@
+//! The speed limit of a session, against programs that ask for more than a page would.
+
+use cia402::PowerState;
+
+use super::{ARM, WHEEL, jog, play};
+use crate::message::{AxisSpeed, AxisTarget, BaseJog, Command, GroupMove};
+
+const LIMIT_RPM: f64 = 20.0;
+
+/// What turns a drive faster than the limit, or may.
+fn too_fast() -> Vec<Command> {
+    let axes = |degrees| [WHEEL, ARM].map(|node| AxisTarget { node, degrees }).to_vec();
+    let speeds = |rpm| vec![AxisSpeed { node: WHEEL, rpm: 1.0 }, AxisSpeed { node: ARM, rpm }];
+    let group = |rpm| GroupMove { axes: axes(90.0), relative: true, rpm, rpm_per_s: None, within_s: None };
+    vec![
+        jog(20.1),
+        jog(-20.1),
+        jog(f64::NAN),
+        Command::Velocity { node: WHEEL, rpm: -21.0, rpm_per_s: None },
+        Command::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: Some(60.0) },
+        // What the drive is set to is 120 r/min as delivered.
+        Command::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None },
+        Command::Home { node: ARM, method: 17, rpm: None },
+        Command::Home { node: ARM, method: 17, rpm: Some(21.0) },
+        Command::Torque { node: WHEEL, amperes: 0.1 },
+        Command::GroupMove(group(None)),
+        Command::GroupMove(group(Some(25.0))),
+        Command::GroupJog { axes: speeds(-25.0), rpm_per_s: None },
+        Command::GroupJog { axes: speeds(f64::NAN), rpm_per_s: None },
+        Command::BaseJog(base(0.22)),
+    ]
+}
+
+/// A wheel of 0.1 m: 20 r/min are 2 pi 0.1 m / 3 s = 0.2094 m/s.
+fn base(most_m_s: f64) -> BaseJog {
+    BaseJog {
+        wheels: [WHEEL, ARM],
+        turns: [1.0, -1.0],
+        wheel_base_m: 0.5,
+        wheel_radius_m: 0.1,
+        most_m_s,
+        m_per_s2: 0.5,
+        linear_m_s: 0.0,
+        angular_rad_s: 0.0,
+    }
+}
+
+#[test]
+fn nothing_beyond_the_limit_of_a_session_is_begun() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Command::LimitSpeed { rpm: Some(LIMIT_RPM) }).await;
+        page.take_control_of_all().await;
+        for command in too_fast() {
+            let answer = page.ask(command.clone()).await;
+            assert_eq!(answer.error_kind(), "speed_limit", "{command:?}: {}", answer.json());
+            assert!(answer.json().contains("speed limit of this session, 20 r/min"), "{}", answer.json());
+            for node in [WHEEL, ARM] {
+                assert_eq!(
+                    stage.power_state(node).await,
+                    PowerState::SwitchOnDisabled,
+                    "{command:?} has not even enabled {node}"
+                );
+            }
+        }
+        assert!(stage.network.moved().is_empty());
+        stage.sleep(100).await;
+        assert_eq!(stage.state()["speed_limit_rpm"], LIMIT_RPM);
+        // What keeps to it turns.
+        page.must(Command::Velocity { node: WHEEL, rpm: -20.0, rpm_per_s: None }).await;
+        stage.turns(WHEEL, 20.0).await;
+        page.must(Command::StopAll {}).await;
+        stage.rests(WHEEL).await;
+        assert_ne!(page.ask(Command::BaseJog(base(0.20))).await.error_kind(), "speed_limit");
+        page.must(Command::LimitSpeed { rpm: None }).await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        stage.turns(WHEEL, 60.0).await;
+    });
+}
+
+#[test]
+fn a_lower_limit_stops_what_was_begun_under_another() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.take_control_of_all().await;
+        page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        stage.turns(WHEEL, 60.0).await;
+        for rpm in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(page.ask(Command::LimitSpeed { rpm: Some(rpm) }).await.error_kind(), "malformed", "{rpm}");
+        }
+        stage.turns(WHEEL, 60.0).await;
+        page.must(Command::LimitSpeed { rpm: Some(30.0) }).await;
+        stage.rests(WHEEL).await;
+        // A higher one stops nothing, and neither does that of a page that only looks.
+        page.must(Command::Velocity { node: WHEEL, rpm: 30.0, rpm_per_s: None }).await;
+        stage.turns(WHEEL, 30.0).await;
+        page.must(Command::LimitSpeed { rpm: Some(60.0) }).await;
+        let mut other = stage.page().await;
+        other.must(Command::LimitSpeed { rpm: Some(1.0) }).await;
+        for _ in 0..20 {
+            stage.sleep(50).await;
+            page.must(Command::Alive {}).await;
+        }
+        assert!((stage.speed(WHEEL).await - 30.0).abs() < 5.0);
+        assert_eq!(stage.state()["speed_limit_rpm"], 60.0, "that of who has control");
+        // Who is given control has a limit of its own, from before.
+        page.must(Command::HandOver { to: other.session.id().0 }).await;
+        stage.rests(WHEEL).await;
+        assert_eq!(other.ask(jog(2.0)).await.error_kind(), "speed_limit");
+    });
+}
