@@ -9,7 +9,7 @@ import { motionView } from "./motion.js";
 import { helpPanel } from "./help.js";
 import { meaningOf } from "./keys.js";
 import { scopeView } from "./scope.js";
-import { lostSight } from "./sight.js";
+import { lostSight, unseenStops } from "./sight.js";
 import { parametersView } from "./parameters.js";
 import { pdoView } from "./pdo.js";
 import { faultsView } from "./faults.js";
@@ -189,6 +189,9 @@ on("state", (state) => {
   say(byId("bus-line"), bus);
   byId("bus-line").title = bus;
   updateControl(state);
+  const unseen = unseenStops(state);
+  byId("moving-notice").hidden = unseen.length === 0;
+  renew(byId("moving-notice"), unseen.join(), () => unseen.map((text) => h("p", {}, text)));
   if (shared.node === null || !state.nodes.some((node) => node.node === shared.node)) {
     shared.node = state.nodes.find((node) => node.drive)?.node ?? state.nodes[0]?.node ?? null;
   }

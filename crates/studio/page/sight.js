@@ -16,6 +16,10 @@ export function isSeenMoving(drive, before_degrees) {
 /** Whether a node may move without anybody doing anything further. */
 export const mayMove = ({ drive, moving, doing }) => Boolean(moving || doing || (drive && (drive.state === null || POWERED.includes(drive.state))));
 
+/** Of which drives a stop was not seen, as texts; until they are seen to stand, which the studio looks for. */
+export const unseenStops = ({ nodes }) =>
+  nodes.filter((node) => node.stop_unseen).map(({ node }) => `NODE ${node} MAY STILL BE MOVING: its stop was not seen. Use the emergency stop`);
+
 /**
  * What is known once nothing new is shown, as `{ text, urgent }` each: of `state`, the last picture, and of whether there is a
  * `connection`. What is urgent concerns drives that nothing stops.

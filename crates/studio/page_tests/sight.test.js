@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { isSeenMoving, lostSight } from "../page/sight.js";
+import { isSeenMoving, lostSight, unseenStops } from "../page/sight.js";
 
 const drive = (state, velocity_rpm = 0, angle_degrees = 0) => ({ state, velocity_rpm, angle_degrees });
 const node = (number, of, more = {}) => ({ node: number, drive: of, moving: false, doing: null, goes_on: false, without_us: null, ...more });
@@ -42,4 +42,13 @@ test("without power nothing is feared, and before the first picture nothing is k
   const lines = lostSight({ state: { nodes: [node(1, drive("Switch on disabled"), { goes_on: true })] }, connected: true, age_ms: 700 });
   assert.ok(lines.every((line) => !line.urgent) && lines.some((line) => /no drive had power/.test(line.text)));
   assert.equal(lostSight({ state: null, connected: false, age_ms: 700 }).length, 1);
+});
+
+test("a drive whose stop was not seen is named until it was seen to stand, whatever was confirmed", () => {
+  const nodes = [node(2, drive("Operation enabled", 60), { stop_unseen: true }), node(4, drive("Operation enabled", 60), { stop_unseen: false }), node(9, null, { stop_unseen: true })];
+  const texts = unseenStops({ nodes });
+  assert.equal(texts.length, 2);
+  assert.match(texts[0], /NODE 2 MAY STILL BE MOVING.*emergency stop/);
+  assert.match(texts[1], /NODE 9 MAY STILL BE MOVING/);
+  assert.deepEqual(unseenStops({ nodes: nodes.map((one) => ({ ...one, stop_unseen: false })) }), []);
 });

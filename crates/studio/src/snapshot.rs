@@ -72,6 +72,8 @@ pub(crate) struct NodeView<'a> {
     pub(crate) doing: Option<&'static str>,
     /// This studio has set it in motion.
     pub(crate) moving: bool,
+    /// It was told to stop and has not been seen to stand since: it may still be moving.
+    pub(crate) stop_unseen: bool,
     /// Writes of parameters that can be put back.
     pub(crate) can_roll_back: usize,
     /// How often it has stored its parameters since the studio began.

@@ -257,6 +257,12 @@ impl Host {
             return;
         }
         let Some(running) = self.running.remove(&node) else { return };
+        match &outcome {
+            // It does what it is asked for: it stands, or is in hand again.
+            Some(Ok(_)) => drop(self.unseen_stops.remove(&node)),
+            Some(Err(_)) if running.what == STOPPING => drop(self.unseen_stops.insert(node, 0)),
+            _ => {}
+        }
         match outcome {
             Some(Ok(notes)) if running.what == STORING => {
                 self.parameters.note_stored(node);

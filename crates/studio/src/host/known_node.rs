@@ -33,7 +33,7 @@ impl KnownNode {
 }
 
 /// True in the states in which the power stage is on or may be.
-fn has_power(state: Option<&'static str>) -> bool {
+pub(super) fn has_power(state: Option<&'static str>) -> bool {
     let powerless = [
         PowerState::NotReadyToSwitchOn,
         PowerState::SwitchOnDisabled,

@@ -115,6 +115,7 @@ impl Host {
             Ok(look) => self.note_look(id, &look.view),
             Err(error) => self.note_silence(id, error),
         }
+        self.look_for_rest(id, read.as_ref().ok().map(|look| &look.view));
         let drives = self.nodes.values().filter(|node| node.drive.is_some()).count() as u32;
         let Some(node) = self.nodes.get_mut(&id) else { return };
         node.is_looked_at = false;
@@ -153,6 +154,7 @@ impl Host {
             trouble: node.trouble.as_deref(),
             doing: self.running.get(&id).map(|running| running.what),
             moving: self.network.moved().contains(id),
+            stop_unseen: self.unseen_stops.contains_key(&id),
             can_roll_back: self.parameters.can_roll_back(id),
             stored: self.parameters.stored(id),
             mapped: self.parameters.mapped(id),

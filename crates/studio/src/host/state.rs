@@ -81,6 +81,8 @@ pub struct Host {
     pub(super) speed_limits: BTreeMap<SessionId, f64>,
     /// Drives that may be moved although nothing stops them when this program dies.
     pub(super) accepted: BTreeSet<NodeId>,
+    /// Drives whose stop was not seen, and in how many looks in a row each has stood since.
+    pub(super) unseen_stops: BTreeMap<NodeId, u32>,
     /// What was last told of a stop of each node, and when.
     pub(super) stops_told: BTreeMap<NodeId, (Instant, &'static str)>,
     /// Several drives as one motion.
@@ -133,6 +135,7 @@ impl Host {
             jogs: BTreeMap::new(),
             speed_limits: BTreeMap::new(),
             accepted: BTreeSet::new(),
+            unseen_stops: BTreeMap::new(),
             stops_told: BTreeMap::new(),
             group: None,
             listening: Vec::new(),

@@ -7,11 +7,19 @@ use can::Instant;
 use canopen::{Mux, NodeId};
 use cia402::PowerCommand;
 
+use super::known_node::has_power;
 use super::state::Host;
 use super::work::{Asked, STOPPING, quietly};
+use crate::snapshot::DriveView;
 
 /// Presses of stop that come within this time are told as one.
 const SAME_PRESS: Duration = Duration::from_secs(1);
+
+/// A shaft that turns more slowly is taken to rest, in r/min.
+const RESTING_RPM: f64 = 1.0;
+
+/// Looks in a row in which it has to: one may meet a shaft that turns round.
+const RESTING_LOOKS: u32 = 2;
 
 const CONTROLWORD: Mux = Mux::new(0x6040, 0);
 
@@ -94,9 +102,27 @@ impl Host {
         });
     }
 
+    /// A drive whose stop was not seen was looked at.
+    pub(super) fn look_for_rest(&mut self, id: NodeId, look: Option<&DriveView>) {
+        let Some(looks) = self.unseen_stops.get_mut(&id) else { return };
+        *looks = if look.is_some_and(rests) { *looks + 1 } else { 0 };
+        if *looks == RESTING_LOOKS {
+            self.unseen_stops.remove(&id);
+            self.say_news(Some(id), "it was seen to stand");
+        } else if *looks == 0 && look.is_some() && !self.running.contains_key(&id) {
+            // It answers again and turns: what it missed is said anew.
+            self.quick_stop_one(id, "", None);
+        }
+    }
+
     /// The nodes that this studio has set in motion, or is about to.
     fn in_motion(&self) -> BTreeSet<NodeId> {
         let begun = self.running.iter().filter(|(_, running)| running.moves).map(|(node, _)| *node);
         self.network.moved().iter().chain(begun).chain(self.jogs.keys().copied()).collect()
     }
+}
+
+/// By its speed; of a drive that does not show it, by its power stage.
+fn rests(look: &DriveView) -> bool {
+    look.velocity_rpm.map_or_else(|| !has_power(look.state), |rpm| rpm.abs() < RESTING_RPM)
 }

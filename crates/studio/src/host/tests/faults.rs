@@ -21,7 +21,7 @@ impl Stage {
     }
 }
 
-fn change(world: &mut World, node: canopen::NodeId, words: &str) {
+pub(super) fn change(world: &mut World, node: canopen::NodeId, words: &str) {
     let stimulus = words.parse().expect("a stimulus");
     world.apply(Place::node(node.raw()), &stimulus).expect("it is there").expect("it has that");
 }

@@ -1,9 +1,12 @@
 //! Drives that nothing stops when the program dies: shown before, refused until accepted.
 
+use std::cell::RefCell;
+
 use cia402::PowerState;
 use serde_json::Value;
 
-use super::{ARM, Page, Stage, WHEEL, play};
+use super::faults::change;
+use super::{ARM, Page, Stage, WHEEL, play, play_acts};
 use crate::message::{AxisSpeed, AxisTarget, Command, GroupMove};
 
 impl Stage {
@@ -121,4 +124,50 @@ fn a_stop_that_comes_by_two_ways_is_told_once() {
         stage.sleep(600).await;
         assert_eq!((told(), stops(stage)), (1, 2));
     });
+}
+
+/// The stepper has no watch over its host, so that it turns on behind a cable that is cut.
+#[test]
+fn a_drive_that_a_stop_does_not_reach_is_shown_until_it_was_seen_to_stand() {
+    let page = RefCell::new(None);
+    let unseen = |stage: &Stage| [0, 1].map(|at| stage.shown(at)["stop_unseen"] == true);
+    play_acts(
+        async |stage| {
+            let mut mine = stage.page().await;
+            mine.take_control_of_all().await;
+            mine.must(Command::Velocity { node: ARM, rpm: 30.0, rpm_per_s: None }).await;
+            stage.turns(ARM, 30.0).await;
+            stage.sleep(100).await;
+            assert_eq!(unseen(stage), [false, false]);
+            page.replace(Some(mine));
+        },
+        |world| change(world, ARM, "cable cut"),
+        async |stage| {
+            let mut mine = page.take().expect("it stays open");
+            // The stop is confirmed, and that is all that is known.
+            mine.must(Command::StopAll {}).await;
+            for _ in 0..6 {
+                stage.sleep(500).await;
+                mine.must(Command::Alive {}).await;
+            }
+            assert_eq!(unseen(stage), [true, false], "{}", stage.state());
+            page.replace(Some(mine));
+        },
+        |world| {
+            change(world, ARM, "cable join");
+        },
+        async |stage| {
+            let mut mine = page.take().expect("it stays open");
+            // It turns still, and is told anew as soon as it answers: nobody has to press again.
+            let mut turned = 0.0_f64;
+            for _ in 0..30 {
+                turned = turned.max(stage.shown(0)["drive"]["velocity_rpm"].as_f64().unwrap_or(0.0));
+                stage.sleep(100).await;
+                mine.must(Command::Alive {}).await;
+            }
+            assert!((turned - 30.0).abs() < 3.0, "{turned}: {}", stage.state());
+            assert!(stage.speed(ARM).await < 1.0);
+            assert_eq!(unseen(stage), [false, false], "{}", stage.state());
+        },
+    );
 }
