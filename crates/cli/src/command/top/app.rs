@@ -9,6 +9,9 @@ use super::hold::{Act, Hold};
 use super::samples::Past;
 use super::seen::{News, Node, State};
 
+/// Columns and lines in which everything fits.
+pub(super) const LEAST: (u16, u16) = (80, 24);
+
 /// Speeds to jog at, r/min.
 const JOG_RPM: [f64; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
 
@@ -31,6 +34,8 @@ pub(super) struct App {
     pub(super) help: bool,
     /// The node that was not moved, since nothing stops it when this program dies: whether it is to be moved nevertheless.
     pub(super) question: Option<u8>,
+    /// Neither what a key would move nor what is asked before that can be seen.
+    is_too_small: bool,
     jog_step: usize,
     hold: Hold,
     /// Which key is or was held: to which side.
@@ -58,6 +63,7 @@ impl App {
             chosen: None,
             help: false,
             question: None,
+            is_too_small: false,
             jog_step: FIRST_JOG,
             hold: Hold::default(),
             side: 1.0,
@@ -152,6 +158,12 @@ impl App {
             let act = side.filter(|side| *side == self.side).and_then(|_| self.hold.release());
             return self.jog(act);
         }
+        if self.is_too_small {
+            return match key.code {
+                KeyCode::Esc | KeyCode::Char(' ' | 'q' | 'c') => self.other_key(key),
+                _ => Vec::new(),
+            };
+        }
         if let Some(node) = self.question {
             let given_up = self.hold.give_up(now);
             return [self.jog(given_up), self.answer(node, key)].concat();
@@ -228,6 +240,12 @@ impl App {
     pub(super) fn look(&mut self, now: Instant) -> Vec<Action> {
         let act = self.hold.look(now);
         self.jog(act)
+    }
+
+    /// The terminal has this size.
+    pub(super) fn resize(&mut self, columns: u16, lines: u16, now: Instant) -> Vec<Action> {
+        self.is_too_small = columns < LEAST.0 || lines < LEAST.1;
+        if self.is_too_small { self.lose_focus(now) } else { Vec::new() }
     }
 
     /// The terminal has lost the keyboard.

@@ -143,6 +143,8 @@ async fn show(context: &Context, host: studio::HostHandle, format: Format) -> Re
     let look = Look { colour: format.paint.is_on() };
     let mut events = listen();
     let mut app = App::new(client.number());
+    let size = screen.terminal.size().map_err(cannot)?;
+    app.resize(size.width, size.height, context.network.now());
     let mut answers = JoinSet::new();
     let say = |client: &mut LocalClient, answers: &mut JoinSet<(Option<u64>, Value)>, message: Value| {
         let node = message["node"].as_u64();
@@ -164,6 +166,7 @@ async fn show(context: &Context, host: studio::HostHandle, format: Format) -> Re
                 is_new = true;
                 match event {
                     Some(Event::Key(key)) => app.key(key, now),
+                    Some(Event::Resize(columns, lines)) => app.resize(columns, lines, now),
                     Some(Event::FocusLost) => app.lose_focus(now),
                     Some(_) => Vec::new(),
                     // The terminal has gone: what is held by it stops with the session.

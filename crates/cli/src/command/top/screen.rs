@@ -8,12 +8,9 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Borders, Chart, Clear, Dataset, GraphType, Paragraph, Wrap};
 
-use super::app::App;
+use super::app::{App, LEAST};
 use super::samples::{SIGNALS, SPAN_S, bounds};
 use super::seen::{Node, State};
-
-/// What everything fits in.
-pub(super) const LEAST: (u16, u16) = (80, 24);
 
 /// Nodes that are listed at most; further ones are scrolled to.
 const MOST_NODES: u16 = 6;
@@ -64,17 +61,18 @@ impl Look {
 pub(super) fn draw(frame: &mut Frame<'_>, app: &App, look: Look) {
     let area = frame.area();
     if area.width < LEAST.0 || area.height < LEAST.1 {
-        let text = format!(
-            "too small: {} x {}, and {} x {} are needed. q quits, SPACE stops all",
-            area.width, area.height, LEAST.0, LEAST.1
-        );
-        return frame.render_widget(Paragraph::new(text).wrap(Wrap { trim: true }), area);
+        let size = format!("{} x {}, and {} x {} are needed", area.width, area.height, LEAST.0, LEAST.1);
+        let text =
+            format!("SPACE stops all, q quits. This terminal is too small: {size}. Until then no key moves a drive");
+        // What is cut off at the end is what matters less.
+        let lines: Vec<_> = unseen_stop(app, look).into_iter().chain([Line::from(text)]).collect();
+        return frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: true }), area);
     }
     let listed = (app.state.nodes.len() as u16).clamp(1, MOST_NODES);
     let rows = [1, listed + 1, 0, 4, NEWS + 1, 1];
     let rows = rows.map(|rows| if rows == 0 { Constraint::Min(7) } else { Constraint::Length(rows) });
     let [title, nodes, plots, chosen, news, keys] = Layout::vertical(rows).areas(area);
-    frame.render_widget(title_line(app, look), title);
+    frame.render_widget(unseen_stop(app, look).unwrap_or_else(|| title_line(app, look)), title);
     draw_nodes(frame, nodes, app, look);
     draw_plots(frame, plots, app, look);
     frame.render_widget(chosen_lines(app, look), chosen);
@@ -86,6 +84,14 @@ pub(super) fn draw(frame: &mut Frame<'_>, app: &App, look: Look) {
     if let Some(node) = app.question {
         draw_question(frame, area, app.state.node(node), look);
     }
+}
+
+/// Which drives were told to stop and have not been seen to stand since.
+fn unseen_stop(app: &App, look: Look) -> Option<Line<'static>> {
+    let unseen = app.state.nodes.iter().filter(|node| node.stop_unseen).map(|node| node.node.to_string());
+    let unseen = unseen.collect::<Vec<_>>().join(", ");
+    let text = format!("! NODE {unseen} MAY STILL BE MOVING: no stop was seen. Use the emergency stop");
+    (!unseen.is_empty()).then(|| Line::from(text).style(look.bad().add_modifier(Modifier::REVERSED)))
 }
 
 fn title_line<'a>(app: &'a App, look: Look) -> Line<'a> {

@@ -38,6 +38,9 @@ pub(super) struct Node {
     /// which whoever has control has accepted.
     #[serde(default)]
     pub(super) accepted: bool,
+    /// It was told to stop and has not been seen to stand since.
+    #[serde(default)]
+    pub(super) stop_unseen: bool,
     pub(super) drive: Option<Drive>,
 }
 

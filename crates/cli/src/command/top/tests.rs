@@ -129,7 +129,9 @@ fn a_plot_shows_the_last_minute() {
 #[test]
 fn a_window_that_is_too_small_says_so_and_an_empty_bus_what_to_do() {
     let text = drawn(&app(), 60, 10).join(" ");
-    assert!(text.contains("too small: 60 x 10, and 80 x 24 are needed") && text.contains("SPACE stops all"), "{text}");
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains("too small: 60 x 10, and 80 x 24 are needed. Until then no key moves a drive"), "{text}");
+    assert!(text.starts_with("SPACE stops all, q quits"), "{text}");
     for (width, height) in [(1, 1), (80, 23), (79, 24), (2, 200)] {
         drawn(&app(), width, height);
     }
@@ -244,6 +246,55 @@ fn what_nothing_stops_is_asked_about_in_full_before_it_moves() {
     let refused = json!({ "ok": false, "error": { "kind": "unguarded", "message": "node 4 was not moved" } });
     assert!(app.answered(Some(4), &refused));
     assert_eq!(app.question, Some(4));
+}
+
+/// What cannot be seen is not moved: neither the drive nor the question about it is on the screen.
+#[test]
+fn in_a_terminal_that_is_too_small_keys_stop_and_quit_and_move_nothing() {
+    let held = |app: &mut App, from: u64| {
+        [from, from + 500, from + 533].map(|ms| app.key(key(KeyCode::Right), at(ms))).concat()
+    };
+    for goes_on in [true, false] {
+        let mut app = app();
+        let mut state = state();
+        state.nodes[0].goes_on = goes_on;
+        app.take(state);
+        for (columns, lines) in [(79, 24), (80, 23), (20, 5)] {
+            assert_eq!(app.resize(columns, lines, at(0)), []);
+            for code in ['e', 'd', 's', 'r', 'x', 'n', 't', 'y', '+', 'j', '?'] {
+                assert_eq!(app.key(key(KeyCode::Char(code)), at(10)), [], "{code}");
+            }
+            assert_eq!(held(&mut app, 2000), []);
+            assert_eq!((app.question, app.help, app.jog_rpm()), (None, false, 10.0));
+            assert_eq!(app.key(key(KeyCode::Esc), at(3000)), [say(json!({ "do": "stop_all" }))]);
+            assert_eq!(app.key(key(KeyCode::Char(' ')), at(3000)), [say(json!({ "do": "stop_all" }))]);
+            assert_eq!(app.key(key(KeyCode::Char('q')), at(3000)), [Action::Quit]);
+            let interrupt = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+            assert_eq!(app.key(interrupt, at(3000)), [Action::Quit]);
+        }
+        // With room again a key counts, and the question is asked.
+        assert_eq!(app.resize(80, 24, at(4000)), []);
+        let begun = held(&mut app, 5000);
+        assert_eq!((begun.is_empty(), app.question.is_some()), (goes_on, goes_on));
+        // A question that is no longer seen is not answered, and what is held ends.
+        let ends = if goes_on { vec![] } else { vec![say(json!({ "do": "jog_end", "node": 1 }))] };
+        assert_eq!(app.resize(60, 24, at(5540)), ends);
+        assert_eq!(app.key(key(KeyCode::Char('y')), at(5600)), []);
+        assert_eq!(app.question.is_some(), goes_on);
+    }
+}
+
+#[test]
+fn a_drive_whose_stop_was_not_seen_is_named_on_a_screen_of_any_size() {
+    let mut app = app();
+    let mut state = state();
+    state.nodes[2].stop_unseen = true;
+    app.take(state);
+    for (columns, lines) in [(80, 24), (200, 60), (40, 6)] {
+        let text = drawn(&app, columns, lines).join(" ");
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.starts_with("! NODE 9 MAY STILL BE MOVING: no stop was seen. Use the emergency stop"), "{text}");
+    }
 }
 
 #[test]
