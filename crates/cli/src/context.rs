@@ -272,8 +272,8 @@ impl Context {
     /// Says of which nodes there are two.
     pub(crate) fn tell_of_twins(&self) {
         let seen = self.network.seen();
-        for node in seen.iter().filter(|node| self.network.node(*node).facts().is_answered_twice()) {
-            self.tell(&master::core::answered_twice(node));
+        for (node, twins) in seen.iter().filter_map(|node| Some((node, self.network.node(node).facts().twins?))) {
+            self.tell(&master::core::two_devices(node, twins));
         }
     }
 

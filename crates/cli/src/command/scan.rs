@@ -3,6 +3,7 @@
 mod heard;
 
 use canopen::NmtState;
+use master::core::Twins;
 use master::identify::{Found, Knowledge};
 use serde::Serialize;
 use tokio::sync::broadcast::error::RecvError;
@@ -25,10 +26,6 @@ use testbench::models::{Description, how_to_say};
     after_help = "Examples:\n  ferrodrive --bus can0 scan\n  ferrodrive --bus can0 scan --model 4=zlac8030l --json"
 )]
 pub(crate) struct Scan {}
-
-/// What is said of a node whose requests are answered twice.
-const TWICE: &str = "two devices answer at this node-ID, and what is said here is of one or the other: switch one off, and give \
-                     the other a node-ID of its own (its switches, or ferrodrive lss scan)";
 
 /// Everybody found.
 #[derive(Debug, Serialize)]
@@ -119,8 +116,8 @@ impl Node {
             product_code: identity.product_code,
             revision_number: identity.revision_number,
             remark: found
-                .twice
-                .then(|| TWICE.to_owned())
+                .twins
+                .map(two_devices)
                 .or(contradiction)
                 .or_else(|| found.doubt().filter(|_| told.is_none()).map(|doubt| remark(found, doubt))),
         }
@@ -137,6 +134,14 @@ impl Node {
             (None, None) => "no heartbeat heard".into(),
         }
     }
+}
+
+/// What is said of a node-ID that two devices have.
+fn two_devices(twins: Twins) -> String {
+    format!(
+        "{twins}: two devices have this node-ID, and what is said here is of one or the other. Switch one off, and give the other \
+         a node-ID of its own (its switches, or ferrodrive lss scan)"
+    )
 }
 
 /// What speaks against the model that a node is said to be.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::Instant;
 use canopen::NodeId;
-use master::core::NodeSet;
+use master::core::{Event, NodeSet};
 use master::supervise::{EmcyRecord, Supervisor, SupervisorEvent};
 use master::units::parse_duration;
 use serde::Serialize;
@@ -89,7 +89,12 @@ impl Supervise {
             // What is watched had better be what was planned.
             return Err(failure);
         }
-        while context.network.poll_event().is_some() {}
+        while let Some((at, event)) = context.network.poll_event() {
+            // What the boot-up has not told.
+            if let Event::TwoDevices(..) = event {
+                format.print(&Told::new(at, &SupervisorEvent::Event(event))).map_err(Failure::not_printed)?;
+            }
+        }
         let mut supervisor = Supervisor::new(context.network.clone(), plan);
         context.progress.show("watching; Ctrl-C ends it");
         let mut words = words();

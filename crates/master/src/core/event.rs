@@ -7,6 +7,7 @@ use canopen::emcy::Emcy;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 
 use super::supervision::CycleLoss;
+use super::twins::Twins;
 use crate::host_loss::HostLoss;
 
 /// Something that happened on the bus and that a person may want to know. Pulled with [`super::Core::poll_event`].
@@ -24,8 +25,8 @@ pub enum Event {
     Emcy(NodeId, Emcy),
     /// A node did not answer an SDO request in this time.
     NoAnswer(NodeId, Mux, Duration),
-    /// SDO requests to a node are answered twice: there are two of it.
-    AnsweredTwice(NodeId),
+    /// Two devices have this node-ID.
+    TwoDevices(NodeId, Twins),
     /// A node aborted an SDO request.
     Aborted(NodeId, Mux, AbortCode),
     /// So many periods directly before this one had no SYNC.
@@ -51,7 +52,7 @@ impl fmt::Display for Event {
             Self::NoAnswer(node, mux, time) => {
                 write!(f, "node {node} did not answer about {mux} within {} ms", time.as_millis())
             }
-            Self::AnsweredTwice(node) => f.write_str(&answered_twice(*node)),
+            Self::TwoDevices(node, twins) => f.write_str(&two_devices(*node, *twins)),
             Self::CyclesMissed(1) => f.write_str("one cycle had no SYNC"),
             Self::CyclesMissed(cycles) => write!(f, "{cycles} cycles had no SYNC"),
             Self::SyncLost(time) => write!(f, "no SYNC for {} ms", time.as_secs_f64() * 1e3),
@@ -63,11 +64,11 @@ impl fmt::Display for Event {
     }
 }
 
-/// That SDO requests to a node are answered twice, and what to do.
-pub fn answered_twice(node: NodeId) -> String {
+/// That two devices have this node-ID, what speaks for it, and what to do.
+pub fn two_devices(node: NodeId, twins: Twins) -> String {
     format!(
-        "node {node}: one SDO request has two answers: two devices have this node-ID, and both act on what either is told. Switch \
-         one off, and give the other a node-ID of its own"
+        "node {node}: {twins}: two devices have this node-ID, and both act on what either is told. Switch one off, and give the \
+         other a node-ID of its own"
     )
 }
 

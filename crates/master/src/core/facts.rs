@@ -6,7 +6,7 @@ use canopen::emcy::Emcy;
 use canopen::{NmtCommand, NmtState};
 use devices::Description;
 
-use super::answers::ENOUGH;
+use super::twins::{Heartbeats, Twins};
 
 /// How many emergency messages are kept for each node.
 const EMCY_KEPT: usize = 8;
@@ -34,6 +34,9 @@ pub struct NodeFacts {
     pub told_at: Option<Instant>,
     /// SDO answers that no client had asked for.
     pub second_answers: u32,
+    /// Two devices have this node-ID: what first spoke for it.
+    pub twins: Option<Twins>,
+    pub(super) heartbeats: Heartbeats,
     emcys: VecDeque<(Instant, Emcy)>,
 }
 
@@ -49,9 +52,16 @@ pub struct HeartbeatWatch {
 }
 
 impl NodeFacts {
-    /// Two devices answer under this node-ID: more requests than one have had two answers.
-    pub const fn is_answered_twice(&self) -> bool {
-        self.second_answers >= ENOUGH
+    /// The shortest time between two of its last heartbeats: less than its period where there are two devices.
+    pub fn shortest_heartbeat_interval(&self) -> Option<Duration> {
+        self.heartbeats.shortest()
+    }
+
+    /// Notes what speaks for two devices; true if that is new.
+    pub(super) fn note_twins(&mut self, twins: Twins) -> bool {
+        let is_new = self.twins.is_none();
+        self.twins.get_or_insert(twins);
+        is_new
     }
 
     /// The emergency messages kept, oldest first, with the time each came.

@@ -22,6 +22,7 @@ mod receive;
 mod request;
 mod supervision;
 mod timers;
+mod twins;
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -31,7 +32,7 @@ use canopen::connection_set::Service;
 use canopen::{Mux, NodeId};
 
 pub use cycle::Cycle;
-pub use event::{Event, answered_twice};
+pub use event::{Event, two_devices};
 pub use facts::{HeartbeatWatch, NodeFacts};
 pub(crate) use field::bits_of;
 pub use field::{Field, NumberForm, Sample, SetPoint, Signal};
@@ -42,6 +43,7 @@ pub use pdo_map::PdoMap;
 pub use request::{Command, Failure, Finished, Outcome, Request, Ticket, Transfer};
 pub use supervision::CycleLoss;
 pub(crate) use supervision::{Cadence, CycleRules, WatchId};
+pub use twins::Twins;
 
 use answers::Answers;
 use channel::Channel;
@@ -370,6 +372,7 @@ impl Station for Core {
             // Another client's: the answer to it is not ours.
             Some(Service::SdoRequest(node)) => return self.member_mut(node).answers.asked(frame, now),
             Some(Service::Sync) => return self.handle_sync(),
+            Some(Service::Nmt) => return self.handle_nmt(frame),
             _ => return,
         };
         self.member_mut(node).facts.seen_at = Some(now);

@@ -13,7 +13,9 @@ impl Core {
     pub(super) fn send_nmt(&mut self, target: NmtTarget, command: NmtCommand) {
         let now = self.now;
         for node in NodeId::all().filter(|node| target.includes(*node)) {
-            self.member_mut(node).facts.nmt_sent = Some((now, command));
+            let facts = &mut self.member_mut(node).facts;
+            facts.nmt_sent = Some((now, command));
+            facts.heartbeats.commanded();
         }
         self.push_frame(NmtRequest::new(command, target).emit());
     }

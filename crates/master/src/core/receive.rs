@@ -1,12 +1,14 @@
 use can::Frame;
 use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
+use canopen::nmt::NmtRequest;
 use canopen::{Mux, NmtState, NodeId};
 
 use super::Core;
 use super::answers::ENOUGH;
 use super::event::Event;
 use super::request::{Failure, Outcome};
+use super::twins::Twins;
 
 /// What a node's frames change.
 impl Core {
@@ -35,7 +37,7 @@ impl Core {
         if let Some(second) = member.answers.answered(frame, now) {
             member.facts.second_answers = second;
             if second == ENOUGH {
-                self.events.push(Event::AnsweredTwice(node), now);
+                self.note_twins(node, Twins::Answers);
             }
         }
         if self.busy.contains(node) {
@@ -50,6 +52,10 @@ impl Core {
         let Some(state) = Heartbeat::parse(frame).and_then(Heartbeat::nmt_state) else { return };
         let facts = &mut self.member_mut(node).facts;
         let before = facts.nmt_state.replace(state);
+        let twins = match state {
+            NmtState::Initialising => facts.heartbeats.booted(now),
+            state => facts.heartbeats.heard(state, now),
+        };
         let back = facts.note_heartbeat(state, now);
         let deadline = facts.heartbeat_watch.and_then(|watch| watch.deadline);
         if state == NmtState::Initialising {
@@ -60,9 +66,26 @@ impl Core {
         if back {
             self.events.push(Event::HeartbeatBack(node), now);
         }
+        if let Some(twins) = twins {
+            self.note_twins(node, twins);
+        }
         if let Some(deadline) = deadline {
             self.heartbeat_check = self.heartbeat_check.min(deadline);
             self.due = self.due.min(deadline);
+        }
+    }
+
+    fn note_twins(&mut self, node: NodeId, twins: Twins) {
+        if self.member_mut(node).facts.note_twins(twins) {
+            self.events.push(Event::TwoDevices(node, twins), self.now);
+        }
+    }
+
+    /// Another master commands a state: the heartbeats that follow say so.
+    pub(super) fn handle_nmt(&mut self, frame: &Frame) {
+        let Ok(NmtRequest { target, .. }) = NmtRequest::parse(frame) else { return };
+        for node in NodeId::all().filter(|node| target.includes(*node)) {
+            self.member_mut(node).facts.heartbeats.commanded();
         }
     }
 

@@ -7,15 +7,15 @@ use canopen::pdo::Direction;
 use devices::HostWatch;
 
 use super::finding::{Finding, Topic, cause, warning};
-use super::observed::HEARTBEAT_TIME;
 use super::observed::Observed;
+use crate::core::Twins;
 
 const TOPIC: Topic = Topic::Communication;
 
 pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
     findings.extend(silent(seen));
     if seen.silence.is_none() {
-        findings.extend(answered_twice(seen).or_else(|| heartbeat(seen)));
+        findings.extend(two_devices(seen).or_else(|| heartbeat(seen)));
         findings.extend(other_master(seen));
         findings.extend(nmt_by_other(seen));
         findings.extend(host_watch(seen));
@@ -47,20 +47,17 @@ fn silent(seen: &Observed) -> Option<Finding> {
     Some(cause(TOPIC, "no_answer", [expected, error.to_string(), follows, remedy]))
 }
 
-/// A server answers each request once (CiA 301, 7.2.4.3).
-fn answered_twice(seen: &Observed) -> Option<Finding> {
-    seen.answered_twice.then(|| {
-        warning(
-            TOPIC,
-            "node_twice",
-            [
-                "One answer to each SDO request".to_owned(),
-                "Two to one request".to_owned(),
-                format!("Two devices answer as node {}: both act on what either is told", seen.node),
-                TWO_DEVICES.to_owned(),
-            ],
-        )
-    })
+/// What a device sends once comes twice.
+fn two_devices(seen: &Observed) -> Option<Finding> {
+    let twins = seen.twins?;
+    let expected = match twins {
+        Twins::Answers => "One answer to each SDO request (CiA 301, 7.2.4.3)",
+        Twins::BootUps => "One boot-up message after a start (CiA 301, 7.2.8.3.3)",
+        Twins::States(..) => "Heartbeats that say one state until a command changes it (CiA 301, 7.2.8.3.2)",
+        Twins::Rhythm(..) => "One heartbeat each period (CiA 301, 7.2.8.3.2)",
+    };
+    let follows = format!("Two devices have the node-ID {}: both act on what either is told", seen.node);
+    Some(warning(TOPIC, "node_twice", [expected.to_owned(), twins.to_string(), follows, TWO_DEVICES.to_owned()]))
 }
 
 /// What to do about two devices with one node-ID.
@@ -69,8 +66,8 @@ const TWO_DEVICES: &str =
 
 /// 1017h says how often one should come.
 fn heartbeat(seen: &Observed) -> Option<Finding> {
-    let period_ms = seen.value(HEARTBEAT_TIME).filter(|time| *time > 0)? as u64;
-    let (period, listened) = (Duration::from_millis(period_ms), seen.heard.listened());
+    let (period, listened) = (seen.heartbeat_period()?, seen.heard.listened());
+    let period_ms = period.as_millis() as u64;
     let heard = seen.heard.heartbeats(seen.node).map_or(0, |heard| heard.count);
     let most = listened.as_millis() as u64 / period_ms + 2;
     let expected = format!("A heartbeat every {period_ms} ms (1017h:00)");

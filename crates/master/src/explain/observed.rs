@@ -8,6 +8,7 @@ use devices::faults::FaultRow;
 use devices::{AxisDescription, Description, HostWatch, Meaning, PowerStyle, Quantity, Terminals};
 
 use super::overheard::Overheard;
+use crate::core::Twins;
 use crate::decode::common_row;
 use crate::drive::{Drive, faults_in};
 use crate::error::Error;
@@ -94,14 +95,20 @@ pub struct Observed {
     pub pdos: Vec<(PdoConfig, CobId)>,
     /// This master said something to it within this time before it was looked at.
     pub talked_to: Option<Duration>,
-    /// Its SDO requests have two answers.
-    pub answered_twice: bool,
+    /// What speaks for two devices with its node-ID.
+    pub twins: Option<Twins>,
     /// What others sent.
     pub heard: Overheard,
     values: BTreeMap<Mux, i64>,
 }
 
 impl Observed {
+    /// How often it sends a heartbeat by its own word, if it does.
+    pub(super) fn heartbeat_period(&self) -> Option<Duration> {
+        let ms = u64::try_from(self.value(HEARTBEAT_TIME)?).ok().filter(|ms| *ms > 0)?;
+        Some(Duration::from_millis(ms))
+    }
+
     /// Reads what the rules want to know. A refused object is left out; silence ends the reading and is told.
     pub async fn of(drive: &Drive, heard: &Overheard) -> Self {
         let (facts, now) = (drive.node().facts(), drive.node().network().now());
@@ -123,11 +130,15 @@ impl Observed {
             rates_of_zero: Vec::new(),
             pdos: Vec::new(),
             talked_to: facts.talked_to_at.map(|at| now - at),
-            answered_twice: facts.is_answered_twice(),
+            twins: facts.twins,
             heard: heard.clone(),
             values: BTreeMap::new(),
         };
         seen.silence = seen.read(drive).await.err();
+        if let Some(period) = seen.heartbeat_period() {
+            drive.node().look_for_twins(period).await;
+            seen.twins = drive.node().facts().twins;
+        }
         seen
     }
 

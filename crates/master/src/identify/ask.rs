@@ -5,7 +5,7 @@ use canopen::{AbortCode, Mux, NmtState, NodeId};
 use devices::Description;
 
 use super::knowledge::{Guess, Identity, Knowledge, names};
-use crate::core::Payload;
+use crate::core::{Payload, Twins};
 use crate::error::Error;
 use crate::models::Models;
 use crate::network::{Network, Node, join_all};
@@ -45,8 +45,8 @@ pub struct Found {
     pub knowledge: Knowledge,
     /// The models that answer so. More than one: it cannot be told which by its identity.
     pub models: Vec<&'static Description>,
-    /// Its requests are answered twice: two devices have this node-ID, and what is said here is of one or the other.
-    pub twice: bool,
+    /// What speaks for two devices with this node-ID: what is said here is of one or the other.
+    pub twins: Option<Twins>,
 }
 
 impl Found {
@@ -181,21 +181,27 @@ impl Network {
         found
     }
 
-    /// Waits for the first heartbeat of those that have sent none since `began` and soon will, and puts down what all have
-    /// said by then: a node that beats more slowly than the scan looks is not silent.
+    /// Waits for one and a half heartbeat periods of each node since `began`, and puts down what all have said by then: a node
+    /// that beats more slowly than the scan looks is not silent, and two with one node-ID both come to a heartbeat.
     async fn hear_heartbeats(&self, found: &mut [Found], began: Instant) {
         let passed = self.now() - began;
-        let due = found.iter().filter(|found| found.nmt_state.is_none()).filter_map(|found| {
+        let due = found.iter().filter_map(|found| {
             let period = found.heartbeat.filter(|period| !period.is_zero() && *period <= HEARTBEAT_PATIENCE)?;
-            let left = (period + HEARTBEAT_JITTER).saturating_sub(passed);
-            Some(self.node(found.node).wait(|node| node.facts.heartbeat_at, left))
+            Some(self.hear_heartbeats_of(found.node, period, passed))
         });
-        let _ = join_all(due.collect::<Vec<_>>()).await;
+        join_all(due.collect::<Vec<_>>()).await;
         for found in found {
             let facts = self.facts(found.node);
             found.nmt_state = facts.probable_state(found.knowledge.description());
-            found.twice = facts.is_answered_twice();
+            found.twins = facts.twins;
         }
+    }
+
+    async fn hear_heartbeats_of(&self, id: NodeId, period: Duration, passed: Duration) {
+        let node = self.node(id);
+        let left = (period * 3 / 2 + HEARTBEAT_JITTER).saturating_sub(passed);
+        let _ = node.wait(|node| node.facts.twins, left).await;
+        node.look_for_twins(period).await;
     }
 
     async fn look_at(&self, id: NodeId, timeout: Duration) -> Option<Found> {
@@ -214,7 +220,7 @@ impl Network {
         };
         let heartbeat = heartbeat.map(|ms| Duration::from_millis(u64::from(ms) & 0xFFFF));
         let nmt_state = facts.probable_state(knowledge.description());
-        Some(Found { node: id, identity, nmt_state, heartbeat, knowledge, models, twice: false })
+        Some(Found { node: id, identity, nmt_state, heartbeat, knowledge, models, twins: None })
     }
 }
 

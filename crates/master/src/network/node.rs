@@ -139,6 +139,15 @@ impl Node {
         booted.await
     }
 
+    /// Where its heartbeats came closer to each other than this period of theirs allows, waits until it is known whether two devices
+    /// have this node-ID: one whose heartbeat was only late is in time again, what two send takes three periods.
+    pub(crate) async fn look_for_twins(&self, period: Duration) {
+        let is_close = |shortest: Duration| shortest < period * 3 / 4;
+        if self.facts().shortest_heartbeat_interval().is_some_and(is_close) {
+            let _ = self.wait(|node| node.facts.twins, 3 * period).await;
+        }
+    }
+
     /// Waits until `condition` gives a value, looking whenever something is heard of the node.
     pub fn wait<T, F>(&self, condition: F, timeout: Duration) -> Wait<F>
     where

@@ -37,7 +37,7 @@ impl SupervisorEvent {
             Self::Event(Event::NmtState(..)) => "nmt_state",
             Self::Event(Event::HeartbeatLost(..)) => "heartbeat_lost",
             Self::Event(Event::HeartbeatBack(_)) => "heartbeat_back",
-            Self::Event(Event::AnsweredTwice(_)) => "node_twice",
+            Self::Event(Event::TwoDevices(..)) => "node_twice",
             Self::Event(_) => "event",
             Self::Emcy(_) => "emcy",
             Self::Held(_) => "heartbeat_held",
@@ -56,7 +56,7 @@ impl SupervisorEvent {
                 | Event::NmtState(node, _)
                 | Event::HeartbeatLost(node, _)
                 | Event::HeartbeatBack(node)
-                | Event::AnsweredTwice(node)
+                | Event::TwoDevices(node, _)
                 | Event::Emcy(node, _)
                 | Event::CyclicStopped(node, _)
                 | Event::Unguarded(node, _),

@@ -4,7 +4,7 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use crate::support::{mux, node};
+use crate::support::{StoppedTwin, mux, node};
 use can::{Bitrate, CanId, Frame, Instant, Station};
 use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
 use canopen::{Mux, NmtCommand, NodeId};
@@ -500,6 +500,18 @@ fn another_master_is_seen() {
         assert!(rules(&explained).contains(&"nmt_by_other"), "{name}: {:?}", rules(&explained));
         assert!(!rules(&explained).contains(&"other_master"), "{name}: {:?}", rules(&explained));
     }
+}
+
+#[test]
+fn a_stopped_device_with_the_node_id_of_another_is_seen_by_its_heartbeats() {
+    let mut bench = Bench::new("cia402");
+    bench.write(mux(0x1017, 0), 1000);
+    let from = bench.world.now() + Duration::from_millis(300);
+    bench.world.add_station(StoppedTwin::of(4, from));
+    let explained = bench.explain();
+    assert!(rules(&explained).contains(&"node_twice"), "{:?}", rules(&explained));
+    let finding = explained.findings.iter().find(|finding| finding.rule == "node_twice").unwrap();
+    assert!(finding.found.contains("in turn, without a command"), "{finding:?}");
 }
 
 #[test]

@@ -6,8 +6,8 @@ use std::time::Duration;
 use crate::support::toy::Toy;
 use crate::support::{Bus, mux, node};
 use can::Instant;
-use canopen::AbortCode;
-use master::core::Event;
+use canopen::{AbortCode, NmtState};
+use master::core::{Event, Twins};
 use master::{Error, join_all};
 
 const DEVICE_TYPE: canopen::Mux = mux(0x1000, 0);
@@ -120,9 +120,9 @@ fn two_devices_with_one_node_id_are_noticed_by_their_answers() {
     let mut bus = Bus::new(vec![one.clone(), other]);
     let network = bus.network.clone();
     let found = bus.block_on(network.scan(Duration::from_millis(50), |_| {}));
-    assert!(found.len() == 1 && found[0].twice, "{found:?}");
+    assert!(found.len() == 1 && found[0].twins == Some(Twins::Answers), "{found:?}");
     let events: Vec<Event> = std::iter::from_fn(|| network.poll_event()).map(|(_, event)| event).collect();
-    let twice: Vec<_> = events.iter().filter(|event| **event == Event::AnsweredTwice(node(4))).collect();
+    let twice: Vec<_> = events.iter().filter(|event| **event == Event::TwoDevices(node(4), Twins::Answers)).collect();
     assert_eq!(twice.len(), 1, "told once: {events:?}");
     // One device, asked by this master and by another.
     let mut bus = Bus::new(vec![one]);
@@ -133,7 +133,35 @@ fn two_devices_with_one_node_id_are_noticed_by_their_answers() {
         assert!(bus.block_on(network.node(node(4)).read::<u32>(DEVICE_TYPE)).is_ok());
     }
     assert_eq!(network.node(node(4)).facts().second_answers, 0);
-    assert!(!bus.block_on(network.scan(Duration::from_millis(50), |_| {}))[0].twice);
+    assert_eq!(bus.block_on(network.scan(Duration::from_millis(50), |_| {}))[0].twins, None);
+}
+
+/// One of the two is stopped and answers no SDO, or both answer the same at the same time: heartbeats and boot-ups tell.
+#[test]
+fn two_devices_with_one_node_id_are_noticed_by_what_they_send() {
+    let toy = Toy::new(4).u32(0x1000, 0, 0x0004_0192).u16(0x1017, 0, 1000);
+    // From 5 s on, when the bus begins.
+    let every = |phase: u64, data: &str| {
+        let frame: can::Frame = format!("704#{data}").parse().unwrap();
+        (0..20).map(move |n| (Instant::from_millis(5000 + phase + n * 1000), frame)).collect::<Vec<_>>()
+    };
+    let stopped = every(300, "04");
+    let ms = Duration::from_millis;
+    for (noise, twins) in [
+        (every(200, "05"), None),
+        ([every(200, "05"), stopped].concat(), Some(Twins::States(NmtState::Stopped, NmtState::Operational))),
+        ([every(200, "05"), every(250, "05")].concat(), Some(Twins::Rhythm(ms(50), ms(950)))),
+        (vec![every(200, "00")[0], every(203, "00")[0]], Some(Twins::BootUps)),
+    ] {
+        let mut bus = Bus::new(vec![toy.clone()]);
+        bus.noise = noise;
+        bus.settle();
+        let network = bus.network.clone();
+        let found = bus.block_on(network.scan(Duration::from_millis(50), |_| {}));
+        assert_eq!(found[0].twins, twins, "{found:?}");
+        let limit = if twins.is_some() { 5000 } else { 1700 };
+        assert!(bus.now < Instant::from_millis(5000 + limit), "{twins:?} at {}", bus.now);
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use crate::support::node;
+use crate::support::{StoppedTwin, node};
 use can::Bitrate;
 use canopen::{NmtState, NodeId};
 use devices::model;
@@ -264,4 +264,21 @@ fn a_guard_of_a_program_that_moves_a_drive_is_left_as_it_is() {
     bench.watch(Duration::from_secs(3));
     assert_eq!(bench.network.guarded(node(SERVO)), Some(loss));
     assert!(bench.told.is_empty(), "{:?}", bench.told);
+}
+
+#[test]
+fn a_second_device_with_a_node_id_is_told_of_once_by_its_heartbeats() {
+    let mut bench = Bench::new();
+    bench.watch(Duration::from_secs(20));
+    assert!(!bench.kinds().contains(&("node_twice", Some(SERVO))), "{:?}", bench.told);
+    let from = bench.world.now() + Duration::from_millis(1);
+    bench.world.add_station(StoppedTwin::of(SERVO.into(), from));
+    let said = bench.watch(Duration::from_secs(20));
+    assert_eq!(bench.kinds().iter().filter(|kind| **kind == ("node_twice", Some(SERVO))).count(), 1, "{said:?}");
+    assert!(
+        said.iter().any(|said| said.contains("in turn, without a command: two devices have this node-ID")),
+        "{said:?}"
+    );
+    let of_others = bench.kinds().iter().filter(|(kind, _)| *kind == "node_twice").count();
+    assert_eq!(of_others, 1, "{:?}", bench.kinds());
 }

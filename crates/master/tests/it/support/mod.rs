@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Poll, Wake, Waker};
 
-use can::{Frame, Instant, Station};
+use can::{CanId, Frame, Instant, Station};
 use canopen::{Mux, NodeId};
 use master::Network;
 use toy::Toy;
@@ -129,6 +129,40 @@ struct Flag(AtomicBool);
 impl Wake for Flag {
     fn wake(self: Arc<Self>) {
         self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A device that is stopped (CiA 301, 7.3.2.2.4: it answers no SDO) and sends the heartbeats of a node-ID that another one has, each
+/// second.
+#[derive(Clone)]
+pub(crate) struct StoppedTwin {
+    pub(crate) id: u16,
+    pub(crate) due: Instant,
+    pub(crate) frame: Option<Frame>,
+}
+
+impl StoppedTwin {
+    pub(crate) fn of(id: u16, from: Instant) -> Self {
+        Self { id, due: from, frame: None }
+    }
+}
+
+impl Station for StoppedTwin {
+    fn handle_frame(&mut self, _: &Frame, _: Instant) {}
+
+    fn handle_timeout(&mut self, now: Instant) {
+        if now >= self.due {
+            self.due += std::time::Duration::from_secs(1);
+            self.frame = Some(Frame::new(CanId::standard(0x700 + self.id), &[0x04]));
+        }
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        self.frame.take()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        Some(self.due)
     }
 }
 
