@@ -8,7 +8,7 @@ use master::Drive;
 use master::core::CycleLoss;
 use master::cyclic::{CyclicOptions, Refusal};
 use master::plan::NodeTraffic;
-use testbench::machine_file::{CyclePlan, TOLERANCE, too_full_at};
+use testbench::machine_file::{CyclePlan, Machine, TOLERANCE, TooFull, too_full_at};
 
 use super::studio::bitrate;
 use crate::context::Context;
@@ -45,21 +45,46 @@ const DRIVE_BITS: u64 = 2 * 135;
 
 /// Refuses a cycle that does not fit the bus, before anything is written. Where nobody says the bit rate nothing is refused.
 pub(super) async fn refuse_too_full(context: &Context, cycle: &CyclePlan, drives: &[&Drive]) -> Result<(), Failure> {
-    let Some(bitrate) = bitrate(context) else { return Ok(()) };
+    let full = too_full(context, cycle, drives, |read| read).await?;
+    full.map_or(Ok(()), |full| Err(refusal(cycle, full.what, full.next)))
+}
+
+/// The same of what a machine file has moved in cycles, once its drives are set up as it says: whoever boots them hears it before.
+/// A drive that cannot be asked is the boot-up's business.
+pub(super) async fn refuse_too_full_cycles(context: &Context, machine: &Machine) -> Result<(), Failure> {
+    for cycle in machine.cycles() {
+        let drives: Vec<_> = cycle.nodes.iter().map(|(node, _)| machine.drive(context.node(*node))).collect();
+        let drives: Vec<_> = drives.iter().collect();
+        if let Ok(Some(full)) = too_full(context, &cycle, &drives, |read| machine.set_up(read)).await {
+            return Err(refusal(&cycle, format!("{}: {}", cycle.what, full.what), full.next));
+        }
+    }
+    Ok(())
+}
+
+async fn too_full(
+    context: &Context,
+    cycle: &CyclePlan,
+    drives: &[&Drive],
+    set_up: impl Fn(NodeTraffic) -> NodeTraffic,
+) -> Result<Option<TooFull>, Failure> {
+    let Some(bitrate) = bitrate(context) else { return Ok(None) };
     let most_ns = (SYNC_BITS + DRIVE_BITS * drives.len() as u64) * bitrate.bit_nanos();
     if Duration::from_nanos(most_ns) <= cycle.period {
         // It fits in any case: nobody need be asked.
-        return Ok(());
+        return Ok(None);
     }
     let mut nodes = Vec::new();
     for drive in drives {
-        let read = NodeTraffic::of(drive).await?;
+        let read = set_up(NodeTraffic::of(drive).await?);
         nodes.push(cycle.traffic(drive, read).map_err(|error| Failure::new(error.to_string()).of_kind("group"))?);
     }
-    too_full_at(&nodes, cycle.period, bitrate).map_or(Ok(()), |full| {
-        let failure = Failure::new(full.what).of_kind("bus_load").next(full.next);
-        Err(failure.next(format!("ferrodrive plan --cycle {}us shows each frame", cycle.period.as_micros())))
-    })
+    Ok(too_full_at(&nodes, cycle.period, bitrate))
+}
+
+fn refusal(cycle: &CyclePlan, what: String, next: String) -> Failure {
+    let shown = format!("ferrodrive plan --cycle {}us shows each frame", cycle.period.as_micros());
+    Failure::new(what).of_kind("bus_load").next(next).next(shown)
 }
 
 /// How a drive that did not become enabled is asked why.

@@ -49,6 +49,11 @@ fn plan_check_and_group_say_the_same_of_a_cycle() {
         let beats = plan["frames"].as_array().unwrap().iter().find(|row| row["frame"] == "heartbeat").unwrap();
         assert_eq!((beats["every_us"].as_f64(), &plan["moved"]), (Some(200_000.0), &"group 'arm'".into()));
         if fits {
+            assert_ne!(
+                ferrodrive(&["--json", "boot", &file, "--reset"]).json()["error"]["kind"],
+                "bus_load",
+                "{period}"
+            );
             continue;
         }
         // The cause, the period that fits and nothing that only a programmer knows; and nothing was written or moved.
@@ -59,6 +64,15 @@ fn plan_check_and_group_say_the_same_of_a_cycle() {
         assert!(finding["next"].as_str().unwrap().contains("1.5 ms"), "{finding}");
         assert_eq!(moved.json()["error"]["kind"], "bus_load");
         assert!(next_of(&moved).contains("1.5 ms") && !moved.out.contains("::"), "{}", moved.out);
+        // Whoever boots the machine hears the same before.
+        for command in [&["boot", &file][..], &["boot", &file, "--reset"], &["supervise", &file, "--for", "1s"]] {
+            let booted = ferrodrive(&[&["--json", "--log", log.to_str().unwrap()], command].concat());
+            let error = &booted.json()["error"];
+            assert_eq!((booted.status, &error["kind"]), (Some(1), &"bus_load".into()), "{command:?}: {}", booted.out);
+            let what = error["message"].as_str().unwrap();
+            assert!(what.contains("group 'arm': a cycle of 1") && what.contains("does not fit the bus"), "{what}");
+            assert!(next_of(&booted).contains("1.5 ms"), "{}", booted.out);
+        }
         let log = std::fs::read_to_string(&log).unwrap();
         let data = |line: &str| line.split(' ').nth(2).map(str::to_owned).unwrap_or_default();
         let writes = |frame: &str| frame.starts_with('6') && frame.as_bytes().get(4) == Some(&b'2');

@@ -11,6 +11,8 @@ pub enum Encoding {
     Utf8WithMark,
     /// ISO 8859-1: one byte a letter.
     Latin1,
+    /// The same behind the byte order mark of UTF-8: a tool put it before what it did not translate.
+    Latin1WithMark,
 }
 
 impl Encoding {
@@ -21,6 +23,7 @@ impl Encoding {
             Self::Utf8 => "UTF-8",
             Self::Utf8WithMark => "UTF-8 with a byte order mark",
             Self::Latin1 => "Latin-1",
+            Self::Latin1WithMark => "Latin-1 with a byte order mark of UTF-8",
         }
     }
 
@@ -29,7 +32,7 @@ impl Encoding {
         match self {
             Self::Ascii => letter.is_ascii(),
             Self::Utf8 | Self::Utf8WithMark => true,
-            Self::Latin1 => letter as u32 <= 0xFF,
+            Self::Latin1 | Self::Latin1WithMark => letter as u32 <= 0xFF,
         }
     }
 }
@@ -41,15 +44,18 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(Encoding, String), Refusal> {
         let reason = "the file is text of 16-bit characters (UTF-16)";
         return Err(Refusal::new(1, reason, "save it as UTF-8 or Latin-1 text"));
     }
-    if let Some(rest) = bytes.strip_prefix(MARK)
-        && let Ok(text) = str::from_utf8(rest)
-    {
-        return Ok((Encoding::Utf8WithMark, text.to_owned()));
+    let latin_1 = |bytes: &[u8]| bytes.iter().map(|byte| char::from(*byte)).collect();
+    if let Some(rest) = bytes.strip_prefix(MARK) {
+        // What stands behind a mark begins behind it, however it is coded: its first line is the first section.
+        return Ok(match str::from_utf8(rest) {
+            Ok(text) => (Encoding::Utf8WithMark, text.to_owned()),
+            Err(_) => (Encoding::Latin1WithMark, latin_1(rest)),
+        });
     }
     match str::from_utf8(bytes) {
         Ok(text) if text.is_ascii() => Ok((Encoding::Ascii, text.to_owned())),
         Ok(text) => Ok((Encoding::Utf8, text.to_owned())),
-        Err(_) => Ok((Encoding::Latin1, bytes.iter().map(|byte| char::from(*byte)).collect())),
+        Err(_) => Ok((Encoding::Latin1, latin_1(bytes))),
     }
 }
 
@@ -57,7 +63,12 @@ pub(super) fn encode(encoding: Encoding, text: &str) -> Vec<u8> {
     match encoding {
         Encoding::Ascii | Encoding::Utf8 => text.as_bytes().to_vec(),
         Encoding::Utf8WithMark => [MARK, text.as_bytes()].concat(),
-        // Each letter came from a byte, or was checked before it was put in.
-        Encoding::Latin1 => text.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap_or(b'?')).collect(),
+        Encoding::Latin1 => one_byte_each(text),
+        Encoding::Latin1WithMark => [MARK, &one_byte_each(text)].concat(),
     }
+}
+
+/// Each letter came from a byte, or was checked before it was put in.
+fn one_byte_each(text: &str) -> Vec<u8> {
+    text.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap_or(b'?')).collect()
 }

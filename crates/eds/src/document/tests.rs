@@ -11,13 +11,14 @@ fn document(text: &str) -> Document {
 
 #[test]
 fn bytes_come_back_as_they_were_read() {
-    let files: [&[u8]; 8] = [
+    let files: [&[u8]; 9] = [
         SMALL.as_bytes(),
         b"",
         b"\n\n",
         b"[a\nb\n=c\n[ d ]  e\nf=g",
         b"\xEF\xBB\xBF[a]\nb=\xC3\xA4\n",
         b"[a]\nb=\xE4\xFF\n",
+        b"\xEF\xBB\xBF[a]\nb=\xE4\xFF\n",
         b"[a]\rb=c\rd=e",
         b"\r\r\n[a]\r\r\nb=1\r\r\n",
     ];
@@ -54,6 +55,19 @@ fn a_heading_with_blanks_or_without_an_end_is_a_section() {
 fn latin_1_is_read_as_such() {
     let document = Document::parse(b"[a]\nb=gr\xFC\xDF\n").expect("small");
     assert_eq!((document.encoding(), document.value("a", "b")), (Encoding::Latin1, Some("gr\u{fc}\u{df}")));
+}
+
+/// A byte order mark is no part of the first line, whatever follows.
+#[test]
+fn a_byte_order_mark_hides_no_section() {
+    for (bytes, encoding, value) in [
+        (&b"\xEF\xBB\xBF[a]\nb=c\n"[..], Encoding::Utf8WithMark, "c"),
+        (b"\xEF\xBB\xBF[a]\nb=gr\xC3\xBC\xC3\x9F\n", Encoding::Utf8WithMark, "gr\u{fc}\u{df}"),
+        (b"\xEF\xBB\xBF[a]\nb=gr\xFC\xDF\n", Encoding::Latin1WithMark, "gr\u{fc}\u{df}"),
+    ] {
+        let document = Document::parse(bytes).expect("small");
+        assert_eq!((document.encoding(), document.value("a", "b")), (encoding, Some(value)), "{bytes:?}");
+    }
 }
 
 #[test]

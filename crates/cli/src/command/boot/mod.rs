@@ -22,8 +22,8 @@ pub(crate) use report::BootReport;
 /// Each node is reset, asked for its identity, configured, watched by its heartbeat and started, in the order of CiA 302-2; each step
 /// says what it expected and found, and a node that fails has the standard's letter. What is expected is said by the file: a
 /// machine file, or the DCF of a CANopen manager (1F80h to 1F8Ah, 1F22h). Without one, whoever is on the bus is booted as what it says that
-/// it is. A node that is operational is left as it is, unless --reset is given. No motor is moved. Ends with status 1 if a
-/// mandatory node has failed, or if one that was left as it is does not have what the file says.
+/// it is. A node that is operational is left as it is, unless --reset is given. No motor is moved. A machine file
+/// whose group or base has a cycle that the bus cannot carry is refused before. Ends with status 1 if a mandatory node has failed, or if one that was left as it is does not have what the file says.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive boot examples/machine.toml\n  \

@@ -8,6 +8,7 @@ use eds::{Eds, Value};
 use master::boot::{BootPlan, Expectation};
 use testbench::machine_file::Machine;
 
+use crate::command::cycles::refuse_too_full_cycles;
 use crate::command::eds::source;
 use crate::context::Context;
 use crate::failure::Failure;
@@ -47,10 +48,13 @@ impl Planned {
         }
     }
 
-    /// The plan, for these nodes alone if there are any.
+    /// The plan, for these nodes alone if there are any. A machine whose cycles its bus cannot carry is refused before.
     pub(crate) async fn plan(&self, context: &Context, only: &[NodeId]) -> Result<BootPlan, Failure> {
         let mut plan = match self {
             Self::Machine(_, machine) => {
+                if only.is_empty() {
+                    refuse_too_full_cycles(context, machine).await?;
+                }
                 let chosen = |(node, model)| {
                     let expectation = Expectation::of(context.told_model(node).unwrap_or(model));
                     (node, Expectation { configuration: machine.configuration(node), ..expectation })
