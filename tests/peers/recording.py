@@ -7,7 +7,7 @@ import tempfile
 import time
 
 from ferrodrive import Simulator
-from mcap.reader import make_reader
+from mcap.reader import NonSeekingReader, make_reader
 
 from checks import check, equal, true
 from drive import ALL
@@ -27,12 +27,20 @@ def records(bench):
             told = simulator.world(f"{node_id} get")
             simulator.quit()
         with open(path, "rb") as file:
-            reader = make_reader(file)
+            reader = make_reader(file, validate_crcs=True)
             summary = reader.get_summary()
             topics = {channel.topic: channel for channel in summary.channels.values()}
             counts = {topic: summary.statistics.channel_message_counts[it.id] for topic, it in topics.items()
                       if it.id in summary.statistics.channel_message_counts}
             messages = [(channel.topic, message) for _, channel, message in reader.iter_messages()]
+            later = [message.log_time for _, _, message in reader.iter_messages(starting_at=1_500_000_000)]
+            file.seek(0)
+            # From its begin to its end, without the index, each check sum on the way.
+            straight = NonSeekingReader(file, validate_crcs=True)
+            equal(sum(1 for _ in straight.iter_messages()), len(messages), "messages without the index")
+        equal({chunk.compression for chunk in summary.chunk_indexes}, {"lz4"}, "compression")
+        equal(later, [message.log_time for _, message in messages if message.log_time >= 1_500_000_000],
+              "messages after 1.5 s, by the index")
         equal(sorted(topics), ["/can", "/events", f"/node/{node_id}"], "topics")
         schema = json.loads(summary.schemas[topics[f"/node/{node_id}"].schema_id].data)
         equal(schema["properties"]["velocity_rpm"]["unit"], "r/min", "unit of the speed")

@@ -54,9 +54,9 @@ pub(crate) fn read_bounded(path: &Path, limit: u64) -> io::Result<Option<Vec<u8>
     Ok(Some(bytes))
 }
 
-/// A file that did not exist, to be written.
+/// A file that did not exist, to be written and read.
 pub(crate) fn create_new(path: &Path) -> io::Result<File> {
-    OpenOptions::new().write(true).create_new(true).open(path)
+    OpenOptions::new().read(true).write(true).create_new(true).open(path)
 }
 
 /// An empty file to write a log to: a new one, or one that is empty or begins as a log of that format does. Any other

@@ -54,7 +54,7 @@ impl Recordings {
     pub(super) fn begin_file(&mut self, world: &mut sim::World, path: &Path, period: Duration) -> io::Result<()> {
         let no_kind = || io::Error::new(io::ErrorKind::InvalidInput, "a record is a file .mcap or .csv");
         let kind = Kind::of_name(&path.to_string_lossy()).ok_or_else(no_kind)?;
-        let file = File::create(path)?;
+        let file = File::options().read(true).write(true).create(true).truncate(true).open(path)?;
         self.look(world);
         self.sample(world, &Signal::ALL, period);
         let record = Record::begin(kind, Box::new(file), &self.columns)?;

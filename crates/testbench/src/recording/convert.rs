@@ -1,6 +1,6 @@
 //! A record as a file of the other kind.
 
-use std::io::{self, Cursor, Seek, SeekFrom, Write};
+use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use can::Instant;
@@ -26,16 +26,35 @@ pub fn mcap_of_csv(bytes: &[u8]) -> Result<Vec<u8>, String> {
         }
     }
     record.finish().map_err(broken)?;
-    Ok(memory.take())
+    Ok(memory.into_bytes())
 }
 
 /// A file in memory, which its owner has when the record is done with it.
 #[derive(Clone, Default)]
-struct Memory(Arc<Mutex<Cursor<Vec<u8>>>>);
+pub(super) struct Memory(Arc<Mutex<Cursor<Vec<u8>>>>);
+
+#[cfg(test)]
+impl Memory {
+    /// What stands in the file now.
+    pub(super) fn contents(&self) -> Vec<u8> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_ref().clone()
+    }
+
+    /// Changes what stands in it.
+    pub(super) fn change(&self, change: impl FnOnce(&mut [u8])) {
+        change(self.0.lock().unwrap_or_else(PoisonError::into_inner).get_mut());
+    }
+}
 
 impl Memory {
-    fn take(&self) -> Vec<u8> {
+    fn into_bytes(self) -> Vec<u8> {
         core::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner)).into_inner()
+    }
+}
+
+impl Read for Memory {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).read(into)
     }
 }
 

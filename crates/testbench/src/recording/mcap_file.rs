@@ -2,32 +2,25 @@
 //!
 //! Chunks are built in memory and written whole: the file of a program that was killed ends between two of them.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io;
 
 use can::{Frame, Instant};
-use mcap::records::MessageHeader;
-use mcap::{McapError, WriteOptions, Writer};
 use serde_json::json;
 
 use super::column::{Column, Subject};
+use super::mcap_writer::McapWriter;
 use super::piece::{Mark, Severity, Target};
-
-/// Bytes of a chunk, before it is written though nobody has asked for it.
-const CHUNK: u64 = 256 << 10;
 
 pub(super) const FRAMES: &str = "/can";
 pub(super) const EVENTS: &str = "/events";
 
 /// An MCAP file that is being written.
 pub(super) struct Mcap {
-    writer: Writer<Box<dyn Target>>,
+    writer: McapWriter,
     topics: Vec<Topic>,
     frames: u16,
     events: u16,
-    /// Messages so far, which count on each channel alike: readers want them ascending.
-    sequence: u32,
     text: String,
 }
 
@@ -40,13 +33,7 @@ struct Topic {
 
 impl Mcap {
     pub(super) fn begin(target: Box<dyn Target>, columns: &[Column]) -> io::Result<Self> {
-        let options = WriteOptions::new()
-            .compression(None)
-            .profile("")
-            .library(concat!("ferrodrive ", env!("CARGO_PKG_VERSION")))
-            .chunk_size(Some(CHUNK))
-            .disable_seeking(true);
-        let mut writer = options.create(target).map_err(broken)?;
+        let mut writer = McapWriter::begin(target, concat!("ferrodrive ", env!("CARGO_PKG_VERSION")))?;
         let mut subjects: Vec<&Subject> = Vec::new();
         for column in columns {
             if !subjects.contains(&&column.subject) {
@@ -65,7 +52,7 @@ impl Mcap {
         let frames = channel(&mut writer, FRAMES, "ferrodrive.Frame", &frame_schema())?;
         // The name and the fields of a line of a log, as Foxglove knows them.
         let events = channel(&mut writer, EVENTS, "foxglove.Log", &log_schema())?;
-        let mut file = Self { writer, topics, frames, events, sequence: 0, text: String::new() };
+        let mut file = Self { writer, topics, frames, events, text: String::new() };
         // A reader that follows the file sees its topics at once.
         file.flush()?;
         Ok(file)
@@ -141,30 +128,22 @@ impl Mcap {
     }
 
     pub(super) fn flush(&mut self) -> io::Result<()> {
-        self.writer.flush().map_err(broken)
+        self.writer.flush()
     }
 
     pub(super) fn finish(mut self) -> io::Result<()> {
-        self.writer.finish().map(drop).map_err(broken)
+        self.writer.finish()
     }
 
     /// Writes what stands in `text`.
-    fn message(&mut self, channel_id: u16, at: Instant) -> io::Result<()> {
-        let time = at.as_nanos();
-        let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
-        self.sequence = self.sequence.wrapping_add(1);
-        self.writer.write_to_known_channel(&header, self.text.as_bytes()).map_err(broken)
+    fn message(&mut self, channel: u16, at: Instant) -> io::Result<()> {
+        self.writer.message(channel, at.as_nanos(), self.text.as_bytes())
     }
 }
 
-fn channel(
-    writer: &mut Writer<Box<dyn Target>>,
-    topic: &str,
-    name: &str,
-    schema: &serde_json::Value,
-) -> io::Result<u16> {
-    let schema = writer.add_schema(name, "jsonschema", schema.to_string().as_bytes()).map_err(broken)?;
-    writer.add_channel(schema, topic, "json", &BTreeMap::new()).map_err(broken)
+fn channel(writer: &mut McapWriter, topic: &str, name: &str, schema: &serde_json::Value) -> io::Result<u16> {
+    let schema = writer.schema(name, "jsonschema", schema.to_string().as_bytes())?;
+    writer.channel(schema, topic, "json")
 }
 
 /// Name and schema of the signals of one subject.
@@ -214,11 +193,4 @@ fn log_schema() -> serde_json::Value {
             "kind": { "type": "string", "description": "what kind of thing: fault, state, stimulus, .." }
         }
     })
-}
-
-fn broken(error: McapError) -> io::Error {
-    match error {
-        McapError::Io(error) => error,
-        other => io::Error::other(other),
-    }
 }

@@ -5,8 +5,7 @@ use std::ops::RangeInclusive;
 use plot::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
 
 use super::column::{Column, Subject, select};
-use super::piece::Severity;
-use super::read::{Recorded, Series};
+use super::piece::{Recorded, Series, Severity};
 
 /// What is drawn when nobody says what.
 const USUAL: [&str; 8] = ["position", "velocity", "current", "supply", "x_m", "y_m", "heading", "joint"];

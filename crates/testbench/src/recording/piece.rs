@@ -1,13 +1,13 @@
-//! What a record is given: its kind, where it goes, and what happened.
+//! What a record is given: its kind, where it goes, and what happened; and what a file is read as.
 
 use std::borrow::Cow;
-use std::io::{Seek, Write};
+use std::io::{Read, Seek, Write};
 
 use can::Instant;
 use sim::events::{Event, EventKind};
 use sim::wire::ErrorState;
 
-use super::column::Subject;
+use super::column::{Column, Subject};
 
 /// The kinds of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +84,28 @@ impl From<&Event> for Mark {
     }
 }
 
-/// What a file may be written to: a file, or memory.
-pub trait Target: Write + Seek + Send {}
+/// What a file may be written to: a file, or memory. It is read too: the index at the end of an MCAP file is made from what stands
+/// before it.
+pub trait Target: Read + Write + Seek + Send {}
 
-impl<T: Write + Seek + Send> Target for T {}
+impl<T: Read + Write + Seek + Send> Target for T {}
+
+/// One signal over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// Which.
+    pub column: Column,
+    /// Time in s and value, times ascending; not a number where there was none.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recorded {
+    /// In the order of the file.
+    pub series: Vec<Series>,
+    /// What happened.
+    pub marks: Vec<Mark>,
+    /// The file ends in the middle of something.
+    pub torn: bool,
+}

@@ -3,36 +3,11 @@
 //! A file whose writer was killed, or that is still being written, ends in the middle of something: what stands before that
 //! is taken, and [`Recorded::torn`] says so.
 
-use std::collections::HashMap;
-
 use can::Instant;
-use mcap::read::Options;
-use mcap::{Channel, MessageStream};
-use serde_json::Value;
 
-use super::column::{Column, Subject};
-use super::mcap_file::EVENTS;
-use super::piece::{Kind, Mark, Severity};
-
-/// One signal over time.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Series {
-    /// Which.
-    pub column: Column,
-    /// Time in s and value, times ascending; not a number where there was none.
-    pub points: Vec<(f64, f64)>,
-}
-
-/// What a file holds.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Recorded {
-    /// In the order of the file.
-    pub series: Vec<Series>,
-    /// What happened.
-    pub marks: Vec<Mark>,
-    /// The file ends in the middle of something.
-    pub torn: bool,
-}
+use super::column::Column;
+use super::mcap_read::read_mcap;
+use super::piece::{Kind, Mark, Recorded, Series, Severity};
 
 /// What stands in a file of this kind.
 ///
@@ -45,63 +20,6 @@ pub fn read(kind: Kind, bytes: &[u8]) -> Result<Recorded, String> {
     };
     recorded.series.retain(|series| !series.points.is_empty());
     Ok(recorded)
-}
-
-fn read_mcap(bytes: &[u8]) -> Result<Recorded, String> {
-    if !bytes.starts_with(mcap::MAGIC) {
-        return Err("it is no MCAP file: it does not begin as one".into());
-    }
-    let messages = MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())
-        .map_err(|error| format!("it is no MCAP file: {error}"))?;
-    let mut recorded = Recorded { torn: !bytes.ends_with(mcap::MAGIC), ..Recorded::default() };
-    let mut places: HashMap<(u16, String), usize> = HashMap::new();
-    for message in messages {
-        let Ok(message) = message else {
-            recorded.torn = true;
-            break;
-        };
-        // A message of another program may be anything.
-        let Ok(Value::Object(fields)) = serde_json::from_slice(&message.data) else { continue };
-        let at = Instant::from_nanos(message.log_time);
-        if message.channel.topic == EVENTS {
-            recorded.marks.push(mark_of(at, &fields));
-            continue;
-        }
-        let Some(subject) = Subject::of_topic(&message.channel.topic) else { continue };
-        for (signal, value) in fields {
-            let value = match value {
-                Value::Number(number) => number.as_f64().unwrap_or(f64::NAN),
-                Value::Null => f64::NAN,
-                _ => continue,
-            };
-            let series = &mut recorded.series;
-            let place = *places.entry((message.channel.id, signal)).or_insert_with_key(|(_, signal)| {
-                let unit = unit_in(&message.channel, signal);
-                let column = Column { subject: subject.clone(), signal: signal.clone().into(), unit: unit.into() };
-                series.push(Series { column, points: Vec::new() });
-                series.len() - 1
-            });
-            recorded.series[place].points.push((at.as_secs_f64(), value));
-        }
-    }
-    Ok(recorded)
-}
-
-/// The unit that a channel's schema gives a signal.
-fn unit_in(channel: &Channel<'_>, signal: &str) -> String {
-    let schema = channel.schema.as_ref().and_then(|schema| serde_json::from_slice::<Value>(&schema.data).ok());
-    let unit = schema.and_then(|schema| Some(schema["properties"][signal]["unit"].as_str()?.to_owned()));
-    unit.unwrap_or_default()
-}
-
-fn mark_of(at: Instant, fields: &serde_json::Map<String, Value>) -> Mark {
-    let text = |name: &str| fields.get(name).and_then(Value::as_str).unwrap_or_default().to_owned();
-    let severity = match fields.get("level").and_then(Value::as_u64) {
-        Some(0..=2) | None => Severity::Note,
-        Some(3) => Severity::Warning,
-        Some(_) => Severity::Fault,
-    };
-    Mark { at, of: text("name").into(), kind: text("kind").into(), severity, text: text("message") }
 }
 
 fn read_csv(bytes: &[u8]) -> Result<Recorded, String> {
@@ -188,37 +106,11 @@ impl<'a> CsvLines<'a> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::convert::Memory;
     use super::super::{Record, columns_of_drives};
     use super::*;
     use sim::Place;
-    use std::io::{Cursor, Seek, SeekFrom, Write};
-    use std::sync::{Arc, Mutex};
-
-    /// Memory that can be looked at while it is written.
-    #[derive(Clone, Default)]
-    struct Memory(Arc<Mutex<Cursor<Vec<u8>>>>);
-
-    impl Memory {
-        fn bytes(&self) -> Vec<u8> {
-            self.0.lock().unwrap().get_ref().clone()
-        }
-    }
-
-    impl Write for Memory {
-        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            self.0.lock().unwrap().write(bytes)
-        }
-
-        fn flush(&mut self) -> std::io::Result<()> {
-            Ok(())
-        }
-    }
-
-    impl Seek for Memory {
-        fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
-            self.0.lock().unwrap().seek(to)
-        }
-    }
+    use std::io::{Read, Seek, SeekFrom, Write};
 
     fn columns() -> Vec<Column> {
         columns_of_drives([Place::node(4), "5.2".parse().unwrap()])
@@ -271,7 +163,7 @@ mod tests {
         for kind in [Kind::Mcap, Kind::Csv] {
             let (memory, record) = written(kind, 40);
             record.finish().unwrap();
-            let recorded = read(kind, &memory.bytes()).unwrap();
+            let recorded = read(kind, &memory.contents()).unwrap();
             assert!(!recorded.torn, "{kind:?}");
             check(&recorded, 40);
             assert_eq!(recorded.marks.len(), 1);
@@ -283,7 +175,7 @@ mod tests {
     fn a_writer_that_is_killed_loses_nothing_of_before_the_last_flush() {
         for kind in [Kind::Mcap, Kind::Csv] {
             let (memory, mut record) = written(kind, 40);
-            let flushed = memory.bytes();
+            let flushed = memory.contents();
             record.row(at(40), &row(40)).unwrap();
             // What a killed process leaves: the file as it is.
             std::mem::forget(record);
@@ -315,6 +207,27 @@ mod tests {
     }
 
     #[test]
+    fn a_chunk_that_is_broken_ends_the_record_and_one_packed_otherwise_is_refused() {
+        let (memory, record) = written(Kind::Mcap, 40);
+        record.finish().unwrap();
+        let whole = memory.contents();
+        let packed = whole.windows(3).position(|window| window == b"lz4").unwrap();
+        let mut otherwise = whole.clone();
+        otherwise[packed] = b'x';
+        assert!(read(Kind::Mcap, &otherwise).unwrap_err().contains("compressed with 'xz4'; expected 'lz4'"));
+        let mut large = whole.clone();
+        // The size before packing stands before the check sum and the length of the name.
+        large[packed - 16..packed - 8].copy_from_slice(&u64::MAX.to_le_bytes());
+        assert!(read(Kind::Mcap, &large).unwrap_err().contains("expected at most"));
+        for place in packed + 11..packed + 200 {
+            let mut broken = whole.clone();
+            broken[place] ^= 0x55;
+            let recorded = read(Kind::Mcap, &broken).unwrap();
+            assert!(recorded.torn && recorded.series.is_empty(), "byte {place}");
+        }
+    }
+
+    #[test]
     fn a_disk_that_is_full_is_an_error_and_no_panic() {
         struct Full;
         impl Write for Full {
@@ -323,6 +236,11 @@ mod tests {
             }
             fn flush(&mut self) -> std::io::Result<()> {
                 Ok(())
+            }
+        }
+        impl Read for Full {
+            fn read(&mut self, _: &mut [u8]) -> std::io::Result<usize> {
+                Ok(0)
             }
         }
         impl Seek for Full {

@@ -7,8 +7,7 @@ use can::Instant;
 use sim::recorder::Signal;
 
 use super::column::{Column, Subject};
-use super::piece::{Mark, Severity};
-use super::read::{Recorded, Series};
+use super::piece::{Mark, Recorded, Series, Severity};
 
 /// What is kept of an axis: what a picture shows, and its faults.
 const KEPT: [Signal; 8] = [
