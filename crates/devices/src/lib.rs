@@ -31,6 +31,7 @@ mod departure;
 mod description;
 pub mod faults;
 pub mod mjoint;
+pub mod names;
 mod placement;
 pub mod row;
 pub mod servo;

@@ -38,6 +38,42 @@ pub const fn rws(index: u16, sub: u8, data_type: DataType, name: &'static str, t
     rw(index, sub, data_type, name, title).stored()
 }
 
+/// Rows of objects of the standards: CiA's names come from [`names`](crate::names), so that no table repeats them.
+///
+/// # Panics
+/// If the table of names does not have the place, at compile time in a `const`.
+pub mod cia {
+    use canopen::Mux;
+    use canopen::od::{Access, DataType, Entry};
+
+    use crate::names::standard;
+
+    /// Attribute RO.
+    pub const fn ro(index: u16, sub: u8, data_type: DataType) -> Entry {
+        row(index, sub, data_type, Access::ReadOnly)
+    }
+
+    /// Attribute RW.
+    pub const fn rw(index: u16, sub: u8, data_type: DataType) -> Entry {
+        row(index, sub, data_type, Access::ReadWrite)
+    }
+
+    /// Attribute WO.
+    pub const fn wo(index: u16, sub: u8, data_type: DataType) -> Entry {
+        row(index, sub, data_type, Access::WriteOnly)
+    }
+
+    /// Attribute RW/S: kept in the EEPROM.
+    pub const fn rws(index: u16, sub: u8, data_type: DataType) -> Entry {
+        rw(index, sub, data_type).stored()
+    }
+
+    const fn row(index: u16, sub: u8, data_type: DataType, access: Access) -> Entry {
+        let Some(name) = standard(Mux::new(index, sub)) else { panic!("no name of the standards: see devices::names") };
+        Entry::new(index, sub, data_type, access, name.name, name.title)
+    }
+}
+
 /// Whether a row of a device that follows the profiles is a parameter, which a save of everything stores (CiA 301, 7.5.2.13):
 /// it can be written, and is neither a command nor a set-point.
 pub const fn is_parameter(row: &Entry) -> bool {
@@ -147,9 +183,9 @@ pub const fn amend<const N: usize>(base: &[Entry], changes: &[Entry]) -> [Entry;
 /// the `TABLE` that they are places of: it lies above the rows.
 macro_rules! rows {
     ($vis:vis const $rows:ident: [Entry; $count:literal], $objects:ident:
-        $($make:ident($index:literal, $sub:literal, $type:ident, $name:expr, $title:expr)
+        $($make:ident($index:literal, $sub:literal, $type:ident $(, $text:expr)*)
             $(.$set:ident($($value:expr),*))* $(=> $object:ident)?;)*) => {
-        $vis const $rows: [Entry; $count] = [$($make($index, $sub, $type, $name, $title)$(.$set($($value),*))*),*];
+        $vis const $rows: [Entry; $count] = [$($make($index, $sub, $type $(, $text)*)$(.$set($($value),*))*),*];
 
         macro_rules! $objects {
             () => {

@@ -95,10 +95,12 @@ pub struct Entry {
     pub data_type: DataType,
     /// SDO access.
     pub access: Access,
-    /// The standard's name in snake case, to search and type: `position_actual_value`.
+    /// The name in snake case, to search and type: `position_actual_value`.
     pub name: &'static str,
-    /// The manual's words, or the standard's.
+    /// The name as an EDS has it: the standard's for an object of the standard, else the maker's.
     pub title: &'static str,
+    /// What the manual calls it or says of it, where that is not the title; else empty.
+    pub description: &'static str,
     /// Factory value.
     pub default: DefaultValue,
     /// Smallest and largest value accepted, if narrower than the type; at a [`resolution`](Self::resolution) of 1, where there
@@ -142,6 +144,7 @@ impl Entry {
             access,
             name,
             title,
+            description: "",
             default: DefaultValue::Value(0),
             limits: None,
             values: &[],
@@ -154,6 +157,12 @@ impl Entry {
             pdo: PdoMapping::No,
             capacity: 0,
         }
+    }
+
+    /// What the manual calls it or says of it, beside the title.
+    pub const fn described(mut self, description: &'static str) -> Self {
+        self.description = description;
+        self
     }
 
     /// Factory value.

@@ -67,6 +67,9 @@ struct Row {
     mux: Mux,
     name: &'static str,
     title: &'static str,
+    /// What the manual calls it or says of it, where that is not the title.
+    #[serde(skip_serializing_if = "str::is_empty")]
+    description: &'static str,
     data_type: &'static str,
     access: &'static str,
     stored: bool,
@@ -203,7 +206,8 @@ fn matches(row: &Entry, word: &str) -> bool {
         return true;
     }
     let word = word.to_lowercase();
-    let texts = [row.name, row.title].into_iter().chain(row.values.iter().map(|(_, meaning)| *meaning));
+    let texts =
+        [row.name, row.title, row.description].into_iter().chain(row.values.iter().map(|(_, meaning)| *meaning));
     texts.into_iter().any(|text| text.to_lowercase().contains(&word))
 }
 
@@ -214,6 +218,7 @@ impl Row {
             mux: row.mux(),
             name: row.name,
             title: row.title,
+            description: row.description,
             data_type: row.data_type.name(),
             access: row.access.name(),
             stored: row.stored,

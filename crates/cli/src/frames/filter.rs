@@ -5,6 +5,7 @@ use canopen::{Mux, NodeId};
 use master::decode::{Decoded, Decoder, ServiceKind};
 
 use crate::failure::Failure;
+use devices::names::present;
 use testbench::models::Description;
 use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
@@ -45,7 +46,7 @@ fn wanted(text: &str) -> Result<Wanted, String> {
     Ok(match object(text)? {
         ObjectArg::Mux(mux) if text.contains(':') => Wanted::Mux(mux),
         ObjectArg::Mux(mux) => Wanted::Index(mux.index),
-        ObjectArg::Name(name) => Wanted::Name(name),
+        ObjectArg::Name(name) => Wanted::Name(present(&name).to_owned()),
     })
 }
 

@@ -27,7 +27,7 @@ const SMALL: &str = "[FileInfo]\nFileName=a.eds\n[MandatoryObjects]\nSupportedOb
 fn a_models_sheet_is_written_and_has_nothing_wrong_with_it() {
     let folder = folder("written");
     let sheet = done(&["eds", "zlim42c"]).out;
-    assert!(sheet.contains("[1014]\nParameterName=COB-ID emergency message\n") && sheet.ends_with('\n'));
+    assert!(sheet.contains("[1014]\nParameterName=COB-ID EMCY\n") && sheet.ends_with('\n'));
     assert!(sheet.contains("DefaultValue=$NODEID+0x80\n"));
     let path = file(&folder, "zlim42c.eds", &sheet);
     let report = done(&["eds", "lint", "--json", &path]).json();

@@ -7,7 +7,8 @@
 
 use canopen::od::Entry;
 
-use crate::row::{U8, U16, U32, join, ro, rw, rws};
+use crate::row::cia::{ro, rw, rws};
+use crate::row::{U8, U16, U32, join};
 
 /// The rows of a drive with these versions (1009h, 100Ah).
 pub(super) const fn rows(hardware_version: i64, software_version: i64) -> [Entry; 102] {
@@ -18,67 +19,67 @@ pub(super) const fn rows(hardware_version: i64, software_version: i64) -> [Entry
 const fn general(hardware_version: i64, software_version: i64) -> [Entry; 14] {
     [
         // The CiA 402 type code of a stepper, in the servo drive too: the manual and the maker's EDS agree on it.
-        ro(0x1000, 0, U32, "device_type", "Device type").default(0x0004_0192),
-        ro(0x1001, 0, U8, "error_register", "Error register"),
-        rw(0x1005, 0, U32, "cob_id_sync", "COB-ID SYNC message").default(0x80),
-        ro(0x1009, 0, U16, "hardware_version", "Hardware version").default(hardware_version),
+        ro(0x1000, 0, U32).default(0x0004_0192),
+        ro(0x1001, 0, U8),
+        rw(0x1005, 0, U32).default(0x80),
+        ro(0x1009, 0, U16).described("Hardware version").default(hardware_version),
         // The ZLAC8030L's manual prints "Hardware version" a second time.
-        ro(0x100A, 0, U16, "software_version", "Software version").default(software_version),
+        ro(0x100A, 0, U16).described("Software version").default(software_version),
         // Printed 0x80, which is SYNC; CiA 301 and the maker's EDS add the node-ID.
-        rw(0x1014, 0, U32, "cob_id_emcy", "COB-ID emergency message").node_id_plus(0x80),
-        rws(0x1017, 0, U16, "producer_heartbeat_time", "Producer heartbeat time").unit("ms"),
+        rw(0x1014, 0, U32).node_id_plus(0x80),
+        rws(0x1017, 0, U16).unit("ms"),
         // Printed 5 with two sub-indexes; CiA 301 allows at most 4 and the maker's EDS has 3.
-        ro(0x1018, 0, U8, "identity_object", "Identity object").default(3),
-        ro(0x1018, 1, U32, "vendor_id", "Vendor ID").default(0x0100),
-        ro(0x1018, 2, U32, "product_code", "Product code").default(0x0001),
-        ro(0x1018, 3, U32, "revision_number", "Revision number"),
-        ro(0x1200, 0, U8, "sdo_server_parameter", "Number of sub-indexes").default(2),
-        ro(0x1200, 1, U32, "sdo_cob_id_client_to_server", "COB-ID client to server").node_id_plus(0x600),
-        ro(0x1200, 2, U32, "sdo_cob_id_server_to_client", "COB-ID server to client").node_id_plus(0x580),
+        ro(0x1018, 0, U8).default(3),
+        ro(0x1018, 1, U32).default(0x0100),
+        ro(0x1018, 2, U32).default(0x0001),
+        ro(0x1018, 3, U32),
+        ro(0x1200, 0, U8).default(2),
+        ro(0x1200, 1, U32).node_id_plus(0x600),
+        ro(0x1200, 2, U32).node_id_plus(0x580),
     ]
 }
 
 const RPDO_PARAMETERS: [Entry; 24] = join(&[
-    &pdo_parameters!(0x1400, "RPDO0", "rpdo0", 0x200),
-    &pdo_parameters!(0x1401, "RPDO1", "rpdo1", 0x300),
-    &pdo_parameters!(0x1402, "RPDO2", "rpdo2", 0x400),
-    &pdo_parameters!(0x1403, "RPDO3", "rpdo3", 0x500),
+    &pdo_parameters!(0x1400, "RPDO0", 0x200),
+    &pdo_parameters!(0x1401, "RPDO1", 0x300),
+    &pdo_parameters!(0x1402, "RPDO2", 0x400),
+    &pdo_parameters!(0x1403, "RPDO3", 0x500),
 ]);
 
 // Factory mapping: RPDO0 carries the controlword, nothing else is mapped. (The maker's EDS have more.)
 const RPDO_MAPPINGS: [Entry; 20] = join(&[
-    &pdo_mapping!(0x1600, "RPDO0", "rpdo0", 1, 0x6040_0010),
-    &pdo_mapping!(0x1601, "RPDO1", "rpdo1", 0, 0),
-    &pdo_mapping!(0x1602, "RPDO2", "rpdo2", 0, 0),
-    &pdo_mapping!(0x1603, "RPDO3", "rpdo3", 0, 0),
+    &pdo_mapping!(0x1600, "RPDO0", 1, 0x6040_0010),
+    &pdo_mapping!(0x1601, "RPDO1", 0, 0),
+    &pdo_mapping!(0x1602, "RPDO2", 0, 0),
+    &pdo_mapping!(0x1603, "RPDO3", 0, 0),
 ]);
 
 const TPDO_PARAMETERS: [Entry; 24] = join(&[
-    &pdo_parameters!(0x1800, "TPDO0", "tpdo0", 0x180),
-    &pdo_parameters!(0x1801, "TPDO1", "tpdo1", 0x280),
-    &pdo_parameters!(0x1802, "TPDO2", "tpdo2", 0x380),
-    &pdo_parameters!(0x1803, "TPDO3", "tpdo3", 0x480),
+    &pdo_parameters!(0x1800, "TPDO0", 0x180),
+    &pdo_parameters!(0x1801, "TPDO1", 0x280),
+    &pdo_parameters!(0x1802, "TPDO2", 0x380),
+    &pdo_parameters!(0x1803, "TPDO3", 0x480),
 ]);
 
 // The ZLAC8030L's manual names these rows RPDO1, RPDO1, RPDO2, RPDO3; by index they are the TPDOs.
 const TPDO_MAPPINGS: [Entry; 20] = join(&[
-    &pdo_mapping!(0x1A00, "TPDO0", "tpdo0", 0, 0),
-    &pdo_mapping!(0x1A01, "TPDO1", "tpdo1", 0, 0),
-    &pdo_mapping!(0x1A02, "TPDO2", "tpdo2", 0, 0),
-    &pdo_mapping!(0x1A03, "TPDO3", "tpdo3", 0, 0),
+    &pdo_mapping!(0x1A00, "TPDO0", 0, 0),
+    &pdo_mapping!(0x1A01, "TPDO1", 0, 0),
+    &pdo_mapping!(0x1A02, "TPDO2", 0, 0),
+    &pdo_mapping!(0x1A03, "TPDO3", 0, 0),
 ]);
 
 /// The six rows of one PDO's communication parameter. Both times are in 0.5 ms (ZLAC8030L, 6.1: `03E8h` is 500 ms); the
 /// ZLIM42-C's manual gives no unit.
 macro_rules! pdo_parameters {
-    ($index:literal, $title:literal, $name:literal, $cob_id:literal) => {
+    ($index:literal, $title:literal, $cob_id:literal) => {
         [
-            ro($index, 0, U8, concat!($name, "_parameter"), "Number of sub-indexes").default(5),
-            rw($index, 1, U32, concat!($name, "_cob_id"), concat!($title, " COB-ID")).node_id_plus($cob_id),
-            rws($index, 2, U8, concat!($name, "_transmission_type"), "Transmission type").default(0xFF),
-            rws($index, 3, U16, concat!($name, "_inhibit_time"), "Inhibit time").unit("0.5 ms"),
-            rw($index, 4, U8, concat!($name, "_reserved"), "Reserved"),
-            rws($index, 5, U16, concat!($name, "_event_timer"), "Event timer").unit("0.5 ms"),
+            ro($index, 0, U8).default(5),
+            rw($index, 1, U32).described(concat!($title, " COB-ID")).node_id_plus($cob_id),
+            rws($index, 2, U8).default(0xFF),
+            rws($index, 3, U16).unit("0.5 ms"),
+            rw($index, 4, U8),
+            rws($index, 5, U16).unit("0.5 ms"),
         ]
     };
 }
@@ -86,13 +87,13 @@ use pdo_parameters;
 
 /// The five rows of one PDO's mapping: how many objects, then up to four mapping records.
 macro_rules! pdo_mapping {
-    ($index:literal, $title:literal, $name:literal, $count:literal, $first:literal) => {
+    ($index:literal, $title:literal, $count:literal, $first:literal) => {
         [
-            rws($index, 0, U8, concat!($name, "_mapping"), "Number of sub-indexes").default($count),
-            rws($index, 1, U32, concat!($name, "_mapping_1"), concat!($title, " mapping 1")).default($first),
-            rws($index, 2, U32, concat!($name, "_mapping_2"), concat!($title, " mapping 2")),
-            rws($index, 3, U32, concat!($name, "_mapping_3"), concat!($title, " mapping 3")),
-            rws($index, 4, U32, concat!($name, "_mapping_4"), concat!($title, " mapping 4")),
+            rws($index, 0, U8).default($count),
+            rws($index, 1, U32).described(concat!($title, " mapping 1")).default($first),
+            rws($index, 2, U32).described(concat!($title, " mapping 2")),
+            rws($index, 3, U32).described(concat!($title, " mapping 3")),
+            rws($index, 4, U32).described(concat!($title, " mapping 4")),
         ]
     };
 }

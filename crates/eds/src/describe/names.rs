@@ -1,5 +1,7 @@
 //! Names: words for people in a file, words to type in a description.
 
+use std::collections::HashSet;
+
 use crate::check::names::CUTTING;
 
 /// Abbreviations of the field, which are written in capitals.
@@ -34,6 +36,20 @@ fn capitals(word: &str) -> String {
     if CAPITALS.contains(&letters) || CAPITALS.contains(&word) { word.to_uppercase() } else { word.to_owned() }
 }
 
+/// Numbers each name but the first of those that are the same.
+pub(super) fn number_shared<'a>(names: impl Iterator<Item = &'a mut String>) {
+    let names: Vec<&mut String> = names.collect();
+    let mut taken: HashSet<String> = names.iter().map(|name| (**name).clone()).collect();
+    let mut seen = HashSet::new();
+    for name in names {
+        if !seen.insert(name.clone()) {
+            let numbered = (2..).map(|number| format!("{name} {number}")).find(|numbered| !taken.contains(numbered));
+            *name = numbered.expect("numbers do not end");
+            taken.insert(name.clone());
+        }
+    }
+}
+
 /// Words as a name to type: `RPDO1 parameter` is `rpdo1_parameter`.
 pub(super) fn name(words: &str) -> String {
     let mut name = String::with_capacity(words.len());
@@ -53,6 +69,7 @@ pub(super) fn name(words: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use devices::names::standard_object;
 
     #[test]
     fn a_name_becomes_words_and_words_become_the_name() {
@@ -67,6 +84,21 @@ mod tests {
         assert_eq!(name("COB-ID (EMCY)"), "cob_id_emcy");
         assert_eq!(name("2nd axis"), "object_2nd_axis");
         assert_eq!(name("\u{4f60}"), "");
+    }
+
+    #[test]
+    fn a_name_that_is_shared_is_numbered_and_gets_no_number_that_another_has() {
+        let mut names = ["Gain", "Gain 2", "Speed", "Gain", "Gain"].map(str::to_owned);
+        number_shared(names.iter_mut());
+        assert_eq!(names, ["Gain", "Gain 2", "Speed", "Gain 3", "Gain 4"]);
+    }
+
+    #[test]
+    fn the_names_of_the_standards_are_typed_as_those_of_a_file_are() {
+        let title = |index| standard_object(index).map(|standard| (standard.title, standard.name));
+        let all: Vec<_> = (0x1000..=0x67FF).filter_map(title).collect();
+        assert!(all.len() > 100);
+        all.iter().for_each(|(title, typed)| assert_eq!(name(title), *typed));
     }
 
     #[test]

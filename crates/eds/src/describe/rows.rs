@@ -4,8 +4,8 @@ use std::collections::HashSet;
 
 use canopen::Mux;
 use canopen::od::{Access, DataType, DefaultValue, Entry, Kind, PdoMapping, ValueRange};
+use devices::names::standard;
 use devices::row::is_parameter;
-use devices::servo;
 
 use super::names;
 use crate::{AccessType, Eds, Number, Object, Value, Variable};
@@ -198,10 +198,9 @@ fn name(object: &Object, variable: &Variable) -> String {
     }
 }
 
-/// The name that the standard's servo has for the object; of the further axes (CiA 402-1) with their number behind.
+/// The name of the standards; of the further axes (CiA 402-1) with their number behind.
 fn standard_name(place: Mux) -> Option<String> {
-    let table = &servo::objects::TABLE;
-    let find = |place| table.find(place).ok().map(|slot| table.row(slot).name);
+    let find = |place| standard(place).map(|name| name.name);
     match place.index {
         0x1000..=0x1FFF | 0x6000..=0x67FF => find(place).map(str::to_owned),
         0x6800..=0x9FFF => {

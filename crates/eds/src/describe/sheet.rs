@@ -4,6 +4,7 @@ use canopen::NodeId;
 use canopen::od::{DataType, Entry};
 use cia402::SupportedModes;
 use devices::Description;
+use devices::names::standard_object;
 use devices::variant::{Preset, Variant};
 
 use super::names;
@@ -60,6 +61,7 @@ impl<'a> Sheet<'a> {
         if self.flavour == Flavour::Ros2Canopen {
             self.add_what_ros2_canopen_asks_for(&mut objects);
         }
+        number_shared_names(&mut objects);
         if let Some(node_id) = self.node_id {
             objects.iter_mut().flat_map(|object| &mut object.variables).for_each(|variable| resolve(variable, node_id));
         }
@@ -122,14 +124,27 @@ impl<'a> Sheet<'a> {
         widen_to_factory_mappings(objects);
         let Some(axis) = self.description.first_axis() else { return };
         let modes = axis.modes.iter().fold(SupportedModes::default(), |modes, mode| modes.with(*mode));
-        add(objects, 0x6502, "Supported drive modes", TypeCode::UNSIGNED32, Some(plain(modes.0.into())), false);
-        add(objects, 0x6061, "Modes of operation display", TypeCode::INTEGER8, None, true);
+        add(objects, 0x6502, TypeCode::UNSIGNED32, Some(plain(modes.0.into())), false);
+        add(objects, 0x6061, TypeCode::INTEGER8, None, true);
     }
 }
 
-/// An object that the device does not have, unless it has.
-fn add(objects: &mut Vec<Object>, index: u16, name: &str, data_type: TypeCode, default: Option<Value>, mappable: bool) {
+/// Readers of such files look objects up by name: of two with one name they find one.
+fn number_shared_names(objects: &mut [Object]) {
+    names::number_shared(objects.iter_mut().map(|object| &mut object.name));
+    for object in objects {
+        match object.variables.as_mut_slice() {
+            // A variable is called as its object is.
+            [only] if !object.object_type.has_sub_objects() => only.name.clone_from(&object.name),
+            parts => names::number_shared(parts.iter_mut().map(|part| &mut part.name)),
+        }
+    }
+}
+
+/// An object of the standards that the device does not have, unless it has.
+fn add(objects: &mut Vec<Object>, index: u16, data_type: TypeCode, default: Option<Value>, mappable: bool) {
     let Err(at) = objects.binary_search_by_key(&index, |object| object.index) else { return };
+    let name = standard_object(index).map_or("", |name| name.title);
     let value = Variable {
         line: 0,
         sub_index: 0,
@@ -164,15 +179,22 @@ fn object(rows: &[Entry], presets: &[Preset]) -> Object {
     let mut variables: Vec<Variable> = rows.iter().map(|row| variable(row, presets, true)).collect();
     if first.sub_index > 0 {
         let highest = rows.last().map_or(0, |row| row.sub_index);
-        let count =
-            Entry::new(first.index, 0, DataType::Unsigned8, canopen::od::Access::ReadOnly, "", "Number of entries")
-                .default(highest.into());
+        let count = Entry::new(
+            first.index,
+            0,
+            DataType::Unsigned8,
+            canopen::od::Access::ReadOnly,
+            "",
+            "Highest sub-index supported",
+        )
+        .default(highest.into());
         variables.insert(0, variable(&count, &[], true));
     }
     // Arrays of the standard: lists of errors, store commands, heartbeats to watch.
     let kind =
         if matches!(first.index, 0x1003 | 0x1010 | 0x1011 | 0x1016) { ObjectType::Array } else { ObjectType::Record };
-    of_variables(first.index, names::words(first.name), kind, variables)
+    let name = standard_object(first.index).map_or_else(|| names::words(first.name), |name| name.title.to_owned());
+    of_variables(first.index, name, kind, variables)
 }
 
 fn variable(row: &Entry, presets: &[Preset], of_record: bool) -> Variable {

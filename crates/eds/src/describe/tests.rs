@@ -1,5 +1,7 @@
 //! The sheet of every model reads back as the model, as far as a sheet goes.
 
+use std::collections::HashSet;
+
 use canopen::od::{Access, DefaultValue, Entry};
 use canopen::{Mux, NodeId};
 use devices::{Description, Placement};
@@ -71,6 +73,55 @@ fn every_model_reads_back_as_itself_in_each_of_its_editions() {
     }
 }
 
+#[test]
+fn the_sheet_of_every_model_has_the_names_of_the_standards_each_once() {
+    let editions = models().flat_map(|model| model.editions.iter().map(|edition| edition.description));
+    for model in models().chain(editions) {
+        for flavour in [Flavour::Standard, Flavour::Ros2Canopen] {
+            let eds = read(&Sheet { flavour, ..Sheet::of(model) }).eds;
+            // CiA 301, 7.5.2; CiA 402-2, clauses 8 to 15.
+            let all = [
+                (0x1000, "Device type"),
+                (0x1018, "Identity object"),
+                (0x1401, "RPDO communication parameter 2"),
+                (0x6040, "Controlword"),
+                (0x6041, "Statusword"),
+                (0x6060, "Modes of operation"),
+                (0x6064, "Position actual value"),
+                (0x606C, "Velocity actual value"),
+                (0x607A, "Target position"),
+                (0x60FF, "Target velocity"),
+            ];
+            for (index, name) in all {
+                let object = eds.object(index).unwrap_or_else(|| panic!("{} has {index:04X}h", model.name));
+                assert_eq!(object.name, name, "{}", model.name);
+            }
+            assert_eq!(eds.variable(0x1018, 1).map(|variable| variable.name.as_str()), Some("Vendor-ID"));
+            assert_eq!(eds.variable(0x1018, 0).map(|count| count.name.as_str()), Some("Highest sub-index supported"));
+            let mut names = HashSet::new();
+            for object in &eds.objects {
+                assert!(names.insert(object.name.to_lowercase()), "{}: two are called {}", model.name, object.name);
+                let parts: HashSet<&str> = object.variables.iter().map(|part| part.name.as_str()).collect();
+                assert_eq!(parts.len(), object.variables.len(), "{}: {}", model.name, object.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_name_that_two_objects_of_a_file_share_is_numbered_in_its_sheet() {
+    let file = "[1018]\nParameterName=Identity object\nObjectType=0x9\nSubNumber=2\n\
+        [1018sub0]\nParameterName=Highest sub-index supported\nDataType=0x5\nAccessType=const\nDefaultValue=1\n\
+        [1018sub1]\nParameterName=Vendor-ID\nDataType=0x7\nAccessType=ro\nDefaultValue=7\n\
+        [6041]\nParameterName=Statusword\nDataType=0x6\nAccessType=ro\n\
+        [6841]\nParameterName=Statusword\nDataType=0x6\nAccessType=ro\n";
+    let kept = keep(&Eds::load(file.as_bytes()).expect("a small file").eds).expect("it fits");
+    let eds = read(&Sheet::of(kept)).eds;
+    let names: Vec<&str> = eds.objects.iter().map(|object| object.name.as_str()).collect();
+    assert_eq!(names, ["Identity object", "Statusword", "Statusword 2"]);
+    assert_eq!(eds.variable(0x6841, 0).map(|variable| variable.name.as_str()), Some("Statusword 2"));
+}
+
 fn same_row(model: &Description, row: &Entry, read: &Entry) {
     let place = format!("{} {} {}", model.name, row.mux(), row.name);
     assert_eq!(read.mux(), row.mux(), "{place}");
@@ -79,9 +130,11 @@ fn same_row(model: &Description, row: &Entry, read: &Entry) {
     assert_eq!(read.data_type.code(), code, "{place}");
     assert_eq!(read.access, row.access, "{place}");
     assert_eq!(read.pdo.is_allowed(), row.pdo.is_allowed(), "{place}");
-    assert_eq!(read.title, names::plain(row.title), "{place}");
-    let default =
-        Sheet::of(model).eds().variable(row.index, row.sub_index).and_then(|variable| variable.default.clone());
+    let shown = Sheet::of(model).eds().variable(row.index, row.sub_index).cloned().expect("it is in the sheet");
+    assert_eq!(read.title, shown.name, "{place}");
+    let number = shown.name.strip_prefix(names::plain(row.title).as_str());
+    assert!(number.is_some_and(|number| number.bytes().all(|byte| byte == b' ' || byte.is_ascii_digit())), "{place}");
+    let default = shown.default;
     if default.is_some() || row.access != Access::ReadOnly {
         assert_eq!(read.default, row.default, "{place}");
     } else {
@@ -92,7 +145,7 @@ fn same_row(model: &Description, row: &Entry, read: &Entry) {
             |row: &Entry| row.limits.and_then(|limits| limits.integers()).filter(|own| *own != row.data_type.range());
         assert_eq!(own(read), own(row), "{place}");
     }
-    if matches!(row.index, 0x6040 | 0x6041 | 0x6060 | 0x6064 | 0x607A | 0x60FF) {
+    if devices::names::standard(row.mux()).is_some() {
         assert_eq!(read.name, row.name, "{place}: the standard's name");
     }
 }

@@ -3,8 +3,8 @@
 
 use canopen::Mux;
 use canopen::od::{Access, DataType, Entry};
-use devices::all;
 use devices::servo::CIA402;
+use devices::{all, names};
 
 use DataType::Unsigned32 as U32;
 use DataType::{Integer16 as I16, Integer32 as I32};
@@ -24,7 +24,7 @@ pub fn common_name(mux: Mux) -> Option<&'static str> {
     let mut names = all().rows(mux).map(|row| row.name);
     match names.next() {
         Some(first) => names.all(|name| name == first).then_some(first),
-        None => standard(mux).map(|(_, name, _)| *name),
+        None => standard_name(mux),
     }
 }
 
@@ -38,7 +38,7 @@ pub fn common_type(mux: Mux, length: usize) -> Option<DataType> {
     let mut fitting = forms.flatten().filter(|data_type| data_type.size() == length && length > 0);
     match fitting.next() {
         Some(first) => fitting.all(|other| other == first).then_some(first),
-        None => standard(mux).and_then(|(_, _, data_type)| *data_type).filter(|data_type| data_type.size() == length),
+        None => standard_type(mux).filter(|data_type| data_type.size() == length),
     }
 }
 
@@ -49,36 +49,29 @@ pub fn standard_row(mux: Mux) -> Option<Entry> {
         let bare = Entry::new(mux.index, mux.sub_index, row.data_type, Access::ReadWrite, row.name, row.title);
         return Some(bare.values(row.values));
     }
-    let (_, name, data_type) = standard(mux)?;
-    Some(Entry::new(mux.index, mux.sub_index, (*data_type)?, Access::ReadWrite, name, ""))
+    let name = names::standard(mux)?;
+    Some(Entry::new(mux.index, mux.sub_index, standard_type(mux)?, Access::ReadWrite, name.name, name.title))
 }
 
-type Standard = (u16, &'static str, Option<DataType>);
-
-fn standard(mux: Mux) -> Option<&'static Standard> {
-    let place = STANDARD.binary_search_by_key(&mux.index, |(index, ..)| *index).ok()?;
-    // A type is that of a variable; what stands in an array or record differs by sub-index.
-    Some(&STANDARD[place]).filter(|(_, _, data_type)| data_type.is_none() || mux.sub_index == 0)
+/// The name of the place, or of an array or record that none of the models has that of the object.
+fn standard_name(mux: Mux) -> Option<&'static str> {
+    let is_whole = || RECORDS.contains(&mux.index);
+    names::standard(mux).or_else(|| names::standard_object(mux.index).filter(|_| is_whole())).map(|name| name.name)
 }
 
-/// Objects of the standards that none of the models has, ascending. Arrays and records have no type.
+fn standard_type(mux: Mux) -> Option<DataType> {
+    let place = TYPES.binary_search_by_key(&mux.index, |(index, _)| *index).ok()?;
+    (mux.sub_index == 0).then_some(TYPES[place].1)
+}
+
+/// Variables of the standards that none of the models has, ascending, with their types.
 #[rustfmt::skip]
-const STANDARD: [Standard; 14] = [
-    (0x1002, "manufacturer_status_register", Some(U32)),
-    (0x1007, "synchronous_window_length", Some(U32)),
-    (0x1012, "cob_id_time", Some(U32)),
-    (0x1013, "high_resolution_time_stamp", Some(U32)),
-    (0x1020, "verify_configuration", None),
-    (0x1021, "store_eds", None),
-    (0x1022, "store_format", None),
-    (0x1028, "emcy_consumer", None),
-    (0x1F80, "nmt_startup", Some(U32)),
-    (0x6069, "velocity_sensor_actual_value", Some(I32)),
-    (0x606A, "sensor_selection_code", Some(I16)),
-    (0x607B, "position_range_limit", None),
-    (0x6090, "velocity_encoder_resolution", None),
-    (0x60FA, "control_effort", Some(I32)),
+const TYPES: [(u16, DataType); 8] = [
+    (0x1002, U32), (0x1007, U32), (0x1012, U32), (0x1013, U32), (0x1F80, U32), (0x6069, I32), (0x606A, I16), (0x60FA, I32),
 ];
+
+/// Arrays and records of the standards that none of the models has: what stands in them differs by sub-index.
+const RECORDS: [u16; 6] = [0x1020, 0x1021, 0x1022, 0x1028, 0x607B, 0x6090];
 
 #[cfg(test)]
 mod tests {
@@ -86,14 +79,17 @@ mod tests {
 
     #[test]
     fn standard_objects_ascend_and_no_model_has_them() {
-        assert!(STANDARD.is_sorted_by(|(a, ..), (b, ..)| a < b));
-        for (index, name, _) in STANDARD {
-            let has = |description: &&devices::Description| description.row(Mux::new(index, 0)).is_some();
-            assert!(
-                !all().iter().any(|description| has(&description)),
-                "{index:04X}h {name}: a model's own row speaks for it"
-            );
+        assert!(TYPES.is_sorted_by(|(a, _), (b, _)| a < b));
+        for index in TYPES.map(|(index, _)| index).into_iter().chain(RECORDS) {
+            let has = |description: &devices::Description| description.row(Mux::new(index, 0)).is_some();
+            assert!(!all().iter().any(has), "{index:04X}h: a model's own row speaks for it");
+            assert!(common_name(Mux::new(index, 0)).is_some(), "{index:04X}h");
         }
+        assert_eq!(common_name(Mux::new(0x607B, 1)), Some("position_range_limit"));
+        assert_eq!(
+            (common_name(Mux::new(0x60FA, 0)), common_name(Mux::new(0x60FA, 1))),
+            (Some("control_effort"), None)
+        );
     }
 
     #[test]

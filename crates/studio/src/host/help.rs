@@ -63,7 +63,7 @@ fn of_object(node: Option<NodeId>, model: &'static Description, name: &str) -> R
     let (mux, row) = found.map_err(|why| ("unknown_object", why))?;
     let (Some(row), Some(node)) = (row, node) else { return Ok(None) };
     let mut told = row_json(model, row, node);
-    told["text"] = json!(row.title);
+    told["text"] = json!(if row.description.is_empty() { row.title } else { row.description });
     told["title"] = json!(format!("{mux} {}", row.name));
     told["source"] = json!(source(model, model.section(row.index)));
     Ok(Some(told))

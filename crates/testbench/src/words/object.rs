@@ -2,6 +2,7 @@
 
 use canopen::Mux;
 use canopen::od::{Entry, Table};
+use devices::names::present;
 
 use super::suggest::{did_you_mean, near};
 
@@ -62,7 +63,8 @@ fn row(table: &'static Table, mux: Mux) -> Option<&'static Entry> {
 }
 
 fn by_name(table: &'static Table, name: &str) -> Result<&'static Entry, String> {
-    let mut rows = table.rows().iter().filter(|row| row.name == name);
+    let present = present(name);
+    let mut rows = table.rows().iter().filter(|row| row.name == name || row.name == present);
     match (rows.next(), rows.next()) {
         (Some(row), None) => Ok(row),
         (Some(first), Some(second)) => Err(format!(
@@ -113,6 +115,15 @@ mod tests {
         assert!(find("position_actual_vale").unwrap_err().contains("did you mean position_actual_value?"));
         assert!(find("highest_sub_index").unwrap_err().contains("1401h:00"));
         assert!(object("velocity").unwrap().resolve(None).err().unwrap().contains("--model"));
+    }
+
+    #[test]
+    fn a_former_name_of_the_standards_is_understood() {
+        let table = devices::model("zlim42c").expect("a model").dictionary;
+        let find = |text: &str| object(text).unwrap().resolve(Some(table)).map(|found| found.0);
+        assert_eq!(find("homing_speed_switch"), Ok(Mux::new(0x6099, 1)));
+        assert_eq!(find("speed_during_search_for_switch"), Ok(Mux::new(0x6099, 1)));
+        assert_eq!(find("software_version"), Ok(Mux::new(0x100A, 0)));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use canopen::od::Entry;
 
 use super::values::{self, MODES, OFF_ON};
 use crate::mjoint::assumptions::*;
+use crate::row::cia::{ro as cia_ro, rw as cia_rw, rws as cia_rws};
 use crate::row::{I8, I16, I32, U8, U16, U32, join, ro, rw, rws};
 
 pub(super) const ROWS: [Entry; 36] = join(&[&MANUFACTURER, &PROFILE]);
@@ -16,7 +17,7 @@ pub(super) const ROWS: [Entry; 36] = join(&[&MANUFACTURER, &PROFILE]);
 pub(super) const CHANGES_OF_1_66: [Entry; 3] = [
     ro(0x260C, 0, I32, "incremental_position", "The incremental position").unit("counts"),
     ro(0x260E, 0, U16, "alarm_code", "Alarm code"),
-    ro(0x606C, 0, I32, "velocity_actual_value", "Motor actual speed").range(-30000, 30000).unit("0.1 r/min").mappable(),
+    cia_ro(0x606C, 0, I32).described("Motor actual speed").range(-30000, 30000).unit("0.1 r/min").mappable(),
 ];
 
 crate::row::rows! { const MANUFACTURER: [Entry; 17], manufacturer_objects:
@@ -46,41 +47,41 @@ crate::row::rows! { const MANUFACTURER: [Entry; 17], manufacturer_objects:
         => SYNCHRONOUS_CONTROL_WORD;
     rws(0x261D, 0, U16, "max_allowable_current", "maximum allowable current")
         .range(0, 10009).default(MAX_ALLOWABLE_CURRENT).unit("mA") => ALLOWABLE_CURRENT;
-    rw(0x6040, 0, U16, "controlword", "Control word").mappable() => CONTROLWORD;
+    cia_rw(0x6040, 0, U16).mappable() => CONTROLWORD;
 }
 
 crate::row::rows! { const PROFILE: [Entry; 19], profile_objects:
-    ro(0x6041, 0, U16, "statusword", "Status word").default(0x0404).mappable() => STATUSWORD;
-    rw(0x6060, 0, I8, "modes_of_operation", "Work mode").values(MODES).default(1).mappable() => MODES_OF_OPERATION;
+    cia_ro(0x6041, 0, U16).default(0x0404).mappable() => STATUSWORD;
+    cia_rw(0x6060, 0, I8).described("Work mode").values(MODES).default(1).mappable() => MODES_OF_OPERATION;
     // Printed on one row with 6064h. Recorded at power-off.
-    ro(0x6063, 0, I32, "position_actual_internal_value", "Position").unit("counts").mappable().stored()
+    cia_ro(0x6063, 0, I32).unit("counts").mappable().stored()
         => POSITION_ACTUAL_INTERNAL_VALUE;
-    ro(0x6064, 0, I32, "position_actual_value", "Actual position").unit("counts").mappable() => POSITION_ACTUAL_VALUE;
+    cia_ro(0x6064, 0, I32).described("Actual position").unit("counts").mappable() => POSITION_ACTUAL_VALUE;
     // Printed read and write, with a range in r/min.
-    ro(0x606C, 0, I16, "velocity_actual_value", "Motor actual speed")
+    cia_ro(0x606C, 0, I16).described("Motor actual speed")
         .range(-30000, 30000).unit("0.1 r/min").mappable() => VELOCITY_ACTUAL_VALUE;
-    ro(0x6078, 0, U16, "current_actual_value", "Actual current").range(0, 32767).unit("1/2000 A").mappable()
+    cia_ro(0x6078, 0, U16).described("Actual current").range(0, 32767).unit("1/2000 A").mappable()
         => CURRENT_ACTUAL_VALUE;
-    ro(0x6079, 0, U16, "dc_link_circuit_voltage", "System voltage").range(0, 32767).unit("1/327 V") => DC_LINK_CIRCUIT_VOLTAGE;
+    cia_ro(0x6079, 0, U16).described("System voltage").range(0, 32767).unit("1/327 V") => DC_LINK_CIRCUIT_VOLTAGE;
     // Printed without M, though RPDO1, 2 and 4 carry it.
-    rw(0x607A, 0, I32, "target_position", "Target location cache").unit("counts").mappable() => TARGET_POSITION;
-    rws(0x6081, 0, U32, "profile_velocity", "Trapezoidal velocity(Position Mode Speed)")
+    cia_rw(0x607A, 0, I32).described("Target location cache").unit("counts").mappable() => TARGET_POSITION;
+    cia_rws(0x6081, 0, U32).described("Trapezoidal velocity(Position Mode Speed)")
         .range(0, 3000).default(PROFILE_VELOCITY_RPM).unit("r/min").mappable() => PROFILE_VELOCITY;
-    rws(0x6083, 0, U32, "profile_acceleration", "Motor acceleration")
+    cia_rws(0x6083, 0, U32).described("Motor acceleration")
         .range(0, 65535).default(ACCELERATION_RPM_S).unit("(r/min)/s") => PROFILE_ACCELERATION;
     // Printed 17 to 21 here, 17 to 22 in 5.09.
-    rws(0x6098, 0, I8, "homing_method", "Return to origin method").range(17, 22).default(17) => HOMING_METHOD;
-    ro(0x60F9, 0, U8, "velocity_loop", "Number of sub-indexes").default(2);
+    cia_rws(0x6098, 0, I8).described("Return to origin method").range(17, 22).default(17) => HOMING_METHOD;
+    cia_ro(0x60F9, 0, U8).default(2);
     rws(0x60F9, 1, U16, "velocity_kp", "Velocity ring proportionality coefficient")
         .range(0, 10000).default(VELOCITY_KP).unit("0.001") => VELOCITY_PROPORTIONAL;
     rws(0x60F9, 2, U16, "velocity_integral_time", "Velocity loop integration time")
         .range(2, 2000).default(VELOCITY_INTEGRAL_TIME_MS).unit("ms") => VELOCITY_INTEGRAL_TIME;
-    ro(0x60FB, 0, U8, "position_loop", "Number of sub-indexes").default(2);
+    cia_ro(0x60FB, 0, U8).default(2);
     rws(0x60FB, 1, U16, "position_kp", "Proportional coefficient of position ring")
         .range(60, 30000).default(POSITION_KP) => POSITION_PROPORTIONAL;
     rws(0x60FB, 2, U16, "velocity_feed_forward", "Rate feed-forward")
         .range(0, 3924).unit("1/327 V/(1000 r/min)") => VELOCITY_FEED_FORWARD;
-    ro(0x60FD, 0, U16, "digital_inputs", "Input port state").mappable() => DIGITAL_INPUTS;
-    rw(0x60FF, 0, I32, "target_velocity", "Speed mode speed").range(-3000, 3000).unit("r/min").mappable()
+    cia_ro(0x60FD, 0, U16).described("Input port state").mappable() => DIGITAL_INPUTS;
+    cia_rw(0x60FF, 0, I32).described("Speed mode speed").range(-3000, 3000).unit("r/min").mappable()
         => TARGET_VELOCITY;
 }

@@ -3,28 +3,29 @@
 
 use canopen::od::{DataType, Entry};
 
-use crate::row::{U8, U16, U32, join, ro, rw};
+use crate::row::cia::{ro, rw};
+use crate::row::{U8, U16, U32, join};
 
 /// All of them.
 pub(super) static ROWS: [Entry; ROW_COUNT] = join(&[
     &GENERAL,
-    &rpdo!(0x1400, "rpdo1", 0x200),
-    &rpdo!(0x1401, "rpdo2", 0x300),
-    &rpdo!(0x1402, "rpdo3", 0x400),
-    &rpdo!(0x1403, "rpdo4", 0x500),
-    &mapping!(0x1600, "rpdo1", CONTROLWORD),
-    &mapping!(0x1601, "rpdo2", CONTROLWORD, 0x6060_0008),
-    &mapping!(0x1602, "rpdo3", CONTROLWORD, 0x607A_0020),
-    &mapping!(0x1603, "rpdo4", CONTROLWORD, 0x60FF_0020),
+    &rpdo!(0x1400, 0x200),
+    &rpdo!(0x1401, 0x300),
+    &rpdo!(0x1402, 0x400),
+    &rpdo!(0x1403, 0x500),
+    &mapping!(0x1600, CONTROLWORD),
+    &mapping!(0x1601, CONTROLWORD, 0x6060_0008),
+    &mapping!(0x1602, CONTROLWORD, 0x607A_0020),
+    &mapping!(0x1603, CONTROLWORD, 0x60FF_0020),
     // The first two are sent when they change. The others hold measurements, which change always: they go with SYNC.
-    &tpdo!(0x1800, "tpdo1", 0x180, 255),
-    &tpdo!(0x1801, "tpdo2", 0x280, 255),
-    &tpdo!(0x1802, "tpdo3", 0x380, 1),
-    &tpdo!(0x1803, "tpdo4", 0x480, 1),
-    &mapping!(0x1A00, "tpdo1", STATUSWORD),
-    &mapping!(0x1A01, "tpdo2", STATUSWORD, 0x6061_0008),
-    &mapping!(0x1A02, "tpdo3", STATUSWORD, 0x6064_0020),
-    &mapping!(0x1A03, "tpdo4", STATUSWORD, 0x606C_0020),
+    &tpdo!(0x1800, 0x180, 255),
+    &tpdo!(0x1801, 0x280, 255),
+    &tpdo!(0x1802, 0x380, 1),
+    &tpdo!(0x1803, 0x480, 1),
+    &mapping!(0x1A00, STATUSWORD),
+    &mapping!(0x1A01, STATUSWORD, 0x6061_0008),
+    &mapping!(0x1A02, STATUSWORD, 0x6064_0020),
+    &mapping!(0x1A03, STATUSWORD, 0x606C_0020),
 ]);
 
 /// Number of rows.
@@ -36,73 +37,71 @@ const STATUSWORD: i64 = 0x6041_0010;
 #[rustfmt::skip]
 const GENERAL: [Entry; 49] = [
     // Bits 0 to 15: profile 402; bits 16 to 23: servo drive.
-    ro(0x1000, 0, U32, "device_type", "Device type").default(0x0002_0192),
-    ro(0x1001, 0, U8, "error_register", "Error register").mappable(),
-    rw(0x1003, 0, U8, "pre_defined_error_field", "Number of errors kept").values(&[(0, "forgets them")]),
-    ro(0x1003, 1, U32, "standard_error_field_1", "Latest error"),
-    ro(0x1003, 2, U32, "standard_error_field_2", "Second latest error"),
-    ro(0x1003, 3, U32, "standard_error_field_3", "Third latest error"),
-    ro(0x1003, 4, U32, "standard_error_field_4", "Fourth latest error"),
-    ro(0x1003, 5, U32, "standard_error_field_5", "Fifth latest error"),
-    ro(0x1003, 6, U32, "standard_error_field_6", "Sixth latest error"),
-    ro(0x1003, 7, U32, "standard_error_field_7", "Seventh latest error"),
-    ro(0x1003, 8, U32, "standard_error_field_8", "Eighth latest error"),
-    rw(0x1005, 0, U32, "cob_id_sync", "COB-ID of SYNC").default(0x80).saved(),
-    rw(0x1006, 0, U32, "communication_cycle_period", "Time between two SYNCs that is awaited; 0 for none").unit("us").saved(),
-    text(0x1008, "manufacturer_device_name", "Name of the device", "Ferrodrive CiA 402 servo"),
-    text(0x1009, "manufacturer_hardware_version", "Version of the hardware", "1"),
-    text(0x100A, "manufacturer_software_version", "Version of the firmware", env!("CARGO_PKG_VERSION")),
-    rw(0x100C, 0, U16, "guard_time", "Guard time; 0 is off").unit("ms").saved(),
-    rw(0x100D, 0, U8, "life_time_factor", "Life time factor; 0 is off").saved(),
-    ro(0x1010, 0, U8, "store_parameters", "Number of groups that can be stored").default(3),
-    rw(0x1010, 1, U32, "save_all_parameters", "Store all: write 'save'").default(1),
-    rw(0x1010, 2, U32, "save_communication_parameters", "Store 1000h to 1FFFh: write 'save'").default(1),
-    rw(0x1010, 3, U32, "save_application_parameters", "Store 6000h to 9FFFh: write 'save'").default(1),
-    ro(0x1011, 0, U8, "restore_default_parameters", "Number of groups that can be restored").default(3),
-    rw(0x1011, 1, U32, "restore_all_default_parameters", "Restore all with the next reset: write 'load'").default(1),
-    rw(0x1011, 2, U32, "restore_communication_default_parameters", "Restore 1000h to 1FFFh: write 'load'").default(1),
-    rw(0x1011, 3, U32, "restore_application_default_parameters", "Restore 6000h to 9FFFh: write 'load'").default(1),
-    rw(0x1014, 0, U32, "cob_id_emcy", "COB-ID of EMCY").node_id_plus(0x80).saved(),
-    rw(0x1015, 0, U16, "inhibit_time_emcy", "Least time between two EMCY messages").unit("100 us").saved(),
-    ro(0x1016, 0, U8, "consumer_heartbeat_time", "Number of nodes that can be watched").default(8),
-    rw(0x1016, 1, U32, "consumer_heartbeat_time_1", "First node watched, and how long it may be silent").saved(),
-    rw(0x1016, 2, U32, "consumer_heartbeat_time_2", "Second node watched, and how long it may be silent").saved(),
-    rw(0x1016, 3, U32, "consumer_heartbeat_time_3", "Third node watched, and how long it may be silent").saved(),
-    rw(0x1016, 4, U32, "consumer_heartbeat_time_4", "Fourth node watched, and how long it may be silent").saved(),
-    rw(0x1016, 5, U32, "consumer_heartbeat_time_5", "Fifth node watched, and how long it may be silent").saved(),
-    rw(0x1016, 6, U32, "consumer_heartbeat_time_6", "Sixth node watched, and how long it may be silent").saved(),
-    rw(0x1016, 7, U32, "consumer_heartbeat_time_7", "Seventh node watched, and how long it may be silent").saved(),
-    rw(0x1016, 8, U32, "consumer_heartbeat_time_8", "Eighth node watched, and how long it may be silent").saved(),
-    rw(0x1017, 0, U16, "producer_heartbeat_time", "Time between two heartbeats; 0 is off").unit("ms").saved(),
-    ro(0x1018, 0, U8, "identity_object", "Number of entries").default(4),
+    ro(0x1000, 0, U32).default(0x0002_0192),
+    ro(0x1001, 0, U8).mappable(),
+    rw(0x1003, 0, U8).described("Number of errors kept").values(&[(0, "forgets them")]),
+    ro(0x1003, 1, U32).described("Latest error"),
+    ro(0x1003, 2, U32).described("Second latest error"),
+    ro(0x1003, 3, U32).described("Third latest error"),
+    ro(0x1003, 4, U32).described("Fourth latest error"),
+    ro(0x1003, 5, U32).described("Fifth latest error"),
+    ro(0x1003, 6, U32).described("Sixth latest error"),
+    ro(0x1003, 7, U32).described("Seventh latest error"),
+    ro(0x1003, 8, U32).described("Eighth latest error"),
+    rw(0x1005, 0, U32).default(0x80).saved(),
+    rw(0x1006, 0, U32).described("Time between two SYNCs that is awaited; 0 for none").unit("us").saved(),
+    text(0x1008, "Ferrodrive CiA 402 servo"),
+    text(0x1009, "1"),
+    text(0x100A, env!("CARGO_PKG_VERSION")),
+    rw(0x100C, 0, U16).described("Guard time; 0 is off").unit("ms").saved(),
+    rw(0x100D, 0, U8).described("Life time factor; 0 is off").saved(),
+    ro(0x1010, 0, U8).described("Number of groups that can be stored").default(3),
+    rw(0x1010, 1, U32).described("Store all: write 'save'").default(1),
+    rw(0x1010, 2, U32).described("Store 1000h to 1FFFh: write 'save'").default(1),
+    rw(0x1010, 3, U32).described("Store 6000h to 9FFFh: write 'save'").default(1),
+    ro(0x1011, 0, U8).described("Number of groups that can be restored").default(3),
+    rw(0x1011, 1, U32).described("Restore all with the next reset: write 'load'").default(1),
+    rw(0x1011, 2, U32).described("Restore 1000h to 1FFFh: write 'load'").default(1),
+    rw(0x1011, 3, U32).described("Restore 6000h to 9FFFh: write 'load'").default(1),
+    rw(0x1014, 0, U32).node_id_plus(0x80).saved(),
+    rw(0x1015, 0, U16).described("Least time between two EMCY messages").unit("100 us").saved(),
+    ro(0x1016, 0, U8).described("Number of nodes that can be watched").default(8),
+    rw(0x1016, 1, U32).described("First node watched, and how long it may be silent").saved(),
+    rw(0x1016, 2, U32).described("Second node watched, and how long it may be silent").saved(),
+    rw(0x1016, 3, U32).described("Third node watched, and how long it may be silent").saved(),
+    rw(0x1016, 4, U32).described("Fourth node watched, and how long it may be silent").saved(),
+    rw(0x1016, 5, U32).described("Fifth node watched, and how long it may be silent").saved(),
+    rw(0x1016, 6, U32).described("Sixth node watched, and how long it may be silent").saved(),
+    rw(0x1016, 7, U32).described("Seventh node watched, and how long it may be silent").saved(),
+    rw(0x1016, 8, U32).described("Eighth node watched, and how long it may be silent").saved(),
+    rw(0x1017, 0, U16).described("Time between two heartbeats; 0 is off").unit("ms").saved(),
+    ro(0x1018, 0, U8).default(4),
     // No vendor of CiA: 0 is not given to anybody.
-    ro(0x1018, 1, U32, "vendor_id", "Vendor"),
-    ro(0x1018, 2, U32, "product_code", "Product").default(402),
-    ro(0x1018, 3, U32, "revision_number", "Revision").default(0x0001_0000),
-    ro(0x1018, 4, U32, "serial_number", "Serial number").default(1),
-    rw(0x1019, 0, U8, "synchronous_counter_overflow_value", "SYNC counter overflow; 0 is off").range(0, 0),
-    ro(0x1029, 0, U8, "error_behaviour", "Number of entries").default(1),
-    rw(0x1029, 1, U8, "communication_error", "What a loss of communication does to the NMT state")
+    ro(0x1018, 1, U32),
+    ro(0x1018, 2, U32).default(402),
+    ro(0x1018, 3, U32).default(0x0001_0000),
+    ro(0x1018, 4, U32).default(1),
+    rw(0x1019, 0, U8).described("SYNC counter overflow; 0 is off").range(0, 0),
+    ro(0x1029, 0, U8).default(1),
+    rw(0x1029, 1, U8).described("What a loss of communication does to the NMT state")
         .values(&[(0, "pre-operational"), (1, "nothing"), (2, "stopped")]).default(1).saved(),
-    ro(0x1200, 0, U8, "sdo_server_parameter", "Number of entries").default(2),
-    ro(0x1200, 1, U32, "sdo_cob_id_client_to_server", "COB-ID client to server").node_id_plus(0x600),
-    ro(0x1200, 2, U32, "sdo_cob_id_server_to_client", "COB-ID server to client").node_id_plus(0x580),
+    ro(0x1200, 0, U8).default(2),
+    ro(0x1200, 1, U32).node_id_plus(0x600),
+    ro(0x1200, 2, U32).node_id_plus(0x580),
 ];
 
-const fn text(index: u16, name: &'static str, title: &'static str, value: &'static str) -> Entry {
-    ro(index, 0, DataType::VisibleString, name, title).text(value)
+const fn text(index: u16, value: &'static str) -> Entry {
+    ro(index, 0, DataType::VisibleString).text(value)
 }
 
 /// Communication parameter of an RPDO.
 macro_rules! rpdo {
-    ($index:literal, $name:literal, $cob_id:literal) => {
+    ($index:literal, $cob_id:literal) => {
         [
-            ro($index, 0, U8, concat!($name, "_parameter"), "Highest entry").default(5),
-            rw($index, 1, U32, concat!($name, "_cob_id"), "COB-ID").node_id_plus($cob_id).saved(),
-            rw($index, 2, U8, concat!($name, "_transmission_type"), "Transmission type").default(255).saved(),
-            rw($index, 5, U16, concat!($name, "_event_timer"), "Longest time without one, from the first on; 0 is off")
-                .unit("ms")
-                .saved(),
+            ro($index, 0, U8).default(5),
+            rw($index, 1, U32).node_id_plus($cob_id).saved(),
+            rw($index, 2, U8).default(255).saved(),
+            rw($index, 5, U16).described("Longest time without one, from the first on; 0 is off").unit("ms").saved(),
         ]
     };
 }
@@ -110,15 +109,13 @@ use rpdo;
 
 /// Communication parameter of a TPDO.
 macro_rules! tpdo {
-    ($index:literal, $name:literal, $cob_id:literal, $transmission_type:literal) => {
+    ($index:literal, $cob_id:literal, $transmission_type:literal) => {
         [
-            ro($index, 0, U8, concat!($name, "_parameter"), "Highest entry").default(5),
-            rw($index, 1, U32, concat!($name, "_cob_id"), "COB-ID").node_id_plus($cob_id).saved(),
-            rw($index, 2, U8, concat!($name, "_transmission_type"), "Transmission type")
-                .default($transmission_type)
-                .saved(),
-            rw($index, 3, U16, concat!($name, "_inhibit_time"), "Least time between two").unit("100 us").saved(),
-            rw($index, 5, U16, concat!($name, "_event_timer"), "Longest time between two; 0 is off").unit("ms").saved(),
+            ro($index, 0, U8).default(5),
+            rw($index, 1, U32).node_id_plus($cob_id).saved(),
+            rw($index, 2, U8).default($transmission_type).saved(),
+            rw($index, 3, U16).described("Least time between two").unit("100 us").saved(),
+            rw($index, 5, U16).described("Longest time between two; 0 is off").unit("ms").saved(),
         ]
     };
 }
@@ -126,23 +123,23 @@ use tpdo;
 
 /// A mapping of up to eight objects, with those that are mapped as delivered.
 macro_rules! mapping {
-    ($index:literal, $name:literal, $($mapped:expr),*) => {{
+    ($index:literal, $($mapped:expr),*) => {{
         const MAPPED: &[i64] = &[$($mapped),*];
         [
-            rw($index, 0, U8, concat!($name, "_mapping"), "Number of objects mapped")
+            rw($index, 0, U8)
                 .default(MAPPED.len() as i64).range(0, 8).saved(),
-            mapping!(@ $index, 1, $name, "_mapping_1", MAPPED),
-            mapping!(@ $index, 2, $name, "_mapping_2", MAPPED),
-            mapping!(@ $index, 3, $name, "_mapping_3", MAPPED),
-            mapping!(@ $index, 4, $name, "_mapping_4", MAPPED),
-            mapping!(@ $index, 5, $name, "_mapping_5", MAPPED),
-            mapping!(@ $index, 6, $name, "_mapping_6", MAPPED),
-            mapping!(@ $index, 7, $name, "_mapping_7", MAPPED),
-            mapping!(@ $index, 8, $name, "_mapping_8", MAPPED),
+            mapping!(@ $index, 1, MAPPED),
+            mapping!(@ $index, 2, MAPPED),
+            mapping!(@ $index, 3, MAPPED),
+            mapping!(@ $index, 4, MAPPED),
+            mapping!(@ $index, 5, MAPPED),
+            mapping!(@ $index, 6, MAPPED),
+            mapping!(@ $index, 7, MAPPED),
+            mapping!(@ $index, 8, MAPPED),
         ]
     }};
-    (@ $index:literal, $sub:literal, $name:literal, $suffix:literal, $mapped:ident) => {
-        rw($index, $sub, U32, concat!($name, $suffix), "Object mapped").default(nth($mapped, $sub)).saved()
+    (@ $index:literal, $sub:literal, $mapped:ident) => {
+        rw($index, $sub, U32).default(nth($mapped, $sub)).saved()
     };
 }
 use mapping;

@@ -6,46 +6,47 @@
 use canopen::od::Entry;
 
 use super::values::{DISABLE_OPTIONS, HALT_OPTIONS, MODES, QUICK_STOP_OPTIONS};
-use crate::row::{I8, I16, I32, U16, U32, ro, rw};
+use crate::row::cia::{ro, rw};
+use crate::row::{I8, I16, I32, U16, U32};
 use crate::zltech::values::SHUTDOWN_OPTIONS;
 
 crate::row::rows! { pub(super) const ROWS: [Entry; 22], profile_objects:
-    ro(0x603F, 0, U16, "error_code", "Driver last fault code").mappable() => ERROR_CODE;
-    rw(0x6040, 0, U16, "controlword", "Control word").mappable() => CONTROLWORD;
-    ro(0x6041, 0, U16, "statusword", "Status word").mappable() => STATUSWORD;
-    rw(0x605A, 0, I16, "quick_stop_option_code", "Quick stop code").values(QUICK_STOP_OPTIONS).default(5);
-    rw(0x605B, 0, I16, "shutdown_option_code", "Close operation code").values(SHUTDOWN_OPTIONS).default(1);
-    rw(0x605C, 0, I16, "disable_operation_option_code", "Disable operation code")
+    ro(0x603F, 0, U16).described("Driver last fault code").mappable() => ERROR_CODE;
+    rw(0x6040, 0, U16).mappable() => CONTROLWORD;
+    ro(0x6041, 0, U16).mappable() => STATUSWORD;
+    rw(0x605A, 0, I16).described("Quick stop code").values(QUICK_STOP_OPTIONS).default(5);
+    rw(0x605B, 0, I16).described("Close operation code").values(SHUTDOWN_OPTIONS).default(1);
+    rw(0x605C, 0, I16).described("Disable operation code")
         .values(DISABLE_OPTIONS).default(1);
-    rw(0x605D, 0, I16, "halt_option_code", "Halt control register").values(HALT_OPTIONS).default(1);
+    rw(0x605D, 0, I16).described("Halt control register").values(HALT_OPTIONS).default(1);
     // Printed RW. A robot's driver has never written it and turns the wheels: a save keeps it.
-    rw(0x6060, 0, I8, "modes_of_operation", "Operating mode").values(MODES).mappable().saved() => MODES_OF_OPERATION;
-    ro(0x6061, 0, I8, "modes_of_operation_display", "Operating mode status").values(MODES).mappable()
+    rw(0x6060, 0, I8).described("Operating mode").values(MODES).mappable().saved() => MODES_OF_OPERATION;
+    ro(0x6061, 0, I8).described("Operating mode status").values(MODES).mappable()
         => MODES_OF_OPERATION_DISPLAY;
-    ro(0x6064, 0, I32, "position_actual_value", "Actual position feedback").unit("counts").mappable()
+    ro(0x6064, 0, I32).described("Actual position feedback").unit("counts").mappable()
         => POSITION_ACTUAL_VALUE;
-    ro(0x606C, 0, I32, "velocity_actual_value", "Actual speed feedback").unit("0.1 r/min").mappable()
+    ro(0x606C, 0, I32).described("Actual speed feedback").unit("0.1 r/min").mappable()
         => VELOCITY_ACTUAL_VALUE;
-    rw(0x6071, 0, I16, "target_torque", "Target torque")
+    rw(0x6071, 0, I16)
         .range(-30000, 30000).unit("mA").held_to(0x2015, 0, 100).mappable() => TARGET_TORQUE;
     // Both show what flows, up to the 60 A that 2015h goes to; 16 bits of 1 mA end before that.
-    ro(0x6074, 0, I16, "torque_demand", "Real-time target torque").unit("mA").mappable() => TORQUE_DEMAND;
-    ro(0x6077, 0, I16, "torque_actual_value", "Real-time torque feedback").range(-600, 600).unit("0.1 A").mappable()
+    ro(0x6074, 0, I16).described("Real-time target torque").unit("mA").mappable() => TORQUE_DEMAND;
+    ro(0x6077, 0, I16).described("Real-time torque feedback").range(-600, 600).unit("0.1 A").mappable()
         => TORQUE_ACTUAL_VALUE;
-    rw(0x607A, 0, I32, "target_position", "Target position")
+    rw(0x607A, 0, I32)
         .range(-0x7FFF_FFFF, 0x7FFF_FFFF).unit("counts").mappable() => TARGET_POSITION;
-    rw(0x6081, 0, U32, "profile_velocity", "Max speed")
+    rw(0x6081, 0, U32).described("Max speed")
         .range(1, 1000).default(120).unit("r/min").held_to(0x200A, 0, 1).mappable();
-    rw(0x6082, 0, U32, "end_velocity", "Start / stop speed in profile position mode")
+    rw(0x6082, 0, U32).described("Start / stop speed in profile position mode")
         .range(1, 1000).default(1).unit("r/min").mappable();
-    rw(0x6083, 0, U32, "profile_acceleration", "S-shaped acceleration time")
+    rw(0x6083, 0, U32).described("S-shaped acceleration time")
         .range(0, 32767).default(500).unit("ms").mappable();
-    rw(0x6084, 0, U32, "profile_deceleration", "S-shaped deceleration time")
+    rw(0x6084, 0, U32).described("S-shaped deceleration time")
         .range(0, 32767).default(500).unit("ms").mappable();
-    rw(0x6085, 0, U32, "quick_stop_deceleration", "Emergency stop deceleration time")
+    rw(0x6085, 0, U32).described("Emergency stop deceleration time")
         .range(0, 32767).default(10).unit("ms").mappable();
-    rw(0x6087, 0, U32, "torque_slope", "Torque slope").default(300).unit("mA/s").mappable() => TORQUE_SLOPE;
+    rw(0x6087, 0, U32).default(300).unit("mA/s").mappable() => TORQUE_SLOPE;
     // 202F:05 makes one count finer and the range wider, from the next restart on (5.3).
-    rw(0x60FF, 0, I32, "target_velocity", "Target speed")
+    rw(0x60FF, 0, I32).described("Target speed")
         .range(-1000, 1000).unit("r/min").resolution(0x202F, 5).held_to(0x200A, 0, 1).mappable() => TARGET_VELOCITY;
 }

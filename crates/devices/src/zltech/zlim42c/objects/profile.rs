@@ -5,48 +5,49 @@
 use canopen::od::Entry;
 
 use super::values::{DISABLE_OPTIONS, HALT_OPTIONS, HOMING_METHODS, MODES, QUICK_STOP_OPTIONS};
-use crate::row::{I8, I16, I32, U8, U16, U32, ro, rw};
+use crate::row::cia::{ro, rw};
+use crate::row::{I8, I16, I32, U8, U16, U32};
 use crate::zltech::values::SHUTDOWN_OPTIONS;
 
 crate::row::rows! { pub(super) const ROWS: [Entry; 24], profile_objects:
-    ro(0x603F, 0, U16, "error_code", "Last fault code").mappable() => ERROR_CODE;
-    rw(0x6040, 0, U16, "controlword", "Control word").mappable() => CONTROLWORD;
-    ro(0x6041, 0, U16, "statusword", "Status word").mappable() => STATUSWORD;
-    rw(0x605A, 0, I16, "quick_stop_option_code", "Quick stop code").values(QUICK_STOP_OPTIONS).default(5);
-    rw(0x605B, 0, I16, "shutdown_option_code", "Shutdown code").values(SHUTDOWN_OPTIONS).default(1);
-    rw(0x605C, 0, I16, "disable_operation_option_code", "Disable operation code")
+    ro(0x603F, 0, U16).described("Last fault code").mappable() => ERROR_CODE;
+    rw(0x6040, 0, U16).mappable() => CONTROLWORD;
+    ro(0x6041, 0, U16).mappable() => STATUSWORD;
+    rw(0x605A, 0, I16).described("Quick stop code").values(QUICK_STOP_OPTIONS).default(5);
+    rw(0x605B, 0, I16).described("Shutdown code").values(SHUTDOWN_OPTIONS).default(1);
+    rw(0x605C, 0, I16).described("Disable operation code")
         .values(DISABLE_OPTIONS).default(1);
-    rw(0x605D, 0, I16, "halt_option_code", "Halt control register").values(HALT_OPTIONS).default(1);
+    rw(0x605D, 0, I16).described("Halt control register").values(HALT_OPTIONS).default(1);
     // 5.3.3 prints type 18, not mappable, and 2 for velocity.
-    rw(0x6060, 0, I8, "modes_of_operation", "Operating mode").values(MODES).mappable() => MODES_OF_OPERATION;
-    ro(0x6061, 0, I8, "modes_of_operation_display", "Operating mode status").values(MODES).mappable()
+    rw(0x6060, 0, I8).described("Operating mode").values(MODES).mappable() => MODES_OF_OPERATION;
+    ro(0x6061, 0, I8).described("Operating mode status").values(MODES).mappable()
         => MODES_OF_OPERATION_DISPLAY;
     // The commanded position: there is no encoder. The default is printed "invalid".
-    ro(0x6064, 0, I32, "position_actual_value", "Actual position feedback").unit("pulses").mappable()
+    ro(0x6064, 0, I32).described("Actual position feedback").unit("pulses").mappable()
         => POSITION_ACTUAL_VALUE;
-    ro(0x606C, 0, I32, "velocity_actual_value", "Actual speed feedback").unit("r/min").mappable()
+    ro(0x606C, 0, I32).described("Actual speed feedback").unit("r/min").mappable()
         => VELOCITY_ACTUAL_VALUE;
-    rw(0x607A, 0, I32, "target_position", "Target position")
+    rw(0x607A, 0, I32)
         .range(-1_000_000, 1_000_000).default(5000).unit("pulses").mappable() => TARGET_POSITION;
-    rw(0x607C, 0, I32, "home_offset", "Home offset").range(-1_000_000, 1_000_000).unit("pulses").mappable()
+    rw(0x607C, 0, I32).range(-1_000_000, 1_000_000).unit("pulses").mappable()
         => HOME_OFFSET;
-    rw(0x6081, 0, U32, "profile_velocity", "Maximum speed").range(5, 3000).default(120).unit("r/min").mappable();
-    rw(0x6082, 0, U32, "end_velocity", "Start / stop speed in position mode")
+    rw(0x6081, 0, U32).described("Maximum speed").range(5, 3000).default(120).unit("r/min").mappable();
+    rw(0x6082, 0, U32).described("Start / stop speed in position mode")
         .range(5, 3000).default(10).unit("r/min").mappable();
-    rw(0x6083, 0, U32, "profile_acceleration", "S-shaped acceleration time")
+    rw(0x6083, 0, U32).described("S-shaped acceleration time")
         .range(0, 2000).default(100).unit("ms").mappable();
-    rw(0x6084, 0, U32, "profile_deceleration", "S-shaped deceleration time")
+    rw(0x6084, 0, U32).described("S-shaped deceleration time")
         .range(0, 2000).default(100).unit("ms").mappable();
-    rw(0x6085, 0, U32, "quick_stop_deceleration", "Emergency stop deceleration time")
+    rw(0x6085, 0, U32).described("Emergency stop deceleration time")
         .range(0, 2000).default(10).unit("ms").mappable();
-    rw(0x6098, 0, U8, "homing_method", "Homing method").values(HOMING_METHODS).mappable() => HOMING_METHOD;
-    ro(0x6099, 0, U8, "homing_speeds", "Number of sub-indexes").default(2);
-    rw(0x6099, 1, U32, "homing_speed_switch", "Homing speed").range(5, 3000).default(120).unit("r/min").mappable()
+    rw(0x6098, 0, U8).values(HOMING_METHODS).mappable() => HOMING_METHOD;
+    ro(0x6099, 0, U8).default(2);
+    rw(0x6099, 1, U32).described("Homing speed").range(5, 3000).default(120).unit("r/min").mappable()
         => HOMING_SPEED;
-    rw(0x6099, 2, U32, "homing_speed_zero", "Homing search speed").range(5, 3000).default(60).unit("r/min").mappable()
+    rw(0x6099, 2, U32).described("Homing search speed").range(5, 3000).default(60).unit("r/min").mappable()
         => HOMING_SEARCH_SPEED;
-    rw(0x609A, 0, U32, "homing_acceleration", "Homing acceleration and deceleration time")
+    rw(0x609A, 0, U32).described("Homing acceleration and deceleration time")
         .range(30, 2000).default(100).unit("ms").mappable() => HOMING_ACCELERATION;
-    rw(0x60FF, 0, I32, "target_velocity", "Target speed").range(-3000, 3000).unit("r/min").mappable()
+    rw(0x60FF, 0, I32).described("Target speed").range(-3000, 3000).unit("r/min").mappable()
         => TARGET_VELOCITY;
 }
