@@ -2,13 +2,15 @@
 
 use std::fmt;
 
-use canopen::{AbortCode, Mux, NodeId};
+use canopen::{Mux, NodeId};
 use clap::error::{ContextKind, ErrorKind};
 use serde::Serialize;
 
 use crate::plain::short;
 use crate::signals::Signal;
 use crate::status::Status;
+pub(crate) use testbench::failure::FailureBody;
+use testbench::failure::Subject;
 use testbench::models::how_to_say;
 
 /// A reason for people, in up to three parts, and what programs look for in it.
@@ -28,14 +30,6 @@ pub(crate) struct Failure {
     pub(crate) subject: Subject,
     /// It has been told already, as part of what the command printed.
     pub(crate) told: bool,
-}
-
-/// What a failure is about, as far as it is about one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Subject {
-    pub(crate) node: Option<NodeId>,
-    pub(crate) object: Option<Mux>,
-    pub(crate) abort: Option<AbortCode>,
 }
 
 impl Failure {
@@ -148,20 +142,6 @@ pub(crate) struct FailureReport {
     error: FailureBody,
 }
 
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct FailureBody {
-    /// A word: `usage`, `no_answer`, `aborted`, `out_of_limits`, ...
-    kind: &'static str,
-    /// What and why.
-    message: String,
-    node: Option<u8>,
-    object: Option<String>,
-    /// The SDO abort code.
-    abort: Option<u32>,
-    /// What to do.
-    next: Option<String>,
-}
-
 impl From<&Failure> for FailureReport {
     fn from(failure: &Failure) -> Self {
         Self { ok: false, error: failure.into() }
@@ -170,63 +150,41 @@ impl From<&Failure> for FailureReport {
 
 impl From<&Failure> for FailureBody {
     fn from(failure: &Failure) -> Self {
-        let because = failure.because.join("; ");
-        let message = if because.is_empty() { failure.what.clone() } else { format!("{}: {because}", failure.what) };
-        let Subject { node, object, abort } = failure.subject;
-        Self {
-            kind: failure.kind,
-            message,
-            node: node.map(NodeId::raw),
-            object: object.map(|object| object.to_string()),
-            abort: abort.map(|code| code.0),
-            next: (!failure.next.is_empty()).then(|| failure.next.join("; ")),
-        }
+        Self::new(failure.kind, (&failure.what, &failure.because, &failure.next), failure.subject)
+    }
+}
+
+impl From<testbench::failure::Failure> for Failure {
+    fn from(failure: testbench::failure::Failure) -> Self {
+        let testbench::failure::Failure { kind, what, because, next, subject, is_usage } = failure;
+        let status = if is_usage { Status::Usage } else { Status::Failed };
+        Self { status, kind, what, because, next, subject, told: false }
     }
 }
 
 impl From<master::Error> for Failure {
-    /// The master's errors say what, why and what to do, but for how a model is named on this command line. What is beyond
-    /// a limit was mistyped.
+    /// With how a model is named on this command line.
     fn from(error: master::Error) -> Self {
         use master::Error;
-        let subject = Subject { node: Some(error.node()), object: error.object(), abort: error.abort() };
-        let failure = Self { kind: error.kind(), subject, ..parts(&error) };
-        match error {
-            Error::OutOfLimits { .. } | Error::TooFine { .. } => Self { status: Status::Usage, ..failure },
+        let advice = match &error {
             Error::GuessedModel { node, guess, .. } => {
                 let fitting: Vec<_> = guess.fitting().map(|model| model.name).collect();
-                failure.next(format!("say which it is: {}", how_to_say(node, &fitting)))
+                Some(format!("say which it is: {}", how_to_say(*node, &fitting)))
             }
-            Error::WrongModel { node, .. } | Error::OtherModel { node, .. } => failure.next(format!(
-                "leave --model {node}=.. away and see what `ferrodrive scan` says of it, or correct the machine file"
+            Error::WrongModel { node, .. } | Error::OtherModel { node, .. } => Some(format!(
+                "omit --model {node}=.., see what `ferrodrive scan` says of it, or correct the machine file"
             )),
-            Error::UnknownModel { node, .. } => {
-                failure.next(format!("say which it is: {}", how_to_say(node, &["MODEL"])))
-            }
-            _ => failure,
-        }
-    }
-}
-
-/// What the error says, and apart from it what it advises.
-fn parts(error: &master::Error) -> Failure {
-    if let master::Error::NotReached(explanation) = error {
-        let facts: Vec<String> = explanation.facts.iter().map(ToString::to_string).collect();
-        return Failure::new(format!("node {}: could not {}", explanation.node, explanation.intent))
-            .because(&explanation.conclusion)
-            .because(format!("seen: {}", facts.join("; ")))
-            .next(&explanation.advice);
-    }
-    let text = error.to_string();
-    match error.advice().and_then(|advice| Some((text.strip_suffix(&advice)?, advice.clone()))) {
-        Some((what, advice)) => Failure::new(what.trim_end().trim_end_matches(['.', ':'])).next(advice),
-        None => Failure::new(text),
+            Error::UnknownModel { node, .. } => Some(format!("say which it is: {}", how_to_say(*node, &["MODEL"]))),
+            _ => None,
+        };
+        advice.into_iter().fold(testbench::failure::Failure::from(error).into(), Self::next)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use canopen::AbortCode;
 
     #[test]
     fn a_failure_names_what_why_and_next() {

@@ -8,7 +8,6 @@ mod command;
 mod completion;
 mod context;
 mod control_client;
-mod decode;
 mod embedded;
 mod failure;
 mod far_world;
@@ -38,6 +37,8 @@ use clap::error::{ContextKind, ContextValue};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, FromArgMatches};
 use clap_complete::env::CompleteEnv;
+
+use testbench::decode;
 
 use crate::args::{Cli, Command};
 use crate::command::completions::ASKED_BY;
@@ -218,7 +219,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Plan(plan) => plan.run(global, format),
         Command::Check(check) => {
             let report = check.run(global)?;
-            judged(format, &report, report.failure(check.strict()))
+            judged(format, &report, report.failure(check.strict()).map(Into::into))
         }
         Command::Plot(plot) => print(format, &plot.draw()?),
         Command::Readings(readings) => print(format, &readings.list()?),

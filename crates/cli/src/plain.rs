@@ -1,18 +1,6 @@
 //! Text of others as it may be shown: what would steer a terminal is made visible.
 
-/// `text` with its control characters escaped, but for the ends of lines: file names, machine files and commands may carry
-/// sequences that a terminal obeys.
-pub(crate) fn plain(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
-    for letter in text.chars() {
-        if letter.is_control() && letter != '\n' {
-            shown.extend(letter.escape_default());
-        } else {
-            shown.push(letter);
-        }
-    }
-    shown
-}
+pub(crate) use testbench::words::plain;
 
 /// Characters of one argument that are repeated in a message.
 const MOST_REPEATED: usize = 120;

@@ -78,6 +78,20 @@ impl Progress {
     }
 }
 
+impl testbench::network::Progress for Progress {
+    fn show(&self, text: String) {
+        Self::show(self, text);
+    }
+
+    fn count(&self, text: String) {
+        Self::count(self, text);
+    }
+
+    fn note(&self, text: &str) {
+        Self::note(self, text);
+    }
+}
+
 /// A text on standard output that is written over by the next one; of a terminal only.
 pub(crate) struct Screen {
     bar: ProgressBar,

@@ -29,7 +29,7 @@ use crate::recording::{CommandLog, LogPath, Logged, Pace, interface_of};
 use crate::signals::asked_to_end;
 use crate::wire;
 use crate::world_bus::WorldBus;
-use testbench::machine_file::{self, Machine};
+use testbench::machine_file::Machine;
 
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.
 const VIRTUAL_LIMIT: Duration = Duration::from_secs(24 * 3600);
@@ -65,19 +65,15 @@ pub(crate) fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
 pub(crate) fn virtual_world(file: Option<&Path>) -> Result<Embedded, Failure> {
     let Some(path) = file else { return embedded::world() };
     let machine = read_machine(path)?;
-    let world = machine.build().map_err(|bad| unusable(path, bad.named(path.display().to_string()).to_string()))?;
+    let world = machine
+        .build()
+        .map_err(|bad| testbench::network::unusable(path, bad.named(path.display().to_string()).to_string()))?;
     Ok((world, machine.models().collect()))
 }
 
 /// The machine file that a command names.
 pub(crate) fn read_machine(path: &Path) -> Result<Machine, Failure> {
-    machine_file::read(path).map_err(|reason| unusable(path, reason))
-}
-
-fn unusable(path: &Path, reason: String) -> Failure {
-    Failure::usage(format!("cannot use the machine file {}", path.display()))
-        .because(reason)
-        .next(machine_file::example())
+    Ok(testbench::network::read_machine(path)?)
 }
 
 fn virtual_bus<R>(

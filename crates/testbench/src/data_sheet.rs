@@ -7,6 +7,8 @@ use std::path::Path;
 use eds::document::{Bounds, Document};
 use eds::{Eds, Reading, Refusal};
 
+use crate::failure::Failure;
+
 /// Why a file gave no data sheet.
 pub enum Unread {
     /// It cannot be read.
@@ -26,4 +28,22 @@ pub fn document(path: &Path) -> Result<Document, Unread> {
 /// Reads a data sheet.
 pub fn reading(path: &Path) -> Result<Reading, Unread> {
     Eds::read(&document(path)?).map_err(Unread::Refused)
+}
+
+impl Unread {
+    /// What it means for a file that was asked for.
+    pub fn failure(&self, path: &Path) -> Failure {
+        match self {
+            Self::File(error) => Failure::new(format!("cannot read {}", path.display()))
+                .because(error)
+                .next("is the name right, and may this user read the file?"),
+            Self::Refused(refusal) => {
+                let at = if refusal.line > 0 { format!(", line {}", refusal.line) } else { String::new() };
+                Failure::new(format!("{}{at} is not read as an EDS", path.display()))
+                    .of_kind("not_an_eds")
+                    .because(&refusal.reason)
+                    .next(&refusal.next)
+            }
+        }
+    }
 }

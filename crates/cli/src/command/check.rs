@@ -1,12 +1,11 @@
 //! `ferrodrive check`: what goes wrong with a described bus, before it is started.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use serde::Serialize;
-use testbench::check::{self, Checked, CheckedNode, Finding, LiveNode, Prediction, Severity};
-use testbench::document::{BadFile, read_text};
+use testbench::check::{LiveNode, Prediction, Severity};
+use testbench::network::check::{CheckReport, read};
 
-use crate::failure::{Failure, FailureBody};
+use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Report;
 use crate::plain::plain;
@@ -37,42 +36,10 @@ pub(crate) struct Check {
     strict: bool,
 }
 
-/// What was found.
-#[derive(Debug, Serialize)]
-pub(crate) struct CheckReport {
-    /// False if the command fails.
-    ok: bool,
-    /// Why the command fails, if it does.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<FailureBody>,
-    file: String,
-    nodes: Vec<CheckedNode>,
-    errors: usize,
-    warnings: usize,
-    notes: usize,
-    findings: Vec<Finding>,
-    /// How the bus boots and what is sent then; `null` if the file does not say enough for that.
-    predicted: Option<Prediction>,
-    /// The drives that were asked; `null` if no bus was named.
-    live: Option<Vec<LiveNode>>,
-}
-
 impl Check {
     /// Looks into the file, and where a bus is named at its drives.
     pub(crate) fn run(&self, global: &Global) -> Result<CheckReport, Failure> {
-        let file = self.file.display().to_string();
-        let ending = self.file.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        let mut checked = match ending {
-            "yml" | "yaml" => {
-                self.read(&file, check::of_bus_yml, "docs/handbook/ros2-canopen.md has a bus.yml that boots")?
-            }
-            "toml" => self.read(&file, check::of_machine, "docs/machine-file.md describes each key")?,
-            _ => {
-                return Err(Failure::usage(format!("'{}' is neither NAME.yml nor NAME.toml", plain(&file)))
-                    .because("the ending tells what it is: a bus.yml of ros2_canopen, or a machine file")
-                    .next("ferrodrive eds lint FILE checks a data sheet"));
-            }
-        };
+        let mut checked = read(&self.file)?;
         let predicted = checked.predict();
         // The bus of this command alone has nobody that the file means.
         let live = match global.bus {
@@ -83,44 +50,12 @@ impl Check {
                 Ok(asked)
             })?),
         };
-        let Checked { nodes, findings, .. } = checked;
-        let count = |severity| findings.iter().filter(|finding: &&Finding| finding.severity == severity).count();
-        let (errors, warnings, notes) = (count(Severity::Error), count(Severity::Warning), count(Severity::Note));
-        let mut report =
-            CheckReport { ok: true, error: None, file, nodes, errors, warnings, notes, findings, predicted, live };
-        let failure = report.failure(self.strict);
-        report.ok = failure.is_none();
-        report.error = failure.as_ref().map(FailureBody::from);
-        Ok(report)
+        Ok(CheckReport::new(&self.file, checked, predicted, live, self.strict))
     }
 
     /// Whether the command is to fail for warnings.
     pub(crate) const fn strict(&self) -> bool {
         self.strict
-    }
-
-    fn read(
-        &self,
-        file: &str,
-        of: fn(&str, &Path) -> Result<Checked, BadFile>,
-        next: &'static str,
-    ) -> Result<Checked, Failure> {
-        let unread = |reason| Failure::new(format!("cannot read {}", plain(file))).of_kind("file").because(reason);
-        let text = read_text(&self.file).map_err(unread)?;
-        let folder = self.file.parent().unwrap_or(Path::new(""));
-        of(&text, folder).map_err(|bad| {
-            let what = format!("cannot use {}", plain(file));
-            Failure::usage(what).because(plain(&bad.named(file).to_string())).next(next)
-        })
-    }
-}
-
-impl CheckReport {
-    /// Why the command fails, if it does.
-    pub(crate) fn failure(&self, strict: bool) -> Option<Failure> {
-        let bad = self.errors + if strict { self.warnings } else { 0 };
-        let what = format!("{}: {bad} of {} findings have to be mended", plain(&self.file), self.findings.len());
-        (bad > 0).then(|| Failure::new(what).of_kind("check").next("each line above says what to do"))
     }
 }
 

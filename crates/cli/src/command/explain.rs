@@ -4,15 +4,15 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use master::Drive;
-use master::explain::{Explained, Finding, Overheard, PdoSeen, Weight};
+use master::explain::Overheard;
 use master::units::parse_duration;
-use serde::Serialize;
 
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
 use plot::Table;
+use testbench::network::explain::ExplainReport;
 use testbench::words::node::node;
 
 /// Explain why a drive does not move, and why its PDOs are silent
@@ -30,42 +30,6 @@ pub(crate) struct Explain {
     /// How long to listen before: longer than the longest period of what is looked for
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "1500ms")]
     watch: Duration,
-}
-
-/// What was found.
-#[derive(Debug, Serialize)]
-pub(crate) struct ExplainReport {
-    node: u8,
-    model: Option<&'static str>,
-    nmt: Option<String>,
-    state: Option<&'static str>,
-    mode: Option<i8>,
-    velocity_rpm: Option<f64>,
-    supply_v: Option<f64>,
-    listened_s: f64,
-    causes: usize,
-    findings: Vec<Row>,
-    pdos: Vec<PdoRow>,
-}
-
-#[derive(Debug, Serialize)]
-struct Row {
-    rule: &'static str,
-    topic: &'static str,
-    weight: &'static str,
-    expected: String,
-    found: String,
-    follows: String,
-    remedy: String,
-}
-
-#[derive(Debug, Serialize)]
-struct PdoRow {
-    pdo: String,
-    id: u32,
-    valid: bool,
-    heard: u64,
-    silent: Option<String>,
 }
 
 impl Explain {
@@ -100,55 +64,6 @@ impl Explain {
         }
         heard.until(network.now());
         heard
-    }
-}
-
-impl From<Explained> for ExplainReport {
-    fn from(explained: Explained) -> Self {
-        let causes = explained.findings.iter().filter(|finding| finding.weight == Weight::Cause).count();
-        Self {
-            node: explained.node.raw(),
-            model: explained.model,
-            nmt: explained.nmt.map(|state| state.to_string()),
-            state: explained.power.map(cia402::PowerState::name),
-            mode: explained.mode.map(|mode| mode.0),
-            velocity_rpm: explained.speed_rpm,
-            supply_v: explained.supply_v,
-            listened_s: explained.listened.as_secs_f64(),
-            causes,
-            findings: explained.findings.into_iter().map(Row::from).collect(),
-            pdos: explained.pdos.into_iter().map(PdoRow::from).collect(),
-        }
-    }
-}
-
-impl From<Finding> for Row {
-    fn from(finding: Finding) -> Self {
-        let Finding { rule, topic, weight, expected, found, follows, remedy } = finding;
-        Self { rule, topic: topic.name(), weight: weight.name(), expected, found, follows, remedy }
-    }
-}
-
-impl From<PdoSeen> for PdoRow {
-    fn from(seen: PdoSeen) -> Self {
-        Self { pdo: seen.pdo.to_string(), id: seen.id, valid: seen.valid, heard: seen.heard, silent: seen.silent }
-    }
-}
-
-impl ExplainReport {
-    /// `node 4 (zlac8030l): Operation enabled, mode 3, operational, 0.0 r/min, 48.0 V; listened 1.5 s`.
-    fn headline(&self) -> String {
-        let model = self.model.map_or_else(String::new, |model| format!(" ({model})"));
-        let parts = [
-            self.state.map(str::to_owned),
-            self.mode.map(|mode| format!("mode {mode}")),
-            self.nmt.clone(),
-            self.velocity_rpm.map(|speed| format!("{speed:.1} r/min")),
-            self.supply_v.map(|volts| format!("{volts:.1} V")),
-        ];
-        let parts: Vec<_> = parts.into_iter().flatten().collect();
-        let said = if parts.is_empty() { "no answer".to_owned() } else { parts.join(", ") };
-        format!("node {}{model}: {said}; listened {:.1} s", self.node, self.listened_s)
     }
 }
 

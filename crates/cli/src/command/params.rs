@@ -5,7 +5,6 @@ mod backup;
 mod compare;
 pub(super) mod journal;
 mod plan;
-mod shown;
 mod source;
 
 use std::path::PathBuf;
@@ -170,6 +169,7 @@ impl Params {
                 let printed = format.print(&report);
                 if let Some(failure) = report.failure().filter(|_| printed.is_ok()) {
                     // For programs the report has it.
+                    let failure = Failure::from(failure);
                     return Err(if format.json { Failure { told: true, ..failure } } else { failure });
                 }
                 printed

@@ -1,16 +1,15 @@
 //! `ferrodrive plan`: whether everything fits the bus, and how late each frame may come.
 
-use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use can::Bitrate;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
-use master::plan::{ErrorRate, HostQueue, NodeTraffic, Plan as BusPlan, PlannedFrame, Settings, most_nodes, plan};
+use master::plan::{ErrorRate, HostQueue, NodeTraffic, Settings};
 use master::units::parse_duration;
-use serde::Serialize;
-use testbench::machine_file::{CyclePlan, Machine, TOLERANCE, too_full};
+use testbench::machine_file::{CyclePlan, Machine};
+use testbench::network::plan::{CYCLE, PlanReport, SHORTEST_CYCLE, traffic};
 use testbench::words::mode::mode;
 use testbench::words::node::node;
 use transport::BusSpec;
@@ -71,58 +70,11 @@ pub(crate) struct Plan {
     by_priority: bool,
 }
 
-/// Period of SYNC where nothing says it.
-const CYCLE: Duration = Duration::from_millis(10);
-
-/// A cycle that is shorter holds no two frames at 1 Mbit/s.
-const SHORTEST_CYCLE: Duration = Duration::from_micros(250);
-
 fn node_mode(text: &str) -> Result<(Option<NodeId>, ModeOfOperation), String> {
     match text.split_once('=') {
         Some((id, name)) => Ok((Some(node(id)?), mode(name)?)),
         None => Ok((None, mode(text)?)),
     }
-}
-
-/// A plan, as it is printed. Times in µs.
-#[derive(Debug, Serialize)]
-pub(crate) struct PlanReport {
-    /// The command ends with status 0.
-    ok: bool,
-    /// Everything is there in time.
-    fits: bool,
-    /// What of the machine file is planned: a group or the base.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    moved: Option<String>,
-    bitrate: u32,
-    cycle_us: f64,
-    /// Share of its time that the bus is taken, at most.
-    load: f64,
-    /// The same without SDO and EMCY.
-    cycle_load: f64,
-    frames: Vec<Row>,
-    /// How many drives like these fit, over and over in their order.
-    most_drives: usize,
-    /// The same without SDO and EMCY.
-    most_drives_in_cycle: usize,
-    drives: usize,
-    notes: Vec<String>,
-}
-
-#[derive(Debug, Serialize)]
-struct Row {
-    frame: String,
-    node: Option<u8>,
-    id: String,
-    bytes: u8,
-    every_us: f64,
-    wire_us: f64,
-    /// With everything that there may be; null: no bound.
-    worst_us: Option<f64>,
-    /// While there is no SDO and no EMCY; null too for a frame that there is not then.
-    cycle_worst_us: Option<f64>,
-    deadline_us: f64,
-    in_time: bool,
 }
 
 impl Plan {
@@ -166,38 +118,7 @@ impl Plan {
             errors: some(self.errors).map(ErrorRate),
             ..Settings::new(cycle_time)
         };
-        let all = plan(&nodes, &settings, bitrate);
-        let cycle = plan(&nodes, &settings.cycle_alone(), bitrate);
-        let mut notes: Vec<String> = all.remarks.iter().map(ToString::to_string).collect();
-        if !nodes.iter().any(|node| node.pdos.iter().any(|(config, id)| id.is_valid() && !config.map.0.is_empty())) {
-            notes.push("no PDO carries anything: --mode plans with what a mode of operation needs".into());
-        }
-        let fits = all.fits();
-        // What stops nothing but in the moment of a fault is no reason not to begin.
-        let ok = fits || moved.is_some() && cycle.fits();
-        if ok && !fits && !all.is_tolerable(&cycle, TOLERANCE) {
-            notes.push(format!(
-                "SDO requests and EMCY beside the cycle may keep a PDO away for more than the {TOLERANCE} cycles that are tolerated, and so \
-                 stop the motion: take a longer period, or ask nothing meanwhile (--sdo 0s shows what that gives)"
-            ));
-        }
-        if let Some(full) = too_full(&nodes, &settings, bitrate, &cycle) {
-            notes.extend([full.what, full.next]);
-        }
-        Ok(PlanReport {
-            ok,
-            fits,
-            moved: moved.map(|moved| moved.what),
-            bitrate: bitrate.bits_per_second(),
-            cycle_us: us(cycle_time),
-            load: rounded(all.load, 1e4),
-            cycle_load: rounded(cycle.load, 1e4),
-            frames: all.frames.iter().map(|frame| Row::new(frame, &cycle)).collect(),
-            most_drives: most_nodes(&nodes, &settings, bitrate),
-            most_drives_in_cycle: most_nodes(&nodes, &settings.cycle_alone(), bitrate),
-            drives: nodes.len(),
-            notes,
-        })
+        Ok(PlanReport::new(&nodes, &settings, bitrate, moved))
     }
 
     /// What each node sends: as it is set up, or on a virtual bus as the machine file has it set up, and in the cycles of what is moved or
@@ -215,51 +136,17 @@ impl Plan {
         for id in found {
             context.progress.show(format!("node {id}: reading its PDOs"));
             let drive = context.drive(id).await?;
-            let read = NodeTraffic::of(&drive).await?;
             // Real drives have been set up, or not.
             let file = context.machine.as_ref().filter(|_| context.is_embedded());
-            let set_up = file.map_or_else(|| read.clone(), |machine| machine.set_up(read.clone()));
             let own = self.modes.iter().rev().find(|(node, _)| *node == Some(id));
             let asked = own.or_else(|| self.modes.iter().rev().find(|(node, _)| node.is_none()));
-            let wrong = |error: &dyn fmt::Display| Failure::new(error.to_string()).at_node(id);
-            nodes.push(match (asked, moved) {
-                (Some((_, mode)), _) => set_up.in_cycles(&drive, *mode, false).map_err(|error| wrong(&error))?,
-                (None, Some(moved)) => moved.traffic(&drive, set_up).map_err(|error| wrong(&error))?,
-                (None, None) => set_up,
-            });
+            nodes.push(traffic(&drive, file, asked.map(|(_, mode)| *mode), moved).await?);
         }
         if nodes.is_empty() {
             return Err(Failure::new("nobody is on the bus").of_kind("nobody").next("ferrodrive scan says more"));
         }
         Ok(nodes)
     }
-}
-
-impl Row {
-    fn new(frame: &PlannedFrame, cycle: &BusPlan) -> Self {
-        let same = |other: &&PlannedFrame| other.purpose == frame.purpose && other.node == frame.node;
-        let alone = cycle.frames.iter().find(same).and_then(|other| other.bound.worst);
-        Self {
-            frame: frame.purpose.to_string(),
-            node: frame.node.map(NodeId::raw),
-            id: frame.frame.id.to_string(),
-            bytes: frame.frame.length,
-            every_us: us(frame.frame.period),
-            wire_us: us(frame.bound.transmission),
-            worst_us: frame.bound.worst.map(us),
-            cycle_worst_us: alone.map(us),
-            deadline_us: us(frame.deadline),
-            in_time: frame.is_in_time(),
-        }
-    }
-}
-
-fn us(time: Duration) -> f64 {
-    rounded(time.as_secs_f64() * 1e6, 1e3)
-}
-
-fn rounded(value: f64, per: f64) -> f64 {
-    (value * per).round() / per
 }
 
 impl Report for PlanReport {

@@ -15,7 +15,7 @@ use testbench::parameters::journal::Journal;
 use tokio::net::TcpListener;
 use transport::BusSpec;
 
-use super::params::journal::{Kept, default_path};
+use super::params::journal::{Kept, default_path, note_kept};
 use crate::context::Context;
 use crate::control_client::ControlArgs;
 use crate::failure::Failure;
@@ -160,7 +160,8 @@ struct InFolder(Mutex<BTreeMap<NodeId, Kept>>);
 
 impl Journals for InFolder {
     fn begin(&self, journal: &Journal) -> Result<(), String> {
-        let kept = Kept::create(&default_path(journal.node), journal).map_err(|failure| failure.to_string())?;
+        let kept =
+            Kept::create(&default_path(journal.node), journal, note_kept).map_err(|failure| failure.to_string())?;
         self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(journal.node, kept);
         Ok(())
     }

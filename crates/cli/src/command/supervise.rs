@@ -4,16 +4,16 @@ use std::io::{self, BufRead, IsTerminal};
 use std::path::PathBuf;
 use std::time::Duration;
 
-use can::Instant;
 use canopen::NodeId;
 use master::core::{Event, NodeSet};
 use master::supervise::{EmcyRecord, Supervisor, SupervisorEvent};
 use master::units::parse_duration;
-use serde::Serialize;
+use testbench::network::boot::BootReport;
+use testbench::network::supervise::WatchedEvent;
 use testbench::words::node::node;
 use tokio::sync::mpsc::{Receiver, channel};
 
-use super::boot::{BootReport, Planned};
+use super::boot::{Planned, global_of, plan_of};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -56,28 +56,16 @@ const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
 /// Words that wait until a node is booted.
 const WORDS: usize = 16;
 
-/// Something that happened.
-#[derive(Debug, Serialize)]
-struct Told {
-    /// In s since the command began.
-    t: f64,
-    kind: &'static str,
-    node: Option<u8>,
-    /// Of an emergency message: its error code.
-    code: Option<u16>,
-    text: String,
-}
-
 impl Supervise {
     /// Boots and watches, until it is told to end.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
         let planned = Planned::read(self.file.as_deref())?;
-        let global = planned.global(global);
+        let global = global_of(&planned, global);
         session::run(&global, async |context| self.supervise(context, &planned, format).await)
     }
 
     async fn supervise(&self, context: &Context, planned: &Planned, format: Format) -> Result<(), Failure> {
-        let mut plan = planned.plan(context, &self.nodes).await?;
+        let mut plan = plan_of(planned, context, &self.nodes).await?;
         plan.own = self.own_node;
         context.progress.show(format!("booting {} nodes", plan.nodes.len()));
         let mut others = context.traffic.of_others();
@@ -87,12 +75,12 @@ impl Supervise {
         format.print(&booted).map_err(Failure::not_printed)?;
         if let Some(failure) = booted.failure().filter(|_| !unconfigured.is_empty()) {
             // What is watched had better be what was planned.
-            return Err(failure);
+            return Err(Failure { told: true, ..failure.into() });
         }
         while let Some((at, event)) = context.network.poll_event() {
-            // What the boot-up has not told.
+            // What the report of the boot-up does not have.
             if let Event::TwoDevices(..) = event {
-                format.print(&Told::new(at, &SupervisorEvent::Event(event))).map_err(Failure::not_printed)?;
+                format.print(&WatchedEvent::new(at, &SupervisorEvent::Event(event))).map_err(Failure::not_printed)?;
             }
         }
         let mut supervisor = Supervisor::new(context.network.clone(), plan);
@@ -109,7 +97,7 @@ impl Supervise {
             }
             // To its end, whatever else happens: it may be stopping a motor.
             if let Some((at, happening)) = supervisor.next().await {
-                format.print(&Told::new(at, &happening)).map_err(Failure::not_printed)?;
+                format.print(&WatchedEvent::new(at, &happening)).map_err(Failure::not_printed)?;
             }
         }
         let open = supervisor.emcys().records().filter(|record| record.gone.is_none());
@@ -148,20 +136,7 @@ async fn obey(supervisor: &mut Supervisor, context: &Context, line: &str) {
     }
 }
 
-impl Told {
-    fn new(at: Instant, happening: &SupervisorEvent) -> Self {
-        let code = if let SupervisorEvent::Emcy(record) = happening { Some(record.emcy.code.0) } else { None };
-        Self {
-            t: at.as_secs_f64(),
-            kind: happening.kind(),
-            node: happening.node().map(NodeId::raw),
-            code,
-            text: happening.to_string(),
-        }
-    }
-}
-
-impl Report for Told {
+impl Report for WatchedEvent {
     fn text(&self, paint: Paint) -> String {
         format!("{} {}", paint.dim(&format!("({:.3})", self.t)), self.text)
     }

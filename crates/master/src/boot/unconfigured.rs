@@ -34,10 +34,12 @@ impl Network {
             // The last value counts: a PDO is switched off and on again on its way.
             let values = expected.configuration.iter().cloned().collect::<BTreeMap<_, _>>();
             let wanted = values.iter().filter(|(object, _)| !is_command(**object, expected.description));
+            // A list, so that the future may be moved between threads.
+            let wanted = wanted.collect::<Vec<_>>();
             let differs = match verify(&self.node(node).with_timeout(plan.timeout), wanted.clone()).await {
                 // What it does not show nobody can compare.
                 Ok(deviations) => deviations.into_iter().filter(|it| it.found.is_ok()).map(|it| it.object).collect(),
-                Err(_) => wanted.map(|(object, _)| *object).collect::<Vec<_>>(),
+                Err(_) => wanted.iter().map(|(object, _)| **object).collect::<Vec<_>>(),
             };
             if !differs.is_empty() {
                 found.push(Unconfigured { node, objects: differs });

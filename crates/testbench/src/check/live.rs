@@ -111,7 +111,7 @@ async fn look(
         }
     }
     let values = place.values();
-    let wanted = values.iter().map(|(object, write)| (object, &write.bytes));
+    let wanted: Vec<_> = values.iter().map(|(object, write)| (object, &write.bytes)).collect();
     let deviations = verify(node, wanted).await?;
     live.compared = values.len();
     report.rule = "live-value";

@@ -14,8 +14,8 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Format;
 use crate::session;
-pub(crate) use planned::Planned;
-pub(crate) use report::BootReport;
+pub(crate) use planned::{Planned, global_of, plan_of};
+use testbench::network::boot::BootReport;
 
 /// Boot the nodes of a network: check who they are, configure and start them
 ///
@@ -48,14 +48,14 @@ impl Boot {
     /// Boots, prints, and fails if a mandatory node has.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
         let planned = Planned::read(self.file.as_deref())?;
-        let global = planned.global(global);
+        let global = global_of(&planned, global);
         let report = session::run(&global, async |context| self.boot(context, &planned).await)?;
         format.print(&report).map_err(Failure::of_stdout)?;
-        report.failure().map_or(Ok(()), Err)
+        report.failure().map_or(Ok(()), |failure| Err(Failure { told: true, ..failure.into() }))
     }
 
     async fn boot(&self, context: &Context, planned: &Planned) -> Result<BootReport, Failure> {
-        let mut plan = planned.plan(context, &self.nodes).await?;
+        let mut plan = plan_of(planned, context, &self.nodes).await?;
         // The heartbeat that a drive would watch ends with this command.
         plan.guard = false;
         self.apply(&mut plan);

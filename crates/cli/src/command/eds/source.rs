@@ -6,17 +6,17 @@ use eds::document::Document;
 use eds::{Eds, Reading, Sheet};
 
 use crate::failure::Failure;
-use testbench::data_sheet::{self, Unread};
+use testbench::data_sheet;
 use testbench::models::resolve;
 
 /// Reads a file as it stands.
 pub(crate) fn document(path: &Path) -> Result<Document, Failure> {
-    data_sheet::document(path).map_err(|unread| unreadable(path, &unread))
+    data_sheet::document(path).map_err(|unread| unread.failure(path).into())
 }
 
 /// Reads a data sheet.
 pub(crate) fn reading(path: &Path) -> Result<Reading, Failure> {
-    data_sheet::reading(path).map_err(|unread| unreadable(path, &unread))
+    data_sheet::reading(path).map_err(|unread| unread.failure(path).into())
 }
 
 /// A data sheet from a file, or that of a model where no file has this name.
@@ -31,20 +31,5 @@ pub(super) fn sheet(name: &str) -> Result<Eds, Failure> {
         Err(unknown) => Err(Failure::usage(format!("there is no file {name}"))
             .because(unknown)
             .next("give the path of an EDS or DCF file, or a model; `ferrodrive objects` lists them")),
-    }
-}
-
-fn unreadable(path: &Path, unread: &Unread) -> Failure {
-    match unread {
-        Unread::File(error) => Failure::new(format!("cannot read {}", path.display()))
-            .because(error)
-            .next("is the name right, and may this user read the file?"),
-        Unread::Refused(refusal) => {
-            let at = if refusal.line > 0 { format!(", line {}", refusal.line) } else { String::new() };
-            Failure::new(format!("{}{at} is not read as an EDS", path.display()))
-                .of_kind("not_an_eds")
-                .because(&refusal.reason)
-                .next(&refusal.next)
-        }
     }
 }

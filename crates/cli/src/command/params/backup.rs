@@ -1,39 +1,14 @@
 //! `ferrodrive params backup`.
 
-use master::parameters::from_any_state;
-use serde::Serialize;
-use testbench::parameters::{Form, sheet, to_concise, to_dcf};
+use testbench::network::params::{BackupReport, back_up, bytes_of};
+use testbench::parameters::{Form, sheet};
 
-use super::shown::name;
 use crate::command::dcf::{exists, keep};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
-
-/// What was read.
-#[derive(Debug, Serialize)]
-pub(super) struct BackupReport {
-    node: u8,
-    /// Where the file is; absent if it is [`parameters`](Self::parameters).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    file: Option<String>,
-    /// The file itself, as TOML, if it was not written anywhere.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    parameters: Option<String>,
-    /// Values in the file.
-    values: usize,
-    /// Objects that could not be read.
-    refused: Vec<Refused>,
-}
-
-#[derive(Debug, Serialize)]
-struct Refused {
-    object: String,
-    name: Option<&'static str>,
-    why: String,
-}
 
 impl super::Backup {
     pub(super) async fn run(&self, context: &Context) -> Result<BackupReport, Failure> {
@@ -43,33 +18,16 @@ impl super::Backup {
             return Err(exists(path));
         }
         let drive = context.known_drive(self.node).await?;
-        let model = drive.description().ok_or_else(|| Failure::new("the model is not known").at_node(self.node))?;
-        let show = |number, of, object| context.progress.count(format!("{number} of {of}: {object}"));
-        let backup = drive.back_up(show).await?;
-        let refused = backup.refused.iter().map(|(object, error)| Refused {
-            object: object.to_string(),
-            name: name(Some(model), *object),
-            why: error.abort().map_or_else(|| error.to_string(), |code| code.to_string()),
-        });
-        let values = backup.parameters.values.len();
-        let mut report =
-            BackupReport { node: self.node.raw(), file: None, parameters: None, values, refused: refused.collect() };
+        let (mut report, parameters, model) = back_up(&context.progress, &drive).await?;
         let Some((path, form)) = self.output.as_deref().zip(form) else {
-            report.parameters = Some(sheet::print(&backup.parameters, Some(model)));
+            report.parameters = Some(sheet::print(&parameters, Some(model)));
             context.progress.clear();
             for refused in &report.refused {
                 context.tell(&format!("{} is not in it: {}", refused.object, refused.why));
             }
             return Ok(report);
         };
-        let bytes = match form {
-            Form::Toml => sheet::print(&backup.parameters, Some(model)).into_bytes(),
-            Form::Dcf => {
-                let name = path.file_name().unwrap_or_default().to_string_lossy();
-                to_dcf(&backup.parameters, model, &name).map_err(Failure::usage)?
-            }
-            Form::Concise => to_concise(&from_any_state(Some(model), self.node, &backup.parameters.values)),
-        };
+        let bytes = bytes_of(&parameters, model, path, form)?;
         keep(path, &bytes, self.force)?;
         report.file = Some(path.display().to_string());
         Ok(report)

@@ -1,154 +1,31 @@
-//! The journal of an `apply` on the disk, and `ferrodrive params rollback`.
+//! `ferrodrive params rollback`, and the journal of an `apply`.
 
-use std::fs::{File, OpenOptions};
 use std::io::Write;
-use std::path::{Path, PathBuf};
 
-use canopen::NodeId;
-use master::parameters::{Undone, roll_back};
-use serde::Serialize;
-use testbench::document::read_text;
-use testbench::parameters::journal::Journal;
+pub(in crate::command) use testbench::network::params::journal::{Kept, default_path};
+use testbench::network::params::journal::{RollbackReport, read, roll_back_by};
 
-use super::source;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
 
-/// Where the journal of a node is, if nobody says another place.
-pub(in crate::command) fn default_path(node: NodeId) -> PathBuf {
-    PathBuf::from(format!("ferrodrive-node{node}.journal"))
-}
-
-/// A journal on the disk. One that is dropped stays there, and is told of.
-#[derive(Debug)]
-pub(in crate::command) struct Kept {
-    path: PathBuf,
-    node: NodeId,
-    is_done: bool,
-}
-
-impl Kept {
-    /// Writes it, whole and onto the disk itself, before anything is written to the node.
-    pub(in crate::command) fn create(path: &Path, journal: &Journal) -> Result<Self, Failure> {
-        let file = OpenOptions::new().write(true).create_new(true).open(path);
-        let mut file = match file {
-            Ok(file) => file,
-            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-                return Err(Failure::new(format!("{} is there already; nothing was written", path.display()))
-                    .of_kind("journal_exists")
-                    .at_node(journal.node)
-                    .because("an earlier apply has not come to its end, or one is running now")
-                    .next(format!("go back first: ferrodrive params rollback {} {}", journal.node, path.display()))
-                    .next("or delete that file, if the node is to stay as it is"));
-            }
-            Err(error) => return Err(Failure::of_writing("the journal", path, &error)),
-        };
-        let written = file.write_all(journal.print().as_bytes()).and_then(|()| file.sync_all());
-        written.and_then(|()| sync_folder(path)).map_err(|error| Failure::of_writing("the journal", path, &error))?;
-        Ok(Self { path: path.to_owned(), node: journal.node, is_done: false })
-    }
-
-    /// Deletes it: the node is as it should be, or as it was.
-    pub(in crate::command) fn remove(mut self) -> Result<(), Failure> {
-        self.is_done = true;
-        remove(&self.path)
-    }
-}
-
-/// The command ends before the transaction does: by a signal, or because the bus has gone.
-impl Drop for Kept {
-    fn drop(&mut self) {
-        if !self.is_done {
-            // Nobody may be listening any more.
-            let _ = writeln!(
-                std::io::stderr(),
-                "note: the writes to node {} have not come to their end; go back: ferrodrive params rollback {0} {}",
-                self.node,
-                plain(&self.path.display().to_string())
-            );
-        }
-    }
-}
-
-fn remove(path: &Path) -> Result<(), Failure> {
-    std::fs::remove_file(path).map_err(|error| {
-        Failure::new(format!("cannot delete the journal {}", path.display()))
-            .because(error)
-            .next("delete it by hand: it leads back to what the node had before")
-    })
-}
-
-/// A new name in a folder is on the disk when the folder is. Not every system lets a folder be opened.
-fn sync_folder(path: &Path) -> std::io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    match File::open(folder) {
-        Ok(folder) => folder.sync_all(),
-        Err(_) => Ok(()),
-    }
-}
-
-/// What was put back.
-#[derive(Debug, Serialize)]
-pub(super) struct RollbackReport {
-    node: u8,
-    journal: String,
-    /// Objects that have again what they had.
-    put_back: usize,
+/// A note that a journal stays. The command may be ending by a signal.
+pub(in crate::command) fn note_kept(text: &str) {
+    // Nobody may be listening any more.
+    let _ = writeln!(std::io::stderr(), "note: {text}");
 }
 
 impl super::Rollback {
     pub(super) async fn run(&self, context: &Context) -> Result<RollbackReport, Failure> {
         let path = self.journal.clone().unwrap_or_else(|| default_path(self.node));
+        // Before the node is asked for: there may be nothing to go back to.
         let journal = read(&path, self.node)?;
         let drive = context.drive(self.node).await?;
-        let meant = master::parameters::Parameters { identity: journal.identity, ..Default::default() };
-        // A plan of nothing compares the identities.
-        drive.plan_parameters(&meant, Default::default()).await.map_err(source::refused)?;
-        drive.check_at_rest().await.map_err(source::refused)?;
         context.progress.show(format!("node {}: writing {} values back", self.node, journal.undo.len()));
-        let undone = roll_back(drive.node(), &journal.undo, |_| None).await;
-        if !undone.not_put_back.is_empty() {
-            return Err(not_put_back(self.node, &undone, &path));
-        }
-        remove(&path)?;
-        Ok(RollbackReport { node: self.node.raw(), journal: path.display().to_string(), put_back: undone.put_back })
+        Ok(roll_back_by(&path, &drive).await?)
     }
-}
-
-/// That some objects have not what they had.
-pub(super) fn not_put_back(node: NodeId, undone: &Undone, path: &Path) -> Failure {
-    let failure = Failure::new(format!("not everything of node {node} could be put back")).of_kind("not_put_back");
-    let failure = undone.not_put_back.iter().fold(failure.at_node(node), |failure, left| {
-        let had = testbench::parameters::hexadecimal(&left.had);
-        failure.because(format!("{} had {had}, {}", left.object, left.why))
-    });
-    failure.next(format!("when it answers again: ferrodrive params rollback {node} {}", path.display()))
-}
-
-fn read(path: &Path, node: NodeId) -> Result<Journal, Failure> {
-    if !path.exists() {
-        return Err(Failure::new(format!("there is no journal {}", path.display()))
-            .of_kind("no_journal")
-            .at_node(node)
-            .because("every apply to this node from this folder has come to its end, or it had another --journal")
-            .next("name the journal, or write parameters that were kept: ferrodrive params apply NODE FILE"));
-    }
-    let unusable = |reason: String| {
-        Failure::new(format!("{} is not read as a journal; nothing was written", path.display()))
-            .of_kind("bad_journal")
-            .because(reason)
-            .next("an apply that was broken off while it wrote its journal had not written to the node: delete the file then")
-    };
-    let text = read_text(path).map_err(unusable)?;
-    let journal = Journal::parse(&text).map_err(|bad| unusable(bad.named(path.display().to_string()).to_string()))?;
-    if journal.node != node {
-        return Err(Failure::usage(format!("{} is of node {}, not of node {node}", path.display(), journal.node))
-            .next(format!("ferrodrive params rollback {} {}", journal.node, path.display())));
-    }
-    Ok(journal)
 }
 
 impl Report for RollbackReport {

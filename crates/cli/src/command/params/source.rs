@@ -1,33 +1,11 @@
-//! Where parameters come from: a file that somebody named.
+//! Where parameters come from on the command line.
 
-use std::path::Path;
-
-use canopen::NodeId;
 use devices::Description;
-use master::parameters::{Deviation, Parameters, PlanError, Unfit};
+use master::parameters::Parameters;
+use testbench::network::params::source::{of_machine, read};
 
 use crate::context::Context;
 use crate::failure::Failure;
-
-/// Reads a file for a node. What the file has of another node of the same model follows this one's node-ID.
-pub(super) fn read(
-    path: &Path,
-    model: Option<&'static Description>,
-    node: Option<NodeId>,
-) -> Result<Parameters, Failure> {
-    let unreadable = |reason| {
-        Failure::new(format!("{} is not read as parameters", path.display()))
-            .of_kind("bad_parameters")
-            .because(reason)
-            .next("nothing was written; mend the file, or make one: ferrodrive params backup NODE -o FILE.toml")
-    };
-    let reader = node.or(NodeId::new(1)).ok_or_else(|| unreadable("no node".to_owned()))?;
-    let parameters = testbench::parameters::read(path, model, reader).map_err(unreadable)?;
-    Ok(match node {
-        Some(node) => parameters.for_node(node, model),
-        None => parameters,
-    })
-}
 
 /// What a node is to have, and where that is said: in the file that was named, or in the machine file.
 pub(super) fn wanted(
@@ -43,57 +21,5 @@ pub(super) fn wanted(
             Failure::usage("which parameters?").next("name their file, or a machine file with --machine FILE.toml")
         );
     };
-    let node = wanted.node;
-    let found = machine.parameters(node).filter(|parameters| !parameters.values.is_empty());
-    let found = found.ok_or_else(|| {
-        Failure::usage(format!("the machine file says nothing of what node {node} is to be set to"))
-            .next("give its [[drive]] pdos, limits, heartbeat or start_up (docs/machine-file.md), or name a file of parameters")
-    })?;
-    Ok((found, "the machine file".to_owned()))
-}
-
-/// A refusal before anything was written.
-pub(super) fn refused(error: PlanError) -> Failure {
-    match error {
-        PlanError::Node(error) => error.into(),
-        PlanError::OtherDevice { node, wanted, found } => Failure::new(format!(
-            "node {node} is another device than these parameters are of; nothing was written"
-        ))
-        .of_kind("other_device")
-        .at_node(node)
-        .because(format!("the file is of {wanted}"))
-        .because(format!("the node says {found}"))
-        .next(format!(
-            "see who is there: ferrodrive scan; if the drive was replaced by another model, it needs parameters of \
-                     its own: ferrodrive params backup {node}"
-        )),
-        PlanError::AtWork { node, axis, state } => Failure::new(format!(
-            "axis {} of node {node} is in {}: parameters are written to a drive at rest only; nothing was written",
-            axis.0 + 1,
-            state.name()
-        ))
-        .of_kind("at_work")
-        .at_node(node)
-        .next(format!("ferrodrive disable {node}, if that may stop what it holds or drives")),
-        PlanError::Unfit { node, unfit } => {
-            let objects = if unfit.len() == 1 { "1 value".to_owned() } else { format!("{} values", unfit.len()) };
-            let failure = Failure::new(format!("node {node} cannot have {objects} of the file; nothing was written"));
-            let failure = failure.of_kind("unfit_parameters").at_node(node);
-            let first = unfit.first().map(Unfit::object);
-            let failure = unfit.iter().fold(failure, |failure, unfit| failure.because(unfit));
-            let failure = failure.next("correct these values, or take them out of the file");
-            match first {
-                Some(object) => failure.at_object(object),
-                None => failure,
-            }
-        }
-    }
-}
-
-/// What an object has in place of its value, in words.
-pub(super) fn found(deviation: &Deviation) -> Result<&[u8], String> {
-    deviation.found.as_deref().map_err(|error| match error.abort() {
-        Some(code) => format!("refused: {code}"),
-        None => error.to_string(),
-    })
+    Ok(of_machine(machine, wanted.node)?)
 }

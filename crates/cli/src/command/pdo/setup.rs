@@ -184,7 +184,7 @@ impl PlanPdos {
         let pdos = budgets.collect();
         let load = |pdos: Vec<(PdoConfig, CobId)>| self.load(&drive, model, pdos);
         let (load_before, load_after) = (load(before), load(after));
-        let plan = plan_of(context, &drive, &wanted, from, false).await?;
+        let plan = plan_of(&context.progress, &drive, &wanted, from, false).await?;
         let (bitrate, cycle_us) = (self.bitrate.bits_per_second(), self.cycle.as_secs_f64() * 1e6);
         Ok(PdoPlanReport { pdos, load_before, load_after, bitrate, cycle_us, plan })
     }

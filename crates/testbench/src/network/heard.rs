@@ -13,19 +13,20 @@ const MOST: usize = 200;
 
 /// Frames of one kind.
 #[derive(Clone, Debug, Serialize, PartialEq, Eq)]
-pub(super) struct Heard {
+pub struct Heard {
     /// Its service, as `dump --service` takes it.
-    service: &'static str,
+    pub service: &'static str,
     /// Who sends it, or whom it is for.
-    node: Option<u8>,
-    count: u64,
-    /// What it means for whoever scans.
-    text: String,
+    pub node: Option<u8>,
+    /// How often.
+    pub count: u64,
+    /// What it means for a scan.
+    pub text: String,
 }
 
 /// Counts what is heard.
 #[derive(Debug, Default)]
-pub(super) struct Counted {
+pub struct Counted {
     kinds: BTreeMap<Kind, (u64, String)>,
     others: u64,
 }
@@ -118,7 +119,7 @@ impl Kind {
 
 impl Counted {
     /// Takes a frame that another station has sent.
-    pub(super) fn note(&mut self, decoder: &mut Decoder, frame: &Frame) {
+    pub fn note(&mut self, decoder: &mut Decoder, frame: &Frame) {
         let decoded = decoder.decode(frame);
         let Some(kind) = Kind::of(frame, &decoded) else { return };
         let known = self.kinds.len();
@@ -138,7 +139,7 @@ impl Counted {
     }
 
     /// What was heard, but for the heartbeats of nodes that are listed anyway.
-    pub(super) fn told(self, is_listed: impl Fn(NodeId) -> bool) -> Vec<Heard> {
+    pub fn told(self, is_listed: impl Fn(NodeId) -> bool) -> Vec<Heard> {
         let kinds = self.kinds.into_iter().filter(|(kind, _)| match kind {
             Kind::Heartbeat(node) => !is_listed(*node),
             _ => true,
@@ -165,7 +166,7 @@ impl Counted {
 
 impl Heard {
     /// In a line.
-    pub(super) fn line(&self) -> String {
+    pub fn line(&self) -> String {
         let times = if self.count == 1 { String::new() } else { format!(" ({} frames)", self.count) };
         format!("heard: {}{times}", self.text)
     }

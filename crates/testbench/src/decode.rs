@@ -5,9 +5,9 @@ use cia402::{Controlword, Statusword};
 use master::decode::statusword_words;
 use serde::Serialize;
 
+use crate::words::unit::split_factor;
+use devices::Description;
 use plot::Paint;
-use testbench::models::Description;
-use testbench::words::unit::split_factor;
 
 /// Most bytes that a line shows whole: some lines of a terminal. Of more it shows the first.
 const SHOWN: usize = 128;
@@ -15,23 +15,23 @@ const FIRST: usize = 16;
 
 /// A decoded value.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Decoded {
+pub struct Decoded {
     /// The bytes as they came, hexadecimal, in the order of the wire.
-    pub(crate) bytes: String,
+    pub bytes: String,
     /// The object's number; `None` for a text or an unknown length.
-    pub(crate) value: Option<i64>,
+    pub value: Option<i64>,
     /// A text object's text.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) string: Option<String>,
+    pub string: Option<String>,
     /// The number in its unit, where it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) quantity: Option<f64>,
+    pub quantity: Option<f64>,
     /// That unit.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) unit: Option<&'static str>,
+    pub unit: Option<&'static str>,
     /// What the number means, where the object says so.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) meaning: Option<String>,
+    pub meaning: Option<String>,
     #[serde(skip)]
     decimals: usize,
     #[serde(skip)]
@@ -39,7 +39,7 @@ pub(crate) struct Decoded {
 }
 
 /// Decodes `bytes`, which came from the object of `row`, if that is known, on a node of `model`.
-pub(crate) fn decode(model: Option<&Description>, row: Option<&'static Entry>, bytes: &[u8]) -> Decoded {
+pub fn decode(model: Option<&Description>, row: Option<&'static Entry>, bytes: &[u8]) -> Decoded {
     let mut decoded = Decoded {
         bytes: bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" "),
         value: None,
@@ -77,7 +77,7 @@ pub(crate) fn decode(model: Option<&Description>, row: Option<&'static Entry>, b
 
 impl Decoded {
     /// The same bytes as a number of a type, where only that is known of them.
-    pub(crate) fn typed(mut self, data_type: Option<DataType>) -> Self {
+    pub fn typed(mut self, data_type: Option<DataType>) -> Self {
         if let (Some(data_type), Some(value)) = (data_type, self.value) {
             self.value = Some(data_type.value(value as u32));
             self.hexadecimal = false;
@@ -86,7 +86,7 @@ impl Decoded {
     }
 
     /// The same value where this many counts make one of the unit.
-    pub(crate) fn at_resolution(mut self, counts: i64) -> Self {
+    pub fn at_resolution(mut self, counts: i64) -> Self {
         if counts > 1 {
             self.quantity = self.quantity.map(|quantity| quantity / counts as f64);
             self.decimals += (counts as f64).log10().ceil() as usize;
@@ -106,17 +106,17 @@ impl Decoded {
     }
 
     /// How many bytes there are.
-    pub(crate) fn length(&self) -> usize {
+    pub fn length(&self) -> usize {
         self.bytes.split_whitespace().count()
     }
 
     /// One line does not show all bytes.
-    pub(crate) fn is_cut(&self) -> bool {
+    pub fn is_cut(&self) -> bool {
         self.value.is_none() && self.string.is_none() && self.length() > SHOWN
     }
 
     /// One line.
-    pub(crate) fn text(&self, paint: Paint) -> String {
+    pub fn text(&self, paint: Paint) -> String {
         let number = match (self.value, self.quantity, self.unit, &self.string) {
             (_, Some(quantity), Some(unit), _) => format!("{quantity:.*} {unit}", self.decimals),
             (Some(value), ..) if self.hexadecimal => format!("0x{value:X}"),

@@ -3,22 +3,23 @@
 use canopen::Mux;
 use canopen::pdo::{MappingRecord, PdoId};
 use devices::Description;
+use plot::Paint;
 use serde::Serialize;
 
 use crate::decode::decode;
-use plot::Paint;
 
 /// A value as it is printed: the bytes of the wire, and what they mean.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Shown {
+pub struct Shown {
     /// In the order of the wire.
-    bytes: String,
+    pub bytes: String,
     /// In words and units.
-    pub(super) text: String,
+    pub text: String,
 }
 
 impl Shown {
-    pub(super) fn new(model: Option<&'static Description>, object: Mux, bytes: &[u8]) -> Self {
+    /// The bytes of an object of a model.
+    pub fn new(model: Option<&'static Description>, object: Mux, bytes: &[u8]) -> Self {
         let row = model.and_then(|model| model.row(object));
         let decoded = decode(model, row, bytes);
         let text = mapped(model, object, bytes).unwrap_or_else(|| decoded.text(Paint::OFF));
@@ -38,7 +39,7 @@ fn mapped(model: Option<&'static Description>, object: Mux, bytes: &[u8]) -> Opt
 }
 
 /// The name of an object, of its model or of the standard.
-pub(super) fn name(model: Option<&'static Description>, object: Mux) -> Option<&'static str> {
+pub fn name(model: Option<&'static Description>, object: Mux) -> Option<&'static str> {
     match model {
         Some(model) => model.row(object).map(|row| row.name),
         None => master::decode::common_name(object),

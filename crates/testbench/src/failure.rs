@@ -1,0 +1,190 @@
+//! Why something was not done, in parts that a person reads in order and a program looks into: what, where, why, what to do next.
+//!
+//! The command line prints it and its `--json`, the Python package raises it.
+
+use std::fmt;
+
+use canopen::{AbortCode, Mux, NodeId};
+use serde::Serialize;
+
+/// A reason in up to three parts, and what it is about.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// What kind it is, in a word that programs may rely on; `docs/json.md` lists them.
+    pub kind: &'static str,
+    /// What could not be done, with node and object.
+    pub what: String,
+    /// Why: what the drive or the system answered, what was expected; one line each.
+    pub because: Vec<String>,
+    /// What to do next, one line each.
+    pub next: Vec<String>,
+    /// The node, object and abort code that it is about.
+    pub subject: Subject,
+    /// The request itself makes no sense: nothing was tried.
+    pub is_usage: bool,
+}
+
+/// What a failure is about, as far as it is about one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Subject {
+    /// The node.
+    pub node: Option<NodeId>,
+    /// The object.
+    pub object: Option<Mux>,
+    /// The SDO abort code that the node answered with.
+    pub abort: Option<AbortCode>,
+}
+
+impl Failure {
+    /// It was tried and failed.
+    pub fn new(what: impl Into<String>) -> Self {
+        Self {
+            kind: "failed",
+            what: what.into(),
+            because: Vec::new(),
+            next: Vec::new(),
+            subject: Subject::default(),
+            is_usage: false,
+        }
+    }
+
+    /// The request makes no sense.
+    pub fn usage(what: impl Into<String>) -> Self {
+        Self { kind: "usage", is_usage: true, ..Self::new(what) }
+    }
+
+    /// A file that was asked for cannot be written.
+    pub fn of_writing(what: &str, path: &std::path::Path, error: &std::io::Error) -> Self {
+        Self::new(format!("cannot write {what} {}", path.display())).of_kind("file").because(error).next(
+            "see that its folder is there, can be written and has room; a file at that path that is not an earlier one of its kind is left alone",
+        )
+    }
+
+    /// Names its kind.
+    #[must_use]
+    pub fn of_kind(self, kind: &'static str) -> Self {
+        Self { kind, ..self }
+    }
+
+    /// Names the node that it is about.
+    #[must_use]
+    pub fn at_node(mut self, node: NodeId) -> Self {
+        self.subject.node = Some(node);
+        self
+    }
+
+    /// The same with the number of a row; 0 or more than 127 names none.
+    #[must_use]
+    pub fn about(mut self, node: u8) -> Self {
+        self.subject.node = NodeId::new(node);
+        self
+    }
+
+    /// Names the object that it is about.
+    #[must_use]
+    pub fn at_object(mut self, object: Mux) -> Self {
+        self.subject.object = Some(object);
+        self
+    }
+
+    /// Adds a reason.
+    #[must_use]
+    pub fn because(mut self, reason: impl fmt::Display) -> Self {
+        self.because.push(reason.to_string());
+        self
+    }
+
+    /// Adds advice.
+    #[must_use]
+    pub fn next(mut self, advice: impl fmt::Display) -> Self {
+        self.next.push(advice.to_string());
+        self
+    }
+}
+
+/// The same for programs: the `error` of a line of `--json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct FailureBody {
+    /// A word: `usage`, `no_answer`, `aborted`, `out_of_limits`, ...
+    pub kind: &'static str,
+    /// What and why.
+    pub message: String,
+    /// The node that it is about.
+    pub node: Option<u8>,
+    /// The object that it is about.
+    pub object: Option<String>,
+    /// The SDO abort code.
+    pub abort: Option<u32>,
+    /// What to do.
+    pub next: Option<String>,
+}
+
+impl FailureBody {
+    /// Of the parts of a failure: what, why, and what to do.
+    pub fn new(kind: &'static str, (what, because, next): (&str, &[String], &[String]), subject: Subject) -> Self {
+        let because = because.join("; ");
+        Self {
+            kind,
+            message: if because.is_empty() { what.to_owned() } else { format!("{what}: {because}") },
+            node: subject.node.map(NodeId::raw),
+            object: subject.object.map(|object| object.to_string()),
+            abort: subject.abort.map(|code| code.0),
+            next: (!next.is_empty()).then(|| next.join("; ")),
+        }
+    }
+}
+
+impl From<&Failure> for FailureBody {
+    fn from(failure: &Failure) -> Self {
+        Self::new(failure.kind, (&failure.what, &failure.because, &failure.next), failure.subject)
+    }
+}
+
+/// Several lines, each complete: `what`, then the reasons, then the advice.
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.what)?;
+        self.because.iter().try_for_each(|reason| write!(f, "\n  because: {reason}"))?;
+        self.next.iter().try_for_each(|advice| write!(f, "\n  next:    {advice}"))
+    }
+}
+
+impl From<master::Error> for Failure {
+    /// The master's errors have what, why and what to do; how a model is named is the caller's to add. What is beyond a limit was
+    /// mistyped.
+    fn from(error: master::Error) -> Self {
+        use master::Error;
+        let subject = Subject { node: Some(error.node()), object: error.object(), abort: error.abort() };
+        let is_usage = matches!(error, Error::OutOfLimits { .. } | Error::TooFine { .. });
+        Self { kind: error.kind(), subject, is_usage, ..parts(&error) }
+    }
+}
+
+/// What the error says, and apart from it what it advises.
+fn parts(error: &master::Error) -> Failure {
+    if let master::Error::NotReached(explanation) = error {
+        let facts: Vec<String> = explanation.facts.iter().map(ToString::to_string).collect();
+        return Failure::new(format!("node {}: could not {}", explanation.node, explanation.intent))
+            .because(&explanation.conclusion)
+            .because(format!("seen: {}", facts.join("; ")))
+            .next(&explanation.advice);
+    }
+    let text = error.to_string();
+    match error.advice().and_then(|advice| Some((text.strip_suffix(&advice)?, advice.clone()))) {
+        Some((what, advice)) => Failure::new(what.trim_end().trim_end_matches(['.', ':'])).next(advice),
+        None => Failure::new(text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_names_what_why_and_next() {
+        let failure = Failure::new("cannot read 6064h:00 of node 9").because("no answer").next("ferrodrive scan");
+        let text = "cannot read 6064h:00 of node 9\n  because: no answer\n  next:    ferrodrive scan";
+        assert_eq!(failure.to_string(), text);
+        assert!(Failure::usage("x").is_usage && !failure.is_usage);
+    }
+}

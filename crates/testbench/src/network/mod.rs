@@ -1,0 +1,51 @@
+//! What the command line and the Python package do with a network, and what comes of it: the same rows for both, as `docs/json.md` has
+//! them.
+//!
+//! In: a network of crate `master`, which somebody runs. Out: reports that serialise, or a [`Failure`]. How a person reads them is the
+//! command line's.
+
+pub mod boot;
+pub mod check;
+pub mod explain;
+pub mod heard;
+pub mod params;
+pub mod plan;
+pub mod scan;
+pub mod supervise;
+
+use std::path::Path;
+
+use crate::failure::Failure;
+use crate::machine_file::{self, Machine};
+
+/// Reads a machine file.
+///
+/// # Errors
+/// Everything that is wrong with it.
+pub fn read_machine(path: &Path) -> Result<Machine, Failure> {
+    machine_file::read(path).map_err(|reason| unusable(path, reason))
+}
+
+/// That a machine file makes no sense.
+pub fn unusable(path: &Path, reason: String) -> Failure {
+    Failure::usage(format!("cannot use the machine file {}", path.display()))
+        .because(reason)
+        .next(machine_file::example())
+}
+
+/// Who is kept informed while something takes its time.
+pub trait Progress {
+    /// What is being waited for.
+    fn show(&self, text: String);
+    /// How far something is that may take long.
+    fn count(&self, text: String);
+    /// What a person has to do now.
+    fn note(&self, text: &str);
+}
+
+/// Nobody is.
+impl Progress for () {
+    fn show(&self, _: String) {}
+    fn count(&self, _: String) {}
+    fn note(&self, _: &str) {}
+}
