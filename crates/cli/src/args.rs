@@ -12,8 +12,6 @@ use crate::global::Global;
 /// CANopen motor drives, virtual and real: simulate them, look into them, move them.
 #[derive(Parser)]
 #[command(name = "ferrodrive", version, propagate_version = true, max_term_width = 100, arg_required_else_help = true)]
-#[command(after_help = "Without --bus everything happens on a virtual bus of its own, in virtual time:\n  \
-    ferrodrive demo\n  ferrodrive move 4 90deg\n  ferrodrive --bus can0 state 4")]
 pub(crate) struct Cli {
     #[command(flatten)]
     pub(crate) global: Global,
@@ -78,4 +76,9 @@ pub(crate) enum Command {
     Completions(completions::Completions),
     #[command(hide = true)]
     ManPages(man_pages::ManPages),
+    /// Options that every command takes, before or behind it
+    ///
+    /// A command refuses those that mean nothing to it; its help names the others.
+    #[command(hide = true)]
+    Options,
 }

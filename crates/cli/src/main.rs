@@ -14,6 +14,7 @@ mod far_world;
 mod frames;
 mod global;
 mod guard;
+mod help;
 mod output;
 mod plain;
 mod progress;
@@ -47,7 +48,7 @@ use crate::command::objects::{Objects, Whose};
 use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
 use crate::global::Global;
-use crate::output::{Format, Report};
+use crate::output::{Format, Report, print_line};
 use crate::plain::{plain, short};
 use crate::recording::LogPath;
 use crate::scope::command_line;
@@ -237,7 +238,8 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Studio(command) => session::run_live(global, async |context| command.run(context, format).await),
         Command::Replay(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Completions(completions) => completions.run(),
-        Command::ManPages(pages) => pages.run(command_line()),
+        Command::ManPages(pages) => pages.run(scope::heeded()),
+        Command::Options => print_line(&help::of_options()).map_err(Failure::of_stdout),
     }
 }
 

@@ -11,6 +11,7 @@ use crate::args::{Cli, Command};
 use crate::command::objects::Whose;
 use crate::failure::Failure;
 use crate::global::Global;
+use crate::help;
 
 /// Options that a command does not heed, by their names in the parser, and why.
 struct Unheeded {
@@ -132,8 +133,13 @@ const CHECK_OF_A_FILE: Unheeded = Unheeded {
     next: "leave it away, or give --bus to have the drives asked that are there",
 };
 
-/// The command line as it is parsed and shown: of each command the options that it heeds.
+/// The command line as it is parsed and shown.
 pub(crate) fn command_line() -> clap::Command {
+    help::dressed(heeded())
+}
+
+/// The command line with, of each command, the options that it heeds.
+pub(crate) fn heeded() -> clap::Command {
     let mut command = Cli::command();
     for row in UNHEEDED {
         for option in row.options {
@@ -299,7 +305,7 @@ mod tests {
             .map(|argument| argument.get_id().to_string())
             .collect();
         assert_eq!(options.len(), ALL.len(), "{options:?}");
-        for its in built.get_subcommands().filter(|its| its.get_name() != "help") {
+        for its in built.get_subcommands().filter(|its| !["help", help::OPTIONS].contains(&its.get_name())) {
             let name = its.get_name();
             let line = LINES.iter().find(|line| line.split(' ').next() == Some(name));
             let line = line.unwrap_or_else(|| panic!("a line of {name} is missing here"));

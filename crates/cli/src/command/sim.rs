@@ -34,24 +34,7 @@ use testbench::document::BadFile;
 use testbench::machine_file::{Machine, Placed};
 use testbench::words::drive::{DriveSpec, drive_spec};
 
-/// Run virtual drives in real time, for other programs
-///
-/// Prints one line that begins with `ready` and names every listener once all of them listen. Then reads world commands
-/// from standard input, one a line, and answers each with one line of JSON; `quit` ends, the end of input does not. Blank
-/// lines and `# comments` have no answer; `help` lists the commands.
-///
-/// With --bus BUS before or behind `sim` the drives join somebody's live bus: can0, vcan0, socketcand://HOST:29536/can0 or
-/// slcan. They hear what is said there and answer, as real ones would; --serve may be given beside it. When that bus goes away,
-/// the drives go on and wait for it.
-///
-/// The drives start when the simulator does, and take about a second to boot (--timing): until its boot-up message a drive is
-/// deaf, and `get` says "power":"booting".
-///
-/// Time on the bus is that of the clock, unless --speed or --clock says otherwise. Nobody holds it up: answers that nobody reads are dropped when 4 MiB wait, and
-/// counted; clients have the wire in turn, at most 256 at a time, of which idle ones make room. `now` and `get` tell
-/// `behind_ms`, how far the bus is behind the clock; falling behind and catching up are also said on standard error.
-#[derive(clap::Args)]
-#[command(after_help = "World commands (4 is the node of --drive):\n  \
+const WORLD_COMMANDS: &str = "World commands (4 is the node of --drive):\n  \
     4 power off|on|cycle|cut  4 input X0 1              4 switch X0 -5000 max\n  \
     4 load torque 2.5         4 load inertia 0.02       4 rotor lock|free\n  \
     4 load friction 0.2 viscous 0.01 static 0.3         (N·m, N·m·s/rad, N·m at rest)\n  \
@@ -69,11 +52,32 @@ use testbench::words::drive::{DriveSpec, drive_spec};
     before that, and a cycle, wait for it, which `power` in `get` tells. Cut, it is dead at once.\n\
     Of the joints, here node 1:\n  \
     1 battery off|on          1 pulses 8192 10000       1 quadrature -400 1000\n  \
-    1 duty 40                 1 clock 10000\n\n\
+    1 duty 40                 1 clock 10000";
+
+const EXAMPLES: &str = "\
     Examples:\n  ferrodrive --bus can0 sim --drive zlac8030l@4\n  ferrodrive sim --drive zlac8030l@4 --serve socketcand://127.0.0.1:29536\n  \
-    ferrodrive --bus socketcand://127.0.0.1:29536/can0 move 4 90deg")]
+    ferrodrive --bus socketcand://127.0.0.1:29536/can0 move 4 90deg";
+
+/// Run virtual drives in real time, for other programs
+///
+/// Prints one line that begins with `ready` and names every listener once all of them listen. Then reads world commands
+/// from standard input, one a line, and answers each with one line of JSON; `quit` ends, the end of input does not. Blank
+/// lines and `# comments` have no answer; `help` lists the commands.
+///
+/// With --bus BUS before or behind `sim` the drives join somebody's live bus: can0, vcan0, socketcand://HOST:29536/can0 or
+/// slcan. They hear what is said there and answer, as real ones would; --serve may be given beside it. When that bus goes away,
+/// the drives go on and wait for it.
+///
+/// The drives start when the simulator does, and take about a second to boot (--timing): until its boot-up message a drive is
+/// deaf, and `get` says "power":"booting".
+///
+/// Time on the bus is that of the clock, unless --speed or --clock says otherwise. Nobody holds it up: answers that nobody reads are dropped when 4 MiB wait, and
+/// counted; clients have the wire in turn, at most 256 at a time, of which idle ones make room. `now` and `get` tell
+/// `behind_ms`, how far the bus is behind the clock; falling behind and catching up are also said on standard error.
+#[derive(clap::Args)]
+#[command(after_help = format!("{EXAMPLES}\n\nWorld commands and more options: ferrodrive sim --help"), after_long_help = format!("{WORLD_COMMANDS}\n\n{EXAMPLES}"))]
 pub(crate) struct Sim {
-    /// A drive and its node-ID, e.g. zlac8030l@4; may be repeated, and comes on top of those of --machine FILE.toml
+    /// A drive and its node-ID, e.g. zlac8030l@4; may be repeated, beside --machine FILE
     ///
     /// cia402@5 is a servo as the standard has it. An EDS or DCF file in place of the model, e.g. vendor.eds@5, is a servo with
     /// the objects of that file, or, if it describes no drive, a node with its objects.
@@ -85,12 +89,14 @@ pub(crate) struct Sim {
     /// Bit rate of the bus; without it the machine file's, or 500k
     #[arg(long, value_name = "RATE")]
     bitrate: Option<Bitrate>,
-    /// Where to serve the bus: socketcand://HOST:PORT or slcan://HOST:PORT; port 0 takes a free one; may be repeated
+    /// Where to serve the bus: socketcand://HOST:PORT or slcan://HOST:PORT; may be repeated
+    ///
+    /// Port 0 takes a free one, which the `ready` line names.
     #[arg(long = "serve", value_name = "URL")]
     places: Vec<ServeSpec>,
     /// Where to serve the joints' registers: HOST:PORT for Modbus TCP, or rtu:///dev/ttyUSB0?baud=115200; the unit
     /// identifier is the joint's address (2615h)
-    #[arg(long, value_name = "PLACE")]
+    #[arg(long, value_name = "PLACE", hide_short_help = true)]
     modbus: Option<ModbusSpec>,
     #[command(flatten)]
     control: ControlOptions,
@@ -108,7 +114,7 @@ pub(crate) struct Sim {
     seed: Option<u64>,
     /// Whether the drives are as calculated (ideal) or have what real ones have (full): noise of encoder, current, voltage
     /// and temperature, dead time, cogging; without it the machine file's, or ideal
-    #[arg(long, value_name = "ideal|full")]
+    #[arg(long, value_name = "ideal|full", hide_short_help = true)]
     realism: Option<Realism>,
     /// Whether the drives take the time that such drives take (device), or none (ideal); without it the machine file's, or
     /// device
@@ -117,7 +123,7 @@ pub(crate) struct Sim {
     /// an RPDO or SYNC after some hundred microseconds, takes some milliseconds for a store and half a second for NMT reset
     /// node. `ferrodrive readings MODEL times` lists the bounds and where they are from; --seed decides each time between them.
     /// A drive may have it otherwise: --drive zlac8030l@4,timing=ideal.
-    #[arg(long, value_name = "device|ideal")]
+    #[arg(long, value_name = "device|ideal", hide_short_help = true)]
     timing: Option<TimingMode>,
     /// How many times as fast as the clock the bus runs, e.g. 10 or 0.1, or max
     ///
@@ -131,12 +137,12 @@ pub(crate) struct Sim {
     /// Moved by hand, time stands between two runs: a frame of a client is taken at the time that the bus has, and goes out
     /// with the next run. Records and logs are the same each time, then; a log counts from the start of the bus. Each run is answered, when it is over, with the time reached, how many frames the bus has carried,
     /// and the drives whose power, statusword or error code has changed. Lines that come before that wait for it; a second `quit` does not.
-    #[arg(long, value_name = "real|manual", value_enum, default_value = "real")]
+    #[arg(long, value_name = "real|manual", value_enum, default_value = "real", hide_possible_values = true)]
     clock: Clock,
     #[command(flatten)]
     recording: RecordOptions,
     /// Name what is else only counted at the start: the objects of a file that have no effect
-    #[arg(short, long)]
+    #[arg(short, long, hide_short_help = true)]
     verbose: bool,
 }
 

@@ -26,10 +26,10 @@ pub(crate) struct RecordOptions {
     #[arg(long, value_name = "FILE", value_parser = record_path)]
     record: Option<PathBuf>,
     /// Time between two samples, from 50us on
-    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = record_period, requires = "record")]
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = record_period, hide_short_help = true, requires = "record")]
     record_period: Option<Duration>,
     /// Which signals, e.g. velocity,4.current_a,5.*; without it all of them
-    #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',', requires = "record")]
+    #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',', hide_short_help = true, requires = "record")]
     record_signals: Vec<String>,
 }
 

@@ -19,7 +19,14 @@ pub(crate) struct ControlOptions {
     control: Option<ControlAddress>,
     /// What clients of --control have to say first; without it, on an address that other machines can reach, a random one is
     /// made and said on standard error
-    #[arg(long, value_name = "TOKEN", env = "FERRODRIVE_CONTROL_TOKEN", hide_env_values = true, requires = "control")]
+    #[arg(
+        long,
+        value_name = "TOKEN",
+        env = "FERRODRIVE_CONTROL_TOKEN",
+        hide_env_values = true,
+        hide_short_help = true,
+        requires = "control"
+    )]
     control_token: Option<String>,
 }
 
