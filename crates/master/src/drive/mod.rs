@@ -7,6 +7,7 @@
 //! While a motion is supervised, the polling keeps the drive's watch over its host content.
 
 mod conclude;
+mod everything;
 mod explain;
 mod goal;
 mod guard;
@@ -26,6 +27,7 @@ pub use crate::error::{Explanation, Fact};
 pub use crate::host_loss::HostLoss;
 pub use crate::limits::{Limits, Setting};
 pub(crate) use conclude::Trigger;
+pub use everything::{StopWay, StoppedAxis};
 pub use explain::faults_in;
 pub use guard::SwitchedOff;
 pub use handle::Drive;

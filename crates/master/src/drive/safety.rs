@@ -146,7 +146,7 @@ impl Drive {
     }
 
     /// Stops the drive and waits until it is seen to stand; how long that took.
-    async fn come_to_rest(&self) -> Result<Duration, Error> {
+    pub(super) async fn come_to_rest(&self) -> Result<Duration, Error> {
         const INTENT: &str = "bring it to rest";
         let network = self.node.network();
         let began = network.now();
@@ -218,12 +218,12 @@ impl Drive {
     }
 
     /// True of a drive that a quick stop may give power: one without the state machine, or of an unknown model.
-    fn may_hold_by_stopping(&self) -> bool {
+    pub(super) fn may_hold_by_stopping(&self) -> bool {
         self.description.is_none() || self.power_style() != PowerStyle::Cia402
     }
 
     /// True if the drive soon says that its motor has no power (statusword bit 4) and does not follow set-points.
-    async fn is_without_power(&self) -> bool {
+    pub(super) async fn is_without_power(&self) -> bool {
         let glance = self.node.clone().with_timeout(GLANCE).read::<u16>(self.place(STATUSWORD)).await;
         glance.is_ok_and(|raw| {
             let statusword = Statusword(raw);

@@ -5,7 +5,12 @@
 //! V1.00, chapter 9; user manual V1.03, 5.4), 2000 (r/min)/s and more of the others.
 
 mod another_master;
+mod everything;
 
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::future::poll_fn;
+use std::pin::pin;
 use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant, Station};
@@ -253,6 +258,8 @@ enum End {
     StopGuard,
     /// The program ends everything, and leaves the bus.
     Close,
+    /// Another program stops everything on the bus, and this one goes on with what it does.
+    Everything,
     /// The program no longer steps what moves, and lives on.
     Forgotten,
     Killed,
@@ -260,8 +267,16 @@ enum End {
     CableCut,
 }
 
-const ENDS: [End; 7] =
-    [End::StopAll, End::StopGuard, End::Close, End::Forgotten, End::Killed, End::Frozen, End::CableCut];
+const ENDS: [End; 8] = [
+    End::StopAll,
+    End::StopGuard,
+    End::Close,
+    End::Everything,
+    End::Forgotten,
+    End::Killed,
+    End::Frozen,
+    End::CableCut,
+];
 
 /// How long a frozen program does not run.
 const FROZEN: Duration = Duration::from_secs(4);
@@ -309,14 +324,28 @@ fn whatever_moves_stops_within_its_ramp_however_its_program_ends() {
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/safety.md");
 const TABLE_BEGINS: &str = "| motion | drive |";
 
+/// What comes of `work`, while `other` goes on without end.
+async fn while_going_on<T>(work: impl Future<Output = T>, other: impl Future<Output = Infallible>) -> T {
+    let (mut work, mut other) = (pin!(work), pin!(other));
+    poll_fn(|context| {
+        let done = work.as_mut().poll(context);
+        if done.is_pending() {
+            let _ = other.as_mut().poll(context);
+        }
+        done
+    })
+    .await
+}
+
 /// What the page has: how long after each end the shaft stands.
 fn table(times: &[((&'static str, Motion), End, Stood)]) -> String {
-    let columns = [End::StopAll, End::StopGuard, End::Forgotten, End::Killed, End::Frozen, End::CableCut];
+    let columns =
+        [End::StopAll, End::StopGuard, End::Everything, End::Forgotten, End::Killed, End::Frozen, End::CableCut];
     let mut lines = vec![
         format!(
-            "{TABLE_BEGINS} signal, failure, `close` | `StopGuard` | no longer stepped | killed | frozen 4 s | cable |"
+            "{TABLE_BEGINS} signal, failure, `close` | `StopGuard` | `estop` | no longer stepped | killed | frozen 4 s | cable |"
         ),
-        "|---|---|---|---|---|---|---|---|".to_owned(),
+        "|---|---|---|---|---|---|---|---|---|".to_owned(),
     ];
     let mut rows: Vec<(&str, Motion)> = times.iter().map(|(row, ..)| *row).collect();
     rows.dedup();
@@ -389,6 +418,34 @@ impl Bench {
         }
     }
 
+    /// Another program stops everything while this one goes on with its cycles. The time after which the last drive was seen to
+    /// stand.
+    fn stop_everything(&mut self, moving: &mut Moving, what: &str) -> Duration {
+        let other = Network::new();
+        self.world.add_station(other.clone());
+        let network = self.network.clone();
+        let go_on = async {
+            loop {
+                match moving {
+                    Moving::Alone => {}
+                    Moving::Group(group) => drop(group.cycle().await),
+                    Moving::Base(base) => {
+                        let _ = base.command(Twist { linear_m_s: 0.6, angular_rad_s: 0.0 });
+                        let _ = base.cycle().await;
+                    }
+                }
+                // What has ended does not wait for its next cycle.
+                network.sleep(PERIOD / 10).await;
+            }
+        };
+        let models = BTreeMap::new();
+        let stopped = block_on(&mut self.world, while_going_on(other.stop_everything(&models), go_on)).unwrap();
+        assert_eq!(stopped.len(), NODES.len(), "{what}: {stopped:?}");
+        assert!(self.fastest() < 2.0, "{what}: said to stand at {} r/min", self.fastest());
+        let times = stopped.iter().map(|axis| axis.outcome.as_ref().unwrap_or_else(|e| panic!("{what}: {e}")).0);
+        times.max().unwrap()
+    }
+
     fn end(&mut self, (name, motion, end): (&str, Motion, End), moving: Moving, speed: f64) -> Stood {
         let what = format!("{name} {motion:?} {end:?}");
         let network = self.network.clone();
@@ -418,6 +475,11 @@ impl Bench {
                 self.world.refresh();
                 kept = Some(moving);
             }
+            End::Everything => {
+                let mut moving = moving;
+                said = Some(self.stop_everything(&mut moving, &what));
+                kept = Some(moving);
+            }
             // A motion that goes on alone is what its program asked for.
             End::Forgotten if matches!(moving, Moving::Alone) => return Stood::AsAsked,
             End::Forgotten => drop(moving),
@@ -437,7 +499,7 @@ impl Bench {
             return Stood::Never;
         }
         let watch = match end {
-            End::StopAll | End::StopGuard | End::Close => Duration::ZERO,
+            End::StopAll | End::StopGuard | End::Close | End::Everything => Duration::ZERO,
             // The patience of the master's own supervision: two cycles, and the one that has begun.
             End::Forgotten => 4 * PERIOD,
             End::Frozen if model(name).unwrap().host_watch == HostWatch::None => FROZEN,

@@ -1,0 +1,181 @@
+//! Stopping every drive on the bus, whoever moves it.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use canopen::{AbortCode, Mux, NmtCommand, NodeId};
+use cia402::PowerState;
+use devices::{AxisId, Description, PowerStyle};
+
+use super::handle::{CONTROLWORD, Drive, STATUSWORD};
+use super::safety::{ANSWER, STOP};
+use crate::core::NodeSet;
+use crate::error::Error;
+use crate::gear::Gear;
+use crate::identify;
+use crate::network::{Network, Node, join_all};
+
+/// How many nodes are asked at once, and how long after them the next ones: 32 requests take 40 ms at 100 kbit/s.
+const WINDOW: usize = 32;
+const WINDOW_TIME: Duration = Duration::from_millis(40);
+
+/// How far apart the axes of a device have their objects, and how many there may be (CiA 402-1: eight blocks of 800h).
+const AXIS_OFFSET: u16 = 0x800;
+const MOST_AXES: u8 = 8;
+
+/// What keeps an axis at rest once it was seen to stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopWay {
+    /// The quick stop: its motor has power and holds.
+    QuickStop,
+    /// Its motor has no power, by its quick stop option (605Ah) or since before: a load may move it.
+    NoPower,
+    /// A fault, which has taken the power off its motor.
+    Fault,
+}
+
+impl StopWay {
+    /// In words.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::QuickStop => "quick stop",
+            Self::NoPower => "no power",
+            Self::Fault => "fault",
+        }
+    }
+}
+
+/// What became of an axis when everything was to stop.
+#[derive(Clone, Debug)]
+pub struct StoppedAxis {
+    /// Its node.
+    pub node: NodeId,
+    /// Which of the node's axes.
+    pub axis: AxisId,
+    /// The model, as far as that is known.
+    pub model: Option<&'static Description>,
+    /// How long after the beginning it was seen to stand, by its statusword and its speed (or its position, where it does not
+    /// show a speed), and what holds it; or why that was not seen: then it may still be moving.
+    pub outcome: Result<(Duration, StopWay), Error>,
+}
+
+impl Network {
+    /// Stops every drive on the bus, all at the same time, whoever has set it in motion, and says how each came to rest.
+    ///
+    /// First one NMT command takes all nodes to pre-operational: no PDO of another master sets a drive going again after
+    /// its quick stop, and a node that was stopped by NMT answers SDO (CiA 301, 7.3.2.2). Stopped would not do, since nothing
+    /// can then be asked or seen. The nodes are left so: who goes on starts them again. Outputs of other devices stay
+    /// as they are in pre-operational.
+    ///
+    /// Then each node-ID has a quick stop by SDO, those first that were heard or are in `models`. A node without a controlword
+    /// (6040h) is not a drive and is left out. One that was heard, or is in `models`, and does not answer is among the
+    /// results with that error. A node-ID that neither answers nor sends anything meanwhile is not: nothing shows it. Of an
+    /// unknown model the second and further axes are told to stop and cannot be seen to stand.
+    ///
+    /// Takes a third of a second, and the time of the drives' own ramps. What else this program asks of these drives has to have
+    /// ended.
+    pub async fn stop_everything(&self, models: &BTreeMap<NodeId, &'static Description>) -> Vec<StoppedAxis> {
+        let began = self.now();
+        self.nmt_all(NmtCommand::EnterPreOperational);
+        self.quick_stop_moved();
+        let expected: NodeSet = self.seen().iter().chain(models.keys().copied()).collect();
+        let (first, others): (Vec<_>, Vec<_>) = NodeId::all().partition(|node| expected.contains(*node));
+        let turns = others.chunks(WINDOW).enumerate().flat_map(|(number, window)| {
+            window.iter().map(move |node| (*node, WINDOW_TIME * (number as u32 + u32::from(!expected.is_empty()))))
+        });
+        let stops = first.into_iter().map(|node| (node, Duration::ZERO)).chain(turns).map(|(id, wait)| async move {
+            if !wait.is_zero() {
+                self.sleep(wait).await;
+            }
+            let node = self.node(id).with_timeout(ANSWER);
+            let stopped = stop_node(&node, models.get(&id).copied(), expected.contains(id)).await;
+            let since = |axis: StoppedAxis| StoppedAxis {
+                outcome: axis.outcome.map(|(_, way)| (self.now() - began, way)),
+                ..axis
+            };
+            stopped.into_iter().map(since).collect::<Vec<_>>()
+        });
+        let mut stopped: Vec<_> = join_all(stops.collect::<Vec<_>>()).await.into_iter().flatten().collect();
+        stopped.sort_by_key(|axis| (axis.node, axis.axis));
+        stopped
+    }
+}
+
+/// Stops what is at a node-ID. Nothing where nobody is, or what is no drive.
+async fn stop_node(node: &Node, told: Option<&'static Description>, is_expected: bool) -> Vec<StoppedAxis> {
+    if told.is_some_and(|model| model.axes.is_empty()) {
+        return Vec::new();
+    }
+    let first = Drive { node: node.clone(), axis: AxisId::FIRST, description: told, guess: None, gear: Gear::DIRECT };
+    // The model is asked for only once it has been told to stop.
+    let told_to_stop = first.tell_to_stop().await;
+    match told_to_stop {
+        Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT, .. }) => return Vec::new(),
+        Err(Error::NoAnswer { .. }) if !is_expected && node.facts().seen_at.is_none() => return Vec::new(),
+        _ => {}
+    }
+    let model = match told {
+        Some(model) => Some(model),
+        None => identify::knowledge(node).await.ok().and_then(|knowledge| knowledge.description()),
+    };
+    let Some(model) = model.filter(|model| !model.axes.is_empty()) else {
+        let mut stopped = vec![first.brought_to_rest().await];
+        if stopped.iter().all(|axis| axis.outcome.is_ok()) {
+            stopped.extend(stop_unseen_axes(node).await);
+        }
+        return stopped;
+    };
+    let axes = (0..model.axes.len() as u8).map(|axis| {
+        let drive = Drive { axis: AxisId(axis), description: Some(model), ..first.clone() };
+        async move { drive.brought_to_rest().await }
+    });
+    join_all(axes.collect::<Vec<_>>()).await
+}
+
+/// Tells the further axes of a device of unknown model to stop, where it has them.
+async fn stop_unseen_axes(node: &Node) -> Vec<StoppedAxis> {
+    let mut axes = Vec::new();
+    for axis in 1..MOST_AXES {
+        let place = |mux: Mux| Mux::new(mux.index + u16::from(axis) * AXIS_OFFSET, mux.sub_index);
+        if node.read::<u16>(place(STATUSWORD)).await.is_err() {
+            break;
+        }
+        let sent = node.write(place(CONTROLWORD), STOP.0).await;
+        let unseen = Error::UnknownModel { node: node.id(), intent: "see its further axes stand" };
+        axes.push(StoppedAxis { node: node.id(), axis: AxisId(axis), model: None, outcome: sent.and(Err(unseen)) });
+    }
+    axes
+}
+
+impl Drive {
+    /// The first word to a drive of which it is not known what it does.
+    async fn tell_to_stop(&self) -> Result<(), Error> {
+        if self.may_hold_by_stopping() && self.is_without_power().await {
+            return Ok(());
+        }
+        self.write_controlword(STOP).await
+    }
+
+    async fn brought_to_rest(&self) -> StoppedAxis {
+        let outcome = match self.come_to_rest().await {
+            Ok(after) => self.statusword().await.map(|statusword| (after, self.way_of(statusword))),
+            Err(error) => Err(error),
+        };
+        StoppedAxis { node: self.node.id(), axis: self.axis, model: self.description, outcome }
+    }
+
+    /// What keeps an axis that stands from turning.
+    fn way_of(&self, statusword: cia402::Statusword) -> StopWay {
+        let has_power = match self.power_style() {
+            PowerStyle::EchoesControlword { live, .. } => statusword.has(live),
+            _ => self.power_state(statusword) == Some(PowerState::QuickStopActive),
+        };
+        if self.power_style().is_faulted(statusword) && !has_power {
+            StopWay::Fault
+        } else if has_power {
+            StopWay::QuickStop
+        } else {
+            StopWay::NoPower
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Everything on the bus stops, whoever moves it: kept going by another master's process data, stopped by NMT, without power, or
+//! not there any more.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use can::{CanId, Frame};
+use canopen::NmtCommand;
+use cia402::{Controlword, PowerCommand};
+use devices::model;
+use master::Network;
+use master::drive::{MotionOptions, StopWay, StoppedAxis};
+use master::units::Rpm;
+use sim::{Place, Stimulus, block_on};
+
+use super::{Bench, NODES, models, options, while_going_on};
+use crate::support::{mux, node};
+
+impl Bench {
+    /// Both drives turn, by this program.
+    fn turn(&mut self) {
+        for drive in self.drives.clone() {
+            self.run(drive.velocity(Rpm(60.0), MotionOptions { wait: true, ..options() })).unwrap();
+        }
+        self.moving = NODES.to_vec();
+    }
+
+    /// Another program on the same bus.
+    fn other(&mut self) -> Network {
+        let other = Network::new();
+        self.world.add_station(other.clone());
+        other
+    }
+
+    fn stop_everything_by(&mut self, other: &Network) -> Vec<StoppedAxis> {
+        self.run(other.stop_everything(&BTreeMap::new()))
+    }
+}
+
+#[test]
+fn process_data_of_another_master_do_not_set_a_drive_going_again() {
+    for name in ["zlac8030l", "cia402"] {
+        let mut bench = Bench::new(name);
+        let (id, feeder) = (node(NODES[0]), bench.other());
+        // RPDO1 carries the controlword alone, as soon as it comes (CiA 301, 7.5.2.35 and 7.5.2.36).
+        let at = 0x200 + u32::from(NODES[0]);
+        let rows: [(_, &[u8]); 7] = [
+            // After a quick stop it holds, and may be enabled again (CiA 402-2, 8.4.5).
+            (mux(0x605A, 0), &6_i16.to_le_bytes()),
+            (mux(0x1400, 1), &(0x8000_0000 | at).to_le_bytes()),
+            (mux(0x1600, 0), &[0]),
+            (mux(0x1600, 1), &0x6040_0010_u32.to_le_bytes()),
+            (mux(0x1600, 0), &[1]),
+            (mux(0x1400, 2), &[255]),
+            (mux(0x1400, 1), &at.to_le_bytes()),
+        ];
+        for (object, bytes) in rows {
+            bench.run(feeder.node(id).download(object, bytes)).unwrap();
+        }
+        feeder.node(id).nmt(NmtCommand::Start);
+        bench.turn();
+        let controlword = PowerCommand::EnableOperation.controlword().0;
+        let enable = Frame::new(CanId::standard(at as u16), &controlword.to_le_bytes());
+        let keep_going = |feeder: Network| async move {
+            loop {
+                feeder.transmit(enable);
+                feeder.sleep(Duration::from_millis(5)).await;
+            }
+        };
+        // A quick stop alone does not last.
+        let other = bench.other();
+        let once = async {
+            other.node(id).write(mux(0x6040, 0), PowerCommand::QuickStop.controlword().0).await.unwrap();
+            other.sleep(Duration::from_secs(2)).await;
+        };
+        block_on(&mut bench.world, while_going_on(once, keep_going(feeder.clone()))).unwrap();
+        assert!(bench.speed(NODES[0]).abs() > 50.0, "{name}: {} r/min", bench.speed(NODES[0]));
+        let stop = async {
+            let stopped = other.stop_everything(&BTreeMap::new()).await;
+            other.sleep(Duration::from_secs(2)).await;
+            stopped
+        };
+        let stopped = block_on(&mut bench.world, while_going_on(stop, keep_going(feeder))).unwrap();
+        assert!(stopped.len() == 2 && stopped.iter().all(|axis| axis.outcome.is_ok()), "{name}: {stopped:?}");
+        assert!(bench.fastest() < 1.0, "{name}: {} r/min", bench.fastest());
+    }
+}
+
+#[test]
+fn a_drive_in_nmt_stopped_is_reached_and_seen_to_stand() {
+    for name in models() {
+        let mut bench = Bench::new(name);
+        let other = bench.other();
+        bench.turn();
+        other.nmt_all(NmtCommand::Stop);
+        bench.world.run_for(Duration::from_millis(20));
+        let stopped = bench.stop_everything_by(&other);
+        assert!(stopped.len() == 2 && stopped.iter().all(|axis| axis.outcome.is_ok()), "{name}: {stopped:?}");
+        assert!(bench.fastest() < 1.0, "{name}");
+    }
+}
+
+#[test]
+fn a_drive_without_power_is_left_without_it() {
+    for name in models() {
+        let mut bench = Bench::new(name);
+        let other = bench.other();
+        let stopped = bench.stop_everything_by(&other);
+        let ways: Vec<_> = stopped.iter().map(|axis| axis.outcome.as_ref().unwrap().1).collect();
+        assert_eq!(ways, [StopWay::NoPower; 2], "{name}");
+        assert_eq!(stopped[0].node, node(NODES[0]), "{name}");
+        let controlword = bench.run(other.node(node(NODES[0])).read::<u16>(mux(0x6040, 0))).unwrap();
+        assert_ne!(Controlword(controlword).command(), PowerCommand::EnableOperation, "{name}");
+    }
+}
+
+#[test]
+fn what_was_heard_or_is_known_and_does_not_answer_may_still_be_moving() {
+    for name in models() {
+        let mut bench = Bench::new(name);
+        bench.turn();
+        bench.world.apply(Place::node(NODES[1]), &Stimulus::CableCut(true)).unwrap().unwrap();
+        let other = bench.other();
+        // Nothing shows the second one to a program that has never heard of it.
+        let stopped = bench.stop_everything_by(&other);
+        assert_eq!(stopped.iter().map(|axis| axis.node).collect::<Vec<_>>(), [node(NODES[0])], "{name}: {stopped:?}");
+        let known = NODES.map(|number| (node(number), model(name).unwrap())).into_iter().collect();
+        let began = bench.world.now();
+        let stopped = bench.run(other.stop_everything(&known));
+        let [stands, silent] = &stopped[..] else { panic!("{name}: {stopped:?}") };
+        assert!(stands.outcome.is_ok(), "{name}: {stopped:?}");
+        let why = silent.outcome.as_ref().unwrap_err().to_string();
+        assert!(why.contains("The drive does not answer"), "{name}: {why}");
+        assert!(bench.world.now() - began < Duration::from_secs(1), "{name}");
+        assert!(bench.speed(NODES[1]).abs() > 50.0, "{name}: it was said rightly");
+    }
+}
