@@ -5,7 +5,7 @@ use canopen::od::Entry;
 use canopen::{CobId, Mux, NmtState, NodeId};
 use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
 use devices::faults::FaultRow;
-use devices::{AxisDescription, Description, HostWatch, Meaning, PowerStyle, Quantity, Terminals};
+use devices::{AxisDescription, Description, HostWatch, Meaning, PowerStyle, Quantity, Scale, Terminals};
 
 use super::overheard::Overheard;
 use crate::core::Twins;
@@ -52,6 +52,9 @@ pub(super) const POSITIVE_TORQUE_LIMIT: Mux = Mux::new(0x60E0, 0);
 pub(super) const NEGATIVE_TORQUE_LIMIT: Mux = Mux::new(0x60E1, 0);
 pub(super) const TARGET_VELOCITY: Mux = Mux::new(0x60FF, 0);
 
+/// Limits in thousandths of what is rated (CiA 402-2, torque profile).
+const CURRENT_LIMITS: [Mux; 4] = [MAX_TORQUE, MAX_CURRENT, POSITIVE_TORQUE_LIMIT, NEGATIVE_TORQUE_LIMIT];
+
 /// Producer heartbeat time in ms (CiA 301, 7.5.2.17).
 pub(super) const HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
 
@@ -85,8 +88,14 @@ pub struct Observed {
     pub speed_rpm: Option<f64>,
     /// The speed that it is told, in r/min.
     pub target_rpm: Option<f64>,
+    /// By how much the speed differed between the two looks, in r/min.
+    pub speed_change_rpm: Option<f64>,
+    /// The fastest that the drive's limit lets it be told, in r/min, where its model has one for the target.
+    pub speed_limit_rpm: Option<f64>,
     /// Motor current in A.
     pub current_a: Option<f64>,
+    /// The largest that its limits allow, in A, where its model has such.
+    pub current_limit_a: Option<f64>,
     /// Supply voltage in V.
     pub supply_v: Option<f64>,
     /// Objects that say how fast its speed may change, and are 0.
@@ -125,7 +134,10 @@ impl Observed {
             fault: None,
             speed_rpm: None,
             target_rpm: None,
+            speed_change_rpm: None,
+            speed_limit_rpm: None,
             current_a: None,
+            current_limit_a: None,
             supply_v: None,
             rates_of_zero: Vec::new(),
             pdos: Vec::new(),
@@ -160,12 +172,28 @@ impl Observed {
         self.target_rpm = measure(drive, units.and_then(|units| units.target_velocity)).await?;
         self.current_a = measure(drive, units.and_then(|units| units.actual_current)).await?;
         self.supply_v = measure(drive, units.and_then(|units| units.bus_voltage)).await?;
+        self.speed_limit_rpm = self.held_to(drive, units.and_then(|units| units.target_velocity), &[]).await?;
+        let current = units.and_then(|units| units.target_current);
+        self.current_limit_a = self.held_to(drive, current, &CURRENT_LIMITS).await?;
         self.rates_of_zero = drive.rates_of_zero().await;
         self.pdos = drive.pdos().await?;
         drive.node().network().sleep(BETWEEN_LOOKS).await;
         let second = measure(drive, speed).await?;
+        self.speed_change_rpm = first.zip(second).map(|(first, second)| second - first);
         self.speed_rpm = first.into_iter().chain(second).max_by(|a, b| a.abs().total_cmp(&b.abs()));
         Ok(())
+    }
+
+    /// The least of what holds a target: the object that its row names, and of a share of something rated those that are shares of
+    /// the same.
+    async fn held_to(&self, drive: &Drive, target: Option<Quantity>, shares: &[Mux]) -> Result<Option<f64>, Error> {
+        let Some(target) = target else { return Ok(None) };
+        let named = self.row(target.object).and_then(|row| row.held_to);
+        let named = named.and_then(|held| Some(self.value(held.object)? * held.counts));
+        let is_share = matches!(target.scale, Scale::Rated { .. });
+        let shares = shares.iter().filter(|_| is_share).filter_map(|mux| self.axis_value(*mux));
+        let Some(least) = named.into_iter().chain(shares).min() else { return Ok(None) };
+        Ok(answered(drive.step_of(target).await)?.map(|step| least as f64 * step))
     }
 
     /// The objects to read, those that the model's units and limits name among them.

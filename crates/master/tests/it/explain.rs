@@ -191,6 +191,14 @@ fn hold_shaft(bench: &mut Bench, target: i64) {
     bench.write(mux(0x60FF, 0), target);
 }
 
+/// Turns at this target velocity for longer than the ramp takes, though nobody talks to the drive.
+fn turn_at(bench: &mut Bench, target: i64) {
+    bench.write(mux(0x2000, 0), 0);
+    bench.enable(3);
+    bench.write(mux(0x60FF, 0), target);
+    bench.world.run_for(Duration::from_secs(3));
+}
+
 fn command(bench: &mut Bench, mode: i64, controlword: i64) {
     bench.enable(mode);
     bench.write(CONTROLWORD, controlword);
@@ -314,10 +322,11 @@ const CONDITIONS: &[Row] = &[
     Row("limit_switch", &["cia402"], meet_limit),
     Row("brake_set", &["zlac8030l"], leave_brake_closed),
     Row("internal_limit", &["cia402"], ask_too_much),
+    Row("supply_limit", &["zlac8030l"], |bench| turn_at(bench, 900)),
 ];
 
 /// With these a drive may move all the same.
-const WARNINGS: [&str; 3] = ["pdo_not_operational", "pdo_without_sync", "internal_limit"];
+const WARNINGS: [&str; 4] = ["pdo_not_operational", "pdo_without_sync", "internal_limit", "supply_limit"];
 
 #[test]
 fn each_condition_is_named_with_what_to_do() {
@@ -400,6 +409,43 @@ fn what_should_have_come_and_did_not_is_named() {
         bench.world.run_for(Duration::from_millis(100));
         let explained = block_on(&mut bench.world, drive.explain(&heard)).unwrap();
         assert!(missing.iter().all(|rule| rules(&explained).contains(rule)), "{name}: {explained:#?}");
+    }
+}
+
+/// The hub motor ends at 48 V over the published constant of its voltage, 0.7613 V s: V / sqrt(3) against 2/3 of Kt (docs/drives, L091).
+#[test]
+fn a_speed_beyond_the_supply_is_told_with_the_voltage_and_what_is_reached() {
+    let mut bench = Bench::new("zlac8030l");
+    turn_at(&mut bench, 900);
+    let explained = bench.explain();
+    let told = explained.findings.iter().find(|finding| finding.rule == "supply_limit").expect("a finding");
+    let reached = explained.speed_rpm.expect("a speed");
+    let closed_form = 48.0 / 3.0_f64.sqrt() * 1.5 / 0.7613 * 60.0 / core::f64::consts::TAU;
+    assert!((0.95..1.0).contains(&(reached / closed_form)), "{reached} of {closed_form} r/min");
+    assert!(told.found.contains(" V, ") && told.found.contains(" A of 30.0 A"), "{told:?}");
+    assert!(told.remedy.contains(&format!("at most {reached:.0} r/min")), "{told:?}");
+    // A load that takes all the current there is, a speed that is reached, one on its way, and one that 200Ah holds are not.
+    type Prepare = fn(&mut Bench);
+    let others: [(&str, Prepare); 4] = [
+        ("a heavy load", |bench| {
+            turn_at(bench, 300);
+            bench.stimulus("load torque 40");
+        }),
+        ("reached", |bench| turn_at(bench, 450)),
+        ("on its way", |bench| {
+            bench.write(mux(0x6083, 0), 30_000);
+            turn_at(bench, 900);
+        }),
+        ("held by 200Ah", |bench| {
+            bench.write(mux(0x200A, 0), 300);
+            turn_at(bench, 300);
+        }),
+    ];
+    for (case, prepare) in others {
+        let mut bench = Bench::new("zlac8030l");
+        prepare(&mut bench);
+        let explained = bench.explain();
+        assert!(!rules(&explained).contains(&"supply_limit"), "{case}: {explained:#?}");
     }
 }
 
