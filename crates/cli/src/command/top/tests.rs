@@ -1,5 +1,7 @@
 //! What is drawn for a state, as text, and what keys lead to.
 
+mod units;
+
 use can::Instant;
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::Terminal;
