@@ -24,12 +24,13 @@ VARIANTS = ((), ("--variant", "ros2_canopen"))
 MODELS = (*ALL, CIA402)
 
 
-def write(bench, folder, *options):
-    """Writes the model's EDS into a folder."""
-    command = [bench.program, "eds", bench.drive.model, *options]
+def write(bench, folder, *options, model=None):
+    """Writes the EDS of the bench's model, or of another, into a folder."""
+    model = model or bench.drive.model
+    command = [bench.program, "eds", model, *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     equal(done.returncode, 0, f"{' '.join(map(str, command[1:]))}: {done.stderr}")
-    path = pathlib.Path(folder) / f"{bench.drive.model}.eds"
+    path = pathlib.Path(folder) / f"{model}.eds"
     path.write_text(done.stdout, encoding="ascii")
     return path
 

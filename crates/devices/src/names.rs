@@ -131,7 +131,7 @@ macro_rules! part {
 
 const HIGHEST: &str = "Highest sub-index supported";
 
-macro_rules! rpdo {
+macro_rules! receive {
     ($index:literal, $number:literal) => {
         object!($index, concat!("RPDO communication parameter ", $number);
             0 HIGHEST, 1 [.. "COB-ID used by RPDO"], 2 [.. "Transmission type"], 3 [.. "Inhibit time"],
@@ -139,7 +139,7 @@ macro_rules! rpdo {
     };
 }
 
-macro_rules! tpdo {
+macro_rules! transmit {
     ($index:literal, $number:literal) => {
         object!($index, concat!("TPDO communication parameter ", $number);
             0 HIGHEST, 1 [.. "COB-ID used by TPDO"], 2 [.. "Transmission type"], 3 [.. "Inhibit time"],
@@ -147,7 +147,7 @@ macro_rules! tpdo {
     };
 }
 
-macro_rules! mapping {
+macro_rules! mapped {
     ($index:literal, $title:literal, $number:literal) => {
         object!($index, concat!($title, " ", $number);
             0 "Number of mapped application objects in PDO",
@@ -199,12 +199,12 @@ const OBJECTS: &[Object] = &[
     object!(0x1029, "Error behavior object"; 0 HIGHEST, 1 "Communication error"),
     object!(0x1200, "SDO server parameter";
         0 HIGHEST, 1 [.. "COB-ID client to server (rx)"], 2 [.. "COB-ID server to client (tx)"]),
-    rpdo!(0x1400, "1"), rpdo!(0x1401, "2"), rpdo!(0x1402, "3"), rpdo!(0x1403, "4"),
-    mapping!(0x1600, "RPDO mapping parameter", "1"), mapping!(0x1601, "RPDO mapping parameter", "2"),
-    mapping!(0x1602, "RPDO mapping parameter", "3"), mapping!(0x1603, "RPDO mapping parameter", "4"),
-    tpdo!(0x1800, "1"), tpdo!(0x1801, "2"), tpdo!(0x1802, "3"), tpdo!(0x1803, "4"),
-    mapping!(0x1A00, "TPDO mapping parameter", "1"), mapping!(0x1A01, "TPDO mapping parameter", "2"),
-    mapping!(0x1A02, "TPDO mapping parameter", "3"), mapping!(0x1A03, "TPDO mapping parameter", "4"),
+    receive!(0x1400, "1"), receive!(0x1401, "2"), receive!(0x1402, "3"), receive!(0x1403, "4"),
+    mapped!(0x1600, "RPDO mapping parameter", "1"), mapped!(0x1601, "RPDO mapping parameter", "2"),
+    mapped!(0x1602, "RPDO mapping parameter", "3"), mapped!(0x1603, "RPDO mapping parameter", "4"),
+    transmit!(0x1800, "1"), transmit!(0x1801, "2"), transmit!(0x1802, "3"), transmit!(0x1803, "4"),
+    mapped!(0x1A00, "TPDO mapping parameter", "1"), mapped!(0x1A01, "TPDO mapping parameter", "2"),
+    mapped!(0x1A02, "TPDO mapping parameter", "3"), mapped!(0x1A03, "TPDO mapping parameter", "4"),
     object!(0x1F80, "NMT startup"),
     object!(0x6007, "Abort connection option code"),
     object!(0x603F, "Error code"),

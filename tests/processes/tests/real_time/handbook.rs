@@ -104,8 +104,9 @@ const FOLLOWED: [(&str, usize); 18] = [
 ];
 
 /// The pages whose commands are not run here, and why.
-const NOT_FOLLOWED: [(&str, &str); 8] = [
+const NOT_FOLLOWED: [(&str, &str); 9] = [
     ("README.md", "the list of the pages"),
+    ("canopen-python.md", "its programs are crates/python/tests/test_canopen_python.py"),
     ("faq.md", "it has no commands"),
     ("library.md", "its command is cargo's: the examples' step"),
     ("gateway.md", "it serves until a signal, and a client speaks to it: gateway.rs"),
