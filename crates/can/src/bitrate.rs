@@ -47,7 +47,7 @@ impl fmt::Display for Bitrate {
     }
 }
 
-/// A text that is no bit rate.
+/// A text that is not a bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParseBitrateError;
 

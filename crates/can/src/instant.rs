@@ -42,7 +42,7 @@ impl Instant {
 
     /// Seconds since zero, for display and for physics: the nearest number to the exact one, up to 104 days.
     pub const fn as_secs_f64(self) -> f64 {
-        // Divided, for 1e-9 is no number of its own: 7.5 s would be 7.500000000000001.
+        // Divided, because 1e-9 cannot be represented exactly: 7.5 s would be 7.500000000000001.
         self.0 as f64 / 1e9
     }
 

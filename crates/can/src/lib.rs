@@ -34,7 +34,7 @@
 //!     }
 //! }
 //!
-//! // Whoever holds a station decides what time is. Here a second passes at once.
+//! // The owner of a station decides what time it is. Here a second passes at once.
 //! let mut clock = Clock { next: Instant::ZERO, is_due: false };
 //! let mut sent = 0;
 //! while let Some(next) = clock.poll_timeout().filter(|next| *next < Instant::from_secs(1)) {
