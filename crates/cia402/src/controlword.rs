@@ -38,7 +38,7 @@ impl Controlword {
     /// The command for the power drive state machine in bits 0 to 3 and 7. Source: CiA 402-2, table 24.
     ///
     /// Bits 0 to 3 = 0111 is "switch on" and, in Operation enabled, "disable operation": the table of transitions
-    /// tells which. While bit 7 is set the command is [`PowerCommand::FaultReset`]; that only its rising edge
+    /// shows which. While bit 7 is set the command is [`PowerCommand::FaultReset`]; that only its rising edge
     /// counts is for the caller to see to.
     pub const fn command(self) -> PowerCommand {
         if self.has(Self::FAULT_RESET) {

@@ -7,7 +7,7 @@
 //! ```
 //! use cia402::{PowerEvent, PowerState, Statusword, next_command, transition};
 //!
-//! // What a drive with this statusword has to be told, one controlword after another, until it moves its motor.
+//! // What a drive with this statusword has to be sent, one controlword after another, until it moves its motor.
 //! let mut state = Statusword(0x1250).state().ok_or("no state has these bits")?;
 //! assert_eq!(state, PowerState::SwitchOnDisabled);
 //! let mut controlwords = Vec::new();

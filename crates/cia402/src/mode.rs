@@ -65,7 +65,7 @@ impl SupportedModes {
     /// Bits of the lower half, one for each mode from 1 to 10; 5 is reserved.
     const STANDARD: u32 = 0x03FF & !(1 << 4);
 
-    /// True if the drive has the mode. [`ModeOfOperation::NONE`] is no mode to have; a mode below 0 is never told here.
+    /// True if the drive has the mode. [`ModeOfOperation::NONE`] is not a mode to have; a mode below 0 is never listed here.
     pub const fn has(self, mode: ModeOfOperation) -> bool {
         match Self::bit(mode) {
             Some(bit) => self.0 & bit != 0,

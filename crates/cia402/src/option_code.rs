@@ -136,7 +136,7 @@ impl QuickStopOption {
         if self.stays() { StopRamp::of(self.0 - 4) } else { StopRamp::of(self.0) }
     }
 
-    /// The drive stays in Quick stop active until it is told to leave.
+    /// The drive stays in Quick stop active until it is commanded to leave.
     pub const fn stays(self) -> bool {
         matches!(self.0, 5..=8)
     }

@@ -43,7 +43,7 @@ impl DigitalOutputs {
     /// Bit 0: the brake is set (1), unless the drive does so itself.
     pub const SET_BRAKE: u32 = 1 << 0;
 
-    /// The levels at the pins: the host's where the mask says so, the drive's own elsewhere.
+    /// The levels at the pins: the host's where the mask has a 1, the drive's own elsewhere.
     pub const fn levels(self, own: u32) -> u32 {
         self.physical_outputs & self.bit_mask | own & !self.bit_mask
     }

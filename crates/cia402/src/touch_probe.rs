@@ -94,7 +94,7 @@ impl TouchProbe {
     }
 
     /// Takes a new function. Switching the channel off clears what is stored; so does switching an edge off for that edge.
-    /// `level` is the signal now: it is no edge.
+    /// `level` is the signal now: that is not an edge.
     pub fn set_function(&mut self, function: TouchProbeFunction, level: bool) {
         if function.source() != self.function.source() {
             self.status = 0;
