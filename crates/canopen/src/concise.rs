@@ -173,7 +173,7 @@ impl fmt::Display for ConciseError {
         match *self {
             Self::NoCount { length } => write!(
                 f,
-                "{length} bytes are no concise DCF: it begins with the number of its entries in {COUNT} bytes"
+                "{length} bytes are not a concise DCF: it begins with the number of its entries in {COUNT} bytes"
             ),
             Self::Ends { entry, of, at, mux, needed, left } => {
                 write!(f, "entry {entry} of {of}, at byte {at}")?;

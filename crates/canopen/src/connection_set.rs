@@ -63,7 +63,7 @@ pub enum Service {
 }
 
 impl Service {
-    /// What `id` carries as long as nobody has moved it; `None` for identifiers outside the set.
+    /// What `id` carries as long as it has not been moved; `None` for identifiers outside the set.
     pub const fn of(id: CanId) -> Option<Self> {
         let Some(raw) = id.as_standard() else { return None };
         match raw {

@@ -122,7 +122,7 @@ impl Emcy {
     }
 }
 
-/// How many EMCY messages may wait for the inhibit time. When full, the oldest is dropped: the newest tells how
+/// How many EMCY messages may wait for the inhibit time. When full, the oldest is dropped: the newest shows how
 /// things are.
 pub const QUEUE_LENGTH: usize = 8;
 

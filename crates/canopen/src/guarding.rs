@@ -21,7 +21,7 @@ pub struct Guarding {
 }
 
 impl Guarding {
-    /// With the guard time 100Ch in ms and the life time factor 100Dh; a life time of 0 answers, and watches nobody.
+    /// With the guard time 100Ch in ms and the life time factor 100Dh; with a life time of 0 it answers, and the master is not supervised.
     pub const fn new(guard_time_ms: u16, life_time_factor: u8) -> Self {
         let life_ns = guard_time_ms as u64 * life_time_factor as u64 * NANOS_PER_MILLI;
         Self { life_ns, toggle: false, until: Instant::FAR_FUTURE, lost: false }
@@ -42,7 +42,7 @@ impl Guarding {
         Frame::new(connection_set::heartbeat(node), &[state.heartbeat_byte() | toggle])
     }
 
-    /// Time has reached `now`. True if the master has not asked within the life time, which is told once.
+    /// Time has reached `now`. True if the master has not asked within the life time, which is reported once.
     pub fn handle_timeout(&mut self, now: Instant) -> bool {
         let lost = now >= self.until;
         if lost {
@@ -86,17 +86,17 @@ mod tests {
         let answers: std::vec::Vec<_> =
             (0..3).map(|n| guarding.answer(NODE, NmtState::Operational, at_ms(n)).to_string()).collect();
         assert_eq!(answers, ["701#05", "701#85", "701#05"]);
-        assert_eq!(guarding.poll_timeout(), None, "a life time of 0 watches nobody");
+        assert_eq!(guarding.poll_timeout(), None, "with a life time of 0 the master is not supervised");
     }
 
     #[test]
     fn the_life_time_is_guard_time_times_factor_from_the_last_request_on() {
         let mut guarding = Guarding::new(100, 3);
-        assert!(!guarding.handle_timeout(at_ms(10_000)), "nobody has asked yet");
+        assert!(!guarding.handle_timeout(at_ms(10_000)), "the master has not asked yet");
         guarding.answer(NODE, NmtState::Operational, at_ms(10_000));
         assert_eq!(guarding.poll_timeout(), Some(at_ms(10_300)));
         assert!(!guarding.handle_timeout(at_ms(10_299)) && guarding.handle_timeout(at_ms(10_300)));
-        assert!(!guarding.handle_timeout(at_ms(20_000)), "told once");
+        assert!(!guarding.handle_timeout(at_ms(20_000)), "reported once");
         assert!(!Guarding::new(100, 3).take_return());
         guarding.answer(NODE, NmtState::Operational, at_ms(20_000));
         assert!(guarding.take_return() && !guarding.take_return());

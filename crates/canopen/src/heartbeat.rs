@@ -87,7 +87,7 @@ impl Producer {
     }
 }
 
-/// What a consumer has to tell.
+/// What a consumer reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConsumerEvent {
     /// The first heartbeat, or the first after a loss; the state byte is given.

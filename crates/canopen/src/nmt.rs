@@ -33,7 +33,7 @@ impl NmtState {
         }
     }
 
-    /// The state that a heartbeat byte tells; bit 7 (the guarding toggle) is ignored.
+    /// The state in a heartbeat byte; bit 7 (the guarding toggle) is ignored.
     pub const fn from_heartbeat_byte(byte: u8) -> Option<Self> {
         match byte & 0x7F {
             0x00 => Some(Self::Initialising),
@@ -165,7 +165,7 @@ pub struct NmtRequest {
     pub target: NmtTarget,
 }
 
-/// Why a frame is no [`NmtRequest`].
+/// Why a frame is not an [`NmtRequest`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MalformedNmt {
     /// Not a data frame with identifier 0.

@@ -1,4 +1,4 @@
-//! TIME (CiA 301, 7.2.6): the frame that tells the time of day. No drive here consumes it.
+//! TIME (CiA 301, 7.2.6): the frame that carries the time of day. No drive here consumes it.
 
 use core::fmt;
 use core::time::Duration;

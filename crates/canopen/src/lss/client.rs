@@ -6,7 +6,7 @@ use can::{Frame, Instant};
 
 use super::wire::{Reply, Request};
 
-/// How long a slave may take, as a client that has not been told otherwise waits. A guess: CiA 305 leaves it to the master.
+/// How long a slave may take, as a client waits without other instructions. A guess: CiA 305 leaves it to the master.
 pub const TIMEOUT: Duration = Duration::from_millis(100);
 
 /// The master's side: one request at a time.

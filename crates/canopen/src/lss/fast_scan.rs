@@ -8,7 +8,7 @@ const HIGHEST_BIT: u8 = 31;
 
 /// The search for one device of which nothing is known, bit by bit (CiA 305, 6.5.3): the smallest address that is there.
 ///
-/// Ask [`next`](Self::next), wait for [`Reply::Identified`](super::Reply::Identified), and tell with [`note`](Self::note) whether it came.
+/// Ask [`next`](Self::next), wait for [`Reply::Identified`](super::Reply::Identified), and report with [`note`](Self::note) whether it came.
 #[derive(Clone, Debug)]
 pub struct FastScan {
     address: Address,
@@ -22,12 +22,12 @@ enum Step {
         part: u8,
         bit: u8,
     },
-    /// All bits of a number are known, and whoever fits goes on to the next.
+    /// All bits of a number are known, and the slaves that fit go on to the next.
     Confirm {
         part: u8,
     },
     Found,
-    /// Nobody is there, or somebody went away.
+    /// There is no slave, or one went away.
     Nobody,
 }
 
@@ -62,7 +62,7 @@ impl FastScan {
             Step::Anybody if identified => Step::Bit { part: 0, bit: HIGHEST_BIT },
             Step::Bit { part, bit } => {
                 if !identified {
-                    // Nobody has 0 there, so whoever is there has 1.
+                    // No slave has 0 there, so all that are there have 1.
                     self.address.numbers[usize::from(part & 3)] |= 1 << bit;
                 }
                 if bit > 0 { Step::Bit { part, bit: bit - 1 } } else { Step::Confirm { part } }

@@ -10,7 +10,7 @@ const DEPTH: usize = 65;
 /// Every number of 32 bits.
 const ALL: Range = Range { lowest: 0, highest: u32::MAX };
 
-/// The search. Ask every [`poll_request`](Self::poll_request); to the sixth wait for [`Reply::Identified`](super::Reply::Identified), and tell with
+/// The search. Ask every [`poll_request`](Self::poll_request); to the sixth wait for [`Reply::Identified`](super::Reply::Identified), and report with
 /// [`note`](Self::note) whether it came, until there is none.
 #[derive(Clone, Debug)]
 pub struct Search {

@@ -25,9 +25,9 @@ pub struct Server {
 pub enum Action {
     /// It has no node-ID, was given one, and waits again: NMT reset communication by itself (CiA 305, 5.3).
     BecomeNode,
-    /// Take this bit rate, in kbit/s, when it is told to.
+    /// Take this bit rate, in kbit/s, when it is commanded.
     SetBitRate(u16),
-    /// Change to the bit rate it was told, silent for this long in ms before and after.
+    /// Change to the bit rate that was set, silent for this long in ms before and after.
     ActivateBitRate(u16),
     /// Keep both.
     Store,

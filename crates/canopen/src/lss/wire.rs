@@ -126,7 +126,7 @@ pub enum Reply {
     Number(Part, u32),
     /// Its node-ID, 255 for none.
     NodeId(u8),
-    /// Somebody fits. Of several that say so at once one frame is seen.
+    /// A slave fits. Of several that answer at once one frame is seen.
     Identified,
     /// Somebody has no node-ID.
     NonConfigured,

@@ -2,7 +2,7 @@ use crate::NmtState;
 use crate::od::{Slot, Storage, Table};
 use crate::pdo::{Direction, MAX_OBJECTS, PdoId, PdoNumber};
 
-/// What a node tells its owner.
+/// What a node reports to its owner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NodeEvent {
     /// A peer wrote an entry; the value is in the dictionary. `raw` is what this write stored, should a later one
@@ -36,14 +36,14 @@ pub enum NodeEvent {
     /// NMT reset communication: the node is down. Put 1000h to 1FFFh to power-on values and call
     /// [`Node::boot`](super::Node::boot).
     ResetCommunication,
-    /// An RPDO was shorter than its mapping and discarded. Told once, until [`RpdoFits`](Self::RpdoFits).
+    /// An RPDO was shorter than its mapping and discarded. Reported once, until [`RpdoFits`](Self::RpdoFits).
     RpdoTooShort(PdoNumber),
     /// An RPDO has the length of its mapping again.
     RpdoFits(PdoNumber),
-    /// An RPDO has stayed away for the time of its event timer (CiA 301, 7.5.2.35). Told once, until
+    /// An RPDO has stayed away for the time of its event timer (CiA 301, 7.5.2.35). Reported once, until
     /// [`RpdoInTime`](Self::RpdoInTime).
     RpdoTimedOut(PdoNumber),
-    /// It has come again, or nobody awaits it any more.
+    /// It has come again, or is not awaited any more.
     RpdoInTime(PdoNumber),
     /// The owner did not poll in time: older events than the following ones are lost. The dictionary has the values.
     EventsLost,
@@ -54,7 +54,7 @@ pub enum NodeEvent {
 pub struct Ticket(pub(super) u16);
 
 /// How many events one frame can make: an owner that polls after every `handle_*` and has room for them never loses one;
-/// another is told [`NodeEvent::EventsLost`].
+/// another is reported as [`NodeEvent::EventsLost`].
 pub(super) fn most_of_a_frame(table: &Table) -> usize {
     // SYNC and the objects of every RPDO that waited for it; or a frame that all RPDOs listen to, each of which was too short
     // before: `RpdoFits` and its objects. The entries of a mapping record are as many as its rows, without sub-index 00h.
@@ -65,7 +65,7 @@ pub(super) fn most_of_a_frame(table: &Table) -> usize {
     1 + rpdos.filter(|counts| *counts).count()
 }
 
-/// What waits for the owner, in the order of arrival. When full, the oldest are lost, and that is told in their place.
+/// What waits for the owner, in the order of arrival. When full, the oldest are lost, and that is reported in their place.
 #[derive(Clone)]
 pub(super) struct EventQueue<S: Storage> {
     events: S::Events<NodeEvent>,

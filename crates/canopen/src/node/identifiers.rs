@@ -4,7 +4,7 @@ use crate::od::Storage;
 use crate::{NodeId, connection_set};
 
 /// The identifiers that a node listens to. Most frames on a bus are for others: a bit for each of the 2048 identifiers
-/// tells with one access.
+/// decides with one access.
 #[derive(Clone)]
 pub(super) struct Identifiers<S: Storage> {
     heard: [u32; WORDS],

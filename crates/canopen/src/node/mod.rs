@@ -179,12 +179,12 @@ impl<S: Storage> Node<S> {
     }
 
     /// When the last frame arrived that brings this node data (SDO request, RPDO): for a watch over the host. NMT commands,
-    /// SYNC and heartbeats go on when nobody means the motor any more. `None` since boot.
+    /// SYNC and heartbeats go on when the motor is not commanded any more. `None` since boot.
     pub const fn last_addressed(&self) -> Option<Instant> {
         self.last_addressed
     }
 
-    /// Whether it has nothing to send and nothing to tell, and its state and its values are those that it had as `earlier`:
+    /// Whether it has nothing to send and nothing to report, and its state and its values are those that it had as `earlier`:
     /// until a frame comes, or its deadline, or another value, it does nothing.
     pub fn rests_since(&self, earlier: &Self) -> bool {
         let silent = self.pending.is_empty() && self.events.is_empty();
@@ -297,7 +297,7 @@ impl<S: Storage> Node<S> {
         }
     }
 
-    /// Waits for the owner to boot again; what it was about to tell is void.
+    /// Waits for the owner to boot again; what it was about to report is void.
     fn begin_reset(&mut self, request: NodeEvent) {
         self.power_off();
         self.push(request);

@@ -12,7 +12,7 @@ use crate::pdo::{
 use crate::{AbortCode, CobId, Mux, NmtState, connection_set};
 
 impl<S: Storage> Node<S> {
-    /// A client's write: checks, stores, takes effect, is told to the owner, unless the owner is to be asked before.
+    /// A client's write: checks, stores, takes effect, is reported to the owner, unless the owner is to be asked before.
     #[inline(always)]
     pub(super) fn write(&mut self, slot: Slot, facts: &RowFacts, raw: u32) -> Result<(), Refusal> {
         if facts.summary.is_special() {
@@ -44,7 +44,7 @@ impl<S: Storage> Node<S> {
         Ok(())
     }
 
-    /// A client's checked value is stored, takes effect and is told to the owner.
+    /// A client's checked value is stored, takes effect and is reported to the owner.
     pub(super) fn commit(&mut self, slot: Slot, raw: u32) {
         let table = self.dictionary.table();
         if table.summary(slot).is_long() {
@@ -58,7 +58,7 @@ impl<S: Storage> Node<S> {
         self.push(NodeEvent::Written { slot, raw: self.dictionary.raw(slot), via: Via::Sdo });
     }
 
-    /// The device's own write to a communication object: unchecked, in effect at once, not told to the owner.
+    /// The device's own write to a communication object: unchecked, in effect at once, not reported to the owner.
     pub fn write_own(&mut self, slot: Slot, raw: u32) {
         self.dictionary.set_raw(slot, raw);
         self.configure(self.dictionary.table().row(slot).mux());

@@ -30,8 +30,8 @@ pub struct NodeProfile {
     pub pdo_changes_while_valid: bool,
     /// What entries of a mapping it takes.
     pub mapping: MappingRules,
-    /// The EMCY error code of an RPDO with fewer bytes than are mapped; `None` if nothing is told of it. Such a frame is
-    /// never used. Of a longer one the mapped bytes are, and nothing is told: CiA 301 has 8220h for it and leaves it to
+    /// The EMCY error code of an RPDO with fewer bytes than are mapped; `None` if it is not reported. Such a frame is
+    /// never used. Of a longer one the mapped bytes are, and nothing is reported: CiA 301 has 8220h for it and leaves it to
     /// the device, and many masters send eight bytes whatever they mean.
     pub short_rpdo: Option<EmcyErrorCode>,
     /// Which SDO frames are heard, by length.

@@ -11,7 +11,7 @@ use crate::pdo::{PdoNumber, Reception, Tpdo};
 use crate::sdo::server::Write;
 
 impl<S: Storage> Node<S> {
-    /// A data frame with an identifier that somebody here listens to. SDO, NMT and SYNC share theirs with nobody; two
+    /// A data frame with an identifier that a service here listens to. SDO, NMT and SYNC do not share theirs; two
     /// RPDOs may have the same.
     #[inline(never)]
     pub(super) fn receive(&mut self, frame: &Frame, id: u16) {
@@ -67,8 +67,8 @@ impl<S: Storage> Node<S> {
         }
     }
 
-    /// The owner's word on the download that [`NodeEvent::Asked`] told of: the value is stored, takes effect and is told as
-    /// [`NodeEvent::Written`], or the client gets this abort code. False if nobody waits for it any more, and nothing is done:
+    /// The owner's decision on the download of [`NodeEvent::Asked`]: the value is stored, takes effect and is reported as
+    /// [`NodeEvent::Written`], or the client gets this abort code. False if no client waits for it any more, and nothing is done:
     /// the client gave up or asked for something else, [`NodeProfile::sdo_timeout_ns`](super::NodeProfile::sdo_timeout_ns)
     /// is over, or communication was stopped.
     pub fn answer(&mut self, ticket: Ticket, verdict: Result<(), AbortCode>, now: Instant) -> bool {
@@ -173,7 +173,7 @@ impl<S: Storage> Node<S> {
         }
     }
 
-    /// An error is told when it begins and when it ends (CiA 301, 7.2.7.1), not with each frame between.
+    /// An error is reported when it begins and when it ends (CiA 301, 7.2.7.1), not with each frame between.
     #[cold]
     fn refuse_short_rpdo(&mut self, position: usize) {
         if !self.pdos.short.contains(position) {
@@ -197,14 +197,14 @@ impl<S: Storage> Node<S> {
         let Some(mapping) = self.pdos.rpdos.as_ref()[position].mapping() else { return };
         let Some(objects) = mapping.plain_objects() else { return self.apply_at_the_bit(position, data) };
         for object in objects {
-            // A refused value has nobody to tell: RPDOs are not confirmed. Communication objects cannot be mapped.
+            // A refused value is not reported to a client: RPDOs are not confirmed. Communication objects cannot be mapped.
             if let Ok(raw) = self.dictionary.write_resolved(&object.write, object.extract(data)) {
                 self.events.push(NodeEvent::Written { slot: object.write.slot, raw, via });
             }
         }
     }
 
-    /// The same where fields are no whole cells.
+    /// The same where fields are not whole cells.
     #[inline(never)]
     fn apply_at_the_bit(&mut self, position: usize, data: u64) {
         let via = Via::Rpdo(number_at(position));

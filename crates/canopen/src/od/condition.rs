@@ -34,7 +34,7 @@ impl From<AbortCode> for Refusal {
 }
 
 impl Refusal {
-    /// The same where nobody is asked.
+    /// The same where the owner is not asked.
     #[inline(always)]
     pub(super) fn unasked(result: Result<(), Self>) -> Result<(), AbortCode> {
         match result {

@@ -153,7 +153,7 @@ impl DataType {
     }
 
     /// The number that the low [`size`](Self::size) bytes of `raw` stand for; of a type that
-    /// [fits a cell](Self::fits_cell) and is no REAL32. See [`Value`](super::Value) for all types.
+    /// [fits a cell](Self::fits_cell) and is not REAL32. See [`Value`](super::Value) for all types.
     pub const fn value(self, raw: u32) -> i64 {
         let unused = self.unused_bits();
         if self.is_signed() { ((raw << unused) as i32 >> unused) as i64 } else { (raw << unused >> unused) as i64 }

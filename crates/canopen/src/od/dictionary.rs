@@ -24,7 +24,7 @@ pub struct Dictionary<S: Storage> {
 pub(crate) struct ResolvedWrite {
     gate: Gate,
     pub(crate) slot: Slot,
-    /// Nobody is asked about what an RPDO brings.
+    /// The owner is not asked about what an RPDO brings.
     check: Option<Check>,
 }
 

@@ -119,7 +119,7 @@ pub struct Entry {
     pub stored: bool,
     /// Kept there as well, but only by a save of everything: not with each write.
     pub saved: bool,
-    /// Writing it does something, and what is written is no setting.
+    /// Writing it does something, and what is written is not a setting.
     pub command: bool,
     /// May be mapped into PDOs.
     pub pdo: PdoMapping,

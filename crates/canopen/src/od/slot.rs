@@ -1,6 +1,6 @@
 //! The numbers of rows in a table.
 
-/// Most rows of a table: one number is no row.
+/// Most rows of a table: one number does not stand for a row.
 pub const MAX_ROWS: usize = u16::MAX as usize;
 
 /// The number of a row in its table.

@@ -21,7 +21,7 @@ use crate::{AbortCode, Mux};
 /// ```
 ///
 /// A program that learns of the rows at run time, from a file say, makes room for the index and keeps rows, index and table
-/// for the rest of its life. Whoever may read the same file twice keeps what it has, by content:
+/// for the rest of its life. A program that may read the same file twice keeps what it has, by content:
 ///
 /// ```
 /// use canopen::Mux;
@@ -190,7 +190,7 @@ impl Table {
     pub(crate) fn look_up(&self, mux: Mux) -> Result<(Slot, &'static RowFacts), AbortCode> {
         let key = mux.key();
         let mut place = first_place(key, self.places.len());
-        // A free place, which is no row's position, comes before the directory has been gone round.
+        // A free place, which is not the position of a row, comes before the directory has been gone round.
         while let Some(position) = self.places.get(place)
             && let Some(facts) = self.facts.get(usize::from(*position))
         {
@@ -240,4 +240,4 @@ impl Table {
     }
 }
 
-const _: () = assert!(FREE as usize >= super::MAX_ROWS, "a free place is no position");
+const _: () = assert!(FREE as usize >= super::MAX_ROWS, "a free place is not a position");

@@ -22,7 +22,7 @@ pub enum Value<'a> {
     Bytes(&'a [u8]),
 }
 
-/// Most bytes of a value that is no string and no DOMAIN.
+/// Most bytes of a value that is neither a string nor a DOMAIN.
 pub const MAX_NUMBER: usize = 8;
 
 /// The bits of a time's first four bytes that are milliseconds.
@@ -42,7 +42,7 @@ impl<'a> Value<'a> {
         Some(Self::of_bits(data_type, u64::from_le_bytes(all)))
     }
 
-    /// The number in the low bits of `bits`, of a type that is no string and no DOMAIN.
+    /// The number in the low bits of `bits`, of a type that is neither a string nor DOMAIN.
     pub(crate) fn of_bits(data_type: DataType, bits: u64) -> Value<'static> {
         let unused = u64::BITS - 8 * data_type.size() as u32;
         match data_type.kind() {
@@ -58,7 +58,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The value as an SDO carries it, in its low bytes. `None` where it is no value of the type; strings and DOMAIN are
+    /// The value as an SDO carries it, in its low bytes. `None` where it is not a value of the type; strings and DOMAIN are
     /// their own bytes.
     pub fn to_bits(self, data_type: DataType) -> Option<u64> {
         let mask = u64::MAX >> (u64::BITS - 8 * data_type.size().max(1) as u32);

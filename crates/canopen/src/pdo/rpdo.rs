@@ -93,7 +93,7 @@ impl Rpdo {
         core::mem::take(&mut self.deadline.missed)
     }
 
-    /// Time has reached `now`. True if the deadline was missed by now, which is told once.
+    /// Time has reached `now`. True if the deadline was missed by now, which is reported once.
     pub fn handle_timeout(&mut self, now: Instant) -> bool {
         let missed = now >= self.deadline.until;
         if missed {

@@ -231,7 +231,7 @@ impl Client {
         self.ask(Request::InitiateDownload(mux, payload), State::Download { mux, expedited: false }, now);
     }
 
-    /// Gives up a transfer under way and tells the server why.
+    /// Gives up a transfer under way and reports the reason to the server.
     pub fn abort(&mut self, code: AbortCode) {
         if let Some(mux) = self.mux() {
             self.give_up(mux, code);
@@ -444,7 +444,7 @@ fn expect_mux(expected: Mux, received: Mux) -> Result<(), Failure> {
     if received == expected { Ok(()) } else { Err(Failure::WrongMux { expected, received }) }
 }
 
-/// What to tell the server; `None` where it has ended the transfer itself.
+/// What to report to the server; `None` where it has ended the transfer itself.
 const fn abort_code_for(failure: &Failure) -> Option<AbortCode> {
     match failure {
         Failure::Aborted { .. } => None,

@@ -1,7 +1,7 @@
 //! The eight bytes of SDO requests and replies (CiA 301, 7.2.4.3).
 //!
 //! [`Request`] goes from client to server, [`Reply`] back. Reading never fails on content: what the standard does
-//! not define is `Unknown`. Command specifiers are told apart by their top three bits alone, so 43h asks for an
+//! not define is `Unknown`. Command specifiers are distinguished by their top three bits alone, so 43h asks for an
 //! upload as 40h does.
 
 use crate::{AbortCode, Mux};

@@ -118,7 +118,7 @@ pub(crate) fn upload(node: &mut Node<Boxed>, mux: Mux) -> Result<Vec<u8>, Failur
     client.upload(mux, Instant::ZERO);
     match run(client, node, &mut buffer)? {
         Outcome::Uploaded { length, .. } => Ok(buffer[..length].to_vec()),
-        other => panic!("{other:?} is no upload"),
+        other => panic!("{other:?} is not an upload"),
     }
 }
 

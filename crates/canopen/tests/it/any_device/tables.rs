@@ -87,7 +87,7 @@ fn a_dictionary_needs_the_bytes_of_its_long_values_and_once_more_the_longest() {
     assert_eq!(values.set_bytes(slot, &[1; 7]), Err(AbortCode::TOO_SHORT));
     assert_eq!(values.set_bytes(slot, &(-1_i64).to_le_bytes()), Ok(()));
     values.set_raw(slot, 3);
-    assert_eq!(values.value(slot), -1, "a cell is no place for it");
+    assert_eq!(values.value(slot), -1, "it does not fit into a cell");
     assert_eq!(values.write(slot, 3), Err(AbortCode::LENGTH_MISMATCH));
 }
 

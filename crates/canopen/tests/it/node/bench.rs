@@ -11,7 +11,7 @@ use canopen::{Mux, NodeEvent, NodeId, NodeProfile};
 
 use crate::node::device::{CELLS, STANDARD};
 
-/// The node, the time, and the frames that it sent and nobody has looked at yet.
+/// The node, the time, and the frames that it sent and that no test has looked at yet.
 #[derive(Clone)]
 pub(crate) struct Bench {
     pub(crate) node: Node<Fixed<CELLS>>,

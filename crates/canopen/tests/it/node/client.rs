@@ -138,7 +138,7 @@ fn silence_times_out_and_the_server_is_told() {
     assert_eq!(client.handle_timeout(Instant::from_millis(50)), Some(Failure::TimedOut { mux: NAME }));
     assert_eq!(client.poll_transmit(), Some("604#8008100000000405".parse().unwrap()));
     assert_eq!(client.handle_timeout(Instant::from_millis(500)), None);
-    // Its late reply is nobody's.
+    // Its late reply belongs to no transfer.
     let late = client.handle_frame(&"584#4108100014000000".parse().unwrap(), &mut [0; 4], Instant::from_millis(501));
     assert_eq!(late, None);
 }

@@ -1,4 +1,4 @@
-//! What waits for the owner: nothing is lost of what one frame makes, and what is lost is told.
+//! What waits for the owner: nothing is lost of what one frame makes, and what is lost is reported.
 //!
 //! The device of these tests has all that CiA 301 allows: four RPDOs of eight objects.
 
@@ -139,5 +139,5 @@ fn an_owner_that_does_not_poll_is_told_that_events_are_lost_and_gets_the_newest(
     assert_eq!((events.len(), events[0]), (EVENT_QUEUE_LENGTH, NodeEvent::EventsLost));
     assert_eq!(events[1..], [&full[2..], &[NodeEvent::Sync]].concat());
     bench.send("080#");
-    assert_eq!(bench.events(), [NodeEvent::Sync], "told once");
+    assert_eq!(bench.events(), [NodeEvent::Sync], "reported once");
 }

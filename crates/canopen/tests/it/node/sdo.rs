@@ -358,7 +358,7 @@ fn a_profile_may_hear_frames_that_are_as_long_as_they_need_be() {
 }
 
 #[test]
-fn nobody_answers_while_stopped_and_the_transfer_is_gone_afterwards() {
+fn a_request_is_not_answered_while_stopped_and_the_transfer_is_gone_afterwards() {
     talk(
         "> 604#4008100000000000
          < 584#4108100014000000

@@ -122,7 +122,7 @@ fn an_unsent_tpdo_is_overwritten_and_never_queued_twice() {
 }
 
 #[test]
-fn a_ready_frame_that_nobody_pulls_makes_no_deadline_in_the_past() {
+fn a_ready_frame_that_is_not_pulled_makes_no_deadline_in_the_past() {
     let mut bench = configured(&STANDARD, 254, 100, 0);
     let node = &mut bench.node;
     node.handle_frame(&"000#0104".parse().unwrap(), Instant::ZERO);
