@@ -75,7 +75,7 @@ pub enum PowerStyle {
 }
 
 impl PowerStyle {
-    /// True if the statusword tells of a fault, or of an alarm, which need not have stopped the drive.
+    /// True if the statusword shows a fault, or of an alarm, which need not have stopped the drive.
     pub const fn is_faulted(self, statusword: Statusword) -> bool {
         match self {
             Self::Cia402 => matches!(statusword.state(), Some(PowerState::Fault)),
@@ -84,7 +84,7 @@ impl PowerStyle {
     }
 
     /// The power state that a statusword shows, or the one of CiA 402 that comes closest: an alarm is a fault only when
-    /// it has taken the power off the motor, and a live motor that follows nobody is switched on.
+    /// it has taken the power off the motor, and a live motor that does not follow a host is switched on.
     pub const fn state(self, statusword: Statusword) -> Option<PowerState> {
         match self {
             Self::Cia402 => statusword.state(),
@@ -118,9 +118,9 @@ pub struct HomingRules {
     pub search_speed: Option<Quantity>,
     /// What starts it.
     pub start: HomingStart,
-    /// How the statusword tells that it was found.
+    /// How the statusword shows that it was found.
     pub attained: BitPattern,
-    /// How the statusword tells that it was not.
+    /// How the statusword shows that it was not.
     pub failed: BitPattern,
     /// What its methods do, where they are not those of CiA 402-2, clause 11; empty where they are.
     pub own_methods: &'static [HomingRow],

@@ -29,7 +29,7 @@ pub fn model(name: &str) -> Option<&'static Description> {
     all().named(name)
 }
 
-/// Descriptions to look in: those of this crate, or of whoever has read more from files.
+/// Descriptions to look in: those of this crate, or with more that were read from files.
 #[derive(Clone, Copy)]
 pub struct Catalogue<'a>(&'a [&'static Description]);
 

@@ -31,7 +31,7 @@ pub struct Description {
     pub node_id: Option<NodeId>,
     /// Bit rate as delivered, where the manual says it.
     pub bitrate: Option<Bitrate>,
-    /// Its axes, the first one first. A device that is no drive has none.
+    /// Its axes, the first one first. A device that is not a drive has none.
     pub axes: &'static [AxisDescription],
     /// How it notices that its host has gone.
     pub host_watch: HostWatch,
@@ -75,12 +75,12 @@ impl Section {
 }
 
 impl Description {
-    /// Where the [`manual`](Self::manual) tells of the objects of an index; `None` where that is not known.
+    /// Where the [`manual`](Self::manual) describes the objects of an index; `None` where that is not known.
     pub fn section(&self, index: u16) -> Option<&'static str> {
         self.sections.iter().find(|part| (part.from..=part.to).contains(&index)).map(|part| part.section)
     }
 
-    /// The first axis; `None` for a device that is no drive.
+    /// The first axis; `None` for a device that is not a drive.
     pub const fn first_axis(&self) -> Option<&'static AxisDescription> {
         self.axes.first()
     }
@@ -142,7 +142,7 @@ impl Description {
         said == NmtState::Stopped && self.nmt.heartbeat_tells_alarm
     }
 
-    /// The fault that an EMCY message with this error code tells of.
+    /// The fault that an EMCY message with this error code reports.
     pub fn fault_told_by(&self, code: EmcyErrorCode) -> Option<&'static FaultRow> {
         self.faults.table.iter().find(|row| row.emcy == code && code != EmcyErrorCode::NO_ERROR)
     }
@@ -195,7 +195,7 @@ impl NmtRules {
 /// How a drive notices that its host has gone, and stops by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HostWatch {
-    /// It does not: it goes on with what it was told last.
+    /// It does not: it goes on with the last command.
     None,
     /// By silence: it stops when no frame for it has come for a time.
     Silence {
@@ -207,8 +207,8 @@ pub enum HostWatch {
     Heartbeat {
         /// The consumer entry, as 1016h: bits 16 to 23 whose heartbeat, bits 0 to 15 the time in ms; 0 is off.
         consumer: Mux,
-        /// The fault code of a drive that it has stopped. With the next heartbeat such a drive goes on with what it was
-        /// told before.
+        /// The fault code of a drive that it has stopped. With the next heartbeat such a drive goes on with its last
+        /// command.
         fault: u16,
     },
 }
@@ -257,7 +257,7 @@ pub struct PdoRules {
     pub inhibit_unit_ns: u64,
     /// Nanoseconds in one count of the event timer.
     pub event_timer_unit_ns: u64,
-    /// The event timer of an RPDO is a deadline for the next one, and missing it an error that is told (CiA 301, 7.5.2.35).
+    /// The event timer of an RPDO is a deadline for the next one, and missing it an error that is reported (CiA 301, 7.5.2.35).
     pub rpdo_deadline: bool,
     /// Objects in one PDO.
     pub max_objects: u8,
@@ -272,7 +272,7 @@ pub struct PdoRules {
     /// What makes the device send TPDOs of type 254 and 255.
     pub event_trigger: EventTrigger,
     /// Error code of the EMCY message when an RPDO has fewer bytes than are mapped; `None` for none. It is not used in
-    /// either case. Of a longer one the mapped bytes are used, and nothing is told.
+    /// either case. Of a longer one the mapped bytes are used, and nothing is reported.
     pub short_rpdo: Option<EmcyErrorCode>,
 }
 

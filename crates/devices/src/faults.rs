@@ -2,7 +2,7 @@
 
 use canopen::{EmcyErrorCode, Mux};
 
-/// How faults are told.
+/// How faults are reported.
 #[derive(Clone, Copy)]
 pub struct Faults {
     /// The object with the present code (603Fh), where there is one.

@@ -15,7 +15,7 @@ pub enum Placement {
     /// This many indexes further on: 0 for the first axis, 800h for the second (CiA 402-1: eight blocks of 800h from 6000h to
     /// 9FFFh). Objects below 6000h and from A000h on are the device's.
     IndexOffset(u16),
-    /// At this sub-index of the same index, as drives of two axes have it that are no two devices. Objects with sub-indexes of
+    /// At this sub-index of the same index, as drives have it whose two axes are not two devices. Objects with sub-indexes of
     /// their own, objects below 6000h and those of `shared` are the device's.
     SubIndex {
         /// The sub-index.

@@ -23,7 +23,7 @@ use crate::units::{Ramps, Scale};
 pub enum Departure {
     /// Said in the description.
     Stated(Stated),
-    /// Another model answers the same identity and has other objects. The object tells them apart.
+    /// Another model answers the same identity and has other objects. The object distinguishes them.
     IdentityShared(Option<Mux>),
     /// A model of the same identity stores its parameters with an object that is another here.
     SiblingStoresWith {

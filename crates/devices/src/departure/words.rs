@@ -132,7 +132,7 @@ impl fmt::Display for Departure {
             Self::NewSetPointClearsItself(_) => f.write_str("bit 4 acts on each write of a 1 and clears itself"),
             Self::StatusBit(_, bit, words) => write!(f, "statusword bit {bit} is \"{words}\""),
             Self::HomingStartsWithMode(object) => write!(f, "homing starts when 6 is written to {object}"),
-            Self::HomingShownBy { .. } => f.write_str("bits 12 and 13 tell nothing of homing"),
+            Self::HomingShownBy { .. } => f.write_str("bits 12 and 13 show nothing of homing"),
             Self::RampsAreTimes(object) => {
                 write!(f, "ramps are times, not accelerations: {:04X}h and what follows it are in ms", object.index)
             }
@@ -187,9 +187,7 @@ impl fmt::Display for Remedy<'_> {
             Departure::HeartbeatTellsAlarm => f.write_str("take 04h in a heartbeat for an alarm; SDO goes on"),
             Departure::PdoTimers(_) => f.write_str("convert the times that are written to 1400h to 19FFh"),
             Departure::PdosCountedFrom(_) => f.write_str("go by the index: 1400h and 1800h are the first"),
-            Departure::TpdoAnswersRpdo => {
-                f.write_str("send RPDO n to be told; there is no change of state to wait for")
-            }
+            Departure::TpdoAnswersRpdo => f.write_str("send RPDO n to get it; there is no change of state to wait for"),
             Departure::AnotherFormInTpdos(TpdoForm { data_type, .. }) => {
                 write!(f, "read it as {} where it is mapped, and as the dictionary says by SDO", data_type.name())
             }

@@ -45,7 +45,7 @@ pub static CIA402: Description = Description {
     editions: &[],
 };
 
-/// How a CiA 402 drive tells its faults: by the codes of the standard.
+/// How a CiA 402 drive reports its faults: by the codes of the standard.
 pub const FAULTS: Faults = Faults {
     code: Some(Mux::new(0x603F, 0)),
     bit_field: false,

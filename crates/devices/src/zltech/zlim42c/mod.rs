@@ -107,7 +107,7 @@ const STATUSWORD_BITS: &[(u16, &str)] = &[
     (IN_POSITION, "in position"),
 ];
 
-/// Bits of 5.3.6: at the end 10 is on and 14 off, and 8 tells whether the home position was found.
+/// Bits of 5.3.6: at the end 10 is on and 14 off, and 8 shows whether the home position was found.
 const AT_THE_END: u16 = HOMING_ATTAINED | Statusword::TARGET_REACHED | RUNNING;
 
 const HOMING: HomingRules = HomingRules {
