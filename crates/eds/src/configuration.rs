@@ -12,7 +12,7 @@ use crate::describe::value_of_bytes;
 use crate::document::{Document, EditError};
 use crate::{Commissioning, Eds, Number, Refusal, Value, Variable};
 
-/// Objects that are no configuration: writing them starts, stops, stores, restores or clears something, or is what a master
+/// Objects that are not configuration: writing them starts, stops, stores, restores or clears something, or is what a master
 /// sends while the device works. Source: CiA 301, 7.5.2; CiA 402-2.
 const NO_CONFIGURATION: &[u16] = &[
     0x1003, 0x1010, 0x1011, 0x1020, 0x1021, 0x1023, 0x1F50, 0x1F51, 0x6040, 0x6042, 0x6071, 0x607A, 0x60C1, 0x60FE,
@@ -71,7 +71,7 @@ impl Configuration {
         self.eds.variables().filter(is_wanted).map(place).collect()
     }
 
-    /// The objects that could be read and written, and are no configuration: commands, set-points, what the sheet says not to
+    /// The objects that could be read and written, and are not configuration: commands, set-points, what the sheet says not to
     /// scan or write, DOMAINs.
     pub fn left_out(&self) -> Vec<Mux> {
         let usable = |variable: &Variable| variable.access.is_readable() && variable.access.is_writable();

@@ -4,7 +4,7 @@ use std::fmt;
 
 /// The code of a data type. Source: CiA 301, table 44.
 ///
-/// Open: a file may name any code; [`is_known`](Self::is_known) tells those of the standard.
+/// Open: a file may name any code; [`is_known`](Self::is_known) distinguishes those of the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TypeCode(pub u16);
 

@@ -63,7 +63,7 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Most findings that are kept. A file with more of them is no EDS, and its reader has long stopped reading.
+    /// Most findings that are kept. A file with more of them is not an EDS, and further ones are of no use.
     pub const MOST: usize = 2_000;
 
     /// Adds one; beyond [`MOST`](Self::MOST) it is only counted.

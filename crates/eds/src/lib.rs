@@ -2,7 +2,7 @@
 //!
 //! [`Document`](document::Document) is the file as it stands, line by line, to look at and to change a value without
 //! touching the rest. [`Eds`] is what it says, typed: objects, defaults, limits, and in a DCF the values of one device.
-//! Reading takes what real files have and tells what is not as the standard has it, with the line and what was taken
+//! Reading takes what real files have and reports what is not as the standard has it, with the line and what was taken
 //! instead.
 //!
 //! ```

@@ -88,7 +88,7 @@ impl Oddity {
 }
 
 /// A number as CiA 306 writes it: decimal, hexadecimal (`0x`), octal (leading zero), with `$NODEID+` or `+$NODEID` in any
-/// case of letters and with blanks; and spellings that other tools take. `None` for what is no number.
+/// case of letters and with blanks; and spellings that other tools take. `None` for what is not a number.
 pub(crate) fn number(text: &str) -> Option<(Number, Option<Oddity>)> {
     let text = text.trim();
     if let Some(plain) = plain_decimal(text) {

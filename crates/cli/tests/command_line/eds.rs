@@ -92,7 +92,7 @@ fn lint_fails_for_errors_and_with_strict_for_warnings_too() {
     assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("3 of 4 files with errors"), "{}", ended.err);
     assert!(
-        ended.out.contains("type 0099h is no data type of a value") && ended.out.contains("UNSIGNED32"),
+        ended.out.contains("type 0099h is not the data type of a value") && ended.out.contains("UNSIGNED32"),
         "{}",
         ended.out
     );

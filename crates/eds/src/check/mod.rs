@@ -37,7 +37,7 @@ fn mandatory(eds: &Eds, findings: &mut Findings) {
     }
 }
 
-/// Which modes a drive has (6502h; CiA 402-2): a file that leaves it to the device leaves it to whoever reads the file.
+/// Which modes a drive has (6502h; CiA 402-2): a file that leaves it to the device leaves it to each reader of the file.
 fn modes(eds: &Eds, findings: &mut Findings) {
     // Each axis in a block of 800h (CiA 402-1).
     for offset in (0..8).map(|axis| axis * 0x800) {

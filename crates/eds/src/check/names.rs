@@ -4,7 +4,7 @@ use super::at::finding;
 use crate::document::{Document, Encoding};
 use crate::{Finding, Findings, Object, Severity};
 
-/// Letters beyond ASCII, told once a file.
+/// Letters beyond ASCII, reported once a file.
 pub(super) fn letters(document: &Document, findings: &mut Findings) {
     if document.encoding() == Encoding::Ascii {
         return;

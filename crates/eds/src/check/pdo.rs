@@ -4,12 +4,12 @@ use super::at::finding;
 use crate::value::Number;
 use crate::{Eds, Findings, Severity, TypeCode, Value};
 
-/// Identifiers that depend on the node-ID (the pre-defined connection set) and do not say so.
+/// Identifiers that depend on the node-ID (the pre-defined connection set) and are written without it.
 pub(super) fn identifiers(eds: &Eds, findings: &mut Findings) {
     for (index, sub_index, base) in predefined() {
         let Some(variable) = eds.variable(index, sub_index) else { continue };
         let Some(Value::Number(Number { base: value, plus_node_id: false })) = variable.default else { continue };
-        // Bits 29 to 31 are no part of the identifier.
+        // Bits 29 to 31 are not part of the identifier.
         if value & 0x1FFF_FFFF == i128::from(base) {
             let what = format!("{base:X}h without $NODEID: every node would have the same identifier");
             let sub_index = (index != 0x1014).then_some(sub_index);

@@ -11,7 +11,7 @@ use devices::{AxisDescription, CountsPerTurn, HomingRules, Placement, Quantity, 
 const MOST_AXES: u16 = 8;
 const BLOCK: u16 = 0x800;
 
-/// The axes: each block of the profile area that has a controlword and a statusword. None for a device that is no drive by
+/// The axes: each block of the profile area that has a controlword and a statusword. None for a device that is not a drive by
 /// 1000h; makers often leave its value open, and then the objects decide.
 pub(super) fn axes(table: &'static Table, device_type: u32) -> Vec<AxisDescription> {
     if !matches!(device_type & 0xFFFF, 0 | 402) {

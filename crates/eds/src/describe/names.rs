@@ -62,7 +62,7 @@ pub(super) fn name(words: &str) -> String {
     }
     let length = name.trim_end_matches('_').len();
     name.truncate(length);
-    // A number alone is an index to whoever types it.
+    // A number alone is read as an index where it is typed.
     if name.starts_with(|first: char| first.is_ascii_digit()) { format!("object_{name}") } else { name }
 }
 

@@ -111,7 +111,7 @@ fn capacity(data_type: DataType, length: usize) -> u32 {
     u32::try_from(length.max(least)).unwrap_or(u32::MAX)
 }
 
-/// A value of a file that is no text, as a row has it.
+/// A value of a file that is not text, as a row has it.
 fn number(value: &Value) -> DefaultValue {
     match value {
         Value::Number(Number { base, plus_node_id: true }) => {

@@ -26,7 +26,7 @@ pub(super) struct Fields<'a> {
 impl<'a> Fields<'a> {
     fn of(&mut self, key: &str) -> Option<&mut Option<Entry<'a>>> {
         let is = |name: &str| key.eq_ignore_ascii_case(name);
-        // Lengths tell nearly all keys apart, so that a look at each costs no more than a comparison.
+        // Lengths distinguish nearly all keys, so that a look at each costs no more than a comparison.
         Some(match key.len() {
             8 if is("DataType") => &mut self.data_type,
             8 if is("LowLimit") => &mut self.low_limit,

@@ -51,7 +51,7 @@ pub(super) enum Info {
     DynamicChannels,
 }
 
-/// Sections that are no objects.
+/// Sections that are not objects.
 const NAMED: &[(&str, Place)] = &[
     ("FileInfo", Place::Info(Info::File)),
     ("DeviceInfo", Place::Info(Info::Device)),

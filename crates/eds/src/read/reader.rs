@@ -24,7 +24,7 @@ impl Reader {
         };
         for (line, kind, text) in document.lines() {
             let what = match kind {
-                LineKind::Stray => "the line is no section, no key=value and no comment",
+                LineKind::Stray => "the line is not a section, a key=value or a comment",
                 LineKind::Entry { .. } if line < first.line() => "a value before the first section",
                 _ => continue,
             };

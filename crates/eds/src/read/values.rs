@@ -109,7 +109,7 @@ impl Reader {
     fn real(&mut self, section: Section<'_>, entry: Entry<'_>, bits: u8) -> Option<Value> {
         let text =
             entry.value.strip_suffix(['f', 'F']).filter(|rest| !rest.contains(['x', 'X'])).unwrap_or(entry.value);
-        // Words such as `inf` are no numbers of an EDS.
+        // Words such as `inf` are not numbers of an EDS.
         let digits = text.bytes().any(|byte| byte.is_ascii_digit()) && !text.contains(['n', 'N']);
         let rounded = |real: f64| if bits == 32 { f64::from(real as f32) } else { real };
         if let Some(real) = text.parse().ok().map(rounded).filter(|real| digits && real.is_finite()) {
@@ -152,7 +152,7 @@ impl Reader {
             return instead;
         };
         if !code.is_known() {
-            self.error(section, entry, format!("{code} is no data type of a value"), instead.to_string());
+            self.error(section, entry, format!("{code} is not the data type of a value"), instead.to_string());
             return instead;
         }
         code

@@ -22,7 +22,7 @@ fn files() -> Vec<PathBuf> {
     files
 }
 
-#[allow(clippy::print_stderr, reason = "a test that has nothing to do says so")]
+#[allow(clippy::print_stderr, reason = "a test that has nothing to do reports it")]
 fn say(text: &str) {
     eprintln!("{text}");
 }
