@@ -42,7 +42,7 @@ impl CommutationModel {
 }
 
 impl Commutation {
-    /// The angle as the Hall state tells it; zero while the state is a fault.
+    /// The angle by the Hall state; zero while the state is a fault.
     pub fn new(model: &CommutationModel, hall: u8, count: u16) -> Self {
         let turns = model.sixth(hall).map_or(0.0, |sixth| model.offset_turns + (f32::from(sixth) + 0.5) / 6.0);
         Commutation {

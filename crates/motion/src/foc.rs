@@ -32,7 +32,7 @@ pub fn modulate(voltage_v: AlphaBeta, bus_v: f32) -> [f32; 3] {
     phases.map(|v| (v * per_volt + centre).clamp(0.0, 1.0))
 }
 
-/// Plain comparisons: `f32::max` pays for a rule about values that are no number.
+/// Plain comparisons: `f32::max` pays for a rule about values that are not a number.
 #[inline]
 fn highest([u, v, w]: [f32; 3]) -> f32 {
     let of_two = if u > v { u } else { v };

@@ -5,7 +5,7 @@
 //! acceleration is continuous and peaks in the middle at `2 * dv / T`, twice its mean.
 //!
 //! A move too short for its full speed keeps the pace of the full change, with a lower peak and shorter times: no
-//! manual says so, but the alternative, the full times for any short move, would take a second for one count.
+//! manual states it, but the alternative, the full times for any short move, would take a second for one count.
 
 use crate::profile::{self, MoveLimits, Profile, Ramp, Shape, pace, sane, sane_speed, sane_time};
 

@@ -156,7 +156,7 @@ impl SetPoints {
         }
     }
 
-    /// Within half a period of when it was to come: jitter of the bus is no lateness.
+    /// Within half a period of when it was to come: jitter of the bus does not count as late.
     fn is_in_time(&self, age_s: f64, following: &Following) -> bool {
         (age_s - following.period_s).abs() <= 0.5 * following.period_s
     }

@@ -43,7 +43,7 @@ impl Travel {
 
     /// A velocity held to what can still be stopped before the limit: `v^2 = 2 a s`. Away from a limit it is free.
     pub fn hold_velocity(&self, position: f64, velocity: f64, deceleration: f64) -> f64 {
-        // At rest the way left is infinite, and without a deceleration its product is no number.
+        // At rest the way left is infinite, and without a deceleration its product is not a number.
         if velocity == 0.0 {
             return velocity;
         }

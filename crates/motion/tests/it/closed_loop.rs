@@ -1,5 +1,5 @@
 //! The control loops of this crate around the motor of crate `plant`: encoder and Hall in, duty cycles out, as a
-//! drive's firmware joins them. Nothing is told to the controller that its sensors do not read.
+//! drive's firmware joins them. The controller gets nothing that its sensors do not read.
 
 use crate::rig::{AT_1_KHZ, AT_4_KHZ, COUNTS_PER_TURN, Rig, rad_s};
 use motion::cascade::{PositionDemand, VelocityDemand};
