@@ -1,4 +1,4 @@
-//! What a shaft does in the end when nobody drives or holds it but its load: the velocity at which friction and the idle bridge
+//! What a shaft does in the end when nothing drives or holds it but its load: the velocity at which friction and the idle bridge
 //! take as much as the load gives.
 
 use crate::clamp::ClampModel;

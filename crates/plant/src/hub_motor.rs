@@ -102,7 +102,7 @@ pub struct HubMotor {
     pub hall_fault: HallFault,
     /// A motor wire that has come off.
     pub lost_phase: Option<Phase>,
-    /// The pull of the magnets at the teeth; none if nobody asks for it.
+    /// The pull of the magnets at the teeth; none unless it is asked for.
     pub cogging: Option<Cogging>,
     /// Load, supply, temperatures and energies.
     pub rig: Rig,
@@ -194,7 +194,7 @@ impl HubMotor {
         }
     }
 
-    /// The same for a shaft that is no plain one. The winding goes by the velocity that is expected in the middle of the step, the
+    /// The same for a shaft that is not a plain one. The winding goes by the velocity that is expected in the middle of the step, the
     /// angle by the real one.
     fn step_joined(&mut self, dt_s: f64, actuation: &Actuation) {
         let bus_v = self.rig.supply.bus_v;
@@ -320,7 +320,7 @@ impl HubMotor {
         self.rig.cut_source(&self.model.rig);
     }
 
-    /// A new power stage. The source is connected again by whoever put it in.
+    /// A new power stage. The caller connects the source again.
     pub fn mend_power_stage(&mut self) {
         self.power_stage_burnt = false;
     }

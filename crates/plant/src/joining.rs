@@ -43,7 +43,7 @@ impl Rig {
         self.coupled.map(|coupled| coupled.push)
     }
 
-    /// True if the shaft is no plain one.
+    /// True if the shaft is not a plain one.
     #[inline]
     pub(crate) fn is_joined(&self) -> bool {
         self.attached.is_some() | self.coupled.is_some()

@@ -97,7 +97,7 @@ pub struct JointMotor {
     pub lost_phase: Option<Phase>,
     /// An external discharge module is wired to the bus, and conducts above this voltage.
     pub discharge_from_v: Option<f64>,
-    /// The pull of the magnets at the teeth; none if nobody asks for it.
+    /// The pull of the magnets at the teeth; none unless it is asked for.
     pub cogging: Option<Cogging>,
     /// Load, supply, temperatures and energies. A locked load holds the output. Friction includes all of the gear's; the
     /// encoder's battery is not in the book.
@@ -181,7 +181,7 @@ impl JointMotor {
         }
     }
 
-    /// The mechanical half of a step of an output that is no plain one.
+    /// The mechanical half of a step of an output that is not a plain one.
     #[cold]
     #[inline(never)]
     fn step_joined(&mut self, pending: Pending, brake_nm: f64) {
@@ -271,7 +271,7 @@ impl JointMotor {
         self.rig.cut_source(&self.model.rig);
     }
 
-    /// A new power stage. The source is connected again by whoever put it in.
+    /// A new power stage. The caller connects the source again.
     pub fn mend_power_stage(&mut self) {
         self.power_stage_burnt = false;
     }

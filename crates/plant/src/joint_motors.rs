@@ -180,7 +180,7 @@ const M8025: Motor = Motor {
 #[derive(Clone, Copy)]
 struct Reducer {
     ratio: f64,
-    /// "Output rated torque", which the motor's torque gives at its rated speed: that tells the loss in the teeth.
+    /// "Output rated torque", which the motor's torque gives at its rated speed: that gives the loss in the teeth.
     output_nm: f64,
     /// "Peak start-stop torque".
     peak_nm: f64,

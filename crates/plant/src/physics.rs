@@ -36,7 +36,7 @@ pub struct Physics {
 }
 
 impl Physics {
-    /// What a rig tells of it, of a load that stands here and turns so fast.
+    /// What a rig knows of it, of a load that stands here and turns so fast.
     fn of_rig(rig: &Rig, load: (Angle, f64)) -> Self {
         let (angle, velocity_rad_s) = load;
         let load_torque_nm = match rig.attached() {

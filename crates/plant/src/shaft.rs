@@ -2,7 +2,7 @@
 //! other motors.
 //!
 //! A shaft that is *attached* is moved with its motor's step, as a free one is. One that is *coupled* is not: the motor's step
-//! says what it does to the shaft (its [`Push`]), whoever owns the machine moves all its shafts together, and each motor then
+//! says what it does to the shaft (its [`Push`]), the owner of the machine moves all its shafts together, and each motor then
 //! follows with the [`Motion`] that came of it. A free shaft is neither, and pays for no more than the question.
 
 use core::f64::consts::TAU;

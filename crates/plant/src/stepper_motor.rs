@@ -2,7 +2,7 @@
 //!
 //! In goes what the two bridges do ([`Bridges`]), out comes what the drive's sensors read ([`Sensors`]). There is no
 //! position sensor: a rotor that is overloaded slips by whole electrical turns (four full steps) and nothing in the
-//! readings says so; only [`StepperMotor::rotor`], the truth, does. The load, the supply, the faults and the
+//! readings shows it; only [`StepperMotor::rotor`], the truth, does. The load, the supply, the faults and the
 //! surroundings are plain fields that a test or a person at a bench changes at any time.
 //!
 //! A rotor that a load drives has its friction, its iron loss, and from some speed on the bus that its voltage charges through
@@ -154,7 +154,7 @@ impl StepperMotor {
         (self.torque_nm, flows)
     }
 
-    /// The step of a shaft that is no plain one. The windings go by the velocity that is expected in the middle of the step, the
+    /// The step of a shaft that is not a plain one. The windings go by the velocity that is expected in the middle of the step, the
     /// angle by the real one.
     #[cold]
     #[inline(never)]

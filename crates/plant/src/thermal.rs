@@ -20,7 +20,7 @@ pub fn resistance_at_ohm(stated_ohm: f64, per_k: f64, temperature_c: f64) -> f64
 /// What a converter's steps make of the range of a thermistor: 13 bits over 256 K. Assumed for every drive.
 const READINGS_PER_K: f64 = 32.0;
 
-/// What a thermometer tells of a temperature.
+/// What a thermometer reads of a temperature.
 #[inline]
 pub fn reading_c(temperature_c: f64) -> f64 {
     // Numbers of this size have no fractions: what is added and taken away again rounds to whole ones.

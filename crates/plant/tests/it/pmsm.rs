@@ -24,7 +24,7 @@ impl Bench {
         Bench { motor, data: PmsmData::default(), lost_phase: None, electrical_rad: 0.0, dt_s: DT_S }
     }
 
-    /// One step at a velocity; `terminals` is told the magnets' direction in the middle of the step.
+    /// One step at a velocity; `terminals` is given the magnets' direction in the middle of the step.
     fn step(&mut self, velocity_rad_s: f64, terminals: impl Fn(Axis) -> Terminals) -> PmsmOutput {
         let step_rad = velocity_rad_s * f64::from(self.motor.pole_pairs) * self.dt_s;
         let axis = Axis::at_turns((self.electrical_rad + 0.5 * step_rad) / core::f64::consts::TAU);
