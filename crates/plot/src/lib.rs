@@ -36,7 +36,7 @@ impl Poster {
         draw::poster(self, false)
     }
 
-    /// A web page with the picture that tells the values under the pointer. It needs nothing from anywhere.
+    /// A web page with the picture that shows the values under the pointer. It needs nothing from anywhere.
     pub fn to_html(&self) -> String {
         page::page(self, &draw::poster(self, true))
     }

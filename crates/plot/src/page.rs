@@ -1,4 +1,4 @@
-//! A picture as a web page of its own: the SVG, and a script that tells the values under the pointer.
+//! A picture as a web page of its own: the SVG, and a script that shows the values under the pointer.
 
 use crate::poster::Poster;
 use crate::svg::escape;

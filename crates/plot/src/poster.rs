@@ -28,7 +28,7 @@ pub struct Figure {
     pub sections: Vec<Section>,
     /// Marked moments.
     pub events: Vec<Event>,
-    /// Spans of time that are left out, ascending; a mark on the time axis tells of each.
+    /// Spans of time that are left out, ascending; a mark on the time axis shows each.
     pub cuts: Vec<(f64, f64)>,
 }
 
@@ -43,7 +43,7 @@ pub struct Panel {
     pub height: f64,
     /// The axis reaches to 0, whatever the values are.
     pub with_zero: bool,
-    /// Its axis spans at least this much, in its unit: what changes by less is no change.
+    /// Its axis spans at least this much, in its unit: what changes by less is not shown as a change.
     pub least_span: f64,
     /// Drawn in order, the last one on top.
     pub traces: Vec<Trace>,
