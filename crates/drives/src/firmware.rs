@@ -35,7 +35,7 @@ pub trait Firmware: Station + Clone {
     /// Supply voltage is gone: everything that is not in the EEPROM is forgotten.
     fn power_off(&mut self, now: Instant);
 
-    /// How long the next resets by NMT take, which depends on the microcontroller: none as long as nobody says it.
+    /// How long the next resets by NMT take, which depends on the microcontroller: none unless it is set.
     fn set_reset_times(&mut self, times: ResetTimes);
 
     /// One control period.

@@ -18,7 +18,7 @@ impl CommunicationErrors {
     /// No error.
     pub(super) const NONE: Self = Self { events_lost: false, heartbeat_lost: false, late_rpdos: 0, short_rpdos: 0 };
 
-    /// The frames of an RPDO have become too short. Told once, as its end.
+    /// The frames of an RPDO have become too short. Reported once, as is its end.
     pub(super) const fn begin_short_rpdo(&mut self) {
         self.short_rpdos = self.short_rpdos.saturating_add(1);
     }
@@ -28,7 +28,7 @@ impl CommunicationErrors {
         self.short_rpdos = self.short_rpdos.saturating_sub(1);
     }
 
-    /// An RPDO has missed its deadline. Told once, as its end.
+    /// An RPDO has missed its deadline. Reported once, as is its end.
     pub(super) const fn begin_late_rpdo(&mut self) {
         self.late_rpdos = self.late_rpdos.saturating_add(1);
     }

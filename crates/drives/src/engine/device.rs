@@ -358,7 +358,7 @@ impl<S: Storage> Device<S> {
         true
     }
 
-    /// The device takes an NMT command of its own: [`Node::command_itself`]. What comes of it is told as events.
+    /// The device takes an NMT command of its own: [`Node::command_itself`]. What comes of it is reported as events.
     pub fn command_itself(&mut self, command: NmtCommand, now: Instant) {
         if self.running {
             self.node.command_itself(command, now);
@@ -435,7 +435,7 @@ pub(crate) trait Application<S: Storage> {
     /// NMT reset node: starts the firmware over with the stored values.
     fn restart(&mut self, now: Instant);
 
-    /// A new NMT state was entered. Nothing by default: the motor goes on, and whoever stops it is the drive's own watch.
+    /// A new NMT state was entered. Nothing by default: the motor goes on, and is stopped by the drive's own watch.
     fn nmt_changed(&mut self, state: NmtState, now: Instant) {
         let _ = (state, now);
     }

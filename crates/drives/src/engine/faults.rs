@@ -45,7 +45,7 @@ impl FaultSet {
     }
 }
 
-/// True if a reading is above a limit. A reading that is no number is no sound reading.
+/// True if a reading is above a limit. A reading that is not a number counts as above.
 #[allow(clippy::neg_cmp_op_on_partial_ord, reason = "NaN is not at most anything")]
 #[inline]
 pub fn exceeds(value: f32, limit: f32) -> bool {

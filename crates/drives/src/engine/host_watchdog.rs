@@ -2,7 +2,7 @@
 
 use can::Instant;
 
-/// Whether the present silence has been told.
+/// Whether the present silence has been reported.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HostWatchdog {
     fired_at_frame: Option<Instant>,

@@ -38,7 +38,7 @@ impl StoredImage {
         store.image
     }
 
-    /// The image in a file's bytes: short files are padded as blank, long ones cut; a checksum tells if it is sound.
+    /// The image in a file's bytes: short files are padded as blank, long ones cut; a checksum shows whether it is sound.
     pub fn from_bytes(bytes: &[u8]) -> Self {
         let mut image = Self::BLANK;
         image.0.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);

@@ -1,7 +1,7 @@
 //! The two LEDs as a function of time ("M Robot Joint Motor CanOpen Manual", "Status indication and alarm").
 //!
 //! Both are lit once after power-on. Then red flashes the alarm code: its high digit long, its low digit short. Green
-//! tells of the battery. The lengths are not printed; they are such that a person can count.
+//! shows the state of the battery. The lengths are not printed; they are such that a person can count.
 
 use super::hardware::Battery;
 

@@ -2,7 +2,7 @@
 //! a multi-turn absolute encoder on a battery, and a reducer.
 //!
 //! Source: "M Robot Joint Motor CanOpen Manual" (Zhengzhou Defy Mechanical & Electrical Equipment). The four models are
-//! one firmware; [`Model`] holds what differs. It is no CiA 402 state machine: the [statusword] mirrors the
+//! one firmware; [`Model`] holds what differs. It does not have the CiA 402 state machine: the [statusword] mirrors the
 //! controlword. Where the manual contradicts itself or is silent, the choice is a named constant in [`assumptions`] or
 //! [`gains`], or stands beside the row of [`objects`], with its reason.
 

@@ -57,7 +57,7 @@ pub(super) enum TimeBase {
     Own,
     /// Above 0: the joint's own clock, which SYNC starts over.
     Sync,
-    /// 255: the level of DIR, which changes each 0.1 ms; SYNC tells from which change on.
+    /// 255: the level of DIR, which changes each 0.1 ms; SYNC marks from which change on.
     Dir,
 }
 

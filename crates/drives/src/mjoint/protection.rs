@@ -59,7 +59,7 @@ impl Protection {
         self.battery_lost = false;
     }
 
-    /// Told once each time: a battery that stays away does not bring the alarm back after an origin was set.
+    /// Reported once each time: a battery that stays away does not bring the alarm back after an origin was set.
     fn watch_battery(&mut self, sensors: &Sensors, now: &Situation<'_>) {
         let missing = sensors.battery == Battery::Missing && !now.has_brake;
         self.battery_lost |= missing && !self.battery_was_missing;

@@ -12,7 +12,7 @@ const TURN: i32 = COUNTS_PER_TURN as i32;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Turns {
     recorded: Option<i32>,
-    /// Counts from what the encoder tells to the position: whole turns.
+    /// Counts from the encoder's reading to the position: whole turns.
     correction: Option<i32>,
 }
 
@@ -22,7 +22,7 @@ impl Turns {
         Self { recorded, correction: None }
     }
 
-    /// The position, from what the encoder tells: `lost` while it knows the place within the turn only. Of all turns it
+    /// The position, from the encoder's reading: `lost` while it knows the place within the turn only. Of all turns it
     /// is the one that is nearest to the record.
     pub(super) fn position(&mut self, encoder_counts: i32, lost: bool) -> i32 {
         if !lost {

@@ -43,7 +43,7 @@ pub enum Loss {
     BusOff,
     /// NMT stopped.
     Stopped,
-    /// NMT reset communication: over as soon as it is told.
+    /// NMT reset communication: over as soon as it is reported.
     Reset,
     /// An RPDO has missed the deadline of its event timer (CiA 301, 7.5.2.35).
     RpdoDeadline,
@@ -103,7 +103,7 @@ impl<S: Storage> DescribedDevice<S> {
         }
     }
 
-    /// Communication begins, unless it has no node-ID: such a device waits for LSS, and nobody sees it on the bus.
+    /// Communication begins, unless it has no node-ID: such a device waits for LSS, and is not seen on the bus.
     pub(crate) fn boot(&mut self, now: Instant) {
         if self.is_node() {
             self.device.boot(now);

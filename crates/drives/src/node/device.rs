@@ -11,7 +11,7 @@ use super::described::{Described, DescribedDevice, described_station};
 use super::{Memory, services};
 use crate::engine::device::{Application, Device, ResetTimes};
 
-/// The firmware of a described device that is no drive.
+/// The firmware of a described device that is not a drive.
 #[derive(Clone)]
 pub struct DescribedNode<S: Storage> {
     description: &'static Description,
@@ -88,7 +88,7 @@ impl<S: Storage> DescribedNode<S> {
     }
 
     /// The application has a new value for an object, as an SDO would carry it: what a sensor measured, whatever its access
-    /// is. Event-driven TPDOs become due. A new error register (1001h) is told: an EMCY message with the code
+    /// is. Event-driven TPDOs become due. A new error register (1001h) is reported: an EMCY message with the code
     /// 1000h for an error, 0000h when none is left.
     ///
     /// # Errors

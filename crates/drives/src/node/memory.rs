@@ -63,7 +63,7 @@ impl<S: Storage> Memory<S> {
         memory
     }
 
-    /// The image in a file's bytes: short files are padded, long ones cut; a checksum tells if it is sound.
+    /// The image in a file's bytes: short files are padded, long ones cut; a checksum shows whether it is sound.
     pub fn from_bytes(table: &Table, bytes: &[u8]) -> Self {
         let mut memory = Self::blank(table);
         let image = &mut memory.image.as_mut()[..memory.size];
@@ -255,7 +255,7 @@ pub const fn is_makers_mark(row: &Entry) -> bool {
 /// The bits of a key that are a multiplexor.
 const OBJECT_KEYS: u32 = (1 << 24) - 1;
 
-/// The key of a record that is no object's.
+/// The key of a record that does not belong to an object.
 const fn is_no_object(key: u32) -> bool {
     key > OBJECT_KEYS
 }

@@ -17,7 +17,7 @@ pub use services::{Services, Written, conditions};
 use canopen::Mux;
 use canopen::od::{Dictionary, Storage};
 
-/// The serial number of a device: what tells it from all others of its make. Source: CiA 301, 7.5.2.19.
+/// The serial number of a device: what distinguishes it from all others of its make. Source: CiA 301, 7.5.2.19.
 pub const SERIAL_NUMBER: Mux = Mux::new(0x1018, 4);
 
 /// Whether these services do something with an object.

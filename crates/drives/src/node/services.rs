@@ -56,7 +56,7 @@ pub enum Written {
     Elsewhere,
     /// An object of theirs.
     Service,
-    /// The watch over the last one that was missed (1016h): nobody is missed any more, and a first heartbeat is waited for where one
+    /// The watch over the last one that was missed (1016h): no node is missed any more, and a first heartbeat is waited for where one
     /// still is to come (CiA 301, 7.2.8.3.2).
     WatchEnded,
 }
@@ -167,7 +167,7 @@ impl<S: Storage> Services<S> {
     }
 
     /// A frame arrived at a node in this state; true if what is watched has come again, and nothing else is missing. A boot-up
-    /// message is no heartbeat yet: the node has lost its state.
+    /// message is not a heartbeat yet: the node has lost its state.
     pub fn handle_frame(&mut self, frame: &Frame, state: NmtState, now: Instant) -> bool {
         let mut heard = false;
         if let Some(guarding) = self.guarding.as_mut().filter(|_| Guarding::is_request(frame, self.node_id)) {
@@ -285,7 +285,7 @@ fn counter_of_sync(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if runs && changes { Err(AbortCode::DEVICE_STATE) } else { Ok(()) }
 }
 
-/// More nodes than can be watched: nobody is told that a watch is there which is not.
+/// More nodes than can be watched: an entry for one is refused, as it would have no effect.
 fn only_nobody(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if Consumer::from_raw(raw).is_none() { Ok(()) } else { Err(AbortCode::PARAMETER_INCOMPATIBLE) }
 }

@@ -1,4 +1,4 @@
-//! What a drive has been told about the motor that is wired to it, and the loops that follow from it.
+//! What a drive is configured with of the motor that is wired to it, and the loops that follow from it.
 
 use motion::cascade::CascadeGains;
 use motion::commutation::CommutationModel;

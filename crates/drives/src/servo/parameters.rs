@@ -31,7 +31,7 @@ const VELOCITY_WINDOW_SHARE: f64 = 0.005;
 const STANDSTILL_SHARE: f64 = 0.001;
 const TORQUE_WINDOW_SHARE: f32 = 0.05;
 
-/// A position that is no limit, increments: finite, so that no product of it with 0 is no number.
+/// A position that does not limit, increments: finite, so that its product with 0 is a number.
 const FAR: f64 = 1e18;
 
 /// Everything that an axis reads of the dictionary besides its targets.

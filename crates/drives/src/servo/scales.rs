@@ -25,7 +25,7 @@ impl Scales {
             feed_constant: pair(slots.feed, slots.feed_turns),
             position_factor: pair(slots.position_factor_numerator, slots.position_factor_divisor),
             velocity_encoder_factor: pair(slots.velocity_encoder_numerator, slots.velocity_encoder_divisor),
-            // As delivered with a 0 in it, it says nothing; nobody can write one.
+            // As delivered with a 0 in it, it has no meaning; a write of 0 is refused.
             velocity_factor_1: pair(slots.velocity_factor_1_numerator, slots.velocity_factor_1_divisor)
                 .filter(|factor| !factor.contains(&0)),
             velocity_factor: pair(slots.velocity_factor_numerator, slots.velocity_factor_divisor),

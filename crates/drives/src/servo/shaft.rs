@@ -1,4 +1,4 @@
-//! One axis: its objects, who may move it, its loops, and what is told of it.
+//! One axis: its objects, who may move it, its loops, and what it reports.
 //!
 //! [`sense`](Shaft::sense) and [`actuate`](Shaft::actuate) run every control period, [`supervise`](Shaft::supervise) every
 //! supervision period.
@@ -32,7 +32,7 @@ use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis};
 /// How long a motor may carry how much more than its rated current. Assumed: the usual class of servo drives.
 const OVERLOAD_FROM: f32 = 1.15;
 const OVERLOAD_CURVE: [(f32, f32); 3] = [(1.15, 60.0), (2.0, 10.0), (3.0, 3.0)];
-/// Currents beyond this multiple of the power stage's own limit are no overload but a short circuit.
+/// Currents beyond this multiple of the power stage's own limit are not an overload but a short circuit.
 const OVER_CURRENT: f32 = 1.5;
 /// Assumed: a winding of thermal class B with some reserve.
 const MOTOR_LIMIT_C: f32 = 120.0;
@@ -49,7 +49,7 @@ enum TargetHold {
     None,
     /// A software limit: the motion ends there, which counts as the target.
     Limit,
-    /// The counter cannot tell it: the motion ends short of it, and the target is not reached.
+    /// The counter cannot show it: the motion ends short of it, and the target is not reached.
     Counter,
 }
 
@@ -246,7 +246,7 @@ impl Shaft {
             .with(row::FOLLOWING_ERROR, self.following_error)
     }
 
-    /// Last: demand, loops, and what is told of them.
+    /// Last: demand, loops, and what is reported of them.
     pub(super) fn supervise(
         &mut self,
         values: &mut Dictionary<impl Storage>,

@@ -2,7 +2,7 @@
 
 use cia402::{ModeOfOperation, PowerState, Statusword};
 
-/// What bits 7 and 10 to 13 tell, whatever the mode calls it.
+/// What bits 7 and 10 to 13 show, whatever the mode calls it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Facts {
     /// The supply of the power stage is there.

@@ -38,7 +38,7 @@ pub const OVER_CURRENT_DEBOUNCE_PERIODS: u16 = 1;
 /// asked for: chapter 8 names a loose power cable as a cause of over-current (0004h).
 pub const LOOSE_WIRE_CURRENT_SHARE: f32 = 0.5;
 
-/// Least current set-point at which a loose wire can be told, A.
+/// Least current set-point at which a loose wire can be detected, A.
 pub const LOOSE_WIRE_LEAST_A: f32 = 1.0;
 
 /// Above this speed the motor's own voltage can hold the current down, and missing current says nothing by itself, r/min.

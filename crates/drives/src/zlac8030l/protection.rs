@@ -20,7 +20,7 @@ pub(super) struct Protection {
     supplied_for: u16,
 }
 
-/// Tells a wire that has come off a moving motor: one current stays away while the two others flow.
+/// Detects a wire that has come off a moving motor: one current stays away while the two others flow.
 ///
 /// The current vector of a sound motor turns with its rotor, whichever way it points, and leaves each wire without current in two
 /// narrow stretches of an electrical turn only.

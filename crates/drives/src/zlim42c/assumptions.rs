@@ -68,7 +68,7 @@ pub const PHASE_COMPARED_RPM: f64 = 300.0;
 /// more than the offset of a current measurement.
 pub const PHASE_SOUND_SHARE: f32 = 0.03;
 
-/// A phase that carries this share of the other one's current is no lost one: the lower of two equal phases has 0.38 of the
+/// A phase that carries this share of the other one's current is not a lost one: the lower of two equal phases has 0.38 of the
 /// higher, at the least, in a supervision period at the speed from which they are compared (an eighth of an electrical turn).
 pub const PHASE_BESIDE_SHARE: f32 = 0.25;
 

@@ -14,7 +14,7 @@ pub struct Led {
 /// How long a flash lasts, and the dark after it: easy to count by eye. No times are printed.
 pub const FLASH_NS: u64 = 200_000_000;
 
-/// Dark between two counts: five times a flash, so that nobody counts on.
+/// Dark between two counts: five times a flash, so that two counts are not taken for one.
 pub const PAUSE_NS: u64 = 1_000_000_000;
 
 /// The lights of a drive that is supplied; `flashes` is the fault's count, 0 without a fault.

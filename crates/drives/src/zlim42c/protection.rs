@@ -15,7 +15,7 @@ pub(super) struct Situation {
     pub(super) latched: FaultSet,
 }
 
-/// Tells an open phase from one that is not asked for current at present, or cannot be given any.
+/// Distinguishes an open phase from one that is not asked for current at present, or cannot be given any.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PhaseWatch {
     /// Supervision periods in which each phase was asked and carried nothing, since it last carried something. Those in

@@ -119,7 +119,7 @@ impl<const INPUTS: usize> Shell<INPUTS> {
         }
     }
 
-    /// What the statusword has to tell.
+    /// What the statusword shows.
     pub(crate) fn status(&self, parameters: &AxisParameters) -> Status {
         self.axis.status(&self.targets, parameters)
     }

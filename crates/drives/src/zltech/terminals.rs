@@ -11,7 +11,7 @@ pub(crate) struct Signals {
     pub(crate) emergency_stop: bool,
 }
 
-/// What the outputs may tell of.
+/// What the outputs may show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Conditions {
     pub(crate) alarm: bool,

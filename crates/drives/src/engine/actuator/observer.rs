@@ -49,7 +49,7 @@ pub struct Tracking {
     acceleration: f32,
 }
 
-/// An error beyond this many counts is no noise: the observer starts over there.
+/// An error beyond this many counts is not noise: the observer starts over there.
 const LOST: f32 = 10_000.0;
 
 impl Tracking {

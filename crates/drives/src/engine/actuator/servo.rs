@@ -18,7 +18,7 @@ use crate::engine::axis::Demand;
 
 const TAU: f32 = core::f32::consts::TAU;
 
-/// What the drive has been told about motor and sensors, and the two periods.
+/// What the drive is configured for: motor and sensors, and the two periods.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoModel {
     /// Encoder, pole pairs, Hall sensors.
@@ -92,7 +92,7 @@ impl ServoModel {
 }
 
 impl Servo {
-    /// At rest, with the angle that the Hall sensors tell.
+    /// At rest, with the angle of the Hall sensors.
     pub fn new(model: &ServoModel, hall: u8, count: u16) -> Self {
         Self {
             commutation: Commutation::new(&model.commutation, hall, count),

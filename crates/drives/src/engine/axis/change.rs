@@ -99,7 +99,7 @@ impl Axis {
         }
         stopping.free = stopping.is_to_be_free();
         if stopping.free {
-            // Whoever holds it again begins from wherever it has got to.
+            // Holding it again begins from wherever it has got to.
             self.trajectory = self.as_it_turns();
         }
         self.stop = Some(stopping);

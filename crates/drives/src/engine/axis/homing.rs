@@ -150,7 +150,7 @@ impl Homing {
         Some(found)
     }
 
-    /// The run has ended by itself, told once: the motion is to be ended.
+    /// The run has ended by itself, reported once: the motion is to be ended.
     pub(super) fn take_end(&mut self) -> bool {
         core::mem::take(&mut self.ended)
     }

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Units are counts of a wrapping 32-bit position, counts/s and A. A task is planned from where the shaft is to be at that
-//! moment, or, where nothing has told it a position, from where it is. While a stop lies over a task the task waits; it goes
+//! moment, or, where it has not been given a position, from where it is. While a stop lies over a task the task waits; it goes
 //! on from wherever the shaft stands or turns by then. Nothing here knows modes, controlwords or objects.
 
 mod change;
@@ -276,7 +276,7 @@ impl Axis {
         self.homing.forget();
     }
 
-    /// Where homing has just found the home position, told once.
+    /// Where homing has just found the home position, reported once.
     #[inline]
     pub fn take_home(&mut self) -> Option<i32> {
         self.home.take()

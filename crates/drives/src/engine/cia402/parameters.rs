@@ -1,4 +1,4 @@
-//! How a [`PowerDrive`](super::PowerDrive) is set, and what it has to tell.
+//! How a [`PowerDrive`](super::PowerDrive) is set, and what it shows.
 
 use cia402::{HaltOption, QuickStopOption, StopRamp};
 
@@ -57,7 +57,7 @@ pub struct Targets {
     pub cyclic: Option<Cyclic>,
 }
 
-/// What the statusword has to tell.
+/// What the statusword shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {
     /// The mode's target is reached; while stopping: the motor stands.

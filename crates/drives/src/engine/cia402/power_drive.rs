@@ -148,7 +148,7 @@ impl PowerDrive {
         self.axis.set_switches(switches);
     }
 
-    /// Where homing has just found the home position, told once: the caller then shifts the position.
+    /// Where homing has just found the home position, reported once: the caller then shifts the position.
     pub fn take_home(&mut self) -> Option<i32> {
         self.axis.take_home()
     }
@@ -158,7 +158,7 @@ impl PowerDrive {
         self.host_timeout = self.power.state() == PowerState::OperationEnabled;
     }
 
-    /// A fault. A motor that is driven is stopped first if its reaction says so; else the power is off at once.
+    /// A fault. A motor that is driven is stopped first if that is its reaction; else the power is off at once.
     pub fn fault(&mut self, reaction: FaultReactionOption) {
         let stops = self.is_driven() && reaction.ramp() != Some(StopRamp::Free);
         self.power.fault();

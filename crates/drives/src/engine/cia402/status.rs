@@ -1,4 +1,4 @@
-//! What the statusword has to tell.
+//! What the statusword shows.
 
 use cia402::ModeOfOperation;
 
@@ -8,7 +8,7 @@ use super::stop::StopCause;
 use crate::engine::axis::HomingState;
 
 impl PowerDrive {
-    /// What the statusword has to tell.
+    /// What the statusword shows.
     pub fn status(&self, targets: &Targets, parameters: &Parameters) -> Status {
         let standing = self.axis.feedback().standing;
         let homing = self.axis.homing();

@@ -1,4 +1,4 @@
-//! What a device tells of its errors: EMCY messages and the error register (CiA 301, 7.2.7 and 7.5.2.2). Faults are the
+//! What a device reports of its errors: EMCY messages and the error register (CiA 301, 7.2.7 and 7.5.2.2). Faults are the
 //! drive's; errors of communication are the device's own, and stand beside them.
 
 use can::Instant;
@@ -23,7 +23,7 @@ impl<S: Storage> Device<S> {
         }
     }
 
-    /// After a reset of faults: the error register shows what is left, and EMCY tells when nothing is.
+    /// After a reset of faults: the error register shows what is left, and EMCY reports when nothing is.
     pub fn report_reset<const F: usize>(&mut self, faults: &FaultMonitor<F>, now: Instant) {
         self.report_register(faults.error_register(), now);
     }
@@ -65,7 +65,7 @@ impl<S: Storage> Device<S> {
         }
     }
 
-    /// The application's own errors, as bits of the error register: a new one is told as a generic error (1000h).
+    /// The application's own errors, as bits of the error register: a new one is reported as a generic error (1000h).
     pub fn report_own_errors(&mut self, register: u8, now: Instant) {
         if register == self.fault_bits {
             return;
@@ -79,7 +79,7 @@ impl<S: Storage> Device<S> {
         }
     }
 
-    /// The controller takes part in the bus again after it was bus-off: that is told, and over.
+    /// The controller takes part in the bus again after it was bus-off: that is reported, and over.
     pub fn report_bus_off_recovery(&mut self, now: Instant) {
         let register = self.fault_bits | self.communication_errors.register_bits();
         self.node.raise_emcy(EmcyErrorCode::RECOVERED_FROM_BUS_OFF, register, [0; 5], now);
@@ -101,7 +101,7 @@ impl<S: Storage> Device<S> {
         self.node.raise_emcy(code, self.fault_bits | self.communication_errors.register_bits(), [0; 5], now);
     }
 
-    /// An error ended: the error register shows what is left, and EMCY tells when nothing is.
+    /// An error ended: the error register shows what is left, and EMCY reports when nothing is.
     fn report_end_of_error(&mut self, now: Instant) {
         let register = self.fault_bits | self.communication_errors.register_bits();
         if let Some(slot) = self.error_register() {

@@ -201,7 +201,7 @@ impl MJoint {
         }
     }
 
-    /// Turns that are lost are no place to go to.
+    /// With its turns lost it has no position to go to.
     fn start_by_itself(&mut self, sensors: &Sensors) {
         self.own_motion = OwnMotion::None;
         let record = self.power_off_position.take();

@@ -120,7 +120,7 @@ pub struct MJoint {
     base_periods: u8,
 }
 
-/// What the joint does without being told over CAN.
+/// What the joint does without a command over CAN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum OwnMotion {
     /// Nothing: it waits for a first pulse, or for a host.

@@ -68,7 +68,7 @@ impl MJoint {
         self.device.values_mut().set(STATUSWORD, statusword(&condition).0);
     }
 
-    /// Bit 4: of a joint that takes pulses it tells nothing until the host asks. 0404h is what 5.10.1 prints for one that
+    /// Bit 4: of a joint that takes pulses it shows nothing until the host asks. 0404h is what 5.10.1 prints for one that
     /// was just switched on, and such a one holds its shaft.
     fn is_shown_live(&self) -> bool {
         let by_host = self.controlword.has(Controlword::ENABLE_VOLTAGE) || self.has_homing_the_motor();

@@ -65,7 +65,7 @@ impl<S: Storage> Application<S> for ServoDrive<S> {
         self.restart_firmware(now);
     }
 
-    /// What it does to the axes is told after the boot-up message.
+    /// What it does to the axes is reported after the boot-up message.
     fn restart_communication(&mut self, now: Instant) {
         self.base.restart_communication(now);
         self.connection(Loss::Reset, true, now);

@@ -1,4 +1,4 @@
-//! Faults of the whole drive and of its axes: what they stop, what is told of them, and how they end.
+//! Faults of the whole drive and of its axes: what they stop, what is reported of them, and how they end.
 
 use can::Instant;
 use canopen::od::Storage;

@@ -194,7 +194,7 @@ impl Shaft {
         }
     }
 
-    /// 607Ah as the axis is given it (bit 6: the way), held to the software limits, and to what the counter can tell: to its
+    /// 607Ah as the axis is given it (bit 6: the way), held to the software limits, and to what the counter can show: to its
     /// two ends, and to no more than half of its round, for beyond that the short way is the other one. Relative moves turn on
     /// past the ends.
     fn held_target(&self, target: i64, controlword: Controlword) -> (i32, TargetHold) {

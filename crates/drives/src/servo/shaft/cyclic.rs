@@ -6,8 +6,8 @@
 //! - Velocities and torques that came once a period do not: the axis is brought to rest after the same time, and held.
 //! - Those that came by RPDO in another rhythm: after three periods of SYNC, if 1006h says how long one is, else after
 //!   [`PATIENCE_S`](crate::servo::parameters::PATIENCE_S). The standard leaves it to makers; a motor that turns on for
-//!   ever is what nobody wants.
-//! - Those that a host wrote by SDO stay: that is no cycle. Such a host is watched by its heartbeat (1016h).
+//!   ever is never wanted.
+//! - Those that a host wrote by SDO stay: they do not come in a cycle. Such a host is watched by its heartbeat (1016h).
 //!
 //! An RPDO's own deadline (its event timer) and 6007h are the drive's: `drive/connection.rs`.
 
@@ -16,7 +16,7 @@ use motion::set_points::{Following, SetPoints};
 
 use crate::servo::parameters::FORGIVEN_PERIODS;
 
-/// Most set-points that wait in ip (60C4h:01): as many as bits tell which places are filled.
+/// Most set-points that wait in ip (60C4h:01): as many as there are bits for the places filled.
 pub(in crate::servo) const MOST_WAITING: usize = u64::BITS as usize;
 
 /// The present path, and in ip what waits behind it.

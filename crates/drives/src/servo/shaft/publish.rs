@@ -1,4 +1,4 @@
-//! What an axis tells in its objects.
+//! What an axis shows in its objects.
 
 use canopen::od::{Dictionary, Storage};
 use cia402::{DigitalInputs, DigitalOutputs, ModeOfOperation, PowerState};

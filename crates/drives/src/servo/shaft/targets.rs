@@ -170,7 +170,7 @@ impl Shaft {
         if self.is_enabled() && takes.contains(&self.power.mode()) { self.offset_a(values) } else { 0.0 }
     }
 
-    /// A set-point held to the software limits, and to what the counter can tell: its ends, and half of its round from here.
+    /// A set-point held to the software limits, and to what the counter can show: its ends, and half of its round from here.
     fn held_position(&self, wanted: f64) -> f64 {
         let (here, most) = (f64::from(self.position()), f64::from(i32::MAX));
         let within = self.parameters.travel.map_or(wanted, |travel| travel.hold(wanted));

@@ -126,7 +126,7 @@ impl Zlac8030l {
         self.servo = Servo::new(&self.parameters.model, sensors.hall, sensors.encoder_count);
     }
 
-    /// Every tenth control period: faults, power state, demand, and what is told of it. The voltages follow every period.
+    /// Every tenth control period: faults, power state, demand, and what is reported of it. The voltages follow every period.
     fn supervise(&mut self, sensors: &Sensors, now: Instant) {
         self.refresh_parameters();
         let feedback = self.measure(sensors);
@@ -187,13 +187,13 @@ impl Zlac8030l {
         let causes = self.protection.causes(&self.parameters, sensors, &situation);
         let new = self.faults.observe(causes);
         if causes.has(row::ENCODER) {
-            // Told once: whether encoder and Hall sensors still disagree shows at the next edges.
+            // Reported once: whether encoder and Hall sensors still disagree shows at the next edges.
             self.servo.realign(&self.parameters.model, sensors.hall, sensors.encoder_count);
         }
         self.enter_fault(new, now);
     }
 
-    /// New faults: off, and tell.
+    /// New faults: off, and report.
     fn enter_fault(&mut self, new: FaultSet, now: Instant) {
         if new.is_empty() {
             return;

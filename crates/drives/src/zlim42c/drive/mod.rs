@@ -48,7 +48,7 @@ pub struct Zlim42c {
     phases: PhaseWatch,
     /// Current from the bus, A: its mean, growing through the supervision period.
     bus_a: f32,
-    /// The fault that 603Fh and the red light tell of: the last that came.
+    /// The fault that 603Fh and the red light show: the last that came.
     shown_fault: Option<usize>,
 }
 
@@ -110,7 +110,7 @@ impl Zlim42c {
         self.device.node()
     }
 
-    /// Every tenth control period: faults, power state, demand, and what is told of it. The voltages follow every period.
+    /// Every tenth control period: faults, power state, demand, and what is reported of it. The voltages follow every period.
     fn supervise(&mut self, sensors: &Sensors, now: Instant) {
         self.refresh_parameters();
         self.watch_faults(sensors, now);
@@ -158,7 +158,7 @@ impl Zlim42c {
         self.enter_fault(new, now);
     }
 
-    /// New faults: off, and tell.
+    /// New faults: off, and report.
     fn enter_fault(&mut self, new: FaultSet, now: Instant) {
         if new.is_empty() {
             return;
@@ -203,7 +203,7 @@ impl Zlim42c {
         self.shell.targets = Targets { velocity, ..Targets::default() };
     }
 
-    /// The motor follows what it is told, as far as the drive knows.
+    /// The motor follows its command, as far as the drive knows.
     fn feedback(&self) -> Feedback {
         let velocity = self.stepper.velocity();
         Feedback {

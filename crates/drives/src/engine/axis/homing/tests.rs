@@ -115,7 +115,7 @@ fn both_limits_without_a_home_switch_end_the_search() {
 #[test]
 fn without_a_method_nothing_starts() {
     let mut homing = Homing::default();
-    assert_eq!(homing.state(), HomingState::None, "nobody has asked for it");
+    assert_eq!(homing.state(), HomingState::None, "homing was not asked for");
     assert_eq!(homing.start(&RUN, Switches::default(), 0), None);
     assert_eq!(homing.state(), HomingState::Failed);
 }
