@@ -15,7 +15,7 @@ use crate::World;
 /// Why a future did not finish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BlockOnError {
-    /// The future waits, nobody woke it, and nothing will ever happen in the world again.
+    /// The future waits, nothing woke it, and nothing will ever happen in the world again.
     #[error("stalled at {at} s: the future waits, but nothing is left to happen in the world")]
     Stalled {
         /// The world's time.

@@ -120,8 +120,8 @@ pub enum CommandError {
         "unknown command {0:?}; expected now, help, run, quit, bus, body, or a node number and a command, as in: 4 get"
     )]
     Unknown(String),
-    /// The number is no node number.
-    #[error("{0:?} is no node number; expected 1 to 127")]
+    /// The number is not a node number.
+    #[error("{0:?} is not a node number; expected 1 to 127")]
     BadNode(String),
     /// A node number and nothing after it.
     #[error(
@@ -129,7 +129,7 @@ pub enum CommandError {
          battery, pulses, quadrature, duty, clock, cable, bus, set or get, as in: {0} get"
     )]
     NoAction(String),
-    /// The words are no stimulus.
+    /// The words are not a stimulus.
     #[error(transparent)]
     Stimulus(#[from] StimulusError),
     /// No drive has this number.
@@ -170,7 +170,7 @@ impl CommandError {
             }
             Self::NotManual => Some("start the simulator with --clock manual"),
             Self::Running { .. } | Self::TooMany { .. } => Some("wait for the answer to the run"),
-            Self::Ended { .. } => Some("now tells how far time has come; run goes on from there"),
+            Self::Ended { .. } => Some("now shows how far time has come; run goes on from there"),
             Self::TooLong => Some("give each command a line of its own"),
             Self::NoSuchDrive { .. } | Self::NoSuchBody { .. } | Self::Refused(_) => None,
         }
@@ -201,7 +201,7 @@ pub struct Answer {
 /// Longest line that is read, in bytes: many times the longest command.
 pub const MAX_LINE_LENGTH: usize = 4096;
 
-/// What only the one who moves a world's time and serves its bus knows; `now` and `get` tell it.
+/// What only the one who moves a world's time and serves its bus knows; `now` and `get` show it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Service {
     /// How far the world's time is behind the clock; nothing where no clock drives it.
@@ -218,7 +218,7 @@ pub fn perform(world: &mut World, command: &Command, service: Service) -> Result
     answer::answer(world, command, service)
 }
 
-/// Does what a line says and answers it, in a world that nobody serves; `None` for a blank line or a comment.
+/// Does what a line says and answers it, in a world that is not served; `None` for a blank line or a comment.
 pub fn answer(world: &mut World, line: &str) -> Option<Answer> {
     answer_served(world, line, Service::default())
 }

@@ -42,7 +42,7 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
         if axis.0 < axes { Ok(()) } else { Err(Refused::NoSuchAxis { model, axis: u16::from(axis.0) + 1, axes }) }
     }
 
-    /// What the outer world does to it, all of it or nothing. What is no axis' own is the whole drive's, whatever the axis.
+    /// What the outer world does to it, all of it or nothing. What does not belong to an axis is the whole drive's, whatever the axis.
     fn apply(&mut self, axis: AxisId, stimulus: &Stimulus, now: Instant) -> Result<(), Refused>;
 
     /// Whether it takes the time that such a device takes, to boot, to answer and to store, or none; `seed` decides its
@@ -77,7 +77,7 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     }
 
     /// What the shaft of an axis will do in the end if its load stays as it is; `None` while the drive drives it, or where it
-    /// cannot be told. Velocities are the motor's.
+    /// is not known. Velocities are the motor's.
     fn free_run(&self, axis: AxisId) -> Option<FreeRun> {
         let _ = axis;
         None

@@ -2,10 +2,10 @@
 //!
 //! A world that is [watched](crate::World::watch) notes an [`Event`] when it happens. Of what the wire carries that is its
 //! own instant; what a firmware does by itself is seen when its communication task has run, at most 1 ms later, which is
-//! when it could first tell of it on the bus. Watching changes nothing: the run has the same digest.
+//! when it could first report it on the bus. Watching changes nothing: the run has the same digest.
 //!
 //! Events are pulled with [`World::poll_event`](crate::World::poll_event), oldest first. At most [`MAX_WAITING`] wait; when
-//! nobody pulls, the oldest go, and [`EventKind::Missed`] says how many.
+//! are not pulled, the oldest go, and [`EventKind::Missed`] says how many.
 
 mod names;
 mod words;
@@ -82,7 +82,7 @@ pub enum EventKind {
     Emcy {
         /// Its content.
         emcy: Emcy,
-        /// The fault of that drive that it tells of.
+        /// The fault of that drive that it reports.
         row: Option<&'static FaultRow>,
     },
     /// Statusword bit 10, target reached, has come while the operation is enabled.
@@ -99,7 +99,7 @@ pub enum EventKind {
     /// Something at the machine is destroyed.
     Damage(&'static str),
     /// An attempt to send failed: an error frame. Of attempts in a row at one frame the first, second, fourth, eighth and so
-    /// on are told.
+    /// on are reported.
     BusError {
         /// Why.
         cause: ErrorCause,

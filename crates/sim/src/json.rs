@@ -13,7 +13,7 @@ const DECIMALS: f64 = 1e6;
 /// Above this a `f64` has no millionths to round.
 const WHOLE: f64 = 9_007_199_254_740_992.0;
 
-/// One line of JSON. Numbers with a fraction are rounded to a millionth; what is no number is `null`.
+/// One line of JSON. Numbers with a fraction are rounded to a millionth; what is not a number is `null`.
 ///
 /// # Errors
 /// Those of the value's own `Serialize`.

@@ -8,7 +8,7 @@ use canopen::NmtCommand;
 use canopen::connection_set::SDO_REPLY_BASE;
 use canopen::nmt::{NmtRequest, NmtTarget};
 
-/// Whether a frame tells the node of this node-ID to reset its communication, or itself.
+/// Whether a frame commands the node of this node-ID to reset its communication, or itself.
 pub(crate) fn is_asked_of(frame: &Frame, node: impl FnOnce() -> u8) -> bool {
     let Ok(NmtRequest { command, target }) = NmtRequest::parse(frame) else { return false };
     matches!(command, NmtCommand::ResetNode | NmtCommand::ResetCommunication)

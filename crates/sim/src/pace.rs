@@ -1,6 +1,6 @@
 //! Pace: which virtual instant belongs to an elapsed wall-clock time, and how far a world is behind.
 //!
-//! Pure arithmetic. Whoever reads the clock hands the elapsed time in; nothing here reads one.
+//! Pure arithmetic. The caller reads the clock and hands the elapsed time in; nothing here reads one.
 
 use core::time::Duration;
 

@@ -95,7 +95,7 @@ impl Recorder {
         self.values.iter().skip(start).step_by(step).copied()
     }
 
-    /// What happened when, as told by [`mark`](Self::mark).
+    /// What happened when, as given by [`mark`](Self::mark).
     pub fn marks(&self) -> &[(Instant, String)] {
         &self.marks
     }

@@ -2,7 +2,7 @@
 
 use canopen::Mux;
 
-/// Why a drive did not take what it was told to.
+/// Why a drive did not take a stimulus.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refused {
     /// The model has no such part.

@@ -3,7 +3,7 @@
 //! [`Bus`] holds one controller for each station and the wire between them. Frames go in with
 //! [`Bus::offer`]; time comes in with [`Bus::arbitrate`] and [`Bus::advance`]; frames that passed,
 //! errors and changes of error state come out. The lowest arbitration key wins an idle wire and holds
-//! it for the exact bits of the frame; a frame that nobody acknowledges, or that was disturbed, costs
+//! it for the exact bits of the frame; a frame that is not acknowledged, or that was disturbed, costs
 //! an error frame and counts in the error counters of everybody who saw it.
 //!
 //! Deliberately absent: overload frames, propagation delay, clock tolerance, and the superposition of
@@ -22,7 +22,7 @@ pub use controller::ControllerOptions;
 
 use can::{Frame, Instant};
 
-/// Recessive bits in a row that tell a controller that the wire is idle.
+/// Recessive bits in a row that show a controller that the wire is idle.
 pub(crate) const IDLE_BITS: u64 = 11;
 
 /// Sequences of eleven recessive bits that a bus-off controller waits for (fault confinement, rule 12).

@@ -35,7 +35,7 @@ use member::{Member, Vacant};
 use probe::Probe;
 use watch::Watch;
 
-/// Tells the seeds of a drive's timing from those of its noise.
+/// Distinguishes the seeds of a drive's timing from those of its noise.
 const TIMING_SEED: u64 = 0x7469_6D69_6E67;
 
 /// A bus with everything on it.
@@ -73,7 +73,7 @@ impl StationId {
     }
 }
 
-/// Why a world did not do what it was told.
+/// Why a world did not do what was asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum WorldError {
     /// A second drive under one number.
@@ -82,8 +82,8 @@ pub enum WorldError {
     /// No drive was added under this number.
     #[error("there is no drive {0}")]
     NoSuchDrive(u8),
-    /// The station is no probe.
-    #[error("station {} is no probe", .0.0)]
+    /// The station is not a probe.
+    #[error("station {} is not a probe", .0.0)]
     NotAProbe(StationId),
     /// More frames wait at this probe than it can hold.
     #[error("too many frames wait to be sent")]
@@ -207,7 +207,7 @@ impl World {
         }
     }
 
-    /// True if a probe has heard a frame that nobody took yet.
+    /// True if a probe has heard a frame that has not been taken yet.
     pub fn has_received(&self, probe: StationId) -> bool {
         matches!(&self.members[probe.0], Member::Probe(probe) if probe.has_received())
     }

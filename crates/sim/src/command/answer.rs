@@ -100,7 +100,7 @@ const fn is_load(stimulus: &Stimulus) -> bool {
     matches!(stimulus, Stimulus::LoadTorque(_) | Stimulus::Load(_))
 }
 
-/// What a load will do to a shaft that nobody drives: it is active, and friction does not stop it.
+/// What a load will do to a shaft that is not driven: it is active, and friction does not stop it.
 fn outlook(world: &mut World, place: Place) -> Option<String> {
     let free_run = world.with_drive(place.node, |drive, now| {
         drive.advance(now);

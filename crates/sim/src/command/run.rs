@@ -1,4 +1,4 @@
-//! `run 20ms`, `run until 2.5s`: time that passes because somebody says so, and what happened in it.
+//! `run 20ms`, `run until 2.5s`: time that passes on request, and what happened in it.
 
 use core::time::Duration;
 
@@ -62,7 +62,7 @@ pub struct Before {
     nodes: Vec<Node>,
 }
 
-/// What may change about a drive that a person would be told of.
+/// What may change about a drive that is reported to a person.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 struct Node {
     node: u8,

@@ -2,7 +2,7 @@
 
 use super::EventKind;
 
-/// Each kind's name and what it tells, as [`EventKind::name`] has them.
+/// Each kind's name and what it means, as [`EventKind::name`] has them.
 pub const KINDS: [(&str, &str); 20] = [
     ("power", "a drive's supply has come, or its bus has drained"),
     ("boot", "a boot-up message"),
@@ -23,7 +23,7 @@ pub const KINDS: [(&str, &str); 20] = [
     ("stimulus", "a world command was done"),
     ("behind", "the bus has fallen behind the clock"),
     ("caught_up", "the bus has caught up with the clock"),
-    ("missed", "events are lost, for nobody read them in time"),
+    ("missed", "events are lost, as they were not read in time"),
 ];
 
 impl EventKind {

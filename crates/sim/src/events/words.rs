@@ -67,7 +67,7 @@ impl fmt::Display for EventKind {
             Self::CaughtUp { worst } => {
                 write!(f, "the bus has caught up with the clock; it was up to {} ms behind", worst.as_millis())
             }
-            Self::Missed(count) => write!(f, "{count} events are missing here: nobody read them in time"),
+            Self::Missed(count) => write!(f, "{count} events are missing here: they were not read in time"),
         }
     }
 }
@@ -111,7 +111,7 @@ impl ErrorCause {
     const fn sentence(self) -> &'static str {
         match self {
             Self::Disturbed => "disturbed on the wire",
-            Self::NotAcknowledged => "nobody acknowledged it",
+            Self::NotAcknowledged => "it was not acknowledged",
             Self::Collision => "another node sent the same identifier with other contents",
             Self::BitRate => "a node at another bit rate got in between",
             Self::Abandoned => "its sender lost power or cable in the middle of it",

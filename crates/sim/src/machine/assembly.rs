@@ -165,7 +165,7 @@ pub trait Assembly: Clone + Send + 'static {
     /// Ends the control period of a coupled axis.
     fn follow(&mut self, axis: AxisId, motion: &Motion);
 
-    /// What the shaft will do if its load stays as it is; `None` while the drive drives it, or where it cannot be told.
+    /// What the shaft will do if its load stays as it is; `None` while the drive drives it, or where it is not known.
     fn free_run(&self, axis: AxisId) -> Option<FreeRun>;
 
     /// Contents of the memory chip as of the last power-off.

@@ -82,7 +82,7 @@ pub struct Joint {
     last_reading: Option<EncoderReading>,
 }
 
-/// What the encoder tells.
+/// What the encoder reads.
 #[derive(Clone, Copy, Debug)]
 struct EncoderReading {
     angle_count: u16,
@@ -354,7 +354,7 @@ impl Assembly for Joint {
         let absent = |what| Err(Refused::Absent { model: self.model(), what });
         match component {
             Component::Hall => return absent("Hall sensors: its encoder is absolute"),
-            Component::Reference => return absent("reference voltage that it watches: no alarm tells of one"),
+            Component::Reference => return absent("reference voltage that it watches: no alarm reports one"),
             Component::Short => return absent("short circuit to simulate"),
             Component::Bleeder => return absent("bleeder"),
             Component::Bridge if broken => self.motor.burn_power_stage(),

@@ -1,4 +1,4 @@
-//! A described device that is no drive: its objects on the bus, a supply switch and a memory, and nothing that turns.
+//! A described device that is not a drive: its objects on the bus, a supply switch and a memory, and nothing that turns.
 
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::Mux;

@@ -45,7 +45,7 @@ impl Order {
 /// Why there is no such drive.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum OrderError {
-    /// Nobody has built this model yet.
+    /// This model has not been built yet.
     #[error("there is no virtual {model}")]
     NoSuchModel {
         /// The model's name.
@@ -115,7 +115,7 @@ pub(super) fn memory(model: &'static Description, order: &Order) -> Result<Memor
     }
     let mut values = Dictionary::<Boxed>::new(model.dictionary, order.node);
     let refused = |preset: &Preset, error| OrderError::Preset { preset: *preset, error };
-    // Not of the store: its maker's marks, by which LSS tells it from others of its make, and what a sheet leaves to the device.
+    // Not of the store: its maker's marks, by which LSS distinguishes it from others of its make, and what a sheet leaves to the device.
     let is_mark = |preset: &&Preset| model.row(preset.object).is_some_and(is_makers_mark);
     let (marks, presets): (Vec<&Preset>, Vec<&Preset>) = order.presets.iter().partition(is_mark);
     for preset in presets {

@@ -139,7 +139,7 @@ mod tests {
     use crate::VirtualDrive;
     use crate::machine::{Order, mjoint, servo, zlac8030l, zlim42c};
 
-    /// When a machine that is switched on, and that nobody uses, is first found at rest within `limit_s`.
+    /// When a machine that is switched on, and that is not used, is first found at rest within `limit_s`.
     fn rests_after<A: Assembly>(mut machine: Machine<A>, limit_s: u64) -> Option<f64> {
         machine.set_power(true, Instant::ZERO);
         let mut now = Instant::ZERO;
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_that_nobody_uses_is_at_rest_within_seconds() {
+    fn a_drive_that_is_not_used_is_at_rest_within_seconds() {
         let joint = mjoint(Model::named("m4230e17b50").expect("a model"), 4, Bitrate::M1);
         let found = [
             ("zlac8030l", rests_after(zlac8030l(4, 0), 10)),

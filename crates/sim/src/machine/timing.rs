@@ -60,7 +60,7 @@ struct Waiting {
 enum Kind {
     /// To the SDO server.
     Request,
-    /// RPDO, SYNC, and whatever else is no business of the operating system.
+    /// RPDO, SYNC, and whatever else is not handled by the operating system.
     Process,
     /// NMT, heartbeats of others: what the controller's interrupt looks after.
     Management,

@@ -1,7 +1,7 @@
 //! A ZLIM42-C on its hardware: stepper, load, supply and EEPROM as the assembly of a machine.
 //!
 //! In go the bridges and outputs of the firmware, out come its sensors and the report for people. The drive does not
-//! know where its rotor is; the report tells both, the commanded position and the rotor's in the same pulses. Figures of
+//! know where its rotor is; the report has both, the commanded position and the rotor's in the same pulses. Figures of
 //! the motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use std::slice::from_mut;

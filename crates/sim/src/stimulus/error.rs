@@ -1,6 +1,6 @@
-//! Why words are no stimulus.
+//! Why words are not a stimulus.
 
-/// Why words are no stimulus.
+/// Why words are not a stimulus.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StimulusError {
     /// The first word is unknown.
@@ -12,8 +12,8 @@ pub enum StimulusError {
     /// Missing, surplus or unknown words.
     #[error("expected: {0}")]
     Usage(&'static str),
-    /// No finite number, or one that makes no sense.
-    #[error("{text:?} is no {what}; expected: {usage}")]
+    /// Not a finite number, or one that makes no sense.
+    #[error("invalid {what} {text:?}; expected: {usage}")]
     BadValue {
         /// What was given.
         text: String,

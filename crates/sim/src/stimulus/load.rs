@@ -131,7 +131,7 @@ fn friction(words: &[&str]) -> Result<Friction, StimulusError> {
             ["stribeck", text] => friction.stribeck_rad_s = Some(value(text, "velocity", FRICTION)?),
             ["viscous" | "static" | "stribeck"] | [] => return Err(StimulusError::Usage(FRICTION)),
             [word, ..] => {
-                let (text, what) = (excerpt(word), "'viscous', 'static' or 'stribeck' before a further number");
+                let (text, what) = (excerpt(word), "term of friction");
                 return Err(StimulusError::BadValue { text, what, usage: FRICTION });
             }
         }

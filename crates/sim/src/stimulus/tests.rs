@@ -129,11 +129,11 @@ fn an_object_is_given_in_any_of_the_usual_spellings() {
     for (words, error) in [
         ("set", "expected: NODE set OBJECT VALUE"),
         ("set 6000:01", "expected: NODE set OBJECT VALUE"),
-        ("set 60000 1", "\"60000\" is no object; expected: NODE set OBJECT VALUE"),
-        ("set 6000:100 1", "\"6000:100\" is no object; expected: NODE set OBJECT VALUE"),
-        ("set 6000 -FFh", "\"-FFh\" is no value; expected: NODE set OBJECT VALUE"),
-        ("set 6000 \"open", "\"\\\"open\" is no value; expected: NODE set OBJECT VALUE"),
-        ("set 6000 nan", "\"nan\" is no value; expected: NODE set OBJECT VALUE"),
+        ("set 60000 1", "invalid object \"60000\"; expected: NODE set OBJECT VALUE"),
+        ("set 6000:100 1", "invalid object \"6000:100\"; expected: NODE set OBJECT VALUE"),
+        ("set 6000 -FFh", "invalid value \"-FFh\"; expected: NODE set OBJECT VALUE"),
+        ("set 6000 \"open", "invalid value \"\\\"open\"; expected: NODE set OBJECT VALUE"),
+        ("set 6000 nan", "invalid value \"nan\"; expected: NODE set OBJECT VALUE"),
     ] {
         assert_eq!(parsed(words).unwrap_err().to_string(), error, "{words}");
     }
@@ -156,8 +156,8 @@ fn what_is_wrong_with_a_load_is_said_with_its_own_form() {
     for (words, error) in [
         ("load", "expected: NODE load torque|inertia|friction|pulley|spring|stop|fan|gear VALUES, or NODE load none"),
         ("load pulley 2", "expected: NODE load pulley KG METRES, or NODE load pulley off"),
-        ("load pulley -2 1", "\"-2\" is no mass; expected: NODE load pulley KG METRES, or NODE load pulley off"),
-        ("load fan 1 inf", "\"inf\" is no speed; expected: NODE load fan N·m R/MIN, or NODE load fan off"),
+        ("load pulley -2 1", "invalid mass \"-2\"; expected: NODE load pulley KG METRES, or NODE load pulley off"),
+        ("load fan 1 inf", "invalid speed \"inf\"; expected: NODE load fan N·m R/MIN, or NODE load fan off"),
         ("load stop 5 -5", "the range from 5 to -5 is empty; give the lower bound first"),
         (
             "load friction 1 static",
@@ -165,7 +165,7 @@ fn what_is_wrong_with_a_load_is_said_with_its_own_form() {
         ),
         (
             "load friction 0.2 0.02",
-            "\"0.02\" is no 'viscous', 'static' or 'stribeck' before a further number; expected: NODE load friction N·m \
+            "invalid term of friction \"0.02\"; expected: NODE load friction N·m \
              [viscous N·m·s/rad] [static N·m] [stribeck rad/s], or NODE load friction off",
         ),
         ("load none of it", "expected: NODE load none"),

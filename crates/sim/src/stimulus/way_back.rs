@@ -5,8 +5,8 @@ use super::kinds::{Power, Stimulus};
 use super::load::{LoadKind, LoadPart};
 
 impl Stimulus {
-    /// What puts the world back to where nobody has done this. `None` for what mends something already, and for what was another
-    /// value before that the stimulus does not tell: a supply, the object of a node.
+    /// What puts the world back to where this has not been done. `None` for what mends something already, and for what was another
+    /// value before that the stimulus does not hold: a supply, the object of a node.
     #[must_use]
     pub fn way_back(&self) -> Option<Self> {
         Some(match self {
@@ -71,7 +71,7 @@ impl BusFault {
 }
 
 impl WireFault {
-    /// What puts the wire back to where nobody has done this.
+    /// What puts the wire back to where this has not been done.
     #[must_use]
     pub fn way_back(&self) -> Option<Self> {
         match self {

@@ -6,7 +6,7 @@ use super::range::SwitchRange;
 /// The longest word that is said again in an error.
 const LONGEST_SHOWN: usize = 40;
 
-/// A word to be said again in an error: no more of it than tells which one is meant.
+/// A word to be said again in an error: no more of it than shows which one is meant.
 pub(crate) fn excerpt(text: &str) -> String {
     match text.char_indices().nth(LONGEST_SHOWN) {
         None => text.to_owned(),

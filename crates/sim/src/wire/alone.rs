@@ -1,4 +1,4 @@
-//! A node whose cable is cut: a wire of its own, with nobody to acknowledge.
+//! A node whose cable is cut: a wire of its own, with no node to acknowledge.
 
 use can::{ERROR_FRAME_BITS, Instant, frame_bits};
 

@@ -70,7 +70,7 @@ impl Bus {
         self.prng != self.fresh
     }
 
-    /// A bus at `bitrate` with nobody on it. `seed` decides all random faults.
+    /// A bus at `bitrate` with no node on it. `seed` decides all random faults.
     pub fn new(bitrate: Bitrate, seed: u64) -> Self {
         Self {
             bitrate,
@@ -152,7 +152,7 @@ impl Bus {
         }
     }
 
-    /// When something happens next if nobody offers anything; `None` for never.
+    /// When something happens next if no node offers anything; `None` for never.
     pub fn next_event(&self) -> Option<Instant> {
         let main = match &self.main.transmission {
             Some(transmission) => transmission.end,

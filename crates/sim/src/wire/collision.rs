@@ -1,4 +1,4 @@
-//! Two nodes that send one identifier with different contents: arbitration cannot tell them apart, a bit error does.
+//! Two nodes that send one identifier with different contents: arbitration cannot distinguish them, a bit error does.
 
 use can::Frame;
 

@@ -58,7 +58,7 @@ impl ErrorCounters {
         self.tec = (self.tec + 8).min(BUS_OFF_ABOVE + 1);
     }
 
-    /// Nobody acknowledged. An error-passive transmitter that reads no dominant bit during its passive
+    /// Not acknowledged. An error-passive transmitter that reads no dominant bit during its passive
     /// error flag keeps its counter: alone, a node never goes bus-off (rule 3, exception 1).
     pub(crate) fn acknowledge_error(&mut self) {
         if self.state() == ErrorState::ErrorActive {

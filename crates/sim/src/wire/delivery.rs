@@ -139,7 +139,7 @@ impl Bus {
         (source, frame, ended_at)
     }
 
-    /// An error-active listener at another bit rate takes every frame for an error and says so.
+    /// An error-active listener at another bit rate takes every frame for an error and signals it.
     fn foreign_listener_objects(&self, now: Instant) -> bool {
         self.any_foreign
             && (0..self.controllers.len()).any(|i| {

@@ -6,7 +6,7 @@ use crate::wire::WireEvent;
 
 /// What happened on the wire, oldest first: frames, errors, changes of error state.
 ///
-/// Holds the last [`FrameLog::DEFAULT_LIMIT`] entries unless told otherwise.
+/// Holds the last [`FrameLog::DEFAULT_LIMIT`] entries unless set otherwise.
 #[derive(Clone, Debug)]
 pub struct FrameLog {
     entries: VecDeque<WireEvent>,
@@ -34,7 +34,7 @@ impl FrameLog {
         self.entries.iter()
     }
 
-    /// Entries lost because nobody pulled them in time.
+    /// Entries lost because they were not pulled in time.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }

@@ -37,7 +37,7 @@ impl Clone for Box<dyn AnyStation> {
     }
 }
 
-/// Whoever is joined to one controller of the bus.
+/// The station that is joined to one controller of the bus.
 #[derive(Clone)]
 pub(super) enum Member {
     Drive { number: u8, drive: Box<dyn VirtualDrive> },

@@ -35,7 +35,7 @@ impl World {
 
     /// Looks again at stations that were changed from outside: what they have to send, when they are due.
     ///
-    /// They are told the time first, so that they can count from it.
+    /// They are given the time first, so that they can count from it.
     pub fn refresh(&mut self) {
         for i in 0..self.members.len() {
             if let Member::Station(station) = &mut self.members[i] {

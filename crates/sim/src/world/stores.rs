@@ -1,6 +1,6 @@
 //! Stores that somebody outside keeps: what a drive answers after a store waits until the store is kept.
 //!
-//! A drive's non-volatile memory lives in the world. Whoever brings it to a disk asks for that with
+//! A drive's non-volatile memory lives in the world. A caller that brings it to a disk asks for that with
 //! [`World::guard_stores`]: from then on each new content is handed out once by [`World::poll_store`], and an SDO answer
 //! that a drive gives after a store, or while one is due, stays off the wire until [`World::confirm_store`]. Nothing else
 //! waits: process data and heartbeats acknowledge nothing.
@@ -89,7 +89,7 @@ impl World {
         }
     }
 
-    /// Station `i` is about to take a frame that may tell it to reset.
+    /// Station `i` is about to take a frame that may command it to reset.
     #[inline]
     pub(super) fn forget_held_on_reset(&mut self, i: usize, frame: &Frame) {
         let (Some(Some(ledger)), Member::Drive { drive, .. }) = (self.ledgers.get_mut(i), &self.members[i]) else {

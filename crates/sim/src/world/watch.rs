@@ -1,7 +1,7 @@
 //! What a watched world remembers, and what it notes.
 //!
 //! A drive is looked at after each frame and deadline of it, and after each stimulus, and compared with what it was like
-//! before; the wire tells of itself. Looking changes nothing: [`VirtualDrive::report_of`] reads what is there.
+//! before; the wire reports itself. Looking changes nothing: [`VirtualDrive::report_of`] reads what is there.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -24,16 +24,16 @@ use crate::{Report, VirtualDrive};
 /// What a watched world remembers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
-    /// By station: its axes as they were when last looked at; none for a station that is no drive.
+    /// By station: its axes as they were when last looked at; none for a station that is not a drive.
     seen: Vec<Vec<Condition>>,
-    /// By station: its controller as the wire last told.
+    /// By station: its controller as the wire last reported.
     controllers: Vec<Controller>,
     waiting: VecDeque<Event>,
     missed: u64,
     pub(super) actor: Option<Arc<str>>,
 }
 
-/// What events tell of one axis.
+/// What events report of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Condition {
     power: PowerPhase,
@@ -186,7 +186,7 @@ impl Subject<'_> {
             mode,
             // A drive that is dead has forgotten what was wrong, and shows nothing.
             error_code: if powered { error_code } else { 0 },
-            // Bits that events tell of; the others change with every set-point.
+            // Bits that events report; the others change with every set-point.
             statusword: statusword.unwrap_or(0) & (Statusword::TARGET_REACHED | Statusword::INTERNAL_LIMIT_ACTIVE),
             damage,
             storing: self.drive.is_storing(),
@@ -194,7 +194,7 @@ impl Subject<'_> {
         }
     }
 
-    /// Tells `note` how the one differs from the other. What is the whole drive's is told at its first axis.
+    /// Reports to `note` how the one differs from the other. What is the whole drive's is reported at its first axis.
     fn compare(self, place: Place, before: &Condition, after: &Condition, mut note: impl FnMut(EventKind)) {
         let first = place.axis == AxisId::FIRST;
         if first && before.power != after.power {

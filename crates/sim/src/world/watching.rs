@@ -1,4 +1,4 @@
-//! A world that tells what happens in it, if asked to.
+//! A world that reports what happens in it, if asked to.
 
 use std::sync::Arc;
 
@@ -31,7 +31,7 @@ impl World {
         self.watch.as_mut()?.pull(self.now)
     }
 
-    /// Who is behind the stimuli from here on, for those who watch: a client's name, `scenario`; `None` for nobody in
+    /// Who is behind the stimuli from here on, for those who watch: a client's name, `scenario`; `None` for no one in
     /// particular.
     pub fn act_as(&mut self, who: Option<Arc<str>>) {
         if let Some(watch) = &mut self.watch {
@@ -39,7 +39,7 @@ impl World {
         }
     }
 
-    /// Has those who watch told of something that only the caller knows of.
+    /// Reports something that only the caller knows of to those who watch.
     pub fn tell(&mut self, place: Option<Place>, kind: EventKind) {
         let at = self.now;
         if let Some(watch) = &mut self.watch {
@@ -68,7 +68,7 @@ impl World {
         }
     }
 
-    /// Takes over what the wire tells.
+    /// Takes over what the wire reports.
     pub(super) fn note_wire(&mut self, event: &WireEvent) {
         if let Some(watch) = &mut self.watch {
             watch.hear(event, &self.members);

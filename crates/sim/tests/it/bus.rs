@@ -310,7 +310,7 @@ fn a_node_at_another_bit_rate_sees_and_makes_errors_only() {
     assert_eq!(world.counters(odd).state(), ErrorState::ErrorPassive);
     assert_eq!(world.counters(a).state(), ErrorState::ErrorActive);
 
-    // As a transmitter it goes bus-off, 32 errors each time, and disturbs nobody for good.
+    // As a transmitter it goes bus-off, 32 errors each time, and does not disturb the others for good.
     world.run_until(at_ms(520));
     assert!(states(&world, odd).iter().any(|(_, state)| *state == ErrorState::BusOff));
     world.send(a, frame("123#FF")).unwrap();

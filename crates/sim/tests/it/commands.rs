@@ -96,7 +96,7 @@ fn now_and_get_tell_what_the_one_who_serves_the_world_knows() {
     assert_eq!(json(&mut world, "now")["behind_ms"], 12);
     assert_eq!(json(&mut world, "now")["frames_lost"], 3);
     assert_eq!(json(&mut world, "4 get")["behind_ms"], 12);
-    assert_eq!(ask(&mut world, "4 get")["behind_ms"], 0, "a world that nobody serves is never late");
+    assert_eq!(ask(&mut world, "4 get")["behind_ms"], 0, "a world that is not served is never late");
 }
 
 #[test]

@@ -214,7 +214,7 @@ fn what_is_asked_of_a_drive_that_resets_is_never_answered_also_right_before_its_
     for model in models() {
         for command in ["000#8200", "000#8100"] {
             let mut bench = Bench::booted(model, 1);
-            // When it ends: the same world, with nobody who asks later.
+            // When it ends: the same world, without a later question.
             let mut alone = Bench { world: bench.world.snapshot(), adapter: bench.adapter };
             alone.send("605#4000100000000000");
             alone.send(command);

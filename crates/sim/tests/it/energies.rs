@@ -103,7 +103,7 @@ fn work_on_a_load_is_its_torque_times_the_way() {
     let way_rad = samples.change(Signal::LoadAngle);
     assert!(way_rad > 1.0, "the load turns it: {way_rad} rad");
     near("work on the torque", samples.change(Signal::LoadWork), -2.0 * way_rad, 1e-3);
-    // Nobody drives it: it has its speed from the load, less what friction took.
+    // It is not driven: it has its speed from the load, less what friction took.
     near(
         "of the load's work",
         samples.change(Signal::StoredEnergy) + samples.change(Signal::FrictionHeat),

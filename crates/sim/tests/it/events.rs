@@ -1,4 +1,4 @@
-//! What happens in a world is told: once, in order, with node, cause and remedy, and without changing the run.
+//! What happens in a world is reported: once, in order, with node, cause and remedy, and without changing the run.
 
 use std::time::Duration;
 
@@ -187,7 +187,7 @@ fn a_watched_run_is_the_same_run() {
 }
 
 #[test]
-fn what_nobody_pulls_is_bounded_and_counted() {
+fn what_is_not_pulled_is_bounded_and_counted() {
     let (mut world, _) = world();
     world.run_for(Duration::from_secs(1));
     events(&mut world);

@@ -23,7 +23,7 @@ fn a_silent_node_sends_nothing_acknowledges_nothing_and_hears() {
     assert!(texts(&world).is_empty());
     world.send(a, frame("123#")).unwrap();
     world.run_until(at_ms(50));
-    assert_eq!(world.counters(a).state(), ErrorState::ErrorPassive, "nobody acknowledges");
+    assert_eq!(world.counters(a).state(), ErrorState::ErrorPassive, "it is not acknowledged");
     let c = world.add_probe();
     world.run_until(at_ms(51));
     assert_eq!(heard(&mut world, b), ["123#"]);

@@ -110,7 +110,7 @@ fn a_store_that_does_not_come_is_not_waited_for() {
     let (mut world, probe) = guarded();
     assert!(sim::command::answer(&mut world, BROKEN).unwrap().json.contains("true"));
     exchange(&mut world, probe, None, 20);
-    // An EEPROM that does not answer takes nothing; the drive says so by its fault, not by silence.
+    // An EEPROM that does not answer takes nothing; the drive shows it by its fault, not by silence.
     assert!(exchange(&mut world, probe, Some(WRITE_700), 5).contains(&TAKEN.to_owned()));
     assert_eq!(world.poll_store(), None);
 }

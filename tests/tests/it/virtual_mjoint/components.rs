@@ -61,7 +61,7 @@ fn a_lost_phase_takes_torque_and_a_heavy_load_locks_the_rotor() {
 #[test]
 fn parts_that_a_joint_does_not_have_cannot_break() {
     let mut bench = Bench::new();
-    for (part, because) in [("hall", "its encoder is absolute"), ("reference", "no alarm tells of one")] {
+    for (part, because) in [("hall", "its encoder is absolute"), ("reference", "no alarm reports one")] {
         let line = format!("1 fault {part} on");
         let answer = sim::command::answer(&mut bench.world, &line).expect("a line is answered").json;
         assert!(answer.starts_with("{\"ok\":false") || answer.contains("\"ok\":false"), "{answer}");
