@@ -9,6 +9,8 @@ world = ferrodrive.World()                      # or Network("socketcand://127.0
 world.add("m4230e17b50", node=1)
 world.add("zlim42c", node=2)
 with ferrodrive.Network(world) as network:
+    for node in (1, 2):
+        network.wait_for(node)                  # it boots, as a real one: about a second
     network.sleep(1)
     axes = [
         ferrodrive.Axis(1, "m4230e17b50", mode="ip", velocity_rpm=20, range_deg=(-180, 180)),

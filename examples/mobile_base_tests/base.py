@@ -30,6 +30,7 @@ class Base:
         self.network.connect(**bus)
         self.wheels = {}
         self.counts = {}
+        self.counted_s = {}
         self.statuswords = {}
         self.x_m = self.y_m = self.heading_rad = 0.0
         self.fault = threading.Event()
@@ -55,6 +56,7 @@ class Base:
         self.fall_silent()
         self.fault.clear()
         self.counts.clear()
+        self.counted_s.clear()
         for node_id, node in self.wheels.items():
             self.check_model(node)
             node.nmt.state = "PRE-OPERATIONAL"
@@ -102,14 +104,17 @@ class Base:
             rpdo.update()
 
     def on_actual_values(self, node_id, message):
-        """One wheel's values; with the second wheel's the pose is counted on."""
+        """One wheel's values; the pose is counted on with those of both wheels to the same SYNC. Which of them answers first is the
+        drives' own: values of two cycles would turn the base by what a wheel rolls in one."""
         statusword, counts = (variable.raw for variable in message)
         if statusword & FAULT:
             self.fault.set()
         self.statuswords[node_id] = statusword
         before = self.counts.setdefault(node_id, [counts, counts])
         before[1] = counts
-        if node_id == RIGHT and len(self.counts) == 2:
+        self.counted_s[node_id] = message.timestamp
+        times = self.counted_s.values()
+        if len(times) == 2 and max(times) - min(times) < SYNC_PERIOD_S / 2:
             arcs = [self.arc_m(self.counts[wheel]) for wheel in (LEFT, RIGHT)]
             middle = self.heading_rad + (arcs[1] - arcs[0]) / WHEEL_BASE_M / 2
             self.x_m += sum(arcs) / 2 * math.cos(middle)

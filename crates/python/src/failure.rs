@@ -2,14 +2,13 @@
 
 use std::path::Path;
 
-use master::Error;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use testbench::failure::{Failure, Subject};
 
 mod classes {
     #![allow(missing_docs, reason = "the classes have their words in ferrodrive/errors.py")]
     pyo3::import_exception!(ferrodrive.errors, Refused);
-    pyo3::import_exception!(ferrodrive.errors, MasterError);
 }
 
 /// A stimulus or an order that the world or the device does not take.
@@ -33,25 +32,28 @@ pub(crate) fn wrong_use(error: impl ToString) -> PyErr {
     PyRuntimeError::new_err(error.to_string())
 }
 
-/// Why the master did not get there: its words, what is wrong with the bus, and the abort code for programs.
-pub(crate) fn master_error(py: Python<'_>, error: &Error, bus: Option<String>) -> PyErr {
-    let bus = bus.map(|bus| format!("; {bus}")).unwrap_or_default();
-    let raised = classes::MasterError::new_err(format!("{error}{bus}"));
-    if let Error::Aborted { node, mux, code, .. } = error {
-        let value = raised.value(py);
-        let set = value
-            .setattr("node", node.raw())
-            .and_then(|()| value.setattr("object", (mux.index, mux.sub_index)))
-            .and_then(|()| value.setattr("abort_code", code.0));
-        if let Err(failed) = set {
-            return failed;
-        }
-    }
-    raised
+/// Why the master did not get there: its words, what is wrong with the bus, and the parts for programs.
+pub(crate) fn master_error(py: Python<'_>, text: &str, failure: &Failure, bus: Option<&str>) -> PyErr {
+    let Subject { node, object, abort } = failure.subject;
+    let bus_said = bus.map(|bus| format!("; {bus}")).unwrap_or_default();
+    let parts = (
+        failure.kind,
+        &failure.what,
+        failure.because.iter().map(String::as_str).chain(bus).collect::<Vec<_>>(),
+        &failure.next,
+        (
+            node.map(|node| u16::from(node.raw())),
+            object.map(|mux| (mux.index, mux.sub_index)),
+            abort.map(|code| code.0),
+        ),
+    );
+    let made = py
+        .import("ferrodrive.errors")
+        .and_then(|errors| errors.call_method1("made", (format!("{text}{bus_said}"), parts)));
+    made.map_or_else(|error| error, PyErr::from_value)
 }
 
-/// What a group or a base says, and what is wrong with the bus.
-pub(crate) fn said(text: &str, bus: Option<String>) -> PyErr {
-    let bus = bus.map(|bus| format!("; {bus}")).unwrap_or_default();
-    classes::MasterError::new_err(format!("{text}{bus}"))
+/// Why a request was not even tried, or a file is not taken.
+pub(crate) fn raised(py: Python<'_>, failure: &Failure) -> PyErr {
+    master_error(py, &failure.to_string(), failure, None)
 }

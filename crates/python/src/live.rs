@@ -12,6 +12,7 @@ use tokio::sync::{Notify, mpsc};
 use tokio::task::{JoinSet, LocalSet};
 use transport::{BusNotes, BusSpec, Note, WallClock, run_station};
 
+use crate::master::tap::{Tap, Traffic};
 use crate::world::Job;
 
 /// What the bus says that may wait for a program: each kind comes once, only a connection may come and go for ever.
@@ -64,13 +65,13 @@ impl Live {
     ///
     /// # Errors
     /// Why the bus does not open.
-    pub(crate) fn open(spec: BusSpec, network: Network) -> Result<Self, String> {
+    pub(crate) fn open(spec: BusSpec, network: Network, traffic: Traffic) -> Result<Self, String> {
         let (jobs, incoming) = mpsc::unbounded_channel();
         let opened = Opened::default();
         let said = Arc::new(Said::of(&spec));
         let (told, noted) = (Arc::clone(&opened), Arc::clone(&said));
         let thread = thread::Builder::new().name("ferrodrive master".into());
-        let thread = thread.spawn(move || run(&spec, network, incoming, &told, &noted));
+        let thread = thread.spawn(move || run(&spec, (network, traffic), incoming, &told, &noted));
         let thread = thread.map_err(|error| format!("cannot start a thread: {error}"))?;
         let mut result = opened.0.lock().unwrap_or_else(PoisonError::into_inner);
         let result = loop {
@@ -120,7 +121,13 @@ impl Drop for Live {
 }
 
 /// The thread: opens the bus, says how that went, and runs until the handle is gone or the bus is lost.
-fn run(spec: &BusSpec, network: Network, incoming: mpsc::UnboundedReceiver<Job>, opened: &Opened, said: &Said) {
+fn run(
+    spec: &BusSpec,
+    (network, traffic): (Network, Traffic),
+    incoming: mpsc::UnboundedReceiver<Job>,
+    opened: &Opened,
+    said: &Said,
+) {
     let tell = |result: Result<(), String>| {
         *opened.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
         opened.1.notify_all();
@@ -137,7 +144,7 @@ fn run(spec: &BusSpec, network: Network, incoming: mpsc::UnboundedReceiver<Job>,
             Err(error) => return tell(Err(with_causes(&error))),
         };
         tell(Ok(()));
-        let mut station = network.clone();
+        let mut station = Tap::new(network.clone(), traffic);
         let wakeup = Arc::new(Notify::new());
         let work = work_through(network.clone(), incoming, Arc::clone(&wakeup));
         let ended = run_station(&mut bus, &mut station, &clock, &wakeup, work, |_, note| said.note(note));

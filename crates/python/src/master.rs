@@ -3,9 +3,14 @@
 //! Blocking calls and coroutines are two ways to wait for a job; both are in Python (`ferrodrive/master.py`).
 
 pub(crate) mod axes;
+mod from_file;
 mod job;
+pub(crate) mod params;
 mod runner;
+pub(crate) mod supervise;
+pub(crate) mod tap;
 mod value;
+pub(crate) mod whole;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,16 +22,18 @@ use master::drive::{Drive, HomingOptions, MotionOptions, SwitchedOff};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Error, Gear, Network as Core, Node};
 use pyo3::prelude::*;
-use testbench::machine_file::{self, Machine};
-use testbench::models::Description;
+use testbench::machine_file::Machine;
+use testbench::models::{Description, with_told};
+use testbench::network::read_machine;
 use transport::BusSpec;
 
 pub(crate) use job::Job;
 use job::Trouble;
 use runner::Runner;
+use tap::{Tap, Traffic};
 use value::Value;
 
-use crate::failure::{bad_value, named, wrong_use};
+use crate::failure::{bad_value, raised, wrong_use};
 use crate::live::{Live, still_moving};
 use crate::sheets::{model_of, node_id};
 use crate::world::World;
@@ -35,6 +42,7 @@ use crate::world::World;
 #[pyclass(frozen, module = "ferrodrive._native")]
 pub(crate) struct Network {
     core: Core,
+    traffic: Traffic,
     runner: Arc<Runner>,
     closed: AtomicBool,
     /// What a machine file says of its drives.
@@ -92,16 +100,17 @@ impl Order {
 
 #[pymethods]
 impl Network {
-    /// A master as one more station of a world.
+    /// A master as one more station of a world; with the machine file that describes what is there, where the world was not made of one.
     #[staticmethod]
-    fn in_world(py: Python<'_>, world: &Bound<'_, World>) -> PyResult<Self> {
-        let (core, shared) = (Core::new(), Arc::clone(world.get().shared()));
+    fn in_world(py: Python<'_>, world: &Bound<'_, World>, machine: Option<PathBuf>) -> PyResult<Self> {
+        let machine = read_machine_of(py, machine)?;
+        let (core, traffic, shared) = (Core::new(), Traffic::default(), Arc::clone(world.get().shared()));
         let mut state = shared.lock(py)?;
-        state.world.add_station(core.clone());
+        state.world.add_station(Tap::new(core.clone(), traffic.clone()));
         state.jobs.note_master();
-        let machine = state.machine();
+        let machine = machine.or_else(|| state.machine());
         drop(state);
-        Ok(Self { core, runner: Arc::new(Runner::World(shared)), closed: AtomicBool::new(false), machine })
+        Ok(Self::new(core, traffic, Runner::World(shared), machine))
     }
 
     /// A master on a real bus: `socketcand://HOST:PORT/can0`, `slcan:///dev/ttyACM0?bitrate=500k`; with the machine file that says what
@@ -109,17 +118,11 @@ impl Network {
     #[staticmethod]
     fn on_bus(py: Python<'_>, bus: &str, machine: Option<PathBuf>) -> PyResult<Self> {
         let spec: BusSpec = bus.parse().map_err(bad_value)?;
-        let read = |path: PathBuf| machine_file::read(&path).map_err(|reason| bad_value(named(&path, reason)));
-        let machine = machine.map(read).transpose()?.map(Arc::new);
-        let core = Core::new();
-        let live = py.detach(|| Live::open(spec, core.clone()));
+        let machine = read_machine_of(py, machine)?;
+        let (core, traffic) = (Core::new(), Traffic::default());
+        let live = py.detach(|| Live::open(spec, core.clone(), traffic.clone()));
         let live = live.map_err(|reason| wrong_use(format!("bus {bus}: {reason}")))?;
-        Ok(Self {
-            core,
-            runner: Arc::new(Runner::Live(Mutex::new(Some(live)))),
-            closed: AtomicBool::new(false),
-            machine,
-        })
+        Ok(Self::new(core, traffic, Runner::Live(Mutex::new(Some(live))), machine))
     }
 
     /// Stops what this program has set in motion, and leaves the real bus; what was not seen to stand, in words.
@@ -289,7 +292,18 @@ impl Drop for Network {
     }
 }
 
+fn read_machine_of(py: Python<'_>, path: Option<PathBuf>) -> PyResult<Option<Arc<Machine>>> {
+    let read = path.map(|path| read_machine(&path)).transpose();
+    Ok(read.map_err(|failure| raised(py, &failure))?.map(Arc::new))
+}
+
 impl Network {
+    fn new(core: Core, traffic: Traffic, runner: Runner, machine: Option<Arc<Machine>>) -> Self {
+        let described = machine.iter().flat_map(|machine| machine.models()).map(|(_, model)| model);
+        core.set_models(with_told(described));
+        Self { core, traffic, runner: Arc::new(runner), closed: AtomicBool::new(false), machine }
+    }
+
     /// Tells its jobs from those of other networks in the same world.
     fn owner(&self) -> usize {
         Arc::as_ptr(&self.runner) as usize
@@ -359,7 +373,7 @@ fn nmt_command(word: &str) -> PyResult<NmtCommand> {
         "reset" => Ok(NmtCommand::ResetNode),
         "reset-communication" => Ok(NmtCommand::ResetCommunication),
         _ => Err(bad_value(format!(
-            "{word:?} is no NMT command; expected start, stop, pre-operational, reset or reset-communication"
+            "{word:?} is not an NMT command; expected start, stop, pre-operational, reset or reset-communication"
         ))),
     }
 }

@@ -43,7 +43,7 @@ pub(crate) fn stimulus_forms() -> Vec<&'static str> {
 }
 
 fn timing_mode(timing: &str) -> PyResult<TimingMode> {
-    timing.parse().map_err(|_| bad_value(format!("{timing:?} is no timing; expected ideal or device")))
+    timing.parse().map_err(|_| bad_value(format!("{timing:?} is not a timing; expected device or ideal")))
 }
 
 /// A bus with everything on it, in virtual time; `ferrodrive.World` is what users have.
@@ -235,7 +235,9 @@ impl World {
     fn become_machine(&self, py: Python<'_>, path: PathBuf, seed: Option<u64>, timing: Option<&str>) -> PyResult<()> {
         let mut machine = machine_file::read(&path).map_err(|reason| bad_value(named(&path, reason)))?;
         machine.seed = seed.or(machine.seed);
-        machine.timing = timing.map(timing_mode).transpose()?.or(machine.timing);
+        let said = timing.map(timing_mode).transpose()?;
+        // What is green here is to be green on the desk.
+        machine.timing = said.or(machine.timing).or(Some(TimingMode::Device));
         let world = machine.build().map_err(|bad| bad_value(bad.named(path.display().to_string())))?;
         *self.shared.lock(py)? = State { machine: Some(Arc::new(machine)), ..State::new(world) };
         Ok(())
@@ -372,7 +374,8 @@ impl World {
 
     /// What can be measured at a place (`4`, or `5.2` for an axis) now.
     fn report<'py>(&self, py: Python<'py>, place: &str) -> PyResult<Bound<'py, PyDict>> {
-        let place: Place = place.parse().map_err(|()| bad_value(format!("{place:?} is no node; expected 1 to 127")))?;
+        let place: Place =
+            place.parse().map_err(|()| bad_value(format!("{place:?} is not a node; expected 1 to 127")))?;
         let mut state = self.shared.lock(py)?;
         report::at(py, &mut state.world, place)
     }

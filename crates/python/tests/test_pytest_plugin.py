@@ -167,12 +167,12 @@ def test_the_marker_says_the_timing_and_the_machine(pytester):
         import ferrodrive
         import pytest
 
-        @pytest.mark.ferrodrive(drives=["zlac8030l@4"])
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4"], timing="ideal")
         def test_ideal(ferrodrive_world):
             ferrodrive_world.run_for(0.1)
             assert ferrodrive_world[4].statusword
 
-        @pytest.mark.ferrodrive(drives=["zlac8030l@4"], timing="device")
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4"])
         def test_device(ferrodrive_world):
             # It boots in about a second, and has no statusword before.
             ferrodrive_world.run_for(0.1)
@@ -180,7 +180,7 @@ def test_the_marker_says_the_timing_and_the_machine(pytester):
             ferrodrive_world.run_for(2)
             assert ferrodrive_world[4].statusword
 
-        @pytest.mark.ferrodrive(machine="machine.toml", timing="device")
+        @pytest.mark.ferrodrive(machine="machine.toml")
         def test_machine(ferrodrive_world):
             assert ferrodrive_world.nodes == [4]
             ferrodrive_world.run_for(0.1)
@@ -189,8 +189,12 @@ def test_the_marker_says_the_timing_and_the_machine(pytester):
         @pytest.mark.ferrodrive(machine="machine.toml", bitrate=250_000)
         def test_both(ferrodrive_world):
             pass
+
+        @pytest.mark.ferrodrive(drive=["zlac8030l@4"])
+        def test_unknown(ferrodrive_world):
+            pass
         """
     )
     result = pytester.runpytest()
-    result.assert_outcomes(passed=3, errors=1)
-    result.stdout.fnmatch_lines(["*a machine file says its bit rate*"])
+    result.assert_outcomes(passed=3, errors=2)
+    result.stdout.fnmatch_lines(["*the bit rate is in the machine file*", "*the marker ferrodrive has no drive; expected bitrate, drives*"])

@@ -173,7 +173,7 @@ def test_a_sweep_is_refused_what_it_has_not(tmp_path):
     with pytest.raises(IndexError):
         sweep.summary().add(9, sweep.run(0))
     for wrong in (range(0), range(1, 10, 2), range(-1, 3)):
-        with pytest.raises(ValueError, match="no range of seeds"):
+        with pytest.raises(ValueError, match="not a range of seeds"):
             ferrodrive.Sweep(STEP_LOSS, wrong)
     with pytest.raises(ValueError, match="more than"):
         ferrodrive.Sweep(STEP_LOSS, range(0, 1 << 40))

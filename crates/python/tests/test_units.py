@@ -90,6 +90,12 @@ def test_a_group_and_a_base_are_behind_the_same_gears(world, network):
     assert turned(world, 4, before) == pytest.approx(360 * 10 * way_m / (math.tau * 0.1), rel=0.05)
 
 
-def test_a_world_that_has_its_file_takes_no_other(world, file):
-    with pytest.raises(ValueError, match="knows its machine file"):
-        ferrodrive.Network(world, machine=file)
+def test_a_file_that_is_given_to_the_network_counts_instead_of_the_world_s(file):
+    bare = ferrodrive.World()
+    bare.add("cia402", node=1)
+    with ferrodrive.Network(bare, machine=file) as network:
+        network.wait_for(1)
+        network.sleep(0.5)
+        before = bare[1].shaft_angle_rad
+        network.drive(1).move(3, relative=True)
+        assert turned(bare, 1, before) == pytest.approx(150, abs=1)

@@ -6,7 +6,7 @@ Virtual drives on a virtual bus, in virtual time::
 
     world = ferrodrive.World(bitrate=500_000, seed=1)
     wheel = world.add("zlac8030l", node=4)
-    world.run_for(1.0)
+    world.wait_until_booted()
     wheel.set_load_torque(0.5)
     print(wheel.supply_v, wheel.velocity_rpm)
 
@@ -26,17 +26,34 @@ from ._native import __version__, eds, models, stimulus_forms
 from .axes import Axis, Base, Group
 from .body import Body
 from .control import Control
-from .errors import BusWarning, FerrodriveError, MasterError, Refused, SimulatorError, Stalled, TimeInUse
-from .master import AsyncDrive, Drive, Network
+from .errors import (
+    Aborted,
+    BadRequest,
+    BusWarning,
+    FerrodriveError,
+    MasterError,
+    NoAnswer,
+    NotReached,
+    Refused,
+    SimulatorError,
+    Stalled,
+    TimeInUse,
+)
+from .drive import AsyncDrive, Drive
+from .master import Network, check
+from .parameters import Parameters
 from .scenario import Outcome, Row, Sweep, SweepSummary, run
 from .simulator import Simulator
+from .supervisor import Supervisor
 from .virtual_drive import VirtualDrive
 from .turns import virtual_time
 from .world import World
 
 __all__ = [
+    "Aborted",
     "AsyncDrive",
     "Axis",
+    "BadRequest",
     "Base",
     "Body",
     "BusWarning",
@@ -46,18 +63,23 @@ __all__ = [
     "Group",
     "MasterError",
     "Network",
+    "NoAnswer",
+    "NotReached",
     "Outcome",
+    "Parameters",
     "Refused",
     "Row",
     "Simulator",
     "SimulatorError",
     "Stalled",
+    "Supervisor",
     "Sweep",
     "SweepSummary",
     "TimeInUse",
     "VirtualDrive",
     "World",
     "__version__",
+    "check",
     "eds",
     "models",
     "run",

@@ -4,11 +4,11 @@
 
     lift = [ferrodrive.Axis(1, "m4230e17b50", velocity_rpm=20, acceleration_rpm_s=60, following_error_deg=20),
             ferrodrive.Axis(5, "cia402", mode="csp", velocity_rpm=60, acceleration_rpm_s=300, range_deg=(-360, 360))]
-    with network.group(lift) as group:
+    with network.group(lift) as group:                  # or network.group("lift"): a [[group]] of the machine file
         group.move([90, -45], within=2)             # degrees; all begin with one SYNC and end together
 
 Drives of a group are stepped in each cycle of SYNC for as long as it is open, on a real bus by the thread of the bus, in a world while
-somebody moves it. When one faults, is lost or lags, all come to rest, and the call that waits raises what its drive says.
+time passes in it. When one faults, is lost or lags, all come to rest, and the call that waits raises what its drive says.
 """
 
 from __future__ import annotations
@@ -16,18 +16,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Optional
+from typing import TYPE_CHECKING, Any, Optional, Union, cast
 
 from ._native import Base as NativeBase
 from ._native import Group as NativeGroup
+from .reports import BaseState, GroupState
 
 if TYPE_CHECKING:
     from .master import Network
 
+#: From one SYNC to the next in s, where nothing says it.
+GROUP_PERIOD = 0.005
+BASE_PERIOD = 0.01
+
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis to be, how it is moved, and what it may do. Angles are those of the output shaft, from the drive's own zero on."""
+    """An axis to be, how it is moved, and what it may do. Angles are those of the output shaft, from the drive's own zero on.
+
+    >>> ferrodrive.Axis(5, "cia402", mode="csp", velocity_rpm=60).following_error_deg
+    72.0
+    """
 
     #: Its node-ID.
     node: int
@@ -56,23 +65,30 @@ class _Open:
         self.network = network
         self._native = native
 
-    def _opened(self, *order: Any) -> None:
-        self.network._finish(self._native.open(*order))
+    def _opened(self, job: Any) -> None:
+        self.network._finish(job)
         self._keeper = self._native.keep()
 
     def stop(self) -> None:
-        """Comes to rest within the limits, and keeps its power; raises what went wrong before or on the way."""
+        """Comes to rest within its limits, and keeps its power.
+
+        :raises MasterError: what went wrong before or on the way
+
+        >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
+        ...     group.stop()
+        """
         self.network._finish(self._native.stop())
 
     def close(self) -> None:
-        """Comes to rest and takes the drives' power. Does nothing the second time, nor after its network, which has stopped it."""
+        """Comes to rest and takes the drives' power. Does nothing the second time, nor after its network, which has stopped it.
+
+        :raises MasterError: a drive was not seen to stand
+
+        >>> group = network.group([ferrodrive.Axis(5, "cia402", mode="csp")])
+        >>> group.close()
+        """
         if not self.network.closed:
             self.network._finish(self._native.close())
-
-    def state(self) -> dict[str, Any]:
-        """What the last cycle showed."""
-        state: dict[str, Any] = self._native.state()
-        return state
 
     def __exit__(
         self, kind: Optional[type[BaseException]], error: Optional[BaseException], traceback: Optional[TracebackType]
@@ -81,45 +97,110 @@ class _Open:
 
 
 class Group(_Open):
-    """Several axes that move as one. From :meth:`Network.group`."""
+    """Several axes that move as one. From :meth:`Network.group`.
 
-    def __init__(self, network: Network, axes: Sequence[Axis], period: float, tolerance: int) -> None:
+    >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp", acceleration_rpm_s=300)]) as group:
+    ...     round(group.move([90], within=2), 3)
+    2.0
+    """
+
+    def __init__(self, network: Network, axes: Union[str, Sequence[Axis]], period: Optional[float], tolerance: int) -> None:
         super().__init__(network, NativeGroup(network._native))
-        self._opened([_order(axis) for axis in axes], period, tolerance)
+        if isinstance(axes, str):
+            self._opened(self._native.open_of_file(axes, period, tolerance))
+        else:
+            orders = [_order(axis) for axis in axes]
+            self._opened(self._native.open(orders, GROUP_PERIOD if period is None else period, tolerance))
 
     def __enter__(self) -> Group:
         return self
 
     def move(self, to_deg: Sequence[float], within: Optional[float] = None) -> float:
-        """All axes to these positions in degrees, together, in the shortest time or within so many seconds. Waits until they are
-        there; returns how long the path takes, in s."""
+        """All axes to these positions, together. Waits until they are there; returns how long the path takes, in s.
+
+        :param to_deg: a position of each axis in degrees
+        :param within: how long it takes in s; without it the shortest time within the limits
+        :raises MasterError: a position or the time breaks a limit, and nothing moves; or what stopped the group on its way
+
+        >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
+        ...     group.move([10]) > 0.5
+        True
+        """
         time: float = self.network._finish(self._native.move_to(list(to_deg), within))
         return time
 
     def follow(self, points_deg: Sequence[Sequence[float]]) -> None:
-        """Along these points in degrees, one of all axes for each cycle, and to rest after the last. Speeds and accelerations
-        between them are held to the limits."""
+        """Along these points, and to rest after the last. Speeds and accelerations between them are held to the limits.
+
+        :param points_deg: for each cycle a position of each axis in degrees
+        :raises MasterError: a point breaks a limit: what was given before it is moved, and the group rests
+
+        >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
+        ...     group.follow([[0.0]] * 20)
+        """
         self.network._finish(self._native.follow([list(point) for point in points_deg]))
+
+    def state(self) -> GroupState:
+        """What the last cycle showed.
+
+        :raises MasterError: it was closed
+
+        >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
+        ...     group.state()["missed_cycles"]
+        0
+        """
+        return cast(GroupState, self._native.state())
 
 
 class Base(_Open):
-    """A base on two wheels. From :meth:`Network.base`. :meth:`state` has ``x_m``, ``y_m``, ``heading_deg`` by its wheels, from where
-    it was opened, the twist that it was told, and the ``cause`` of a stop."""
+    """A base on two wheels. From :meth:`Network.base`.
 
-    def __init__(self, network: Network, order: dict[str, Any], period: float, tolerance: int) -> None:
+    >>> with ferrodrive.Network(ferrodrive.World.machine("base.toml")) as network:
+    ...     report = network.boot()
+    ...     with network.base() as base:
+    ...         base.drive(0.2, 0.0, seconds=1)
+    ...         0.1 < base.state()["x_m"] < 0.3
+    True
+    """
+
+    def __init__(self, network: Network, order: Optional[dict[str, Any]], period: Optional[float], tolerance: int) -> None:
         super().__init__(network, NativeBase(network._native))
-        self._opened(order, period, tolerance)
+        if order is None:
+            self._opened(self._native.open_of_file(period, tolerance))
+        else:
+            self._opened(self._native.open(order, BASE_PERIOD if period is None else period, tolerance))
 
     def __enter__(self) -> Base:
         return self
 
     def command(self, linear_m_s: float, angular_rad_s: float) -> None:
-        """Drives with this twist from the next cycle on, until a new one comes, and no longer than the watchdog's time. Does not wait."""
+        """Drives with this twist from the next cycle on, until a new one comes, and no longer than the watchdog's time. Does not wait.
+
+        :param linear_m_s: speed along the heading in m/s; ``angular_rad_s`` that of the heading in rad/s, above 0 to the left
+        :raises MasterError: it is not a finite number, or a wheel has stopped the base
+
+        >>> base.command(0.1, 0.0)
+        """
         self._native.command(linear_m_s, angular_rad_s)
 
     def drive(self, linear_m_s: float, angular_rad_s: float, seconds: float) -> None:
-        """Drives with this twist for so many seconds, and comes to rest."""
+        """Drives with this twist for so many seconds, and comes to rest.
+
+        :raises MasterError: what stopped it on its way
+
+        >>> base.drive(0.1, 0.2, seconds=0.5)
+        """
         self.network._finish(self._native.drive(linear_m_s, angular_rad_s, seconds))
+
+    def state(self) -> BaseState:
+        """What the last cycle showed.
+
+        :raises MasterError: it was closed
+
+        >>> base.state()["cause"] is None
+        True
+        """
+        return cast(BaseState, self._native.state())
 
 
 def _order(axis: Axis) -> dict[str, Any]:

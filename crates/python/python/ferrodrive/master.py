@@ -12,7 +12,7 @@ While a call waits, other Python threads run. On a virtual bus time passes as fa
 program ends, quick-stops what this program has set in motion.
 
 What a real bus says beside frames (the connection is lost, the controller is bus-off) comes as a :class:`~ferrodrive.BusWarning` with
-the next call that waits; a call that fails while the connection is lost says so.
+the next call that waits; the message of a call that fails while the connection is lost ends with that.
 """
 
 from __future__ import annotations
@@ -22,14 +22,20 @@ import atexit
 import os
 import warnings
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import Any, Optional, Union
+from typing import Any, Optional, Union, cast
 
+from . import _native
 from ._native import Job, model_name
 from ._native import Network as NativeNetwork
 from .axes import Axis, Base, Group
-from .errors import BusWarning, MasterError, Stalled
+from .drive import AsyncDrive, Drive
+from .errors import BusWarning, MasterError, Stalled, made
+from .parameters import File, Parameters
+from .real_time import REAL
+from .reports import BootReport, CheckReport, ExplainReport, PlanReport, ScanReport
+from .supervisor import Supervisor, path_of
 from .turns import taking_part
 from .world import World
 
@@ -40,18 +46,27 @@ class Network:
     """The network as its master sees it.
 
     :param bus: a :class:`~ferrodrive.World`, ``socketcand://HOST:PORT/can0`` or ``slcan:///dev/ttyACM0?bitrate=500k``
-    :param machine: the machine file that describes what is on a real bus: which models are where, and what stands behind their
-        shafts (``units``). :meth:`World.machine` has one already
+    :param machine: the machine file that describes what is there: which models are where, what stands behind their shafts (``units``), how
+        they are set up, groups and the base. A world of :meth:`World.machine` has one already; one that is given here counts instead
+    :raises ValueError: the bus is not one, or the file makes no sense (:class:`BadRequest`)
+    :raises RuntimeError: the bus does not open
+
+    >>> network = ferrodrive.Network(world)
+    >>> network.wait_for(5)
+    >>> drive = network.drive(5)
+    >>> round(drive.velocity(60)["reached_after_s"], 1) > 0
+    True
+    >>> network.close()
     """
 
-    def __init__(self, bus: Union[World, str], *, machine: Optional[Union[str, os.PathLike[str]]] = None) -> None:
+    def __init__(self, bus: Union[World, str], *, machine: Optional[File] = None) -> None:
         self._world = bus if isinstance(bus, World) else None
+        path = None if machine is None else os.fspath(machine)
+        self._machine = path if path is not None else getattr(bus, "machine_file", None)
         if isinstance(bus, World):
-            if machine is not None:
-                raise ValueError("a world knows its machine file: make it by World.machine(FILE)")
-            self._native = NativeNetwork.in_world(bus)
+            self._native = NativeNetwork.in_world(bus, path)
         else:
-            self._native = NativeNetwork.on_bus(bus, None if machine is None else os.fspath(machine))
+            self._native = NativeNetwork.on_bus(bus, path)
         _open.add(self)
 
     def __enter__(self) -> Network:
@@ -65,12 +80,19 @@ class Network:
         except MasterError as moving:
             if error is None:
                 raise
-            # What went wrong first is what is raised; that a drive may still be moving is said beside it.
+            # What went wrong first is what is raised; that a drive may still be moving is a warning beside it.
             warnings.warn(str(moving), BusWarning, stacklevel=2)
 
     def close(self) -> None:
         """Gives up what is still asked of drives, quick-stops what this program has set in motion, and leaves the bus: nothing is
-        sent after that. :class:`~ferrodrive.MasterError` if a drive was not seen to stand."""
+        sent after that. Does nothing the second time.
+
+        :raises MasterError: a drive was not seen to stand
+
+        >>> network.close()
+        >>> network.closed
+        True
+        """
         if self not in _open:
             return
         _open.discard(self)
@@ -143,60 +165,104 @@ class Network:
             raise
         return self._result(job)
 
+    @property
+    def _now(self) -> Callable[[], float]:
+        world = self._world
+        return REAL.monotonic if world is None else lambda: world.now
+
     # What a network does.
 
     def drive(self, node: int, model: Optional[str] = None, *, gear_ratio: Optional[float] = None) -> Drive:
         """A drive, to be moved in physical units.
 
+        :param node: its node-ID, 1 to 127
         :param model: as :func:`~ferrodrive.models` lists them, or a file that describes it (``FILE.eds``); without it the machine file's, else
-            the drive is asked, and one that cannot be told is an error
+            its identity and objects are read
         :param gear_ratio: turns of its shaft for one turn of the output behind a gear: angles and speeds are the output's, counts the
             drive's; without it what ``units`` of the machine file say, or 1
+        :raises MasterError: its model was not given and is not certain, or it does not answer
+        :raises ValueError: the model is not known
+
+        >>> network.drive(5).model
+        'cia402'
         """
         model = model or self._native.model_by_file(node) or self._finish(self._native.identify(node))
         if model is None:
-            raise MasterError(f"the model of node {node} is not certain from its identity and objects; say which: drive({node}, MODEL)")
+            raise MasterError(f"the model of node {node} is not certain from its identity and objects; state it: drive({node}, MODEL)")
         return Drive(self, node, model, gear_ratio)
 
-    def async_drive(self, node: int, model: str, *, gear_ratio: Optional[float] = None) -> AsyncDrive:
-        """The same with coroutines."""
+    def async_drive(self, node: int, model: Optional[str] = None, *, gear_ratio: Optional[float] = None) -> AsyncDrive:
+        """:meth:`drive` with coroutines; a model that the machine file does not have is to be given.
+
+        :raises ValueError: the model is not known, or neither given nor in the machine file
+
+        >>> network.async_drive(5, "cia402")
+        <AsyncDrive cia402 at 5>
+        """
+        model = model or self._native.model_by_file(node)
+        if model is None:
+            raise ValueError(f"which model is node {node}? The machine file does not have it: async_drive({node}, MODEL)")
         return AsyncDrive(self, node, model, gear_ratio)
 
-    def group(self, axes: Sequence[Axis], *, period: float = 0.005, tolerance: int = 2) -> Group:
+    def group(
+        self, axes: Union[str, Sequence[Axis]], *, period: Optional[float] = None, tolerance: int = 2
+    ) -> Group:
         """Opens a group of axes that move as one, and enables its drives; nothing moves. Close it, or use it with ``with``.
 
-        :param period: from one SYNC to the next in s, 0.0005 to 0.1
+        :param axes: the name of a ``[[group]]`` of the machine file, or its axes
+        :param period: from one SYNC to the next in s, 0.0005 to 0.1; without it the file's, or 0.005
         :param tolerance: cycles in a row that this program may be late for, or a drive's TPDO, before the drives are stopped
+        :raises MasterError: a drive was not enabled, with what keeps it; the file has no such group (:class:`BadRequest`)
+
+        >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
+        ...     group.state()["phase"]
+        'holding'
         """
         return Group(self, axes, period, tolerance)
 
     def base(
         self,
-        left: tuple[int, str],
-        right: tuple[int, str],
+        left: Optional[tuple[int, str]] = None,
+        right: Optional[tuple[int, str]] = None,
         *,
-        wheel_base_m: float,
-        wheel_radius_m: float,
-        linear_m_s: float,
-        angular_rad_s: float,
-        wheel_m_s: float,
-        wheel_m_s2: float,
+        wheel_base_m: float = 0.0,
+        wheel_radius_m: float = 0.0,
+        linear_m_s: float = 0.0,
+        angular_rad_s: float = 0.0,
+        wheel_m_s: float = 0.0,
+        wheel_m_s2: float = 0.0,
         turns: tuple[float, float] = (1.0, -1.0),
         mode: str = "pv",
         watchdog: float = 0.3,
         lag_m: Optional[float] = None,
-        period: float = 0.01,
+        period: Optional[float] = None,
         tolerance: int = 2,
     ) -> Base:
-        """Opens a base on two wheels, each a node and its model, and enables both; nothing moves. Close it, or use it with ``with``.
+        """Opens a base on two wheels and enables both; nothing moves. Close it, or use it with ``with``. Without wheels it is the ``[base]``
+        of the machine file, and nothing but ``period`` and ``tolerance`` may be given beside.
 
+        :param left: node and model of the left wheel, ``right`` those of the right one
+        :param wheel_base_m: distance between the wheels in m; ``wheel_radius_m`` their radius in m
         :param linear_m_s: highest speed along the heading; ``angular_rad_s`` that of the heading, ``wheel_m_s`` that of a wheel over
             the ground, ``wheel_m_s2`` how fast that may change
         :param turns: turns of each drive for a turn of its wheel forward; the right one of two hub motors sits the other way round
         :param watchdog: how long a twist counts, in s
-        :param lag_m: how far a wheel may stay behind the way that it was told before both are stopped, over the ground; None is what
-            it goes in 0.25 s at ``wheel_m_s``, and 0.1 m at least
+        :param lag_m: how far a wheel may stay behind its way over the ground before both are stopped, in m; None is what it goes in
+            0.25 s at ``wheel_m_s``, and 0.1 m at least
+        :param period: from one SYNC to the next in s; without it the file's, or 0.01
+        :param tolerance: cycles in a row that this program may be late for, or a drive's TPDO, before the drives are stopped
+        :raises MasterError: a wheel was not enabled; the file has no base (:class:`BadRequest`)
+
+        >>> with ferrodrive.Network(ferrodrive.World.machine("base.toml")) as network:
+        ...     network.boot()["ok"]
+        ...     with network.base() as base:
+        ...         base.drive(0.2, 0.0, seconds=1)
+        True
         """
+        if left is None or right is None:
+            if left is not None or right is not None or wheel_base_m or wheel_radius_m:
+                raise ValueError("a base has two wheels: give left and right, or neither for the [base] of the machine file")
+            return Base(self, None, period, tolerance)
         order = {
             "wheels": ((*left, turns[0]), (*right, turns[1])),
             "mode": mode,
@@ -211,241 +277,242 @@ class Network:
         }
         return Base(self, order, period, tolerance)
 
+    def scan(self) -> ScanReport:
+        """Asks all 127 node-IDs who they are; reads only. What others sent meanwhile is in ``heard``.
+
+        :raises MasterError: no node is on the bus (kind ``nobody``)
+
+        >>> [(node["node"], node["model"]) for node in network.scan()["nodes"]]
+        [(5, 'cia402')]
+        """
+        return cast(ScanReport, self._finish(_native.scan(self._native)))
+
+    def boot(
+        self,
+        file: Optional[File] = None,
+        *,
+        nodes: Sequence[int] = (),
+        reset: bool = False,
+        start: bool = True,
+    ) -> BootReport:
+        """Boots the nodes by CiA 302-2: who they are is checked, they are configured and started; no motor is moved. What is expected is in
+        a machine file or the DCF of a CANopen manager, else in the network's machine file, else each node is booted as what it is.
+
+        :param nodes: these alone
+        :param reset: nodes that are operational too: a motor that turns may stop at once, or go on
+        :param start: False leaves them pre-operational
+        :raises MasterError: a mandatory node has failed (kind ``not_booted``), or one that was left as it is does not have what the file
+            says (``not_configured``); ``report`` of the exception has each step
+
+        >>> [step["step"] for step in network.boot()["nodes"][0]["steps"]][-1]
+        'start'
+        """
+        return cast(BootReport, self._finish(_native.boot(self._native, path_of(file), list(nodes), reset, start)))
+
+    def supervise(self, file: Optional[File] = None, *, nodes: Sequence[int] = (), own_node: int = 127) -> Supervisor:
+        """Boots as :meth:`boot` does, has each drive stop by itself when this program dies, where its model has something for that, and
+        watches the network from then on. Close it, or use it with ``with``.
+
+        :param own_node: node-ID of this master, for drives whose watch over a heartbeat (1016h) is off as yet
+        :raises MasterError: a node that was left as it is does not have what the file says
+
+        >>> with network.supervise() as supervisor:
+        ...     supervisor.report["ok"]
+        True
+        """
+        return Supervisor(self, path_of(file), nodes, own_node)
+
+    def check(self, file: Optional[File] = None, *, strict: bool = False) -> CheckReport:
+        """Checks the description of a bus as :func:`~ferrodrive.check` does, and holds it against the drives of this one; reads only.
+
+        :param file: a machine file, or a ``bus.yml`` of ros2_canopen; without it the network's machine file
+        :param strict: ``ok`` is False for warnings too
+        :raises MasterError: the file makes no sense
+        :raises ValueError: no file was given, and the network has none
+
+        >>> network.check("base.toml")["errors"] > 0        # node 4 of the file is not on this bus
+        True
+        """
+        path = path_of(file) or self._machine
+        if path is None:
+            raise ValueError("which file? This network has no machine file: check(FILE), or Network(bus, machine=FILE)")
+        return cast(CheckReport, self._finish(_native.check(self._native, path, strict)))
+
+    def plan(
+        self,
+        *,
+        cycle: Optional[float] = None,
+        mode: Optional[str] = None,
+        modes: Optional[Mapping[int, str]] = None,
+        bitrate: Optional[Union[int, str]] = None,
+        jitter: float = 0.0,
+        sdo: float = 0.01,
+        emcy: float = 0.1,
+        heartbeat: float = 0.0,
+        errors: float = 0.0,
+        by_priority: bool = False,
+    ) -> PlanReport:
+        """Whether everything fits the bus: its load, the longest time of each frame, and how many such drives it carries. The group or the base
+        of the machine file is planned as it will run. That it does not fit is in the report, and raises nothing. All times in s.
+
+        :param cycle: period of SYNC; without it that of the file's group or base, or 0.01
+        :param mode: the PDOs that this mode of operation needs, in place of those that are mapped; ``modes`` the same for single nodes
+        :param bitrate: that of the bus; without it the world's or the file's
+        :param jitter: how late this program may be with SYNC and RPDOs
+        :param sdo: shortest time between two SDO requests; 0 for none
+        :param emcy: shortest time between two EMCY of one node; 0 for none
+        :param heartbeat: period of this program's heartbeat; 0 for none
+        :param errors: the bus destroys a frame at most once in this time; 0 for never
+        :param by_priority: the controller sends the most urgent frame first, not in the order given
+        :raises MasterError: a node cannot be moved in this mode, or does not answer
+        :raises ValueError: the bit rate is not known, or a value makes no sense
+
+        >>> network.plan(cycle=0.005, mode="csp")["fits"]
+        True
+        """
+        order = {
+            "cycle": cycle,
+            "mode": mode,
+            "modes": dict(modes or {}),
+            "bitrate": None if bitrate is None else str(bitrate),
+            "jitter": jitter,
+            "sdo": sdo,
+            "emcy": emcy,
+            "heartbeat": heartbeat,
+            "errors": errors,
+            "by_priority": by_priority,
+        }
+        return cast(PlanReport, self._finish(_native.plan(self._native, order)))
+
+    def explain(self, node: int, model: Optional[str] = None, *, watch: float = 1.5) -> ExplainReport:
+        """Why a drive does not move, and why its PDOs are silent. Listens to the bus first, then reads what the drive has; writes nothing.
+
+        :param model: as for :meth:`drive`
+        :param watch: how long to listen, in s: longer than the longest period of what is looked for
+        :raises MasterError: the node answers, and refuses what has to be read
+
+        >>> network.explain(5)["findings"][0]["rule"]
+        'not-operational'
+        """
+        return cast(ExplainReport, self._finish(_native.explain(self._native, node, model, watch)))
+
+    def params(self, node: int, model: Optional[str] = None) -> Parameters:
+        """The parameters of a node, to be kept, compared, written as a transaction and checked.
+
+        :param model: as for :meth:`drive`; without it the machine file's, or what its identity and objects say
+        :raises ValueError: the model is not known
+
+        >>> network.params(5).backup()["values"] > 10
+        True
+        """
+        return Parameters(self, node, model if model is None else model_name(model))
+
     def sleep(self, seconds: float) -> None:
-        """Lets time pass on the bus, in s."""
+        """Lets time pass on the bus, in s.
+
+        >>> network.sleep(0.25)
+        """
         self._finish(self._native.sleep(seconds))
 
     async def async_sleep(self, seconds: float) -> None:
-        """The same as a coroutine."""
+        """:meth:`sleep` as a coroutine, in s.
+
+        >>> with ferrodrive.virtual_time(world):
+        ...     asyncio.run(network.async_sleep(0.25))
+        """
         await self._finish_soon(self._native.sleep(seconds))
 
     def wait_for(self, node: int, within: float = 5.0) -> None:
-        """Waits until a node was heard of, in s; :class:`~ferrodrive.MasterError` if it was not."""
+        """Waits until a node was heard of: by its boot-up message, a heartbeat or an answer.
+
+        :param within: longest time to wait, in s
+        :raises MasterError: it was not heard of (kind ``no_answer``)
+
+        >>> network.wait_for(5)
+        """
         if not self._finish(self._native.wait_for(node, within)):
-            raise MasterError(f"nothing was heard of node {node} within {within} s; is it powered, on this bus, at this bit rate?")
+            advice = "is it powered, on this bus, at this bit rate?"
+            what = f"nothing was heard of node {node} within {within} s"
+            raise made(f"{what}; {advice}", ("no_answer", what, [], [advice], (node, None, None)))
 
     def seen(self) -> list[int]:
-        """Nodes that were heard of."""
+        """Nodes that were heard of.
+
+        >>> network.seen()
+        [5]
+        """
         return self._native.seen()
 
     def nmt(self, command: str, node: Optional[int] = None) -> None:
-        """NMT command to a node, or to all: ``start``, ``stop``, ``pre-operational``, ``reset``, ``reset-communication``."""
+        """NMT command (CiA 301, 7.2.8) to a node, or to all without one.
+
+        :param command: ``start``, ``stop``, ``pre-operational``, ``reset``, ``reset-communication``
+        :raises ValueError: it is not one of these
+
+        >>> network.nmt("start", 5)
+        """
         self._native.nmt(command, node)
 
     def sync(self, period: Optional[float]) -> None:
-        """Produces SYNC with this period in s, or stops with None. On a virtual bus it is exact."""
+        """Produces SYNC with this period in s, or stops with None. On a virtual bus it is exact.
+
+        :raises ValueError: the period is not a time
+
+        >>> network.sync(0.01)
+        """
         self._native.sync(period)
 
     def upload(self, node: int, index: int, sub_index: int = 0) -> bytes:
-        """SDO upload: the bytes of an object, little endian as on the wire."""
+        """SDO upload: the bytes of an object, little endian as on the wire.
+
+        :raises MasterError: the node refused (:class:`Aborted`) or did not answer (:class:`NoAnswer`)
+
+        >>> network.upload(5, 0x1000)[:2]
+        b'\x92\x01'
+        """
         uploaded: bytes = self._finish(self._native.upload(node, index, sub_index))
         return uploaded
 
     def download(self, node: int, index: int, sub_index: int, data: bytes) -> None:
-        """SDO download: writes these bytes to an object."""
+        """SDO download: writes these bytes to an object, little endian.
+
+        :raises MasterError: the node refused (:class:`Aborted`) or did not answer (:class:`NoAnswer`)
+
+        >>> network.download(5, 0x1017, 0, (250).to_bytes(2, "little"))
+        """
         self._finish(self._native.download(node, index, sub_index, data))
 
     async def async_upload(self, node: int, index: int, sub_index: int = 0) -> bytes:
-        """:meth:`upload` as a coroutine."""
+        """:meth:`upload` as a coroutine.
+
+        >>> with ferrodrive.virtual_time(world):
+        ...     asyncio.run(network.async_upload(5, 0x1017))
+        b'\x00\x00'
+        """
         uploaded: bytes = await self._finish_soon(self._native.upload(node, index, sub_index))
         return uploaded
 
     async def async_download(self, node: int, index: int, sub_index: int, data: bytes) -> None:
-        """:meth:`download` as a coroutine."""
+        """:meth:`download` as a coroutine.
+
+        >>> with ferrodrive.virtual_time(world):
+        ...     asyncio.run(network.async_download(5, 0x1017, 0, b"\xfa\x00"))
+        """
         await self._finish_soon(self._native.download(node, index, sub_index, data))
 
 
-class _Orders:
-    """What can be asked of a drive, as jobs. Both kinds of drive wait for these."""
+def check(file: File, *, strict: bool = False) -> CheckReport:
+    """Checks the description of a bus before it is started, as ``ferrodrive check`` does: a machine file, or a ``bus.yml`` of ros2_canopen
+    with its data sheets. The bus that it means is booted in virtual time; nothing is sent. What is wrong with it is in the report, and
+    raises nothing.
 
-    def __init__(self, network: Network, node: int, model: str, gear_ratio: Optional[float] = None) -> None:
-        model_name(model)
-        self.network = network
-        #: Its node-ID, 1 to 127.
-        self.node = node
-        #: Its model.
-        self.model = model
-        #: Turns of its shaft for one turn of the output; None: as the machine file says, or 1.
-        self.gear_ratio = gear_ratio
+    :param strict: ``ok`` is False for warnings too
+    :raises MasterError: the file cannot be read, or makes no sense (:class:`BadRequest`)
 
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.model} at {self.node}>"
-
-    def _begin(self, do_: str, **order: Any) -> Job:
-        given = {name: value for name, value in order.items() if value is not None}
-        behind = {} if self.gear_ratio is None else {"gear_ratio": self.gear_ratio}
-        return self.network._native.drive(self.node, self.model, {"do_": do_, **behind, **given})
-
-
-def _angle(degrees: Optional[float], counts: Optional[int]) -> dict[str, Any]:
-    if (degrees is None) == (counts is None):
-        raise ValueError("an angle is said in degrees or in counts, one of them")
-    return {"value": degrees} if counts is None else {"counts": counts}
-
-
-class Drive(_Orders):
-    """A drive in physical units. Every method waits until it is done, and raises :class:`~ferrodrive.MasterError` if it is not."""
-
-    def enable(self) -> None:
-        """Brings it to Operation enabled (CiA 402-2, clause 8)."""
-        self.network._finish(self._begin("enable"))
-
-    def disable(self) -> None:
-        """Takes the current from the motor."""
-        self.network._finish(self._begin("disable"))
-
-    def stop(self) -> None:
-        """Brings it to a stand with its own ramp; it stays enabled."""
-        self.network._finish(self._begin("stop"))
-
-    def quick_stop(self) -> None:
-        """Stops as fast as it is set up to."""
-        self.network._finish(self._begin("quick_stop"))
-
-    def reset_fault(self) -> None:
-        """Resets a fault whose cause is gone."""
-        self.network._finish(self._begin("reset_fault"))
-
-    def save(self) -> None:
-        """Stores its parameters in the drive."""
-        self.network._finish(self._begin("save"))
-
-    def restore(self) -> None:
-        """Takes the factory's parameters, from the next start on."""
-        self.network._finish(self._begin("restore"))
-
-    def check_identity(self) -> None:
-        """Raises if the node says that it is another model."""
-        self.network._finish(self._begin("check_identity"))
-
-    def guard(self) -> str:
-        """Arms what the drive has against the end of this program; returns in words what it will do then."""
-        words: str = self.network._finish(self._begin("guard"))
-        return words
-
-    def release_guard(self) -> None:
-        """Takes that back."""
-        self.network._finish(self._begin("release_guard"))
-
-    def state(self) -> dict[str, Any]:
-        """What it says of itself: ``power``, ``statusword``, ``mode``, ``fault_code``, ``faults`` (each with ``name`` and
-        ``remedy``), ``position`` (counts), ``angle_deg``, ``velocity_rpm``, ``current_a``, ``supply_v``, ``motor_c``, ``driver_c``,
-        ``nmt``. What the model does not have is None."""
-        state: dict[str, Any] = self.network._finish(self._begin("state"))
-        return state
-
-    def velocity(
-        self,
-        rpm: float,
-        *,
-        acceleration_rpm_s: Optional[float] = None,
-        deceleration_rpm_s: Optional[float] = None,
-        wait: bool = True,
-    ) -> dict[str, Any]:
-        """Turns at this speed in r/min (profile velocity) until told otherwise; enables the drive first. Accelerations in (r/min)/s;
-        None leaves them as the drive has them. Returns ``reached_after_s`` and ``notes``."""
-        options = {"acceleration_rpm_s": acceleration_rpm_s, "deceleration_rpm_s": deceleration_rpm_s, "wait": wait}
-        report: dict[str, Any] = self.network._finish(self._begin("velocity", value=rpm, **options))
-        return report
-
-    def move(
-        self,
-        degrees: Optional[float] = None,
-        *,
-        counts: Optional[int] = None,
-        relative: bool = False,
-        speed_rpm: Optional[float] = None,
-        acceleration_rpm_s: Optional[float] = None,
-        deceleration_rpm_s: Optional[float] = None,
-        wait: bool = True,
-    ) -> dict[str, Any]:
-        """Goes to a position of the shaft that the drive counts (of a joint the motor's) in degrees, or in its counts (profile
-        position); enables the drive first. Returns ``reached_after_s`` and ``notes``."""
-        ramps = {"acceleration_rpm_s": acceleration_rpm_s, "deceleration_rpm_s": deceleration_rpm_s}
-        order = {**_angle(degrees, counts), **ramps, "relative": relative, "speed_rpm": speed_rpm, "wait": wait}
-        report: dict[str, Any] = self.network._finish(self._begin("move", **order))
-        return report
-
-    def torque(self, current_a: float) -> dict[str, Any]:
-        """Lets the motor push with this current in A (profile torque) until told otherwise. Does not wait."""
-        report: dict[str, Any] = self.network._finish(self._begin("torque", value=current_a))
-        return report
-
-    def home(
-        self, method: int, *, speed_rpm: Optional[float] = None, within: Optional[float] = None, wait: bool = True
-    ) -> dict[str, Any]:
-        """Finds its reference position with a homing method of CiA 402, within so many seconds (60 if not said)."""
-        order = {"counts": method, "speed_rpm": speed_rpm, "limit_s": within, "wait": wait}
-        report: dict[str, Any] = self.network._finish(self._begin("home", **order))
-        return report
-
-
-class AsyncDrive(_Orders):
-    """:class:`Drive` with coroutines, for several drives at the same time. On a virtual bus the loop runs inside
-    ``with ferrodrive.virtual_time(world)``."""
-
-    async def enable(self) -> None:
-        """As :meth:`Drive.enable`."""
-        await self.network._finish_soon(self._begin("enable"))
-
-    async def disable(self) -> None:
-        """As :meth:`Drive.disable`."""
-        await self.network._finish_soon(self._begin("disable"))
-
-    async def stop(self) -> None:
-        """As :meth:`Drive.stop`."""
-        await self.network._finish_soon(self._begin("stop"))
-
-    async def quick_stop(self) -> None:
-        """As :meth:`Drive.quick_stop`."""
-        await self.network._finish_soon(self._begin("quick_stop"))
-
-    async def reset_fault(self) -> None:
-        """As :meth:`Drive.reset_fault`."""
-        await self.network._finish_soon(self._begin("reset_fault"))
-
-    async def state(self) -> dict[str, Any]:
-        """As :meth:`Drive.state`."""
-        state: dict[str, Any] = await self.network._finish_soon(self._begin("state"))
-        return state
-
-    async def velocity(
-        self,
-        rpm: float,
-        *,
-        acceleration_rpm_s: Optional[float] = None,
-        deceleration_rpm_s: Optional[float] = None,
-        wait: bool = True,
-    ) -> dict[str, Any]:
-        """As :meth:`Drive.velocity`."""
-        options = {"acceleration_rpm_s": acceleration_rpm_s, "deceleration_rpm_s": deceleration_rpm_s, "wait": wait}
-        report: dict[str, Any] = await self.network._finish_soon(self._begin("velocity", value=rpm, **options))
-        return report
-
-    async def move(
-        self,
-        degrees: Optional[float] = None,
-        *,
-        counts: Optional[int] = None,
-        relative: bool = False,
-        speed_rpm: Optional[float] = None,
-        acceleration_rpm_s: Optional[float] = None,
-        deceleration_rpm_s: Optional[float] = None,
-        wait: bool = True,
-    ) -> dict[str, Any]:
-        """As :meth:`Drive.move`."""
-        ramps = {"acceleration_rpm_s": acceleration_rpm_s, "deceleration_rpm_s": deceleration_rpm_s}
-        order = {**_angle(degrees, counts), **ramps, "relative": relative, "speed_rpm": speed_rpm, "wait": wait}
-        report: dict[str, Any] = await self.network._finish_soon(self._begin("move", **order))
-        return report
-
-    async def home(
-        self, method: int, *, speed_rpm: Optional[float] = None, within: Optional[float] = None, wait: bool = True
-    ) -> dict[str, Any]:
-        """As :meth:`Drive.home`."""
-        order = {"counts": method, "speed_rpm": speed_rpm, "limit_s": within, "wait": wait}
-        report: dict[str, Any] = await self.network._finish_soon(self._begin("home", **order))
-        return report
+    >>> ferrodrive.check("base.toml")["ok"]
+    True
+    """
+    return cast(CheckReport, _native.check_file(os.fspath(file), strict))
 
 
 @atexit.register

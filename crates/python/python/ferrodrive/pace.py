@@ -24,7 +24,7 @@ class Pace:
 
     def __init__(self, world: World, speed: float) -> None:
         if not speed > 0:
-            raise ValueError(f"{speed} is no pace; expected virtual seconds for each second, more than 0")
+            raise ValueError(f"{speed} is not a pace; expected virtual seconds for each second, more than 0")
         self._world = weakref.ref(world)
         self.speed = speed
         self._begin_s = REAL.monotonic()

@@ -1,17 +1,17 @@
 """Fixtures for pytest, and what a failing test wants to know of the bus.
 
 ``ferrodrive_world`` is an empty world whose virtual time is in use; ``ferrodrive_sim`` is the served simulator as a process, its
-drives booted. What they begin with is said by a marker::
+drives booted. What they begin with is in a marker::
 
-    @pytest.mark.ferrodrive(drives=["zlac8030l@4"], bitrate=500_000, seed=7, timing="device")
+    @pytest.mark.ferrodrive(drives=["zlac8030l@4"], bitrate=500_000, seed=7)
     def test_wheel(ferrodrive_world): ...
 
     @pytest.mark.ferrodrive(machine="examples/machine.toml")
     def test_machine(ferrodrive_world): ...
 
-``timing`` says whether the drives take the time that such drives take to boot, to answer and to store: ``device`` is what ``ferrodrive
-sim`` and real drives have; without it a world has ``ideal``, in which none of that takes time, and a served simulator ``device``. A machine
-file is looked for in pytest's root; its own bit rate, seed and timing count.
+``timing`` is whether the drives take the time that such drives take to boot, to answer and to store: ``device``, as real drives and
+``ferrodrive sim``, is the default of both fixtures, so that a suite that is green in CI is green on the desk; with ``ideal`` none of that
+takes time. A machine file is looked for in pytest's root; its own bit rate, seed and timing count.
 
 A test that fails shows, of each world among its fixtures, the last frames, the state of the drives, and a plot of the last seconds:
 in the report of pytest-html if there is one, else as an SVG file that the report names.
@@ -35,6 +35,9 @@ from .world import World
 #: Frames that a failing test shows.
 LAST_FRAMES = 40
 
+#: What the marker may have.
+KNOWN = {"drives", "machine", "timing", "bitrate", "seed", "extra"}
+
 #: Worlds that fixtures have made, by the fixture's name.
 WORLDS = pytest.StashKey[dict[str, World]]()
 
@@ -42,21 +45,21 @@ WORLDS = pytest.StashKey[dict[str, World]]()
 def pytest_configure(config: pytest.Config) -> None:
     """Makes the marker known."""
     words = (
-        "ferrodrive(drives=[], machine=FILE, bitrate=500000, seed=1, timing='ideal', extra=[]): what ferrodrive_world and "
-        "ferrodrive_sim begin with; timing is 'device' (as real drives) for ferrodrive_sim, and 'ideal' (boot, answers and stores take no "
-        "time) for ferrodrive_world"
+        "ferrodrive(drives=[], machine=FILE, timing='device', bitrate=500000, seed=1, extra=[]): what ferrodrive_world and "
+        "ferrodrive_sim begin with; timing='ideal' is without the time that real drives take to boot, to answer and to store"
     )
     config.addinivalue_line("markers", words)
 
 
 @pytest.fixture
 def ferrodrive_world(request: pytest.FixtureRequest) -> Iterator[World]:
-    """A virtual bus with the drives of the marker, its virtual time in use: sleeping and waiting moves it, and nothing else."""
+    """A virtual bus with the drives of the marker, its virtual time in use: sleeping and waiting moves it, and nothing else. Its time is 0:
+    the drives begin to boot, and the first thing to do is to wait for that, as on the desk."""
     wanted = marked(request)
     if "machine" in wanted:
         world = World.machine(machine_file(request, wanted), wanted.get("seed"), timing=wanted.get("timing"))
     else:
-        world = World(wanted.get("bitrate", 500_000), wanted.get("seed", 1), wanted.get("timing", "ideal"))
+        world = World(wanted.get("bitrate", 500_000), wanted.get("seed", 1), wanted.get("timing", "device"))
     with virtual_time(world):
         for place in wanted.get("drives", ()):
             model, _, node = place.rpartition("@")
@@ -74,22 +77,25 @@ def ferrodrive_sim(request: pytest.FixtureRequest) -> Iterator[Simulator]:
     if "timing" in wanted:
         extra += ["--timing", wanted["timing"]]
     with Simulator(wanted.get("drives", ()), wanted.get("seed", 1), extra) as simulator:
-        # A clock that only moves when it is told to boots no drive by waiting.
+        # A clock that is moved by hand boots no drive by waiting.
         if "manual" not in simulator.command_line:
             simulator.wait_until_booted()
         yield simulator
 
 
 def marked(request: pytest.FixtureRequest) -> dict[str, Any]:
-    """What the test's marker says."""
+    """What the test's marker has."""
     marker = request.node.get_closest_marker("ferrodrive")
-    return {} if marker is None else marker.kwargs
+    wanted: dict[str, Any] = {} if marker is None else marker.kwargs
+    if unknown := sorted(set(wanted) - KNOWN):
+        raise ValueError(f"the marker ferrodrive has no {', '.join(unknown)}; expected {', '.join(sorted(KNOWN))}")
+    return wanted
 
 
 def machine_file(request: pytest.FixtureRequest, wanted: dict[str, Any]) -> pathlib.Path:
     """The machine file of the marker, from pytest's root."""
     if "bitrate" in wanted:
-        raise ValueError("a machine file says its bit rate: leave bitrate away, or say it there")
+        raise ValueError("the bit rate is in the machine file: omit bitrate, or change it there")
     return request.config.rootpath / wanted["machine"]
 
 

@@ -117,7 +117,7 @@ class Sweep:
         self, path: Union[str, os.PathLike[str]], seeds: range = range(1, 2), set: Optional[Mapping[str, Value]] = None
     ) -> None:
         if seeds.step != 1 or len(seeds) == 0 or seeds.start < 0:
-            raise ValueError(f"{seeds} is no range of seeds; expected one after the other, as range(1, 101)")
+            raise ValueError(f"{seeds} is not a range of seeds; expected one after the other, as range(1, 101)")
         os.stat(path)
         self._made_of = (os.fspath(path), seeds, set)
         self._native = _native.Sweep(os.fspath(path), seeds.start, seeds.stop - 1, settings(set))

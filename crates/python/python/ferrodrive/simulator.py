@@ -69,14 +69,17 @@ class Simulator:
 
     def __enter__(self) -> Simulator:
         self._errors = tempfile.TemporaryFile("w+")
-        self.process = subprocess.Popen(
-            self.command_line,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._errors,
-            text=True,
-            bufsize=1,
-        )
+        try:
+            self.process = subprocess.Popen(
+                self.command_line,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._errors,
+                text=True,
+                bufsize=1,
+            )
+        except OSError as error:
+            raise SimulatorError(f"cannot start {self.command_line[0]}: {error}; is it installed, and may this user run it?") from error
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         try:

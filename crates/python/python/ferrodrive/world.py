@@ -28,7 +28,7 @@ _by_channel: weakref.WeakValueDictionary[str, World] = weakref.WeakValueDictiona
 class World(_native.World):
     """A CAN bus, the drives on it and the physics around them, in virtual time.
 
-    Time moves only when it is told to (:meth:`run_for`, :meth:`run_until`), or as far as a program waits while
+    Time moves only in :meth:`run_for` and :meth:`run_until`, or as far as a program waits while
     :func:`~ferrodrive.virtual_time` or ``can.Bus(interface="ferrodrive")`` is in use. The same seed and the same calls give the
     same frames at the same nanoseconds on every run and every machine.
 
@@ -36,14 +36,17 @@ class World(_native.World):
 
     :param bitrate: bit rate of the bus in bit/s, or as text (``"500k"``)
     :param seed: decides everything random
-    :param timing: ``ideal``: boot, answers and stores take no time beyond the wire; ``device``: what a device of this kind takes
+    :param timing: ``device``: boot, answers and stores take the time that such a device takes, as on the desk; ``ideal``: none beyond the
+        wire
     :param channel: a name under which ``can.Bus(interface="ferrodrive", channel=...)`` finds this world
     """
 
+    #: The file of :meth:`machine`, if it is of one.
+    machine_file: Optional[str] = None
     _watched = False
     _keeps_trail = False
 
-    def __new__(cls, bitrate: Union[int, str] = 500_000, seed: int = 1, timing: str = "ideal", *, channel: Optional[str] = None) -> Self:
+    def __new__(cls, bitrate: Union[int, str] = 500_000, seed: int = 1, timing: str = "device", *, channel: Optional[str] = None) -> Self:
         world = super().__new__(cls, str(bitrate), seed)
         world.set_timing(timing)
         if channel is not None:
@@ -53,14 +56,18 @@ class World(_native.World):
     @classmethod
     def machine(cls, path: Union[str, os.PathLike[str]], seed: Optional[int] = None, *, timing: Optional[str] = None) -> World:
         """The world that a machine file describes: its drives and what is around them. Data sheets that it names are looked for beside
-        it. A file that makes no sense raises :class:`ValueError` with everything that is wrong in it.
+        it.
 
         :param seed: instead of the file's
-        :param timing: ``ideal`` or ``device`` instead of the file's; drives that say it for themselves keep theirs
+        :param timing: ``device`` or ``ideal`` instead of the file's, which is ``device`` unless the file has another; a drive that has its
+            own in the file keeps it
+        :raises OSError: the file is not there
+        :raises ValueError: it makes no sense, with everything that is wrong in it
         """
         os.stat(path)
         world = cls()
         world.become_machine(os.fspath(path), seed, timing)
+        world.machine_file = os.fspath(path)
         return world
 
     def add(
@@ -104,7 +111,7 @@ class World(_native.World):
         :class:`~ferrodrive.Refused`."""
         answer: dict[str, Any] = json.loads(self.command(line) or "{}")
         if not answer.get("ok"):
-            error = answer.get("error", "nothing to do is said")
+            error = answer.get("error", "expected a world command, got nothing")
             raise Refused(error["message"] if isinstance(error, dict) else error)
         return answer
 
@@ -144,6 +151,15 @@ class World(_native.World):
             time.sleep_ns(ns)
         else:
             self.run_ns(ns)
+
+    def wait_until_booted(self, within: float = 30.0) -> float:
+        """Lets time pass until every drive that was added has booted; returns the time at which it had, in s. With ``timing="device"`` a
+        drive takes about a second, in which it is deaf, as a real one.
+
+        :param within: longest time in s of virtual time
+        :raises TimeoutError: not all had by then
+        """
+        return self.run_until(lambda: all(self.apply(f"{node} get")["power"] == "on" for node in self.nodes), within)
 
     def snapshot(self) -> World:
         """A copy of everything: drives, physics, frames under way. It goes its own way from here, or is come back to with
@@ -217,7 +233,7 @@ def nanoseconds(seconds: float) -> int:
     """A length of time as a whole number of nanoseconds."""
     ns = round(seconds * NANOSECONDS)
     if ns < 0:
-        raise ValueError(f"time does not go back; {seconds} s is no length of time")
+        raise ValueError(f"expected a time of 0 s or more, got {seconds} s")
     return ns
 
 
@@ -235,6 +251,6 @@ def at_channel(channel: object) -> World:
             world.add(model, node=int(node))
         return world
     raise ValueError(
-        f"{text!r} is no channel; expected a World, the name of one (World(channel={text!r})), or drives, "
+        f"{text!r} is not a channel; expected a World, the name of one (World(channel={text!r})), or drives, "
         'as in "zlac8030l@4 m4230e17b50@1"'
     )

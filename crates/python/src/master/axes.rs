@@ -3,6 +3,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use master::base::{Base as MasterBase, BaseError, BaseLimits, BaseState, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
@@ -180,18 +181,14 @@ impl Group {
     fn open(&self, py: Python<'_>, axes: Vec<AxisOrder>, period_s: f64, tolerance: u32) -> PyResult<Job> {
         let network = self.network.get();
         let axes = axes.iter().map(|axis| axis.setup(network)).collect::<PyResult<Vec<_>>>()?;
-        let (period, slot) = (duration(period_s)?, self.slot.clone());
-        let options = CyclicOptions { tolerance, ..CyclicOptions::default() };
-        network.begin_said(py, async move {
-            let mut group = MasterGroup::open(&axes, period, options).await?;
-            if let Err(error) = group.enable().await {
-                let reason = group.explain_stop().await.map(|reason| format!(". {reason}")).unwrap_or_default();
-                let _ = group.close().await;
-                return Err(Trouble::Said(format!("{error}{reason}")));
-            }
-            *slot.lock() = Some(group);
-            Ok(Value::None)
-        })
+        self.open_with(py, axes, duration(period_s)?, tolerance)
+    }
+
+    /// The same with the axes of a group of the machine file, and its period unless one is given.
+    fn open_of_file(&self, py: Python<'_>, name: &str, period_s: Option<f64>, tolerance: u32) -> PyResult<Job> {
+        let (axes, period) = self.network.get().group_of_file(py, name)?;
+        let period = period_s.map_or(Ok(period), duration)?;
+        self.open_with(py, axes, period, tolerance)
     }
 
     /// Steps it in each cycle for as long as it is open; nobody waits for this.
@@ -278,6 +275,23 @@ impl Group {
             ]))
         });
         value.map_err(|trouble| trouble.raised(py, None))?.into_python(py)
+    }
+}
+
+impl Group {
+    fn open_with(&self, py: Python<'_>, axes: Vec<AxisSetup>, period: Duration, tolerance: u32) -> PyResult<Job> {
+        let slot = self.slot.clone();
+        let options = CyclicOptions { tolerance, ..CyclicOptions::default() };
+        self.network.get().begin_said(py, async move {
+            let mut group = MasterGroup::open(&axes, period, options).await?;
+            if let Err(error) = group.enable().await {
+                let reason = group.explain_stop().await.map(|reason| format!(". {reason}")).unwrap_or_default();
+                let _ = group.close().await;
+                return Err(Trouble::Said(format!("{error}{reason}")));
+            }
+            *slot.lock() = Some(group);
+            Ok(Value::None)
+        })
     }
 }
 
@@ -371,18 +385,14 @@ impl Base {
             watchdog: duration(order.watchdog_s)?,
             lag_m: order.lag_m.unwrap_or_else(|| BaseLimits::lag_for(order.wheel_m_s)),
         };
-        let (period, slot) = (duration(period_s)?, self.slot.clone());
-        let options = CyclicOptions { tolerance, ..CyclicOptions::default() };
-        network.begin_said(py, async move {
-            let [left, right] = &wheels;
-            let mut base = MasterBase::open([left, right], geometry, limits, period, options).await?;
-            if let Err(error) = base.enable().await {
-                let _ = base.close().await;
-                return Err(error.into());
-            }
-            *slot.lock() = Some(base);
-            Ok(Value::None)
-        })
+        self.open_with(py, wheels, (geometry, limits), duration(period_s)?, tolerance)
+    }
+
+    /// The same with the base of the machine file, and its period unless one is given.
+    fn open_of_file(&self, py: Python<'_>, period_s: Option<f64>, tolerance: u32) -> PyResult<Job> {
+        let (wheels, plan, period) = self.network.get().base_of_file(py)?;
+        let period = period_s.map_or(Ok(period), duration)?;
+        self.open_with(py, wheels, (plan.geometry, plan.limits), period, tolerance)
     }
 
     /// Steps it in each cycle for as long as it is open; nobody waits for this.
@@ -439,6 +449,30 @@ impl Base {
             ("cause", cause.map_or(Value::None, |cause| Value::Text(cause.to_string()))),
         ];
         Value::Record(record).into_python(py)
+    }
+}
+
+impl Base {
+    fn open_with(
+        &self,
+        py: Python<'_>,
+        wheels: [WheelSetup; 2],
+        (geometry, limits): (Geometry, BaseLimits),
+        period: Duration,
+        tolerance: u32,
+    ) -> PyResult<Job> {
+        let slot = self.slot.clone();
+        let options = CyclicOptions { tolerance, ..CyclicOptions::default() };
+        self.network.get().begin_said(py, async move {
+            let [left, right] = &wheels;
+            let mut base = MasterBase::open([left, right], geometry, limits, period, options).await?;
+            if let Err(error) = base.enable().await {
+                let _ = base.close().await;
+                return Err(error.into());
+            }
+            *slot.lock() = Some(base);
+            Ok(Value::None)
+        })
     }
 }
 

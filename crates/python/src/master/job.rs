@@ -9,10 +9,11 @@ use std::time::Duration;
 
 use master::Error;
 use pyo3::prelude::*;
+use testbench::failure::Failure;
 
 use super::runner::Runner;
 use super::value::Value;
-use crate::failure::{master_error, said, wrong_use};
+use crate::failure::{master_error, wrong_use};
 use crate::live::Live;
 use crate::world;
 
@@ -33,6 +34,16 @@ pub(super) enum Trouble {
     Drive(Error),
     /// What a group or a base says.
     Said(String),
+    /// What an operation on the network as a whole says.
+    Failed(Failure),
+    /// The same, with what was done as far as it went.
+    Reported(Failure, Box<Value>),
+}
+
+impl From<Failure> for Trouble {
+    fn from(failure: Failure) -> Self {
+        Self::Failed(failure)
+    }
 }
 
 impl From<Error> for Trouble {
@@ -43,10 +54,19 @@ impl From<Error> for Trouble {
 
 impl Trouble {
     /// As Python raises it, with what is wrong with the bus.
-    pub(super) fn raised(&self, py: Python<'_>, bus: Option<String>) -> PyErr {
+    pub(super) fn raised(self, py: Python<'_>, bus: Option<&str>) -> PyErr {
         match self {
-            Self::Drive(error) => master_error(py, error, bus),
-            Self::Said(text) => said(text, bus),
+            Self::Drive(error) => {
+                let text = error.to_string();
+                master_error(py, &text, &Failure::from(error), bus)
+            }
+            Self::Said(text) => master_error(py, &text, &Failure::new(text.as_str()), bus),
+            Self::Failed(failure) => master_error(py, &failure.to_string(), &failure, bus),
+            Self::Reported(failure, report) => {
+                let error = master_error(py, &failure.to_string(), &failure, bus);
+                let set = report.into_python(py).and_then(|report| error.value(py).setattr("report", report));
+                set.map_or_else(|failed| failed, |()| error)
+            }
         }
     }
 }
@@ -191,7 +211,7 @@ impl Job {
         let lost = || self.runner.with_live(Live::lost).flatten();
         match self.outcome.lock().result.take() {
             Some(Ok(value)) => value.into_python(py),
-            Some(Err(trouble)) => Err(trouble.raised(py, lost())),
+            Some(Err(trouble)) => Err(trouble.raised(py, lost().as_deref())),
             None => {
                 Err(wrong_use(lost().unwrap_or_else(|| "it was given up, or the network was closed meanwhile".into())))
             }

@@ -14,9 +14,16 @@ pub(crate) enum Value {
     Bytes(Vec<u8>),
     List(Vec<Value>),
     Record(Vec<(&'static str, Value)>),
+    /// A report, as `--json` has it.
+    Report(serde_json::Value),
 }
 
 impl Value {
+    /// A report of crate `testbench`.
+    pub(super) fn report(report: &impl serde::Serialize) -> Self {
+        Self::Report(serde_json::to_value(report).unwrap_or_default())
+    }
+
     /// Python's value.
     pub(super) fn into_python(self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         Ok(match self {
@@ -40,8 +47,31 @@ impl Value {
                 }
                 dict.into_any().unbind()
             }
+            Self::Report(report) => of_json(py, report)?,
         })
     }
+}
+
+fn of_json(py: Python<'_>, json: serde_json::Value) -> PyResult<Py<PyAny>> {
+    use serde_json::Value as Json;
+    let value = match json {
+        Json::Null => Value::None,
+        Json::Bool(flag) => Value::Bool(flag),
+        Json::Number(number) => match number.as_i64() {
+            Some(integer) => Value::Integer(integer),
+            None => real(number.as_f64()),
+        },
+        Json::String(text) => Value::Text(text),
+        Json::Array(items) => Value::List(items.into_iter().map(Value::Report).collect()),
+        Json::Object(fields) => {
+            let dict = PyDict::new(py);
+            for (name, value) in fields {
+                dict.set_item(name, of_json(py, value)?)?;
+            }
+            return Ok(dict.into_any().unbind());
+        }
+    };
+    value.into_python(py)
 }
 
 fn real(value: Option<f64>) -> Value {

@@ -1,0 +1,355 @@
+"""A drive in physical units: what is asked of it, blocking and as coroutines."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Optional
+
+from ._native import Job, model_name
+from .reports import DriveState, MotionReport
+
+if TYPE_CHECKING:
+    from .master import Network
+
+
+class _Orders:
+    """What can be asked of a drive, as jobs. Both kinds of drive wait for these."""
+
+    def __init__(self, network: Network, node: int, model: str, gear_ratio: Optional[float] = None) -> None:
+        model_name(model)
+        self.network = network
+        #: Its node-ID, 1 to 127.
+        self.node = node
+        #: Its model.
+        self.model = model
+        #: Turns of its shaft for one turn of the output; None: as the machine file says, or 1.
+        self.gear_ratio = gear_ratio
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.model} at {self.node}>"
+
+    def _begin(self, do_: str, **order: Any) -> Job:
+        given = {name: value for name, value in order.items() if value is not None}
+        behind = {} if self.gear_ratio is None else {"gear_ratio": self.gear_ratio}
+        return self.network._native.drive(self.node, self.model, {"do_": do_, **behind, **given})
+
+
+def _angle(degrees: Optional[float], counts: Optional[int]) -> dict[str, Any]:
+    if (degrees is None) == (counts is None):
+        raise ValueError("expected an angle in degrees or in counts, one of them")
+    return {"value": degrees} if counts is None else {"counts": counts}
+
+
+class Drive(_Orders):
+    """A drive in physical units. From :meth:`Network.drive`. Every method waits until it is done, and raises :class:`MasterError` if it is
+    not: :class:`NoAnswer`, :class:`Aborted`, :class:`NotReached`, :class:`BadRequest` for a value beyond what it takes.
+
+    >>> drive = network.drive(5, "cia402")
+    >>> report = drive.velocity(60)
+    >>> drive.stop()
+    """
+
+    def enable(self) -> None:
+        """Brings it to Operation enabled (CiA 402-2, clause 8).
+
+        :raises NotReached: it does not get there, with what keeps it
+
+        >>> drive.enable()
+        >>> drive.state()["power"]
+        'Operation enabled'
+        """
+        self.network._finish(self._begin("enable"))
+
+    def disable(self) -> None:
+        """Takes the current from the motor; what turns runs out.
+
+        :raises MasterError: it refused or did not answer
+
+        >>> drive.disable()
+        """
+        self.network._finish(self._begin("disable"))
+
+    def stop(self) -> None:
+        """Brings it to a stand with its own ramp; it stays enabled.
+
+        :raises NotReached: it was not seen to stand
+
+        >>> drive.velocity(60)["notes"]
+        []
+        >>> drive.stop()
+        """
+        self.network._finish(self._begin("stop"))
+
+    def quick_stop(self) -> None:
+        """Stops it as fast as it is set up to (605Ah), and leaves it as that option says.
+
+        :raises NotReached: it was not seen to stand
+
+        >>> drive.quick_stop()
+        """
+        self.network._finish(self._begin("quick_stop"))
+
+    def reset_fault(self) -> None:
+        """Resets a fault whose cause is gone.
+
+        :raises NotReached: the fault stays, with its remedy
+
+        >>> drive.reset_fault()
+        """
+        self.network._finish(self._begin("reset_fault"))
+
+    def save(self) -> None:
+        """Stores its parameters in the drive (1010h, or what its model has for that).
+
+        :raises MasterError: its model has no store, or it refused
+
+        >>> drive.save()
+        """
+        self.network._finish(self._begin("save"))
+
+    def restore(self) -> None:
+        """Has the drive take its factory values from the next start on (1011h). What was set is lost.
+
+        :raises MasterError: its model has no such command, or it refused
+
+        >>> drive.restore()
+        """
+        self.network._finish(self._begin("restore"))
+
+    def check_identity(self) -> None:
+        """Checks that the drive is of the model that it is taken for (1018h).
+
+        :raises MasterError: it is another one
+
+        >>> drive.check_identity()
+        """
+        self.network._finish(self._begin("check_identity"))
+
+    def guard(self) -> str:
+        """Has the drive stop by itself when this program dies, where its model has something for that; returns what it does then, in words.
+
+        :raises MasterError: it refused or did not answer
+
+        >>> drive.guard()[:4]
+        'the '
+        """
+        loss: str = self.network._finish(self._begin("guard"))
+        return loss
+
+    def release_guard(self) -> None:
+        """Takes that back.
+
+        :raises MasterError: it refused or did not answer
+
+        >>> drive.release_guard()
+        """
+        self.network._finish(self._begin("release_guard"))
+
+    def state(self) -> DriveState:
+        """What the drive says of itself. What its model does not have is None.
+
+        :raises MasterError: it does not answer
+
+        >>> drive.state()["supply_v"]
+        48.0
+        """
+        state: DriveState = self.network._finish(self._begin("state"))
+        return state
+
+    def velocity(
+        self,
+        rpm: float,
+        *,
+        acceleration_rpm_s: Optional[float] = None,
+        deceleration_rpm_s: Optional[float] = None,
+        wait: bool = True,
+    ) -> MotionReport:
+        """Turns at this speed until another command comes (profile velocity); enables the drive first.
+
+        :param rpm: speed of the output in r/min; below 0 the other way round
+        :param acceleration_rpm_s: in (r/min)/s; None leaves it as the drive has it, ``deceleration_rpm_s`` the same
+        :param wait: until the speed is reached
+        :raises NotReached: the speed was not reached, with what was seen
+        :raises BadRequest: the speed is beyond what the drive takes
+
+        >>> drive.velocity(60, acceleration_rpm_s=600)["reached_after_s"] > 0.1
+        True
+        """
+        options = {"acceleration_rpm_s": acceleration_rpm_s, "deceleration_rpm_s": deceleration_rpm_s, "wait": wait}
+        report: MotionReport = self.network._finish(self._begin("velocity", value=rpm, **options))
+        return report
+
+    def move(
+        self,
+        degrees: Optional[float] = None,
+        *,
+        counts: Optional[int] = None,
+        relative: bool = False,
+        speed_rpm: Optional[float] = None,
+        acceleration_rpm_s: Optional[float] = None,
+        deceleration_rpm_s: Optional[float] = None,
+        wait: bool = True,
+    ) -> MotionReport:
+        """Goes to a position (profile position); enables the drive first.
+
+        :param degrees: of the output, or of the shaft that the drive counts where nothing stands behind it
+        :param counts: instead of degrees, in the drive's counts
+        :param relative: by this much from where it is
+        :param speed_rpm: highest speed on the way in r/min; None leaves it as the drive has it
+        :param acceleration_rpm_s: in (r/min)/s; None leaves it as the drive has it, ``deceleration_rpm_s`` the same
+        :param wait: until the position is reached
+        :raises NotReached: the position was not reached, with what was seen
+        :raises BadRequest: the position is beyond what the drive takes
+        :raises ValueError: both or neither of ``degrees`` and ``counts``
+
+        >>> report = drive.move(90, relative=True, speed_rpm=30)
+        >>> round(drive.state()["angle_deg"])
+        90
+        """
+        ramps = {"acceleration_rpm_s": acceleration_rpm_s, "deceleration_rpm_s": deceleration_rpm_s}
+        order = {**_angle(degrees, counts), **ramps, "relative": relative, "speed_rpm": speed_rpm, "wait": wait}
+        report: MotionReport = self.network._finish(self._begin("move", **order))
+        return report
+
+    def torque(self, current_a: float) -> MotionReport:
+        """Lets the motor push with this current until another command comes (profile torque); enables the drive first. Does not wait.
+
+        :param current_a: in A; below 0 the other way round
+        :raises BadRequest: the current is beyond what the drive takes
+        :raises MasterError: its model has no profile torque (kind ``no_such_mode``)
+
+        >>> drive.torque(0.5)["notes"]
+        []
+        """
+        report: MotionReport = self.network._finish(self._begin("torque", value=current_a))
+        return report
+
+    def home(
+        self,
+        method: int,
+        *,
+        speed_rpm: Optional[float] = None,
+        within: Optional[float] = None,
+        wait: bool = True,
+    ) -> MotionReport:
+        """Finds its reference position (homing).
+
+        :param method: of CiA 402-2 (6098h), -128 to 127
+        :param speed_rpm: in r/min; None leaves it as the drive has it
+        :param within: longest time in s; 60 without it
+        :param wait: until it is done
+        :raises NotReached: it was not done in this time
+        :raises ValueError: the method is not such a number
+
+        >>> drive.home(35)["reached_after_s"] < 1
+        True
+        """
+        order = {"counts": method, "speed_rpm": speed_rpm, "limit_s": within, "wait": wait}
+        report: MotionReport = self.network._finish(self._begin("home", **order))
+        return report
+
+
+class AsyncDrive(_Orders):
+    """:class:`Drive` with coroutines, for several drives at the same time. From :meth:`Network.async_drive`. On a virtual bus the loop runs
+    inside ``with ferrodrive.virtual_time(world)``.
+
+    >>> async def main():
+    ...     servo = network.async_drive(5, "cia402")
+    ...     await servo.velocity(60)
+    ...     await servo.stop()
+    >>> with ferrodrive.virtual_time(world):
+    ...     asyncio.run(main())
+    """
+
+    async def enable(self) -> None:
+        """As :meth:`Drive.enable`."""
+        await self.network._finish_soon(self._begin("enable"))
+
+    async def disable(self) -> None:
+        """As :meth:`Drive.disable`."""
+        await self.network._finish_soon(self._begin("disable"))
+
+    async def stop(self) -> None:
+        """As :meth:`Drive.stop`."""
+        await self.network._finish_soon(self._begin("stop"))
+
+    async def quick_stop(self) -> None:
+        """As :meth:`Drive.quick_stop`."""
+        await self.network._finish_soon(self._begin("quick_stop"))
+
+    async def reset_fault(self) -> None:
+        """As :meth:`Drive.reset_fault`."""
+        await self.network._finish_soon(self._begin("reset_fault"))
+
+    async def save(self) -> None:
+        """As :meth:`Drive.save`."""
+        await self.network._finish_soon(self._begin("save"))
+
+    async def restore(self) -> None:
+        """As :meth:`Drive.restore`."""
+        await self.network._finish_soon(self._begin("restore"))
+
+    async def check_identity(self) -> None:
+        """As :meth:`Drive.check_identity`."""
+        await self.network._finish_soon(self._begin("check_identity"))
+
+    async def guard(self) -> str:
+        """As :meth:`Drive.guard`."""
+        loss: str = await self.network._finish_soon(self._begin("guard"))
+        return loss
+
+    async def release_guard(self) -> None:
+        """As :meth:`Drive.release_guard`."""
+        await self.network._finish_soon(self._begin("release_guard"))
+
+    async def state(self) -> DriveState:
+        """As :meth:`Drive.state`."""
+        state: DriveState = await self.network._finish_soon(self._begin("state"))
+        return state
+
+    async def velocity(
+        self,
+        rpm: float,
+        *,
+        acceleration_rpm_s: Optional[float] = None,
+        deceleration_rpm_s: Optional[float] = None,
+        wait: bool = True,
+    ) -> MotionReport:
+        """As :meth:`Drive.velocity`."""
+        options = {"acceleration_rpm_s": acceleration_rpm_s, "deceleration_rpm_s": deceleration_rpm_s, "wait": wait}
+        report: MotionReport = await self.network._finish_soon(self._begin("velocity", value=rpm, **options))
+        return report
+
+    async def move(
+        self,
+        degrees: Optional[float] = None,
+        *,
+        counts: Optional[int] = None,
+        relative: bool = False,
+        speed_rpm: Optional[float] = None,
+        acceleration_rpm_s: Optional[float] = None,
+        deceleration_rpm_s: Optional[float] = None,
+        wait: bool = True,
+    ) -> MotionReport:
+        """As :meth:`Drive.move`."""
+        ramps = {"acceleration_rpm_s": acceleration_rpm_s, "deceleration_rpm_s": deceleration_rpm_s}
+        order = {**_angle(degrees, counts), **ramps, "relative": relative, "speed_rpm": speed_rpm, "wait": wait}
+        report: MotionReport = await self.network._finish_soon(self._begin("move", **order))
+        return report
+
+    async def torque(self, current_a: float) -> MotionReport:
+        """As :meth:`Drive.torque`."""
+        report: MotionReport = await self.network._finish_soon(self._begin("torque", value=current_a))
+        return report
+
+    async def home(
+        self,
+        method: int,
+        *,
+        speed_rpm: Optional[float] = None,
+        within: Optional[float] = None,
+        wait: bool = True,
+    ) -> MotionReport:
+        """As :meth:`Drive.home`."""
+        order = {"counts": method, "speed_rpm": speed_rpm, "limit_s": within, "wait": wait}
+        report: MotionReport = await self.network._finish_soon(self._begin("home", **order))
+        return report

@@ -1,0 +1,108 @@
+"""A network that is watched: what ``ferrodrive supervise`` does."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Optional, Union, cast
+
+from ._native import Supervisor as NativeSupervisor
+from .reports import BootReport, WatchedEvent
+
+if TYPE_CHECKING:
+    from .master import Network
+
+
+class Supervisor:
+    """The watch over a network: lost heartbeats, states, emergency messages with fault and remedy, another master. From
+    :meth:`Network.supervise`, which boots it before.
+
+    A node whose supply or cable was away is stopped, identified and configured again; it is not started until :meth:`resume`. While a drive
+    that watches this program's heartbeat is out of reach the heartbeat is held back, so that nothing goes on by itself. It watches while
+    time passes on the bus: on a virtual one in calls of the network that wait, and never moves a motor.
+
+    >>> with network.supervise() as supervisor:
+    ...     world[5].disconnect_supply()
+    ...     supervisor.wait_for("heartbeat_lost", within=5)["node"]
+    5
+    """
+
+    def __init__(self, network: Network, file: Optional[str], nodes: Sequence[int], own_node: int) -> None:
+        self.network = network
+        self._native = NativeSupervisor(network._native)
+        #: What came of the boot-up; that a mandatory node has failed is in it, and raises nothing.
+        self.report: BootReport = network._finish(self._native.open(file, list(nodes), own_node))
+        self._keeper = self._native.keep()
+
+    def __enter__(self) -> Supervisor:
+        return self
+
+    def __exit__(
+        self, kind: Optional[type[BaseException]], error: Optional[BaseException], traceback: Optional[TracebackType]
+    ) -> None:
+        self.close()
+
+    def next(self, within: float = 1.0) -> Optional[WatchedEvent]:
+        """The next thing that happened, or None if nothing did.
+
+        :param within: longest time to wait, in s
+        :raises MasterError: the network was closed
+
+        >>> supervisor.next(within=0.1) is None
+        True
+        """
+        return cast(Optional[WatchedEvent], self.network._finish(self._native.next(within)))
+
+    def events(self, within: float = 1.0) -> Iterator[WatchedEvent]:
+        """What happens, one after the other, until nothing did for this time in s.
+
+        >>> world[5].set_fault("over-temperature")
+        >>> [event["kind"] for event in supervisor.events(within=0.5)][:1]
+        ['emcy']
+        """
+        while (event := self.next(within)) is not None:
+            yield event
+
+    def wait_for(self, kind: str, node: Optional[int] = None, within: float = 5.0) -> WatchedEvent:
+        """The next event of a kind; events before it are passed over.
+
+        :param kind: ``boot_up``, ``nmt_state``, ``heartbeat_lost``, ``heartbeat_back``, ``heartbeat_held``, ``heartbeat_released``,
+            ``emcy``, ``recovered``, ``not_stopped``, ``another_master``, ``node_twice``, ``event``
+        :param within: longest time to wait, in s of the bus
+        :raises TimeoutError: it did not happen in this time
+
+        >>> world[5].disconnect_supply()
+        >>> supervisor.wait_for("heartbeat_lost", node=5)["kind"]
+        'heartbeat_lost'
+        """
+        clock = self.network._now
+        end = clock() + within
+        while (left := end - clock()) > 0 and (event := self.next(left)) is not None:
+            if event["kind"] == kind and node in (None, event["node"]):
+                return event
+        raise TimeoutError(f"no event {kind!r} within {within} s")
+
+    def resume(self, node: int) -> None:
+        """Lets a node that came back take part again (NMT start).
+
+        :raises MasterError: it could not be made to stand, and was not started
+
+        >>> supervisor.resume(5)
+        """
+        self.network._finish(self._native.resume(node))
+
+    def close(self) -> None:
+        """Ends the watch; no drive waits for the heartbeat of this program then. Does nothing the second time.
+
+        :raises MasterError: a drive did not let go
+
+        >>> supervisor.close()
+        """
+        if not self.network.closed:
+            self.network._finish(self._native.close())
+
+
+def path_of(file: Optional[Union[str, os.PathLike[str]]]) -> Optional[str]:
+    """A file's name as the native half has it."""
+    return None if file is None else os.fspath(file)

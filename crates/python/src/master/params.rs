@@ -1,0 +1,196 @@
+//! A node's configuration as one thing, for Python: kept, compared, written as a transaction, checked. What comes of it is that of
+//! `ferrodrive params`.
+
+use std::path::PathBuf;
+
+use devices::Description;
+use master::parameters::Parameters;
+use pyo3::prelude::*;
+use testbench::failure::Failure;
+use testbench::network::params::journal::{default_path, roll_back_by};
+use testbench::network::params::{Proof, Transaction, back_up, bytes_of, diff_of_node, plan_of, source, verify_node};
+use testbench::parameters::{Form, sheet};
+
+use super::value::Value;
+use super::whole::Asked;
+use super::{Job, Network, duration};
+use crate::failure::bad_value;
+
+impl Asked {
+    /// What the node is to have: as this file has it, or the machine file.
+    fn wanted(
+        &self,
+        file: Option<&PathBuf>,
+        model: Option<&'static Description>,
+    ) -> Result<(Parameters, String), Failure> {
+        match (file, &self.machine) {
+            (Some(path), _) => Ok((source::read(path, model, Some(self.node))?, path.display().to_string())),
+            (None, Some(machine)) => source::of_machine(machine, self.node),
+            (None, None) => Err(Failure::usage("which parameters?")
+                .at_node(self.node)
+                .next("name their file, or give the network a machine file: Network(bus, machine=FILE)")),
+        }
+    }
+}
+
+/// Reads all parameters of a node's model: the report, and what a file of this name has, if there is to be one.
+#[pyfunction]
+pub(crate) fn params_backup(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    file: Option<PathBuf>,
+) -> PyResult<Job> {
+    let asked = Asked::of(network.get(), node, model)?;
+    // Before anything is asked for: nobody waits for what cannot be kept.
+    let form = file.as_deref().map(Form::of).transpose().map_err(bad_value)?;
+    network.get().begin_said(py, async move {
+        let drive = asked.drive().await?;
+        let (mut report, parameters, model) = back_up(&(), &drive).await?;
+        let bytes = match (&file, form) {
+            (Some(path), Some(form)) => {
+                report.file = Some(path.display().to_string());
+                Value::Bytes(bytes_of(&parameters, model, path, form)?)
+            }
+            _ => {
+                report.parameters = Some(sheet::print(&parameters, Some(model)));
+                Value::None
+            }
+        };
+        Ok(Value::List(vec![Value::report(&report), bytes]))
+    })
+}
+
+/// In what a node and a file differ.
+#[pyfunction]
+pub(crate) fn params_diff(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    file: Option<PathBuf>,
+) -> PyResult<Job> {
+    let asked = Asked::of(network.get(), node, model)?;
+    network.get().begin_said(py, async move {
+        let drive = asked.drive().await?;
+        let (wanted, name) = asked.wanted(file.as_ref(), drive.description())?;
+        Ok(Value::report(&diff_of_node(&drive, &wanted, name).await?))
+    })
+}
+
+/// What would be written, in its order.
+#[pyfunction]
+pub(crate) fn params_plan(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    file: Option<PathBuf>,
+    address: bool,
+) -> PyResult<Job> {
+    let asked = Asked::of(network.get(), node, model)?;
+    network.get().begin_said(py, async move {
+        let drive = asked.drive().await?;
+        let (wanted, name) = asked.wanted(file.as_ref(), drive.description())?;
+        Ok(Value::report(&plan_of(&(), &drive, &wanted, name, address).await?))
+    })
+}
+
+/// Whether a node has what a file has.
+#[pyfunction]
+pub(crate) fn params_verify(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    file: Option<PathBuf>,
+) -> PyResult<Job> {
+    let asked = Asked::of(network.get(), node, model)?;
+    network.get().begin_said(py, async move {
+        let drive = asked.drive().await?;
+        let (wanted, name) = asked.wanted(file.as_ref(), drive.description())?;
+        Ok(Value::report(&verify_node(&drive, &wanted, name).await?))
+    })
+}
+
+/// How a transaction is made, in plain values.
+#[derive(FromPyObject)]
+pub(crate) struct TransactionOrder {
+    #[pyo3(item)]
+    address: bool,
+    #[pyo3(item)]
+    save: bool,
+    #[pyo3(item)]
+    prove: Option<String>,
+    #[pyo3(item)]
+    within: f64,
+    #[pyo3(item)]
+    journal: Option<PathBuf>,
+}
+
+impl TransactionOrder {
+    fn transaction(self, asked: &Asked) -> PyResult<Transaction> {
+        let prove = match self.prove.as_deref() {
+            None => None,
+            Some(_) if !self.save => {
+                return Err(bad_value("prove needs save=True: what is not stored is gone after a start"));
+            }
+            Some("reset") => Some(Proof::Reset),
+            Some("power-cycle") => Some(Proof::PowerCycle),
+            Some(other) => {
+                return Err(bad_value(format!("expected prove=\"reset\" or \"power-cycle\", got {other:?}")));
+            }
+        };
+        let journal = self.journal.unwrap_or_else(|| default_path(asked.node));
+        Ok(Transaction {
+            address: self.address,
+            save: self.save,
+            prove,
+            within: duration(self.within)?,
+            // A virtual bus ends with the program, and nothing is left to go back to.
+            journal: (!asked.is_virtual).then_some(journal),
+            on_kept: |_| (),
+        })
+    }
+}
+
+/// Writes a file's parameters to a node: all or none.
+#[pyfunction]
+pub(crate) fn params_apply(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    file: Option<PathBuf>,
+    order: TransactionOrder,
+) -> PyResult<Job> {
+    let asked = Asked::of(network.get(), node, model)?;
+    let transaction = order.transaction(&asked)?;
+    network.get().begin_said(py, async move {
+        let drive = asked.drive().await?;
+        if transaction.save {
+            // Parameters that cannot be stored were not asked for.
+            drive.check_save().await?;
+        }
+        let (wanted, name) = asked.wanted(file.as_ref(), drive.description())?;
+        Ok(Value::report(&transaction.apply(&(), &drive, &wanted, name).await?))
+    })
+}
+
+/// Goes back to how a node was before a transaction that was broken off.
+#[pyfunction]
+pub(crate) fn params_rollback(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    journal: Option<PathBuf>,
+) -> PyResult<Job> {
+    let asked = Asked::of(network.get(), node, model)?;
+    network.get().begin_said(py, async move {
+        let path = journal.unwrap_or_else(|| default_path(asked.node));
+        let drive = asked.drive().await?;
+        Ok(Value::report(&roll_back_by(&path, &drive).await?))
+    })
+}

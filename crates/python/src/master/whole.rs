@@ -1,0 +1,332 @@
+//! What is asked of a network as a whole: who is there, its boot-up, its description, its load, and why a drive does not move. What
+//! comes of it is that of the command line (`testbench::network`).
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use can::Bitrate;
+use canopen::NodeId;
+use cia402::ModeOfOperation;
+use master::decode::Decoder;
+use master::drive::Drive;
+use master::explain::Overheard;
+use master::plan::{ErrorRate, HostQueue, NodeTraffic, Settings};
+use master::{Network as Core, boot as booting};
+use pyo3::prelude::*;
+use testbench::failure::Failure;
+use testbench::machine_file::Machine;
+use testbench::models::Description;
+use testbench::network::boot::{BootReport, Planned};
+use testbench::network::check::CheckReport;
+use testbench::network::explain::ExplainReport;
+use testbench::network::heard::Counted;
+use testbench::network::plan::{CYCLE, PlanReport, SHORTEST_CYCLE, traffic};
+use testbench::network::scan::{ScanReport, ScannedNode, nobody};
+use testbench::words::mode::mode;
+
+use super::job::Trouble;
+use super::runner::Runner;
+use super::value::Value;
+use super::{Job, Network, duration};
+use crate::failure::{bad_value, raised};
+use crate::sheets::{model_of, node_id};
+
+/// Longest wait for an answer, as the command line has it where nothing is said.
+pub(super) const TIMEOUT: Duration = Duration::from_millis(500);
+
+/// Time for a frame without an answer (NMT) to get onto the bus.
+const SETTLING_TIME: Duration = Duration::from_millis(50);
+
+impl Network {
+    /// The models that need not be found out.
+    pub(super) fn known(&self) -> BTreeMap<NodeId, &'static Description> {
+        self.machine.iter().flat_map(|machine| machine.models()).collect()
+    }
+
+    /// What a boot-up goes by: this file, or the machine file, or who is there.
+    pub(super) fn planned(&self, py: Python<'_>, file: Option<PathBuf>) -> PyResult<Planned> {
+        match (&self.machine, file) {
+            (_, Some(path)) => Planned::read(Some(&path)).map_err(|failure| raised(py, &failure)),
+            (Some(machine), None) => Ok(Planned::Machine(PathBuf::new(), Box::new(Machine::clone(machine)))),
+            (None, None) => Ok(Planned::Bus),
+        }
+    }
+
+    fn is_virtual(&self) -> bool {
+        matches!(&*self.runner, Runner::World(_))
+    }
+
+    /// The bit rate, where it is known without being said.
+    fn bitrate(&self, py: Python<'_>) -> PyResult<Option<Bitrate>> {
+        match &*self.runner {
+            Runner::World(shared) => Ok(Some(shared.lock(py)?.world.bitrate())),
+            Runner::Live(_) => Ok(self.machine.as_ref().and_then(|machine| machine.bitrate)),
+        }
+    }
+}
+
+/// The drive at a node: of this model, or as the machine file has it, or as its identity and objects have it.
+pub(super) async fn drive_at(
+    core: &Core,
+    machine: Option<&Machine>,
+    id: NodeId,
+    model: Option<&'static Description>,
+) -> Result<Drive, Failure> {
+    let node = core.node(id);
+    let described = machine.filter(|machine| machine.models().any(|(other, _)| other == id));
+    match (model, described) {
+        (Some(model), _) => {
+            Ok(Drive::new(node, model).behind(machine.map_or(master::Gear::DIRECT, |file| file.gear(id))))
+        }
+        (None, Some(machine)) => {
+            let drive = machine.drive(node);
+            drive.check_identity().await?;
+            Ok(drive)
+        }
+        (None, None) => {
+            let knowledge = master::identify::knowledge(&node).await?;
+            Ok(Drive::known_as(node, knowledge))
+        }
+    }
+}
+
+/// Everybody on the bus.
+#[pyfunction]
+pub(crate) fn scan(py: Python<'_>, network: &Bound<'_, Network>) -> PyResult<Job> {
+    let network = network.get();
+    let (core, known, listener) = (network.core.clone(), network.known(), network.traffic.listen(false));
+    network.begin_said(py, async move {
+        let found = core.scan(TIMEOUT, |_| ()).await;
+        let (mut counted, mut decoder) = (Counted::default(), Decoder::knowing(core.models()));
+        known.iter().for_each(|(node, model)| decoder.set_model(*node, model));
+        while let Some((_, frame)) = listener.take() {
+            counted.note(&mut decoder, &frame);
+        }
+        let heard = counted.told(|node| found.iter().any(|found| found.node == node));
+        if found.is_empty() {
+            return Err(nobody(&heard).into());
+        }
+        let nodes = found.iter().map(|found| ScannedNode::new(known.get(&found.node).copied(), found, how_to_say));
+        Ok(Value::report(&ScanReport { nodes: nodes.collect(), heard }))
+    })
+}
+
+/// How a program says which model a node is.
+fn how_to_say(node: NodeId, models: &[&str]) -> String {
+    let (first, others) = models.split_first().unwrap_or((&"MODEL", &[]));
+    let others = if others.is_empty() { String::new() } else { format!(" (or {})", others.join(", ")) };
+    format!("network.drive({node}, {first:?}){others}, or a machine file: Network(bus, machine=FILE)")
+}
+
+/// Boots the nodes of a file, or who is there.
+#[pyfunction]
+pub(crate) fn boot(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    file: Option<PathBuf>,
+    nodes: Vec<u8>,
+    reset: bool,
+    start: bool,
+) -> PyResult<Job> {
+    let network = network.get();
+    let (planned, only) = (network.planned(py, file)?, node_ids(nodes)?);
+    let (core, known) = (network.core.clone(), network.known());
+    network.begin_said(py, async move {
+        let mut plan = planned.plan(&core, &known, TIMEOUT, &only, |_| ()).await?;
+        // A guard is armed where something is moved.
+        plan.guard = false;
+        if reset {
+            for expectation in plan.nodes.values_mut() {
+                expectation.assignment = expectation.assignment.without(booting::Assignment::KEEP_ALIVE);
+            }
+        }
+        if !start {
+            plan.startup.0 |= booting::Startup::STARTS_NONE;
+        }
+        let report = core.boot(&plan).await;
+        core.sleep(SETTLING_TIME).await;
+        let unconfigured = core.unconfigured(&plan, &report).await;
+        let report = BootReport::new(&plan, &report, &unconfigured);
+        let value = Value::report(&report);
+        report.failure().map_or(Ok(()), |failure| Err(Trouble::Reported(failure, Box::new(Value::report(&report)))))?;
+        Ok(value)
+    })
+}
+
+/// Node-IDs of a list.
+pub(super) fn node_ids(nodes: Vec<u8>) -> PyResult<Vec<NodeId>> {
+    nodes.into_iter().map(node_id).collect()
+}
+
+/// What goes wrong with a described bus; no bus is needed.
+#[pyfunction]
+pub(crate) fn check_file(py: Python<'_>, file: PathBuf, strict: bool) -> PyResult<Py<PyAny>> {
+    let report = py.detach(|| {
+        let mut checked = testbench::network::check::read(&file)?;
+        let predicted = checked.predict();
+        Ok::<_, Failure>(CheckReport::new(&file, checked, predicted, None, strict))
+    });
+    Value::report(&report.map_err(|failure| raised(py, &failure))?).into_python(py)
+}
+
+/// The same, held against the drives of this bus.
+#[pyfunction]
+pub(crate) fn check(py: Python<'_>, network: &Bound<'_, Network>, file: PathBuf, strict: bool) -> PyResult<Job> {
+    let network = network.get();
+    let core = network.core.clone();
+    let read = py.detach(|| {
+        let mut checked = testbench::network::check::read(&file)?;
+        let predicted = checked.predict();
+        Ok::<_, Failure>((checked, predicted))
+    });
+    let (mut checked, predicted) = read.map_err(|failure| raised(py, &failure))?;
+    network.begin_said(py, async move {
+        let live = checked.ask(&core, |node| core.node(node)).await;
+        Ok(Value::report(&CheckReport::new(&file, checked, predicted, Some(live), strict)))
+    })
+}
+
+/// How a bus is planned, in plain values. Times in s; 0 for none.
+#[derive(FromPyObject)]
+pub(crate) struct PlanOrder {
+    #[pyo3(item)]
+    cycle: Option<f64>,
+    #[pyo3(item)]
+    mode: Option<String>,
+    #[pyo3(item)]
+    modes: BTreeMap<u8, String>,
+    #[pyo3(item)]
+    bitrate: Option<String>,
+    #[pyo3(item)]
+    jitter: f64,
+    #[pyo3(item)]
+    sdo: f64,
+    #[pyo3(item)]
+    emcy: f64,
+    #[pyo3(item)]
+    heartbeat: f64,
+    #[pyo3(item)]
+    errors: f64,
+    #[pyo3(item)]
+    by_priority: bool,
+}
+
+impl PlanOrder {
+    fn settings(&self, cycle: Duration) -> PyResult<Settings> {
+        let some = |seconds| Ok::<_, PyErr>(Some(duration(seconds)?).filter(|time| !time.is_zero()));
+        Ok(Settings {
+            jitter: duration(self.jitter)?,
+            queue: if self.by_priority { HostQueue::Priority } else { HostQueue::Fifo },
+            sdo: some(self.sdo)?,
+            emcy: some(self.emcy)?,
+            host_heartbeat: some(self.heartbeat)?.map(|time| (NodeId::MAX, time)),
+            errors: some(self.errors)?.map(ErrorRate),
+            ..Settings::new(cycle)
+        })
+    }
+
+    fn modes(&self) -> PyResult<(Option<ModeOfOperation>, BTreeMap<NodeId, ModeOfOperation>)> {
+        let own = self.modes.iter().map(|(node, name)| Ok((node_id(*node)?, mode(name).map_err(bad_value)?)));
+        let all = self.mode.as_deref().map(mode).transpose().map_err(bad_value)?;
+        Ok((all, own.collect::<PyResult<_>>()?))
+    }
+}
+
+/// Whether everything fits the bus, and how late each frame may come.
+#[pyfunction]
+pub(crate) fn plan(py: Python<'_>, network: &Bound<'_, Network>, order: PlanOrder) -> PyResult<Job> {
+    let network = network.get();
+    let said = order.bitrate.as_deref().map(str::parse).transpose();
+    let said: Option<Bitrate> = said.map_err(|error| bad_value(format!("bitrate: {error}")))?;
+    let bitrate = said.map_or_else(|| network.bitrate(py), |said| Ok(Some(said)))?;
+    let bitrate =
+        bitrate.ok_or_else(|| bad_value("the bit rate of this bus is not known: state it, as in bitrate=500_000"))?;
+    let (all, own) = order.modes()?;
+    let machine = network.machine.clone();
+    let moved =
+        machine.as_ref().filter(|_| all.is_none() && own.is_empty()).and_then(|machine| machine.fullest_cycle());
+    let cycle = order.cycle.map(duration).transpose()?.or(moved.as_ref().map(|moved| moved.period)).unwrap_or(CYCLE);
+    if cycle < SHORTEST_CYCLE {
+        return Err(bad_value(format!("a cycle of {} s is too short; expected 0.00025 or more", cycle.as_secs_f64())));
+    }
+    let settings = order.settings(cycle)?;
+    // Real drives have been set up, or not.
+    let file = machine.clone().filter(|_| network.is_virtual());
+    let core = network.core.clone();
+    network.begin_said(py, async move {
+        let mut found: Vec<NodeId> = core.scan(TIMEOUT, |_| ()).await.iter().map(|found| found.node).collect();
+        found.sort_unstable();
+        if let Some(missing) = own.keys().find(|node| !found.contains(node)) {
+            return Err(Failure::usage(format!("modes has node {missing}, which is not on the bus"))
+                .at_node(*missing)
+                .into());
+        }
+        let mut nodes: Vec<NodeTraffic> = Vec::new();
+        for id in found {
+            let drive = drive_at(&core, machine.as_deref(), id, None).await?;
+            let asked = own.get(&id).copied().or(all);
+            nodes.push(traffic(&drive, file.as_deref(), asked, moved.as_ref()).await?);
+        }
+        if nodes.is_empty() {
+            return Err(nobody(&[]).into());
+        }
+        Ok(Value::report(&PlanReport::new(&nodes, &settings, bitrate, moved)))
+    })
+}
+
+/// Why a drive does not move, and why its PDOs are silent.
+#[pyfunction]
+pub(crate) fn explain(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    watch_s: f64,
+) -> PyResult<Job> {
+    let network = network.get();
+    let (id, watch, model) = (node_id(node)?, duration(watch_s)?, model.map(model_of).transpose()?);
+    let (core, machine, listener) = (network.core.clone(), network.machine.clone(), network.traffic.listen(true));
+    network.begin_said(py, async move {
+        let mut heard = Overheard::from(core.now());
+        core.sleep(watch).await;
+        while let Some((at, frame)) = listener.take() {
+            heard.note(&frame, at);
+        }
+        heard.until(core.now());
+        let drive = match drive_at(&core, machine.as_deref(), id, model).await {
+            // Silence is what is to be explained; the frames still say something.
+            Err(failure) if failure.kind == "no_answer" => Drive::of_unknown_model(core.node(id)),
+            drive => drive?,
+        };
+        Ok(Value::report(&ExplainReport::from(drive.explain(&heard).await)))
+    })
+}
+
+/// What a job needs of a network to ask one of its drives.
+pub(super) struct Asked {
+    pub(super) core: Core,
+    pub(super) machine: Option<Arc<Machine>>,
+    pub(super) node: NodeId,
+    pub(super) model: Option<&'static Description>,
+    /// The bus ends with the program.
+    pub(super) is_virtual: bool,
+}
+
+impl Asked {
+    pub(super) fn of(network: &Network, node: u8, model: Option<&str>) -> PyResult<Self> {
+        Ok(Self {
+            core: network.core.clone(),
+            machine: network.machine.clone(),
+            node: node_id(node)?,
+            model: model.map(model_of).transpose()?,
+            is_virtual: network.is_virtual(),
+        })
+    }
+
+    /// The drive that is meant.
+    pub(super) async fn drive(&self) -> Result<Drive, Failure> {
+        drive_at(&self.core, self.machine.as_deref(), self.node, self.model).await
+    }
+}
