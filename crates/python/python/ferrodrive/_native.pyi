@@ -11,16 +11,32 @@ __version__: str
 Plain = tuple[int, bool, bool, int, bytes]
 
 def models() -> list[str]:
-    """Names of the models that can be simulated."""
+    """Names of the models that can be simulated.
+
+    >>> "zlac8030l" in ferrodrive.models()
+    True
+    """
 
 def model_name(model: str) -> str:
     """The name of a model as it is written, or of a file that describes one."""
 
 def eds(model: str, node: Optional[int] = None) -> str:
-    """The text of a model's data sheet (CiA 306-1); for one node-ID, or with ``$NODEID``."""
+    """The text of a model's data sheet (CiA 306-1).
+
+    :param model: as :func:`models` lists them
+    :param node: the node-ID, 1 to 127, that it is for; without it the sheet has ``$NODEID``
+    :raises ValueError: the model is not known, or the node-ID is not one
+
+    >>> ferrodrive.eds("zlac8030l", node=4)[:10]
+    '[FileInfo]'
+    """
 
 def stimulus_forms() -> list[str]:
-    """The forms of world commands, one each."""
+    """The forms of world commands, one each, as :meth:`World.apply` takes them.
+
+    >>> len(ferrodrive.stimulus_forms()) > 10
+    True
+    """
 
 def run_scenario(path: str, seed: Optional[int], set: list[tuple[str, str]]) -> str:
     """Runs the scenario of a file to its end; returns what ``ferrodrive run --json`` prints."""
@@ -47,13 +63,25 @@ class World:
     def __new__(cls, bitrate: str, seed: int) -> Self: ...
     @property
     def bitrate(self) -> int:
-        """Bit rate of the bus in bit/s."""
+        """Bit rate of the bus in bit/s.
+
+        >>> world.bitrate
+        500000
+        """
     @property
     def now_ns(self) -> int:
-        """The present in ns since the world began."""
+        """The present in ns since the world began.
+
+        >>> ferrodrive.World().now_ns
+        0
+        """
     @property
     def nodes(self) -> list[int]:
-        """Numbers of the drives, in the order in which they were added."""
+        """Numbers of the drives, in the order in which they were added.
+
+        >>> world.nodes
+        [5]
+        """
     def add_drive(self, model: str, node: int, options: list[tuple[str, str]]) -> None: ...
     def set_timing(self, timing: str) -> None:
         """How long boot, answers and stores take from here on: ``ideal``, or ``device``."""
@@ -83,11 +111,24 @@ class World:
     def axes_of(self, number: int) -> int: ...
     def inputs_of(self, number: int) -> list[str]: ...
     def digest(self) -> int:
-        """Hash over all frames with their times and over the present shaft angles: equal digests, equal runs."""
+        """Hash over all frames with their times and over the present shaft angles: equal digests, equal runs.
+
+        >>> world.digest() == world.snapshot().digest()
+        True
+        """
     def statistics(self) -> tuple[float, int]:
-        """Bus load from 0 to 1, and the frames carried, since the world began."""
+        """Bus load from 0 to 1, and the frames carried, since the world began.
+
+        >>> load, frames = world.statistics()
+        >>> 0 <= load <= 1
+        True
+        """
     def frames(self, last: int) -> list[str]:
-        """The last frames on the wire, oldest first, one candump line each."""
+        """The last frames on the wire, oldest first, one candump line each, with the time in s.
+
+        >>> world.frames(1)[0].endswith("705#00")
+        True
+        """
     def become_copy_of(self, other: World) -> None: ...
 
 class Job:

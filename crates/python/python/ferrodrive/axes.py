@@ -123,8 +123,8 @@ class Group(_Open):
         :raises MasterError: a position or the time breaks a limit, and nothing moves; or what stopped the group on its way
 
         >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
-        ...     group.move([10]) > 0.5
-        True
+        ...     round(group.move([10], within=2), 3)
+        2.0
         """
         time: float = self.network._finish(self._native.move_to(list(to_deg), within))
         return time

@@ -30,6 +30,11 @@ class Control:
 
     :param address: host and port, or the path of a Unix socket
     :param token: where the simulator asks for one
+
+    >>> with sim.control() as control:
+    ...     number = control.subscribe_events(kinds=["fault"])
+    ...     control.world("4 supply 90")["ok"]
+    True
     """
 
     def __init__(self, address: Union[tuple[str, int], str], token: Optional[str] = None) -> None:
@@ -56,11 +61,18 @@ class Control:
         self.close()
 
     def close(self) -> None:
-        """Ends the connection; the simulator goes on."""
+        """Ends the connection; the simulator goes on.
+
+        >>> control.close()
+        """
         self._socket.close()
 
     def request(self, request: str, **fields: Any) -> dict[str, Any]:
-        """Sends a request and returns its answer; one that is refused raises :class:`~ferrodrive.Refused`."""
+        """Sends a request and returns its answer; one that is refused raises :class:`~ferrodrive.Refused`.
+
+        >>> control.request("world", line="now")["ok"]
+        True
+        """
         self._asked += 1
         self._send({"id": self._asked, "request": request, **fields})
         until = REAL.monotonic() + ANSWER_TIMEOUT_S
@@ -73,24 +85,40 @@ class Control:
         raise SimulatorError(f"no answer to {request!r} within {ANSWER_TIMEOUT_S} s")
 
     def world(self, line: str) -> dict[str, Any]:
-        """Does what a world command says (``4 supply 48``) and returns its answer."""
+        """Does what a world command says (``4 supply 48``) and returns its answer.
+
+        >>> control.world("4 get")["node"]
+        4
+        """
         return self.request("world", line=line)
 
     def subscribe_events(self, nodes: Optional[Iterable[int]] = None, kinds: Optional[Iterable[str]] = None) -> int:
-        """Has events sent from now on, of these nodes and kinds or of all; returns the number of the subscription."""
+        """Has events sent from now on, of these nodes and kinds or of all; returns the number of the subscription.
+
+        >>> control.subscribe_events()
+        1
+        """
         wanted = {"nodes": nodes, "kinds": kinds}
         events = {name: list(some) for name, some in wanted.items() if some is not None}
         number: int = self.request("subscribe", events=events)["subscription"]
         return number
 
     def subscribe_values(self, node: int, signals: Iterable[str], every: str, axis: int = 1) -> int:
-        """Has values of an axis sent from now on, each time that ``every`` has passed (``"10ms"``)."""
+        """Has values of an axis sent from now on, each time that ``every`` has passed (``"10ms"``).
+
+        >>> control.subscribe_values(4, ["supply_v"], every="10ms")
+        1
+        """
         values = [{"node": node, "axis": axis, "signals": list(signals)}]
         number: int = self.request("subscribe", values=values, every=every)["subscription"]
         return number
 
     def news(self, within: float) -> Optional[dict[str, Any]]:
-        """The next of what was subscribed to, or None if there is nothing within so many seconds."""
+        """The next of what was subscribed to, or None if there is nothing within so many seconds.
+
+        >>> control.news(within=0.01) is None
+        True
+        """
         until = REAL.monotonic() + within
         while not self._news:
             line = self._line(until)
@@ -101,7 +129,14 @@ class Control:
 
     def wait_for(self, kind: str, node: Optional[int] = None, within: float = ANSWER_TIMEOUT_S) -> dict[str, Any]:
         """The next event of a kind that was subscribed to; events before it are passed over. None in time raises
-        :class:`TimeoutError`."""
+        :class:`TimeoutError`.
+
+        >>> number = control.subscribe_events()
+        >>> control.world("4 power cut")["ok"]
+        True
+        >>> control.wait_for("power")["node"]
+        4
+        """
         until = REAL.monotonic() + within
         while (news := self.news(max(0.0, until - REAL.monotonic()))) is not None:
             event: dict[str, Any] = news.get("event", {})

@@ -53,8 +53,8 @@ class MasterError(FerrodriveError, RuntimeError):
     >>> try:
     ...     network.upload(9, 0x1000)
     ... except ferrodrive.MasterError as error:
-    ...     error.kind, error.where, error.do[0][:18]
-    ('no_answer', 'node 9, 1000h:00', 'is the node powere')
+    ...     error.kind, error.where, error.what
+    ('no_answer', 'node 9, 1000h:00', 'node 9 did not answer within 500 ms when asked to read 1000h:00')
     """
 
     #: What kind it is, in a word that programs may rely on: ``no_answer``, ``aborted``, ``not_reached``, ``usage``, ...

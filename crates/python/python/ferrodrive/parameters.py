@@ -110,7 +110,7 @@ class Parameters:
         :raises MasterError: the node is another device, or does not answer
 
         >>> parameters.verify("slow.toml")["deviations"][0]["wanted"]["text"]
-        '10.0 r/min (100)'
+        '100 inc/s'
         """
         return cast(VerifyReport, self._do(_native.params_verify(*self._of, _path(file))))
 

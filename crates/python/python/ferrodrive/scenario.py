@@ -18,7 +18,12 @@ Value = Union[int, float, str]
 
 @dataclass(frozen=True)
 class Row:
-    """One thing that was asked in a run, and what was seen."""
+    """One thing that was asked in a run, and what was seen.
+
+    >>> outcome = ferrodrive.run("scenario.toml")
+    >>> outcome.rows[0].verdict
+    'passed'
+    """
 
     #: ``step``: what the outer world does; ``host``: what a host does; ``expect``: what is expected.
     kind: str
@@ -47,7 +52,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a scenario. As text it is what failed, and the last frames: ``assert outcome.passed, outcome``."""
+    """What came of a scenario. As text it is what failed, and the last frames: ``assert outcome.passed, outcome``.
+
+    >>> outcome = ferrodrive.run("scenario.toml")
+    >>> assert outcome.passed, outcome
+    """
 
     title: str
     #: What decided everything random.
@@ -97,6 +106,9 @@ def run(
 
     A file that cannot be read raises :class:`OSError`, one that makes no sense :class:`ValueError` with everything that is wrong
     in it. What is not as the file expects raises nothing: it is in the outcome.
+
+    >>> ferrodrive.run("scenario.toml", seed=7).seed
+    7
     """
     os.stat(path)
     return outcome(_native.run_scenario(os.fspath(path), seed, settings(set)))
@@ -111,6 +123,10 @@ class Sweep:
     :param path: a scenario file
     :param seeds: one seed after the other, as ``range(1, 101)``
     :param set: values of parameters; one that is set here is not swept
+
+    >>> sweep = ferrodrive.Sweep("scenario.toml", range(1, 3))
+    >>> len(sweep), sweep.run(0).passed
+    (2, True)
     """
 
     def __init__(
@@ -129,27 +145,49 @@ class Sweep:
         return self._native.runs
 
     def point(self, number: int) -> tuple[int, dict[str, str]]:
-        """Seed and values of the run of this number."""
+        """Seed and values of the run of this number.
+
+        >>> sweep.point(1)[0]
+        2
+        """
         seed, values = self._native.point(number)
         return seed, dict(values)
 
     def run(self, number: int) -> Outcome:
-        """Makes the run of this number. Values that make no sense together raise :class:`ValueError`."""
+        """Makes the run of this number. Values that make no sense together raise :class:`ValueError`.
+
+        >>> sweep.run(1).seed
+        2
+        """
         return outcome(self._native.run(number))
 
     def summary(self) -> SweepSummary:
-        """A summary to which no run has been added."""
+        """A summary to which no run has been added.
+
+        >>> sweep.summary().report()["passed"]
+        0
+        """
         return SweepSummary(self._native)
 
 
 class SweepSummary:
-    """What came of the runs of a sweep, in a size that does not grow with them. The order of adding does not matter."""
+    """What came of the runs of a sweep, in a size that does not grow with them. The order of adding does not matter.
+
+    >>> summary = sweep.summary()
+    >>> summary.add(0, sweep.run(0))
+    >>> summary.report()["passed"]
+    1
+    """
 
     def __init__(self, sweep: _native.Sweep) -> None:
         self._native = _native.Summary(sweep)
 
     def add(self, number: int, came: Union[Outcome, ValueError]) -> None:
-        """Adds what came of a run, or what it raised: that run has failed."""
+        """Adds what came of a run, or what it raised: that run has failed.
+
+        >>> summary = sweep.summary()
+        >>> summary.add(0, sweep.run(0))
+        """
         if isinstance(came, Outcome):
             failures = came.failures
             failure = (failures[0].asked, failures[0].seen) if failures else None
@@ -160,7 +198,11 @@ class SweepSummary:
     def report(self) -> dict[str, Any]:
         """What ``ferrodrive run --seeds --json`` prints: ``runs``, ``passed``, ``failed``, ``complete``; of each figure ``min``,
         ``median``, ``max`` and the points with the least and the most; the first failed runs with the command that repeats each;
-        ``seeds_differ``, and a ``note`` where the seed makes no difference."""
+        ``seeds_differ``, and a ``note`` where the seed makes no difference.
+
+        >>> sweep.summary().report()["complete"]
+        False
+        """
         report: dict[str, Any] = json.loads(self._native.report())
         return report
 

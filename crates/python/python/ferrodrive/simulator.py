@@ -50,6 +50,10 @@ class Simulator:
     :param seed: decides everything random
     :param extra: further words of the command line (``ferrodrive sim --help``)
     :param path: the program; without it :func:`program`
+
+    >>> with ferrodrive.Simulator(["zlac8030l@4"]) as sim:
+    ...     sim.world("4 supply 48")["ok"]
+    True
     """
 
     def __init__(
@@ -100,6 +104,8 @@ class Simulator:
         second, in which they are deaf, as real ones are.
 
         :param within: longest time in s; after that :class:`~ferrodrive.SimulatorError` is raised
+
+        >>> sim.wait_until_booted()
         """
         until = REAL.monotonic() + within
         for drive in self.drives:
@@ -110,7 +116,11 @@ class Simulator:
                 REAL.sleep(0.02)
 
     def port(self, protocol: str = "socketcand") -> int:
-        """The port of a listener, as the ``ready`` line names it."""
+        """The port of a listener, as the ``ready`` line names it.
+
+        >>> sim.port() > 1023
+        True
+        """
         address = re.search(rf"{protocol}://127\.0\.0\.1:(\d+)", self.ready)
         if address is None:
             raise SimulatorError(f"no {protocol} address in {self.ready!r}")
@@ -120,23 +130,39 @@ class Simulator:
         """What ``can.Bus`` or ``canopen.Network.connect`` take to reach it.
 
         With ``tcp_tune`` small segments go out at once, whatever the other side acknowledges.
+
+        >>> sim.can_arguments()["interface"]
+        'socketcand'
         """
         place = {"host": "127.0.0.1", "port": self.port()}
         return {"interface": "socketcand", "channel": "can0", "tcp_tune": True, **place}
 
     def control(self) -> Control:
-        """A control connection: events and values as they come, and requests, beside those of others."""
+        """A control connection: events and values as they come, and requests, beside those of others.
+
+        >>> with sim.control() as control:
+        ...     control.world("now")["ok"]
+        True
+        """
         return Control(("127.0.0.1", self.port("control")))
 
     def world(self, command: str) -> dict[str, Any]:
-        """Sends one world command and returns its answer; one that is not ok raises :class:`~ferrodrive.SimulatorError`."""
+        """Sends one world command and returns its answer; one that is not ok raises :class:`~ferrodrive.SimulatorError`.
+
+        >>> sim.world("4 get")["node"]
+        4
+        """
         answer = self.tell(command)
         if not answer.get("ok"):
             raise SimulatorError(f"world command {command!r} refused: {answer.get('error', answer)}")
         return answer
 
     def tell(self, line: str) -> dict[str, Any]:
-        """Sends a line and returns its answer, whatever it is."""
+        """Sends a line and returns its answer, whatever it is.
+
+        >>> sim.tell("fly")["ok"]
+        False
+        """
         assert self.process.stdin is not None
         try:
             self.process.stdin.write(line + "\n")
@@ -147,12 +173,20 @@ class Simulator:
         return answer
 
     def stderr(self) -> list[str]:
-        """The last lines that it wrote to standard error."""
+        """The last lines that it wrote to standard error.
+
+        >>> isinstance(sim.stderr(), list)
+        True
+        """
         self._errors.seek(0)
         return self._errors.read().splitlines()[-10:]
 
     def quit(self) -> int:
-        """Asks the program to quit, and ends the very process that was started if it does not. Returns its exit status."""
+        """Asks the program to quit, and ends the very process that was started if it does not. Returns its exit status.
+
+        >>> sim.quit()
+        0
+        """
         assert self.process.stdin is not None and self.process.stdout is not None
         try:
             if self.process.poll() is None:
@@ -168,7 +202,10 @@ class Simulator:
         return self.process.returncode
 
     def kill(self) -> None:
-        """Ends the process without a word, as a crash of the machine would."""
+        """Ends the process without a word, as a crash of the machine would.
+
+        >>> sim.kill()
+        """
         self.process.kill()
         self.process.wait()
 

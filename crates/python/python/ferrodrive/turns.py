@@ -401,6 +401,13 @@ def virtual_time(world: World) -> Iterator[World]:
             ...
 
     It ends with the block, whatever was left open in it.
+
+    >>> import time
+    >>> with ferrodrive.virtual_time(world):
+    ...     begin = world.now
+    ...     time.sleep(2)
+    ...     round(world.now - begin, 3)
+    2.0
     """
     time = enter(world)
     began_it = time.depth == 1

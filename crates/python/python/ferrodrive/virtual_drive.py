@@ -16,6 +16,11 @@ class VirtualDrive:
     Its properties are the truth about the machine at this moment, whatever its firmware says over the bus. Its methods are what
     the outer world does to it, each one of the world commands of ``ferrodrive sim``. A method that the drive does not take raises
     :class:`~ferrodrive.Refused` and changes nothing.
+
+    >>> servo = world[5]
+    >>> servo.set_load_torque(0.5)
+    >>> abs(servo.velocity_rpm) < 1
+    True
     """
 
     def __init__(self, world: World, node: int, axis: int = 1) -> None:
@@ -53,7 +58,11 @@ class VirtualDrive:
         return self._world.axes_of(self._node)
 
     def axis(self, number: int) -> VirtualDrive:
-        """Another axis of the same drive, counted from 1."""
+        """Another axis of the same drive, counted from 1.
+
+        >>> world[5].axis(1)
+        <cia402 at 5>
+        """
         if not 1 <= number <= self.axes:
             raise ValueError(f"a {self.model} has no axis {number}; it has {self.axes}")
         return VirtualDrive(self._world, self._node, number)
@@ -61,7 +70,11 @@ class VirtualDrive:
     # What can be measured.
 
     def report(self) -> dict[str, Any]:
-        """Everything below at once, by the names of the properties."""
+        """Everything below at once, by the names of the properties.
+
+        >>> world[5].report()["bus"]
+        'error-active'
+        """
         return self._world.report(self._place)
 
     @property
@@ -168,41 +181,73 @@ class VirtualDrive:
     # What the outer world can do. Numbers are written with all their digits, so that they arrive as they are.
 
     def apply(self, words: str) -> None:
-        """Does what a world command says, without the node: ``apply("load torque 2.5")``."""
+        """Does what a world command says, without the node: ``apply("load torque 2.5")``.
+
+        >>> world[5].apply("load torque 2.5")
+        """
         self._world.apply(f"{self._place} {words}")
 
     def power_on(self) -> None:
-        """Switches the supply on (``power on``): the firmware boots."""
+        """Switches the supply on (``power on``): the firmware boots.
+
+        >>> world[5].power_on()
+        """
         self.apply("power on")
 
     def power_off(self) -> None:
-        """Switches the supply off (``power off``): the drive lives on until its bus has drained."""
+        """Switches the supply off (``power off``): the drive lives on until its bus has drained.
+
+        >>> world[5].power_off()
+        >>> world.run_for(5)
+        >>> world[5].statusword is None
+        True
+        """
         self.apply("power off")
 
     def power_cycle(self) -> None:
-        """Switches off, and on again when the drive has died of it (``power cycle``)."""
+        """Switches off, and on again when the drive has died of it (``power cycle``).
+
+        >>> world[5].power_cycle()
+        """
         self.apply("power cycle")
 
     def power_cut(self) -> None:
-        """The drive is dead at once, in the middle of whatever it does (``power cut``)."""
+        """The drive is dead at once, in the middle of whatever it does (``power cut``).
+
+        >>> world[5].power_cut()
+        >>> world[5].statusword is None
+        True
+        """
         self.apply("power cut")
 
     def set_input(self, name: str, level: bool) -> None:
-        """Level of a digital input (``input X0 1``). Takes a switch away that is tied to it."""
+        """Level of a digital input (``input X0 1``). Takes a switch away that is tied to it.
+
+        >>> wheel.set_input(wheel.inputs[0], True)
+        """
         self.apply(f"input {word(name)} {int(bool(level))}")
 
     def set_switch(self, name: str, low: Optional[int] = None, high: Optional[int] = None) -> None:
         """Ties an input to the position (``switch X0 -5000 max``): active from ``low`` to ``high``, in the drive's counts; None
-        reaches for ever. The range is fixed in the machine from then on."""
+        reaches for ever. The range is fixed in the machine from then on.
+
+        >>> wheel.set_switch(wheel.inputs[0], low=-5000)
+        """
         bounds = ("min" if low is None else int(low), "max" if high is None else int(high))
         self.apply(f"switch {word(name)} {bounds[0]} {bounds[1]}")
 
     def set_load_torque(self, torque_nm: Number) -> None:
-        """Torque at the output shaft in N·m (``load torque 2.5``); positive opposes positive motion, also at standstill."""
+        """Torque at the output shaft in N·m (``load torque 2.5``); positive opposes positive motion, also at standstill.
+
+        >>> world[5].set_load_torque(2.5)
+        """
         self.apply(f"load torque {number(torque_nm)}")
 
     def set_load_inertia(self, inertia_kg_m2: Number) -> None:
-        """Inertia added at the output shaft in kg·m² (``load inertia 0.02``)."""
+        """Inertia added at the output shaft in kg·m² (``load inertia 0.02``).
+
+        >>> world[5].set_load_inertia(0.02)
+        """
         self.apply(f"load inertia {number(inertia_kg_m2)}")
 
     def set_load_friction(
@@ -214,7 +259,11 @@ class VirtualDrive:
     ) -> None:
         """Friction beside the motor's own, at the output shaft (``load friction 0.2 viscous 0.01 static 0.3 stribeck 0.5``): dry in
         N·m, growing with the speed in N·m·s/rad, breaking loose in N·m, and the speed in rad/s from which on it is as in motion.
-        None takes it away (``load friction off``)."""
+        None takes it away (``load friction off``).
+
+        >>> world[5].set_load_friction(0.2, viscous_nm_s=0.01)
+        >>> world[5].set_load_friction(None)
+        """
         if coulomb_nm is None:
             self.apply("load friction off")
             return
@@ -225,40 +274,65 @@ class VirtualDrive:
 
     def set_load_pulley(self, mass_kg: Optional[Number], radius_m: Number = 0.05) -> None:
         """A weight in kg on a drum of this radius in m, lifted by positive motion, lowered with a negative radius
-        (``load pulley 2 0.05``); None takes it away (``load pulley off``)."""
+        (``load pulley 2 0.05``); None takes it away (``load pulley off``).
+
+        >>> world[5].set_load_pulley(2, radius_m=0.05)
+        """
         self.apply("load pulley off" if mass_kg is None else f"load pulley {number(mass_kg)} {number(radius_m)}")
 
     def set_load_spring(self, stiffness_nm_rad: Optional[Number], rest_deg: Number = 0) -> None:
         """A spring in N·m/rad, at rest so many degrees from where the shaft is now (``load spring 5 90``); None takes it away
-        (``load spring off``)."""
+        (``load spring off``).
+
+        >>> world[5].set_load_spring(5, rest_deg=90)
+        """
         off = stiffness_nm_rad is None
         self.apply("load spring off" if off else f"load spring {number(stiffness_nm_rad or 0)} {number(rest_deg)}")
 
     def set_load_stop(self, low: Optional[int], high: Optional[int]) -> None:
         """End stops at these actual positions in the drive's counts (``load stop -5000 max``); None is no stop on that side, and
-        two of them take both away (``load stop off``)."""
+        two of them take both away (``load stop off``).
+
+        >>> position = world[5].position
+        >>> world[5].set_load_stop(position - 5000, None)
+        """
         bounds = ("min" if low is None else int(low), "max" if high is None else int(high))
         self.apply("load stop off" if bounds == ("min", "max") else f"load stop {bounds[0]} {bounds[1]}")
 
     def set_load_fan(self, torque_nm: Optional[Number], speed_rpm: Number = 1000) -> None:
-        """A fan that takes this torque in N·m at this speed in r/min (``load fan 2 300``); None takes it away (``load fan off``)."""
+        """A fan that takes this torque in N·m at this speed in r/min (``load fan 2 300``); None takes it away (``load fan off``).
+
+        >>> world[5].set_load_fan(2, speed_rpm=300)
+        """
         self.apply("load fan off" if torque_nm is None else f"load fan {number(torque_nm)} {number(speed_rpm)}")
 
     def set_load_gear(self, ratio: Optional[Number], backlash_deg: Number = 0) -> None:
         """All of these hang behind a gear of this ratio with so many degrees of backlash (``load gear 10 0.5``); None takes it away
-        (``load gear off``)."""
+        (``load gear off``).
+
+        >>> world[5].set_load_gear(10, backlash_deg=0.5)
+        """
         self.apply("load gear off" if ratio is None else f"load gear {number(ratio)} {number(backlash_deg)}")
 
     def clear_loads(self) -> None:
-        """Takes all loads away (``load none``)."""
+        """Takes all loads away (``load none``).
+
+        >>> world[5].clear_loads()
+        """
         self.apply("load none")
 
     def lock_rotor(self) -> None:
-        """Holds the rotor (``rotor lock``)."""
+        """Holds the rotor (``rotor lock``).
+
+        >>> world[5].lock_rotor()
+        """
         self.apply("rotor lock")
 
     def free_rotor(self) -> None:
-        """Lets the rotor go (``rotor free``)."""
+        """Lets the rotor go (``rotor free``).
+
+        >>> world[5].free_rotor()
+        """
         self.apply("rotor free")
 
     def set_supply(
@@ -268,7 +342,10 @@ class VirtualDrive:
         resistance_ohm: Optional[Number] = None,
     ) -> None:
         """The supply (``supply 48 limit 10 resistance 0.2``): open-circuit voltage in V, the most that it gives in A, resistance
-        of source and wires in ohm. None leaves that as it is."""
+        of source and wires in ohm. None leaves that as it is.
+
+        >>> world[5].set_supply(36, limit_a=10)
+        """
         words = [] if voltage_v is None else [number(voltage_v)]
         words += [] if limit_a is None else ["limit", number(limit_a)]
         words += [] if resistance_ohm is None else ["resistance", number(resistance_ohm)]
@@ -277,69 +354,116 @@ class VirtualDrive:
 
     def hold_temperature(self, sensor: str, celsius: Optional[Number]) -> None:
         """Holds a temperature in °C (``temperature motor 95``), or gives it back to the model with None. The sensor is ``motor``
-        or ``driver``."""
+        or ``driver``.
+
+        >>> world[5].hold_temperature("motor", 95)
+        """
         self.apply(f"temperature {word(sensor)} {'auto' if celsius is None else number(celsius)}")
 
     def set_fault(self, component: str, broken: bool = True) -> None:
         """Breaks or mends a component (``fault hall on``): ``hall``, ``encoder``, ``eeprom``, ``reference``, ``phase``, ``short``,
-        ``bridge`` or ``bleeder``."""
+        ``bridge`` or ``bleeder``.
+
+        >>> wheel.set_fault("hall")
+        """
         self.apply(f"fault {word(component)} {'on' if broken else 'off'}")
 
     def set_battery(self, connected: bool) -> None:
-        """The multi-turn battery of a joint (``battery off``)."""
+        """The multi-turn battery of a joint (``battery off``).
+
+        >>> joint.set_battery(False)
+        """
         self.apply(f"battery {'on' if connected else 'off'}")
 
     def send_pulses(self, count: int, hz: Number) -> None:
         """Pulses with a direction at the pulse inputs (``pulses 8192 10000``): how many, negative with the direction input
-        conducting, and how many a second."""
+        conducting, and how many a second.
+
+        >>> joint.send_pulses(8192, hz=10_000)
+        """
         self.apply(f"pulses {int(count)} {number(hz)}")
 
     def send_quadrature(self, count: int, hz: Number) -> None:
         """Two channels of an encoder (``quadrature -400 1000``): counts, four a line, negative with the second channel ahead, and
-        counts a second."""
+        counts a second.
+
+        >>> joint.send_quadrature(-400, hz=1000)
+        """
         self.apply(f"quadrature {int(count)} {number(hz)}")
 
     def send_duty(self, percent: Number) -> None:
-        """A square wave of this duty cycle in per cent (``duty 40``), for ever."""
+        """A square wave of this duty cycle in per cent (``duty 40``), for ever.
+
+        >>> joint.send_duty(40)
+        """
         self.apply(f"duty {number(percent)}")
 
     def send_clock(self, hz: Number) -> None:
-        """A level on the second input that changes so many times a second (``clock 10000``), for ever."""
+        """A level on the second input that changes so many times a second (``clock 10000``), for ever.
+
+        >>> joint.send_clock(10_000)
+        """
         self.apply(f"clock {number(hz)}")
 
     def cut_cable(self) -> None:
-        """Cuts its bus cable (``cable cut``). It goes on alone."""
+        """Cuts its bus cable (``cable cut``). It goes on alone.
+
+        >>> world[5].cut_cable()
+        >>> world[5].bus
+        'cut'
+        """
         self.apply("cable cut")
 
     def join_cable(self) -> None:
-        """Joins its bus cable (``cable join``)."""
+        """Joins its bus cable (``cable join``).
+
+        >>> world[5].join_cable()
+        """
         self.apply("cable join")
 
     def set_bus_silent(self, silent: bool) -> None:
-        """It listens to the bus only (``bus silent on``)."""
+        """It listens to the bus only (``bus silent on``).
+
+        >>> world[5].set_bus_silent(True)
+        """
         self.apply(f"bus silent {'on' if silent else 'off'}")
 
     def set_bus_late(self, min_ms: Optional[Number], max_ms: Optional[Number] = None) -> None:
-        """Its frames reach the bus so many ms late (``bus late 5 20``); None ends it (``bus late off``)."""
+        """Its frames reach the bus so many ms late (``bus late 5 20``); None ends it (``bus late off``).
+
+        >>> world[5].set_bus_late(5, 20)
+        """
         self.apply("bus late off" if min_ms is None else f"bus late {number(min_ms)} {number(min_ms if max_ms is None else max_ms)}")
 
     def set_bus_babble(self, frame: Optional[str], gap_ms: Number = 1) -> None:
         """It sends this frame again so many ms after it went out, for ever (``bus babble 080# 1``); None ends it
-        (``bus babble off``)."""
+        (``bus babble off``).
+
+        >>> world[5].set_bus_babble("080#", gap_ms=1)
+        """
         self.apply("bus babble off" if frame is None else f"bus babble {word(frame)} {number(gap_ms)}")
 
     def set_bus_overrun(self, frames: Optional[int], service_ms: Number = 1) -> None:
         """It holds so many frames and takes so many ms for each; what comes faster is lost (``bus overrun 2 0.5``); None ends it
-        (``bus overrun off``)."""
+        (``bus overrun off``).
+
+        >>> world[5].set_bus_overrun(2, service_ms=0.5)
+        """
         self.apply("bus overrun off" if frames is None else f"bus overrun {int(frames)} {number(service_ms)}")
 
     def set_bus_corruption(self, probability: Optional[Number]) -> None:
         """Each attempt to send a frame fails with this probability, 0 to 1 (``bus corrupt 0.3``), as with a bad plug at this node;
-        None ends it (``bus corrupt off``)."""
+        None ends it (``bus corrupt off``).
+
+        >>> world[5].set_bus_corruption(0.3)
+        """
         self.apply("bus corrupt off" if probability is None else f"bus corrupt {number(probability)}")
 
     def set_object(self, index: int, sub_index: int, value: Union[int, float, str]) -> None:
-        """Value of an object of a node whose objects are the outer world's (``set 6000:01 FFh``): what its sensor measured."""
+        """Value of an object of a node whose objects are the outer world's (``set 6000:01 FFh``): what its sensor measured.
+
+        >>> sensor.set_object(0x6000, 1, 0xFF)
+        """
         if isinstance(value, str):
             text = '"' + value + '"'
         elif isinstance(value, float):

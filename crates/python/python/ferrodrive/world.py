@@ -39,6 +39,11 @@ class World(_native.World):
     :param timing: ``device``: boot, answers and stores take the time that such a device takes, as on the desk; ``ideal``: none beyond the
         wire
     :param channel: a name under which ``can.Bus(interface="ferrodrive", channel=...)`` finds this world
+
+    >>> world = ferrodrive.World(bitrate=500_000, seed=1)
+    >>> servo = world.add("cia402", node=5)
+    >>> world.wait_until_booted() < 3
+    True
     """
 
     #: The file of :meth:`machine`, if it is of one.
@@ -63,6 +68,9 @@ class World(_native.World):
             own in the file keeps it
         :raises OSError: the file is not there
         :raises ValueError: it makes no sense, with everything that is wrong in it
+
+        >>> ferrodrive.World.machine("base.toml").nodes
+        [4, 5]
         """
         os.stat(path)
         world = cls()
@@ -85,6 +93,9 @@ class World(_native.World):
         :param node: node-ID at the first start, 1 to 127; the drive keeps this number in the world
         :param options: what is special about this one, in the words of ``ferrodrive sim --drive``: ``motor="fast"``,
             ``firmware="2.01"``, ``max_current=100``; an object by its index as ``**{"6060": 3}``
+
+        >>> world.add("zlac8030l", node=4, motor="fast")
+        <zlac8030l at 4>
         """
         if (model is None) == (eds is None):
             raise ValueError("a drive is of a model or of a file (eds=...), one of them")
@@ -108,7 +119,11 @@ class World(_native.World):
 
     def apply(self, line: str) -> dict[str, Any]:
         """Does what a world command says (``4 load torque 2.5``, ``bus corrupt 0.01``) and returns its answer; what is refused raises
-        :class:`~ferrodrive.Refused`."""
+        :class:`~ferrodrive.Refused`.
+
+        >>> world.apply("5 load torque 2.5")["ok"]
+        True
+        """
         answer: dict[str, Any] = json.loads(self.command(line) or "{}")
         if not answer.get("ok"):
             error = answer.get("error", "expected a world command, got nothing")
@@ -116,7 +131,11 @@ class World(_native.World):
         return answer
 
     def body(self, name: str) -> Body:
-        """A machine that several drives move, by its name."""
+        """A machine that several drives move, by its name.
+
+        >>> ferrodrive.World.machine("base.toml").body("base")
+        <Body base>
+        """
         return Body(self, name)
 
     @property
@@ -125,7 +144,10 @@ class World(_native.World):
         return self.now_ns / NANOSECONDS
 
     def run_for(self, seconds: float) -> None:
-        """Lets time pass, in s. Threads that take part in the virtual time of this world go on meanwhile."""
+        """Lets time pass, in s. Threads that take part in the virtual time of this world go on meanwhile.
+
+        >>> world.run_for(0.5)
+        """
         ns = nanoseconds(seconds)
         self._let_pass(ns)
 
@@ -136,6 +158,10 @@ class World(_native.World):
         :param every: how often the condition is looked at, in s of virtual time
 
         An exception that the condition raises comes out here; the world stands where it was raised.
+
+        >>> world[5].power_cut()
+        >>> world.run_until(lambda: world[5].statusword is None, within=1) > 0
+        True
         """
         end_ns = self.now_ns + nanoseconds(within)
         step_ns = max(1, nanoseconds(every))
@@ -158,24 +184,50 @@ class World(_native.World):
 
         :param within: longest time in s of virtual time
         :raises TimeoutError: not all had by then
+
+        >>> world = ferrodrive.World()
+        >>> servo = world.add("cia402", node=5)
+        >>> world.wait_until_booted() > 0.1
+        True
         """
         return self.run_until(lambda: all(self.apply(f"{node} get")["power"] == "on" for node in self.nodes), within)
 
     def snapshot(self) -> World:
         """A copy of everything: drives, physics, frames under way. It goes its own way from here, or is come back to with
-        :meth:`restore`."""
+        :meth:`restore`.
+
+        >>> copy = world.snapshot()
+        >>> world.run_for(1)
+        >>> copy.now < world.now
+        True
+        """
         copy = type(self)(self.bitrate)
         copy.become_copy_of(self)
         return copy
 
     def restore(self, snapshot: World) -> None:
-        """Becomes again what it was when `snapshot` was taken from it. May be done any number of times."""
+        """Becomes again what it was when `snapshot` was taken from it. May be done any number of times.
+
+        >>> before = world.snapshot()
+        >>> world.run_for(1)
+        >>> world.restore(before)
+        >>> world.now == before.now
+        True
+        """
         self.become_copy_of(snapshot)
 
     def events(self) -> Iterator[dict[str, Any]]:
         """What happened since the last call, oldest first: boots, changes of state, faults with their remedies, EMCY, arrivals,
         stores, errors of the bus. Each has ``t`` (s), ``t_ns``, ``kind``, ``text`` for people, ``node`` where it is about one,
-        ``remedy`` where there is one. The first call begins the watch, and has nothing to tell."""
+        ``remedy`` where there is one. The first call begins the watch, and has nothing to tell.
+
+        >>> list(world.events())
+        []
+        >>> world[5].power_cut()
+        >>> world.run_for(0.1)
+        >>> [event["node"] for event in world.events()][:1]
+        [5]
+        """
         if not self._watched:
             self._watched = True
             self.watch(True)
@@ -189,6 +241,9 @@ class World(_native.World):
         frames) or ``.csv``.
 
         :param every: time between two samples in s of virtual time
+
+        >>> with world.record("run.csv", every=0.01):
+        ...     world.run_for(0.1)
         """
         self.begin_record(os.fspath(path), max(1, nanoseconds(every)))
         try:
@@ -201,6 +256,8 @@ class World(_native.World):
 
         :param last: how far back it goes, in s of virtual time
         :param every: time between two samples in s of virtual time
+
+        >>> world.keep_trail(last=5)
         """
         self.begin_trail(nanoseconds(last), max(1, nanoseconds(every)))
         self._keeps_trail = True
@@ -212,15 +269,27 @@ class World(_native.World):
 
     def picture(self, title: str = "the last of a run") -> str:
         """What :meth:`keep_trail` has kept, as the text of an SVG: position, velocity, current, supply and faults of each drive, and
-        where bodies were, over time."""
+        where bodies were, over time.
+
+        >>> world.keep_trail()
+        >>> world.run_for(1)
+        >>> world.picture("a second")[:4]
+        '<svg'
+        """
         return self.trail_picture(title)
 
     def corrupt(self, probability: float) -> None:
-        """From now on each frame is destroyed on the wire with this probability, 0 to 1, and sent again (``bus corrupt 0.01``)."""
+        """From now on each frame is destroyed on the wire with this probability, 0 to 1, and sent again (``bus corrupt 0.01``).
+
+        >>> world.corrupt(0.01)
+        """
         self.apply(f"bus corrupt {number(probability)}")
 
     def destroy(self, nth_frame: int, bit: int) -> None:
-        """The n-th frame from here on is destroyed at this bit of it, counted from 1 at start of frame (``bus destroy 3 20``)."""
+        """The n-th frame from here on is destroyed at this bit of it, counted from 1 at start of frame (``bus destroy 3 20``).
+
+        >>> world.destroy(3, bit=20)
+        """
         self.apply(f"bus destroy {int(nth_frame)} {int(bit)}")
 
     @property
