@@ -92,7 +92,7 @@ impl fmt::Display for HostLoss {
                 "nothing of this program stops it: {object} has it watch node {host}, which is another device on this bus"
             ),
             Self::GoesOn => {
-                f.write_str("nothing stops it: this model has no watch over its host and goes on as it was told")
+                f.write_str("nothing stops it: this model has no watch over its host and goes on as it was commanded")
             }
         }
     }

@@ -1,6 +1,6 @@
 //! How long a node's answers take, and how evenly SYNC comes, from the frames alone.
 //!
-//! A [`Meter`] is told of every frame on the bus, with its time, and gives [`Sample`]s: from an SDO request to its
+//! A [`Meter`] is given every frame on the bus, with its time, and gives [`Sample`]s: from an SDO request to its
 //! answer (CiA 301, 7.2.4), from a SYNC to each synchronous TPDO that it brings (7.2.5.3), and from one SYNC to the next. It sends
 //! nothing, reads no clock, and keeps nothing but the last frame of each kind. On a simulated wire a frame's time is the end
 //! of its last bit; on a real bus that of handing it to the connection or of getting it from there.
@@ -64,7 +64,7 @@ impl Meter {
         self.watched.push(Watched { id, every: every.max(1), since: None });
     }
 
-    /// Forgets the SYNC and the request that came last: a pause in the measurement is no sample.
+    /// Forgets the SYNC and the request that came last: a pause in the measurement is not a sample.
     pub fn pause(&mut self) {
         (self.sync, self.request) = (None, None);
         self.watched.iter_mut().for_each(|watched| watched.since = None);
@@ -76,7 +76,7 @@ impl Meter {
             if self.request.take().is_some() {
                 self.note(Sample::SdoLost);
             }
-            // A client that has waited long enough aborts; nobody answers that.
+            // A client that has waited long enough aborts; an abort has no answer.
             self.request = (frame.data().first() != Some(&SDO_ABORT)).then_some(at);
         } else if self.node.is_some_and(|node| frame.id() == connection_set::sdo_reply(node)) {
             if let Some(request) = self.request.take() {
@@ -152,7 +152,7 @@ mod tests {
                 ('>', 100, "604#4000100000000000"),
                 ('<', 150, "585#4300100000000000"), // another node's
                 ('<', 1_300, "584#4300100092010200"),
-                ('<', 1_400, "584#4300100092010200"), // nobody asked
+                ('<', 1_400, "584#4300100092010200"), // without a request
                 ('>', 2_000, "604#4000100000000000"),
                 ('>', 3_000, "604#4000100000000000"),
                 ('>', 8_000, "604#8000100000000405"),
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn periods_of_sync_are_measured_whoever_sends_it() {
+    fn periods_of_sync_are_measured_for_any_producer() {
         let mut meter = Meter::new(None);
         let found = measured(&mut meter, &[('>', 0, "080#"), ('>', 10_020, "080#"), ('<', 19_990, "080#01")]);
         assert_eq!(found, [Sample::SyncPeriod(micros(10_020)), Sample::SyncPeriod(micros(9_970))]);
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_that_nobody_fetches_are_bounded() {
+    fn samples_that_are_not_fetched_are_bounded() {
         let mut meter = Meter::new(None);
         let sync: Frame = "080#".parse().unwrap();
         for cycle in 0..10_000 {

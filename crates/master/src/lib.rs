@@ -83,7 +83,7 @@
 //! ```
 //!
 //! A program that dies stops nothing by itself: [`Drive::guard`], which cyclic drives ask for of themselves, arms what a drive has against that (a watch for silence, a
-//! heartbeat that this master then produces), and tells what it has not. While its runner runs, a guarded drive is kept
+//! heartbeat that this master then produces), and reports what it lacks. While its runner runs, a guarded drive is kept
 //! content, whatever the tasks wait for.
 
 pub mod base;

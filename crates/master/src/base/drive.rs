@@ -44,7 +44,7 @@ pub struct BaseState {
     pub follows: bool,
     /// Why it is being stopped, or stands.
     pub cause: Option<StopCause>,
-    /// The twist that the wheels were told in this cycle, within the limits.
+    /// The twist commanded to the wheels in this cycle, within the limits.
     pub commanded: Twist,
     /// Where it came to, by the positions of its wheels. `Pose::after` of every cycle.
     pub pose: Pose,
@@ -64,8 +64,8 @@ pub struct Base {
     wanted: Twist,
     /// When the newest twist came; `None` before the first.
     wanted_at: Option<Instant>,
-    /// What the wheels were told, m/s over the ground.
-    told: Wheels,
+    /// Speeds commanded to the wheels, m/s over the ground.
+    sent: Wheels,
     state: BaseState,
     now: Instant,
 }
@@ -85,7 +85,7 @@ struct Wheel {
     turns: f64,
     /// Where the shaft was when the pose was counted last, in turns.
     counted_turns: Option<f64>,
-    /// How far it is behind the way that it was told, m. What is forgotten of it is what speeds are rounded by.
+    /// Lag behind the commanded way, m. A part is forgotten in each cycle: speeds are rounded.
     behind_m: f64,
     shows: Option<CyclicState>,
     _claim: Claim,
@@ -130,7 +130,7 @@ impl Base {
             power: Power::Off,
             wanted: Twist::default(),
             wanted_at: None,
-            told: Wheels::default(),
+            sent: Wheels::default(),
             state: BaseState {
                 follows: false,
                 cause: None,
@@ -165,9 +165,9 @@ impl Base {
     pub fn step(&mut self, io: &mut Exchange<'_>) -> BaseState {
         self.now = io.now();
         self.ramp();
-        let told = [self.told.left, self.told.right];
+        let sent = [self.sent.left, self.sent.right];
         let turns_per_m = self.geometry.turns_per_m();
-        for (wheel, m_s) in self.wheels.iter_mut().zip(told) {
+        for (wheel, m_s) in self.wheels.iter_mut().zip(sent) {
             let demand = match self.power {
                 Power::Off => Demand::Off,
                 Power::Enabling | Power::On => Demand::Velocity(Rpm(m_s * turns_per_m * wheel.turns * 60.0)),
@@ -175,7 +175,7 @@ impl Base {
             wheel.shows = Some(wheel.drive.step(io, demand));
         }
         let period_s = self.period.as_secs_f64();
-        for (wheel, m_s) in self.wheels.iter_mut().zip(told) {
+        for (wheel, m_s) in self.wheels.iter_mut().zip(sent) {
             wheel.behind_m = (wheel.behind_m + m_s * period_s) * (1.0 - period_s / LAG_MEMORY_S);
         }
         self.count();
@@ -186,7 +186,7 @@ impl Base {
         if self.power == Power::Enabling && self.state.follows {
             self.power = Power::On;
         }
-        self.state.commanded = self.geometry.twist(self.told);
+        self.state.commanded = self.geometry.twist(self.sent);
         self.state
     }
 
@@ -203,12 +203,12 @@ impl Base {
         } else {
             self.geometry.wheels_m_s(self.wanted)
         };
-        let (left, right) = (goal.left - self.told.left, goal.right - self.told.right);
+        let (left, right) = (goal.left - self.sent.left, goal.right - self.sent.right);
         let most = self.limits.wheel_m_s2 * self.period.as_secs_f64();
         let share = (most / left.abs().max(right.abs())).min(1.0);
         // The same goal again: nothing over nothing.
         if share.is_finite() {
-            self.told = Wheels { left: self.told.left + share * left, right: self.told.right + share * right };
+            self.sent = Wheels { left: self.sent.left + share * left, right: self.sent.right + share * right };
         }
     }
 
@@ -281,7 +281,7 @@ impl Base {
     /// [`BaseError::Stopped`] when a drive is at fault, [`BaseError::NotEnabled`] when one takes too long, those of
     /// [`cycle`](Self::cycle).
     pub async fn enable(&mut self) -> Result<(), BaseError> {
-        (self.state.cause, self.wanted, self.told) = (None, Twist::default(), Wheels::default());
+        (self.state.cause, self.wanted, self.sent) = (None, Twist::default(), Wheels::default());
         self.wheels.iter_mut().for_each(|wheel| wheel.behind_m = 0.0);
         // What an earlier stop has left behind ends without power.
         self.switch_off().await?;
@@ -306,8 +306,8 @@ impl Base {
     /// Brings the base to rest within its limits; it stays powered.
     ///
     /// # Errors
-    /// As [`cycle`](Self::cycle); [`BaseError::Stopped`], once it has been told no speed, where a wheel was lost before or on the
-    /// way to rest.
+    /// As [`cycle`](Self::cycle); [`BaseError::Stopped`], once it has been commanded to speed 0, where a wheel was lost
+    /// before or on the way to rest.
     pub async fn stop(&mut self) -> Result<(), BaseError> {
         self.wanted = Twist::default();
         // From the highest speed, and some cycles.

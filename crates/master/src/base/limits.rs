@@ -23,12 +23,12 @@ pub struct BaseLimits {
     pub wheel_m_s2: f64,
     /// How long a twist counts. Without a new one the base stops.
     pub watchdog: Duration,
-    /// How far a wheel may stay behind the way that it was told, over the ground, before both are stopped, m: it is blocked, or
+    /// How far a wheel may lag behind its commanded way, over the ground, before both are stopped, m: it is blocked, or
     /// its load is too heavy. See [`lag_for`](Self::lag_for).
     pub lag_m: f64,
 }
 
-/// What a wheel at its highest speed is behind in this time, in s, is a lag that nobody states.
+/// Default lag: what a wheel at its highest speed covers in this time, s.
 const LAG_S: f64 = 0.25;
 
 /// The least of such lags, m: at low speeds a wheel may stick before it begins to roll.
@@ -54,7 +54,7 @@ impl BaseLimits {
         }
     }
 
-    /// A lag for wheels of this highest speed where nobody states one: several times what velocity loops and a bus take.
+    /// The default lag for wheels of this highest speed: several times what velocity loops and a bus take.
     pub fn lag_for(wheel_m_s: f64) -> f64 {
         (LAG_S * wheel_m_s).max(LEAST_LAG_M)
     }

@@ -10,14 +10,14 @@ use crate::cyclic::Refusal;
 /// Why a base was stopped. A wheel's cause stays until the base is enabled anew; a watchdog's until the next twist.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StopCause {
-    /// A drive did not do what it was told: a fault, a loss.
+    /// A drive did not follow its command: a fault, a loss.
     Wheel {
         /// Its node.
         node: NodeId,
         /// What its drive says.
         refusal: Refusal,
     },
-    /// A wheel stays behind the way that it was told.
+    /// A wheel lags behind its commanded way.
     Lag {
         /// Its node.
         node: NodeId,
@@ -49,7 +49,7 @@ impl fmt::Display for StopCause {
             Self::Wheel { node, refusal } => write!(f, "the base was stopped by its wheel, node {node}: {refusal}"),
             Self::Lag { node, lag_m, limit_m } => write!(
                 f,
-                "the base was stopped: its wheel, node {node}, is {lag_m:.2} m behind what it was told, and may be {limit_m:.2} m \
+                "the base was stopped: its wheel, node {node}, lags {lag_m:.2} m behind its command; at most {limit_m:.2} m is allowed \
                  (lag_m). It may be blocked, or its load too heavy"
             ),
             Self::Watchdog { after } => {

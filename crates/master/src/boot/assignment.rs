@@ -7,9 +7,10 @@ pub struct Startup(pub u32);
 impl Startup {
     /// The device is the NMT master.
     pub const MASTER: u32 = 1;
-    /// Nodes are started all together by one command, when the last mandatory one has booted; without it each by itself.
+    /// Nodes are started all together by one command, when the last mandatory one has booted; without it each on its
+    /// own.
     pub const START_ALL: u32 = 1 << 1;
-    /// The master starts no node: somebody else does.
+    /// The master starts no node; another device or program does.
     pub const STARTS_NONE: u32 = 1 << 3;
     /// When a mandatory node fails, all nodes are reset.
     pub const RESET_ALL: u32 = 1 << 4;

@@ -70,7 +70,7 @@ const TABLE: [Row; 15] = [
     (
         NoHeartbeat,
         'E',
-        "it sends no heartbeat by which its state could be told",
+        "it sends no heartbeat that would show its state",
         "check that its 1017h is not 0, and its cable",
     ),
     (NoGuarding, 'F', "it does not answer node guarding", "use a heartbeat (1017h) instead"),
@@ -142,7 +142,7 @@ impl ErrorStatus {
     }
 
     fn row(self) -> &'static Row {
-        // The rows stand in the order of the variants, which a test holds.
+        // The rows are in the order of the variants, which a test checks.
         &TABLE[self as usize]
     }
 }

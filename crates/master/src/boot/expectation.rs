@@ -12,7 +12,7 @@ use devices::Description;
 
 use super::assignment::{Assignment, Startup};
 
-/// Waits for one SDO answer, if the plan is not made from something that says so: a slow drive takes some milliseconds, 127 that
+/// Timeout of one SDO answer where the source of the plan gives none: a slow drive takes some milliseconds, 127 that
 /// are asked at once half a second at 50 kbit/s.
 const ANSWER: Duration = Duration::from_millis(200);
 
@@ -82,13 +82,13 @@ impl Expectation {
     pub fn of(description: &'static Description) -> Self {
         let identity = description.identity;
         // A description without a number (0: 1018h is mandatory, the number may be unknown) expects none.
-        let told = |number: u32| (number != 0).then_some(number);
+        let given = |number: u32| (number != 0).then_some(number);
         Self {
             assignment: Assignment::CAREFUL,
             device_type: Some(identity.device_type),
-            vendor_id: told(identity.vendor_id),
-            product_code: told(identity.product_code),
-            revision_number: told(identity.revision_number),
+            vendor_id: given(identity.vendor_id),
+            product_code: given(identity.product_code),
+            revision_number: given(identity.revision_number),
             restore: 1,
             description: Some(description),
             ..Self::default()
@@ -210,7 +210,7 @@ impl fmt::Display for BadPlan {
             }
             Self::NoMaster(Startup(bits)) => write!(
                 f,
-                "1F80h is {bits:X}h: without its bit 0 the device is not the NMT master, and boots nobody. Set bit 0, or give \
+                "1F80h is {bits:X}h: without its bit 0 the device is not the NMT master and boots no node. Set bit 0, or give \
                  the file of the master"
             ),
         }

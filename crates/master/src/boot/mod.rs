@@ -48,7 +48,7 @@ impl Network {
     ///
     /// A drive that is armed to stop without this program stays so until its guard is released
     /// ([`release_guards`](Self::release_guards)), and its heartbeat is watched until
-    /// [`Node::watch_heartbeat`](crate::Node::watch_heartbeat) is told otherwise.
+    /// [`Node::watch_heartbeat`](crate::Node::watch_heartbeat) changes that.
     pub async fn boot(&self, plan: &BootPlan) -> BootReport {
         let began = plan.nodes.iter().map(|(id, expectation)| NodeBoot::new(self, *id, plan, expectation).run());
         let mut report = BootReport { nodes: join_all(began).await, notes: Vec::new() };
@@ -67,7 +67,7 @@ impl Network {
         report
     }
 
-    /// Starts all nodes with one command, if the plan says so.
+    /// Starts all nodes with one command, if the plan has that.
     async fn start_together(&self, plan: &BootPlan, report: &mut BootReport) {
         if !plan.startup.has(Startup::START_ALL) || plan.startup.has(Startup::STARTS_NONE) {
             return;
@@ -78,7 +78,7 @@ impl Network {
             let expectation = plan.nodes.get(&node.node)?;
             let mut booting = NodeBoot::resumed(self, node.node, plan, expectation);
             booting.await_start(before).await;
-            booting.tell(node);
+            booting.fill_in(node);
             Some(())
         });
         join_all(started.collect::<Vec<_>>()).await;

@@ -27,7 +27,7 @@ const CONFIGURATION_TIME: Mux = Mux::new(0x1020, 2);
 const SOFTWARE: Mux = Mux::new(0x1F56, 1);
 const IDENTITY: u16 = 0x1018;
 const RESTORE: u16 = 0x1011;
-/// What 1011h has to be told. Source: CiA 301, 7.5.2.14.
+/// The signature that 1011h expects. Source: CiA 301, 7.5.2.14.
 const LOAD: [u8; 4] = *b"load";
 
 /// How much later than its time a heartbeat may come: behind a bus full of other frames.
@@ -78,7 +78,7 @@ impl<'a> NodeBoot<'a> {
     }
 
     /// Puts what was done since into its report.
-    pub(super) fn tell(self, report: &mut NodeReport) {
+    pub(super) fn fill_in(self, report: &mut NodeReport) {
         report.state = self.node.facts().probable_state(self.expectation.description);
         report.steps.extend(self.steps);
     }
@@ -110,7 +110,7 @@ impl<'a> NodeBoot<'a> {
         // CiA 302-2, 1F81h and the figure of the process: without bit 2 the steps are passed over up to error control.
         if !assignment.has(Assignment::BOOT) {
             let left =
-                Found::Told("a node that somebody else boots (1F81h, bit 2): its heartbeat is watched".to_owned());
+                Found::Text("a node booted by another manager (1F81h, bit 2): its heartbeat is watched".to_owned());
             self.note(StepKind::Assignment, None, Expected::Listed, left, Verdict::Noted);
             return self.watch_heartbeat().await;
         }
@@ -137,7 +137,7 @@ impl<'a> NodeBoot<'a> {
         Ok(())
     }
 
-    /// Resets it and waits for its boot-up message. Whether it is there at all is for the next request to tell.
+    /// Resets it and waits for its boot-up message. The next request shows whether it is there at all.
     async fn reset(&mut self, command: NmtCommand) {
         let booted = self.node.wait_boot_up(self.plan.boot_time);
         self.node.nmt(command);
@@ -178,7 +178,7 @@ impl<'a> NodeBoot<'a> {
     async fn state(&mut self) -> Go<State> {
         let expected = Expected::OtherState(NmtState::Operational);
         let Some(patience) = self.produce_heartbeat().await else {
-            let unknown = Found::Told("a node that sends no heartbeat (1017h): it is not reset".to_owned());
+            let unknown = Found::Text("a node that sends no heartbeat (1017h): it is not reset".to_owned());
             self.note(StepKind::State, Some(PRODUCER_HEARTBEAT_TIME), expected, unknown, Verdict::Noted);
             return Ok(State::Unknown);
         };
@@ -223,7 +223,7 @@ impl<'a> NodeBoot<'a> {
             return Ok(());
         }
         let Some(expected) = self.expectation.software else {
-            let found = Found::Told("a plan that does not say which (1F55h is 0)".to_owned());
+            let found = Found::Text("a plan that does not say which (1F55h is 0)".to_owned());
             return self.fail(StepKind::Software, Some(SOFTWARE), Expected::Answer, found, ErrorStatus::NoProgram);
         };
         let allowed = assignment.has(Assignment::UPDATE_SOFTWARE) && !assignment.has(Assignment::KEEP_ALIVE);
@@ -260,7 +260,7 @@ impl<'a> NodeBoot<'a> {
     /// Has the master watch its heartbeat, and waits for the first.
     async fn watch_heartbeat(&mut self) -> Go {
         let Some(time) = self.produce_heartbeat().await else {
-            let found = Found::Told("a node that sends none: nobody notices when it is gone".to_owned());
+            let found = Found::Text("a node that sends none: its loss would go unnoticed".to_owned());
             self.note(StepKind::Heartbeat, Some(PRODUCER_HEARTBEAT_TIME), Expected::Heartbeat, found, Verdict::Noted);
             return Ok(());
         };
@@ -306,15 +306,15 @@ impl<'a> NodeBoot<'a> {
             Ok(loss) => {
                 // Without a guard, a watch that the next heartbeat arms is as it should be.
                 let fine = loss.stops_after().is_some() || matches!(loss, HostLoss::NotArmed { .. });
-                (Found::Told(loss.to_string()), if fine { Verdict::Passed } else { Verdict::Noted })
+                (Found::Text(loss.to_string()), if fine { Verdict::Passed } else { Verdict::Noted })
             }
-            Err(error) => (Found::Told(error.to_string()), Verdict::Noted),
+            Err(error) => (Found::Text(error.to_string()), Verdict::Noted),
         };
         self.note(StepKind::HostWatch, object, Expected::Stops, found, verdict);
     }
 
     /// Arms the drive's watch for this master. One that is off and listens to heartbeats gets this master's node-ID; one that is
-    /// set already is somebody's decision.
+    /// set already was set on purpose, and stays as it is.
     async fn guard(&self, drive: &Drive, object: Option<Mux>) -> Result<HostLoss, Error> {
         if let (Some(HostWatch::Heartbeat { .. }), Some(consumer)) =
             (self.expectation.description.map(|description| description.host_watch), object)
@@ -330,10 +330,10 @@ impl<'a> NodeBoot<'a> {
     pub(super) async fn await_start(&mut self, before: Instant) {
         let expected = Expected::State(NmtState::Operational);
         let Some(time) = self.heartbeat else {
-            let found = Found::Told("no word: it sends no heartbeat".to_owned());
+            let found = Found::Text("no state: it sends no heartbeat".to_owned());
             return self.note(StepKind::Start, None, expected, found, Verdict::Noted);
         };
-        // A heartbeat may have been on its way when the command went out: the next one tells.
+        // A heartbeat may have been on its way when the command went out: the next one counts.
         let heard = self.hear_state(before, time * 2, |state| state == NmtState::Operational).await;
         let (found, verdict) = match (heard, self.node.facts().probable_state(self.expectation.description)) {
             (Ok(state), _) => (Found::State(state), Verdict::Passed),
@@ -343,7 +343,7 @@ impl<'a> NodeBoot<'a> {
         self.note(StepKind::Start, None, expected, found, verdict);
     }
 
-    /// A heartbeat that came after `since` and tells a state that is wanted.
+    /// A heartbeat that came after `since` with a wanted state.
     async fn hear_state(
         &self,
         since: Instant,
@@ -394,7 +394,7 @@ impl<'a> NodeBoot<'a> {
                         return Found::Silent { waited: self.node.timeout(), tries, last: self.last_heard(), hints };
                     }
                 }
-                Err(error) => return Found::Told(error.to_string()),
+                Err(error) => return Found::Text(error.to_string()),
             }
         }
     }

@@ -109,7 +109,7 @@ pub enum Found {
         hints: Hints,
     },
     /// Something else, in words.
-    Told(String),
+    Text(String),
 }
 
 /// The last thing that was heard of a node, and how long before.
@@ -224,7 +224,7 @@ impl fmt::Display for Found {
                 write!(f, "none within {} ms", waited.as_millis())?;
                 heard(f, last)
             }
-            Self::Told(words) => f.write_str(words),
+            Self::Text(words) => f.write_str(words),
         }
     }
 }

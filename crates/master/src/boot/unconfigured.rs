@@ -1,8 +1,8 @@
 //! Nodes that were operational before and were left as they are (CiA 302-2, error status L), with another configuration than was
 //! planned.
 //!
-//! The standard has a node that must not be reset (1F81h, bit 4) keep what it does: that it has not been configured is no error of the
-//! boot-up. Whoever counts on the configuration has to know.
+//! The standard has a node that must not be reset (1F81h, bit 4) keep what it does: that it has not been configured is
+//! not an error of the boot-up. A caller that counts on the configuration has to know.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ impl Network {
             // A list, so that the future may be moved between threads.
             let wanted = wanted.collect::<Vec<_>>();
             let differs = match verify(&self.node(node).with_timeout(plan.timeout), wanted.clone()).await {
-                // What it does not show nobody can compare.
+                // What it does not show cannot be compared.
                 Ok(deviations) => deviations.into_iter().filter(|it| it.found.is_ok()).map(|it| it.object).collect(),
                 Err(_) => wanted.iter().map(|(object, _)| **object).collect::<Vec<_>>(),
             };

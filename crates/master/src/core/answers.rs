@@ -7,7 +7,7 @@ use can::{Frame, Instant};
 use canopen::AbortCode;
 use canopen::sdo::wire::{Reply, Request};
 
-/// After so long without a request nobody waits for an answer any more: servers that slow are not known.
+/// After so long without a request no client waits for an answer any more: servers that slow are not known.
 const FORGOTTEN: Duration = Duration::from_secs(5);
 
 /// In a block transfer there are many frames to one answer, or to one request. It is at its end after so long a silence.
@@ -16,7 +16,7 @@ const BLOCK_SILENCE: Duration = Duration::from_secs(2);
 /// Requests that may be open: each client has one, and some have been given up.
 const MOST_OPEN: u8 = 8;
 
-/// How many answers too many are told of: one alone may be the answer to a request that was lost on the way here.
+/// Surplus answers that are reported: one alone may be the answer to a request that was lost on the way here.
 pub(super) const ENOUGH: u32 = 2;
 
 /// See the [module](self).
@@ -25,7 +25,7 @@ pub(super) struct Answers {
     open: u8,
     asked_at: Instant,
     block_until: Instant,
-    /// Answers that nobody had asked for.
+    /// Answers without a request.
     second: u32,
 }
 
@@ -52,7 +52,7 @@ impl Answers {
             self.block_until = now + BLOCK_SILENCE;
             return None;
         }
-        // A server that has waited in vain for the next segment says so by itself.
+        // A server that has waited in vain for the next segment aborts unasked.
         if matches!(Reply::parse(reply.padded()), Reply::Abort(_, AbortCode::TIMED_OUT)) {
             return None;
         }

@@ -26,7 +26,7 @@ impl Cycle {
 /// Whose SYNC counts the cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
-    Nobody,
+    Off,
     This,
     Another,
 }
@@ -54,7 +54,7 @@ pub(super) struct SyncClock {
 
 impl Default for SyncClock {
     fn default() -> Self {
-        let source = Source::Nobody;
+        let source = Source::Off;
         Self { source, period_ns: 0, due: None, pending: false, cycle: None, first: true, lost: false, missed: 0 }
     }
 }
@@ -85,7 +85,7 @@ impl SyncClock {
 
     fn begin(&mut self, source: Source, period: Option<Duration>) {
         self.period_ns = period.map_or(0, |period| u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
-        self.source = if self.period_ns > 0 { source } else { Source::Nobody };
+        self.source = if self.period_ns > 0 { source } else { Source::Off };
         (self.due, self.pending, self.first, self.lost) = (None, false, true, false);
     }
 
@@ -148,10 +148,10 @@ impl SyncClock {
         self.missed
     }
 
-    /// Time from one SYNC to the next; `None` while nobody's counts.
+    /// Time from one SYNC to the next; `None` while no producer's counts.
     pub(super) const fn period(&self) -> Option<Duration> {
         match self.source {
-            Source::Nobody => None,
+            Source::Off => None,
             Source::This | Source::Another => Some(Duration::from_nanos(self.period_ns)),
         }
     }

@@ -67,7 +67,7 @@ impl fmt::Display for Event {
 /// That two devices have this node-ID, what speaks for it, and what to do.
 pub fn two_devices(node: NodeId, twins: Twins) -> String {
     format!(
-        "node {node}: {twins}: two devices have this node-ID, and both act on what either is told. Switch one off, and give the \
+        "node {node}: {twins}: two devices have this node-ID, and both act on requests to either. Switch one off, and give the \
          other a node-ID of its own"
     )
 }

@@ -30,8 +30,9 @@ pub struct NodeFacts {
     pub unanswered: u32,
     /// When the last frame for it alone left this master: an SDO request or an RPDO.
     pub talked_to_at: Option<Instant>,
-    /// When it was last told something: an SDO download had ended, or an RPDO left. What it sent before tells nothing of that.
-    pub told_at: Option<Instant>,
+    /// When it was last written to: an SDO download had ended, or an RPDO left. What it sent before does not reflect
+    /// that.
+    pub written_at: Option<Instant>,
     /// SDO answers that no client had asked for.
     pub second_answers: u32,
     /// Two devices have this node-ID: what first spoke for it.
@@ -100,20 +101,20 @@ impl NodeFacts {
         !booted && core::mem::take(&mut watch.lost)
     }
 
-    /// The state that it must be in: what this master last told it, or what it has said since, as a node of this model
-    /// means it (as the standard says, if the model is not known).
+    /// The state that it must be in: by the last NMT command of this master, or by what it has sent since, as a node of
+    /// this model means it (as the standard says, if the model is not known).
     pub fn probable_state(&self, description: Option<&Description>) -> Option<NmtState> {
-        let told = self.nmt_sent.and_then(|(at, command)| Some((at, state_after(command)?)));
+        let commanded = self.nmt_sent.and_then(|(at, command)| Some((at, state_after(command)?)));
         let said = self.nmt_state.map(|said| match description {
-            // Such a model's heartbeat cannot say that it is stopped: what it was told decides.
+            // Such a model's heartbeat cannot show that it is stopped: the last command decides.
             Some(description) if description.tells_alarm(said) => {
-                told.map_or(NmtState::Operational, |(_, state)| state)
+                commanded.map_or(NmtState::Operational, |(_, state)| state)
             }
             Some(description) => description.nmt_state(said),
             None if said == NmtState::Initialising => NmtState::PreOperational,
             None => said,
         });
-        let since = told.filter(|(at, _)| self.heartbeat_at.is_none_or(|heard| heard < *at));
+        let since = commanded.filter(|(at, _)| self.heartbeat_at.is_none_or(|heard| heard < *at));
         since.map(|(_, state)| state).or(said)
     }
 
@@ -129,7 +130,7 @@ impl NodeFacts {
     }
 }
 
-/// The state that a command leads to; `None` for a reset, of which the boot-up message tells.
+/// The state that a command leads to; `None` for a reset, which the boot-up message reports.
 const fn state_after(command: NmtCommand) -> Option<NmtState> {
     match command {
         NmtCommand::Start => Some(NmtState::Operational),

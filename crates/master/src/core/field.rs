@@ -109,7 +109,7 @@ impl Field {
 /// What a value of a PDO can be read as and written from: integers, `bool`, floating point, and the units of
 /// [`crate::units`].
 pub trait Sample: Copy {
-    /// How a field is a number where nobody has said so.
+    /// How a field is read as a number by default.
     const FORM: NumberForm;
     /// True if a field of this form holds such values.
     fn suits(field: &Field) -> bool;
@@ -231,7 +231,7 @@ macro_rules! handles {
             /// `None` if a field of this form and length does not hold such values.
             pub(crate) fn new(place: Place, form: NumberForm, per_count: f64) -> Option<Self> {
                 let field = Field { bits: place.bits(), form, per_count };
-                // An entry of no bits holds nothing, and REAL numbers have 32 or 64.
+                // An entry without bits holds nothing, and REAL numbers have 32 or 64.
                 let whole = field.bits > 0 && (form != NumberForm::Real || matches!(field.bits, 32 | 64));
                 (whole && T::suits(&field)).then_some(Self { place, field, kind: PhantomData })
             }

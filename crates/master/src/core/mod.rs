@@ -59,7 +59,7 @@ const OUTBOX: usize = 128;
 /// What a drive is asked to show it that this master lives: something that any drive has and that changes nothing.
 const STATUSWORD: Mux = Mux::new(0x6041, 0);
 
-/// Names those questions; nobody waits for their answers. Other tickets count from 1.
+/// Names those questions; no caller waits for their answers. Other tickets count from 1.
 const FEED: Ticket = Ticket(0);
 
 /// Shortest wait for their answers: drives take some milliseconds, a loaded bus some tens more.
@@ -170,7 +170,7 @@ impl Core {
     pub fn execute(&mut self, command: Command, now: Instant) {
         self.advance(now);
         match command {
-            // Requests and timers end all the same, for whoever waits for them.
+            // Requests and timers end all the same, for the callers that wait for them.
             Command::Request(..) | Command::Timer(..) | Command::Cancel(_) => {}
             _ if self.silent => return,
             _ => {}
@@ -223,7 +223,7 @@ impl Core {
         &mut self.image
     }
 
-    /// The latest time this core was told.
+    /// The latest time that was passed to this core.
     pub const fn now(&self) -> Instant {
         self.now
     }
@@ -256,7 +256,7 @@ impl Core {
         while let Some(ended) = self.member_mut(node).channel.poll_finished() {
             self.note_outcome(node, ended.mux, &ended.outcome);
             if ended.downloads {
-                self.member_mut(node).facts.told_at = Some(now);
+                self.member_mut(node).facts.written_at = Some(now);
             }
             if ended.ticket != FEED {
                 self.finished.push_back(Finished { ticket: ended.ticket, outcome: ended.outcome });

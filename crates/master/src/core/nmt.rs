@@ -8,7 +8,7 @@ use super::Core;
 use super::event::Event;
 use super::facts::HeartbeatWatch;
 
-/// NMT commands, and the watch over the heartbeats that tell what became of them.
+/// NMT commands, and the watch over the heartbeats that show their effect.
 impl Core {
     pub(super) fn send_nmt(&mut self, target: NmtTarget, command: NmtCommand) {
         let now = self.now;

@@ -16,7 +16,7 @@ const SHORTEST_FEED: Duration = Duration::from_millis(1);
 ///
 /// Heartbeats lie on a grid, as SYNC does. A node that is kept fed is asked only after a time in which nothing else was
 /// sent to it. A sign of life that comes later than a drive allows (the program was frozen) would have a drive that has stopped
-/// go on by itself: it is not sent, and none after it until it is asked for anew.
+/// start again unasked: it is not sent, and none after it until it is asked for anew.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Presence {
     producers: Vec<Own>,
@@ -45,10 +45,10 @@ struct Feed {
     patience: Patience,
 }
 
-/// How long whoever watches this master can wait for a sign of life.
+/// How long a drive that watches this master waits for a sign of life.
 #[derive(Clone, Copy, Debug)]
 struct Patience {
-    /// `None`: nobody says.
+    /// `None`: not known.
     allowed: Option<Duration>,
     last: Instant,
     /// How long it was left without one.
@@ -136,8 +136,8 @@ impl Presence {
             .collect()
     }
 
-    /// How long whoever watches the heartbeat of this node-ID, or is fed at it, was left without a sign of life, if that was too
-    /// long.
+    /// How long a drive that watches the heartbeat of this node-ID, or is fed at it, was left without a sign of life,
+    /// if too long.
     pub(super) fn lapse(&self, node: NodeId) -> Option<Duration> {
         let heartbeats = self.producers.iter().filter(|own| own.node == node).find_map(|own| own.patience.lapse);
         heartbeats.or_else(|| self.feeds.iter().filter(|feed| feed.node == node).find_map(|feed| feed.patience.lapse))

@@ -14,7 +14,7 @@ use super::request::{Request, Transfer};
 use super::supervision::{CycleLoss, CycleRules, WatchId};
 use crate::host_loss::HostLoss;
 
-/// How long the answer to a write is awaited that nobody is told of.
+/// Timeout of a write whose answer is not reported to any caller.
 const POST_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Cycles of SYNC, what is read and written in them, and who is stopped when they fail.
@@ -115,14 +115,15 @@ impl Core {
     pub(crate) fn stop_axis(&mut self, node: NodeId, controlword: Mux, stop: u16) {
         self.supervision.stop(node, controlword);
         self.image.overrule(node, controlword, stop);
-        // The stop by SDO does not wait behind what nobody waits for: words of earlier cycles, and questions to keep a drive content.
+        // The stop by SDO does not wait behind what no caller waits for: words of earlier cycles, and questions to keep
+        // a drive content.
         let now = self.now;
         while self.member_mut(node).channel.cancel(FEED, now) {}
         self.settle(node);
         self.find_due();
     }
 
-    /// Writes an object by SDO; nobody waits for the answer.
+    /// Writes an object by SDO; no caller waits for the answer.
     pub(crate) fn post(&mut self, node: NodeId, mux: Mux, value: u16) {
         let transfer = Transfer::Download(Payload::new(&value.to_le_bytes()));
         self.start_request(FEED, Request { node, mux, transfer, timeout: POST_TIMEOUT });
@@ -133,7 +134,7 @@ impl Core {
         let (node, frame) = self.image.poll_transmit()?;
         let now = self.now;
         let facts = &mut self.member_mut(node).facts;
-        (facts.talked_to_at, facts.told_at) = (Some(now), Some(now));
+        (facts.talked_to_at, facts.written_at) = (Some(now), Some(now));
         Some(frame)
     }
 
@@ -171,7 +172,7 @@ impl Core {
         self.stop_lost();
     }
 
-    /// Where nobody counts cycles any more, nobody would find that a program stays away.
+    /// Where cycles are no longer counted, a program that stays away would not be noticed.
     fn stop_without_cycles(&mut self) {
         if self.sync.period().is_none() {
             self.lost.extend(self.supervision.lose_sync(self.since_sync()));

@@ -23,7 +23,7 @@ impl Core {
             }
             Err(Failure::NoAnswer { waited, .. }) => {
                 facts.unanswered = facts.unanswered.saturating_add(1);
-                // Silence of a node that was never heard is no news: a scan meets it a hundred times.
+                // Silence of a node that was never heard is not an event: a scan meets it a hundred times.
                 if facts.seen_at.is_some() {
                     self.events.push(Event::NoAnswer(node, mux, waited), now);
                 }

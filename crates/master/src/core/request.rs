@@ -33,7 +33,7 @@ pub struct Request {
     pub timeout: Duration,
 }
 
-/// What the core can be told to do. A command is plain data; the time comes with [`super::Core::execute`].
+/// What the core can be asked to do. A command is plain data; the time comes with [`super::Core::execute`].
 #[derive(Clone, Debug)]
 pub enum Command {
     /// Queue an SDO request; it finishes under the ticket.

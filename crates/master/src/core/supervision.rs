@@ -27,7 +27,7 @@ pub(crate) struct CycleRules {
     pub(crate) tolerance: u32,
 }
 
-/// How often a TPDO comes by itself.
+/// How often a TPDO is sent without a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Cadence {
     /// Once in so many cycles of SYNC.
@@ -62,8 +62,8 @@ pub enum CycleLoss {
     Silent(u64),
     /// The SYNC of another producer stayed away for this long.
     NoSync(Duration),
-    /// The program has told all that it moves to stop ([`crate::Network::stop_all_moved`]).
-    Told,
+    /// The program has commanded all that it moves to stop ([`crate::Network::stop_all_moved`]).
+    StopAll,
 }
 
 impl fmt::Display for CycleLoss {
@@ -71,7 +71,7 @@ impl fmt::Display for CycleLoss {
         match self {
             Self::ProgramLate(cycles) => write!(f, "its program gave no set-point for {cycles} cycles"),
             Self::Silent(cycles) => write!(f, "its TPDO did not come for {cycles} cycles"),
-            Self::Told => f.write_str("its program told all drives to stop"),
+            Self::StopAll => f.write_str("its program stopped all drives"),
             Self::NoSync(time) => write!(f, "no SYNC came for {} ms", time.as_secs_f64() * 1e3),
         }
     }
@@ -173,10 +173,10 @@ impl Supervision {
     /// An axis is being stopped by other means, whether it has been given a set-point or is about to be.
     pub(super) fn stop(&mut self, node: NodeId, controlword: Mux) {
         let same = |watch: &&mut Watch| (watch.rules.node, watch.rules.controlword) == (node, controlword);
-        self.watches.iter_mut().filter(same).for_each(|watch| watch.state = WatchState::Stopped(CycleLoss::Told));
+        self.watches.iter_mut().filter(same).for_each(|watch| watch.state = WatchState::Stopped(CycleLoss::StopAll));
     }
 
-    /// The drives to stop now that nobody counts the cycles any more.
+    /// The drives to stop now that cycles are no longer counted.
     pub(super) fn lose_sync(&mut self, waited: Duration) -> impl Iterator<Item = (CycleRules, CycleLoss)> {
         self.watches.iter_mut().filter_map(move |watch| {
             let WatchState::Moving(_) = watch.state else { return None };

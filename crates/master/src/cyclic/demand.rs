@@ -34,7 +34,7 @@ impl Demand {
     }
 }
 
-/// Why a demand was not carried out in a cycle. The drive was given [`Demand::Hold`] instead, if nothing else is said.
+/// Why a demand was not carried out in a cycle. The drive was given [`Demand::Hold`] instead, unless noted otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
     /// SYNC is neither produced nor followed, or no cycle has begun yet.
@@ -47,11 +47,11 @@ pub enum Refusal {
     Stopped(CycleLoss),
     /// The drive is at fault: [`crate::Drive::explain_refusal`] asks it why. Until [`Demand::ResetFault`].
     Fault(Statusword),
-    /// The drive left Operation enabled by itself, or somebody else took it away. Until [`Demand::Off`].
+    /// The drive left Operation enabled on its own, or by another master's command. Until [`Demand::Off`].
     LostOperation(Option<PowerState>),
     /// The value is of another kind than the mode's.
     WrongKind,
-    /// The value is no number, or more than the mapped bits hold.
+    /// The value is not a number, or more than the mapped bits hold.
     NoNumber,
     /// The value is outside what the object takes, or would be held back by another object.
     OutOfLimits {
@@ -125,7 +125,7 @@ impl fmt::Display for Refusal {
             }
             Self::WrongKind => f.write_str("its mode takes set-points of another kind. The drive is held instead"),
             Self::NoNumber => {
-                f.write_str("the set-point is no number that its object can hold. The drive is held instead")
+                f.write_str("the set-point is not a number that its object can hold. The drive is held instead")
             }
             Self::OutOfLimits { asked, bound } => {
                 write!(f, "{asked} is out of range for {bound}. The drive is held instead")

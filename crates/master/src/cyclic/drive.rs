@@ -20,8 +20,8 @@ const REPEAT_AFTER: core::time::Duration = core::time::Duration::from_millis(100
 /// [`crate::Drive::cyclic`].
 ///
 /// From the first step that wants motion on, the master stops the drive when no step comes for some cycles, when the drive's
-/// TPDO does not come, or when SYNC stays away; the step after that says so. That the whole program dies is the drive's to
-/// notice: [`host_loss`](Self::host_loss) says whether it does.
+/// TPDO does not come, or when SYNC stays away; the step after that reports it. That the whole program dies is the
+/// drive's to notice: [`host_loss`](Self::host_loss) says whether it does.
 #[derive(Clone, Debug)]
 pub struct CyclicDrive {
     pub(super) node: NodeId,
@@ -60,7 +60,7 @@ pub(super) enum ControlwordPath {
 /// What one step leaves for the next.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Progress {
-    /// The drive has been heard since it was opened, or was told something that does not want power.
+    /// The drive has been heard since it was opened, or was sent a demand that does not want power.
     spoken: bool,
     /// The drive followed set-points.
     followed: bool,
@@ -120,8 +120,8 @@ impl CyclicDrive {
     /// Looks at the drive and has it do what is wanted in this cycle. A demand that is refused stops the drive as
     /// [`Demand::Hold`] does, for as long as it is refused, and the state says why. Allocates nothing.
     ///
-    /// A demand for power says nothing to a drive that has not been heard yet: one that somebody else has enabled keeps its
-    /// power and is taken over where it stands, and none gets power before its state is known.
+    /// A demand for power is not sent to a drive that has not been heard yet: one that another master has enabled keeps
+    /// its power and is taken over where it stands, and none gets power before its state is known.
     pub fn step(&mut self, io: &mut Exchange<'_>, demand: Demand) -> CyclicState {
         self.progress.odd_step ^= true;
         let mut seen = self.look(io);

@@ -66,9 +66,9 @@ pub enum CyclicError {
         /// The mode.
         mode: ModeOfOperation,
     },
-    /// The TPDO with the statusword comes when something changes, so that its absence tells nothing.
+    /// The TPDO with the statusword comes when something changes, so that its absence means nothing.
     #[error(
-        "the TPDO of node {node} with {STATUSWORD} is sent when something changes: that it stays away would tell \
+        "the TPDO of node {node} with {STATUSWORD} is sent when something changes: its absence would mean \
              nothing. Give it transmission type 1 or an event timer, or call configure_cyclic"
     )]
     OnEventsOnly {
@@ -194,7 +194,7 @@ impl Drive {
         }
         if let Err(error) = self.set_mode(mode).await {
             if options.guard.is_some() && !guarded_before {
-                // The first error is the one to tell.
+                // The first error is the one to report.
                 let _ = self.release_guard().await;
             }
             return Err(error);
@@ -343,8 +343,8 @@ impl Drive {
         Ok((number, Target { set_point, limits: self.limits(object).await?, kind, last_sent }))
     }
 
-    /// The highest speed that the drive follows, and the object that says so: the target velocity's own limits, and those of
-    /// profiles (607Fh) and of the motor (6080h, in r/min) where the model has them.
+    /// The highest speed that the drive follows, and the object that limits it: the target velocity's own limits, and
+    /// those of profiles (607Fh) and of the motor (6080h, in r/min) where the model has them.
     async fn highest_speed(&self, axis: &AxisDescription, velocity: Quantity) -> Result<(f64, Bound), Error> {
         let step = self.step_of(velocity).await?;
         let own = Bound::from(self.limits(velocity.object).await?);
@@ -357,7 +357,7 @@ impl Drive {
             let bound = Bound::from(self.limits(object).await?);
             let value = self.read_number(object).await?;
             let rpm = value as f64 * step;
-            // 0 is no limit that anything could move within.
+            // Nothing could move within a limit of 0.
             if value > 0 && rpm < least.0 {
                 least = (rpm, Bound { high: value, ..bound });
             }
@@ -365,8 +365,8 @@ impl Drive {
         Ok(least)
     }
 
-    /// The TPDO with the statusword that comes by itself, the one of the set-point's number first, then the one that comes with
-    /// SYNC; and how often it comes.
+    /// The TPDO with the statusword that is sent without a request, the one of the set-point's number first, then the
+    /// one that comes with SYNC; and how often it comes.
     fn statusword_carrier(
         &self,
         description: &Description,
@@ -454,7 +454,7 @@ impl Drive {
     }
 }
 
-/// How often a TPDO comes by itself, if it does. With `answers` it is sent for each RPDO of its number.
+/// How often a TPDO is sent without a request, if it does. With `answers` it is sent for each RPDO of its number.
 fn cadence_of(pdo: &PdoConfig, answers: bool) -> Option<Cadence> {
     let time = |time: Option<Duration>| time.filter(|time| !time.is_zero());
     let inhibited = time(pdo.inhibit_time);

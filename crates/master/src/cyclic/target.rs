@@ -80,6 +80,6 @@ impl Target {
 
 /// The nearest count.
 fn whole(value: f64) -> Result<i64, Refusal> {
-    // Beyond this no object of 64 bits goes.
+    // No object of 64 bits goes beyond this.
     if value.abs() < 9e18 { Ok(value.round() as i64) } else { Err(Refusal::NoNumber) }
 }

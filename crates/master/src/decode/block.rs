@@ -42,7 +42,7 @@ enum Phase {
     Asked,
     /// Segments come; the last one has been seen if so.
     Segments { last: bool },
-    /// The sender has told how the data ends.
+    /// The sender has announced how the data ends.
     Ending,
 }
 
@@ -52,7 +52,7 @@ pub(super) enum BlockStep {
     Goes(SdoStep),
     /// It has ended.
     Over(SdoStep),
-    /// The frame is no part of it: it has been given up without a word.
+    /// The frame is not a part of it: the transfer was abandoned without an abort.
     NotPart,
 }
 

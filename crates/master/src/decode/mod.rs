@@ -55,13 +55,13 @@ pub enum Decoded {
     Sync(Sync),
     /// TIME stamp.
     Time(TimeOfDay),
-    /// Emergency message, and the fault of the node's model that it tells of.
+    /// Emergency message, and the fault of the node's model that it reports.
     Emcy(NodeId, Emcy, Option<&'static FaultRow>),
     /// Boot-up message.
     BootUp(NodeId),
     /// Heartbeat, or answer to node guarding.
     Heartbeat(NodeId, NmtState),
-    /// Heartbeat of a node whose model says so, and nothing of its NMT state, that there is an alarm.
+    /// Heartbeat that reports an alarm, and not the NMT state, on a model that does so.
     AlarmHeartbeat(NodeId),
     /// Part of an SDO transfer.
     Sdo(Sdo),
@@ -90,7 +90,7 @@ pub struct Decoder {
 
 impl Decoder {
     /// A decoder that knows no node's model: it names the objects that all models agree on. A node whose 1000h is seen
-    /// being read is known as far as that tells it.
+    /// being read is known as far as that identifies it.
     pub fn new() -> Self {
         Self::default()
     }
@@ -107,8 +107,8 @@ impl Decoder {
         self.pdos.load_defaults(node, model.dictionary);
     }
 
-    /// A node has said its device type (1000h): enough where all makers' models that say so have the same objects. The servo
-    /// of no maker (vendor 0), whose device type any servo has, tells nothing of the others; it has to be named.
+    /// A node has said its device type (1000h): enough where all makers' models with that value have the same objects.
+    /// The generic servo (vendor 0), whose device type any servo has, does not identify the others; it has to be named.
     fn learn_model(&mut self, node: NodeId, device_type: &[u8]) {
         let Ok(bytes) = <[u8; 4]>::try_from(device_type) else { return };
         let said = u32::from_le_bytes(bytes);
@@ -148,7 +148,7 @@ impl Decoder {
         }
     }
 
-    /// Takes in what a frame teaches of those behind it, for somebody who does not want it in words: mappings, models and
+    /// Takes in what a frame teaches of those behind it, without describing it: mappings, models and
     /// transfers under way. Only SDO frames do.
     pub fn pass(&mut self, frame: &Frame) {
         if let Some(Service::SdoRequest(_) | Service::SdoReply(_)) = Service::of(frame.id()) {

@@ -1,4 +1,4 @@
-//! Which frames may set a drive in motion: for whoever is about to send what another program sent.
+//! Which frames may set a drive in motion: a check before sending again what another program sent.
 //!
 //! Rather too many than too few: what an object of a maker (2000h to 5FFFh) does is not known here, nor what a PDO at an
 //! identifier of its own carries.
@@ -10,7 +10,7 @@ use canopen::{Mux, NmtCommand, NodeId};
 use super::{Decoded, SdoStep, Side};
 
 impl Decoded {
-    /// Why sending this frame may set a drive in motion; `None` if it cannot by itself.
+    /// Why sending this frame may set a drive in motion; `None` if it cannot on its own.
     pub fn may_move(&self) -> Option<&'static str> {
         match self {
             // It makes process data count, what is in them by then included.
@@ -52,7 +52,7 @@ pub(crate) fn object_may_move(mux: Mux) -> Option<&'static str> {
             0x6098 | 0x6099 => Some("a homing parameter"),
             _ => None,
         },
-        _ => Some("a write to an object of no profile known here"),
+        _ => Some("a write to an object outside of the profiles known here"),
     }
 }
 

@@ -165,7 +165,7 @@ impl PdoBook {
         })
     }
 
-    /// True if the object says something about a PDO.
+    /// True if the object describes a PDO.
     fn note(&mut self, node: NodeId, mux: Mux, raw: u32) -> bool {
         let Some((pdo, is_mapping)) = PdoId::of_object(mux.index) else { return false };
         let known = self.pdos.entry((node.raw(), pdo)).or_default();

@@ -53,7 +53,7 @@ impl<'a> Value<'a> {
         object_name(self.mux, self.model)
     }
 
-    /// Type and unit of the bytes: an object may have another form in TPDOs, which its length tells.
+    /// Type and unit of the bytes: an object may have another form in TPDOs, recognised by its length.
     fn form(&self, entry: &Entry) -> (DataType, &'static str) {
         let form = self.model.and_then(|model| model.pdo.mapping.tpdo_form(self.mux));
         match form {

@@ -15,7 +15,7 @@ use crate::units::Shown;
 pub(crate) enum Trigger {
     /// It is at fault.
     Fault,
-    /// The state machine does not move by itself where it should.
+    /// The state machine does not go on where it should without a command.
     Waiting,
     /// A command had no effect.
     Ignored(PowerCommand),
@@ -41,14 +41,14 @@ pub(crate) enum Trigger {
     Silent(Error),
 }
 
-/// Who or what has stopped a motion, as far as the drive's objects tell.
+/// Who or what has stopped a motion, as far as the drive's objects show.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Interference {
     /// The halt bit of the controlword is set.
     Halted,
     /// The target is another one than what was sent.
     Retargeted { object: Mux, now: i64, sent: i64 },
-    /// Nothing tells.
+    /// Nothing shows it.
     Unknown,
 }
 
@@ -186,9 +186,9 @@ fn elsewhere(at: f64, target: f64, unit: &str, by: &Interference) -> (String, St
     let place = format!("It is at {} {unit} where {} {unit} was asked for", Shown(at), Shown(target));
     let find = "Find out who else commands it: another master, a PLC, a pendant, an RPDO. When it is safe, begin the motion anew";
     match by {
-        Interference::Halted => (format!("{place}: somebody has halted it (bit 8 of 6040h)"), find.to_owned()),
+        Interference::Halted => (format!("{place}: another master has halted it (bit 8 of 6040h)"), find.to_owned()),
         Interference::Retargeted { object, now, sent } => {
-            (format!("{place}: {object} is {now}, and {sent} was sent: somebody gave it another target"), find.to_owned())
+            (format!("{place}: {object} is {now}, and {sent} was sent: another master gave it another target"), find.to_owned())
         }
         Interference::Unknown => (
             format!("{place}, though it is enabled, is not halted and has its target"),
@@ -223,7 +223,7 @@ fn silent(error: &Error) -> (String, String) {
         return ("The drive does not answer".to_owned(), hints.to_string());
     }
     (
-        "The drive stopped answering. Whether it still moves cannot be told from here: a drive with a watch over its \
+        "The drive stopped answering. Whether it still moves is not known: a drive with a watch over its \
          host stops by itself"
             .to_owned(),
         format!("If it moves and must not, use the emergency stop. {hints}"),

@@ -58,7 +58,8 @@ const SETTLE_TIME: Duration = Duration::from_millis(200);
 /// How often the drive is looked at before its verdict on homing is believed: 50 ms, many cycles of any drive.
 const LOOKS_BEFORE_VERDICT: u8 = 5;
 
-/// Looks in a row at a shaft that rests, or is not as fast as it should be, after which somebody is looked for who has stopped it.
+/// Looks in a row at a shaft that rests, or is not as fast as it should be, after which the cause of the stop is looked
+/// for.
 const LOOKS_AT_REST: u32 = 20;
 
 /// What a shaft that is stopped may move by from one look to the next, in turns.
@@ -141,11 +142,11 @@ impl Drive {
         }
     }
 
-    /// An error if somebody has halted the drive or given it another target.
+    /// An error if another master has halted the drive or given it another target.
     async fn find_who_stopped_it(&self, intent: &'static str, goal: &Goal, at: f64) -> Result<(), Error> {
         let Some((target, unit, sent)) = goal.target() else { return Ok(()) };
         let elsewhere = |by| Trigger::Elsewhere { at, target, unit, by };
-        // What a drive does not tell, nobody can be blamed for.
+        // Without an answer there is nothing to report.
         if let Ok(controlword) = self.node.read::<u16>(self.place(CONTROLWORD)).await
             && Controlword(controlword).has(Controlword::HALT)
         {

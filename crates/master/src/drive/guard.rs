@@ -1,7 +1,7 @@
 //! What a drive does when the program that moves it dies, and arming what it has against that.
 //!
 //! How a drive notices is data of its model ([`HostWatch`]): by silence, by a missing heartbeat (CiA 301, 7.2.8.2.2), or not
-//! at all. A guard lasts until it is released; meanwhile the core keeps the drive content, so long as somebody runs it.
+//! at all. A guard lasts until it is released; meanwhile the core keeps the drive content, as long as it is run.
 //! That the program lives and yet does nothing sensible is not noticed here.
 
 use std::time::Duration;
@@ -32,11 +32,11 @@ const OWN_WATCH: i64 = 127 << 16 | 2000;
 /// How long a node that this program does not move is waited for, when it is asked whether it watches too.
 const BYSTANDER_TIMEOUT: Duration = Duration::from_millis(100);
 
-/// What is to be done with a watch that is set to 0 on the drive.
+/// How to treat a watch that is set to 0 on the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SwitchedOff {
-    /// It is somebody's decision, and stays so; but for a consumer of heartbeats that is delivered switched off, which nobody
-    /// has decided: that is switched on as by the other.
+    /// It was switched off on purpose, and stays so; except for a consumer of heartbeats that is delivered switched
+    /// off: that is switched on as by the other.
     Leave,
     /// It is set to its factory value until the guard is released, or to node 127 within 2000 ms where that is off. A drive that
     /// stores each write stores these two.
@@ -52,7 +52,7 @@ impl Drive {
         if let Some(guard) = self.node.network().with_guards(|guards| guards.get(&self.node.id()).copied()) {
             return Ok(guard.loss);
         }
-        match self.known("tell what it does without its host")?.host_watch {
+        match self.known("find out what it does without its host")?.host_watch {
             HostWatch::Heartbeat { consumer, .. } => Ok(match self.read_number(consumer).await? {
                 0 => HostLoss::SwitchedOff { object: consumer },
                 _ => HostLoss::NotArmed { object: consumer },
@@ -62,13 +62,13 @@ impl Drive {
         }
     }
 
-    /// What [`guard`](Self::guard) would tell now, with [`SwitchedOff::Leave`]: what the drive does when this program dies in the
-    /// middle of a motion that is guarded. Changes nothing.
+    /// What [`guard`](Self::guard) would report now, with [`SwitchedOff::Leave`]: what the drive does when this program
+    /// dies in the middle of a motion that is guarded. Changes nothing.
     ///
     /// # Errors
     /// [`Error::UnknownModel`]; those of the SDO reads.
     pub async fn host_loss_if_guarded(&self) -> Result<HostLoss, Error> {
-        match self.known("tell what it does without its host")?.host_watch {
+        match self.known("find out what it does without its host")?.host_watch {
             HostWatch::Silence { time: object } | HostWatch::Heartbeat { consumer: object, .. } => {
                 Ok(self.loss(self.read_number(object).await?))
             }
@@ -76,13 +76,14 @@ impl Drive {
         }
     }
 
-    /// Has the drive stop by itself when this program dies, with what its model has for that, and tells what it will do:
-    /// [`HostLoss::stops_after`] is `None` where nothing can be done.
+    /// Has the drive stop by itself when this program dies, with what its model has for that, and reports what it will
+    /// do: [`HostLoss::stops_after`] is `None` where nothing can be done.
     ///
     /// From here on the runner keeps the drive content: a drive that watches for silence is asked for its statusword when
     /// no other request is sent to it (whether process data count for it is not known of every drive), and for one that consumes a heartbeat this master produces it, under the node-ID that the
     /// drive watches. A drive that had lost its host, and would go on with an old motion at the first heartbeat, is stopped
-    /// before. Ends with [`release_guard`](Self::release_guard); to stop in another way is to let the drive stop by itself.
+    /// before. Ends with [`release_guard`](Self::release_guard); a program that ends otherwise leaves it to the drive
+    /// to stop.
     ///
     /// One request whose answer is waited for longer than the drive's time leaves it without a frame: timeouts should be
     /// shorter.
@@ -106,7 +107,7 @@ impl Drive {
             DefaultValue::Value(factory) => factory,
             _ => 0,
         };
-        // Nobody has decided against a watch that is delivered switched off, as 1016h mostly is.
+        // A watch that is delivered switched off, as 1016h mostly is, was not switched off on purpose.
         let delivered_off = factory == 0 && object.index == HEARTBEAT_CONSUMERS;
         let switches_on = armed == 0 && (delivered_off || switched_off == SwitchedOff::SwitchOn);
         if switches_on {
@@ -118,7 +119,7 @@ impl Drive {
         // Noted before anything changes on the drive: whatever fails from here on, a release puts it back.
         network.with_guards(|guards| guards.insert(id, guard));
         if let Err(error) = self.begin_guard(object, &guard, switches_on).await {
-            // The first error is the one to tell.
+            // The first error is the one to report.
             let _ = network.release_guard(id, NodeSet::EMPTY).await;
             return Err(error);
         }
@@ -260,8 +261,8 @@ impl Network {
         }
     }
 
-    /// Has every drive but the `others` that this program's heartbeat has armed forget it: they would stop for want of it, whoever
-    /// moves them. Who does not answer cannot be helped.
+    /// Has every drive but the `others` that this program's heartbeat has armed forget it: they would stop for want of
+    /// it, even when moved by another program. A drive that does not answer stays armed.
     async fn disarm_bystanders(&self, others: NodeSet, object: Mux, host: NodeId) {
         let bystanders = self.seen().iter().filter(|node| !others.contains(*node)).collect::<Vec<_>>();
         let disarmed = bystanders.into_iter().map(|id| async move {

@@ -24,8 +24,8 @@ pub(super) const ERROR_CODE: Mux = Mux::new(0x603F, 0);
 /// for two objects.
 pub(super) const POLL: Duration = Duration::from_millis(10);
 
-/// How long a drive that watches for silence is left without a question while it tells all by itself: much less than any of
-/// their times as delivered (1000 ms).
+/// How long a drive that watches for silence is left without a request while its PDOs carry everything: much less than
+/// any of their times as delivered (1000 ms).
 const TALKING_INTERVAL: Duration = Duration::from_millis(100);
 
 /// How long one step of the power state machine, or a change of mode, may take.
@@ -37,7 +37,7 @@ pub struct Drive {
     pub(super) node: Node,
     pub(super) axis: AxisId,
     pub(super) description: Option<&'static Description>,
-    /// Set where the description is no more than that.
+    /// Set where the description is only a guess.
     pub(super) guess: Option<Guess>,
     /// What is between its shaft and what is moved.
     pub(super) gear: Gear,
@@ -84,7 +84,8 @@ impl Drive {
     }
 
     /// The same behind a gear: all its angles, speeds and accelerations are those of the gear's output from here on. What an
-    /// object holds, and what is told of objects ([`limits`](Self::limits), [`explain`](crate::explain)), stays the drive's.
+    /// object holds, and what is reported of objects ([`limits`](Self::limits), [`explain`](crate::explain)), stays the
+    /// drive's.
     #[must_use]
     pub fn behind(self, gear: Gear) -> Self {
         Self { gear, ..self }
@@ -105,7 +106,7 @@ impl Drive {
         self.axis
     }
 
-    /// What is known of this axis; `None` of an unknown model, or one that is no drive.
+    /// What is known of this axis; `None` of an unknown model, or one that is not a drive.
     pub fn axis_description(&self) -> Option<&'static AxisDescription> {
         self.description?.axes.get(usize::from(self.axis.0))
     }
@@ -125,7 +126,8 @@ impl Drive {
         self.guess.clone()
     }
 
-    /// Checks that the node says it is this model, and has the object that tells it from others that say so too.
+    /// Checks that the node identifies itself as this model, and has the object that distinguishes it from others with
+    /// that identity.
     ///
     /// # Errors
     /// [`Error::WrongModel`] when its device type or vendor differ, [`Error::OtherModel`] when it lacks that object;
@@ -179,8 +181,8 @@ impl Drive {
     }
 
     /// What the process image holds of an object, if it is as good as an answer by SDO: it came within the time of one poll,
-    /// and after everything that the drive was told. A drive that watches for silence is asked by SDO now and then all the
-    /// same: that keeps it content.
+    /// and after everything that was sent to the drive. A drive that watches for silence is asked by SDO now and then
+    /// all the same: that keeps it content.
     fn in_process_data(&self, object: Mux, bits: u32) -> Option<u64> {
         let watches_for_silence =
             matches!(self.description.map(|description| description.host_watch), Some(HostWatch::Silence { .. }));
@@ -188,7 +190,7 @@ impl Drive {
         self.node.network().look(|core| {
             let received = core.image().value_of_length(node, object, bits)?;
             let (facts, now) = (core.facts(node), core.now());
-            let fresh = now - received.at < POLL && facts.told_at.is_none_or(|told| told < received.at);
+            let fresh = now - received.at < POLL && facts.written_at.is_none_or(|at| at < received.at);
             let content = !watches_for_silence || facts.talked_to_at.is_some_and(|at| now - at < TALKING_INTERVAL);
             (fresh && content).then_some(received.raw)
         })

@@ -1,4 +1,4 @@
-//! Homing (CiA 402-2, clause 11), as each model starts it and tells its end.
+//! Homing (CiA 402-2, clause 11), as each model starts it and reports its end.
 //!
 //! The way to the switch is not known, so the time that it may take is the caller's to say. Setting a model's inputs up
 //! as switches is not done here.
@@ -16,7 +16,7 @@ use crate::units::Rpm;
 
 const ENABLED: u16 = 0x0F;
 
-/// How the reference position is to be found.
+/// How to find the reference position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HomingOptions {
     /// Speed of the search, where the model has an object for it; else, and with `None`, as the drive has it.
@@ -59,7 +59,7 @@ impl Drive {
         }
         let reached = match self.watch(INTENT, Goal::Home { rules, method, looks: 0 }, options.limit).await {
             Err(error @ Error::NotReached(_)) => {
-                // What went wrong first is what matters, whatever becomes of the stop.
+                // The first error is reported, whether or not the stop succeeds.
                 let _ = self.quick_stop().await;
                 return Err(error);
             }

@@ -1,4 +1,4 @@
-//! What an object takes at this time, and why: limits that stand in the model's table, moved by the objects that the row
+//! What an object takes at this time, and why: limits from the model's table, moved by the objects that the row
 //! names ([`Entry::resolution`], [`Entry::held_to`]). Their values are read from the drive, and no rule is written here a
 //! second time.
 
@@ -17,7 +17,7 @@ impl Drive {
     /// [`Error::UnknownModel`]; [`Error::Aborted`] with the code of a missing object where the model has none; those of the
     /// SDO reads.
     pub async fn limits(&self, object: Mux) -> Result<Limits, Error> {
-        let row = self.row(object, "tell its limits")?;
+        let row = self.row(object, "find out its limits")?;
         self.limits_of(row).await
     }
 
@@ -29,7 +29,7 @@ impl Drive {
         let scale = resolution.map_or(1, |setting| setting.value.max(1));
         let held_to = match row.held_to {
             Some(HeldTo { object, counts }) => {
-                // A drive that does not tell holds nothing back that could be named.
+                // A drive that refuses the object holds nothing back by it.
                 let setting = refused_is_none(self.setting(object).await)?;
                 setting.map(|setting| (setting.value * counts * scale, setting))
             }
@@ -42,7 +42,7 @@ impl Drive {
 
     async fn setting(&self, object: Mux) -> Result<Setting, Error> {
         let value = self.read_number(object).await?;
-        let description = self.known("tell its limits")?;
+        let description = self.known("find out its limits")?;
         let name = description.row(object).map_or("", |row| row.name);
         let since_restart = description.storage.effective_after_restart.contains(&object);
         Ok(Setting { object, name, value, since_restart })
@@ -61,8 +61,8 @@ impl Drive {
         if limits.take(value) { Ok(row) } else { Err(self.out_of_limits(value, limits)) }
     }
 
-    /// As [`check_number`](Self::check_number), for what is to be effected: a value that the drive would take and hold back
-    /// is refused too.
+    /// As [`check_number`](Self::check_number), for what is to take effect: a value that the drive would take and hold
+    /// back is refused too.
     pub(crate) async fn check_effect(&self, mux: Mux, value: i64) -> Result<&'static Entry, Error> {
         let row = self.check_number(mux, value).await?;
         if row.held_to.is_none() || value == 0 {

@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::host_loss::HostLoss;
 use crate::units::{Amperes, Ramp, Rpm};
 
-/// How a motion is to be made. What is `None` is left as the drive has it.
+/// How to make a motion. `None` leaves a setting as the drive has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionOptions {
     /// Speed of a position move.
@@ -61,7 +61,7 @@ impl fmt::Display for Note {
         match self {
             Self::HostLoss(loss @ HostLoss::StopsInSilence { object, .. }) => write!(
                 f,
-                "when nobody talks to it {loss}: watching the motion keeps it content; when nobody does, ask it something \
+                "when no frames are sent to it {loss}: watching the motion keeps it content; otherwise send it a request \
                  from time to time or set {object} to 0"
             ),
             Self::HostLoss(loss) => write!(f, "when the program that moves it dies {loss}"),
@@ -81,7 +81,7 @@ pub(super) const LATE_FACTOR: f64 = 1.5;
 pub(super) const LATE_MARGIN_S: f64 = 2.0;
 
 impl Drive {
-    /// Turns at this speed (profile velocity) until told otherwise. Enables the drive first.
+    /// Turns at this speed (profile velocity) until commanded otherwise. Enables the drive first.
     ///
     /// # Errors
     /// [`Error::OutOfLimits`] and [`Error::TooFine`] before anything moves; [`Error::NotReached`] with an explanation; those
@@ -116,9 +116,9 @@ impl Drive {
         Ok(MotionReport { reached_after: Some(reached), commanded, notes })
     }
 
-    /// Lets the motor push with this current (profile torque) until told otherwise. Enables the drive first.
+    /// Applies this motor current (profile torque) until commanded otherwise. Enables the drive first.
     ///
-    /// The speed that comes of it is up to the load: have somebody watch. Does not wait.
+    /// The resulting speed depends on the load: supervise it. Does not wait.
     ///
     /// # Errors
     /// As [`velocity`](Self::velocity).
@@ -199,7 +199,7 @@ impl Drive {
 
     /// What to know about a motion, beside what was noted at its start.
     pub(super) async fn notes(&self, noted: Option<Note>) -> Vec<Note> {
-        // A note that cannot be made is no reason to fail: the drive moves already.
+        // A note that cannot be made is not a reason to fail: the drive moves already.
         let loss = self.host_loss().await.ok().map(Note::HostLoss);
         noted.into_iter().chain(loss).collect()
     }

@@ -10,13 +10,13 @@ use crate::error::Error;
 /// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
 pub(crate) const STANDSTILL_RPM: f64 = 1.0;
 
-/// The speed of a motor that does not tell it, r/min: more than those of its kind turn.
+/// The assumed speed of a motor whose speed cannot be read, r/min: more than those of its kind turn.
 const FASTEST_RPM: f64 = 10_000.0;
 
 /// How many looks in a row have to find it so: a shaft that swings about its rest passes zero.
 pub(super) const STANDSTILL_LOOKS: u32 = 5;
 
-/// The power drive state machine (CiA 402-2, 8.2), and what stands in its place on drives without one.
+/// The power drive state machine (CiA 402-2, 8.2), and what replaces it on drives without one.
 impl Drive {
     /// Brings the drive to Operation enabled, one step of the state machine at a time, or in one step where there is no
     /// state machine.
@@ -135,7 +135,7 @@ impl Drive {
         }
         self.forget_lost_host().await?;
         let rest = match self.power_state(statusword) {
-            // A fault has taken the power off: what was commanded before must not come back by itself.
+            // A fault has taken the power off: what was commanded before must not come back unasked.
             Some(PowerState::Fault) | None => Controlword(0),
             // An alarm that has stopped nothing: who follows or holds goes on so.
             Some(_) => Controlword(self.node.read::<u16>(self.place(CONTROLWORD)).await? & !Controlword::FAULT_RESET),

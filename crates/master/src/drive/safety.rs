@@ -25,13 +25,14 @@ pub(crate) const STOP: Controlword = Controlword(PowerCommand::QuickStop.control
 /// get through where this one was lost.
 pub(crate) const ANSWER: Duration = Duration::from_millis(150);
 
-/// How long a drive is asked for its state that may not be told to stop without.
+/// How long the state of a drive is asked for that must not be stopped without knowing it.
 const GLANCE: Duration = Duration::from_millis(50);
 
 /// How long a drive may leave everything unanswered before its stop counts as not seen.
 const SILENCE: Duration = Duration::from_millis(300);
 
-/// How long a drive may go on in Operation enabled before it is told again: somebody else may have enabled it since.
+/// How long a drive may go on in Operation enabled before the stop is sent again: another master may have enabled it
+/// since.
 const REPEAT: Duration = Duration::from_millis(100);
 
 /// How long a drive of an unknown model is given to come to rest: its ramps are not known.
@@ -100,9 +101,9 @@ impl Network {
         self.moved()
     }
 
-    /// Ends all that this master sends by itself, and everything else: SYNC, heartbeats, process data, requests. For a program
-    /// that leaves the bus, after [`stop_and_release`](Self::stop_and_release): drives that may still be moving and watch over
-    /// their host stop then. Requests after this fail.
+    /// Ends all that this master sends on its own, and everything else: SYNC, heartbeats, process data, requests. For a
+    /// program that leaves the bus, after [`stop_and_release`](Self::stop_and_release): drives that may still be moving
+    /// and watch over their host stop then. Requests after this fail.
     pub fn fall_silent(&self) {
         self.with_core(Core::fall_silent);
     }
@@ -150,27 +151,29 @@ impl Drive {
         const INTENT: &str = "bring it to rest";
         let network = self.node.network();
         let began = network.now();
-        let (mut told, mut heard) = (None, began);
+        let (mut stop_sent, mut heard) = (None, began);
         let mut limit = None;
         let mut rest = Rest { looks: 0, position: None };
         loop {
-            match self.look_at_rest(&mut told, &mut rest).await {
+            match self.look_at_rest(&mut stop_sent, &mut rest).await {
                 Ok(true) => {
                     self.note_stopped();
                     return Ok(network.now() - began);
                 }
                 Ok(false) => heard = network.now(),
                 // Not a drive: nothing of it can move.
-                Err(Error::Aborted { code, .. }) if told.is_none() && code == canopen::AbortCode::NO_SUCH_OBJECT => {
+                Err(Error::Aborted { code, .. })
+                    if stop_sent.is_none() && code == canopen::AbortCode::NO_SUCH_OBJECT =>
+                {
                     self.note_stopped();
                     return Ok(network.now() - began);
                 }
                 Err(error) if network.now() - heard >= SILENCE => return self.answered(INTENT, Err(error)).await,
                 Err(_) => {}
             }
-            let limit = match (limit, told) {
+            let limit = match (limit, stop_sent) {
                 (Some(limit), _) => limit,
-                // Asked only once it has been told to stop.
+                // Asked only once the stop has been sent.
                 (None, Some(_)) => *limit.insert(self.time_to_rest().await),
                 (None, None) => SILENCE,
             };
@@ -183,24 +186,25 @@ impl Drive {
         }
     }
 
-    /// Tells the drive to stop where it has not been told, or goes on nevertheless; true once it was seen to stand for a while.
-    async fn look_at_rest(&self, told: &mut Option<can::Instant>, rest: &mut Rest) -> Result<bool, Error> {
+    /// Sends the stop if it has not been sent, or the drive goes on nevertheless; true once it was seen to stand for a
+    /// while.
+    async fn look_at_rest(&self, stop_sent: &mut Option<can::Instant>, rest: &mut Rest) -> Result<bool, Error> {
         let network = self.node.network();
-        if told.is_none() {
+        if stop_sent.is_none() {
             // Such a drive would energise its motor to hold it.
             if self.may_hold_by_stopping() && self.is_without_power().await {
                 return Ok(true);
             }
             self.write_controlword(STOP).await?;
-            *told = Some(network.now());
+            *stop_sent = Some(network.now());
         }
         let statusword = self.statusword().await?;
         if self.power_state(statusword) == Some(PowerState::OperationEnabled) {
             rest.looks = 0;
-            if told.is_some_and(|at| network.now() - at >= REPEAT) {
+            if stop_sent.is_some_and(|at| network.now() - at >= REPEAT) {
                 let (node, controlword) = (self.node.id(), self.place(CONTROLWORD));
                 network.with_core(|core| core.stop_axis(node, controlword, STOP.0));
-                *told = None;
+                *stop_sent = None;
             }
             return Ok(false);
         }

@@ -13,10 +13,10 @@ use crate::units::{Along, Angle, Ramp, Shown, Turning};
 /// they run smoothly.
 pub(super) const REACHED_LEAST_RPM: f64 = 2.0;
 
-/// A physical value as it was asked for, and as the drive was told it: an object holds whole counts.
+/// A physical value as it was asked for, and as it was sent to the drive: an object holds whole counts.
 ///
 /// What would come to zero counts and is not zero is refused ([`Error::TooFine`]); everything else is rounded to the nearest
-/// count, and whoever asked can see by how much.
+/// count, and the caller can see by how much.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Commanded {
     /// What it is: `speed`, `position`, `acceleration`, ...
@@ -350,7 +350,8 @@ fn rate_time_s(raw: i64, change_rpm: f64, worth: f64, none_from: Option<u32>) ->
     if none || raw <= 0 { 0.0 } else { change_rpm / (raw as f64 * worth) }
 }
 
-/// A ramp as the time of one change of speed, in ms. A rate that is steeper than 1 ms gets that: 0 ms is no ramp at all.
+/// A ramp as the time of one change of speed, in ms. A rate that is steeper than 1 ms gets that: 0 ms would mean no
+/// ramp at all.
 fn ramp_ms(ramp: Ramp, change_rpm: f64) -> i64 {
     match ramp {
         Ramp::Time(time) => milliseconds(time).round() as i64,

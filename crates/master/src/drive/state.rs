@@ -18,7 +18,7 @@ pub struct DriveState {
     pub statusword: Statusword,
     /// The state it shows; of a drive without the state machine, the one that comes closest.
     pub power: Option<PowerState>,
-    /// How its statusword is to be read.
+    /// How to read its statusword.
     pub style: PowerStyle,
     /// Bits of the statusword of this model's own, in words.
     pub own_bits: &'static [(u16, &'static str)],
@@ -104,7 +104,7 @@ impl Drive {
 }
 
 impl DriveState {
-    /// The bits of the statusword that are set, in words. Bits 8 and 11 to 15 are told by their number where mode
+    /// The bits of the statusword that are set, in words. Bits 8 and 11 to 15 are given by their number where mode
     /// or maker decide what they mean, unless the model's description says it.
     pub fn statusword_words(&self) -> Vec<&'static str> {
         let own = self.own_bits.iter().filter(|(mask, _)| self.statusword.has(*mask)).map(|(_, name)| *name);

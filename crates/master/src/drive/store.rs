@@ -39,7 +39,7 @@ impl Drive {
     /// Puts all parameters back to their factory values. Some take effect after a restart only.
     ///
     /// # Errors
-    /// As [`save`](Self::save); [`Error::NoFactorySettings`] for a model that cannot be told to.
+    /// As [`save`](Self::save); [`Error::NoFactorySettings`] for a model without that function.
     pub async fn restore(&self) -> Result<(), Error> {
         let description = self.named("restore its factory settings")?;
         let model = description.title;

@@ -42,7 +42,7 @@ impl Hints {
                 "check that the CAN interface is up and that another node acknowledges frames (cable, bit rate, termination)"
             }
             (_, Some(NmtState::Stopped), _) => {
-                "send NMT pre-operational or start. Some drives' heartbeats say so in an alarm: then check supply and cable"
+                "send NMT pre-operational or start. Some drives' heartbeats show this state in an alarm: then check supply and cable"
             }
             (_, _, Some(_)) => "check whether it has lost its supply or its cable, or is too busy to answer in time",
             (_, _, None) if self.others => {

@@ -170,7 +170,7 @@ pub enum Error {
     },
     /// A way was asked for, of a drive that is not known to move something along.
     #[error(
-        "node {node}: nobody has said how far one turn of it moves something: say it in the machine file, units = \
+        "node {node}: its travel per turn is not known: state it in the machine file, units = \
          {{ feed_constant = \"10mm\" }}, or give an angle"
     )]
     NoFeed {
@@ -186,7 +186,7 @@ pub enum Error {
         model: &'static str,
     },
     /// The model has no command that restores factory settings.
-    #[error("node {node}: the {model} cannot be told to restore its factory settings: write each object instead")]
+    #[error("node {node}: the {model} cannot restore its factory settings: write each object instead")]
     NoFactorySettings {
         /// The node.
         node: NodeId,

@@ -22,7 +22,7 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
     }
 }
 
-/// Nothing else can be told of a node that does not answer.
+/// Nothing else can be found out about a node that does not answer.
 fn silent(seen: &Observed) -> Option<Finding> {
     let (node, error) = (seen.node, seen.silence.as_ref()?);
     let heartbeats = seen.heard.heartbeats(node).map_or(0, |heard| heard.count);
@@ -38,7 +38,7 @@ fn silent(seen: &Observed) -> Option<Finding> {
                 .to_owned(),
         ),
         _ => (
-            "Nobody is there, or its bit rate, node-ID or cable is wrong".to_owned(),
+            "No node is there, or its bit rate, node-ID or cable is wrong".to_owned(),
             "Look at its supply and cable, at the termination (120 ohm at both ends), and who is there: ferrodrive scan"
                 .to_owned(),
         ),
@@ -56,7 +56,7 @@ fn two_devices(seen: &Observed) -> Option<Finding> {
         Twins::States(..) => "Heartbeats that say one state until a command changes it (CiA 301, 7.2.8.3.2)",
         Twins::Rhythm(..) => "One heartbeat each period (CiA 301, 7.2.8.3.2)",
     };
-    let follows = format!("Two devices have the node-ID {}: both act on what either is told", seen.node);
+    let follows = format!("Two devices have the node-ID {}: both act on requests to either", seen.node);
     Some(warning(TOPIC, "node_twice", [expected.to_owned(), twins.to_string(), follows, TWO_DEVICES.to_owned()]))
 }
 
@@ -92,7 +92,7 @@ fn heartbeat(seen: &Observed) -> Option<Finding> {
             [
                 expected,
                 found,
-                format!("Two devices send as node {}: both act on what either is told", seen.node),
+                format!("Two devices send as node {}: both act on requests to either", seen.node),
                 TWO_DEVICES.to_owned(),
             ],
         )
@@ -161,7 +161,7 @@ fn host_watch(seen: &Observed) -> Option<Finding> {
                 cause(TOPIC, "host_silent", [
                     format!("A frame for it at least every {} ms ({})", limit.as_millis(), seen.named(time)),
                     format!("None for {} of the {} ms listened", silence.as_millis(), listened.as_millis()),
-                    "It takes its host for dead and stops by itself".to_owned(),
+                    "It takes its host for dead and stops".to_owned(),
                     "Send it something more often (an RPDO, a read of its statusword); what moves it with ferrodrive does \
                      so by itself"
                         .to_owned(),
@@ -177,7 +177,7 @@ fn host_watch(seen: &Observed) -> Option<Finding> {
                 cause(TOPIC, "host_heartbeat_missing", [
                     format!("A heartbeat of node {host} at least every {limit_ms} ms ({})", seen.named(consumer)),
                     format!("{heard} of them in {} ms, and the fault of that watch", listened.as_millis()),
-                    "It takes its host for dead and has stopped; with the next heartbeat it goes on with what it was told \
+                    "It takes its host for dead and has stopped; with the next heartbeat it goes on with what was commanded \
                      before"
                         .to_owned(),
                     format!("Set its target to zero, then have node {host} send its heartbeat again"),

@@ -39,7 +39,7 @@ impl Topic {
 pub enum Weight {
     /// With this the drive does not move.
     Cause,
-    /// It may move with this, and somebody will wonder sooner or later.
+    /// It may move with this, but not always as expected.
     Warning,
 }
 
@@ -66,7 +66,7 @@ pub struct Finding {
     pub expected: String,
     /// What this one has.
     pub found: String,
-    /// What comes of it.
+    /// The consequence.
     pub follows: String,
     /// What to do.
     pub remedy: String,

@@ -70,7 +70,7 @@ fn internal_limit(seen: &Observed) -> Option<Finding> {
     })
 }
 
-/// Enabled, told to turn, and nothing found that keeps it: then the shaft is held.
+/// Enabled, commanded to turn, and nothing found that prevents it: then the shaft is held.
 fn held(seen: &Observed) -> Option<Finding> {
     let by_speed =
         matches!(seen.mode?, ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY);
@@ -83,7 +83,8 @@ fn held(seen: &Observed) -> Option<Finding> {
             [
                 format!("A speed near {target:.1} r/min"),
                 format!("{speed:.1} r/min{}", current(seen)),
-                "Nothing that the drive tells keeps it: its shaft is held, or its current does not suffice".to_owned(),
+                "Nothing that the drive reports prevents it: its shaft is held, or its current does not suffice"
+                    .to_owned(),
                 "Look at the load, the brake, the motor's wires and the current limit".to_owned(),
             ],
         )

@@ -86,11 +86,11 @@ pub struct Observed {
     pub fault: Option<(u16, Vec<&'static FaultRow>)>,
     /// Speed in r/min, the larger of two looks.
     pub speed_rpm: Option<f64>,
-    /// The speed that it is told, in r/min.
+    /// The commanded speed, in r/min.
     pub target_rpm: Option<f64>,
     /// By how much the speed differed between the two looks, in r/min.
     pub speed_change_rpm: Option<f64>,
-    /// The fastest that the drive's limit lets it be told, in r/min, where its model has one for the target.
+    /// The fastest speed that the limit of the drive allows, in r/min, where its model has one for the target.
     pub speed_limit_rpm: Option<f64>,
     /// Motor current in A.
     pub current_a: Option<f64>,
@@ -118,7 +118,7 @@ impl Observed {
         Some(Duration::from_millis(ms))
     }
 
-    /// Reads what the rules want to know. A refused object is left out; silence ends the reading and is told.
+    /// Reads what the rules need. A refused object is left out; silence ends the reading and is reported.
     pub async fn of(drive: &Drive, heard: &Overheard) -> Self {
         let (facts, now) = (drive.node().facts(), drive.node().network().now());
         let mut seen = Self {
@@ -156,7 +156,7 @@ impl Observed {
 
     async fn read(&mut self, drive: &Drive) -> Result<(), Error> {
         let units = self.axis.map(|axis| &axis.units);
-        // Everything answers this one: whether there is anybody is told by the first question.
+        // Every node answers this one: the first request shows whether one is there.
         answered(drive.node().upload(Mux::new(0x1000, 0)).await)?;
         if let Some(statusword) = answered(drive.statusword().await)? {
             (self.statusword, self.power) = (Some(statusword), drive.power_state(statusword));

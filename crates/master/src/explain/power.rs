@@ -1,4 +1,4 @@
-//! The way to Operation enabled (CiA 402-2, 8.2), or what stands in its place.
+//! The way to Operation enabled (CiA 402-2, 8.2), or what replaces it.
 
 use canopen::pdo::Direction;
 use cia402::{Controlword, PowerCommand, PowerEvent, PowerState, Statusword, next_command, transition};
@@ -35,7 +35,7 @@ fn no_state(statusword: Statusword) -> Finding {
         [
             "A statusword with one of the states of CiA 402".to_owned(),
             statusword.to_string(),
-            "What it is told by 6040h may mean something else to it".to_owned(),
+            "What is written to 6040h may mean something else to it".to_owned(),
             "Check which device the node is: ferrodrive scan, ferrodrive read NODE 1000 1018:*".to_owned(),
         ],
     )
@@ -137,7 +137,7 @@ fn not_enabled(seen: &Observed, state: PowerState, statusword: Statusword) -> Op
     let enable = format!("ferrodrive enable {node}");
     let leads_on = next_command(state).is_some_and(|next| next == command);
     let (rule, follows, remedy) = match state {
-        // The fault has been told.
+        // The fault has been reported.
         PowerState::Fault | PowerState::FaultReactionActive => {
             let stuck = state == PowerState::Fault && controlword.has(Controlword::FAULT_RESET);
             return stuck.then(|| reset_bit_left_set(seen, controlword));

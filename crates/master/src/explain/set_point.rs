@@ -1,4 +1,4 @@
-//! What an enabled drive that stands still is told to do (CiA 402-2, the clauses of its modes).
+//! What an enabled drive that stands still is commanded to do (CiA 402-2, the clauses of its modes).
 
 use canopen::Mux;
 use cia402::{Controlword, ModeOfOperation, Statusword};
@@ -60,7 +60,7 @@ fn zero(seen: &Observed, rule: &'static str, object: Mux, expected: &str) -> Opt
             [
                 format!("{expected} in {}", seen.named(object)),
                 "It is 0".to_owned(),
-                "The drive stands because it is told to".to_owned(),
+                "The drive stands because it is commanded to".to_owned(),
                 format!("Write {object}, by SDO or in the RPDO that carries it"),
             ],
         )
@@ -85,7 +85,7 @@ fn halt(seen: &Observed, mode: ModeOfOperation) -> Option<Finding> {
     })
 }
 
-/// Profile position: is there a way to go, and was the drive told to go it?
+/// Profile position: is there a way to go, and was it started?
 fn position(seen: &Observed) -> Option<Finding> {
     let (target, at) = (seen.axis_value(TARGET_POSITION)?, seen.axis_value(POSITION_ACTUAL)?);
     let (controlword, statusword) = (seen.controlword()?, seen.statusword?);
@@ -99,7 +99,7 @@ fn position(seen: &Observed) -> Option<Finding> {
             [
                 format!("A target elsewhere in {object}"),
                 format!("Target {target}, position {at} counts"),
-                "The drive is where it is told to be".to_owned(),
+                "The drive is where it is commanded to be".to_owned(),
                 "Write another target, then start it with controlword bit 4".to_owned(),
             ],
         ));
@@ -126,7 +126,7 @@ fn position(seen: &Observed) -> Option<Finding> {
             [
                 "A 1 in controlword bit 4 after the target was written".to_owned(),
                 found,
-                "The target stands in 607Ah and the drive was not told to go there".to_owned(),
+                "The target is in 607Ah and the move was not started".to_owned(),
                 format!(
                     "Write the controlword with bit 4: 1Fh, or 5Fh for a relative move; or: ferrodrive move {}",
                     seen.node
@@ -181,7 +181,7 @@ fn homing(seen: &Observed) -> Option<Finding> {
             [
                 "Controlword bit 4 rises in mode 6 (CiA 402-2, 11.1)".to_owned(),
                 format!("Controlword {controlword}{method}"),
-                "The drive is ready to look for its reference and was not told to".to_owned(),
+                "The drive is ready to look for its reference and the search was not started".to_owned(),
                 format!("Write the controlword with bit 4: 1Fh; or: ferrodrive home {} --method N", seen.node),
             ],
         )
@@ -195,10 +195,10 @@ fn limits(seen: &Observed, mode: ModeOfOperation, findings: &mut Vec<Finding>) {
     let torque = [MAX_TORQUE, MAX_CURRENT, POSITIVE_TORQUE_LIMIT, NEGATIVE_TORQUE_LIMIT].map(|mux| seen.place(mux));
     let by_speed = matches!(mode.0, 1 | 3 | 9);
     let rows = speed.into_iter().chain(held_to).filter(|_| by_speed).map(|object| ("speed_limit_zero", object));
-    let mut told = Vec::new();
+    let mut zero = Vec::new();
     for (rule, object) in rows.chain(torque.map(|object| ("torque_limit_zero", object))) {
-        if seen.value(object) == Some(0) && !told.contains(&object) {
-            told.push(object);
+        if seen.value(object) == Some(0) && !zero.contains(&object) {
+            zero.push(object);
             findings.push(cause(
                 TOPIC,
                 rule,

@@ -17,7 +17,7 @@ pub enum Refusal {
 impl Refusal {
     /// The command is not supported.
     pub const NOT_SUPPORTED: Self = Self::Internal(100);
-    /// The line is no command.
+    /// The line is not a command.
     pub const SYNTAX: Self = Self::Internal(101);
     /// The gateway cannot do it now.
     pub const STATE: Self = Self::Internal(102);

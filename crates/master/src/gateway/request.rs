@@ -51,7 +51,7 @@ pub enum GatewayCommand {
     BootUpIndication(bool),
     /// `info version`.
     InfoVersion,
-    /// `set rpdo NUMBER COB-ID TRANSMISSION COUNT TYPE..`: tell of such PDOs.
+    /// `set rpdo NUMBER COB-ID TRANSMISSION COUNT TYPE..`: report such PDOs.
     SetRpdo(u64, u64, Vec<GatewayType>),
     /// `set tpdo NUMBER COB-ID TRANSMISSION COUNT TYPE..`: PDOs to be sent.
     SetTpdo(u64, u64, Vec<GatewayType>),

@@ -70,8 +70,8 @@ impl Session {
         self.moved
     }
 
-    /// The nodes whose drives a line may set in motion, if it is obeyed: for whoever sees to it that they stop without the
-    /// gateway. A controlword that does not enable operation is not held up for that: it may be a stop.
+    /// The nodes whose drives a line may set in motion, if it is obeyed: for the part of the program that has them stop
+    /// without the gateway. A controlword that does not enable operation is not held up for that: it may be a stop.
     pub fn about_to_move(&self, line: &str) -> NodeSet {
         let mut nodes = NodeSet::EMPTY;
         match GatewayRequest::parse(line) {
@@ -173,7 +173,7 @@ impl Session {
                 let own = self.own_id.ok_or(Refusal::STATE)?;
                 self.network.heartbeat(own, (time > 0).then(|| Duration::from_millis(time.into())));
             }
-            Do::BootUpIndication(told) => self.boot_up_indication = told,
+            Do::BootUpIndication(wanted) => self.boot_up_indication = wanted,
             Do::SetRpdo(number, cob, types) => {
                 let id = pdo_id(cob, &types)?;
                 self.rpdos.retain(|_, (known, _)| *known != number);
@@ -250,8 +250,8 @@ impl Session {
         }
     }
 
-    /// The line that tells of a frame, if it is one that is told of: boot-up, EMCY, a PDO that was set up.
-    pub fn told_frame(&mut self, frame: &Frame) -> Option<String> {
+    /// The line for a frame, if it is one that is reported: boot-up, EMCY, a PDO that was set up.
+    pub fn frame_line(&mut self, frame: &Frame) -> Option<String> {
         if let Some((number, pdo)) = frame.standard_data_id().and_then(|id| self.rpdos.get_mut(&id)) {
             let values = pdo_values(&pdo.types, frame.data())?;
             let line = format!("{NET} PDO {}\r\n", pdo_text(*number, &values));
@@ -272,8 +272,8 @@ impl Session {
         }
     }
 
-    /// The line that tells of what the network has noticed, if it is something that no frame tells.
-    pub fn told_event(&self, event: &Event) -> Option<String> {
+    /// The line for an event of the network, if no frame carries it.
+    pub fn event_line(&self, event: &Event) -> Option<String> {
         match event {
             // CiA 309-3, internal error codes: 203 heartbeat lost, 202 heartbeat started.
             Event::HeartbeatLost(node, _) => Some(format!("{NET} {node} ERROR 203\r\n")),

@@ -1,4 +1,4 @@
-//! One axis of a group: from a point of its path to what its drive is told in a cycle, and how far behind it is.
+//! One axis of a group: from a point of its path to the set-point of its drive in a cycle, and how far behind it is.
 
 use crate::cyclic::{CyclicDrive, CyclicState, Demand};
 use crate::network::{Claim, Exchange};
@@ -73,7 +73,7 @@ impl Axis {
     /// The path's speed, and some more to catch up.
     fn speed(&self, point: PathPoint, limits: &AxisLimits, before: &CyclicState) -> Rpm {
         let most = limits.velocity_turns_s * MOST_CORRECTION;
-        // A drive that is not heard is not sent after a place that nobody knows.
+        // A drive that is not heard is not sent to an unknown place.
         let behind = before.position.map_or(0.0, |Turns(at)| self.asked[self.age(before)] - at);
         let correction = (behind * POSITION_GAIN_PER_S).clamp(-most, most);
         let highest = limits.velocity_turns_s;

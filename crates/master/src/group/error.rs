@@ -18,7 +18,7 @@ pub(super) const PERIODS: core::ops::RangeInclusive<Duration> = Duration::from_m
 /// Why a group cannot be made, or did not do what it should.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum GroupError {
-    /// A group of nobody.
+    /// A group without axes.
     #[error("a group needs at least one axis")]
     NoAxis,
     /// The drives are on several networks, which no SYNC joins.

@@ -141,7 +141,8 @@ impl Group {
     pub async fn rest(&mut self) -> Result<(), GroupError> {
         while matches!(self.state().phase, Phase::Moving | Phase::Streaming | Phase::Stopping) {
             self.cycle().await?;
-            // A quick stop has no end that the group plans: its drives stand when they say so, and are not waited for for ever.
+            // A quick stop has no end that the group plans: its drives stand when they report it, and the wait is
+            // bounded.
             if let Activity::QuickStop { cycles } = self.runner.activity
                 && (self.runner.has_quick_stopped() || cycles > self.cycles(POWER_LIMIT))
             {
@@ -214,7 +215,7 @@ impl Group {
     ///
     /// # Errors
     /// As [`cycle`](Self::cycle). [`GroupError::Stopped`] for what went wrong on the way to rest; the power is taken nevertheless.
-    /// What had stopped the group before is no error here.
+    /// What had stopped the group before is not an error here.
     pub async fn disable(&mut self) -> Result<(), GroupError> {
         let known = self.runner.cause.is_some_and(|cause| cause != StopCause::Asked);
         self.start_stop();

@@ -55,7 +55,7 @@ pub async fn home(axes: &[AxisHoming], order: HomingOrder) -> Result<Vec<MotionR
         HomingOrder::Together => {
             let found = all_or_first_error(searches.by_ref().collect()).await;
             if found.is_err() {
-                // What went wrong first is what matters, whatever becomes of the stops.
+                // The first error is reported, whether or not the stops succeed.
                 let _ = join_all(axes.iter().map(|axis| axis.drive.quick_stop())).await;
             }
             found

@@ -78,7 +78,7 @@ pub enum PathError {
         /// What was given.
         value: f64,
     },
-    /// Software limits that leave no place, or that are no numbers.
+    /// Software limits that leave no place, or that are not numbers.
     #[error("the software limits of axis {axis} are {} to {} deg: state the lower one first, both finite", degrees(*low), degrees(*high))]
     BadRange {
         /// Which axis.
@@ -132,13 +132,13 @@ pub enum PathError {
     NoPath(String),
 }
 
-/// Turns as people are told them: in degrees, as machine files and the command line have them.
+/// Turns as they are shown: in degrees, as machine files and the command line have them.
 pub(super) const fn degrees(turns: f64) -> Shown {
     Shown(turns * 360.0)
 }
 
 impl Quantity {
-    /// The unit in which people are told its values.
+    /// The unit in which its values are shown.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Position | Self::FollowingError => "deg",
@@ -166,7 +166,7 @@ impl fmt::Display for Quantity {
 const MOST: f64 = 1e9;
 
 impl AxisLimits {
-    /// What a careful person begins with where nothing is said: 30 r/min, 60 (r/min)/s reached within 100 ms, a lag of 0.2
+    /// Conservative defaults: 30 r/min, 60 (r/min)/s reached within 100 ms, a lag of 0.2
     /// turns, no software limits.
     pub const fn careful() -> Self {
         Self {

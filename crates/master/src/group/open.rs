@@ -17,7 +17,7 @@ use crate::units::Rpm;
 /// The interpolation time period (CiA 402-2, 12.3.4): value, and its power of ten in seconds.
 const INTERPOLATION_TIME: [Mux; 2] = [Mux::new(0x60C2, 1), Mux::new(0x60C2, 2)];
 
-/// An axis to be, and how it is moved.
+/// A future axis, and how it is moved.
 #[derive(Clone, Debug)]
 pub struct AxisSetup {
     /// The drive.

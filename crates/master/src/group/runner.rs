@@ -192,9 +192,9 @@ impl Runner {
 
     /// What stops the whole group.
     fn find_trouble(&self) -> Option<StopCause> {
-        // What went wrong first is told; a stop that was asked for is nothing wrong.
-        let is_told = self.cause.is_some_and(|cause| cause != StopCause::Asked);
-        if is_told || matches!(self.activity, Activity::Off | Activity::QuickStop { .. }) {
+        // The first cause is reported; a stop that was asked for is not an error.
+        let is_reported = self.cause.is_some_and(|cause| cause != StopCause::Asked);
+        if is_reported || matches!(self.activity, Activity::Off | Activity::QuickStop { .. }) {
             return None;
         }
         let enabling = matches!(self.activity, Activity::Enabling);
@@ -281,12 +281,12 @@ mod tests {
     }
 
     #[test]
-    fn a_quick_stop_has_a_cause_also_where_somebody_asked_for_a_stop() {
+    fn a_quick_stop_has_a_cause_also_where_a_stop_was_asked_for() {
         let mut asked = runner(stream());
         asked.stop(StopCause::Asked);
         assert!(matches!(asked.activity, Activity::QuickStop { .. }), "{:?}", asked.activity);
         assert_eq!(asked.state().cause, Some(StopCause::NoPathToRest));
-        // At the end of a stream nobody asked.
+        // At the end of a stream there was no request to stop.
         let mut ended = runner(stream());
         ended.come_to_rest();
         assert_eq!(ended.state().cause, Some(StopCause::NoPathToRest));

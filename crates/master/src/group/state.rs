@@ -37,10 +37,10 @@ impl fmt::Display for Phase {
     }
 }
 
-/// Why the group was stopped. It stays until the group is switched off or told to go on.
+/// Why the group was stopped. It stays until the group is switched off or goes on by command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StopCause {
-    /// A drive did not do what it was told: a fault, a loss, a refused set-point.
+    /// A drive did not follow its command: a fault, a loss, a refused set-point.
     Axis {
         /// Which axis, from 1.
         axis: usize,
@@ -103,7 +103,7 @@ impl fmt::Display for StopCause {
                 "the group was stopped by the quick stop (605Ah) of each of its drives, not along a path, since none to rest was \
                  found within its limits. Switch it off, look where its axes are, and enable it again",
             ),
-            Self::Asked => f.write_str("the group was told to stop"),
+            Self::Asked => f.write_str("the group was stopped by command"),
         }
     }
 }

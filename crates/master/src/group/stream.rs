@@ -33,7 +33,7 @@ impl Default for StreamOptions {
 /// The most points that a stream keeps: a minute at 1 ms.
 const MOST_POINTS: usize = 60_000;
 
-/// The longest time for which a group may go on without being told where, in seconds; one cycle in any case.
+/// The longest time for which a group may go on without a point, in seconds; one cycle in any case.
 const LONGEST_GRACE_S: f64 = 0.1;
 
 impl StreamOptions {

@@ -181,7 +181,7 @@ mod tests {
                 assert!(point.velocity_turns_s.abs() <= limits.velocity_turns_s + 1e-9);
                 assert!(point.acceleration_turns_s2.abs() <= limits.acceleration_turns_s2 + 1e-9);
                 assert!(jerk.abs() <= limits.jerk_turns_s3 + 1e-6, "{jerk}");
-                // Nobody waits at the end for the others.
+                // No axis waits at the end for the others.
                 let early = step < steps - 40 && step > 40;
                 assert!(!early || point.velocity_turns_s.abs() > 1e-6, "axis {axis} rests in step {step}");
             }

@@ -24,7 +24,7 @@ const TRIES: usize = 4;
 const PRODUCER_HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
 
 /// Longest heartbeat period that a scan waits for: twice that of the joint as delivered, the slowest of the drives here. A
-/// guess of what somebody who scans likes to wait; of slower ones the period is told.
+/// guess of how long a user waits for a scan; of slower ones the period is reported.
 const HEARTBEAT_PATIENCE: Duration = Duration::from_secs(2);
 
 /// How much later than its period a heartbeat may come: behind a bus full of other frames.
@@ -39,18 +39,18 @@ pub struct Found {
     pub identity: Option<Identity>,
     /// Its NMT state by its last boot-up or heartbeat message, or the NMT command sent since.
     pub nmt_state: Option<NmtState>,
-    /// How often it sends a heartbeat, as it says in 1017h; zero for never, `None` if it does not tell.
+    /// How often it sends a heartbeat, by its 1017h; zero for never, `None` if that cannot be read.
     pub heartbeat: Option<Duration>,
-    /// What that tells of its model.
+    /// What that shows of its model.
     pub knowledge: Knowledge,
-    /// The models that answer so. More than one: it cannot be told which by its identity.
+    /// The models that answer so. More than one: its identity does not decide which.
     pub models: Vec<&'static Description>,
-    /// What speaks for two devices with this node-ID: what is said here is of one or the other.
+    /// What speaks for two devices with this node-ID: what is listed here is of one or the other.
     pub twins: Option<Twins>,
 }
 
 impl Found {
-    /// What cannot be told about it, and why.
+    /// What is not known about it, and why.
     pub fn doubt(&self) -> Option<String> {
         match (self.identity, &self.knowledge) {
             (None, _) => Some("it is heard but answers no SDO: stopped, or busy, or its SDO is elsewhere".to_owned()),
@@ -58,7 +58,7 @@ impl Found {
             (Some(_), Knowledge::Guessed(guess)) => Some(format!("cannot tell: {guess}")),
             (Some(_), Knowledge::Unknown) => Some(match names(self.models.iter().copied()) {
                 (answering, true) => {
-                    format!("cannot tell: {answering} answer the same identity, and its objects speak for none of them")
+                    format!("cannot tell: {answering} answer the same identity, and its objects match none of them")
                 }
                 _ => "no model known here answers so".to_owned(),
             }),
@@ -111,18 +111,18 @@ fn node_silent(node: &Node, mux: Mux) -> Error {
     Error::NoAnswer { node: node.id(), mux, access, waited: node.timeout(), hints: node.hints(false) }
 }
 
-/// What a node's identity and objects tell of its model.
+/// What a node's identity and objects show of its model.
 ///
 /// # Errors
 /// [`Error::NoAnswer`] when it is silent.
 pub async fn knowledge(node: &Node) -> Result<Knowledge, Error> {
     let said = identity(node).await?;
     let known = node.network().models();
-    told_apart(node, &known, &answering(&known, said)).await
+    distinguish(node, &known, &answering(&known, said)).await
 }
 
-/// What the node's objects tell of which of `models` it is.
-async fn told_apart(node: &Node, known: &Models, models: &[&'static Description]) -> Result<Knowledge, Error> {
+/// Which of `models` it is, by the node's objects.
+async fn distinguish(node: &Node, known: &Models, models: &[&'static Description]) -> Result<Knowledge, Error> {
     let Some((first, others)) = models.split_first() else { return Ok(Knowledge::Unknown) };
     if others.is_empty() {
         return Ok((*first).into());
@@ -213,7 +213,7 @@ impl Network {
         }
         let known = self.models();
         let models = identity.map(|said| answering(&known, said)).unwrap_or_default();
-        let knowledge = told_apart(&node, &known, &models).await.unwrap_or(Knowledge::Unknown);
+        let knowledge = distinguish(&node, &known, &models).await.unwrap_or(Knowledge::Unknown);
         let heartbeat = match identity {
             Some(_) => optional(&node, PRODUCER_HEARTBEAT_TIME).await.ok().flatten(),
             None => None,

@@ -62,7 +62,7 @@ impl fmt::Display for Identity {
 /// What is known of a node's model.
 #[derive(Clone, Debug)]
 pub enum Knowledge {
-    /// This model: somebody has said so who must know, or no other model answers so.
+    /// This model: named by the caller, or no other model answers so.
     Named(Model),
     /// One of several that answer so: good for reading and moving, not for what only one model means.
     Guessed(Guess),

@@ -2,7 +2,7 @@
 //!
 //! In: boot-up and heartbeat messages seen, and answers to 1000h and 1018h. Out: one [`Found`] per node. Nodes are
 //! asked in windows, all of a window at the same time. Models may share an identity: an object that only some of them
-//! have then makes a [`Guess`], never a certainty. What cannot be told is said.
+//! have then makes a [`Guess`], never a certainty. What is not known is reported.
 
 mod ask;
 pub(crate) mod knowledge;

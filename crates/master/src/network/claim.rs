@@ -4,7 +4,7 @@ use canopen::{Mux, NodeId};
 
 use super::handle::Network;
 
-/// An axis that nobody else may claim until this is dropped.
+/// An axis that cannot be claimed again until this is dropped.
 #[derive(Debug)]
 pub(crate) struct Claim {
     network: Network,
@@ -12,7 +12,7 @@ pub(crate) struct Claim {
 }
 
 impl Network {
-    /// Claims the axis with this controlword; `None` where somebody has it.
+    /// Claims the axis with this controlword; `None` where it is claimed already.
     pub(crate) fn claim(&self, node: NodeId, controlword: Mux) -> Option<Claim> {
         let axis = (node, controlword);
         self.lock().claims.insert(axis).then(|| Claim { network: self.clone(), axis })

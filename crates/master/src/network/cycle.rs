@@ -16,7 +16,7 @@ use crate::core::{Command, Core, Cycle, CycleLoss, Sample, SetPoint, Signal, Tic
 /// Why there is no next cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoCycle {
-    /// Nobody's SYNC counts the cycles.
+    /// No producer's SYNC counts the cycles.
     #[error("SYNC is neither produced nor followed: call Network::sync or Network::follow_sync first")]
     NoSync,
     /// The SYNC of another producer stays away.
@@ -100,7 +100,7 @@ impl Exchange<'_> {
         self.core.sync_period()
     }
 
-    /// The latest time that the runner has told.
+    /// The latest time that the runner has passed.
     pub const fn now(&self) -> Instant {
         self.core.now()
     }
@@ -111,7 +111,7 @@ impl Exchange<'_> {
         self.core.read(&signal)
     }
 
-    /// As [`read`](Self::read), of no value that is older than this many cycles: 0 for one that came in this cycle.
+    /// As [`read`](Self::read), if the value is not older than this many cycles: 0 for one that came in this cycle.
     #[inline]
     pub fn read_fresh<T: Sample>(&self, signal: Signal<T>, cycles: u64) -> Option<T> {
         let fresh = self.core.cycles_since(&signal)? <= cycles;
@@ -141,7 +141,7 @@ impl Exchange<'_> {
         self.core.note_resting(watch);
     }
 
-    /// The drive is told to switch off; a loss is forgotten.
+    /// The drive is commanded to switch off; a loss is forgotten.
     pub(crate) fn forget_loss(&mut self, watch: WatchId) {
         self.core.forget_loss(watch);
     }
@@ -151,7 +151,7 @@ impl Exchange<'_> {
         self.moved.remove(axis.node, axis.controlword);
     }
 
-    /// Why the drive was stopped, until it was told to switch off.
+    /// Why the drive was stopped, until it was commanded to switch off.
     pub(crate) fn cycle_loss(&self, watch: WatchId) -> Option<CycleLoss> {
         self.core.cycle_loss(watch)
     }

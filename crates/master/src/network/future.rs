@@ -155,7 +155,7 @@ impl NodeView<'_> {
         self.core.image().value(self.node, mux)
     }
 
-    /// The latest time that the runner has told.
+    /// The latest time that the runner has passed.
     pub const fn now(&self) -> Instant {
         self.core.now()
     }

@@ -24,7 +24,7 @@ pub struct Network {
 #[derive(Debug, Default)]
 pub(super) struct Shared {
     pub(super) core: Core,
-    /// Commands that wait to be told the time.
+    /// Commands that wait for the runner's next time.
     inbox: VecDeque<Command>,
     pub(super) slots: HashMap<Ticket, Slot>,
     pub(super) watchers: Vec<Watcher>,
@@ -139,12 +139,12 @@ impl Network {
         self.lock().core.image().value(node, mux)
     }
 
-    /// The latest time that the runner has told.
+    /// The latest time that the runner has passed.
     pub fn now(&self) -> Instant {
         self.lock().core.now()
     }
 
-    /// Looks into the core, or changes mappings and values to send. The runner is told to come and fetch frames.
+    /// Looks into the core, or changes mappings and values to send. The runner is woken to fetch frames.
     pub fn with_core<T>(&self, look: impl FnOnce(&mut Core) -> T) -> T {
         self.with_shared(|shared| look(&mut shared.core))
     }
@@ -159,7 +159,7 @@ impl Network {
         result
     }
 
-    /// Looks into the core without the runner being told.
+    /// Looks into the core without waking the runner.
     pub(crate) fn look<T>(&self, look: impl FnOnce(&Core) -> T) -> T {
         look(&self.lock().core)
     }
@@ -221,7 +221,7 @@ impl Network {
             use Command::{FollowSync, Heartbeat, KeepFed, Nmt, Sync, Transmit};
             matches!(command, Nmt(..) | Transmit(_) | Sync(_) | FollowSync(_) | Heartbeat(..) | KeepFed(..))
         };
-        // Nobody has run the bus for thousands of commands: the newest replaces the oldest.
+        // The bus was not run for thousands of commands: the newest replaces the oldest.
         if shared.inbox.len() >= INBOX
             && plain(&command)
             && let Some(oldest) = shared.inbox.iter().position(plain)
@@ -247,7 +247,7 @@ impl Network {
         }
     }
 
-    /// Calls the core at `now`, waiting commands first, and wakes whoever waited for what came of it.
+    /// Calls the core at `now`, waiting commands first, and wakes the futures that waited for the results.
     fn run(&self, now: Instant, call: impl FnOnce(&mut Core)) {
         let mut shared = self.lock();
         shared.fresh = false;
@@ -273,7 +273,7 @@ impl Network {
 }
 
 impl Shared {
-    /// Hands outcomes to their slots, and collects the wakers of whoever waited.
+    /// Hands outcomes to their slots, and collects the wakers of those that waited.
     fn collect(&mut self) {
         while let Some(finished) = self.core.poll_finished() {
             // No slot: the future has been dropped.

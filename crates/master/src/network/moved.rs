@@ -7,7 +7,7 @@ use crate::core::NodeSet;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MovedAxis {
     pub(crate) node: NodeId,
-    /// The place of its controlword, which tells the axes of a node apart.
+    /// The place of its controlword, which distinguishes the axes of a node.
     pub(crate) controlword: Mux,
     pub(crate) axis: AxisId,
     /// `None` where only the place of the controlword is known.

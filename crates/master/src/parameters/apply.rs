@@ -78,10 +78,10 @@ impl Drive {
         let node = self.node();
         match node.download(step.object, &step.value).await {
             Ok(()) => {}
-            // Some devices map regardless and have no such bit: what follows tells whether this one does.
+            // Some devices map regardless and have no such bit: what follows shows whether this one does.
             Err(Error::Aborted { .. }) if step.purpose == Purpose::SwitchOff => return Taken::Yes,
             Err(error) => {
-                // After silence nobody knows.
+                // After silence it is not known.
                 let written = error.abort().is_none();
                 return Taken::No { why: Why::Failed(error), written };
             }

@@ -131,7 +131,7 @@ pub struct ApplyError {
     pub of: usize,
     /// Why.
     pub why: Why,
-    /// What the object takes now, where its model says so.
+    /// What the object takes now, where its model has that.
     pub limits: Option<Limits>,
     /// How the way back went.
     pub undone: Undone,

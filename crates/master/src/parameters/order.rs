@@ -60,8 +60,8 @@ pub struct Step {
     pub purpose: Purpose,
 }
 
-/// COB-IDs that are off while their identifiers change, and the bit that says so: SYNC (bit 30: the device generates it), TIME
-/// (bits 31 and 30: it consumes or produces it) and EMCY (bit 31: it does not exist).
+/// COB-IDs that are off while their identifiers change, and the bit for that: SYNC (bit 30: the device generates it),
+/// TIME (bits 31 and 30: it consumes or produces it) and EMCY (bit 31: it does not exist).
 const IDENTIFIERS: [(u16, u32, u32); 3] =
     [(0x1005, CobId::NO_RTR, 0), (0x1012, CobId::NO_RTR | CobId::INVALID, 0), (0x1014, 0, CobId::INVALID)];
 
@@ -108,8 +108,8 @@ pub fn in_order(
 }
 
 /// The writes that give a device these values whatever it has: what a configuration manager keeps of it (CiA 302-3, 1F22h).
-/// Node-ID and bit rate are left out: whoever writes to the device has found it. What of a PDO is not said is as `model`
-/// is delivered.
+/// Node-ID and bit rate are left out: a device that can be written to has them. What of a PDO is not given is as
+/// `model` is delivered.
 pub fn from_any_state(
     model: Option<&Description>,
     node: NodeId,

@@ -1,4 +1,4 @@
-//! What is to be written, found out before anything is.
+//! The writes, worked out before the first is sent.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -107,7 +107,7 @@ impl Drive {
             let of_axis = if axis == self.axis_id() { self.clone() } else { self.axis(axis)? };
             let statusword = match of_axis.statusword().await {
                 Ok(statusword) => statusword,
-                // A device that is no drive, or whose model is not known.
+                // A device that is not a drive, or whose model is not known.
                 Err(Error::Aborted { .. }) => continue,
                 Err(error) => return Err(error.into()),
             };
@@ -120,7 +120,7 @@ impl Drive {
         Ok(())
     }
 
-    /// Whether the object can have the value, as far as that can be told before it is tried.
+    /// Whether the object can have the value, as far as that is known before it is tried.
     async fn fits(
         &self,
         object: Mux,
@@ -198,7 +198,7 @@ enum Fit {
 }
 
 /// Whether a list made for one device is for the one that is there. A revision whose upper half is the same behaves the same
-/// on the bus (CiA 301, 7.5.2.21): that it differs below is told, not refused.
+/// on the bus (CiA 301, 7.5.2.21): a difference below that is reported, not refused.
 fn same_device(node: NodeId, wanted: &Identity, found: &Identity) -> Result<Option<u32>, PlanError> {
     let differ = |wanted: Option<u32>, found: Option<u32>| matches!((wanted, found), (Some(a), Some(b)) if a != b);
     let major = |revision: Option<u32>| revision.map(|revision| revision >> 16);

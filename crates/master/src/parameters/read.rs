@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::identify::identity;
 use crate::network::Node;
 
-/// The parameters of a node, and what it did not tell.
+/// The parameters of a node, and what it refused to show.
 #[derive(Clone, Debug)]
 pub struct Backup {
     /// What it has.
@@ -34,7 +34,7 @@ impl Drive {
     /// # Errors
     /// [`Error::UnknownModel`]; silence. An object that the node refuses is noted.
     pub async fn back_up(&self, mut progress: impl FnMut(usize, usize, Mux)) -> Result<Backup, Error> {
-        let wanted = wanted_of(self.known("tell its parameters from its other objects")?);
+        let wanted = wanted_of(self.known("find out which of its objects are parameters")?);
         let node = self.node();
         let (identity, id) = (identity(node).await?, node.id());
         let mut parameters = Parameters { identity, node: Some(id), ..Parameters::default() };

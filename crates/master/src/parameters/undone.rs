@@ -47,7 +47,7 @@ impl fmt::Display for Undone {
 }
 
 /// Writes what leads back, in this order, and looks whether every object has again what it had: `had`, or else what its
-/// last write here was. Ends at the first silence: what is left then is told.
+/// last write here was. Ends at the first silence: what is left then is reported.
 pub async fn roll_back(node: &Node, undo: &[(Mux, Vec<u8>)], had: impl Fn(Mux) -> Option<Vec<u8>>) -> Undone {
     let mut silent = None;
     for (object, value) in undo {

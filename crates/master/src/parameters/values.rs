@@ -26,7 +26,7 @@ pub struct Parameters {
 pub enum Left {
     /// It is a command or a set-point: writing it does something.
     Command,
-    /// It chooses node-ID or bit rate, and nobody asked for that.
+    /// It chooses node-ID or bit rate, which was not asked for.
     Address,
     /// It can only be read, and has the value already.
     Fixed,
@@ -35,7 +35,7 @@ pub enum Left {
 impl std::fmt::Display for Left {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Command => "a command or a set-point, no parameter",
+            Self::Command => "a command or a set-point, not a parameter",
             Self::Address => "chooses node-ID or bit rate, which is changed only when asked for",
             Self::Fixed => "can only be read, and has this value",
         })
@@ -119,14 +119,14 @@ pub(super) fn same(object: Mux, first: &[u8], second: &[u8]) -> bool {
 }
 
 /// The objects of a model that are its parameters: what it keeps in its store and can be written, or all that can be written
-/// and is no command of a model that does not say what it keeps. Node-ID and bit rate are among them.
+/// and is not a command, of a model that does not say what it keeps. Node-ID and bit rate are among them.
 pub fn wanted_of(model: &Description) -> Vec<Mux> {
     let rows = || model.dictionary.rows().iter().filter(|row| is_parameter(row) && row.data_type != DataType::Domain);
     let any_kept = rows().any(Entry::is_kept);
     rows().filter(|row| !any_kept || row.is_kept()).map(Entry::mux).collect()
 }
 
-/// True for an object that nobody writes to configure a device: a command, a set-point.
+/// True for an object that is not written to configure a device: a command, a set-point.
 pub(crate) fn is_command(object: Mux, model: Option<&Description>) -> bool {
     let by_standard = Entry::new(object.index, object.sub_index, DataType::Unsigned32, Access::ReadWrite, "", "");
     !is_parameter(&by_standard) || model.and_then(|model| model.row(object)).is_some_and(|row| row.command)

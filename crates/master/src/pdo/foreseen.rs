@@ -76,7 +76,7 @@ mod tests {
     fn what_is_not_written_stays() {
         let model = devices::model("zlac8030l").expect("a model");
         let before = mapped(&[0x6041_0010, 0x6064_0020]).event_time(Duration::from_millis(1));
-        // Of the second entry and of a third that is not there nothing is said; TPDO2 is another PDO.
+        // The second entry and a third that is not there are not mentioned; TPDO2 is another PDO.
         let values = [(Mux::new(0x1A00, 0), vec![3]), (Mux::new(0x1A00, 1), 0x6061_0008_u32.to_le_bytes().to_vec())];
         let others = [(Mux::new(0x1A01, 0), vec![0]), (Mux::new(0x1801, 2), vec![1])];
         let (after, cob_id) = before.with_values(CobId(0x184), &values.into_iter().chain(others).collect(), model);

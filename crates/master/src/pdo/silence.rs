@@ -44,8 +44,8 @@ pub enum Silence {
     AnswersRpdo,
     /// Its inhibit time holds it back for so long.
     Inhibited(Duration),
-    /// An RPDO, and nobody was heard sending it.
-    NobodySends,
+    /// An RPDO, and no node was heard sending it.
+    NoSender,
 }
 
 /// A PDO that is held back for longer than this seems silent to a person.
@@ -74,7 +74,7 @@ pub fn why_silent(config: &PdoConfig, cob_id: CobId, situation: &Situation) -> V
     let by_sync = config.transmission.is_synchronous() || config.transmission.0 == 252;
     add(by_sync && situation.sync_heard == Some(false), Silence::NoSync);
     if config.pdo.direction == Direction::Rpdo {
-        add(situation.heard == Some(false), Silence::NobodySends);
+        add(situation.heard == Some(false), Silence::NoSender);
         add(matches!(config.transmission.0, 241..=253), Silence::Reserved(config.transmission.0));
         return reasons;
     }
@@ -116,7 +116,7 @@ impl fmt::Display for Silence {
             Self::OnChange => f.write_str("it comes when a mapped value changes; its event timer is off"),
             Self::AnswersRpdo => f.write_str("it comes as the answer to the RPDO of its number"),
             Self::Inhibited(time) => write!(f, "its inhibit time holds it back for {time:?}"),
-            Self::NobodySends => f.write_str("nobody was heard sending it"),
+            Self::NoSender => f.write_str("no node was heard sending it"),
         }
     }
 }
@@ -164,7 +164,7 @@ mod tests {
         let quiet = Situation { sync_heard: Some(false), heard: Some(false), ..WELL };
         assert_eq!(reasons(&pdo(Direction::Tpdo, 240), &quiet), [Silence::NoSync]);
         assert_eq!(reasons(&pdo(Direction::Tpdo, 255), &quiet), [Silence::OnChange]);
-        assert_eq!(reasons(&pdo(Direction::Rpdo, 1), &quiet), [Silence::NoSync, Silence::NobodySends]);
+        assert_eq!(reasons(&pdo(Direction::Rpdo, 1), &quiet), [Silence::NoSync, Silence::NoSender]);
         let unknown = Situation { nmt: None, sync_heard: None, heard: None, ..WELL };
         assert_eq!(reasons(&pdo(Direction::Rpdo, 1), &unknown), []);
         assert_eq!(reasons(&pdo(Direction::Tpdo, 0), &WELL), [Silence::SyncAndChange]);

@@ -23,7 +23,7 @@ pub enum PdoUnfit {
         has: String,
     },
     /// What it carries cannot be changed.
-    #[error("the mapping of a {model} is fixed: leave the objects of {pdo} away")]
+    #[error("the mapping of a {model} is fixed: leave out the objects of {pdo}")]
     Fixed {
         /// The model.
         model: &'static str,
@@ -187,7 +187,7 @@ impl PdoConfig {
         Ok(())
     }
 
-    /// Its COB-ID: as asked for, else as the model is delivered but valid; `None` where nobody can write it.
+    /// Its COB-ID: as asked for, else as the model is delivered but valid; `None` where it cannot be written.
     fn cob_id_in(&self, model: &Description, node: NodeId) -> Option<u32> {
         let row = model.row(self.parameter(1)).filter(|row| row.access.is_writable())?;
         let delivered = default_of(row, node)?;
@@ -195,7 +195,7 @@ impl PdoConfig {
         // The flags of a model stay; the identifier may be another.
         let flags = delivered & CobId::NO_RTR;
         let id = self.id.map_or(delivered & !CobId::INVALID & !CobId::NO_RTR, u32::from);
-        // Of a PDO without an identifier of its own by the standard nobody can guess one.
+        // Of a PDO without an identifier of its own by the standard none can be guessed.
         (id != 0).then_some(flags | id)
     }
 }
@@ -213,7 +213,7 @@ pub fn values_off(model: &Description, pdo: PdoId, node: NodeId) -> Result<Vec<(
         pdo,
         asked: "off".to_owned(),
         what: "COB-ID",
-        takes: "no change: the model does not let it be written; leave its objects away".to_owned(),
+        takes: "no change: the model does not let it be written; leave out its objects".to_owned(),
     })?;
     Ok(vec![(object, (delivered | CobId::INVALID).to_le_bytes().to_vec())])
 }

@@ -11,8 +11,8 @@
 //! - of the own queue what may stand before it.
 //!
 //! And a cycle as a whole is at its end when all that is in step and all else that can pass meanwhile has passed, and the bus has
-//! stood still for no longer than a host is late and a device takes to answer: whoever has something to send, sends. A cycle
-//! that takes longer than its period takes of the next one, and so on until one is in time again.
+//! stood still for no longer than a host is late and a device takes to answer: a node that has something to send,
+//! sends. A cycle that takes longer than its period takes of the next one, and so on until one is in time again.
 //!
 //! As K. Tindell, "Adding time-offsets to schedulability analysis", 1994, and M. Palencia and M. González Harbour, "Exploiting
 //! precedence relations in the schedulability analysis of distributed real-time systems", 1999, with all offsets but those of

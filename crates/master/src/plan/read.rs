@@ -1,4 +1,4 @@
-//! What a node sends by itself, read from it.
+//! What a node sends on its own, read from it.
 
 use std::time::Duration;
 

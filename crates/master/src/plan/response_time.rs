@@ -10,7 +10,8 @@
 //!   known by name in place of all of the queue.
 //! - Frames that answer others ([`Trigger`](super::Trigger)): a TPDO comes after SYNC, as much later as its device takes.
 //!
-//! Where that finds a frame late, a second analysis counts what comes in step once (`in_step.rs`), and the smaller bound is told.
+//! Where that finds a frame late, a second analysis counts what comes in step once (`in_step.rs`), and the smaller
+//! bound is given.
 //!
 //! What is given is an upper bound for a bus without errors, or with one at most in each [`ErrorRate`].
 
@@ -89,7 +90,7 @@ pub fn response_times(frames: &[Queued], bitrate: Bitrate, errors: Option<ErrorR
         }
     }
     if !is_settled {
-        // What still grows has no bound that could be told.
+        // What still grows has no bound.
         known.iter_mut().for_each(|known| known.response_ns = None);
     }
     let settled = known.iter().zip(frames).map(|(known, frame)| {
@@ -177,8 +178,8 @@ impl Bus<'_> {
             let wait_ns = work.longest_wait(own, late_ns, blocking_ns.unwrap_or_default())?;
             return Some((late_ns + wait_ns + own.time_ns, 0));
         }
-        // The queue has to be empty before the next batch comes, so that one instance tells all. A batch before it may have held
-        // up more urgent frames as a less urgent one would.
+        // The queue has to be empty before the next batch comes, so that one instance stands for all. A batch before it
+        // may have held up more urgent frames as a less urgent one would.
         let ahead = || own.ahead.iter().map(|other| &self.frames[*other]);
         let pushed_ns = ahead().map(|frame| frame.time_ns).chain([own.time_ns]).max().unwrap_or_default();
         let first_ns = blocking_ns.unwrap_or_default().max(pushed_ns) + ahead().map(|frame| frame.time_ns).sum::<u64>();

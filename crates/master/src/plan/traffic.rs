@@ -19,10 +19,10 @@ const EMCY_BYTES: u8 = 8;
 const HEARTBEAT_BYTES: u8 = 1;
 const NMT_BYTES: u8 = 2;
 
-/// Nobody's motion waits for an SDO answer; whoever asked does, for so long.
+/// No motion waits for an SDO answer; the client does, for so long.
 const SDO_PATIENCE: Duration = DEFAULT_TIMEOUT;
 
-/// One node: what it sends by itself, and how fast it is.
+/// One node: what it sends on its own, and how fast it is.
 #[derive(Clone, Debug)]
 pub struct NodeTraffic {
     /// Its node-ID.
@@ -60,7 +60,7 @@ pub struct Settings {
     pub queue: HostQueue,
     /// Shortest time between two SDO requests of the host, to whichever node; `None`: it sends none.
     pub sdo: Option<Duration>,
-    /// Shortest time between two EMCY of a node; `None`: while no drive tells of a fault.
+    /// Shortest time between two EMCY of a node; `None`: while no drive reports a fault.
     pub emcy: Option<Duration>,
     /// Shortest time between two NMT commands; `None`: while none is given.
     pub nmt: Option<Duration>,
@@ -149,7 +149,7 @@ impl PlannedFrame {
     }
 }
 
-/// What somebody who plans should know of a PDO.
+/// Remarks on a PDO for the planner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Remark {
     /// Event-driven, without inhibit time: nothing bounds how often it comes. It was taken once in a cycle, or as often as its event

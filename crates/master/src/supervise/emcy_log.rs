@@ -45,7 +45,7 @@ impl EmcyLog {
         self.dropped
     }
 
-    /// Keeps a message, and returns what was kept. One that says that there is no error ends those of its node, and is not
+    /// Keeps a message, and returns what was kept. One with error code 0 ends those of its node, and is not
     /// kept itself.
     pub fn push(&mut self, at: Instant, node: NodeId, emcy: Emcy, model: Option<&Description>) -> EmcyRecord {
         let fault = model.and_then(|model| model.fault_told_by(emcy.code));

@@ -1,4 +1,4 @@
-//! What a supervisor tells, in words.
+//! What a supervisor reports, in words.
 
 use core::fmt;
 
@@ -12,16 +12,17 @@ use crate::core::{Event, NodeSet};
 /// Something that happened on a network that is watched.
 #[derive(Clone, Debug)]
 pub enum SupervisorEvent {
-    /// As the network tells it.
+    /// As the network reports it.
     Event(Event),
     /// An emergency message.
     Emcy(EmcyRecord),
-    /// A drive that this master's heartbeat keeps content is out of reach: the heartbeat is held back, so that nothing goes on by
-    /// itself when the drive hears it again. These drives stop for want of it.
+    /// A drive that this master's heartbeat keeps content is out of reach: the heartbeat is held back, so that nothing
+    /// starts again unasked when the drive hears it. These drives stop for want of it.
     Held(NodeSet),
     /// All that was lost is back and stands: the heartbeat is sent again.
     Released,
-    /// A node came back, and this came of its boot-up. It stands, and is not started until somebody says so.
+    /// A node came back, and this came of its boot-up. It stands, and is not started until
+    /// [`Supervisor::resume`](super::Supervisor::resume).
     Recovered(NodeReport),
     /// A node came back, and could not be made to stand: why.
     NotStopped(NodeId, String),

@@ -7,7 +7,7 @@ use can::Frame;
 use canopen::connection_set::Service;
 use canopen::{NodeId, connection_set};
 
-/// What another master does. Each is told once.
+/// What another master does. Each is reported once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Foreign {
     /// It commands NMT states (CiA 301, 7.2.8.3.1).
@@ -68,21 +68,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_thing_that_only_a_master_does_is_told_once() {
+    fn each_thing_that_only_a_master_does_is_reported_once() {
         let (own, ours) = (NodeId::MAX, NodeId::new(4).unwrap());
         let mut masters = ForeignMasters::default();
-        let mut told = |frame: &str| {
+        let mut noted = |frame: &str| {
             let foreign = masters.note(&frame.parse().unwrap(), own, |node| node == ours);
             foreign.map(|foreign| foreign.to_string().split(':').next().unwrap_or_default().to_owned())
         };
-        assert_eq!(told("000#0104").as_deref(), Some("another master sends NMT commands (000)"));
-        assert_eq!(told("000#8000"), None);
-        assert_eq!(told("604#4000100000000000").as_deref(), Some("another master sends SDO requests to node 4"));
-        assert_eq!((told("604#4000100000000000"), told("605#4000100000000000")), (None, None));
-        assert!(told("77F#05").is_some_and(|text| text.contains("as node 127, which is this master")));
+        assert_eq!(noted("000#0104").as_deref(), Some("another master sends NMT commands (000)"));
+        assert_eq!(noted("000#8000"), None);
+        assert_eq!(noted("604#4000100000000000").as_deref(), Some("another master sends SDO requests to node 4"));
+        assert_eq!((noted("604#4000100000000000"), noted("605#4000100000000000")), (None, None));
+        assert!(noted("77F#05").is_some_and(|text| text.contains("as node 127, which is this master")));
         // What devices send, SYNC too (CiA 301, 7.2.5: any device may produce it), and what asks.
         assert_eq!(
-            (told("704#05"), told("584#4300100000000000"), told("080#"), told("77F#R")),
+            (noted("704#05"), noted("584#4300100000000000"), noted("080#"), noted("77F#R")),
             (None, None, None, None)
         );
     }

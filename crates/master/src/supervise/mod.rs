@@ -1,12 +1,12 @@
 //! The watch over a booted network: what happens to its nodes, and the boot-up of those that come back.
 //!
 //! In: the events of the network, and the frames of others ([`Supervisor::hear`]). Out: [`SupervisorEvent`]s. A node whose supply or cable
-//! was away is stopped, identified, configured and watched anew; it is not started, and nothing moves, until somebody says so
-//! ([`Supervisor::resume`]).
+//! was away is stopped, identified, configured and watched anew; it is not started, and nothing moves, until the caller
+//! resumes it ([`Supervisor::resume`]).
 //!
 //! A drive that stops for want of this master's heartbeat may go on with its old motion at the next one (M joint manual, 5.11.2),
 //! before anybody could stop it. So the heartbeat is held back as soon as such a drive is out of reach, which stops all that watch
-//! it, and sent again when all of them are back and have been told to stand. For that the loss of a drive has to be noticed
+//! it, and sent again when all of them are back and have been stopped. For that the loss of a drive has to be noticed
 //! before the drive notices the loss of its master: by a shorter heartbeat of its own (1017h) than the watch that it has (1016h).
 
 mod emcy_log;
@@ -108,8 +108,8 @@ impl Supervisor {
         None
     }
 
-    /// Somebody says that a node that came back may take part again: NMT start. What it did before does not come back by
-    /// itself: its set-points were ended. Stops what could not be stopped before.
+    /// Lets a node that came back take part again: NMT start. What it did before does not come back
+    /// with it: its set-points were ended. Stops what could not be stopped before.
     ///
     /// # Errors
     /// Those of the SDO requests that stop it, and [`Error::NotReached`] where it turns on. It is not started then.
@@ -177,7 +177,7 @@ impl Supervisor {
         }
     }
 
-    /// Stops a node that has come back, boots it alone, and lets the heartbeat go out again if nobody is missing.
+    /// Stops a node that has come back, boots it alone, and lets the heartbeat go out again if no node is missing.
     async fn recover(&mut self, node: NodeId, how: Return) -> SupervisorEvent {
         let stopped = match how {
             Return::HeartbeatBack => self.stop(node).await,
@@ -225,7 +225,8 @@ impl Supervisor {
         Some(Drive::new(self.network.node(node).with_timeout(self.plan.timeout), description))
     }
 
-    /// If nobody is missing: everybody who stopped for want of the heartbeat is told to stand, then it goes out again.
+    /// If no node is missing: every drive that stopped for want of the heartbeat is stopped by command, then it goes
+    /// out again.
     async fn release_if_all_stand(&mut self) -> Result<(), Error> {
         if !self.held || !self.away.is_empty() {
             return Ok(());

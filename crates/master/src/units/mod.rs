@@ -45,7 +45,7 @@ pub struct Volts(pub f64);
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Celsius(pub f64);
 
-/// An angle as somebody gave it: in counts, which are exact, or in turns.
+/// An angle as it was given: in counts, which are exact, or in turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Angle {
     /// The drive's own counts.

@@ -1,5 +1,5 @@
-//! What is asked for in physical units and what the drive is sent for it: rounded to whole counts and told, refused where
-//! nothing would be left of it, and held to the limits in force. On the three drives, in their manuals' units.
+//! What is asked for in physical units and what the drive is sent for it: rounded to whole counts and reported, refused
+//! where nothing would be left of it, and held to the limits in force. On the three drives, in their manuals' units.
 
 use std::time::Duration;
 
@@ -35,8 +35,8 @@ fn no_wait() -> MotionOptions {
     MotionOptions { wait: false, ..MotionOptions::default() }
 }
 
-/// What, how much was asked for, how much was sent, in counts, and whether that is told.
-fn told(commanded: &[Commanded]) -> Vec<(&'static str, f64, f64, i64, bool)> {
+/// What, how much was asked for, how much was sent, in counts, and whether that is reported.
+fn values(commanded: &[Commanded]) -> Vec<(&'static str, f64, f64, i64, bool)> {
     commanded.iter().map(|sent| (sent.what, sent.requested, sent.commanded, sent.raw, sent.is_rounded())).collect()
 }
 
@@ -46,11 +46,11 @@ fn a_speed_between_two_counts_is_told_with_what_was_sent_on_all_three_drives() {
     for drive in &drives {
         // 60FFh counts whole r/min on each of them.
         let report = block_on(&mut world, drive.velocity(Rpm(2.7), MotionOptions::default())).unwrap().unwrap();
-        assert_eq!(told(&report.commanded), [("speed", 2.7, 3.0, 3, true)], "{drive:?}");
+        assert_eq!(values(&report.commanded), [("speed", 2.7, 3.0, 3, true)], "{drive:?}");
         let target = block_on(&mut world, drive.node().read::<i32>(mux(0x60FF, 0))).unwrap().unwrap();
         assert_eq!(target, 3);
         let report = block_on(&mut world, drive.velocity(Rpm(-60.0), no_wait())).unwrap().unwrap();
-        assert_eq!(told(&report.commanded), [("speed", -60.0, -60.0, -60, false)], "{drive:?}");
+        assert_eq!(values(&report.commanded), [("speed", -60.0, -60.0, -60, false)], "{drive:?}");
     }
 }
 
@@ -63,7 +63,7 @@ fn what_would_come_to_nothing_is_refused_with_the_worth_of_a_count_and_what_make
         let error = block_on(&mut world, drive.move_relative(Degrees(0.004), no_wait())).unwrap().unwrap_err();
         assert!(matches!(error, Error::TooFine { unit: "deg", .. }), "{error}");
         assert!(!drive.node().network().moved().contains(drive.node().id()), "nothing was begun");
-        // Zero is no rounding.
+        // Zero is not rounded.
         block_on(&mut world, drive.velocity(Rpm(0.0), no_wait())).unwrap().unwrap();
     }
     let error = block_on(&mut world, drives[2].velocity(Rpm(0.4), no_wait())).unwrap().unwrap_err().to_string();
@@ -85,7 +85,7 @@ fn the_resolution_that_is_set_on_the_drive_counts() {
         servo.velocity(Rpm(2.7), MotionOptions::default()).await
     };
     let report = block_on(&mut world, restart).unwrap().unwrap();
-    assert_eq!(told(&report.commanded), [("speed", 2.7, 2.7, 27, false)]);
+    assert_eq!(values(&report.commanded), [("speed", 2.7, 2.7, 27, false)]);
     world.run_for(Duration::from_secs(1));
     let speed = world.report(SERVO).unwrap().velocity_rpm;
     assert!((speed - 2.7).abs() < 0.2, "{speed}");
@@ -109,11 +109,11 @@ fn angles_currents_ramps_and_profile_velocities_are_told_too() {
         ("profile velocity", 30.4, 30.0, 30, true),
         ("acceleration", 300.6, 301.0, 301, true),
     ];
-    assert_eq!(told(&report.commanded), expected);
+    assert_eq!(values(&report.commanded), expected);
     let report = block_on(&mut world, servo.move_absolute(Counts(32), no_wait())).unwrap().unwrap();
-    assert_eq!(told(&report.commanded), [("position", 32.0, 32.0, 32, false)]);
+    assert_eq!(values(&report.commanded), [("position", 32.0, 32.0, 32, false)]);
     let report = block_on(&mut world, servo.torque(Amperes(0.0107))).unwrap().unwrap();
-    assert_eq!(told(&report.commanded), [("current", 0.0107, 0.011, 11, true)]);
+    assert_eq!(values(&report.commanded), [("current", 0.0107, 0.011, 11, true)]);
     let error = block_on(&mut world, servo.torque(Amperes(0.0004))).unwrap().unwrap_err();
     assert!(matches!(error, Error::TooFine { unit: "A", .. }), "{error}");
 
@@ -125,12 +125,12 @@ fn angles_currents_ramps_and_profile_velocities_are_told_too() {
     };
     let report = block_on(&mut world, joint.velocity(Rpm(60.0), ramps)).unwrap().unwrap();
     assert_eq!(report.commanded[1..].iter().map(Commanded::is_rounded).collect::<Vec<_>>(), [false, true]);
-    assert_eq!(told(&report.commanded)[2], ("deceleration", 200.0, 100.0, 100, true));
+    assert_eq!(values(&report.commanded)[2], ("deceleration", 200.0, 100.0, 100, true));
 
     // A rate steeper than a millisecond can say gets that: 0 ms would be no ramp at all.
     let steep = MotionOptions { acceleration: Some(Ramp::RpmPerSecond(1e6)), ..no_wait() };
     let report = block_on(&mut world, stepper.velocity(Rpm(60.0), steep)).unwrap().unwrap();
-    assert_eq!(told(&report.commanded)[1], ("acceleration", 1e6, 60_000.0, 1, true));
+    assert_eq!(values(&report.commanded)[1], ("acceleration", 1e6, 60_000.0, 1, true));
     let short = MotionOptions { acceleration: Some(Ramp::Time(Duration::from_micros(300))), ..no_wait() };
     let error = block_on(&mut world, stepper.velocity(Rpm(-60.0), short)).unwrap().unwrap_err();
     assert!(matches!(error, Error::TooFine { unit: "ms", .. }), "{error}");

@@ -216,7 +216,7 @@ fn a_wheel_that_is_not_heard_for_a_while_ends_the_motion_with_a_cause() {
     }
     let cause = base.state().cause;
     assert!(matches!(cause, Some(StopCause::Wheel { node, .. }) if node.raw() == RIGHT), "{cause:?}");
-    assert!(bench.truth().1.abs() < 0.01, "it drives on by itself: {} m/s", bench.truth().1);
+    assert!(bench.truth().1.abs() < 0.01, "it drives on unasked: {} m/s", bench.truth().1);
     // A stop does not say that all is well; enabled again, it drives.
     let stopped = block_on(&mut bench.world, base.stop()).unwrap();
     assert!(matches!(stopped, Err(BaseError::Stopped(StopCause::Wheel { .. }))), "{stopped:?}");

@@ -214,7 +214,7 @@ fn a_manager_s_dictionary_is_a_plan() {
     bench.world.run_for(Duration::from_secs(1));
     let handle = bench.network.node(node(SERVO));
     assert_eq!(block_on(&mut bench.world, handle.read::<u16>(mux(0x1017, 0))).unwrap().unwrap(), 200);
-    // 1F80h, bit 0: the dictionary of a device that is no master is no plan.
+    // 1F80h, bit 0: the dictionary of a device that is not a master is not a plan.
     objects.insert((0x1F80, 0), 0x02_u32.to_le_bytes().to_vec());
     let refused = plan(&objects).unwrap_err().to_string();
     assert!(refused.starts_with("1F80h is 2h: without its bit 0 the device is not the NMT master"), "{refused}");
@@ -277,7 +277,7 @@ fn nobody_on_the_bus_is_said_within_the_time_of_the_plan() {
 }
 
 /// A joint starts operational by itself (M joint manual, 4.2), and is left so (CiA 302-2, 1F81h bit 4): its configuration is not
-/// written. That is told of it as long as it is so, and no longer.
+/// written. That is reported as long as it is so, and no longer.
 #[test]
 fn a_node_that_was_left_operational_without_its_configuration_is_told() {
     let mut bench = Bench::new();

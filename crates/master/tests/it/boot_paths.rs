@@ -47,8 +47,8 @@ fn written(bus: &Bus, index: u16) -> bool {
         .any(|[command, low, high, ..]| command >> 5 == 1 && [*low, *high] == index.to_le_bytes())
 }
 
-/// CiA 302-2, error status: H where the update is not allowed, which it never is of a node that is to be left as it is, G where it
-/// is and there is no program to load.
+/// CiA 302-2, error status: H where the update is not allowed, which it never is for a node that must be left as it is,
+/// G where it is and there is no program to load.
 #[test]
 fn another_program_version_ends_with_g_or_h_and_the_right_one_goes_on() {
     const UPDATE: u32 = Assignment::VERIFY_SOFTWARE | Assignment::UPDATE_SOFTWARE;
@@ -111,7 +111,8 @@ fn a_configuration_of_this_date_is_not_written_again() {
     }
 }
 
-/// CiA 302-2, 1F8Ah: which sub-index of 1011h is told `load`; what is restored counts after a reset (CiA 301, 7.5.2.14).
+/// CiA 302-2, 1F8Ah: which sub-index of 1011h `load` is written to; what is restored counts after a reset (CiA 301,
+/// 7.5.2.14).
 #[test]
 fn factory_settings_are_restored_before_the_configuration_where_it_is_asked_for() {
     let mut bus = bus_of(device().u32(0x1011, 2, 1).u32(0x2000, 0, 1));
@@ -132,7 +133,7 @@ fn factory_settings_are_restored_before_the_configuration_where_it_is_asked_for(
     assert_eq!((letter(&boot(&mut bus, 0, expectation)), written(&bus, 0x2000)), (Some('J'), false));
 }
 
-/// CiA 302-2, 1F80h, bit 3: the nodes are started by somebody else.
+/// CiA 302-2, 1F80h, bit 3: the nodes are started by another device.
 #[test]
 fn a_master_that_starts_no_node_leaves_it_pre_operational() {
     for (startup, is_started) in [(0, true), (Startup::STARTS_NONE, false)] {

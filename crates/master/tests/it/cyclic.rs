@@ -370,7 +370,7 @@ fn a_program_that_gives_no_set_points_any_more_stops_its_drive() {
         assert!(bench.speed_rpm(id).abs() < 2.0, "node {id}: {}", bench.speed_rpm(id));
         let events: Vec<_> = std::iter::from_fn(|| bench.network.poll_event()).map(|(_, event)| event).collect();
         assert!(events.contains(&Event::CyclicStopped(node(id), CycleLoss::ProgramLate(3))), "{events:?}");
-        // It comes back, is told, and moves nothing until it has switched the drive off.
+        // It comes back, gets the reason, and moves nothing until it has switched the drive off.
         let state = bench.run(&mut cyclic, 100, |_| Demand::Velocity(Rpm(100.0)));
         assert_eq!(state.refused, Some(Refusal::Stopped(CycleLoss::ProgramLate(3))));
         assert!(bench.speed_rpm(id).abs() < 2.0);
@@ -398,7 +398,7 @@ fn a_drive_that_falls_silent_is_told_and_stopped() {
     let mut bench = Bench::new();
     let (_, mut cyclic) = bench.open(SERVO, PV);
     bench.run(&mut cyclic, 400, |_| Demand::Velocity(Rpm(100.0)));
-    // Its TPDO stays away, and it hears: somebody has made the TPDO invalid.
+    // Its TPDO stays away, and it hears: the TPDO was made invalid.
     block_on(&mut bench.world, bench.network.node(node(SERVO)).write(mux(0x1800, 1), 0x8000_0184_u32))
         .unwrap()
         .unwrap();
@@ -465,13 +465,13 @@ fn what_nothing_stops_when_the_program_dies_is_told_before_it_moves() {
     assert_eq!(cyclic.host_loss(), HostLoss::GoesOn);
     let events: Vec<_> = std::iter::from_fn(|| bench.network.poll_event()).map(|(_, event)| event).collect();
     assert!(events.contains(&Event::Unguarded(node(STEPPER), HostLoss::GoesOn)), "{events:?}");
-    // One that is to be left alone is not armed.
+    // One that must be left alone is not armed.
     let drive = bench.drive(JOINT);
     let options = CyclicOptions { guard: None, ..CyclicOptions::default() };
     let cyclic = block_on(&mut bench.world, drive.cyclic(IP, options)).unwrap().unwrap();
     assert_eq!((cyclic.host_loss().stops_after(), bench.network.guarded(node(JOINT))), (None, None));
-    let told = std::iter::from_fn(|| bench.network.poll_event());
-    assert!(told.last().is_some_and(|(_, event)| matches!(event, Event::Unguarded(id, _) if id == node(JOINT))));
+    let events = std::iter::from_fn(|| bench.network.poll_event());
+    assert!(events.last().is_some_and(|(_, event)| matches!(event, Event::Unguarded(id, _) if id == node(JOINT))));
 }
 
 #[test]
@@ -495,7 +495,7 @@ fn stopping_all_that_was_moved_is_not_undone_by_the_next_step() {
     assert!(bench.network.moved().contains(node(SERVO)));
     bench.network.quick_stop_moved();
     let state = bench.run(&mut cyclic, 200, |_| Demand::Velocity(Rpm(100.0)));
-    assert_eq!(state.refused, Some(Refusal::Stopped(CycleLoss::Told)));
+    assert_eq!(state.refused, Some(Refusal::Stopped(CycleLoss::StopAll)));
     assert!(bench.speed_rpm(SERVO).abs() < 2.0);
 }
 
@@ -511,8 +511,8 @@ fn a_fault_is_latched_explained_and_reset() {
     let error = block_on(&mut bench.world, drive.explain_refusal(refusal)).unwrap().unwrap();
     assert!(matches!(error, Error::NotReached(_)), "{error}");
     let by_intent = block_on(&mut bench.world, drive.enable()).unwrap().unwrap_err().to_string();
-    let told = |text: &str| text.split("Seen:").next().unwrap().split('.').nth(1).map(str::to_owned);
-    assert_eq!(told(&error.to_string()), told(&by_intent));
+    let cause = |text: &str| text.split("Seen:").next().unwrap().split('.').nth(1).map(str::to_owned);
+    assert_eq!(cause(&error.to_string()), cause(&by_intent));
     bench.world.with_drive(SERVO, |drive, now| drive.set_supply(48.0, now)).unwrap().unwrap();
     bench.run(&mut cyclic, 100, |_| Demand::Off);
     let state = bench.run(&mut cyclic, 100, |_| Demand::ResetFault);

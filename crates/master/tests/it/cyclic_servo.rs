@@ -126,7 +126,8 @@ fn speeds_and_currents_of_each_cycle_are_followed_in_csv_and_cst() {
     // The loops of the current need some cycles; some more, and the motor without a load turns at its highest speed.
     let state = bench.run(&mut cyclic, 12, |_| Demand::Current(Amperes(0.5)));
     assert_eq!(state.refused, None, "{state}");
-    // 6071h is a share of the rated torque, and the motor's rated torque comes of a tenth less than its rated current.
+    // 6071h is a share of the rated torque, and the motor's rated torque results from a tenth less than its rated
+    // current.
     let Amperes(current) = state.current.unwrap();
     assert!((0.4..0.52).contains(&current), "{state} {:?}", bench.world.report(SERVO));
     assert!(bench.speed_rpm() > 60.0, "{}", bench.speed_rpm());

@@ -1,4 +1,4 @@
-//! What a cyclic drive is told before it has been heard: nothing that takes its power, and nothing that gives it any.
+//! What a cyclic drive is sent before it has been heard: nothing that takes its power, and nothing that gives it any.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -39,7 +39,7 @@ impl Station for RpdoCounter {
     }
 }
 
-/// One drive, mapped, opened and enabled by somebody else; SYNC is on.
+/// One drive, mapped, opened and enabled by another master; SYNC is on.
 struct Bench {
     world: World,
     drive: Drive,
@@ -99,7 +99,7 @@ fn a_drive_that_is_enabled_and_stands_keeps_its_power_when_a_program_takes_it_ov
 #[test]
 fn nothing_is_said_to_a_drive_that_is_not_heard_and_off_is_said_to_it_nevertheless() {
     let mut bench = Bench::new("zlac8030l", PV);
-    // Its TPDO does not come: somebody has made it invalid.
+    // Its TPDO does not come: it was made invalid.
     let write = bench.drive.node().write(mux(0x1800, 1), 0x8000_0181_u32);
     block_on(&mut bench.world, write).unwrap().unwrap();
     bench.world.run_for(Duration::from_secs(1));

@@ -260,7 +260,7 @@ fn block_transfers_are_put_together_and_attributed_to_their_object() {
         "584#A2027F0000000000",
         "604#D5C3310000000000", // end: n = 5
         "584#A100000000000000",
-        "604#4008100000000000", // the next request is no part of it
+        "604#4008100000000000", // the next request is not a part of it
     ];
     assert_eq!(
         lines(&mut Decoder::new(), &download),

@@ -121,7 +121,7 @@ fn a_fault_in_the_middle_of_a_move_is_explained_at_once() {
     let error = bus.block_on(drive.move_absolute(Turns(10.0), MotionOptions::default())).unwrap_err();
     assert!(error.to_string().contains("The drive is at fault: over-current"), "{error}");
     assert!(bus.now - start < Duration::from_millis(1_050), "{}", bus.now);
-    // Nobody told it to stop: it stays on the list of what moved.
+    // It was not stopped: it stays on the list of what moved.
     assert!(bus.network.moved().contains(node(4)));
 }
 
@@ -377,10 +377,10 @@ fn a_value_that_was_sent_before_the_drive_was_told_something_is_not_believed() {
     network.with_core(|core| core.image_mut().set_tpdo(node(4), PdoNumber::FIRST, 0x184, map));
     bus.toys[0].send(0x180, &[0x37, 0x02]);
     bus.settle();
-    // Just come: believed, and nobody is asked.
+    // Just come: believed, and not asked for.
     assert_eq!(bus.block_on(drive.statusword()).unwrap().0, 0x0237);
     assert!(bus.toys[0].requests.is_empty());
-    // Told something since: asked.
+    // Written to since: asked.
     bus.block_on(drive.node().write(mux(0x6040, 0), 6_u16)).unwrap();
     assert_eq!(bus.block_on(drive.statusword()).unwrap().0, 0x0231);
     // Come again, and believed until it is as old as a poll.

@@ -115,7 +115,7 @@ impl Bench {
         *self.heard.lock().unwrap() = Overheard::from(self.world.now());
         for _ in 0..LISTENING.as_millis() / 50 {
             during(&self.other);
-            // A quiet bus wakes nobody: the other program's frame would lie until one came.
+            // A quiet bus wakes no task: the other program's frame would wait until one came.
             self.world.refresh();
             self.world.run_for(Duration::from_millis(50));
         }
@@ -335,12 +335,12 @@ fn each_condition_is_named_with_what_to_do() {
             let mut bench = Bench::new(name);
             prepare(&mut bench);
             let explained = bench.explain();
-            let told = explained.findings.iter().find(|finding| finding.rule == *rule);
-            let told = told.unwrap_or_else(|| panic!("{name}: no {rule} in {:?}", rules(&explained)));
-            let texts = [&told.expected, &told.found, &told.follows, &told.remedy];
-            assert!(texts.iter().all(|text| !text.is_empty()), "{name}: {told:?}");
-            let is_cause = told.weight == Weight::Cause;
-            assert_eq!(is_cause, !WARNINGS.contains(rule), "{name}: {told:?}");
+            let seen = explained.findings.iter().find(|finding| finding.rule == *rule);
+            let seen = seen.unwrap_or_else(|| panic!("{name}: no {rule} in {:?}", rules(&explained)));
+            let texts = [&seen.expected, &seen.found, &seen.follows, &seen.remedy];
+            assert!(texts.iter().all(|text| !text.is_empty()), "{name}: {seen:?}");
+            let is_cause = seen.weight == Weight::Cause;
+            assert_eq!(is_cause, !WARNINGS.contains(rule), "{name}: {seen:?}");
         }
     }
 }
@@ -350,9 +350,9 @@ fn an_input_is_told_by_its_name_and_object_of_the_manual_and_is_gone_when_releas
     let mut bench = Bench::new("zlac8030l");
     press_emergency_stop(&mut bench);
     let explained = bench.explain();
-    let told = explained.findings.iter().find(|finding| finding.rule == "emergency_stop").unwrap();
-    assert!(told.expected.contains("X0 (emergency stop)"), "{told:?}");
-    assert!(told.found.contains("2003h:00") && told.found.contains("2030h:02"), "{told:?}");
+    let seen = explained.findings.iter().find(|finding| finding.rule == "emergency_stop").unwrap();
+    assert!(seen.expected.contains("X0 (emergency stop)"), "{seen:?}");
+    assert!(seen.found.contains("2003h:00") && seen.found.contains("2030h:02"), "{seen:?}");
     bench.stimulus("input X0 0");
     bench.world.run_for(Duration::from_millis(100));
     let explained = bench.explain();
@@ -367,8 +367,8 @@ fn a_limit_switch_is_a_cause_only_where_the_shaft_is_to_go() {
         meet_limit(&mut bench);
         bench.write(mux(0x60FF, 0), target);
         let explained = bench.explain();
-        let told = explained.findings.iter().find(|finding| finding.rule == "limit_switch");
-        assert_eq!(told.map(|finding| finding.weight), Some(weight), "{explained:#?}");
+        let seen = explained.findings.iter().find(|finding| finding.rule == "limit_switch");
+        assert_eq!(seen.map(|finding| finding.weight), Some(weight), "{explained:#?}");
     }
 }
 
@@ -494,10 +494,10 @@ fn a_controlword_that_others_send_by_rpdo_is_told_with_its_value() {
         let id = map_controlword(&mut bench);
         bench.nmt(NmtCommand::Start);
         let explained = bench.explain_while(|other| other.transmit(Frame::new(CanId::standard(id), &[0x06, 0x00])));
-        let told = explained.findings.iter().find(|finding| finding.rule == "controlword_by_rpdo");
-        let told = told.unwrap_or_else(|| panic!("{name}: {:?}", rules(&explained)));
-        assert!(told.found.contains("RPDO1") && told.found.contains("0006h (shutdown)"), "{name}: {}", told.found);
-        assert!(told.found.contains("bits 0, 3 are missing"), "{name}: {}", told.found);
+        let seen = explained.findings.iter().find(|finding| finding.rule == "controlword_by_rpdo");
+        let seen = seen.unwrap_or_else(|| panic!("{name}: {:?}", rules(&explained)));
+        assert!(seen.found.contains("RPDO1") && seen.found.contains("0006h (shutdown)"), "{name}: {}", seen.found);
+        assert!(seen.found.contains("bits 0, 3 are missing"), "{name}: {}", seen.found);
         // One byte where two are mapped.
         let explained = bench.explain_while(|other| other.transmit(Frame::new(CanId::standard(id), &[0x06])));
         assert!(rules(&explained).contains(&"pdo_too_short"), "{name}: {:?}", rules(&explained));
@@ -516,7 +516,7 @@ fn each_pdo_says_why_it_is_silent() {
         assert!(rpdo.silent.as_deref().is_some_and(|why| why.contains("operational only")), "{name}: {rpdo:?}");
         bench.nmt(NmtCommand::Start);
         let rpdo = bench.explain().pdos.into_iter().find(|seen| seen.pdo == pdo(Direction::Rpdo)).unwrap();
-        assert_eq!((rpdo.silent.as_deref(), rpdo.heard), (Some("nobody was heard sending it"), 0), "{name}");
+        assert_eq!((rpdo.silent.as_deref(), rpdo.heard), (Some("no node was heard sending it"), 0), "{name}");
         let map = PdoMap(vec![MappingRecord { mux: mux(0x6041, 0), bits: 16 }]);
         let config = PdoConfig::new(pdo(Direction::Tpdo), map).transmission(TransmissionType::EVERY_SYNC);
         let units = TimerUnits::of(drive.description().unwrap());

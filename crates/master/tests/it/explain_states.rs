@@ -82,8 +82,8 @@ fn a_power_stage_without_supply_is_named() {
     assert!(!has(&explained(READY & !VOLTAGE_ENABLED, 0x06, VELOCITY), "no_voltage"));
 }
 
-/// The standard leaves the reaction to a following error to the maker: such a drive stays enabled and tells of it. The virtual
-/// ones take it for a fault.
+/// The standard leaves the reaction to a following error to the maker: such a drive stays enabled and reports it. The
+/// virtual ones take it for a fault.
 #[test]
 fn a_following_error_is_named_in_the_modes_whose_bit_13_it_is() {
     assert!(has(&explained(ENABLED | FOLLOWING_ERROR, 0x0F, POSITION), "following_error"));

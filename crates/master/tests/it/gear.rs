@@ -1,5 +1,6 @@
-//! A gear behind a drive's shaft: what is asked of its output, what the drive is told for it, and what the shaft does then.
-//! Expected counts are the closed form: turns of the output times the ratio times the counts of one turn of the shaft.
+//! A gear behind a drive's shaft: what is asked of its output, what the drive is sent for it, and what the shaft does
+//! then. Expected counts are the closed form: turns of the output times the ratio times the counts of one turn of the
+//! shaft.
 
 use std::time::Duration;
 
@@ -57,7 +58,7 @@ fn a_move_of_the_output_is_the_ratio_times_as_many_counts_and_the_shaft_gets_the
         let actual = block_on(&mut world, drive.node().read::<i32>(mux(0x6064, 0))).unwrap().unwrap();
         assert!((f64::from(actual) - 0.1 * RATIO * counts).abs() < 0.02 * counts, "{drive:?}: {actual}");
         let state = block_on(&mut world, drive.state()).unwrap().unwrap();
-        let angle = state.angle.expect("it tells its position").0;
+        let angle = state.angle.expect("it shows its position").0;
         assert!((angle - 36.0).abs() < 0.5, "{drive:?}: {angle}");
         assert_eq!(state.position.map(|counts| counts.0), Some(actual.into()), "counts stay the drive's own");
     }
@@ -76,13 +77,13 @@ fn a_speed_of_the_output_and_its_ramps_are_those_of_the_shaft_divided_by_the_rat
         let expected = if drive.node().id().raw() == JOINT { 200 } else { 500 };
         assert_eq!((ramp, report.commanded[1].commanded), (expected, 16.0 * sign_of(report.commanded[1].commanded)));
         let state = block_on(&mut world, drive.state()).unwrap().unwrap();
-        let speed = state.velocity.expect("it tells its speed").0;
+        let speed = state.velocity.expect("it shows its speed").0;
         assert!((speed + 8.0).abs() < 0.5, "{drive:?}: {speed}");
         block_on(&mut world, drive.stop()).unwrap().unwrap();
     }
 }
 
-/// A ramp is told with the sign of its change.
+/// A ramp is reported with the sign of its change.
 fn sign_of(value: f64) -> f64 {
     if value < 0.0 { -1.0 } else { 1.0 }
 }
@@ -96,7 +97,7 @@ fn a_shaft_that_turns_behind_a_great_ratio_does_not_stand_still() {
     let target = block_on(&mut world, slow.node().read::<i32>(mux(0x60FF, 0))).unwrap().unwrap();
     assert_eq!(target, 50);
     block_on(&mut world, slow.stop()).unwrap().unwrap();
-    let speed = block_on(&mut world, slow.state()).unwrap().unwrap().velocity.expect("it tells its speed").0;
+    let speed = block_on(&mut world, slow.state()).unwrap().unwrap().velocity.expect("it shows its speed").0;
     assert!(speed.abs() < 1.0 / 1000.0, "stopped is when the shaft has stopped: {speed}");
     // A gear that makes faster: 10 r/min of the output are one of the shaft.
     let fast = slow.behind(Gear::new(0.1).unwrap());

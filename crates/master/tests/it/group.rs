@@ -193,7 +193,7 @@ fn a_drive_that_goes_stops_the_others_within_their_limits_and_is_named() {
     assert!(bench.rpm(1).abs() < 0.5 && bench.rpm(3).abs() < 0.5);
     // Cut off near 0.7 of 2 turns; the stop takes v/2 (v/a + a/j) = 0.15 turns.
     assert!(places_of(&group, [0, 2]).into_iter().zip([to[0], to[2]]).all(|(at, to)| at < to - 0.3));
-    // Nothing moves until somebody has looked.
+    // A stopped group refuses a move.
     let refused = group.start_move(&turns(&to), None).unwrap_err();
     assert!(matches!(refused, GroupError::Stopped(_)), "{refused}");
 }

@@ -94,7 +94,7 @@ impl Bench {
         let drive = self.drive(id);
         let foretold = self.run(drive.host_loss_if_guarded()).unwrap();
         let loss = self.run(drive.guard(SwitchedOff::Leave)).unwrap();
-        assert_eq!(foretold, loss, "what a guard would tell is what it tells");
+        assert_eq!(foretold, loss, "what a guard would report is what it reports");
         loss
     }
 
@@ -257,7 +257,7 @@ fn a_servo_with_a_heartbeat_consumer_is_guarded_without_being_asked() {
     assert_eq!(bench.run(drive.node().read::<u32>(mux(0x1016, 1))).unwrap(), 0, "as it was before");
 }
 
-/// CiA 402 has 6007h for it, and a servo is delivered with 1016h:01 = 0: it would watch nobody.
+/// CiA 402 has 6007h for it, and a servo is delivered with 1016h:01 = 0: it would watch no node.
 #[test]
 fn a_servo_that_is_delivered_without_a_watch_is_given_one_and_stops_when_the_program_dies() {
     let (mut bench, drive) = with_servo();
@@ -271,7 +271,7 @@ fn a_servo_that_is_delivered_without_a_watch_is_given_one_and_stops_when_the_pro
     assert!(!bench.turns(GENERIC));
 }
 
-/// J112: the next heartbeat lets the joint go on with what it was told.
+/// J112: the next heartbeat lets the joint go on with what it was commanded.
 #[test]
 fn the_motion_of_a_dead_program_does_not_come_back_with_the_next_one() {
     let mut bench = Bench::new();

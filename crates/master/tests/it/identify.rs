@@ -1,4 +1,4 @@
-//! Which model a node is: what its identity and its objects tell, and what a master does with a guess.
+//! Which model a node is: what its identity and its objects show, and what a master does with a guess.
 
 use std::future::poll_fn;
 use std::pin::pin;
@@ -156,7 +156,7 @@ fn objects_that_speak_for_two_models_or_for_none_leave_it_unknown() {
         assert!(matches!(known, Knowledge::Unknown), "{known:?}");
     }
     let found = bus.block_on(network.scan(Duration::from_millis(100), |_| {}));
-    assert!(found[0].doubt().unwrap().contains("speak for none of them"), "{found:?}");
+    assert!(found[0].doubt().unwrap().contains("match none of them"), "{found:?}");
 }
 
 #[test]
@@ -165,13 +165,13 @@ fn models_with_the_same_objects_are_the_same_to_a_master() {
         for other in all().same_objects(one) {
             let rules = |profile: &devices::Description| (profile.axes, profile.storage, profile.pdo, profile.nmt);
             assert_eq!(rules(one), rules(other), "{} and {}", one.name, other.name);
-            let told = |profile: &devices::Description| {
+            let identity = |profile: &devices::Description| {
                 (profile.host_watch, profile.stated_departures, profile.distinguishing_object)
             };
-            assert_eq!(told(one), told(other), "{} and {}", one.name, other.name);
+            assert_eq!(identity(one), identity(other), "{} and {}", one.name, other.name);
         }
     }
-    // Of the makers' models none is alone with its identity; the servo of no maker is.
+    // Of the makers' models none is alone with its identity; the generic servo is.
     let alone = all().iter().filter(|model| all().of_identity(model.identity).count() == 1);
     assert_eq!(alone.map(|model| model.name).collect::<Vec<_>>(), ["cia402"]);
 }
@@ -208,7 +208,7 @@ fn a_joint_in_alarm_is_operational_though_its_heartbeat_says_04h() {
     assert_ne!(state.fault_code, 0);
 }
 
-/// CiA 301, 7.2.4.3: one SDO channel has one client. Where somebody has two masters all the same, the answers to both mix.
+/// CiA 301, 7.2.4.3: one SDO channel has one client. Where there are two masters all the same, the answers to both mix.
 #[test]
 fn another_master_that_asks_too_keeps_nobody_from_being_found() {
     let (mut alone, first) = bench();

@@ -15,7 +15,8 @@ use sim::machine::{Order, TimingMode};
 use sim::wire::{ControllerOptions, WireEvent};
 use sim::{Prng, StationId, World};
 
-/// A sender of frames that come again and again, with contents that nobody foresees, and the longest time that each took.
+/// A sender of frames that come again and again, with contents that cannot be foreseen, and the longest time that each
+/// took.
 #[derive(Clone)]
 struct Sender {
     frames: Vec<Running>,
@@ -245,7 +246,8 @@ fn no_frame_of_a_cycle_is_later_than_its_bound() {
 }
 
 /// A bus that is nearly full: set-points of more nodes, one request and emergency messages in cycles that leave a third to a tenth of
-/// their time. The first analysis has no bound for most of these; what is told is one, and none of a bus that has room is left out.
+/// their time. The first analysis has no bound for most of these; what is given is one, and none of a bus that has room
+/// is left out.
 #[test]
 fn no_frame_of_a_full_cycle_is_later_than_its_bound() {
     let (mut bounded, mut late) = (0, 0);
@@ -380,7 +382,7 @@ fn no_frame_of_moved_drives_is_later_than_planned() -> Result<(), Failed> {
     let planned = plan(&nodes, &Settings::new(CYCLE), Bitrate::M1);
     assert!(planned.fits(), "{planned:#?}");
     let frames = frames_of_cycles(&mut world, &network, drives)?;
-    // SYNC is offered on a grid of the cycle: the earliest start of all tells where it lies.
+    // SYNC is offered on a grid of the cycle: the earliest start of all shows where it lies.
     let cycle_ns = CYCLE.as_nanos() as u64;
     let sync = Frame::new(CanId::standard(0x80), &[]);
     let sync_ns = u64::from(can::frame_bits(&sync)) * Bitrate::M1.bit_nanos();

@@ -1,4 +1,4 @@
-//! Process data for programs: cycles of SYNC, handles on mapped objects, and what a program that comes late is told.
+//! Process data for programs: cycles of SYNC, handles on mapped objects, and what a program that comes late is given.
 
 use std::time::Duration;
 

@@ -108,7 +108,7 @@ fn random_traffic_never_panics_and_every_request_ends_once() {
                 }
                 _ => core.handle_frame(&random.frame(), now),
             }
-            // Cycles only go on, whoever counts them.
+            // Cycles only go on, for any producer.
             if let (Some(before), Some(cycle)) = (before, core.cycle()) {
                 assert!(
                     cycle.number >= before.number && cycle.at >= before.at,

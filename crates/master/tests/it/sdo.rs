@@ -71,7 +71,7 @@ fn a_silent_node_times_out_exactly_at_its_deadline() {
     let node = network.node(node(4)).with_timeout(Duration::from_millis(200));
     let error = bus.block_on(node.read::<u32>(DEVICE_TYPE)).unwrap_err();
     assert!(matches!(error, Error::NoAnswer { waited, .. } if waited == Duration::from_millis(200)), "{error}");
-    // The abort that tells the server goes out one frame after the deadline; the time was 5 s when it began.
+    // The abort to the server goes out one frame after the deadline; the time was 5 s when it began.
     let (at, abort) = bus.log.last().unwrap();
     assert_eq!(abort.to_string(), "604#8000100000000405");
     assert_eq!(*at - Instant::from_secs(5), Duration::from_micros(200_256));
@@ -123,7 +123,7 @@ fn two_devices_with_one_node_id_are_noticed_by_their_answers() {
     assert!(found.len() == 1 && found[0].twins == Some(Twins::Answers), "{found:?}");
     let events: Vec<Event> = std::iter::from_fn(|| network.poll_event()).map(|(_, event)| event).collect();
     let twice: Vec<_> = events.iter().filter(|event| **event == Event::TwoDevices(node(4), Twins::Answers)).collect();
-    assert_eq!(twice.len(), 1, "told once: {events:?}");
+    assert_eq!(twice.len(), 1, "reported once: {events:?}");
     // One device, asked by this master and by another.
     let mut bus = Bus::new(vec![one]);
     let network = bus.network.clone();

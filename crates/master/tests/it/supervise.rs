@@ -1,5 +1,5 @@
 //! The watch over a booted network in virtual time: cables cut and joined, supplies taken away, drives replaced. What counts is
-//! that nothing turns by itself when it is back.
+//! that nothing turns unasked when it is back.
 //!
 //! The joint goes on with its old motion at the first heartbeat after it had lost its host (M joint manual, 5.11.2).
 
@@ -27,7 +27,7 @@ struct Bench {
     world: World,
     network: Network,
     supervisor: Supervisor,
-    told: Vec<SupervisorEvent>,
+    reported: Vec<SupervisorEvent>,
 }
 
 impl Bench {
@@ -48,7 +48,7 @@ impl Bench {
         assert!(report.is_whole(), "{:?}", report.nodes);
         while network.poll_event().is_some() {}
         let supervisor = Supervisor::new(network.clone(), plan);
-        Self { world, network, supervisor, told: Vec::new() }
+        Self { world, network, supervisor, reported: Vec::new() }
     }
 
     fn drive(&self, id: u8) -> Drive {
@@ -80,21 +80,21 @@ impl Bench {
         self.apply(id, "power on");
     }
 
-    /// Lets the supervisor work for this long; what it told.
+    /// Lets the supervisor work for this long; what it reported.
     fn watch(&mut self, time: Duration) -> Vec<String> {
         let end = self.world.now() + time;
         let mut said = Vec::new();
         while self.world.now() < end {
             if let Some((_, happening)) = block_on(&mut self.world, self.supervisor.next()).unwrap() {
                 said.push(happening.to_string());
-                self.told.push(happening);
+                self.reported.push(happening);
             }
         }
         said
     }
 
     fn kinds(&self) -> Vec<(&'static str, Option<u8>)> {
-        self.told.iter().map(|happening| (happening.kind(), happening.node().map(NodeId::raw))).collect()
+        self.reported.iter().map(|happening| (happening.kind(), happening.node().map(NodeId::raw))).collect()
     }
 
     fn resume(&mut self, id: u8) {
@@ -108,11 +108,11 @@ fn a_joint_whose_cable_is_joined_again_stands_until_somebody_moves_it() {
     let mut bench = Bench::new();
     bench.turn(JOINT);
     bench.turn(DESCRIBED);
-    bench.told.clear();
+    bench.reported.clear();
     bench.apply(JOINT, "cable cut");
     bench.watch(Duration::from_secs(6));
     assert_eq!(bench.kinds()[..2], [("heartbeat_lost", Some(JOINT)), ("heartbeat_held", None)]);
-    let held = bench.told[1].to_string();
+    let held = bench.reported[1].to_string();
     assert!(held.contains("for want of it stops: node 1, 5"), "{held}");
     assert!(bench.speed(JOINT) < 1.0 && bench.speed(DESCRIBED) < 1.0);
 
@@ -133,15 +133,15 @@ fn a_joint_whose_cable_is_joined_again_stands_until_somebody_moves_it() {
     bench.turn(JOINT);
 }
 
-/// However long the cut: a joint that has once stopped for it stands afterwards, and one that nobody missed turns on as if nothing
-/// had been.
+/// However long the cut: a joint that has once stopped for it stands afterwards, and one that was not missed turns on
+/// as if nothing had been.
 #[test]
 fn no_length_of_a_cut_lets_a_joint_go_on_after_it_has_stopped() {
     // In steps that come at every phase of the two heartbeats.
     for ms in (200..1400).step_by(400).chain((1400..3000).step_by(70)) {
         let mut bench = Bench::new();
         bench.turn(JOINT);
-        bench.told.clear();
+        bench.reported.clear();
         bench.apply(JOINT, "cable cut");
         let mut stood = false;
         for _ in 0..ms / 10 {
@@ -166,7 +166,7 @@ fn a_drive_that_lost_its_supply_is_booted_again_and_started_when_somebody_says_s
     let mut bench = Bench::new();
     for id in [SERVO, DESCRIBED, JOINT] {
         bench.turn(id);
-        bench.told.clear();
+        bench.reported.clear();
         bench.supply_away(id);
         let said = bench.watch(Duration::from_secs(15));
         assert!(bench.kinds().contains(&("boot_up", Some(id))), "{said:#?}");
@@ -211,7 +211,7 @@ fn another_device_in_the_place_of_a_drive_is_told_with_what_differs_and_not_star
     let old = bench.world.drive_id(SERVO).unwrap();
     bench.world.remove(old);
     bench.watch(Duration::from_secs(3));
-    bench.told.clear();
+    bench.reported.clear();
     let kind = Model::named("m4230e17b50").unwrap();
     bench.world.add_drive(SERVO + 10, Box::new(mjoint(kind, SERVO, Bitrate::K500))).unwrap();
     let said = bench.watch(Duration::from_secs(10)).join("\n");
@@ -224,7 +224,7 @@ fn another_device_in_the_place_of_a_drive_is_told_with_what_differs_and_not_star
 fn emergencies_are_told_with_fault_and_remedy_and_kept_until_they_are_gone() {
     let mut bench = Bench::new();
     bench.turn(SERVO);
-    bench.told.clear();
+    bench.reported.clear();
     bench.apply(SERVO, "fault hall on");
     let said = bench.watch(Duration::from_secs(1)).join("\n");
     assert!(bench.kinds().contains(&("emcy", Some(SERVO))), "{said}");
@@ -239,7 +239,7 @@ fn emergencies_are_told_with_fault_and_remedy_and_kept_until_they_are_gone() {
     assert!(bench.supervisor.emcys().records().all(|record| record.gone.is_some()));
 }
 
-/// Its answers would mix with ours; it is told once.
+/// Its answers would mix with ours; it is reported once.
 #[test]
 fn a_second_master_is_told_once_with_what_it_does() {
     let mut bench = Bench::new();
@@ -248,14 +248,14 @@ fn a_second_master_is_told_once_with_what_it_does() {
     }
     bench.watch(Duration::from_millis(100));
     let foreign: Vec<_> = bench
-        .told
+        .reported
         .iter()
         .filter_map(|happening| if let SupervisorEvent::Foreign(foreign) = happening { Some(*foreign) } else { None })
         .collect();
     assert_eq!(foreign, [Foreign::SdoRequest(node(SERVO)), Foreign::Nmt]);
 }
 
-/// Guards of somebody who moves one of the drives himself stay his.
+/// Guards of a program that moves one of the drives on its own stay its own.
 #[test]
 fn a_guard_of_a_program_that_moves_a_drive_is_left_as_it_is() {
     let mut bench = Bench::new();
@@ -263,7 +263,7 @@ fn a_guard_of_a_program_that_moves_a_drive_is_left_as_it_is() {
     let loss = block_on(&mut bench.world, drive.guard(SwitchedOff::Leave)).unwrap().unwrap();
     bench.watch(Duration::from_secs(3));
     assert_eq!(bench.network.guarded(node(SERVO)), Some(loss));
-    assert!(bench.told.is_empty(), "{:?}", bench.told);
+    assert!(bench.reported.is_empty(), "{:?}", bench.reported);
 }
 
 #[test]

@@ -80,8 +80,8 @@ fn the_same_606ch_is_a_tenth_of_a_revolution_a_minute_on_the_zlac_and_a_whole_on
         block_on(&mut world, drive.supervise(Duration::from_secs(1))).unwrap().unwrap();
         let raw = block_on(&mut world, drive.node().read::<i32>(mux(0x606C, 0))).unwrap().unwrap();
         assert!((f64::from(raw) / counts_a_rpm - 60.0).abs() < 3.0, "{drive:?}: {raw}");
-        let Rpm(told) = block_on(&mut world, drive.state()).unwrap().unwrap().velocity.unwrap();
-        assert!((told - 60.0).abs() < 3.0, "{drive:?}: {told}");
+        let Rpm(shown) = block_on(&mut world, drive.state()).unwrap().unwrap().velocity.unwrap();
+        assert!((shown - 60.0).abs() < 3.0, "{drive:?}: {shown}");
         block_on(&mut world, drive.stop()).unwrap().unwrap();
     }
 }
@@ -213,7 +213,7 @@ fn a_note_tells_what_each_drive_does_without_its_host() {
     for drive in &drives {
         let report = block_on(&mut world, drive.velocity(Rpm(30.0), slowly())).unwrap().unwrap();
         let [Note::HostLoss(loss)] = report.notes[..] else { panic!("{drive:?}: {:?}", report.notes) };
-        // 2000h is 1000 ms as delivered; nobody has armed the joint's watch; the stepper has none.
+        // 2000h is 1000 ms as delivered; the joint's watch is not armed; the stepper has none.
         let expected = match id(drive) {
             SERVO => HostLoss::StopsInSilence { object: mux(0x2000, 0), time: Duration::from_secs(1) },
             JOINT => HostLoss::NotArmed { object: mux(0x1016, 1) },
@@ -370,7 +370,7 @@ fn saving_a_zlac_writes_2009h_2_and_the_same_bytes_set_250_kbit_s_on_a_zlim42_c(
         assert!(matches!(error, Error::OtherModel { object, .. } if object == mux(0x2029, 0)), "{error}");
     }
     assert_eq!(block_on(&mut world, rate()).unwrap().unwrap(), K500);
-    // One that is not told the model, too.
+    // One that is not given the model, too.
     let unknown = Drive::of_unknown_model(stepper.node().clone());
     assert!(matches!(block_on(&mut world, unknown.save()).unwrap(), Err(Error::UnknownModel { .. })));
     // This is what would have happened.

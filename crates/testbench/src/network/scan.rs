@@ -81,7 +81,7 @@ impl ScannedNode {
 /// The remark on a node-ID that two devices have.
 fn two_devices(twins: Twins) -> String {
     format!(
-        "{twins}: two devices have this node-ID, and what is said here is of one or the other. Switch one off, and give the other \
+        "{twins}: two devices have this node-ID, and what is listed here is of one or the other. Switch one off, and give the other \
          a node-ID of its own (its switches, or ferrodrive lss scan)"
     )
 }

@@ -360,7 +360,7 @@ fn a_pdo_that_was_set_up_comes_and_before_it_was_said_why_not() {
         assert!(ended.out.contains(part), "{part}: {}", ended.out);
     };
     shown("node 4 TPDO1, TPDO2, TPDO3, TPDO4, RPDO2, RPDO3, RPDO4: nothing is mapped into it");
-    shown("node 4 RPDO1: nobody was heard sending it");
+    shown("node 4 RPDO1: no node was heard sending it");
     served.done(&["pdo", "apply", "4", "tpdo1=statusword,position_actual_value", "tpdo2=off", "--type", "1"]);
     shown("TPDO2: off: bit 31 of its COB-ID is set");
     shown("TPDO1: it waits for SYNC, and none was heard");

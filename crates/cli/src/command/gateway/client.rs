@@ -64,12 +64,12 @@ async fn converse(stream: TcpStream, session: &mut Session, handle: &mut Handle,
                 }
             }
             frame = handle.frames.recv() => match frame {
-                Ok((_, frame)) => session.told_frame(&frame),
+                Ok((_, frame)) => session.frame_line(&frame),
                 Err(RecvError::Lagged(_)) => None,
                 Err(RecvError::Closed) => return Ok(()),
             },
             event = handle.events.recv() => match event {
-                Ok(event) => session.told_event(&event),
+                Ok(event) => session.event_line(&event),
                 Err(RecvError::Lagged(_)) => None,
                 Err(RecvError::Closed) => return Ok(()),
             },

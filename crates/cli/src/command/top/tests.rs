@@ -216,7 +216,7 @@ fn what_nothing_stops_is_asked_about_in_full_before_it_moves() {
     let mut state = state();
     state.nodes[0].goes_on = true;
     state.nodes[0].without_us =
-        Some("nothing stops it: this model has no watch over its host and goes on as it was told".into());
+        Some("nothing stops it: this model has no watch over its host and goes on as it was commanded".into());
     app.take(state.clone());
     assert_eq!(held(&mut app, 0), [], "nothing is begun");
     // The key is still held, and so is the question.
@@ -227,7 +227,7 @@ fn what_nothing_stops_is_asked_about_in_full_before_it_moves() {
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     for part in [
         "NOTHING STOPS NODE 1 IF THIS PROGRAM DIES",
-        "nothing stops it: this model has no watch over its host and goes on as it was told.",
+        "nothing stops it: this model has no watch over its host and goes on as it was commanded.",
         "Keep an emergency stop within reach.",
         "y move it nevertheless",
     ] {

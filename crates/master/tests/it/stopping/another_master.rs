@@ -1,5 +1,5 @@
-//! What another master does to a drive while this program moves it: it is neither said to be reached nor to be kept, and who did
-//! it is said.
+//! What another master does to a drive while this program moves it: neither success nor a kept motion is reported, and the cause
+//! is named.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use sim::block_on;
 use super::{Bench, models, options};
 use crate::support::mux;
 
-/// What comes of `first`, while `second` goes on beside it.
+/// The outcome of `first`, while `second` goes on beside it.
 async fn beside<T>(first: impl Future<Output = T>, second: impl Future<Output = ()>) -> T {
     type Part<'a, T> = std::pin::Pin<Box<dyn Future<Output = Option<T>> + 'a>>;
     let first: Part<'_, T> = Box::pin(async { Some(first.await) });
@@ -23,16 +23,16 @@ async fn beside<T>(first: impl Future<Output = T>, second: impl Future<Output = 
     ended.expect("the first one has ended")
 }
 
-/// What another master does to a drive that is moved, and the words that say so.
+/// What another master does to a drive that is moved, and the words that report it.
 type Meddling = (&'static str, &'static [(canopen::Mux, i64, u8)], &'static str);
 
 /// Halt (bit 8), and another target.
-const HALT: Meddling = ("halt", &[(mux(0x6040, 0), 0x010F, 2)], "somebody has halted it");
+const HALT: Meddling = ("halt", &[(mux(0x6040, 0), 0x010F, 2)], "another master has halted it");
 const TARGET: Meddling = (
     "another target",
     // A joint follows the target as soon as it is written and bit 4 rises; so do the others with bits 4 and 5.
     &[(mux(0x6040, 0), 0x0F, 2), (mux(0x607A, 0), 0, 4), (mux(0x6040, 0), 0x3F, 2)],
-    "somebody gave it another target",
+    "another master gave it another target",
 );
 
 #[test]
@@ -55,7 +55,7 @@ fn a_move_that_another_master_stops_is_not_said_to_be_reached() {
             let outcome = block_on(&mut bench.world, moved).unwrap();
             let error = outcome.expect_err(&format!("{name}, {what}"));
             assert!(error.to_string().contains(says), "{name}, {what}: {error}");
-            assert!(bench.network.moved().contains(id), "{name}, {what}: nobody has seen it stand");
+            assert!(bench.network.moved().contains(id), "{name}, {what}: it was not seen to stand");
         }
     }
 }
@@ -77,7 +77,7 @@ fn a_speed_that_another_master_takes_away_is_not_said_to_be_kept() {
         };
         let kept = beside(drive.supervise(Duration::from_secs(6)), meddle);
         let error = block_on(&mut bench.world, kept).unwrap().unwrap_err();
-        assert!(error.to_string().contains("somebody gave it another target"), "{name}: {error}");
+        assert!(error.to_string().contains("another master gave it another target"), "{name}: {error}");
         // Not at the end of the six seconds.
         assert!(bench.world.now() - began < Duration::from_secs(2), "{name}");
     }

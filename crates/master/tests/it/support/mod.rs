@@ -33,7 +33,7 @@ pub(crate) struct Bus {
     pub(crate) network: Network,
     pub(crate) toys: Vec<Toy>,
     pub(crate) log: Vec<(Instant, Frame)>,
-    /// Frames that nobody asked for, sent at their time.
+    /// Unrequested frames, sent at their time.
     pub(crate) noise: Vec<(Instant, Frame)>,
 }
 

@@ -65,7 +65,7 @@ fn every_pdo_is_told_with_what_keeps_it_away_and_what_may_be_changed() {
         assert_eq!(rpdo["objects"], json!([{ "object": "6040h:00", "name": "controlword", "bits": 16 }]));
         let silent = json!([
             "the node is pre-operational, and PDOs are sent and taken in operational only",
-            "nobody was heard sending it"
+            "no node was heard sending it"
         ]);
         assert_eq!(rpdo["silent"], silent);
         let takes = &tpdo["takes"];
