@@ -3,9 +3,9 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    boot, check, completions, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, events, explain, export,
-    gateway, group, home, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings,
-    record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time, top, watch, world,
+    boot, check, completions, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, estop, events, explain,
+    export, gateway, group, home, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read,
+    readings, record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time, top, watch, world,
 };
 use crate::global::Global;
 
@@ -52,6 +52,7 @@ pub(crate) enum Command {
     Explain(explain::Explain),
     Enable(drive::Enable),
     Disable(drive::Disable),
+    Estop(estop::Estop),
     Stop(drive::Stop),
     QuickStop(drive::QuickStop),
     Reset(drive::Reset),

@@ -31,6 +31,7 @@ const GROUPS: &[CommandGroup] = &[
             "drive-base",
             "stop",
             "quick-stop",
+            "estop",
             "reset",
         ],
     },

@@ -22,6 +22,7 @@ mod readings;
 mod recording;
 mod remembered;
 mod scope;
+mod senses;
 mod serve;
 mod session;
 mod signals;
@@ -94,20 +95,45 @@ fn matches() -> Result<ArgMatches, clap::Error> {
     else {
         return Err(error);
     };
-    match word_order::mend(&command, &words, error.kind()) {
+    let meant = match word_order::mend(&command, &words, error.kind()) {
         Some(mended) if mended.is_harmless() => {
             if !words.iter().any(|word| word == "--json") {
                 // Nobody may be listening any more.
                 let _ = writeln!(io::stderr(), "note: taken for: {}", plain(&mended.text()));
             }
-            Ok(mended.matches)
+            return Ok(mended.matches);
         }
-        Some(mended) => {
-            let hint = StyledStr::from(format!("did you mean: {}", mended.text()));
-            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![hint]));
-            Err(error)
-        }
-        None => Err(error),
+        Some(mended) => Some(mended.text()),
+        None => senses::joined(&command, &words).map(|words| word_order::text(&words)),
+    };
+    match meant {
+        Some(text) => suggest(&mut error, vec![format!("did you mean: {text}")]),
+        None => suggest_by_sense(&mut error, &words),
+    }
+    Err(error)
+}
+
+fn suggest(error: &mut clap::Error, tips: Vec<String>) {
+    let tips = tips.into_iter().map(StyledStr::from).collect();
+    error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tips));
+}
+
+/// In place of commands that are spelt like an unknown one, those that do what it is the word for elsewhere.
+fn suggest_by_sense(error: &mut clap::Error, words: &[String]) {
+    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) else { return };
+    let word = word.clone();
+    let behind = words.iter().skip_while(|other| **other != word).nth(1).map(String::as_str);
+    let by_spelling = match error.remove(ContextKind::SuggestedSubcommand) {
+        Some(ContextValue::Strings(names)) => names,
+        Some(ContextValue::String(name)) => vec![name],
+        _ => Vec::new(),
+    };
+    if let Some(tips) = senses::tips(&word, behind) {
+        return suggest(error, tips);
+    }
+    let names: Vec<_> = by_spelling.into_iter().filter(|name| senses::may_be_meant(&word, name)).collect();
+    if !names.is_empty() {
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(names));
     }
 }
 
@@ -202,8 +228,18 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Explain(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Disable(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Stop(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::QuickStop(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Estop(command) => {
+            let report = session::run(global, async |context| command.run(context).await)?;
+            judged(format, &report, report.failure())
+        }
+        Command::Stop(command) => {
+            let outcome = session::run(global, async |context| command.run(context).await)?;
+            judged(format, &outcome, outcome.failure())
+        }
+        Command::QuickStop(command) => {
+            let outcome = session::run(global, async |context| command.run(context).await)?;
+            judged(format, &outcome, outcome.failure())
+        }
         Command::Reset(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Velocity(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Move(command) => on_bus(global, format, async |context| command.run(context).await),

@@ -226,6 +226,7 @@ mod tests {
         "eds zlac8030l",
         "emcy watch",
         "enable 4",
+        "estop",
         "events --control 127.0.0.1:1",
         "explain 4",
         "export dbc",

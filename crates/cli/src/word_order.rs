@@ -22,18 +22,22 @@ pub(crate) struct Mended {
 impl Mended {
     /// As it is typed.
     pub(crate) fn text(&self) -> String {
-        let quoted = self.words.iter().map(|word| {
-            let plain =
-                !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./:=,@%+#*".contains(c));
-            if plain { word.clone() } else { format!("'{}'", word.replace('\'', r"'\''")) }
-        });
-        format!("ferrodrive {}", quoted.collect::<Vec<_>>().join(" "))
+        text(&self.words)
     }
 
     /// True if it changes nothing on the bus.
     pub(crate) fn is_harmless(&self) -> bool {
         self.matches.subcommand_name().is_some_and(|name| HARMLESS.contains(&name))
     }
+}
+
+/// A command line of these words, as it is typed.
+pub(crate) fn text(words: &[String]) -> String {
+    let quoted = words.iter().map(|word| {
+        let plain = !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./:=,@%+#*".contains(c));
+        if plain { word.clone() } else { format!("'{}'", word.replace('\'', r"'\''")) }
+    });
+    format!("ferrodrive {}", quoted.collect::<Vec<_>>().join(" "))
 }
 
 /// The order that was meant, if there is exactly one.

@@ -7,12 +7,13 @@ use master::Gear;
 use master::drive::{Drive, DriveState};
 use serde::Serialize;
 
+use super::estop::{Estop, StopReport, stop_all};
 use super::sdo::guessed;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
-use testbench::words::node::node;
+use testbench::words::node::{Nodes, node, nodes};
 
 /// Show what a drive says of itself: power state, fault with remedy, position, speed, current, temperatures, supply
 ///
@@ -52,26 +53,56 @@ pub(crate) struct Disable {
     node: NodeId,
 }
 
-/// Stop a drive by its deceleration ramp; it stays enabled
+/// Stop a drive, or all, by the deceleration ramp; it stays enabled
 ///
-/// Returns when it stands.
+/// Returns when it stands. For all: each drive that answers on the bus is stopped, at the same time, and the command ends with status 0
+/// only when every one was seen to stand.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  ferrodrive --bus can0 stop 4")]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 stop 4\n  ferrodrive --bus can0 stop all")]
 pub(crate) struct Stop {
-    /// Node-ID
-    #[arg(value_parser = node)]
-    node: NodeId,
+    /// Node-ID, or all
+    #[arg(value_name = "NODE|all", value_parser = nodes)]
+    nodes: Nodes,
 }
 
-/// Stop a drive as fast as it is set to (605Ah)
+/// Stop a drive, or all, as fast as it is set to (605Ah)
 ///
-/// By the quick stop of its model, whatever it does; what the drive is in then is said.
+/// By the quick stop of its model, whatever it does; what the drive is in then is said. `quick-stop all` is `estop`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  ferrodrive --bus can0 quick-stop 4")]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 quick-stop 4\n  ferrodrive --bus can0 quick-stop all")]
 pub(crate) struct QuickStop {
-    /// Node-ID
-    #[arg(value_parser = node)]
-    node: NodeId,
+    /// Node-ID, or all
+    #[arg(value_name = "NODE|all", value_parser = nodes)]
+    nodes: Nodes,
+}
+
+/// What came of a stop.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub(crate) enum StopOutcome {
+    /// Of one drive.
+    One(Box<StateReport>),
+    /// Of every drive on the bus.
+    All(StopReport),
+}
+
+impl StopOutcome {
+    /// Why not every drive was seen to stand.
+    pub(crate) fn failure(&self) -> Option<Failure> {
+        match self {
+            Self::One(_) => None,
+            Self::All(report) => report.failure(),
+        }
+    }
+}
+
+impl Report for StopOutcome {
+    fn text(&self, paint: Paint) -> String {
+        match self {
+            Self::One(report) => report.text(paint),
+            Self::All(report) => report.text(paint),
+        }
+    }
 }
 
 /// Reset a drive's fault, once its cause is gone
@@ -173,20 +204,22 @@ impl Disable {
 
 impl Stop {
     /// Stops and shows the state.
-    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
-        let drive = context.drive_to_stop(self.node).await?;
+    pub(crate) async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
+        let Nodes::One(node) = self.nodes else { return stop_all(context).await.map(StopOutcome::All) };
+        let drive = context.drive_to_stop(node).await?;
         drive.stop().await?;
-        StateReport::read(&drive).await
+        Ok(StopOutcome::One(Box::new(StateReport::read(&drive).await?)))
     }
 }
 
 impl QuickStop {
     /// Stops at once and shows the state. The stop goes out before the model is asked for.
-    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
-        context.quick_stop(self.node).await?;
-        let drive = context.drive_to_stop(self.node).await?;
+    pub(crate) async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
+        let Nodes::One(node) = self.nodes else { return Estop {}.run(context).await.map(StopOutcome::All) };
+        context.quick_stop(node).await?;
+        let drive = context.drive_to_stop(node).await?;
         drive.quick_stop().await?;
-        StateReport::read(&drive).await
+        Ok(StopOutcome::One(Box::new(StateReport::read(&drive).await?)))
     }
 }
 

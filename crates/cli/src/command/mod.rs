@@ -14,6 +14,7 @@ pub(crate) mod drive_base;
 pub(crate) mod dump;
 pub(crate) mod eds;
 pub(crate) mod emcy;
+pub(crate) mod estop;
 pub(crate) mod events;
 pub(crate) mod explain;
 pub(crate) mod export;

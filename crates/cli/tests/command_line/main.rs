@@ -4,6 +4,7 @@ mod broken_pipe;
 mod completion;
 mod cycles;
 mod eds;
+mod estop;
 mod handbook;
 mod json;
 mod on_sim;

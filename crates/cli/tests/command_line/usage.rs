@@ -19,6 +19,20 @@ fn no_command_and_unknown_commands_are_refused() {
     refused(&["scan", "--jsn"], &["--json"]);
 }
 
+/// By the sense of a word in other tools, not by its spelling.
+#[test]
+fn words_of_other_tools_are_answered_with_the_command_that_does_it() {
+    refused(&["candump", "can0"], &["tip: ferrodrive dump"]);
+    refused(&["sdo", "read", "4", "6064"], &["tip: ferrodrive read 4 6064"]);
+    refused(&["--bus", "sim", "fault", "4"], &["tip: ferrodrive explain 4"]);
+    refused(&["velocity", "4", "60", "rpm"], &["did you mean: ferrodrive velocity 4 60rpm"]);
+    refused(&["sim", "zlac8030l@4"], &["did you mean: ferrodrive sim --drive zlac8030l@4"]);
+    let traced = ferrodrive(&["trace"]).err;
+    assert!(traced.contains("tip: ferrodrive dump") && !traced.contains("torque"), "{traced}");
+    let json = ferrodrive(&["--json", "get", "4", "6064"]).json();
+    assert!(json["error"]["next"].as_str().unwrap().starts_with("ferrodrive read 4 6064"), "{json}");
+}
+
 #[test]
 fn nodes_are_checked() {
     refused(&["read", "0", "6064"], &["there is no node 0", "1 to 127", "e.g. 4"]);

@@ -191,11 +191,10 @@ impl Drive {
     async fn look_at_rest(&self, stop_sent: &mut Option<can::Instant>, rest: &mut Rest) -> Result<bool, Error> {
         let network = self.node.network();
         if stop_sent.is_none() {
-            // Such a drive would energise its motor to hold it.
-            if self.may_hold_by_stopping() && self.is_without_power().await {
-                return Ok(true);
+            // One without power would energise its motor to hold it; it may coast.
+            if !(self.may_hold_by_stopping() && self.is_without_power().await) {
+                self.write_controlword(STOP).await?;
             }
-            self.write_controlword(STOP).await?;
             *stop_sent = Some(network.now());
         }
         let statusword = self.statusword().await?;

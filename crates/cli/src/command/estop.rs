@@ -1,0 +1,209 @@
+//! `ferrodrive estop`, `quick-stop all` and `stop all`: every drive on the bus comes to rest, whoever has set it in motion.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use canopen::{Mux, NodeId};
+use devices::AxisId;
+use master::drive::{Drive, StopWay, StoppedAxis};
+use master::{Error, join_all};
+use serde::Serialize;
+
+use crate::context::Context;
+use crate::failure::{Failure, FailureBody};
+use crate::output::Report;
+use crate::plain::plain;
+use plot::Paint;
+
+/// Stop every drive on the bus at once, whoever moves it
+///
+/// First one NMT command takes all nodes to pre-operational, so that no PDO of another master sets a drive going again; then each
+/// drive is quick-stopped. The nodes are left so: `ferrodrive boot` or `ferrodrive nmt all start` goes on. Ends with status 0 only
+/// when every drive was seen to stand, by its statusword and its speed. A node that was heard, or is in the machine file, and does not
+/// answer may still be moving; --timeout has no effect on how long that is waited for. This is software on a bus: it does not replace an emergency stop that takes the power away.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive --bus can0 estop\n  ferrodrive --bus can0 --machine machine.toml estop --json\n  \
+    ferrodrive --bus can0 quick-stop all    # the same\n  ferrodrive --bus can0 stop all          # by the ramps; stays enabled"
+)]
+pub(crate) struct Estop {}
+
+/// What became of every drive on the bus.
+#[derive(Debug, Serialize)]
+pub(crate) struct StopReport {
+    ok: bool,
+    nodes: Vec<AxisReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<FailureBody>,
+    #[serde(skip)]
+    failure: Option<Failure>,
+}
+
+#[derive(Debug, Serialize)]
+struct AxisReport {
+    node: u8,
+    /// Of a drive that has several, from 1.
+    axis: u8,
+    model: Option<&'static str>,
+    stands: bool,
+    /// What holds it, where it was seen to stand.
+    way: Option<&'static str>,
+    after_ms: Option<u64>,
+    /// Why it was not seen to stand.
+    why: Option<String>,
+}
+
+/// By what a drive that `stop all` has stopped is held.
+const RAMP: &str = "ramp";
+
+/// How long a node is given to say whether it is a drive.
+const PATIENCE: Duration = Duration::from_millis(150);
+const STATUSWORD: Mux = Mux::new(0x6041, 0);
+
+impl Estop {
+    /// Stops everything.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StopReport, Failure> {
+        let models: BTreeMap<_, _> = context.told_models();
+        let stopped = context.network.stop_everything(&models).await;
+        StopReport::new(
+            context,
+            stopped.into_iter().map(AxisReport::from).collect(),
+            "the emergency stop of the machine",
+        )
+    }
+}
+
+/// `stop all`: each by its ramp; it stays enabled.
+pub(crate) async fn stop_all(context: &Context) -> Result<StopReport, Failure> {
+    let asked = NodeId::all().map(|id| async move {
+        let answer = context.network.node(id).with_timeout(PATIENCE).read::<u16>(STATUSWORD).await;
+        let expected = context.told_model(id).is_some() || context.network.facts(id).seen_at.is_some();
+        match answer {
+            Ok(_) => Some((id, None)),
+            Err(Error::NoAnswer { .. }) if !expected => None,
+            Err(Error::Aborted { code: canopen::AbortCode::NO_SUCH_OBJECT, .. }) => None,
+            Err(error) => Some((id, Some(error))),
+        }
+    });
+    let found = join_all(asked.collect::<Vec<_>>()).await.into_iter().flatten();
+    let stops = found.map(|(id, silent)| async move {
+        let silent = silent.map(Failure::from);
+        let drive = match silent {
+            None => context.drive_to_stop(id).await,
+            Some(silent) => Err(silent),
+        };
+        match drive {
+            Ok(drive) => stop_axes(context, &drive).await,
+            Err(failure) => vec![AxisReport::unseen(id, AxisId::FIRST, None, &failure)],
+        }
+    });
+    let stopped = join_all(stops.collect::<Vec<_>>()).await.into_iter().flatten().collect();
+    StopReport::new(context, stopped, "ferrodrive estop, or the emergency stop of the machine")
+}
+
+/// Stops every axis of a drive.
+async fn stop_axes(context: &Context, drive: &Drive) -> Vec<AxisReport> {
+    let id = drive.node().id();
+    let model = drive.description().filter(|_| drive.guess().is_none()).map(|model| model.name);
+    let many = drive.description().map_or(1, |model| model.axes.len());
+    let axes = (0..many as u8).map(AxisId).map(|axis| async move {
+        let began = context.network.now();
+        let stopped = match drive.axis(axis) {
+            Ok(drive) => drive.stop().await,
+            Err(error) => Err(error),
+        };
+        match stopped {
+            Ok(()) => AxisReport::seen(id, axis, model, context.network.now() - began, RAMP),
+            Err(error) => AxisReport::unseen(id, axis, model, &error.into()),
+        }
+    });
+    join_all(axes.collect::<Vec<_>>()).await
+}
+
+impl AxisReport {
+    fn seen(node: NodeId, axis: AxisId, model: Option<&'static str>, after: Duration, way: &'static str) -> Self {
+        let (way, after_ms) = (Some(way), Some(after.as_millis() as u64));
+        Self { node: node.raw(), axis: axis.0 + 1, model, stands: true, way, after_ms, why: None }
+    }
+
+    fn unseen(node: NodeId, axis: AxisId, model: Option<&'static str>, failure: &Failure) -> Self {
+        let why = [&[failure.what.clone()], &failure.because[..]].concat().join("; ");
+        Self { node: node.raw(), axis: axis.0 + 1, model, stands: false, way: None, after_ms: None, why: Some(why) }
+    }
+
+    /// `node 4`, and the axis where it is not the first.
+    fn name(&self) -> String {
+        if self.axis == 1 { format!("node {}", self.node) } else { format!("node {}, axis {}", self.node, self.axis) }
+    }
+}
+
+impl From<StoppedAxis> for AxisReport {
+    fn from(stopped: StoppedAxis) -> Self {
+        let StoppedAxis { node, axis, model, outcome } = stopped;
+        let model = model.map(|model| model.name);
+        match outcome {
+            Ok((after, way)) => Self::seen(node, axis, model, after, way.words()),
+            Err(error) => Self::unseen(node, axis, model, &error.into()),
+        }
+    }
+}
+
+impl StopReport {
+    fn new(context: &Context, nodes: Vec<AxisReport>, surer: &str) -> Result<Self, Failure> {
+        let bus = context.bus();
+        if nodes.is_empty() {
+            return Err(Failure::new(format!("no drive answers on {bus}: what is there may still be moving"))
+                .of_kind("nobody")
+                .because("no node has a statusword (6041h), and none was heard")
+                .next(format!("if something moves and must not: {surer}"))
+                .next("check supply, cable and bit rate; then: ferrodrive scan"));
+        }
+        let moving: Vec<_> = nodes.iter().filter(|axis| !axis.stands).collect();
+        let failure = moving.first().map(|_| {
+            let names: Vec<_> = moving.iter().map(|axis| axis.name()).collect();
+            let what = format!("{} may still be moving", names.join("; "));
+            let failure = Failure::new(what)
+                .of_kind("not_stopped")
+                .next(surer)
+                .next(format!("then: ferrodrive state {}", moving[0].node));
+            moving
+                .iter()
+                .filter_map(|axis| Some(format!("{}: {}", axis.name(), axis.why.as_ref()?)))
+                .fold(failure, Failure::because)
+        });
+        let error = failure.as_ref().map(FailureBody::from);
+        Ok(Self { ok: failure.is_none(), nodes, error, failure })
+    }
+
+    /// Why not every drive was seen to stand.
+    pub(crate) fn failure(&self) -> Option<Failure> {
+        self.failure.clone()
+    }
+}
+
+impl Report for StopReport {
+    fn text(&self, paint: Paint) -> String {
+        let line = |axis: &AxisReport| {
+            let model = axis.model.map(|model| format!(" ({model})")).unwrap_or_default();
+            let said = match (axis.after_ms, axis.way) {
+                (Some(ms), Some(way)) => format!("stands, seen after {:.2} s: {}", ms as f64 / 1e3, in_words(way)),
+                _ => paint.bad("may still be moving"),
+            };
+            format!("{}{}: {said}", axis.name(), plain(&model))
+        };
+        self.nodes.iter().map(line).collect::<Vec<_>>().join("\n")
+    }
+}
+
+/// What a way to stand means for the machine.
+fn in_words(way: &'static str) -> String {
+    if way == StopWay::QuickStop.words() {
+        "quick stop, its motor holds".to_owned()
+    } else if way == StopWay::NoPower.words() {
+        "its motor has no power; a load may move it".to_owned()
+    } else if way == StopWay::Fault.words() {
+        "a fault has taken the power off its motor; a load may move it".to_owned()
+    } else {
+        "by its ramp; it was left as enabled as it was".to_owned()
+    }
+}
