@@ -9,7 +9,7 @@ export function speedLimit(report) {
   const input = h("input", { id: "speed-limit", type: "number", step: "any", min: "0", placeholder: "none", inputmode: "decimal", value: localStorage.getItem(KEY) ?? "" });
   const status = h("span", { class: "quiet", role: "status" });
   const root = h("div", { class: "bar" }, h("label", { for: "speed-limit" }, "Speed limit ", input, " r/min"), status);
-  /** The session that has been given the limit. */
+  /** The welcome message of the session that has been given the limit. */
   let given_to = null;
 
   async function send() {
@@ -23,10 +23,9 @@ export function speedLimit(report) {
 
   // Each connection is a session of its own, and knows of no limit. It has to take control after this.
   on("state", () => {
-    const session = link.welcome?.session ?? null;
-    if (session === given_to) return;
-    given_to = session;
-    if (session !== null && input.value.trim() !== "") send();
+    if (link.welcome === given_to) return;
+    given_to = link.welcome;
+    if (given_to !== null && input.value.trim() !== "") send();
   });
 
   return root;

@@ -23,6 +23,9 @@ export const link = {
   fresh: false,
 };
 
+/** What the studio says to a page that it does not let in: it was started anew, with another token. */
+let turned_away = null;
+
 const listeners = { state: [], news: [], change: [], sight: [], stop: [] };
 let socket = null;
 let seq = 0;
@@ -35,7 +38,7 @@ let last_at = performance.now();
 
 /**
  * Calls `listener` with each picture ("state"), piece of news ("news"), when the connection comes or goes ("change"), when what is
- * shown begins or ceases to be what is now, and again and again while it is not ("sight": `{ fresh, connected, age_ms }`), and with
+ * shown begins or ceases to be what is now, and again and again while it is not ("sight": `{ fresh, connected, age_ms, refused }`), and with
  * what became of a press of stop ("stop": `{ confirmed, after_ms }`).
  */
 export function on(what, listener) {
@@ -85,6 +88,7 @@ function take(message) {
   switch (message.type) {
     case "welcome":
       link.welcome = message;
+      turned_away = null;
       seq = 0;
       tell("change", true);
       break;
@@ -126,7 +130,19 @@ function lose() {
   waiting.clear();
   look();
   tell("change", false);
-  setTimeout(connect, RETRY_MS);
+  // Also where it is refused: the browser may be let in by another tab of it.
+  findRefusal().then(() => setTimeout(connect, RETRY_MS));
+}
+
+/** A socket that is refused does not say why; the answer to a request does. */
+async function findRefusal() {
+  try {
+    const answer = await fetch("/api/state", { signal: AbortSignal.timeout(RETRY_MS) });
+    turned_away = answer.ok ? null : (await answer.json()).error.message;
+  } catch {
+    turned_away = null;
+  }
+  look();
 }
 
 /** Looks how old the picture is. */
@@ -134,7 +150,7 @@ function look() {
   const now = performance.now();
   const before = link.fresh;
   link.fresh = now - seen_at <= OLD_MS;
-  if (!link.fresh || !before) tell("sight", { fresh: link.fresh, connected: link.welcome !== null, age_ms: now - last_at });
+  if (!link.fresh || !before) tell("sight", { fresh: link.fresh, connected: link.welcome !== null, age_ms: now - last_at, refused: turned_away });
   if (socket && now - Math.max(seen_at, opened_at) > DEAD_MS) {
     const dead = socket;
     lose();

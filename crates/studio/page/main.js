@@ -209,13 +209,13 @@ on("change", (connected) => {
 });
 
 // What is not seen any more is grey, and what is known of it stands over the whole width.
-on("sight", ({ fresh, connected, age_ms }) => {
+on("sight", ({ fresh, connected, age_ms, refused }) => {
   const wasFresh = !document.body.classList.contains("unseen");
   document.body.classList.toggle("unseen", !fresh);
   const banner = byId("banner");
-  banner.hidden = fresh || (!link.state && age_ms < OPENING_MS);
+  banner.hidden = fresh || (!link.state && !refused && age_ms < OPENING_MS);
   if (fresh) return;
-  const lines = lostSight({ state: link.state, connected, age_ms });
+  const lines = lostSight({ state: link.state, connected, age_ms, refused });
   renew(banner, JSON.stringify(lines), () => lines.map(({ text, urgent }) => h("p", { class: urgent ? "urgent" : "" }, text)));
   if (wasFresh && link.state) {
     for (const { view } of views) view.lose?.();

@@ -22,11 +22,12 @@ export const unseenStops = ({ nodes }) =>
 
 /**
  * What is known once nothing new is shown, as `{ text, urgent }` each: of `state`, the last picture, and of whether there is a
- * `connection`. What is urgent concerns drives that nothing stops.
+ * `connection`, and what the studio says where it does not let this page in. What is urgent concerns drives that nothing stops.
  */
-export function lostSight({ state, connected, age_ms }) {
+export function lostSight({ state, connected, age_ms, refused = null }) {
   const since = `${(Math.floor(age_ms / 100) / 10).toFixed(1)} s`;
-  const lines = [{ text: connected ? `Nothing new of the studio for ${since}.` : "No connection to the studio. Trying again …", urgent: false }];
+  const lost = connected ? `Nothing new of the studio for ${since}.` : "No connection to the studio. Trying again …";
+  const lines = [{ text: refused ? `The studio was started anew and does not let this page in: ${refused}.` : lost, urgent: false }];
   if (!state) return lines;
   lines.push({ text: "This page no longer knows what moves, and what is grey is old.", urgent: false });
   const nodes = state.nodes.filter(mayMove);

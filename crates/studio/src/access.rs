@@ -13,6 +13,9 @@ use subtle::ConstantTimeEq;
 /// Bytes of a secret: more than anybody guesses.
 const SECRET_BYTES: usize = 16;
 
+/// The shortest token that is taken.
+const SHORTEST_TOKEN: usize = 2 * SECRET_BYTES;
+
 /// The shortest password that is taken.
 const SHORTEST_PASSWORD: usize = 12;
 
@@ -25,6 +28,9 @@ pub enum AccessError {
     /// It is soon guessed.
     #[error("the password has {0} characters: at least {SHORTEST_PASSWORD} are wanted")]
     ShortPassword(usize),
+    /// It is soon guessed, or an address cannot have it.
+    #[error("expected a token of {SHORTEST_TOKEN} or more letters, digits, - and _")]
+    BadToken,
     /// The system gives no random numbers.
     #[error("the system gives no random numbers for a token: {0}")]
     NoRandom(getrandom::Error),
@@ -51,6 +57,41 @@ impl Password {
             short if short < SHORTEST_PASSWORD => Err(AccessError::ShortPassword(short)),
             _ => Ok(Self(text)),
         }
+    }
+}
+
+/// What lets in whoever shows it, where it is kept over launches.
+#[derive(Clone)]
+pub struct Token(String);
+
+impl core::fmt::Debug for Token {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("Token(..)")
+    }
+}
+
+impl Token {
+    /// Takes a token.
+    ///
+    /// # Errors
+    /// [`AccessError::BadToken`].
+    pub fn new(text: impl Into<String>) -> Result<Self, AccessError> {
+        let text = text.into();
+        let is_plain = text.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_'));
+        if is_plain && text.len() >= SHORTEST_TOKEN { Ok(Self(text)) } else { Err(AccessError::BadToken) }
+    }
+
+    /// A new one.
+    ///
+    /// # Errors
+    /// [`AccessError::NoRandom`].
+    pub fn random() -> Result<Self, AccessError> {
+        secret().map(Self)
+    }
+
+    /// It, to be kept where nobody else reads it.
+    pub fn text(&self) -> &str {
+        &self.0
     }
 }
 
@@ -82,6 +123,12 @@ impl Access {
             return Err(AccessError::NoPassword(address));
         }
         Ok(Self { address, token: secret()?, pass: secret()?, password, hosts: Vec::new() })
+    }
+
+    /// Takes this token in place of one of this launch. The cookie is the same too: a page that is open goes on after a restart.
+    #[must_use]
+    pub fn with_token(self, Token(token): Token) -> Self {
+        Self { pass: token.clone(), token, ..self }
     }
 
     /// Lets browsers call this server by these names, too: `drives.local`, whatever the port.
@@ -194,6 +241,24 @@ mod tests {
         assert!(access.is_password("correct horse battery") && !access.is_password("correct horse batterz"));
         let here = Access::new("127.0.0.1:1".parse().expect("an address"), None).expect("loopback");
         assert!(!here.is_password(""), "where there is none, none is right");
+    }
+
+    #[test]
+    fn a_token_that_is_kept_lets_in_what_an_earlier_launch_let_in() {
+        let address: SocketAddr = "127.0.0.1:8402".parse().expect("an address");
+        for bad in ["", "0123456789abcdef0123456789abcde", "0123456789abcdef 0123456789abcdef", &"\u{e4}".repeat(32)] {
+            assert!(matches!(Token::new(bad), Err(AccessError::BadToken)), "{bad}");
+        }
+        let token = Token::random().expect("random");
+        let again = Token::new(token.text()).expect("what was made is taken");
+        assert!(!format!("{token:?}").contains(token.text()), "no secret in a log");
+        let launches = [token, again].map(|token| Access::new(address, None).expect("loopback").with_token(token));
+        assert_eq!((launches[0].url(), launches[0].cookie()), (launches[1].url(), launches[1].cookie()));
+        let mut headers = HeaderMap::new();
+        let cookie = launches[0].cookie();
+        headers.insert(COOKIE, cookie.split(';').next().expect("a pair").parse().expect("a header"));
+        assert!(launches[1].lets_in(&headers));
+        assert!(!Access::new(address, None).expect("loopback").lets_in(&headers), "without it none does");
     }
 
     #[test]

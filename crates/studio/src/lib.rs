@@ -29,7 +29,7 @@ mod web;
 mod wire;
 mod world;
 
-pub use access::{Access, AccessError, Password};
+pub use access::{Access, AccessError, Password, Token};
 pub use dead_man::DeadMan;
 pub use handle::HostHandle;
 pub use host::{Host, JOG_SPAN, Journals, PRESENCE_SPAN, Setting};

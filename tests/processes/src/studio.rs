@@ -21,7 +21,12 @@ pub struct Studio {
 impl Studio {
     /// Starts one on a free port, and waits until it serves.
     pub fn start(arguments: &[&str]) -> Self {
-        let arguments = [arguments, &["studio", "--listen", "127.0.0.1:0"]].concat();
+        Self::start_at("127.0.0.1:0", arguments, &[])
+    }
+
+    /// The same at an address, with arguments of its own behind those of every command.
+    pub fn start_at(address: &str, arguments: &[&str], own: &[&str]) -> Self {
+        let arguments = [arguments, &["studio", "--listen", address], own].concat();
         let mut child = command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut ready = String::new();
         BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut ready).unwrap();

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
+use std::io::Write;
 use std::net::{SocketAddr, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -10,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use can::Bitrate;
 use canopen::NodeId;
 use serde::Serialize;
-use studio::{Access, AccessError, Host, Journals, Password, Setting};
+use studio::{Access, AccessError, Host, Journals, Password, Setting, Token};
 use testbench::parameters::journal::Journal;
 use tokio::net::TcpListener;
 use transport::BusSpec;
@@ -43,6 +44,12 @@ pub(crate) struct Studio {
     /// and whoever has it can move the drives.
     #[arg(long, value_name = "FILE")]
     password_file: Option<PathBuf>,
+    /// File with the token that lets in; it is made if it is not there, and holds over launches
+    ///
+    /// Without it each launch has a token of its own, and pages that were open before have to be opened anew by the address that
+    /// is printed. Whoever can read the file can move the drives: it is made for its owner alone.
+    #[arg(long, value_name = "FILE")]
+    token_file: Option<PathBuf>,
     /// A name that browsers may call this server by, e.g. drives.local; may be repeated
     ///
     /// Without it that is an address of this machine, or localhost: under a name of another site, which leads here, it could be
@@ -81,6 +88,10 @@ impl Studio {
         let listener = TcpListener::bind(&self.listen).await.map_err(cannot)?;
         let address = listener.local_addr().map_err(cannot)?;
         let access = Access::new(address, password).map_err(|error| refused(&error))?.with_hosts(self.hosts.clone());
+        let access = match self.token_file.as_deref().map(kept_token).transpose()? {
+            Some(token) => access.with_token(token),
+            None => access,
+        };
         if !address.ip().is_loopback() {
             let place = elsewhere(address);
             context.tell(&format!(
@@ -193,6 +204,30 @@ fn read_password(path: &Path) -> Result<Password, Failure> {
     Password::new(text.lines().next().unwrap_or_default()).map_err(|error| refused(&error))
 }
 
+/// The token of a file, which is made with a new one where it is not there.
+fn kept_token(path: &Path) -> Result<Token, Failure> {
+    let mut options = std::fs::OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    match options.open(path) {
+        Ok(mut file) => {
+            let token = Token::random().map_err(|error| refused(&error))?;
+            writeln!(file, "{}", token.text()).map_err(|error| Failure::of_writing("the token", path, &error))?;
+            Ok(token)
+        }
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+            let text = std::fs::read_to_string(path).map_err(|error| {
+                Failure::new(format!("cannot read the token from {}", path.display()))
+                    .because(error)
+                    .next("give --token-file a file that you can read, or one that is not there: it is made")
+            })?;
+            Token::new(text.lines().next().unwrap_or_default()).map_err(|error| refused(&error).because(path.display()))
+        }
+        Err(error) => Err(Failure::of_writing("the token", path, &error)),
+    }
+}
+
 fn refused(error: &AccessError) -> Failure {
     let failure = Failure::usage(error.to_string());
     match error {
@@ -200,6 +235,7 @@ fn refused(error: &AccessError) -> Failure {
             .because("whoever reaches a studio from elsewhere can move the drives, and sees all that passes")
             .next("give --password-file FILE too, or --listen 127.0.0.1:8402 and reach it through `ssh -L 8402:127.0.0.1:8402`"),
         AccessError::ShortPassword(_) => failure.next("choose a longer one, e.g. four words that do not belong together"),
+        AccessError::BadToken => failure.next("delete the file: a new token is put there"),
         AccessError::NoRandom(_) => Failure::new(error.to_string()),
     }
 }
@@ -227,4 +263,35 @@ async fn open(context: &Context, url: &str) {
         Err(_) => return,
     };
     context.tell(&format!("cannot open a browser ({program}: {why}): open the address yourself"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use processes::scratch;
+
+    #[test]
+    fn a_token_file_is_made_once_for_its_owner_and_refused_if_it_holds_none() {
+        let folder = scratch("token_file");
+        let path = folder.join("token");
+        let text = |token: Result<Token, Failure>| token.expect("a token").text().to_owned();
+        let made = text(kept_token(&path));
+        assert_eq!(text(kept_token(&path)), made);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            let mode = std::fs::metadata(&path).expect("it is there").permissions().mode();
+            assert_eq!(mode & 0o777, 0o600);
+        }
+        for bad in ["", "short\n", "0123456789abcdef 0123456789abcdef\n"] {
+            std::fs::write(&path, bad).expect("written");
+            let failure = kept_token(&path).expect_err(bad);
+            assert!(
+                failure.what.contains("expected a token") && failure.next[0].contains("delete the file"),
+                "{failure:?}"
+            );
+        }
+        let nowhere = folder.join("no/such/token");
+        assert_eq!(kept_token(&nowhere).expect_err("no such folder").kind, "file");
+    }
 }

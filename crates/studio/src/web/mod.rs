@@ -204,7 +204,11 @@ fn refuse(access: &Access, request: &Request) -> Option<Refusal> {
     if access.has_password() && path == "/" {
         return Some(Refusal::Elsewhere("/login", None));
     }
-    let text = "open the address that `ferrodrive studio` printed: it has the token of this launch";
+    let text = if access.has_password() {
+        "give the password anew (reload this page), or open the address that `ferrodrive studio` printed on its own machine"
+    } else {
+        "open the address that `ferrodrive studio` printed: it has the token of this launch"
+    };
     Some(Refusal::Trouble(StatusCode::UNAUTHORIZED, "no_token", text))
 }
 

@@ -1,5 +1,7 @@
 //! What happens to virtual drives, as the timeline tells it.
 
+use std::cell::RefCell;
+
 use canopen::NmtCommand;
 use serde_json::Value;
 use sim::{Place, World};
@@ -29,11 +31,18 @@ pub(super) fn change(world: &mut World, node: canopen::NodeId, words: &str) {
 /// ZLAC8030L quick start guide V1.00, chapters 8 and 9: 0001h is over-voltage.
 #[test]
 fn a_fault_is_told_with_its_remedy_and_where_that_is_written_until_it_is_over() {
+    let news = RefCell::new(None);
     play_acts(
-        async |stage| stage.sleep(200).await,
+        async |stage| {
+            stage.sleep(200).await;
+            news.replace(Some(stage.handle.news()));
+        },
         |world| change(world, WHEEL, "supply 80"),
         async |stage| {
             stage.sleep(1000).await;
+            let mut news = news.take().expect("somebody listens");
+            let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
+            assert!(heard.iter().any(|news| news.contains("node 4: emergency 0001h (over-voltage)")), "{heard:?}");
             for kind in ["emcy", "fault"] {
                 let told = stage.find(WHEEL, kind);
                 assert_eq!((&told["code"], &told["gone_s"]), (&1.into(), &Value::Null), "{told}");

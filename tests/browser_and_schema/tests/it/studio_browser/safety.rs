@@ -8,6 +8,8 @@ use std::time::Duration;
 use fantoccini::key::Key;
 use serde_json::{Value, json};
 
+use processes::studio::Studio;
+
 use super::{PATIENCE, Stage, press, speed};
 
 /// The stepper of the embedded bus, by its place: nothing stops it when the studio dies.
@@ -142,6 +144,30 @@ async fn a_speed_limit_and_keys_that_are_off_are_kept_by_the_browser() {
     stage.key('d').await;
     stage.key(' ').await;
     stage.wheel("no power", |wheel| wheel["drive"]["state"] != "Operation enabled");
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn an_old_tab_says_what_to_do_after_a_restart_and_goes_on_where_the_token_was_kept() {
+    let mut stage = Stage::open("restart").await;
+    let address = stage.studio.address.clone();
+    stage.signal("-KILL");
+    stage.says("#banner:not([hidden])", "No connection to the studio. Trying again").await;
+    let token = stage.profile.join("token");
+    let kept = ["--token-file", token.to_str().expect("a path")];
+    stage.studio = Studio::start_at(&address, &[], &kept);
+    let told = stage.says("#banner:not([hidden])", "does not let this page in: open the address").await;
+    assert!(!told.contains("Trying again"), "{told}");
+    stage.shoot("restart").await;
+    // The address that it printed, in the same browser; and once more, where nothing has to be done.
+    stage.load().await;
+    stage.find("#take").await;
+    stage.signal("-KILL");
+    stage.says("#banner:not([hidden])", "No connection to the studio").await;
+    stage.studio = Studio::start_at(&address, &[], &kept);
+    stage.find("body:not(.unseen) #take").await;
+    stage.find("#banner[hidden]").await;
     stage.close().await;
 }
 
