@@ -98,8 +98,8 @@ pub enum BusError {
         /// What should have come.
         expected: &'static str,
     },
-    /// The peer sent what is no message.
-    #[error("{address} sent what is no socketcand message")]
+    /// The peer sent what is not a message.
+    #[error("{address} sent what is not a socketcand message")]
     Malformed {
         /// `HOST:PORT`.
         address: String,

@@ -81,7 +81,7 @@ pub enum BusSpec {
 }
 
 impl BusSpec {
-    /// Opens the bus. [`BusSpec::Sim`] is not opened here but embedded by whoever wants it.
+    /// Opens the bus. [`BusSpec::Sim`] is not opened here but embedded by the caller.
     pub async fn open(&self, clock: &WallClock) -> Result<AnyBus, BusError> {
         Ok(AnyBus(match self {
             Self::Sim { .. } => return Err(BusError::Simulated),
@@ -116,7 +116,7 @@ impl BusSpec {
 
 /// Why a text names no bus.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{text}' is no {what}: {reason}")]
+#[error("'{text}' is not a {what}: {reason}")]
 pub struct ParseBusError {
     text: String,
     what: &'static str,
@@ -187,7 +187,7 @@ fn parse_slcan(rest: &str) -> Result<BusSpec, String> {
         match option.split_once('=') {
             Some(("bitrate", value)) => bitrate = Some(value.parse().map_err(|error| format!("{error}"))?),
             Some(("baud", value)) => {
-                let value: u32 = value.parse().map_err(|_| format!("'{value}' is no line speed"))?;
+                let value: u32 = value.parse().map_err(|_| format!("'{value}' is not a line speed"))?;
                 baud = Some(value);
             }
             _ => return Err(format!("unknown option '{option}'; known are bitrate=500k and baud=115200")),
@@ -209,7 +209,7 @@ fn parse_cannelloni(rest: &str) -> Result<BusSpec, String> {
     let rest = rest.strip_prefix("//").ok_or("expected cannelloni://HOST:PORT?local=PORT")?;
     let (place, option) = rest.split_once('?').unwrap_or((rest, ""));
     let address = parse_address(place, None)?;
-    let port = |text: &str| text.parse::<u16>().map_err(|_| format!("'{text}' is no port; a port is 0 to 65535"));
+    let port = |text: &str| text.parse::<u16>().map_err(|_| format!("'{text}' is not a port; a port is 0 to 65535"));
     let local_port = match option.split_once('=') {
         None if option.is_empty() => port(address.rsplit(':').next().unwrap_or_default())?,
         Some(("local", value)) => port(value)?,
@@ -225,12 +225,12 @@ fn parse_udp_multicast(rest: &str) -> Result<BusSpec, String> {
     let (host, port) = address.rsplit_once(':').unwrap_or((&address, ""));
     let bare = host.trim_start_matches('[').trim_end_matches(']');
     let group = bare.parse::<IpAddr>().ok().filter(IpAddr::is_multicast).ok_or_else(|| {
-        format!("'{bare}' is no multicast group; python-can's are 239.74.163.2 and [ff15:7079:7468:6f6e:6465:6d6f:6d63:6173]")
+        format!("'{bare}' is not a multicast group; python-can's are 239.74.163.2 and [ff15:7079:7468:6f6e:6465:6d6f:6d63:6173]")
     })?;
-    let port = port.parse().map_err(|_| format!("'{port}' is no port"))?;
+    let port = port.parse().map_err(|_| format!("'{port}' is not a port"))?;
     let hops = match option.split_once('=') {
         None if option.is_empty() => DEFAULT_HOPS,
-        Some(("hops", value)) => value.parse().map_err(|_| format!("'{value}' is no number of hops, 0 to 255"))?,
+        Some(("hops", value)) => value.parse().map_err(|_| format!("'{value}' is not a number of hops, 0 to 255"))?,
         _ => return Err(format!("unknown option '{option}'; known is hops=1 (0 stays in this machine)")),
     };
     Ok(BusSpec::UdpMulticast { group, port, hops })
@@ -243,7 +243,7 @@ pub(crate) fn parse_address(text: &str, default_port: Option<u16>) -> Result<Str
         Some((host, port)) => {
             let digits = port.bytes().all(|byte| byte.is_ascii_digit());
             let number = port.parse::<u16>().ok().filter(|_| digits);
-            (host, number.ok_or_else(|| format!("'{port}' is no port; a port is 0 to 65535"))?)
+            (host, number.ok_or_else(|| format!("'{port}' is not a port; a port is 0 to 65535"))?)
         }
         None => (text, default_port.ok_or("the port is missing; expected HOST:PORT")?),
     };
@@ -252,7 +252,7 @@ pub(crate) fn parse_address(text: &str, default_port: Option<u16>) -> Result<Str
         Some(bare) => bare.contains(':') && bare.bytes().all(|byte| byte.is_ascii_hexdigit() || b":.%".contains(&byte)),
         None => !host.is_empty() && host.bytes().all(|byte| byte.is_ascii_alphanumeric() || b".-_".contains(&byte)),
     };
-    if well_formed { Ok(format!("{host}:{port}")) } else { Err(format!("'{host}' is no host name or address")) }
+    if well_formed { Ok(format!("{host}:{port}")) } else { Err(format!("'{host}' is not a host name or address")) }
 }
 
 impl fmt::Display for BusSpec {
@@ -390,22 +390,22 @@ mod tests {
             ("sim:", "file name is missing"),
             ("log:", "file name is missing"),
             ("socketcand:localhost", "expected socketcand://HOST:PORT/can0"),
-            ("socketcand://:29536/can0", "'' is no host name"),
-            ("socketcand://a:99999/can0", "'99999' is no port"),
-            ("socketcand://a:+1/can0", "'+1' is no port"),
+            ("socketcand://:29536/can0", "'' is not a host name"),
+            ("socketcand://a:99999/can0", "'99999' is not a port"),
+            ("socketcand://a:+1/can0", "'+1' is not a port"),
             ("socketcand://a:1/", "cannot be the name of a bus"),
             ("socketcand://a:1/x > y", "cannot be the name of a bus"),
-            ("socketcand://::1:5/can0", "'::1' is no host name"),
+            ("socketcand://::1:5/can0", "'::1' is not a host name"),
             ("slcan://ttyACM0", "a device with three slashes"),
             ("slcan://host:1?bitrate=2M", "bit rate must be"),
             ("slcan://host:1?baud=9600", "baud is for serial devices"),
             ("slcan:///dev/ttyS0?parity=none", "unknown option 'parity=none'"),
             ("slcan:///dev/ttyS0?bitrate=fast", "bit rate must be"),
             ("cannelloni://host", "the port is missing"),
-            ("cannelloni://host:1?local=x", "'x' is no port"),
+            ("cannelloni://host:1?local=x", "'x' is not a port"),
             ("cannelloni://host:1?remote=2", "unknown option 'remote=2'"),
-            ("udp_multicast://127.0.0.1", "'127.0.0.1' is no multicast group"),
-            ("udp_multicast://239.1.2.3?hops=256", "'256' is no number of hops"),
+            ("udp_multicast://127.0.0.1", "'127.0.0.1' is not a multicast group"),
+            ("udp_multicast://239.1.2.3?hops=256", "'256' is not a number of hops"),
             ("udp_multicast://239.1.2.3?ttl=1", "unknown option 'ttl=1'"),
         ] {
             let error = text.parse::<BusSpec>().unwrap_err().to_string();

@@ -43,7 +43,7 @@ impl WallClock {
         let (told, entered) = std::sync::mpsc::channel();
         let face = Face::new();
         let timer = Timer::start(face, since_epoch(), move || drop(told.send(realtime::enter())));
-        // A thread that tells nothing has not entered anything.
+        // A thread that reports nothing has not entered anything.
         entered.recv().unwrap_or(Err(RealTimeError::NotHere))?;
         Ok(Self { face, timer })
     }

@@ -27,7 +27,7 @@ pub(crate) struct Datagrams {
     received: usize,
     /// What came and was not fetched yet: at most what one datagram carries.
     waiting: VecDeque<Received>,
-    /// The system says that nobody listens there.
+    /// The system reports that no program listens there.
     is_lost: bool,
 }
 
@@ -88,15 +88,15 @@ impl Datagrams {
         self.unless_refused(result).map(drop)
     }
 
-    /// What the system says for lack of a peer comes with a later call than the one that went astray, and is no end: the peer
-    /// may come. It is told once.
+    /// What the system says for lack of a peer comes with a later call than the one that went astray, and is not an end: the peer
+    /// may come. It is reported once.
     fn unless_refused<T>(&mut self, result: io::Result<T>) -> Result<Option<T>, BusError> {
         use io::ErrorKind::{ConnectionRefused, HostUnreachable, NetworkUnreachable};
         match result {
             Ok(done) => Ok(Some(done)),
             Err(error) if matches!(error.kind(), ConnectionRefused | HostUnreachable | NetworkUnreachable) => {
                 if !std::mem::replace(&mut self.is_lost, true) {
-                    let reason = format!("nobody listens at {}: {error}", self.address);
+                    let reason = format!("no program listens at {}: {error}", self.address);
                     self.push(Note::ConnectionLost { reason });
                 }
                 Ok(None)

@@ -62,7 +62,7 @@ impl Link {
             stream = TcpStream::connect(address) => stream.map_err(failed)?,
             () = clock.sleep(CONNECT_PATIENCE) => return Err(failed(std::io::ErrorKind::TimedOut.into())),
         };
-        // A frame waits for nobody: CANopen is a conversation of small messages.
+        // A frame is sent at once: CANopen is a conversation of small messages.
         tcp::send_at_once(&stream).map_err(failed)?;
         tcp::notice_loss(&stream).map_err(failed)?;
         Ok(Self::new(address, Box::new(stream), clock))

@@ -34,7 +34,7 @@ pub(crate) struct Reconnecting<B: Reopen> {
 
 enum Connection<B> {
     Up(B),
-    /// Lost for this reason, which has not been told yet.
+    /// Lost for this reason, which has not been reported yet.
     Lost(String),
     Opening(Pin<Box<dyn Future<Output = B> + Send>>),
 }
@@ -183,9 +183,9 @@ mod tests {
         let clock = WallClock::start();
         let mut bus = Reconnecting::<Scripted>::open(fate, &clock).await.unwrap();
         assert_eq!(bus.recv().await.unwrap().1, frame("181#01").into());
-        let (_, Received::Note(lost)) = bus.recv().await.unwrap() else { panic!("a frame of nobody") };
+        let (_, Received::Note(lost)) = bus.recv().await.unwrap() else { panic!("a frame without a sender") };
         assert_eq!(lost.to_string(), "the connection to the bus is lost: peer closed the connection");
-        bus.send(&frame("601#AA")).await.unwrap(); // is lost, and keeps nobody waiting
+        bus.send(&frame("601#AA")).await.unwrap(); // is lost, and does not block
         assert_eq!(bus.recv().await.unwrap().1, Note::ConnectionBack.into());
         bus.send(&frame("601#BB")).await.unwrap();
         assert_eq!(bus.recv().await.unwrap().1, frame("181#02").into());

@@ -17,7 +17,7 @@ use tokio::net::TcpStream;
 #[cfg(target_os = "linux")]
 const LOSS_AFTER: Duration = Duration::from_secs(5);
 
-/// Our segments wait for nobody.
+/// Our segments are sent at once.
 pub(crate) fn send_at_once(stream: &TcpStream) -> std::io::Result<()> {
     stream.set_nodelay(true)
 }
@@ -25,7 +25,7 @@ pub(crate) fn send_at_once(stream: &TcpStream) -> std::io::Result<()> {
 /// Acknowledges what has been received, now. To be called after each read, because the kernel goes back to delaying by itself
 /// (tcp(7), TCP_QUICKACK). Where the system has no such option, the peer's own TCP_NODELAY has to do.
 pub(crate) fn acknowledge_at_once(stream: &TcpStream) {
-    // Refused only for a connection that is no more, which the next read tells.
+    // Refused only for a connection that is gone, which the next read shows.
     #[cfg(target_os = "linux")]
     let _ = rustix::net::sockopt::set_tcp_quickack(stream, true);
     #[cfg(not(target_os = "linux"))]

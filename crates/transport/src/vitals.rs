@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use can::Instant;
 
-/// Of one client; shared between the task that serves it and whoever hands out the places.
+/// Of one client; shared between the task that serves it and the owner of the places.
 #[derive(Debug)]
 pub struct Vitals {
     engaged: AtomicBool,

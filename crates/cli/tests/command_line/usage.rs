@@ -76,7 +76,7 @@ fn what_is_beyond_the_drives_limits_is_refused_before_anything_moves() {
 #[test]
 fn buses_are_checked() {
     refused(&["--bus", "http://x", "scan"], &["socketcand://HOST:PORT/can0", "slcan://HOST:PORT"]);
-    refused(&["--bus", "socketcand://localhost:99999/can0", "scan"], &["'99999' is no port"]);
+    refused(&["--bus", "socketcand://localhost:99999/can0", "scan"], &["'99999' is not a port"]);
     refused(&["--bus", "sim:/nowhere/machine.toml", "scan"], &["/nowhere/machine.toml", "[[drive]]"]);
     refused(&["--bus", "log:trace.log", "scan"], &["nobody there can answer", "dump"]);
 }

@@ -22,7 +22,7 @@ pub struct CannelloniBus {
 
 impl CannelloniBus {
     /// Exchanges datagrams with the peer at `address` (`HOST:PORT`), from and at `local_port`: a peer sends to the port that it was
-    /// told (`cannelloni -r`), and takes what comes from there.
+    /// given (`cannelloni -r`), and takes what comes from there.
     pub async fn open(address: &str, local_port: u16, clock: &WallClock) -> Result<Self, BusError> {
         let failed = |source| BusError::Connect { address: address.to_owned(), source };
         let peer = lookup_host(address).await.map_err(failed)?.next();

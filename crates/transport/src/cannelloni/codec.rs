@@ -12,7 +12,7 @@ use crate::raw_id::RawId;
 
 /// The version of the protocol.
 const VERSION: u8 = 2;
-/// The operation that carries frames; 1 and 2 (acknowledgements) are reserved and sent by nobody.
+/// The operation that carries frames; 1 and 2 (acknowledgements) are reserved and never sent.
 const DATA: u8 = 0;
 const HEAD_LENGTH: usize = 5;
 /// In the byte of the length: a CAN FD frame.
@@ -49,7 +49,7 @@ pub enum Item {
     },
 }
 
-/// Why bytes are no cannelloni datagram.
+/// Why bytes are not a cannelloni datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Malformed {
     /// Less than a head.
@@ -68,7 +68,7 @@ pub enum Malformed {
         missing: u16,
     },
     /// A standard identifier above 7FFh, or more data than a frame can have.
-    #[error("identifier word {word:08X}h with {length} bytes is no CAN frame")]
+    #[error("identifier word {word:08X}h with {length} bytes is not a CAN frame")]
     Frame {
         /// The identifier with its flags.
         word: u32,

@@ -1,4 +1,4 @@
-//! What clients of a hub do, and how they are told apart.
+//! What clients of a hub do, and how they are distinguished.
 
 use std::fmt;
 use std::net::SocketAddr;

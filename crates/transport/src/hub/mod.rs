@@ -1,7 +1,7 @@
 //! A CAN bus served to other programs: any number of clients over socketcand and slcan.
 //!
-//! The hub moves frames and knows no bus. Whoever owns the bus takes the clients' frames from [`Hub::next_event`], puts them
-//! on the wire, and when the wire has carried a frame tells everybody with [`Hub::broadcast`]; the sender does not hear its
+//! The hub moves frames and knows no bus. The owner of the bus takes the clients' frames from [`Hub::next_event`], puts them
+//! on the wire, and when the wire has carried a frame sends it to all with [`Hub::broadcast`]; the sender does not hear its
 //! own. A client may have 64 frames that were neither broadcast nor discarded; then its connection is not read, so that a
 //! client that sends faster than the bus is slowed down and no queue grows. A client that does not read is disconnected
 //! when 16,384 frames wait for it; it never holds up the bus or the others. Reading what clients send is done in small turns,
@@ -131,7 +131,7 @@ impl Hub {
 
     /// Makes `bus` a client like any other: its frames come as [`HubEvent::Frame`], and what is broadcast goes onto it. `tell`
     /// hears its notes. Completes, with the reason, when that bus ends or takes frames more slowly than they come; the frames
-    /// are carried from now on by a task of the current tokio runtime, also while nobody waits for this.
+    /// are carried from now on by a task of the current tokio runtime, also while this is not awaited.
     pub fn join<B, T>(&self, bus: B, tell: T) -> impl Future<Output = BusError> + Send + use<B, T>
     where
         B: AsyncBus + Send + 'static,
@@ -146,7 +146,7 @@ impl Hub {
             if let Some(shared) = shared.upgrade() {
                 shared.forget(client, LeaveReason::Broken);
             }
-            // Nobody may wait for it.
+            // It may not be awaited.
             let _ = ended.send(error);
         });
         clients.list.push(entry);
@@ -173,12 +173,12 @@ impl Hub {
         self.inbox.try_recv().ok()
     }
 
-    /// Tells every listening client but `from` of a frame that was on the bus at `at`, and lets `from` send another.
+    /// Sends every listening client but `from` a frame that was on the bus at `at`, and lets `from` send another.
     pub fn broadcast(&self, frame: &Frame, at: Instant, from: Option<ClientId>) {
         self.hand_out(Stamped { at, what: Carried::Frame(*frame) }, from);
     }
 
-    /// Tells every listening client, as far as its protocol can, of an error frame that was on the bus at `at`.
+    /// Reports to every listening client, as far as its protocol can, an error frame that was on the bus at `at`.
     pub fn broadcast_error(&self, error: &ErrorFrame, at: Instant) {
         self.hand_out(Stamped { at, what: Carried::Error(class_of(error)) }, None);
     }
@@ -346,7 +346,7 @@ async fn accept(socket: TcpListener, protocol: Protocol, shared: Arc<Shared>) {
     loop {
         match socket.accept().await {
             Ok((stream, peer)) => {
-                // Each reply is a segment of its own, and a frame waits for nobody.
+                // Each reply is a segment of its own, and a frame is sent at once.
                 if tcp::send_at_once(&stream).is_ok() {
                     shared.admit(stream, peer, protocol);
                 }

@@ -33,7 +33,7 @@ impl Default for Parser {
 }
 
 impl Parser {
-    /// Reads a line; `None` for the head, comments and events that are no frames.
+    /// Reads a line; `None` for the head, comments and events that are not frames.
     pub(super) fn line(&mut self, line: &str) -> Result<Option<Record>, &'static str> {
         let line = line.trim();
         if line.is_empty() || line.starts_with("//") || self.head(line) {
@@ -126,7 +126,7 @@ impl Parser {
     fn id(&self, word: &str) -> Result<CanId, &'static str> {
         let digits = word.strip_suffix(['x', 'X']);
         let raw =
-            self.number(digits.unwrap_or(word)).ok_or("the identifier is no number; log without symbolic names")?;
+            self.number(digits.unwrap_or(word)).ok_or("the identifier is not a number; log without symbolic names")?;
         match digits {
             Some(_) if raw <= CanId::MAX_EXTENDED => Ok(CanId::extended(raw)),
             None if raw <= u32::from(CanId::MAX_STANDARD) => Ok(CanId::standard(raw as u16)),
@@ -136,7 +136,7 @@ impl Parser {
 
     fn length(&self, word: &str) -> Result<u8, &'static str> {
         // A DLC above 8 means 8 bytes (ISO 11898-1, 8.4.2.4).
-        let dlc = self.number(word).filter(|dlc| *dlc <= 15).ok_or("the length is no number from 0 to f")?;
+        let dlc = self.number(word).filter(|dlc| *dlc <= 15).ok_or("the length is not a number from 0 to f")?;
         Ok(dlc.min(MAX_DATA_LENGTH as u32) as u8)
     }
 
@@ -145,7 +145,7 @@ impl Parser {
         let words = words.get(..usize::from(length)).ok_or("there are fewer bytes than the length says")?;
         for (byte, word) in data.iter_mut().zip(words) {
             let value = self.number(word).filter(|_| self.decimal || word.len() == 2);
-            *byte = value.and_then(|value| u8::try_from(value).ok()).ok_or("a byte is no number of its base")?;
+            *byte = value.and_then(|value| u8::try_from(value).ok()).ok_or("a byte is not a number of its base")?;
         }
         Ok(Frame::new(id, &data[..usize::from(length)]))
     }
@@ -159,7 +159,7 @@ impl Parser {
 type Found = (Interface, Option<Direction>, Content);
 
 fn interface(channel: &str) -> Result<Interface, &'static str> {
-    channel.parse().map(Interface::numbered).map_err(|_| "the channel is no number")
+    channel.parse().map(Interface::numbered).map_err(|_| "the channel is not a number")
 }
 
 fn direction(word: &str) -> Result<Direction, &'static str> {
@@ -170,7 +170,7 @@ fn direction(word: &str) -> Result<Direction, &'static str> {
     }
 }
 
-/// Writes the lines of a file; the head comes with the first record, whose time it tells.
+/// Writes the lines of a file; the head comes with the first record, whose time it has.
 #[derive(Debug, Default)]
 pub(super) struct Writer {
     begin: Option<Instant>,
@@ -196,7 +196,7 @@ impl Writer {
         output.write_all(b"End TriggerBlock\n")
     }
 
-    /// The file's zero of time, which its head tells to the millisecond.
+    /// The file's zero of time, which its head has to the millisecond.
     fn head(&mut self, output: &mut impl Write, first: Option<Instant>) -> io::Result<Instant> {
         if let Some(begin) = self.begin {
             return Ok(begin);
@@ -312,7 +312,7 @@ mod tests {
             ("1.0 1 EngineData Rx d 0", "symbolic names"),
             ("1.0 1 800 Rx d 0", "beyond 7FF"),
             ("1.0 1 64 Rx d 2 00", "fewer bytes"),
-            ("1.0 1 64 Rx d 2 00 0", "no number of its base"),
+            ("1.0 1 64 Rx d 2 00 0", "not a number of its base"),
             ("1.0 1 64 Rx d 99 00", "from 0 to f"),
             ("1.0 99999999 64 Rx d 0", "the channel"),
             ("date Sat Sep 30 15:06:13 2017\n18446744073.0 1 64 Rx d 0", "beyond all years"),

@@ -1,6 +1,6 @@
 //! Vector's binary logging format (BLF), read.
 //!
-//! A head tells the begin of the measurement; then objects follow, most of them inside containers that are compressed with
+//! A head has the begin of the measurement; then objects follow, most of them inside containers that are compressed with
 //! zlib. An object may go on in the next container, so that what comes out of all containers is one stream. Source: Vector's
 //! published header of the binlog library, and files of its tools; there is no public standard. The begin has no time zone and
 //! is taken for UTC. What is damaged is passed over up to the next signature.
@@ -18,7 +18,7 @@ use super::record::{Content, Direction, Entry, Interface, RawErrorFrame, Record}
 
 pub(super) const FILE_SIGNATURE: [u8; 4] = *b"LOGG";
 pub(super) const OBJECT_SIGNATURE: [u8; 4] = *b"LOBJ";
-/// Head of a file; files tell it, all have this.
+/// Length of the head of a file: a field of the file, the same in all.
 pub(super) const FILE_HEAD: usize = 144;
 /// Where the begin of the measurement stands in it.
 pub(super) const BEGIN_OF_MEASUREMENT: usize = 40;
@@ -58,7 +58,7 @@ const MAX_SIZE: u32 = 16 << 20;
 /// Largest object in a container. None about frames comes near; a damaged length must not swallow the rest of the log.
 const MAX_INNER_SIZE: u32 = 1 << 20;
 
-/// Types that are told of; a damaged file could have four thousand million.
+/// Types that are reported; a damaged file could have four thousand million.
 const MAX_TOLD: usize = 64;
 
 #[derive(Debug)]
@@ -110,10 +110,10 @@ impl<R: Read> BlfReader<R> {
         self.stage = Stage::Objects;
         if read < FILE_HEAD || head[..4] != FILE_SIGNATURE {
             self.stage = Stage::End;
-            return Ok(Some(found(0, "this is no BLF file: it does not begin with LOGG and a head of 144 bytes")));
+            return Ok(Some(found(0, "this is not a BLF file: it does not begin with LOGG and a head of 144 bytes")));
         }
         let fields = std::array::from_fn(|i| u16_at(&head, BEGIN_OF_MEASUREMENT + 2 * i));
-        // No date is no error: the times then count from the begin.
+        // A missing date is not an error: the times then count from the begin.
         self.begin = of_system_time(fields).unwrap_or(Instant::ZERO);
         let longer = u64::from(u32_at(&head, 4)).saturating_sub(FILE_HEAD as u64);
         self.source.skip(longer.min(u64::from(MAX_SIZE)))?;
@@ -257,7 +257,7 @@ fn found(byte: u64, reason: impl Into<String>) -> Finding {
     Finding { place: Place::Byte(byte), text: String::new(), reason: reason.into() }
 }
 
-/// Reads an object; `None` for one that is no frame.
+/// Reads an object; `None` for one that is not a frame.
 fn read_object(object: &[u8], begin: Instant) -> Result<Option<Record>, &'static str> {
     const SHORT: &str = "an object is too short for its type";
     let kind = u32_at(object, 12);
@@ -317,7 +317,7 @@ fn can_id(raw: u32) -> CanId {
     if raw & ID_EXTENDED != 0 { CanId::extended(raw) } else { CanId::standard(raw as u16) }
 }
 
-/// Flags, error code capture, position and frame length tell of Vector's hardware; where they are all 0, the identifier has the
+/// Flags, error code capture, position and frame length are those of Vector's hardware; where they are all 0, the identifier has the
 /// classes as Linux has them (so python-can, and this program, write it).
 fn error_frame(body: &[u8]) -> RawErrorFrame {
     let (class, ecc) = (u32_at(body, 16) & CanId::MAX_EXTENDED, body[8]);

@@ -1,6 +1,6 @@
 //! Vector's binary logging format (BLF), written: see [`super::blf`] for what stands where.
 //!
-//! What was handed on is whole containers, and the head tells of them, so that a file whose writer was killed can be read.
+//! What was handed on is whole containers, and the head counts them, so that a file whose writer was killed can be read.
 
 use std::io::{self, Seek, SeekFrom, Write};
 
@@ -18,7 +18,7 @@ use super::record::{Content, Direction, Record};
 /// A container is written when it holds so much; Vector's own hold 128 KiB.
 const CONTAINER_SIZE: usize = 128 << 10;
 
-/// Version of the format that the head tells: that of files which Vector's and other tools read.
+/// Version of the format that the head names: that of files which Vector's and other tools read.
 const FORMAT_VERSION: [u8; 4] = [2, 6, 8, 1];
 
 #[derive(Debug, Default)]
@@ -68,7 +68,7 @@ impl BlfWriter {
         if self.objects.len() >= CONTAINER_SIZE { self.container(output) } else { Ok(()) }
     }
 
-    /// Writes what there is as a container, and the head that tells of it.
+    /// Writes what there is as a container, and the head that counts it.
     pub(super) fn flush(&mut self, output: &mut (impl Write + Seek)) -> io::Result<()> {
         if self.objects.is_empty() {
             return Ok(());
@@ -86,7 +86,7 @@ impl BlfWriter {
         self.flush(output)
     }
 
-    /// The file's zero of time, which its head tells to the millisecond.
+    /// The file's zero of time, which its head has to the millisecond.
     fn begin(&mut self, output: &mut impl Write, first: Option<Instant>) -> io::Result<Instant> {
         if let Some(begin) = self.begin {
             return Ok(begin);

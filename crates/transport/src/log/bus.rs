@@ -1,4 +1,4 @@
-//! A log as a bus that only tells.
+//! A log as a bus that is only read.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -37,7 +37,7 @@ impl AsyncBus for LogBus {
         Err(BusError::ReadOnly { path: self.path.clone() })
     }
 
-    /// [`BusError::EndOfLog`] behind the last frame. What is no frame is a note; what is torn, at the time of the frame before.
+    /// [`BusError::EndOfLog`] behind the last frame. What is not a frame is a note; what is torn, at the time of the frame before.
     async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
         loop {
             if let Some(received) = self.more.pop_front() {

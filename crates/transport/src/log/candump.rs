@@ -3,7 +3,7 @@
 //! Read are the log form of `candump -l` and `-L` (`(1700000000.123456) can0 604#4041600000000000`, with or without a
 //! direction behind it) and the screen form of plain `candump`, `-ta` and `-td`
 //! (`(1700000000.123456)  can0  604   [8]  40 41 60 00 00 00 00 00`). Written is the log form. Calendar times (`-tA`) are
-//! refused: they need a time zone that the log does not tell.
+//! refused: they need a time zone that the log does not have.
 
 use can::{CanId, Frame, Instant, MAX_DATA_LENGTH, ParseFrameError};
 
@@ -14,7 +14,7 @@ use crate::text::{self, push_hex, push_hex_id, push_padded};
 const ERROR_FLAG: u32 = 0x2000_0000;
 
 /// Appends a line in log form, such as `(1700000000.123456) can0 604#4041600000000000 R`, line feed included. The direction
-/// is left away where it is not known; an FD frame becomes a comment, because its data was not kept.
+/// is omitted where it is not known; an FD frame becomes a comment, because its data was not kept.
 pub fn emit_line(record: &Record, out: &mut Vec<u8>) {
     if matches!(record.content, Content::FdFrame { .. }) {
         out.extend_from_slice(b"# CAN FD: ");
@@ -58,10 +58,10 @@ fn push_frame(frame: &Frame, out: &mut Vec<u8>) {
     }
 }
 
-/// Why a line of a log is no frame.
+/// Why a line of a log is not a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ParseRecordError {
-    /// The parenthesis is not closed, or what stands in it is no number of seconds.
+    /// The parenthesis is not closed, or what stands in it is not a number of seconds.
     #[error("the time stamp must be seconds in parentheses, such as (1700000000.123456); log with candump -L or -ta")]
     TimeStamp,
     /// Nothing behind the time stamp.

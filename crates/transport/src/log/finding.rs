@@ -7,7 +7,7 @@ use std::fmt;
 pub struct Finding {
     /// Where it is.
     pub place: Place,
-    /// What stands there, shortened; empty where it is no text.
+    /// What stands there, shortened; empty where it is not text.
     pub text: String,
     /// What is wrong with it.
     pub reason: String,

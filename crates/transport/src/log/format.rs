@@ -60,7 +60,7 @@ impl Format {
         ROWS.iter().find(is_its).map(|row| row.format)
     }
 
-    /// The one whose files begin so; `None` where that tells none.
+    /// The one whose files begin so; `None` where there is none.
     pub fn of_content(begin: &[u8]) -> Option<Self> {
         match begin {
             [b'L', b'O', b'G', b'G', ..] => return Some(Self::Blf),
@@ -76,7 +76,7 @@ impl Format {
         lines.find_map(|line| of_line(&line.to_ascii_lowercase()))
     }
 
-    /// What a file is that is no log, in a sentence, where its first bytes tell; `by_name` is the form of its extension.
+    /// What a file is that is not a log, in a sentence, where its first bytes show it; `by_name` is the form of its extension.
     pub(super) fn foreign(begin: &[u8], by_name: Option<Self>) -> Option<&'static str> {
         if begin.starts_with(b"\x89MCAP") {
             return Some("this is an MCAP file, a record of signals (ferrodrive plot), not a log of frames");

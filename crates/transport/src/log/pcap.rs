@@ -1,6 +1,6 @@
 //! libpcap's first format (pcap), read: a head, then packets, in either byte order, with microseconds or nanoseconds.
 //!
-//! Source: draft-ietf-opsawg-pcap. A packet tells only its own length, so that nothing behind a damaged one can be found.
+//! Source: draft-ietf-opsawg-pcap. A packet has only its own length, so that nothing behind a damaged one can be found.
 
 use std::io::{self, Read};
 
@@ -68,12 +68,15 @@ impl<R: Read> PcapReader<R> {
                 NANOSECONDS => true,
                 _ => continue,
             };
-            // The upper bits tell of frame check sequences, which CAN has not.
+            // The upper bits are about frame check sequences, which CAN does not have.
             let link = number(swapped, 20) & 0x0FFF_FFFF;
             self.state = State::Packets { swapped, nanos, link };
             return Ok(packet::refused_link(link).map_or(Ok(()), |reason| Err(found(20, reason))));
         }
-        Ok(Err(found(0, "this is no pcap file: it does not begin with A1B2C3D4h or A1B23C4Dh and a head of 24 bytes")))
+        Ok(Err(found(
+            0,
+            "this is not a pcap file: it does not begin with A1B2C3D4h or A1B23C4Dh and a head of 24 bytes",
+        )))
     }
 
     /// `Err` ends the reading.
@@ -169,7 +172,7 @@ mod tests {
         for (bytes, reason) in [
             (&whole[..whole.len() - 1], "ends within a packet"),
             (&whole[..30], "ends within the head of a packet"),
-            (&whole[..20], "no pcap file"),
+            (&whole[..20], "not a pcap file"),
             (&file(false, MICROSECONDS, &[(1, 0, SYNC)])[..24], ""),
         ] {
             let last = entries(bytes).pop();

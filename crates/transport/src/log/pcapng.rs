@@ -1,4 +1,4 @@
-//! Wireshark's format (pcapng), read and written: blocks that tell their length, sections of either byte order, an interface for
+//! Wireshark's format (pcapng), read and written: blocks with their length, sections of either byte order, an interface for
 //! each bus, with its name.
 //!
 //! Source: draft-ietf-opsawg-pcapng. Read are enhanced, simple and obsolete packet blocks; blocks of other types are left out,
@@ -57,7 +57,7 @@ struct Link {
     offset_s: i64,
 }
 
-/// What a block says, or why it is no good; `fatal` if nothing behind it can be found.
+/// What a block says, or why it cannot be read; `fatal` if nothing behind it can be found.
 struct Bad {
     reason: String,
     fatal: bool,
@@ -120,7 +120,7 @@ impl<R: Read> PcapngReader<R> {
                 _ => return fatal("a section has no byte order of pcapng, 1A2B3C4Dh"),
             };
         } else if self.state == State::Begin {
-            return fatal("this is no pcapng file: it does not begin with a section header, 0A0D0D0Ah");
+            return fatal("this is not a pcapng file: it does not begin with a section header, 0A0D0D0Ah");
         }
         let kind = if is_section { SECTION } else { self.number(&head, 0) };
         let length = self.number(&head, 4);
@@ -230,7 +230,7 @@ impl<R: Read> PcapngReader<R> {
     fn packet(&self, of: usize, ticks: Option<u64>, packet: &[u8], flags: u32) -> Result<Option<Record>, Bad> {
         let link = self.interfaces.get(of).ok_or("a packet is of an interface that no block describes")?;
         if packet::refused_link(link.kind).is_some() {
-            // Told once, at the interface.
+            // Reported once, at the interface.
             return Ok(None);
         }
         let Some((direction, content)) = packet::parse(link.kind, packet)? else { return Ok(None) };

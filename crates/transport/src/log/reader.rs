@@ -44,7 +44,7 @@ enum Form<R> {
 pub type AnyLogReader = LogReader<Box<dyn BufRead + Send>>;
 
 impl AnyLogReader {
-    /// The log `path`, or standard input for `-`. Its form is that of its first bytes, where they tell one, else that of its
+    /// The log `path`, or standard input for `-`. Its form is that of its first bytes, where they show one, else that of its
     /// extension, else candump's.
     ///
     /// # Errors

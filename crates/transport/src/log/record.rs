@@ -14,14 +14,14 @@ pub struct Record {
     pub at: Option<Instant>,
     /// On which bus.
     pub interface: Interface,
-    /// Whether the logging program sent it; `None` where the log does not tell.
+    /// Whether the logging program sent it; `None` where the log does not have it.
     pub direction: Option<Direction>,
     /// What was on the bus.
     pub content: Content,
 }
 
 impl Record {
-    /// A frame of the bus called `can0`, of nobody in particular.
+    /// A frame of the bus called `can0`, without a direction.
     pub fn of_frame(at: Instant, frame: Frame) -> Self {
         let content = Content::Frame(frame);
         Self { at: Some(at), interface: Interface::default(), direction: None, content }
@@ -41,7 +41,7 @@ impl Record {
 pub enum Content {
     /// A frame of classical CAN.
     Frame(Frame),
-    /// An error frame, as Linux tells of one.
+    /// An error frame, as Linux reports one.
     Error(RawErrorFrame),
     /// A CAN FD frame, which CANopen (CiA 301) has not; its data is passed over.
     FdFrame {
@@ -104,7 +104,7 @@ pub struct Interface {
 }
 
 impl Interface {
-    /// `name`, with everything that is no printable ASCII replaced, and cut where it is too long.
+    /// `name`, with everything that is not printable ASCII replaced, and cut where it is too long.
     pub fn named(name: &str) -> Self {
         let mut interface = Self { name: [0; MAX_NAME_LENGTH], length: 0 };
         for char in name.chars().take(MAX_NAME_LENGTH) {

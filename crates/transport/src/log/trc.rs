@@ -37,7 +37,7 @@ enum Column {
 
 use Column::{Bus, Data, Direction as Way, Dlc, Id, Kind, Length, Number, Reserved, Time};
 
-/// The columns of the versions that do not tell them, "PEAK CAN TRC File Format", 1.0 to 1.3.
+/// The columns of the versions whose files do not name them, "PEAK CAN TRC File Format", 1.0 to 1.3.
 const VERSIONS: [(&str, &[Column]); 4] = [
     ("1.0", &[Number, Time, Id, Length, Data]),
     ("1.1", &[Number, Time, Way, Id, Length, Data]),
@@ -78,7 +78,7 @@ struct Fields<'a> {
 }
 
 impl Parser {
-    /// Reads a line; `None` for comments and for what is no message.
+    /// Reads a line; `None` for comments and for what is not a message.
     pub(super) fn line(&mut self, line: &str) -> Result<Option<Record>, &'static str> {
         let line = line.trim();
         if let Some(comment) = line.strip_prefix(';') {
@@ -104,9 +104,9 @@ impl Parser {
             (None, Some("Rx" | "Tx") | None) => fields.data_frame()?,
             (None, Some(_)) => return Err("expected Rx or Tx before the identifier"),
         };
-        let at = self.time(fields.time).ok_or("the time is no number of milliseconds, such as 1059.9")?;
+        let at = self.time(fields.time).ok_or("the time is not a number of milliseconds, such as 1059.9")?;
         let interface = match fields.bus {
-            Some(bus) => bus.parse().map(Interface::numbered).map_err(|_| "the bus is no number")?,
+            Some(bus) => bus.parse().map(Interface::numbered).map_err(|_| "the bus is not a number")?,
             None => Interface::default(),
         };
         Ok(Some(Record { at: Some(at), interface, direction, content }))
@@ -119,7 +119,7 @@ impl Parser {
         match key {
             "FILEVERSION" => {
                 let known = VERSIONS.iter().find(|(version, _)| *version == value);
-                // From 2.0 on the columns are told.
+                // From 2.0 on the file names the columns.
                 self.columns = known.map(|(_, columns)| columns.to_vec()).unwrap_or_default();
                 if self.columns.is_empty() && !value.starts_with("2.") {
                     return Err("the version of the file is none from 1.0 to 2.1");
@@ -127,7 +127,7 @@ impl Parser {
             }
             "STARTTIME" => {
                 let days = value.parse().ok().and_then(of_automation_date);
-                self.start = days.ok_or("the start time is no number of days since 1899-12-30")?;
+                self.start = days.ok_or("the start time is not a number of days since 1899-12-30")?;
             }
             "COLUMNS" => {
                 let columns: Option<Vec<Column>> =
@@ -194,7 +194,7 @@ fn column(name: &str) -> Option<Column> {
 
 impl Fields<'_> {
     fn id(&self) -> Result<CanId, &'static str> {
-        let raw = text::parse_hex(self.id, 8).ok_or("the identifier is no hexadecimal number")?;
+        let raw = text::parse_hex(self.id, 8).ok_or("the identifier is not a hexadecimal number")?;
         // 4 digits mean a standard identifier, 8 an extended one, whatever their value.
         match self.id.len() {
             0..=4 if raw <= u32::from(CanId::MAX_STANDARD) => Ok(CanId::standard(raw as u16)),
@@ -204,13 +204,13 @@ impl Fields<'_> {
     }
 
     fn fd_length(&self) -> Result<u8, &'static str> {
-        self.length.parse().ok().filter(|length| *length <= 64).ok_or("the length is no number from 0 to 64")
+        self.length.parse().ok().filter(|length| *length <= 64).ok_or("the length is not a number from 0 to 64")
     }
 
     /// Bytes of a classical frame; a length code above 8 means 8 (ISO 11898-1, 8.4.2.4).
     fn length(&self) -> Result<u8, &'static str> {
         let length: u8 =
-            self.length.parse().ok().filter(|length| *length <= 15).ok_or("the length is no number from 0 to 8")?;
+            self.length.parse().ok().filter(|length| *length <= 15).ok_or("the length is not a number from 0 to 8")?;
         Ok(length.min(MAX_DATA_LENGTH as u8))
     }
 

@@ -26,10 +26,7 @@ enum Form {
 
 /// A format that is only read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "{format} is read and not written; what can be written is told by the extension: {}",
-    Format::written_extensions()
-)]
+#[error("{format} is read and not written; expected a file with the extension {}", Format::written_extensions())]
 pub struct NotWritten {
     /// The format.
     pub format: Format,

@@ -85,7 +85,7 @@ pub(super) fn wrap(unit: u8, out: &mut Vec<u8>, emit: impl FnOnce(&mut Vec<u8>))
 /// How long a frame is by its own account.
 enum Length {
     Known(usize),
-    /// The byte that would tell has not come.
+    /// The byte that decides has not come.
     Missing,
     Unknown,
 }

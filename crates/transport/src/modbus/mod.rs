@@ -3,8 +3,8 @@
 //!
 //! Function codes 03h and 04h read (the registers are the same to both), 06h and 10h write; any other is answered with
 //! exception 01, and a request whose length or quantity contradicts itself with exception 03. The server knows no
-//! registers: each request goes as a [`ModbusRequest`] to whoever has them, and the connection waits for the answer, so
-//! that a client's requests keep their order. A unit that nobody has gets exception 0Bh over TCP, where this end is the
+//! registers: each request goes as a [`ModbusRequest`] to the owner of them, and the connection waits for the answer, so
+//! that a client's requests keep their order. A unit that does not exist gets exception 0Bh over TCP, where this end is the
 //! gateway to the units, and silence on a serial line. [`ModbusSession`] is all of that without sockets.
 
 mod adu;
@@ -76,7 +76,7 @@ fn parse_rtu(place: &str) -> Result<ModbusSpec, String> {
     for option in options.split('&').filter(|option| !option.is_empty()) {
         let value = option.strip_prefix("baud=").ok_or_else(|| format!("unknown option '{option}'; known is baud="))?;
         let parsed = value.parse().ok().filter(|baud| *baud > 0);
-        baud = parsed.ok_or_else(|| format!("'{value}' is no line speed"))?;
+        baud = parsed.ok_or_else(|| format!("'{value}' is not a line speed"))?;
     }
     Ok(ModbusSpec::Rtu { path: path.to_owned(), baud })
 }
@@ -157,7 +157,7 @@ mod tests {
         }
         for text in ["", "1502", "host", "tcp://a:1", "rtu://ttyS0", "rtu:///dev/x?baud=0", "rtu:///dev/x?parity=e"] {
             let error = text.parse::<ModbusSpec>().unwrap_err().to_string();
-            assert!(error.contains("no place to serve Modbus at"), "{error}");
+            assert!(error.contains("is not a place to serve Modbus at"), "{error}");
         }
     }
 }

@@ -31,7 +31,7 @@ pub enum ModbusException {
     IllegalDataAddress = 0x02,
     /// A value out of its range, or a request whose length or quantity contradicts itself.
     IllegalDataValue = 0x03,
-    /// Whoever has the registers failed to answer.
+    /// The owner of the registers failed to answer.
     ServerDeviceFailure = 0x04,
     /// No unit of this number answers behind the gateway.
     GatewayTargetDevice = 0x0B,

@@ -1,4 +1,4 @@
-//! The task that serves one connection or line: bytes to the session, its requests to whoever has the registers, and the
+//! The task that serves one connection or line: bytes to the session, its requests to the owner of the registers, and the
 //! answers back.
 
 use std::io;
@@ -14,7 +14,7 @@ use crate::WallClock;
 /// Read at once, in bytes: two of the longest requests.
 const READ_SIZE: usize = 512;
 
-/// Serves `stream` until it ends, fails, or brings what is no Modbus. A silence on a line lasts `silence`; `heard` is
+/// Serves `stream` until it ends, fails, or brings what is not Modbus. A silence on a line lasts `silence`; `heard` is
 /// called for each request.
 pub(super) async fn serve<T, S>(
     mut stream: S,
@@ -51,7 +51,7 @@ where
     }
 }
 
-/// The answer of whoever has the registers, and may be gone.
+/// The answer of the owner of the registers, who may be gone.
 async fn ask<T: From<ModbusRequest>>(requests: &mpsc::Sender<T>, inquiry: &ModbusInquiry) -> RegisterAnswer {
     let (answer, answered) = oneshot::channel();
     let (unit, broadcast, access) = (inquiry.unit(), inquiry.is_broadcast(), inquiry.access().clone());

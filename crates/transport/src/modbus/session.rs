@@ -10,7 +10,7 @@ const BROADCAST: u8 = 0;
 /// What the units are reached by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModbusMedium {
-    /// This end is the gateway to the units: of one that nobody has it tells with exception 0Bh.
+    /// This end is the gateway to the units: one that does not exist is answered with exception 0Bh.
     Tcp,
     /// Units hear everything and keep silent if it is not for them.
     SerialLine,
@@ -20,7 +20,7 @@ pub enum ModbusMedium {
 ///
 /// # Contract
 /// After each [`receive`](Self::receive) take what [`next_request`](Self::next_request) gives until it gives nothing, one
-/// at a time, and send what [`ModbusInquiry::respond`] appends. On a line tell of a silence with
+/// at a time, and send what [`ModbusInquiry::respond`] appends. On a line report a silence with
 /// [`handle_silence`](Self::handle_silence) while [`awaits_silence`](Self::awaits_silence), and take requests again. What
 /// it keeps of the bytes is bounded by the longest request and what was received last.
 #[derive(Clone, Debug)]
@@ -67,7 +67,7 @@ impl ModbusSession {
         matches!(&self.input, Input::SerialLine(line) if line.is_waiting())
     }
 
-    /// What came is no Modbus: close the connection, there is no telling where the next request would begin.
+    /// What came is not Modbus: close the connection, there is no telling where the next request would begin.
     pub fn is_over(&self) -> bool {
         self.over
     }

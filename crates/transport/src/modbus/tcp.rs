@@ -1,5 +1,5 @@
-//! Modbus TCP: one task a client. What is no Modbus ends its connection: there is no telling where the next request
-//! would begin. When all places are taken, whoever has been idle for longest makes room for the next.
+//! Modbus TCP: one task a client. What is not Modbus ends its connection: there is no telling where the next request
+//! would begin. When all places are taken, the client that has been idle for longest makes room for the next.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -58,6 +58,6 @@ where
     let _ = stream.set_nodelay(true);
     let heard = || vitals.spoke(clock.now());
     let session = ModbusSession::new(ModbusMedium::Tcp);
-    // A client that speaks no Modbus, or is gone, is no news to anybody.
+    // A client that does not speak Modbus, or is gone, is not reported.
     let _ = service::serve(stream, session, &requests, &clock, Duration::ZERO, heard).await;
 }

@@ -2,14 +2,14 @@
 
 use std::fmt;
 
-/// What a controller tells of an error on the wire.
+/// What a controller reports of an error on the wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ErrorFrame {
-    /// What was detected; empty where the controller does not tell.
+    /// What was detected; empty where the controller does not report it.
     pub kinds: ErrorKinds,
-    /// Whether the controller itself was sending; `None` where it does not tell.
+    /// Whether the controller itself was sending; `None` where it does not report that.
     pub transmitting: Option<bool>,
-    /// The error counters, where the controller tells them.
+    /// The error counters, where the controller reports them.
     pub counters: Option<ErrorCounters>,
 }
 
@@ -26,7 +26,7 @@ pub struct ErrorCounters {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum ErrorKind {
-    /// Nobody acknowledged a frame that was sent.
+    /// A frame that was sent was not acknowledged.
     Acknowledge,
     /// A bit on the wire was not the one sent.
     Bit,
@@ -61,7 +61,7 @@ impl ErrorKind {
 impl fmt::Display for ErrorKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Acknowledge => "nobody acknowledged a frame",
+            Self::Acknowledge => "a frame was not acknowledged",
             Self::Bit => "bit error",
             Self::Stuff => "stuff error",
             Self::Form => "form error",
@@ -112,7 +112,7 @@ impl FromIterator<ErrorKind> for ErrorKinds {
 impl fmt::Display for ErrorFrame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.kinds.is_empty() {
-            f.write_str("of a kind that the controller does not tell")?;
+            f.write_str("of a kind that the controller does not report")?;
         }
         for (place, kind) in self.kinds.iter().enumerate() {
             write!(f, "{}{kind}", if place == 0 { "" } else { ", " })?;
@@ -149,6 +149,6 @@ mod tests {
             counters: Some(ErrorCounters { transmit: 8, receive: 0 }),
         };
         assert_eq!(frame.to_string(), "bit error, CRC error while sending (error counters: 8 sent, 0 received)");
-        assert_eq!(ErrorFrame::default().to_string(), "of a kind that the controller does not tell");
+        assert_eq!(ErrorFrame::default().to_string(), "of a kind that the controller does not report");
     }
 }

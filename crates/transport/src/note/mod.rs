@@ -1,7 +1,7 @@
 //! What a live bus says beside frames: the state of the controller, errors on the wire, a connection that went away.
 //!
-//! A [`Note`] is never an error of [`crate::AsyncBus`]: the bus goes on, or comes back. Whoever runs a bus hands notes to
-//! whoever listens ([`crate::run_station`]). Terms are those of ISO 11898-1.
+//! A [`Note`] is never an error of [`crate::AsyncBus`]: the bus goes on, or comes back. The caller that runs a bus hands notes to
+//! its listener ([`crate::run_station`]). Terms are those of ISO 11898-1.
 
 mod error_frame;
 mod suspicion;
@@ -87,7 +87,7 @@ pub enum Note {
     },
     /// The connection is there again.
     ConnectionBack,
-    /// A part of a log that is no frame, and was passed over.
+    /// A part of a log that is not a frame, and was passed over.
     TornRecord(Finding),
 }
 
@@ -113,11 +113,11 @@ impl Note {
         }
     }
 
-    /// What a person at the bus does about it; `None` where nothing is to be done, or the note itself tells.
+    /// What a person at the bus does about it; `None` where nothing is to be done, or the note itself says what.
     pub const fn advice(&self) -> Option<&'static str> {
         match self {
             Self::WrongBitRate => {
-                Some("is the bit rate right? `ip -details link show can0` tells that of an interface")
+                Some("is the bit rate right? `ip -details link show can0` shows that of an interface")
             }
             Self::NoAcknowledge => {
                 Some("is another node on, is the bus terminated at both ends, has everybody the same bit rate?")
@@ -129,7 +129,7 @@ impl Note {
             Self::FdFrame { .. } => Some("a controller of classical CAN would destroy it: keep FD nodes off this bus"),
             Self::Overrun { .. } => Some("this machine is too busy, or the program was stopped for a while"),
             Self::SendQueueFull => Some(
-                "nobody takes the frames (bus-off, no other node), or there are too many: `ip link set can0 txqueuelen 1000`",
+                "no node takes the frames (bus-off, no other node), or there are too many: `ip link set can0 txqueuelen 1000`",
             ),
             _ => None,
         }
@@ -153,7 +153,7 @@ impl fmt::Display for Note {
             Self::Restarted => f.write_str("the controller was bus-off and takes part again"),
             Self::ErrorFrame(error) => write!(f, "error frame: {error}"),
             Self::WrongBitRate => f.write_str("many errors on the wire and no frame"),
-            Self::NoAcknowledge => f.write_str("nobody acknowledges what is sent, and no frame is heard"),
+            Self::NoAcknowledge => f.write_str("what is sent is not acknowledged, and no frame is heard"),
             Self::FdFrame { id, length } => {
                 write!(f, "CAN FD frame {id} with {length} bytes passed over: CANopen has classical frames only")
             }
@@ -209,7 +209,7 @@ mod tests {
         for (note, takes_part) in [
             (Note::State(ControllerState::BusOff), Some(false)),
             (Note::Restarted, Some(true)),
-            // Some drivers tell of no restart, only of the state that comes after.
+            // Some drivers do not report a restart, only of the state that comes after.
             (Note::State(ControllerState::ErrorActive), Some(true)),
             (Note::State(ControllerState::ErrorPassive), Some(true)),
             (Note::Overrun { lost: None }, None),

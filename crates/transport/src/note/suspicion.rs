@@ -1,4 +1,4 @@
-//! What the errors of a bus mean together: a bit rate that is wrong, or nobody who acknowledges.
+//! What the errors of a bus mean together: a bit rate that is wrong, or no node that acknowledges.
 
 use super::{ControllerState, ErrorFrame, ErrorKind, Note, Received};
 
@@ -6,7 +6,7 @@ use super::{ControllerState, ErrorFrame, ErrorKind, Note, Received};
 /// after the other, and a wrong bit rate hits each.
 const GARBLED: u32 = 10;
 
-/// Frames in a row that nobody acknowledged before that is said: a node may be about to boot.
+/// Frames in a row without an acknowledgement before that is reported: a node may be about to boot.
 const UNACKNOWLEDGED: u32 = 3;
 
 /// Counts errors between frames. One for each bus.
@@ -25,7 +25,7 @@ impl Suspicions {
                 None
             }
             Received::Note(Note::ErrorFrame(error)) => self.after_error(*error),
-            // A controller that tells of no single error tells that they add up. One that only listens gets no further
+            // A controller that does not report single errors reports that they add up. One that only listens gets no further
             // than error-passive by a wrong bit rate, and one that sends gets there by the lack of an acknowledgement.
             Received::Note(Note::State(ControllerState::ErrorPassive)) if self.garbled == 0 => {
                 let is_new = self.unacknowledged < UNACKNOWLEDGED;
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn many_errors_and_no_frame_are_a_wrong_bit_rate_and_said_once() {
+    fn many_errors_and_no_frame_are_a_wrong_bit_rate_and_reported_once() {
         let stuff = vec![error(ErrorKind::Stuff); 40];
         assert_eq!(suspected(&stuff), [(10, Note::WrongBitRate)]);
         // A disturbed bus with frames on it has the right one.
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_nobody_acknowledges_are_told_from_a_wrong_bit_rate() {
+    fn frames_that_are_not_acknowledged_are_not_taken_for_a_wrong_bit_rate() {
         let alone = vec![error(ErrorKind::Acknowledge); 40];
         assert_eq!(suspected(&alone), [(3, Note::NoAcknowledge)]);
         let passive = Received::Note(Note::State(ControllerState::ErrorPassive));

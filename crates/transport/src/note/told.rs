@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::Note;
 use crate::BusSpec;
 
-/// Which kinds have been told of a bus, and whether it is there.
+/// Which kinds have been reported of a bus, and whether it is there.
 #[derive(Clone, Debug)]
 pub struct BusNotes {
     bus: String,
@@ -15,7 +15,7 @@ pub struct BusNotes {
 }
 
 impl BusNotes {
-    /// Nothing has been told yet of `bus`.
+    /// Nothing has been reported yet of `bus`.
     pub fn of(bus: &BusSpec) -> Self {
         Self { bus: bus.to_string(), told: BTreeSet::new(), lost: None, troubles: Vec::new() }
     }
@@ -43,7 +43,7 @@ impl BusNotes {
         self.lost.as_deref()
     }
 
-    /// What was told of the bus that somebody has to do something about, each kind once: a likely cause of what fails there.
+    /// What was reported of the bus that a person has to do something about, each kind once: a likely cause of what fails there.
     pub fn troubles(&self) -> impl Iterator<Item = &str> {
         self.troubles.iter().map(String::as_str)
     }

@@ -18,13 +18,13 @@ const PARTING_PATIENCE: Duration = Duration::from_secs(1);
 /// then still goes out.
 ///
 /// The calls keep to the contract of [`Station`]. What `until` does to the station through a handle - a master's command
-/// that queues an SDO request - is noticed at once, because `until` runs inside this loop; whoever does so from another
+/// that queues an SDO request - is noticed at once, because `until` runs inside this loop; a caller that does so from another
 /// task calls `wakeup.notify_one()` behind it. After each such wake-up the station gets a `handle_timeout`, so that its
 /// idea of now is fresh.
 ///
 /// `tell` hears the notes of the bus. A controller that is bus-off is the station's own ([`Station::handle_bus_off`]).
 ///
-/// `handle_transmitted` is called when the connection has taken a frame: a socket does not tell when the wire did.
+/// `handle_transmitted` is called when the connection has taken a frame: a socket does not report when the wire did.
 pub async fn run_station<B, S, U>(
     bus: &mut B,
     station: &mut S,

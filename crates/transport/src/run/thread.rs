@@ -13,7 +13,7 @@ use super::run_station;
 use crate::realtime::{self, RealTimeError};
 use crate::{AnyBus, BusError, BusSpec, Note, WallClock};
 
-/// Notes that may wait for whoever is told of them; further ones are dropped, for a bus waits for nobody.
+/// Notes that may wait for their listener; further ones are dropped, as a bus does not wait.
 const NOTES_WAITING: usize = 256;
 
 /// Why a bus does not run in real time.
@@ -81,7 +81,7 @@ impl BusThread {
                 let _ = ended.send(run.await.map(drop));
             })
         });
-        // A thread that has ended says so below.
+        // A thread that has ended is reported below.
         let _ = self.work.send(work);
         let mut until = pin!(until);
         let output = loop {

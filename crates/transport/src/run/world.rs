@@ -60,7 +60,7 @@ pub trait RealTimeWorld {
         let _ = (client, reason);
     }
 
-    /// How far the world is behind its target, in its own time, told at every turn of the loop and before every command: next to nothing
+    /// How far the world is behind its target, in its own time, reported at every turn of the loop and before every command: next to nothing
     /// while the machine keeps up.
     fn set_lag(&mut self, lag: Duration) {
         let _ = lag;
@@ -81,7 +81,7 @@ pub enum Heard {
     },
     /// A frame was destroyed on the wire, and an error frame followed: all stations see that.
     Error {
-        /// What a controller tells of it.
+        /// What a controller reports of it.
         error: ErrorFrame,
         /// When.
         at: Instant,
@@ -149,7 +149,7 @@ async fn until_due(deadline: Option<Instant>, clock: &WallClock) {
     }
 }
 
-/// Moves the world towards now and tells what was heard; true if now is not reached.
+/// Moves the world towards now and reports what was heard; true if now is not reached.
 fn catch_up(world: &mut impl RealTimeWorld, hub: &Hub, clock: &WallClock) -> bool {
     let began = clock.now();
     let now = world.target(began).max(world.now());

@@ -26,16 +26,16 @@ pub struct SlcanBus {
     decoder: Decoder<Answer>,
     clock: WallClock,
     polling: Polling,
-    /// As the flags told last.
+    /// As the flags were last.
     state: ControllerState,
-    /// What the flags told and was not fetched yet: a handful.
+    /// What the flags showed and was not fetched yet: a handful.
     notes: VecDeque<Note>,
     lines: usize,
     refused: u64,
     malformed: u64,
 }
 
-/// Whether the adapter tells its status flags.
+/// Whether the adapter reports its status flags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Polling {
     /// It does not.
@@ -91,7 +91,7 @@ impl SlcanBus {
         self.refused
     }
 
-    /// Lines that were no slcan: noise on the line, or an extension of the firmware. They are skipped, and told.
+    /// Lines that were not slcan: noise on the line, or an extension of the firmware. They are skipped, and reported.
     pub fn lines_malformed(&self) -> u64 {
         self.malformed
     }
@@ -118,7 +118,7 @@ impl SlcanBus {
             malformed: 0,
         };
         // What an earlier host left half typed ends here, and its channel closes. How many of these lines are answered
-        // differs between adapters; the answer to V tells that all of them have been.
+        // differs between adapters; the answer to V shows that all of them have been.
         for command in [Command::Empty, Command::Empty, Command::Close, Command::Version] {
             bus.link.send(|out| command.emit(out)).await?;
         }
@@ -251,7 +251,7 @@ mod tests {
 
     use super::*;
 
-    /// Answers one line after the other on the adapter's end of a serial line; what it was told.
+    /// Answers one line after the other on the adapter's end of a serial line; what it was sent.
     async fn adapter(mut line: SerialStream, answers: &[&str]) -> String {
         let mut told = Vec::new();
         for answer in answers {

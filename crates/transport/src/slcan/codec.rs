@@ -48,7 +48,7 @@ pub enum Command {
     Empty,
 }
 
-/// What an adapter tells a host.
+/// What an adapter sends to a host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// CR: done.
@@ -75,7 +75,7 @@ pub enum Answer {
     SerialNumber(String),
 }
 
-/// Why a line is no slcan line.
+/// Why a line is not an slcan line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Malformed {
     /// No CR came within [`MAX_LINE_LENGTH`] bytes; the line was skipped.

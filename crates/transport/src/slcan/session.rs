@@ -128,7 +128,7 @@ impl Session for SlcanSession {
         }
     }
 
-    /// The protocol has no message for it: the status tells.
+    /// The protocol has no message for it: the status shows it.
     fn deliver_error(&mut self, _: Instant, _: u32, _: &mut Vec<u8>) {
         if self.is_listening() {
             self.happened |= BUS_ERROR;

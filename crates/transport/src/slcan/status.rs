@@ -13,7 +13,7 @@ const ERROR_PASSIVE: u8 = 0x20;
 const ARBITRATION_LOST: u8 = 0x40;
 pub(super) const BUS_ERROR: u8 = 0x80;
 
-/// The state of the controller that flags tell.
+/// The state of the controller by its flags.
 pub(super) const fn state(flags: u8) -> ControllerState {
     if flags & ERROR_PASSIVE != 0 {
         ControllerState::ErrorPassive
@@ -24,7 +24,7 @@ pub(super) const fn state(flags: u8) -> ControllerState {
     }
 }
 
-/// What flags tell beside the state: they stand for what has been since they were last asked for, and are cleared by that.
+/// What flags show beside the state: they stand for what has been since they were last asked for, and are cleared by that.
 pub(super) fn happened(flags: u8) -> impl Iterator<Item = Note> {
     let has = move |bits: u8| flags & bits != 0;
     let lost = has(ARBITRATION_LOST).then_some(ErrorKind::LostArbitration);

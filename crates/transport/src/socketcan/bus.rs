@@ -30,7 +30,7 @@ const MOST_FILTERS: usize = 512;
 
 /// A bus behind a CAN interface of Linux.
 ///
-/// When the interface goes down or its adapter is unplugged, this says so ([`Note::ConnectionLost`]) and waits until it is up
+/// When the interface goes down or its adapter is unplugged, this is reported ([`Note::ConnectionLost`]), and it waits until it is up
 /// again. A frame that finds the send queue full waits a moment; when the queue is not being emptied it is lost, and so are
 /// those behind it, until one gets through ([`Note::SendQueueFull`]).
 #[derive(Debug)]
@@ -40,12 +40,12 @@ pub struct SocketCanBus {
     connection: Connection,
     /// Identifiers that are asked for; none for all.
     wanted: Vec<CanId>,
-    /// What is to be told next: what one message said, and what sending met.
+    /// What is to be reported next: what one message said, and what sending met.
     waiting: VecDeque<(Instant, Received)>,
     suspicions: Suspicions,
-    /// The time told last: a clock that is set back must not turn time round.
+    /// The time reported last: a clock that is set back must not turn time round.
     last: Instant,
-    /// Messages that the socket had lost when that was last told.
+    /// Messages that the socket had lost when that was last reported.
     lost: u32,
     /// The send queue was full for longer than its patience, and no frame got through since.
     is_stuck: bool,
@@ -88,7 +88,7 @@ impl SocketCanBus {
         Ok(!ids.is_empty())
     }
 
-    /// An interface that is up and has no carrier belongs to a controller that is bus-off, which tells that only once.
+    /// An interface that is up and has no carrier belongs to a controller that is bus-off, which reports that only once.
     fn tell_state(&mut self, has_carrier: bool) {
         if !has_carrier {
             self.tell(Note::State(ControllerState::BusOff));
@@ -99,7 +99,7 @@ impl SocketCanBus {
         self.waiting.push_back((self.clock.now(), note.into()));
     }
 
-    /// Takes in a message: at least one thing to tell.
+    /// Takes in a message: at least one thing to report.
     fn take(&mut self, incoming: Incoming) {
         let now = self.clock.now();
         let at = incoming.stamp.map_or(now, |stamp| self.clock.at_unix(stamp)).clamp(self.last, now);
@@ -119,7 +119,7 @@ impl SocketCanBus {
         }
     }
 
-    /// An answer of the system that is no frame: the interface went away and may come back, or the bus is of no use.
+    /// An answer of the system that is not a frame: the interface went away and may come back, or the bus is of no use.
     fn lose(&mut self, error: io::Error) -> Result<(), BusError> {
         let problem = InterfaceProblem::of(&self.interface, error);
         if !problem.may_pass() {

@@ -1,6 +1,6 @@
 //! Error messages of Linux CAN, as notes: the class in the identifier and the eight bytes behind it.
 //!
-//! Source: the kernel's `include/uapi/linux/can/error.h`. A driver fills in what its controller tells; one message may say
+//! Source: the kernel's `include/uapi/linux/can/error.h`. A driver fills in what its controller reports; one message may say
 //! several things, and a server of socketcand passes on the class alone.
 
 use crate::note::{ControllerState, ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds, Note};
@@ -17,7 +17,7 @@ mod class {
     pub(super) const BUS_ERROR: u32 = 0x080;
     pub(super) const RESTARTED: u32 = 0x100;
     pub(super) const COUNTERS: u32 = 0x200;
-    /// Classes that tell of an error frame on the wire, or of a lost arbitration.
+    /// Classes of an error frame on the wire, or of a lost arbitration.
     pub(super) const ON_THE_WIRE: u32 = LOST_ARBITRATION | PROTOCOL | TRANSCEIVER | NO_ACKNOWLEDGE | BUS_ERROR;
 }
 
@@ -39,7 +39,7 @@ mod protocol {
     pub(super) const TX: u8 = 0x80;
 }
 
-/// Values of byte 3: where in the frame (`CAN_ERR_PROT_LOC_*`). What controllers have no kind for is told by its place.
+/// Values of byte 3: where in the frame (`CAN_ERR_PROT_LOC_*`). What controllers have no kind for is named by its place.
 mod location {
     pub(super) const CRC_SEQUENCE: u8 = 0x08;
     pub(super) const CRC_DELIMITER: u8 = 0x18;
@@ -132,7 +132,7 @@ mod tests {
             // sja1000: bus error, "other" at the acknowledge slot while sending.
             (0x088, [0, 0, 0x80, 0x19, 0, 0, 0, 0], &[error(&[Acknowledge], true, None)]),
             (0x088, [0, 0, 0x80, 0x08, 0, 0, 0, 0], &[error(&[Crc], true, None)]),
-            // A stuff error inside the checksum is no error of the checksum.
+            // A stuff error inside the checksum is not an error of the checksum.
             (0x088, [0, 0, 0x04, 0x08, 0, 0, 0, 0], &[error(&[Stuff], false, None)]),
             (0x288, [0, 0, 0x02, 0x00, 0, 0, 8, 96], &[error(&[Form], false, Some((8, 96)))]),
             (0x088, [0, 0, 0x90, 0, 0, 0, 0, 0], &[error(&[Bit], true, None)]),

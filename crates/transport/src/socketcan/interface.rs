@@ -1,10 +1,10 @@
-//! What Linux tells of its CAN interfaces (in `/sys/class/net`), and what stands in the way of opening one.
+//! What Linux reports of its CAN interfaces (in `/sys/class/net`), and what stands in the way of opening one.
 
 use std::fs;
 use std::io;
 use std::path::Path;
 
-/// Where interfaces are told of.
+/// Where interfaces are listed.
 pub(super) const SYSTEM: &str = "/sys/class/net";
 
 /// Kind of hardware of a CAN interface (`ARPHRD_CAN`, `linux/if_arp.h`).
@@ -33,7 +33,7 @@ pub enum InterfaceProblem {
         is_virtual: bool,
     },
     /// An interface of another kind.
-    #[error("{name} is no CAN interface{}", others(.existing))]
+    #[error("{name} is not a CAN interface{}", others(.existing))]
     NotCan {
         /// Its name.
         name: String,
@@ -118,7 +118,7 @@ pub(super) fn look(system: &Path, name: &str) -> Result<bool, InterfaceProblem> 
         text.strip_prefix("0x").map_or_else(|| text.parse().ok(), |digits| u32::from_str_radix(digits, 16).ok())
     };
     match number("type") {
-        // A system that tells nothing of interfaces may have it all the same: opening it shows that.
+        // A system that reports nothing of interfaces may have it all the same: opening it shows that.
         None if !system.is_dir() => return Ok(true),
         None => return Err(InterfaceProblem::Missing { name: name.to_owned(), existing: existing(system) }),
         Some(HARDWARE_CAN) => {}
@@ -187,9 +187,9 @@ mod tests {
         assert_eq!(said("can1"), "can1 is down: ip link set can1 up type can bitrate 500000");
         assert_eq!(said("vcan0"), "vcan0 is down: ip link set vcan0 up");
         assert_eq!(said("can7"), "there is no interface can7; there is can0, can1, can2, vcan0");
-        assert_eq!(said("eth0"), "eth0 is no CAN interface; there is can0, can1, can2, vcan0");
+        assert_eq!(said("eth0"), "eth0 is not a CAN interface; there is can0, can1, can2, vcan0");
         fs::remove_dir_all(&system).unwrap();
-        assert!(look(&system, "can0").unwrap(), "a system that tells nothing may have it");
+        assert!(look(&system, "can0").unwrap(), "a system that reports nothing may have it");
     }
 
     #[test]

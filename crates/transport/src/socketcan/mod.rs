@@ -1,6 +1,6 @@
 //! CAN of the Linux kernel: an interface such as `can0` or `vcan0` as a bus.
 //!
-//! [`wire`] and [`error_class`] are the kernel's forms without a kernel, [`interface`] what the system tells of its interfaces,
+//! [`wire`] and [`error_class`] are the kernel's forms without a kernel, [`interface`] what the system reports of its interfaces,
 //! [`socket`] the only place that calls it, [`bus`] what comes of it: an interface that goes down and comes back.
 
 #[cfg(target_os = "linux")]

@@ -13,7 +13,7 @@ use tokio::io::unix::AsyncFd;
 
 use super::wire::{self, FD_LENGTH, Message};
 
-/// What a reader waits for: messages, and that the interface goes down, which the kernel tells as an error without a message.
+/// What a reader waits for: messages, and that the interface goes down, which the kernel reports as an error without a message.
 const HEARS: Interest = Interest::READABLE.add(Interest::ERROR);
 
 /// A socket that hears everything on its interface but what it sent itself.
@@ -28,7 +28,7 @@ pub(super) struct Socket {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Incoming {
     pub(super) message: Message,
-    /// Unix time at which the kernel had it from the driver; `None` where it does not tell.
+    /// Unix time at which the kernel had it from the driver; `None` where it does not report that.
     pub(super) stamp: Option<Duration>,
     /// How many messages the socket has lost since it was opened, for want of room.
     pub(super) lost: u32,

@@ -117,8 +117,8 @@ impl AsyncBus for SocketcandBus {
     }
 }
 
-/// `< error 004 23.424242 >` tells of an error frame on the bus: class (with or without the flag of error messages) and
-/// time. It is no answer to a request.
+/// `< error 004 23.424242 >` reports an error frame on the bus: class (with or without the flag of error messages) and
+/// time. It is not an answer to a request.
 fn error_class(said: &str) -> Option<u32> {
     let mut words = said.split_ascii_whitespace();
     let class = text::parse_hex(words.next()?, 8)?;

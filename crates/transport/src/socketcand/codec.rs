@@ -30,7 +30,7 @@ pub enum Request {
     Unsupported(&'static str),
 }
 
-/// What a server tells a client.
+/// What a server sends to a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reply {
     /// `< hi >`: the greeting.
@@ -51,7 +51,7 @@ pub enum Reply {
     Error(String),
 }
 
-/// Why a piece of a socketcand stream is no message.
+/// Why a piece of a socketcand stream is not a message.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Malformed {
     /// No `>` came within [`MAX_MESSAGE_LENGTH`] bytes; the message was skipped up to its `>`.

@@ -2,7 +2,7 @@
 //!
 //! Source: `doc/protocol.md` of the linux-can/socketcand project. Here are its raw mode and the way there; the broadcast
 //! manager (`add`, `subscribe`, `filter`, ..), control mode, ISO-TP and the UDP beacon are deliberately absent, and a
-//! server says so to a client that asks.
+//! server answers that to a client that asks.
 
 mod client;
 mod codec;
@@ -12,5 +12,5 @@ pub use client::SocketcandBus;
 pub use codec::{Decoder, MAX_MESSAGE_LENGTH, Malformed, Message, Reply, Request};
 pub(crate) use session::SocketcandSession;
 
-/// The port that socketcand listens on unless told otherwise.
+/// The port that socketcand listens on by default.
 pub const DEFAULT_PORT: u16 = 29_536;

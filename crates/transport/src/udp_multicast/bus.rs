@@ -16,7 +16,7 @@ use crate::{AsyncBus, BusError, Received, WallClock};
 pub struct UdpMulticastBus {
     datagrams: Datagrams,
     sender: UdpSocket,
-    /// Port of `sender`: no two programs of a machine have the same. Other machines may; then the address tells.
+    /// Port of `sender`: no two programs of a machine have the same. Other machines may; then the address distinguishes them.
     own_port: u16,
     /// From which address own frames come back, once one has.
     own_ip: Option<IpAddr>,

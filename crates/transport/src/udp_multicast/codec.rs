@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Longest data of a CAN FD frame.
 const MAX_FD_LENGTH: usize = 64;
 
-/// A `can.Message`. What a sender leaves away is as the constructor of `can.Message` has it.
+/// A `can.Message`. What a sender omits is as the constructor of `can.Message` has it.
 #[derive(Debug, Deserialize, Serialize)]
 struct Message<'a> {
     /// Unix time, in s.
@@ -57,14 +57,14 @@ pub enum Item {
     Error,
 }
 
-/// Why bytes are no message of python-can.
+/// Why bytes are not a message of python-can.
 #[derive(Debug, thiserror::Error)]
 pub enum Malformed {
     /// No MessagePack, or a map that lacks what a message has.
     #[error("no message of python-can: {0}")]
     Map(#[from] rmp_serde::decode::Error),
     /// A map whose values do not make a frame.
-    #[error("identifier {id:X}h with {length} bytes is no CAN frame")]
+    #[error("identifier {id:X}h with {length} bytes is not a CAN frame")]
     Frame {
         /// `arbitration_id`.
         id: u32,
@@ -192,9 +192,9 @@ mod tests {
             parse(&rmp_serde::to_vec_named(&message).unwrap())
         };
         let said = |result: Result<Item, Malformed>| result.unwrap_err().to_string();
-        assert_eq!(said(packed(|_| {})), "identifier 181h with 9 bytes is no CAN frame");
-        assert_eq!(said(packed(|m| m.arbitration_id = 0x800)), "identifier 800h with 9 bytes is no CAN frame");
-        assert_eq!(said(packed(|m| m.is_remote_frame = true)), "identifier 181h with 9 bytes is no CAN frame");
+        assert_eq!(said(packed(|_| {})), "identifier 181h with 9 bytes is not a CAN frame");
+        assert_eq!(said(packed(|m| m.arbitration_id = 0x800)), "identifier 800h with 9 bytes is not a CAN frame");
+        assert_eq!(said(packed(|m| m.is_remote_frame = true)), "identifier 181h with 9 bytes is not a CAN frame");
         let fd = packed(|m| m.is_fd = true).unwrap();
         assert_eq!(fd, Item::FdFrame { id: CanId::standard(0x181), length: 9 });
         assert_eq!(packed(|m| m.is_error_frame = true).unwrap(), Item::Error);

@@ -1,6 +1,6 @@
 //! python-can's `udp_multicast`: a bus of all programs of a network that joined the same multicast group.
 //!
-//! Source: `can/interfaces/udp_multicast` of python-can 4.6. There is no arbitration and nobody acknowledges: a frame is heard by who
+//! Source: `can/interfaces/udp_multicast` of python-can 4.6. There is neither arbitration nor acknowledgement: a frame is heard by who
 //! is there.
 
 mod bus;

@@ -45,7 +45,7 @@ const TROUBLE: &[&str] =
 #[test]
 fn dump_shows_each_note_among_the_frames() {
     let lines = dumped(&server(TROUBLE), &[], 4);
-    for (line, part) in lines.iter().zip(["nobody acknowledged", "704#05", "bus-off", "takes part again"]) {
+    for (line, part) in lines.iter().zip(["was not acknowledged", "704#05", "bus-off", "takes part again"]) {
         assert!(line.contains(part), "{part} in {lines:#?}");
     }
     assert_eq!(lines.len(), 4);

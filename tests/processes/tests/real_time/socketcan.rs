@@ -316,7 +316,7 @@ fn a_send_queue_that_nobody_empties_is_said_once() {
 #[test]
 #[ignore = "needs the interfaces of cargo xtask vcan-test"]
 fn an_interface_that_is_not_there_or_of_another_kind_is_said_with_those_that_are() {
-    for (bus, text) in [("can9", "there is no interface can9"), ("lo", "lo is no CAN interface")] {
+    for (bus, text) in [("can9", "there is no interface can9"), ("lo", "lo is not a CAN interface")] {
         let refused = ferrodrive(&["--bus", bus, "scan"]);
         assert_eq!(refused.status, Some(1));
         assert!(refused.err.contains(text) && refused.err.contains("vcan0"), "{}", refused.err);

@@ -87,7 +87,7 @@ async fn a_cannelloni_peer_that_is_not_there_is_told_once_and_may_come() {
     });
     let told = told.await;
     assert!(
-        matches!(&told, Received::Note(Note::ConnectionLost { reason }) if reason.contains("nobody listens at 127.0.0.1:"))
+        matches!(&told, Received::Note(Note::ConnectionLost { reason }) if reason.contains("no program listens at 127.0.0.1:"))
     );
     for _ in 0..5 {
         bus.send(&frame("080#")).await.unwrap();
