@@ -3,29 +3,17 @@
 
 use clap::Command;
 
-/// What one wants who types a word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sense {
-    /// To see something, or to stop: no tip may set a motor in motion.
-    Looks,
-    /// To change or to move something.
-    Acts,
-}
-
 /// Words of one sense, and what is typed here in their place. A word may be two: `sdo read`.
 struct Row {
     words: &'static [&'static str],
-    sense: Sense,
     tips: &'static [&'static str],
 }
-
-use Sense::{Acts, Looks};
 
 /// Commands that may set a motor in motion, or give it power.
 const MOVING: [&str; 8] = ["enable", "velocity", "move", "torque", "home", "group", "drive-base", "replay"];
 
-const ROWS: &[Row] = &[
-    // Stopping.
+/// Words of who wants to see something, or to have it stop: no tip may set a motor in motion.
+const LOOKING: &[Row] = &[
     Row {
         words: &[
             "e-stop",
@@ -38,31 +26,25 @@ const ROWS: &[Row] = &[
             "panic",
             "kill",
         ],
-        sense: Looks,
         tips: &["estop", "stop 4"],
     },
-    Row { words: &["quickstop", "quick_stop", "brake"], sense: Looks, tips: &["quick-stop 4", "estop"] },
-    // Looking at a bus.
+    Row { words: &["quickstop", "quick_stop", "brake"], tips: &["quick-stop 4", "estop"] },
     Row {
         words: &["candump", "sniff", "sniffer", "cansniffer", "listen", "can", "frames", "canmon", "can-monitor"],
-        sense: Looks,
         tips: &["dump"],
     },
-    Row { words: &["monitor", "mon", "live"], sense: Looks, tips: &["top", "watch 4 statusword 606C", "dump"] },
+    Row { words: &["monitor", "mon", "live"], tips: &["top", "watch 4 statusword 606C", "dump"] },
     Row {
         words: &["list", "ls", "devices", "discover", "nodes", "node list", "search", "ping", "who", "bus"],
-        sense: Looks,
         tips: &["scan"],
     },
-    Row { words: &["info", "identify", "id", "describe", "node info"], sense: Looks, tips: &["scan", "state 4"] },
-    Row { words: &["heartbeat", "hb", "alive"], sense: Looks, tips: &["scan", "supervise"] },
-    Row { words: &["canbusload", "busload", "load"], sense: Looks, tips: &["plan", "top"] },
-    Row { words: &["nmt-state", "lifecycle"], sense: Looks, tips: &["scan", "nmt 4 start --wait"] },
-    // Looking at a drive.
-    Row { words: &["status", "stat", "show", "drv-status", "query"], sense: Looks, tips: &["state 4"] },
+    Row { words: &["info", "identify", "id", "describe", "node info"], tips: &["scan", "state 4"] },
+    Row { words: &["heartbeat", "hb", "alive"], tips: &["scan", "supervise"] },
+    Row { words: &["canbusload", "busload", "load"], tips: &["plan", "top"] },
+    Row { words: &["nmt-state", "lifecycle"], tips: &["scan", "nmt 4 start --wait"] },
+    Row { words: &["status", "stat", "show", "drv-status", "query"], tips: &["state 4"] },
     Row {
         words: &["temperature", "voltage", "current", "statusword", "encoder", "angle"],
-        sense: Looks,
         tips: &["state 4", "watch 4 statusword 6064"],
     },
     Row {
@@ -80,47 +62,16 @@ const ROWS: &[Row] = &[
             "why",
             "doctor",
         ],
-        sense: Looks,
         tips: &["explain 4", "state 4", "emcy show 4"],
     },
-    Row { words: &["emergencies", "emergency-messages"], sense: Looks, tips: &["emcy watch"] },
-    Row {
-        words: &[
-            "clear",
-            "clear-faults",
-            "clear_errors",
-            "clear-errors",
-            "ack",
-            "acknowledge",
-            "reset-fault",
-            "fault-reset",
-        ],
-        sense: Acts,
-        tips: &["reset 4"],
-    },
-    // Objects.
+    Row { words: &["emergencies", "emergency-messages"], tips: &["emcy watch"] },
     Row {
         words: &["get", "sdo read", "sdo get", "sdo upload", "sdo", "upload", "param get", "rd", "peek"],
-        sense: Looks,
         tips: &["read 4 6064"],
     },
-    Row {
-        words: &["set", "sdo write", "sdo set", "sdo download", "download", "param set", "wr", "poke", "assign"],
-        sense: Acts,
-        tips: &["write 4 6081 120"],
-    },
-    Row {
-        words: &["od", "dictionary", "dict", "objdict", "param list", "registers"],
-        sense: Looks,
-        tips: &["objects 4"],
-    },
-    Row {
-        words: &["topic", "echo", "follow-object", "tail", "poll"],
-        sense: Looks,
-        tips: &["watch 4 statusword 606C"],
-    },
-    Row { words: &["mapping", "rpdo", "tpdo"], sense: Looks, tips: &["pdo show 4"] },
-    // Parameters.
+    Row { words: &["od", "dictionary", "dict", "objdict", "param list", "registers"], tips: &["objects 4"] },
+    Row { words: &["topic", "echo", "follow-object", "tail", "poll"], tips: &["watch 4 statusword 606C"] },
+    Row { words: &["mapping", "rpdo", "tpdo"], tips: &["pdo show 4"] },
     Row {
         words: &[
             "backup",
@@ -131,53 +82,15 @@ const ROWS: &[Row] = &[
             "export-config",
             "save-config",
         ],
-        sense: Looks,
         tips: &["params backup 4 -o drive.toml"],
     },
-    Row {
-        words: &[
-            "restore-config",
-            "restore_config",
-            "param load",
-            "load-config",
-            "import",
-            "apply",
-            "configure",
-            "config",
-        ],
-        sense: Acts,
-        tips: &["params plan 4 drive.toml", "params apply 4 drive.toml", "params backup 4 -o drive.toml"],
-    },
-    Row { words: &["param", "parameter", "parameters"], sense: Looks, tips: &["params backup 4", "read 4 6081"] },
-    Row { words: &["store", "save_configuration", "persist"], sense: Acts, tips: &["save 4"] },
-    Row {
-        words: &["factory-reset", "factory", "defaults", "erase", "erase_configuration", "erase-config"],
-        sense: Acts,
-        tips: &["restore 4"],
-    },
-    Row { words: &["reboot", "restart"], sense: Acts, tips: &["nmt 4 reset --wait"] },
-    Row {
-        words: &["set-id", "node-id", "nodeid", "address", "baudrate", "bitrate", "baud"],
-        sense: Acts,
-        tips: &["lss scan", "lss set --help"],
-    },
+    Row { words: &["param", "parameter", "parameters"], tips: &["params backup 4", "read 4 6081"] },
     Row {
         words: &["tune", "tuning", "gains", "pid", "autotune"],
-        sense: Looks,
         tips: &["objects 4 gain", "record 4 606C 6077 --out run.mcap --for 5s", "params backup 4 -o gains.toml"],
     },
-    // Frames and logs.
-    Row {
-        words: &["cansend", "cangen", "transmit", "tx", "pub", "publish"],
-        sense: Acts,
-        tips: &["send 604#4041600000000000"],
-    },
-    Row {
-        words: &["log", "logger", "canlogger", "candump-log", "save-log"],
-        sense: Looks,
-        tips: &["dump --log trace.log"],
-    },
-    Row { words: &["trace", "tracing", "spy"], sense: Looks, tips: &["dump", "dump --log trace.log", "state 4 -v"] },
+    Row { words: &["log", "logger", "canlogger", "candump-log", "save-log"], tips: &["dump --log trace.log"] },
+    Row { words: &["trace", "tracing", "spy"], tips: &["dump", "dump --log trace.log", "state 4 -v"] },
     Row {
         words: &[
             "scope",
@@ -191,56 +104,80 @@ const ROWS: &[Row] = &[
             "bag record",
             "bag",
         ],
-        sense: Looks,
         tips: &["top", "studio", "record 4 606C 6077 --out run.mcap --for 5s"],
     },
-    Row { words: &["graph", "draw", "chart"], sense: Looks, tips: &["plot run.mcap"] },
-    Row {
-        words: &["canplayer", "play", "playback", "bag play"],
-        sense: Acts,
-        tips: &["replay trace.log --skip-motion"],
-    },
-    Row {
-        words: &["log2asc", "asc2log", "log2long", "export-log"],
-        sense: Looks,
-        tips: &["convert trace.log trace.asc"],
-    },
-    Row { words: &["parse", "decoder"], sense: Looks, tips: &["decode trace.log"] },
-    Row { words: &["dbc"], sense: Looks, tips: &["export dbc"] },
-    Row { words: &["lint", "validate", "verify"], sense: Looks, tips: &["check machine.toml", "eds lint vendor.eds"] },
-    // Programs around.
-    Row { words: &["gui", "ui", "web", "dashboard", "serve", "browser"], sense: Looks, tips: &["studio"] },
-    Row { words: &["shell", "console", "repl", "interactive", "tui", "htop"], sense: Looks, tips: &["top", "studio"] },
+    Row { words: &["graph", "draw", "chart"], tips: &["plot run.mcap"] },
+    Row { words: &["log2asc", "asc2log", "log2long", "export-log"], tips: &["convert trace.log trace.asc"] },
+    Row { words: &["parse", "decoder"], tips: &["decode trace.log"] },
+    Row { words: &["dbc"], tips: &["export dbc"] },
+    Row { words: &["lint", "validate", "verify"], tips: &["check machine.toml", "eds lint vendor.eds"] },
+    Row { words: &["gui", "ui", "web", "dashboard", "serve", "browser"], tips: &["studio"] },
+    Row { words: &["shell", "console", "repl", "interactive", "tui", "htop"], tips: &["top", "studio"] },
     Row {
         words: &["simulate", "simulator", "emulate", "virtual", "mock", "start-sim"],
-        sense: Looks,
         tips: &["sim --drive zlac8030l@4 --serve socketcand://127.0.0.1:29536"],
     },
-    Row { words: &["test", "scenario", "scenarios"], sense: Looks, tips: &["run scenario.toml", "demo"] },
-    Row { words: &["launch", "bringup", "up", "start"], sense: Acts, tips: &["boot", "nmt 4 start"] },
-    Row { words: &["connect", "open", "interface", "interfaces"], sense: Looks, tips: &["--bus can0 scan"] },
-    Row { words: &["version"], sense: Looks, tips: &["--version"] },
-    // Motion.
-    Row { words: &["on", "arm", "power-on", "torque-on", "closed_loop_control"], sense: Acts, tips: &["enable 4"] },
-    Row { words: &["off", "disarm", "idle", "power-off", "torque-off", "release"], sense: Looks, tips: &["disable 4"] },
+    Row { words: &["test", "scenario", "scenarios"], tips: &["run scenario.toml", "demo"] },
+    Row { words: &["connect", "open", "interface", "interfaces"], tips: &["--bus can0 scan"] },
+    Row { words: &["version"], tips: &["--version"] },
+    Row { words: &["off", "disarm", "idle", "power-off", "torque-off", "release"], tips: &["disable 4"] },
+];
+
+/// Words of who wants to change or to move something.
+const ACTING: &[Row] = &[
     Row {
-        words: &["jog", "spin", "rotate", "turn"],
-        sense: Acts,
-        tips: &["velocity 4 60rpm --for 2s", "move 4 --relative 90deg"],
+        words: &[
+            "clear",
+            "clear-faults",
+            "clear_errors",
+            "clear-errors",
+            "ack",
+            "acknowledge",
+            "reset-fault",
+            "fault-reset",
+        ],
+        tips: &["reset 4"],
     },
-    Row { words: &["speed", "vel", "rpm"], sense: Acts, tips: &["state 4", "velocity 4 60rpm"] },
-    Row { words: &["goto", "go", "pos", "position", "moveto", "mv"], sense: Acts, tips: &["state 4", "move 4 90deg"] },
+    Row {
+        words: &["set", "sdo write", "sdo set", "sdo download", "download", "param set", "wr", "poke", "assign"],
+        tips: &["write 4 6081 120"],
+    },
+    Row {
+        words: &[
+            "restore-config",
+            "restore_config",
+            "param load",
+            "load-config",
+            "import",
+            "apply",
+            "configure",
+            "config",
+        ],
+        tips: &["params plan 4 drive.toml", "params apply 4 drive.toml", "params backup 4 -o drive.toml"],
+    },
+    Row { words: &["store", "save_configuration", "persist"], tips: &["save 4"] },
+    Row {
+        words: &["factory-reset", "factory", "defaults", "erase", "erase_configuration", "erase-config"],
+        tips: &["restore 4"],
+    },
+    Row { words: &["reboot", "restart"], tips: &["nmt 4 reset --wait"] },
+    Row {
+        words: &["set-id", "node-id", "nodeid", "address", "baudrate", "bitrate", "baud"],
+        tips: &["lss scan", "lss set --help"],
+    },
+    Row { words: &["cansend", "cangen", "transmit", "tx", "pub", "publish"], tips: &["send 604#4041600000000000"] },
+    Row { words: &["canplayer", "play", "playback", "bag play"], tips: &["replay trace.log --skip-motion"] },
+    Row { words: &["launch", "bringup", "up", "start"], tips: &["boot", "nmt 4 start"] },
+    Row { words: &["on", "arm", "power-on", "torque-on", "closed_loop_control"], tips: &["enable 4"] },
+    Row { words: &["jog", "spin", "rotate", "turn"], tips: &["velocity 4 60rpm --for 2s", "move 4 --relative 90deg"] },
+    Row { words: &["speed", "vel", "rpm"], tips: &["state 4", "velocity 4 60rpm"] },
+    Row { words: &["goto", "go", "pos", "position", "moveto", "mv"], tips: &["state 4", "move 4 90deg"] },
     Row {
         words: &["calibrate", "calibration", "zero", "set-zero", "homing", "reference"],
-        sense: Acts,
         tips: &["home 4 --method 35", "state 4"],
     },
-    Row { words: &["follow", "trajectory", "path", "interpolate"], sense: Acts, tips: &["group move 1=90deg 4=90deg"] },
-    Row {
-        words: &["drive", "cmd_vel", "twist"],
-        sense: Acts,
-        tips: &["drive-base examples/base.toml --linear 0.2 --for 2s"],
-    },
+    Row { words: &["follow", "trajectory", "path", "interpolate"], tips: &["group move 1=90deg 4=90deg"] },
+    Row { words: &["drive", "cmd_vel", "twist"], tips: &["drive-base examples/base.toml --linear 0.2 --for 2s"] },
 ];
 
 /// What is typed here in place of an unknown command, with the word behind it where that belongs to it.
@@ -248,7 +185,7 @@ pub(crate) fn tips(word: &str, behind: Option<&str>) -> Option<Vec<String>> {
     let two = behind.map(|behind| format!("{word} {behind}"));
     let said = |words: &str| {
         let words = words.to_ascii_lowercase();
-        ROWS.iter().find(|row| row.words.contains(&words.as_str()))
+        LOOKING.iter().chain(ACTING).find(|row| row.words.contains(&words.as_str()))
     };
     let row = two.and_then(|two| said(&two)).or_else(|| said(word))?;
     Some(row.tips.iter().map(|tip| format!("ferrodrive {tip}")).collect())
@@ -293,10 +230,11 @@ mod tests {
     #[test]
     fn every_tip_is_a_line_that_the_parser_takes_and_no_word_is_a_command() {
         let command = command_line();
-        for row in ROWS {
+        let all = || LOOKING.iter().chain(ACTING);
+        for row in all() {
             for word in row.words {
                 assert!(command.find_subcommand(word).is_none(), "{word} is a command");
-                assert!(ROWS.iter().filter(|other| other.words.contains(word)).count() == 1, "{word} is there twice");
+                assert!(all().filter(|other| other.words.contains(word)).count() == 1, "{word} is there twice");
             }
             for tip in row.tips {
                 // A machine file is read while the line is parsed.
@@ -310,7 +248,7 @@ mod tests {
 
     #[test]
     fn a_word_for_looking_or_stopping_is_never_answered_with_what_moves_a_motor() {
-        for row in ROWS.iter().filter(|row| row.sense == Looks) {
+        for row in LOOKING {
             for tip in row.tips {
                 assert!(!tip.split(' ').any(|word| MOVING.contains(&word)), "{:?}: {tip}", row.words);
             }
