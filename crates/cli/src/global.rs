@@ -1,11 +1,14 @@
 //! What every command takes from the command line.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
+use clap::ArgMatches;
+use clap::parser::ValueSource;
 use transport::BusSpec;
 
+use crate::failure::Failure;
 use crate::recording::{LogPath, log_path};
 use testbench::machine_file::{self, Machine};
 use testbench::models::Description;
@@ -30,10 +33,11 @@ pub(crate) struct Global {
     #[arg(long = "model", value_name = "NODE=MODEL", value_parser = node_model, global = true)]
     pub(crate) models: Vec<(NodeId, &'static Description)>,
 
-    /// Machine file that says which models are where on a real bus; `sim` serves the drives that it describes
+    /// Machine file: which models are where, behind which gears; on a virtual bus its drives are there
     ///
-    /// On a real bus the `model` and `node` of each [[drive]] count. The same file describes a bus of a command's own to --bus
-    /// sim:FILE.toml, which knows its drives.
+    /// On a real bus the `model`, `node` and `units` of each [[drive]] count, and what is moved as one. On the virtual bus of a command's
+    /// own it is the short form of --bus sim:FILE.toml, and `sim` serves the drives that it describes. A command that takes a machine
+    /// file as an argument takes it here too.
     #[arg(long, value_name = "FILE.toml", value_parser = machine_file::machine, env = "FERRODRIVE_MACHINE", global = true)]
     pub(crate) machine: Option<Machine>,
 
@@ -56,18 +60,76 @@ pub(crate) struct Global {
     /// Longest wait for each answer of a node
     #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "500ms", global = true)]
     pub(crate) timeout: Duration,
+
+    /// Where the machine file is, and whether the command line names it.
+    #[arg(skip)]
+    pub(crate) machine_file: Option<MachineFile>,
+}
+
+/// Where the machine file of `--machine` or of the environment is.
+#[derive(Clone, Debug)]
+pub(crate) struct MachineFile {
+    pub(crate) path: PathBuf,
+    /// By `--machine`; else by the environment, which a file of the command line overrules.
+    pub(crate) is_typed: bool,
 }
 
 impl Global {
-    /// The command line with a machine file that a command names itself: on the virtual bus of a command's own, its drives are
+    /// The command line with the machine file where the command looks for it: on the virtual bus of a command's own its drives are
     /// there.
-    pub(crate) fn on_machine(&self, path: &Path, machine: &Machine) -> Self {
+    ///
+    /// # Errors
+    /// Where `--bus` names another file than `--machine`.
+    pub(crate) fn with_machine_file(mut self, matches: &ArgMatches) -> Result<Self, Failure> {
+        let path = matches.get_raw("machine").and_then(|mut values| values.next()).map(PathBuf::from);
+        let (Some(path), Some(_)) = (path, &self.machine) else { return Ok(self) };
+        let is_typed = matches.value_source("machine") == Some(ValueSource::CommandLine);
+        // A check reads its file, and asks only a bus that is named; a simulator makes its drives itself.
+        let makes_its_own = matches!(matches.subcommand_name(), Some("check" | "sim"));
+        match &self.bus {
+            BusSpec::Sim { file: None } if !makes_its_own => self.bus = BusSpec::Sim { file: Some(path.clone()) },
+            BusSpec::Sim { file: Some(other) } if *other != path => {
+                if is_typed {
+                    return Err(two_files(other, &path));
+                }
+                self.machine = None;
+                return Ok(self);
+            }
+            _ => {}
+        }
+        self.machine_file = Some(MachineFile { path, is_typed });
+        Ok(self)
+    }
+
+    /// The command line with a machine file that a command names itself, as if it stood behind `--machine`.
+    ///
+    /// # Errors
+    /// Where `--machine` names another one.
+    pub(crate) fn on_machine(&self, path: &Path, machine: &Machine) -> Result<Self, Failure> {
+        self.refuse_another(path)?;
         let mut global = self.clone();
-        if matches!(global.bus, BusSpec::Sim { file: None }) {
+        let before = self.machine_file.as_ref();
+        let of_machine =
+            |file: &Option<PathBuf>| file.as_deref().is_none_or(|file| before.is_some_and(|own| own.path == file));
+        if matches!(&global.bus, BusSpec::Sim { file } if of_machine(file)) {
             global.bus = BusSpec::Sim { file: Some(path.to_owned()) };
         } else {
             global.machine = Some(machine.clone());
         }
-        global
+        Ok(global)
     }
+
+    /// Refuses a file that a command names where `--machine` names another one.
+    pub(crate) fn refuse_another(&self, path: &Path) -> Result<(), Failure> {
+        match &self.machine_file {
+            Some(other) if other.is_typed && other.path != path => Err(two_files(path, &other.path)),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn two_files(one: &Path, other: &Path) -> Failure {
+    Failure::usage(format!("two machine files: {} and {}", one.display(), other.display()))
+        .because("a bus is described by one")
+        .next("give one of them, with --machine FILE or as the command takes it")
 }

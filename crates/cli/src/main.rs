@@ -67,9 +67,11 @@ fn main() -> ExitCode {
         Err(error) => return refuse_command_line(&error),
     };
     let format = Format { json: cli.global.json, paint: Paint::for_stream(&io::stdout()) };
+    let log = cli.global.log.clone();
     let ran = scope::refuse_unheeded(&cli.global, &cli.command, &matches)
-        .and_then(|()| run(&cli.global, format, &cli.command, Typed::of(&matches)));
-    let ran = match (ran, cli.global.log.as_ref().and_then(LogPath::failure)) {
+        .and_then(|()| cli.global.with_machine_file(&matches))
+        .and_then(|global| run(&global, format, &cli.command, Typed::of(&matches)));
+    let ran = match (ran, log.as_ref().and_then(LogPath::failure)) {
         (ran, None) => ran,
         // What the command found out has been printed.
         (Ok(()), Some(torn)) => Err(torn),
@@ -186,13 +188,12 @@ fn complain(format: Format, failure: &Failure) {
 #[derive(Clone, Copy)]
 struct Typed {
     bus: bool,
-    machine: bool,
 }
 
 impl Typed {
     fn of(matches: &ArgMatches) -> Self {
         let typed = |option| matches.value_source(option) == Some(ValueSource::CommandLine);
-        Self { bus: typed("bus"), machine: typed("machine") }
+        Self { bus: typed("bus") }
     }
 }
 
@@ -208,9 +209,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
             let report = demo.run(global)?;
             judged(format, &report, report.failure())
         }
-        Command::Sim(sim) => {
-            sim.run(global, typed.bus.then_some(&global.bus), global.machine.as_ref().filter(|_| typed.machine))
-        }
+        Command::Sim(sim) => sim.run(global, typed.bus.then_some(&global.bus)),
         Command::Run(run) => run.run(format),
         Command::Scan(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Read(command) => session::run(global, async |context| command.run(context, format).await),

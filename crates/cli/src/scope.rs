@@ -107,7 +107,7 @@ const UNHEEDED: [Unheeded; 15] = [
     },
     Unheeded {
         command: "check",
-        options: &[MODEL, MACHINE],
+        options: &[MODEL],
         why: "the file that is checked says which models are where",
         next: "leave it away",
     },
@@ -173,11 +173,6 @@ pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgM
     // A command that has no bus is not on one of its own.
     let own_bus =
         own_bus && name != "sim" && !UNHEEDED.iter().any(|row| row.command == name && row.options.contains(&BUS));
-    if typed(MACHINE) && own_bus {
-        return Err(Failure::usage("--machine means nothing on a virtual bus of this command alone")
-            .because("such a bus knows its drives")
-            .next("give --bus sim:FILE.toml to have the drives of the file on it, or --bus with the bus that it describes"));
-    }
     if typed(REALTIME) && own_bus {
         return Err(Failure::usage("--realtime means nothing on a virtual bus of this command alone")
             .because("its time is that of the simulation, not of the clock")

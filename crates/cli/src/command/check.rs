@@ -1,6 +1,6 @@
 //! `ferrodrive check`: what goes wrong with a described bus, before it is started.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use testbench::check::{LiveNode, Prediction, Severity};
 use testbench::network::check::{CheckReport, read};
@@ -28,9 +28,9 @@ use transport::BusSpec;
     ferrodrive --bus can0 check config/bus.yml          # and the drives that are there\n  \
     ferrodrive --json check bus.yml")]
 pub(crate) struct Check {
-    /// NAME.yml, NAME.yaml or NAME.toml
+    /// NAME.yml, NAME.yaml or NAME.toml (default: the file of --machine)
     #[arg(value_name = "FILE")]
-    file: PathBuf,
+    file: Option<PathBuf>,
     /// Fail for warnings too
     #[arg(long)]
     strict: bool,
@@ -39,7 +39,8 @@ pub(crate) struct Check {
 impl Check {
     /// Looks into the file, and where a bus is named at its drives.
     pub(crate) fn run(&self, global: &Global) -> Result<CheckReport, Failure> {
-        let mut checked = read(&self.file)?;
+        let path = self.path(global)?;
+        let mut checked = read(path)?;
         let predicted = checked.predict();
         // The bus of this command alone has nobody that the file means.
         let live = match global.bus {
@@ -50,12 +51,21 @@ impl Check {
                 Ok(asked)
             })?),
         };
-        Ok(CheckReport::new(&self.file, checked, predicted, live, self.strict))
+        Ok(CheckReport::new(path, checked, predicted, live, self.strict))
     }
 
     /// Whether the command is to fail for warnings.
     pub(crate) const fn strict(&self) -> bool {
         self.strict
+    }
+
+    /// The file that is checked.
+    fn path<'a>(&'a self, global: &'a Global) -> Result<&'a Path, Failure> {
+        if let Some(file) = &self.file {
+            return global.refuse_another(file).map(|()| file.as_path());
+        }
+        let by_option = global.machine_file.as_ref().map(|file| file.path.as_path());
+        by_option.ok_or_else(|| Failure::usage("no file to check").next("ferrodrive check machine.toml"))
     }
 }
 

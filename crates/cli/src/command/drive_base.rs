@@ -155,7 +155,7 @@ impl DriveBase {
     /// Drives, and prints where the base came to.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
         let global = match &self.file {
-            Some(path) => global.on_machine(path, &session::read_machine(path)?),
+            Some(path) => global.on_machine(path, &session::read_machine(path)?)?,
             None => global.clone(),
         };
         let report = session::run(&global, async |context| self.drive(context).await)?;
@@ -165,7 +165,7 @@ impl DriveBase {
     async fn drive(&self, context: &Context) -> Result<BaseDriven, Failure> {
         let Some(plan) = context.machine.as_ref().and_then(|machine| machine.base) else {
             return Err(Failure::usage("no machine file with a [base] is given")
-                .next("give one: ferrodrive drive-base FILE.toml (docs/machine-file.md says what it has)"));
+                .next("give one: ferrodrive drive-base --machine FILE.toml (docs/machine-file.md says what it has)"));
         };
         let watchdog = self.dead_man.unwrap_or(plan.limits.watchdog);
         let limits = BaseLimits { watchdog, ..plan.limits };

@@ -230,7 +230,7 @@ impl Move {
         if let Some(other) = files.next() {
             return Err(Failure::usage(format!("two machine files: {} and {}", path.display(), other.display())));
         }
-        Ok(global.on_machine(path, &session::read_machine(path)?))
+        global.on_machine(path, &session::read_machine(path)?)
     }
 
     fn targets(&self) -> impl Iterator<Item = (NodeId, Angle)> {

@@ -85,6 +85,7 @@ impl Plan {
         }
         let mut global = global.clone();
         if let Some(file) = &self.file {
+            global.refuse_another(file)?;
             global.bus = BusSpec::Sim { file: Some(file.clone()) };
         }
         let bitrate = self.bitrate_of(&global.bus)?;

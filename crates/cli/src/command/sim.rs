@@ -151,9 +151,11 @@ const NOBODY: &str = "note: no program can reach these drives: give --serve sock
                       --bus to join a bus. World commands on standard input are answered all the same";
 
 impl Sim {
-    /// Runs until `quit`, Ctrl-C or a lost `bridge` (the bus given with `--bus` beside `sim`). The drives of `file` (given with
-    /// `--machine` beside `sim`) come first.
-    pub(crate) fn run(&self, global: &Global, bridge: Option<&BusSpec>, file: Option<&Machine>) -> Result<(), Failure> {
+    /// Runs until `quit`, Ctrl-C or a lost `bridge` (the bus given with `--bus` beside `sim`). The drives of the machine file come
+    /// first; one of the environment is for a simulator without drives of its own.
+    pub(crate) fn run(&self, global: &Global, bridge: Option<&BusSpec>) -> Result<(), Failure> {
+        let is_typed = global.machine_file.as_ref().is_some_and(|file| file.is_typed);
+        let file = global.machine.as_ref().filter(|_| is_typed || self.drives.is_empty());
         let machine = self.machine(file)?;
         if global.realtime && (self.clock != Clock::Real || self.speed.is_some()) {
             return Err(Failure::usage("--realtime has no meaning where the bus does not run with the clock")

@@ -13,7 +13,7 @@ use testbench::network::supervise::WatchedEvent;
 use testbench::words::node::node;
 use tokio::sync::mpsc::{Receiver, channel};
 
-use super::boot::{Planned, global_of, plan_of};
+use super::boot::{Planned, global_of, plan_of, planned_by};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -59,8 +59,8 @@ const WORDS: usize = 16;
 impl Supervise {
     /// Boots and watches, until it is told to end.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
-        let planned = Planned::read(self.file.as_deref())?;
-        let global = global_of(&planned, global);
+        let planned = planned_by(self.file.as_deref(), global)?;
+        let global = global_of(&planned, global)?;
         session::run(&global, async |context| self.supervise(context, &planned, format).await)
     }
 

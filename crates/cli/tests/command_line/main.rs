@@ -7,6 +7,7 @@ mod eds;
 mod estop;
 mod handbook;
 mod json;
+mod machine;
 mod on_sim;
 mod plan;
 mod run;

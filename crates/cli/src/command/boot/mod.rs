@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Format;
 use crate::session;
-pub(crate) use planned::{Planned, global_of, plan_of};
+pub(crate) use planned::{Planned, global_of, plan_of, planned_by};
 use testbench::network::boot::BootReport;
 
 /// Boot the nodes of a network: check who they are, configure and start them
@@ -47,8 +47,8 @@ pub(crate) struct Boot {
 impl Boot {
     /// Boots, prints, and fails if a mandatory node has.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
-        let planned = Planned::read(self.file.as_deref())?;
-        let global = global_of(&planned, global);
+        let planned = planned_by(self.file.as_deref(), global)?;
+        let global = global_of(&planned, global)?;
         let report = session::run(&global, async |context| self.boot(context, &planned).await)?;
         format.print(&report).map_err(Failure::of_stdout)?;
         report.failure().map_or(Ok(()), |failure| Err(Failure { told: true, ..failure.into() }))

@@ -1,5 +1,7 @@
 //! What a boot-up goes by, on the command line.
 
+use std::path::Path;
+
 use canopen::NodeId;
 use master::boot::BootPlan;
 pub(crate) use testbench::network::boot::Planned;
@@ -9,11 +11,17 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
 
+/// The file of the command, else that of `--machine`.
+pub(crate) fn planned_by(file: Option<&Path>, global: &Global) -> Result<Planned, Failure> {
+    let by_option = || global.machine_file.as_ref().map(|file| file.path.as_path());
+    Ok(Planned::read(file.or_else(by_option))?)
+}
+
 /// The command line with what the file says: on the virtual bus of a command's own, its drives are there.
-pub(crate) fn global_of(planned: &Planned, global: &Global) -> Global {
+pub(crate) fn global_of(planned: &Planned, global: &Global) -> Result<Global, Failure> {
     match planned {
         Planned::Machine(path, machine) => global.on_machine(path, machine),
-        Planned::Manager(_) | Planned::Bus => global.clone(),
+        Planned::Manager(_) | Planned::Bus => Ok(global.clone()),
     }
 }
 
