@@ -241,7 +241,7 @@ mod tests {
         "quick-stop 4",
         "read 4 6064",
         "readings zlac8030l",
-        "record 4 6064 --out a.csv",
+        "record 4 6064 -o a.csv",
         "replay a.log",
         "reset 4",
         "restore 4",

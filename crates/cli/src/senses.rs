@@ -87,7 +87,7 @@ const LOOKING: &[Row] = &[
     Row { words: &["param", "parameter", "parameters"], tips: &["params backup 4", "read 4 6081"] },
     Row {
         words: &["tune", "tuning", "gains", "pid", "autotune"],
-        tips: &["objects 4 gain", "record 4 606C 6077 --out run.mcap --for 5s", "params backup 4 -o gains.toml"],
+        tips: &["objects 4 gain", "record 4 606C 6077 -o run.mcap --for 5s", "params backup 4 -o gains.toml"],
     },
     Row { words: &["log", "logger", "canlogger", "candump-log", "save-log"], tips: &["dump --log trace.log"] },
     Row { words: &["trace", "tracing", "spy"], tips: &["dump", "dump --log trace.log", "state 4 -v"] },
@@ -104,7 +104,7 @@ const LOOKING: &[Row] = &[
             "bag record",
             "bag",
         ],
-        tips: &["top", "studio", "record 4 606C 6077 --out run.mcap --for 5s"],
+        tips: &["top", "studio", "record 4 606C 6077 -o run.mcap --for 5s"],
     },
     Row { words: &["graph", "draw", "chart"], tips: &["plot run.mcap"] },
     Row { words: &["log2asc", "asc2log", "log2long", "export-log"], tips: &["convert trace.log trace.asc"] },

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use canopen::{Mux, NodeId};
 use eds::document::Document;
 use eds::{Commissioning, Configuration, Sheet, write};
+use master::parameters::Parameters;
 use master::{Error, Node};
 use serde::Serialize;
 
@@ -22,8 +23,8 @@ use testbench::words::node::node;
 
 /// Read a device's parameters into a device configuration file (DCF)
 ///
-/// The file is the data sheet with the values that differ from it. What is read-only is left out, and so are commands and
-/// set-points, which are no configuration.
+/// The file is the data sheet with the values of the device's parameters, the same that `params backup` writes; with --eds with those
+/// that differ from that sheet. What is read-only is left out, and so are commands and set-points, which are not configuration.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive dcf 4 --output left-wheel.dcf\n  \
     ferrodrive --bus socketcand://HOST:29536/can0 dcf 5 --eds vendor.eds --output axis.dcf\n  ferrodrive dcf 4 --model 4=zlac8030l > left-wheel.dcf")]
@@ -34,10 +35,10 @@ pub(crate) struct Dcf {
     /// The device's data sheet; without it that of its model
     #[arg(long, value_name = "FILE")]
     eds: Option<PathBuf>,
-    /// Write the file here, and say what was read; without it the file goes to standard output
-    #[arg(long, short, value_name = "FILE")]
+    /// Write the file here, and say what was read; without it, and as -, the file goes to standard output
+    #[arg(long, short, value_name = "FILE.dcf", value_parser = dcf_path)]
     output: Option<PathBuf>,
-    /// Every value that was read, not only those that differ from the data sheet
+    /// Every object that can be written, not only parameters or what differs from the data sheet
     #[arg(long)]
     all: bool,
     /// Write over a file that is there
@@ -81,21 +82,24 @@ impl Dcf {
     /// Reads the values and writes the file.
     pub(crate) async fn run(&self, context: &Context) -> Result<DcfReport, Failure> {
         // Before anything is asked for: nobody waits for what cannot be kept.
-        if let Some(path) = self.output.as_deref().filter(|path| !self.force && path.exists()) {
+        let output = self.output.as_deref().filter(|path| *path != Path::new("-"));
+        if let Some(path) = output.filter(|path| !self.force && path.exists()) {
             return Err(exists(path));
         }
         let (mut made, model) = self.sheet(context).await?;
         let node = context.node(self.node);
-        let (values, read, refused) = self.read_values(context, &node, &mut made).await?;
+        let (values, read, refused) = match &self.eds {
+            None if !self.all => self.back_up(context, &mut made).await?,
+            _ => self.read_values(context, &node, &mut made).await?,
+        };
         let left_out = made.left_out().iter().map(ToString::to_string).collect();
-        let device = self.commissioning(&node, model).await;
-        let file_name =
-            self.output.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+        let device = commissioning(&node, model, &self.name).await;
+        let file_name = output.and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
         let file_name = file_name.unwrap_or_else(|| format!("node{}.dcf", self.node));
         made.commission(&device, &file_name).map_err(|error| Failure::usage(error.to_string()))?;
         let document = made.into_document();
         let mut report = DcfReport { node: self.node.raw(), file: None, dcf: None, read, values, refused, left_out };
-        match &self.output {
+        match output {
             Some(path) => {
                 keep(path, &document.to_bytes(), self.force)?;
                 report.file = Some(path.display().to_string());
@@ -117,8 +121,7 @@ impl Dcf {
                 let drive = context.known_drive(self.node).await?;
                 let model =
                     drive.description().ok_or_else(|| Failure::new("the model is not known").at_node(self.node))?;
-                let sheet = Document::parse(write(&Sheet::of(model).eds()).as_bytes());
-                (sheet.map_err(|refusal| Failure::new(refusal.to_string()))?, Some(model))
+                (sheet_of(model)?, Some(model))
             }
         };
         let made = Configuration::new(document, self.node.raw());
@@ -160,20 +163,76 @@ impl Dcf {
         Ok((values, read, refused))
     }
 
-    /// Which device it is: its serial number and its bit rate, where it says them.
-    async fn commissioning(&self, node: &Node, model: Option<&'static Description>) -> Commissioning {
-        let bit_rate = match model {
-            Some(model) => bit_rate(node, model).await,
-            None => None,
-        };
-        Commissioning {
-            node_id: Some(self.node.raw()),
-            node_name: self.name.clone(),
-            bit_rate,
-            net_number: Some(1),
-            lss_serial_number: node.read::<u32>(Mux::new(0x1018, 4)).await.ok(),
-            ..Commissioning::default()
-        }
+    /// Reads the parameters of the device's model, as `params backup` does.
+    async fn back_up(
+        &self,
+        context: &Context,
+        made: &mut Configuration,
+    ) -> Result<(usize, usize, Vec<Refused>), Failure> {
+        let drive = context.known_drive(self.node).await?;
+        let show = |number, of, object| context.progress.count(format!("{number} of {of}: {object}"));
+        let backup = drive.back_up(show).await?;
+        put(made, &backup.parameters)?;
+        let refused = backup.refused.iter().map(|(object, error)| Refused {
+            object: object.to_string(),
+            name: made.eds().variable(object.index, object.sub_index).map(|row| row.name.clone()).unwrap_or_default(),
+            abort: error.abort().map(|code| code.0),
+            why: error.abort().map_or_else(|| error.to_string(), |code| code.to_string()),
+        });
+        let (refused, values) = (refused.collect(), backup.parameters.values.len());
+        Ok((values, values, refused))
+    }
+}
+
+/// The parameters of a device as a DCF, for `params backup`.
+pub(super) async fn of_parameters(
+    node: &Node,
+    model: &'static Description,
+    parameters: &Parameters,
+    file_name: &str,
+) -> Result<Vec<u8>, Failure> {
+    let mut made = Configuration::new(sheet_of(model)?, node.id().raw())
+        .map_err(|refusal| Failure::new(refusal.to_string()).of_kind("not_an_eds"))?;
+    put(&mut made, parameters)?;
+    let device = commissioning(node, Some(model), "").await;
+    made.commission(&device, file_name).map_err(|error| Failure::usage(error.to_string()))?;
+    Ok(made.into_document().to_bytes())
+}
+
+fn put(made: &mut Configuration, parameters: &Parameters) -> Result<(), Failure> {
+    for (object, bytes) in &parameters.values {
+        made.set(*object, bytes, true).map_err(|error| Failure::new(format!("{object}: {error}")))?;
+    }
+    Ok(())
+}
+
+/// The data sheet of a model.
+fn sheet_of(model: &'static Description) -> Result<Document, Failure> {
+    let sheet = Document::parse(write(&Sheet::of(model).eds()).as_bytes());
+    sheet.map_err(|refusal| Failure::new(refusal.to_string()))
+}
+
+fn dcf_path(text: &str) -> Result<PathBuf, String> {
+    if text == "-" || text.to_ascii_lowercase().ends_with(".dcf") {
+        Ok(text.into())
+    } else {
+        Err("expected FILE.dcf, or - for standard output; `params backup` writes .toml and .bin too".into())
+    }
+}
+
+/// Which device it is: its serial number and its bit rate, where it says them.
+async fn commissioning(node: &Node, model: Option<&'static Description>, name: &str) -> Commissioning {
+    let bit_rate = match model {
+        Some(model) => bit_rate(node, model).await,
+        None => None,
+    };
+    Commissioning {
+        node_id: Some(node.id().raw()),
+        node_name: name.to_owned(),
+        bit_rate,
+        net_number: Some(1),
+        lss_serial_number: node.read::<u32>(Mux::new(0x1018, 4)).await.ok(),
+        ..Commissioning::default()
     }
 }
 

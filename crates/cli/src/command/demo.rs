@@ -9,6 +9,7 @@ use serde::Serialize;
 use sim::machine::models;
 use transport::WallClock;
 
+use crate::command::plot::svg_path;
 use crate::failure::{Failure, FailureBody};
 use crate::global::Global;
 use crate::output::Report;
@@ -22,10 +23,10 @@ use testbench::models::resolve;
 /// Prints what was asked, what answered and what moved, beside what the manuals let expect, and draws the motion.
 /// Exit status 1 if anything differs.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  ferrodrive demo\n  ferrodrive demo --drive zlim42c --svg stepper.svg")]
+#[command(after_help = "Examples:\n  ferrodrive demo\n  ferrodrive demo --drive zlim42c -o stepper.svg")]
 pub(crate) struct Demo {
     /// Where to draw the motion
-    #[arg(long, value_name = "FILE", default_value = "demo.svg")]
+    #[arg(long = "output", short = 'o', alias = "svg", value_name = "FILE.svg", default_value = "demo.svg", value_parser = svg_path)]
     svg: PathBuf,
     /// Only the part of one drive, which may be any model that its manual is about
     #[arg(long, value_name = "MODEL", value_parser = PossibleValuesParser::new(models().map(|known| known.name)))]

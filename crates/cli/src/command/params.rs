@@ -50,7 +50,7 @@ struct Backup {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
-    /// Write the file here, .toml, .dcf or .bin; without it TOML goes to standard output
+    /// Write the file here, .toml, .dcf or .bin; without it, and as -, TOML goes to standard output
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Write over a file that is there

@@ -12,12 +12,12 @@ use plot::Paint;
 
 /// Draw a record of --record: a figure for each node, a panel for each quantity
 ///
-/// The picture is SVG, or with --html a web page of its own that tells the values under the pointer and the differences
+/// The picture is SVG (.svg), or a web page (.html) of its own that tells the values under the pointer and the differences
 /// between two places. A record whose writer was killed, or is still at work, is drawn as far as it goes.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
-    ferrodrive plot run.mcap --svg run.svg\n  \
-    ferrodrive plot run.csv --signals velocity,4.current_a --from 1.5 --to 3 --html run.html")]
+    ferrodrive plot run.mcap -o run.svg\n  \
+    ferrodrive plot run.csv --signals velocity,4.current_a --from 1.5 --to 3 -o run.html")]
 pub(crate) struct Plot {
     /// The record: NAME.mcap or NAME.csv
     file: PathBuf,
@@ -30,12 +30,19 @@ pub(crate) struct Plot {
     /// End, in s; without it that of the record
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     to: Option<f64>,
-    /// Write the picture to this file; without --svg and --html it goes beside the record, as NAME.svg
-    #[arg(long, value_name = "FILE")]
-    svg: Option<PathBuf>,
-    /// Write a web page with the picture to this file
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
+    /// Write the picture to this file, NAME.svg or NAME.html; without it, it goes beside the record, as NAME.svg
+    #[arg(long, short, alias = "svg", alias = "html", value_name = "FILE", value_parser = picture_path)]
+    output: Vec<PathBuf>,
+}
+
+fn picture_path(text: &str) -> Result<PathBuf, String> {
+    let is_known = [".svg", ".html"].iter().any(|ending| text.to_ascii_lowercase().ends_with(ending));
+    if is_known { Ok(text.into()) } else { Err("expected NAME.svg (a picture) or NAME.html (a web page)".into()) }
+}
+
+/// Where a picture of a command that draws no web page goes.
+pub(super) fn svg_path(text: &str) -> Result<PathBuf, String> {
+    if text.to_ascii_lowercase().ends_with(".svg") { Ok(text.into()) } else { Err("expected NAME.svg".into()) }
 }
 
 /// Largest record that is read: 4 GiB would be a day of three drives at 1 kHz.
@@ -73,15 +80,15 @@ impl Plot {
                 .because(reason)
                 .next("without --signals, --from and --to all of it is drawn that has a picture")
         })?;
-        let mut files = Vec::new();
-        let beside = (self.svg.is_none() && self.html.is_none()).then(|| self.file.with_extension("svg"));
-        if let Some(path) = self.svg.clone().or(beside) {
-            write(&path, &poster.to_svg(), b"<svg")?;
-            files.push(path);
+        let mut files = self.output.clone();
+        if files.is_empty() {
+            files.push(self.file.with_extension("svg"));
         }
-        if let Some(path) = self.html.clone() {
-            write(&path, &poster.to_html(), b"<!doctype html>")?;
-            files.push(path);
+        for path in &files {
+            let is_page = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
+            let (text, begin): (_, &[u8]) =
+                if is_page { (poster.to_html(), b"<!doctype html>") } else { (poster.to_svg(), b"<svg") };
+            write(path, &text, begin)?;
         }
         let figures = || poster.rows.iter().flatten();
         let signals = figures().flat_map(|figure| &figure.panels).map(|panel| panel.traces.len()).sum();

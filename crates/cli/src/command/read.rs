@@ -21,7 +21,7 @@ use testbench::words::selection::{Selection, selection};
 #[command(
     after_help = "Objects are hexadecimal indices or names:\n  6064, 0x6064, 6064h, 2026:01, position_actual_value\n\
     Several at once:\n  1018:*        all sub-indices\n  1600:1..4     some of them\n  1000..1FFF    every object between these indices\n\
-    Examples:\n  ferrodrive read 4 6064 606C statusword\n  ferrodrive read 4 1018:*\n  ferrodrive read 5 1021 --to device.eds"
+    Examples:\n  ferrodrive read 4 6064 606C statusword\n  ferrodrive read 4 1018:*\n  ferrodrive read 5 1021 -o device.eds"
 )]
 pub(crate) struct Read {
     /// Node-ID
@@ -31,7 +31,7 @@ pub(crate) struct Read {
     #[arg(value_name = "OBJECT", required = true, value_parser = selection)]
     objects: Vec<Selection>,
     /// Write the bytes of the one object, as they come, into a new file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long = "output", short = 'o', alias = "to", value_name = "FILE")]
     to: Option<PathBuf>,
     /// Write over the file
     #[arg(long, requires = "to")]
@@ -169,12 +169,12 @@ impl Read {
 
     fn check_file(&self, path: &Path, is_one: bool) -> Result<(), Failure> {
         if !is_one {
-            return Err(Failure::usage("--to takes one object").next("read them one by one, or use --json > FILE"));
+            return Err(Failure::usage("--output takes one object").next("read them one by one, or use --json > FILE"));
         }
         if !self.force && path.exists() {
             return Err(Failure::new(format!("{} is there already", path.display()))
                 .of_kind("file_exists")
-                .next("--force writes over it, or give another --to"));
+                .next("--force writes over it, or give another --output"));
         }
         Ok(())
     }

@@ -35,8 +35,8 @@ use plot::Paint;
 /// and each would take the other's answers. Ends after --for, or with Ctrl-C; what is older than a second is on the disk by then.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    ferrodrive --bus can0 --model 4=zlac8030l record 4 velocity_actual_value position_actual_value --out run.mcap --for 10s\n  \
-    ferrodrive --bus can0 record 4 606C 6077 --every 20ms --out run.csv\n  ferrodrive plot run.mcap")]
+    ferrodrive --bus can0 --model 4=zlac8030l record 4 velocity_actual_value position_actual_value -o run.mcap --for 10s\n  \
+    ferrodrive --bus can0 record 4 606C 6077 --every 20ms -o run.csv\n  ferrodrive plot run.mcap")]
 pub(crate) struct Record {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -45,7 +45,7 @@ pub(crate) struct Record {
     #[arg(value_name = "OBJECT", required = true, value_parser = object)]
     objects: Vec<ObjectArg>,
     /// The file: NAME.mcap or NAME.csv; a new one, or an empty one, or an earlier record, which is replaced
-    #[arg(long, value_name = "FILE", value_parser = record_file)]
+    #[arg(long = "output", short = 'o', alias = "out", value_name = "FILE", value_parser = record_file)]
     out: (PathBuf, Kind),
     /// Time between two samples
     #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = sample_time)]

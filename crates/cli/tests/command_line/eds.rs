@@ -151,14 +151,20 @@ fn a_devices_values_make_a_dcf_that_is_not_written_over_unasked() {
     let report = done(&["dcf", "4", "--output", &path, "--name", "left", "--json"]).json();
     assert_eq!(
         (report["node"].as_u64(), report["values"].as_u64()),
-        (Some(4), Some(0)),
-        "a fresh drive is as its sheet says"
+        (Some(4), Some(116)),
+        "its parameters, as `params backup` reads them"
     );
     assert!(report["read"].as_u64().is_some_and(|read| read > 100), "{report}");
     assert!(report["left_out"].as_array().is_some_and(|objects| objects.iter().any(|object| object == "6040h:00")));
     let written = std::fs::read_to_string(&path).expect("the file");
     assert!(written.contains("[DeviceComissioning]\nNodeID=4\nNodeName=left\nBaudrate=500\n"), "{written}");
     assert!(written.contains("FileName=wheel.dcf\n") && written.contains("LastEDS=zlac8030l.eds\n"));
+
+    let backup = folder.join("backup").join("wheel.dcf");
+    std::fs::create_dir(backup.parent().unwrap()).unwrap();
+    done(&["params", "backup", "4", "-o", backup.to_str().unwrap()]);
+    let backup = std::fs::read_to_string(backup).unwrap();
+    assert_eq!(backup, written.replace("NodeName=left\n", "NodeName=\n"), "one file for one node");
 
     let ended = ferrodrive(&["dcf", "4", "--output", &path]);
     assert_eq!(ended.status, Some(1));

@@ -12,6 +12,7 @@ use plot::{Colour, Figure, Panel, Poster, Style, Trace};
 use serde::Serialize;
 use testbench::words::node::node;
 
+use crate::command::plot::svg_path;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -32,7 +33,7 @@ use spread::{Bin, Spread};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive --bus socketcand://HOST:29536/can0 latency 4\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k latency 4 --count 10000 --svg latency.svg\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k latency 4 --count 10000 -o latency.svg\n  \
     ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k latency --sync 5ms --for 1min")]
 pub(crate) struct Latency {
     /// The node to ask; without it only SYNC is measured
@@ -48,7 +49,7 @@ pub(crate) struct Latency {
     #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "10ms")]
     sync: Duration,
     /// Draw the histograms into this file
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long = "output", short = 'o', alias = "svg", value_name = "FILE.svg", value_parser = svg_path)]
     svg: Option<PathBuf>,
 }
 

@@ -3,7 +3,7 @@
 use testbench::network::params::{BackupReport, back_up, bytes_of};
 use testbench::parameters::{Form, sheet};
 
-use crate::command::dcf::{exists, keep};
+use crate::command::dcf::{exists, keep, of_parameters};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -13,13 +13,14 @@ use plot::Paint;
 impl super::Backup {
     pub(super) async fn run(&self, context: &Context) -> Result<BackupReport, Failure> {
         // Before anything is asked for: nobody waits for what cannot be kept.
-        let form = self.output.as_deref().map(Form::of).transpose().map_err(Failure::usage)?;
-        if let Some(path) = self.output.as_deref().filter(|path| !self.force && path.exists()) {
+        let output = self.output.as_deref().filter(|path| *path != std::path::Path::new("-"));
+        let form = output.map(Form::of).transpose().map_err(Failure::usage)?;
+        if let Some(path) = output.filter(|path| !self.force && path.exists()) {
             return Err(exists(path));
         }
         let drive = context.known_drive(self.node).await?;
         let (mut report, parameters, model) = back_up(&context.progress, &drive).await?;
-        let Some((path, form)) = self.output.as_deref().zip(form) else {
+        let Some((path, form)) = output.zip(form) else {
             report.parameters = Some(sheet::print(&parameters, Some(model)));
             context.progress.clear();
             for refused in &report.refused {
@@ -27,7 +28,13 @@ impl super::Backup {
             }
             return Ok(report);
         };
-        let bytes = bytes_of(&parameters, model, path, form)?;
+        let bytes = match form {
+            Form::Dcf => {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                of_parameters(&context.node(self.node), model, &parameters, &name).await?
+            }
+            Form::Toml | Form::Concise => bytes_of(&parameters, model, path, form)?,
+        };
         keep(path, &bytes, self.force)?;
         report.file = Some(path.display().to_string());
         Ok(report)
