@@ -1,4 +1,4 @@
-// What a piece of a series says: its response to a step, what it is made of, where it crosses a level. No knowledge of the page.
+// Analysis of a part of a series: step response, spectrum, level crossings. Independent of the page.
 
 /** The value of a straight line between the samples of `series` at a time within it. */
 function between(series, time_s) {
@@ -8,7 +8,7 @@ function between(series, time_s) {
   return v0 + ((v1 - v0) * (time_s - t0)) / (t1 - t0);
 }
 
-/** The straight line by least squares through the samples of two places, the second beyond the last: `{ mean, slope, rms }` of what is left. */
+/** Least-squares line through the samples from the first index up to, not including, the second: `{ mean, slope, rms }`, the rms of the residuals. */
 function straight({ times, values }, from, to) {
   const count = to - from;
   let [middle_s, mean] = [0, 0];
@@ -40,28 +40,28 @@ export function crossing(series, level, edge, from_s = -Infinity) {
   return null;
 }
 
-/** Readings that the rise of a step needs at least, and those in which an overshoot has to be seen. */
+/** Least readings in the rise of a step, and least readings in which an overshoot has to be seen. */
 const FEWEST_IN_RISE = 10;
 const FEWEST_IN_PEAK = 5;
-/** Readings by which is judged whether a value stands. */
+/** Readings from which it is judged whether a value is steady. */
 const FEWEST_AT_REST = 3;
-/** By which part of the way a value may drift while it stands, how far it may be off its mean, and how far a step is off every straight line. */
+/** As fractions of the step: drift of a steady value, its deviation from its mean, and the least deviation of a step from every straight line. */
 const DRIFT = 0.02;
 const SCATTER = 0.05;
 const BEND = 0.05;
-/** An end that has not come wholly to rest is off by so much of the way, and with it whatever is measured from it. */
+/** Error of an end value that has not fully settled, as a fraction of the step; everything measured from it has the same error. */
 const FINEST = 0.001;
-/** Within which part of the way it has settled. */
+/** Settling band, as a fraction of the step. */
 const BAND = 0.02;
 
-/** The largest time between two samples of these places. */
+/** The largest time between two neighbouring samples of this range. */
 function widest({ times }, from, to) {
   let most = 0;
   for (let at = from + 1; at <= to; at += 1) most = Math.max(most, times[at] - times[at - 1]);
   return most;
 }
 
-/** Whether the samples of a part stand still, beside a change by `way`. */
+/** Whether the samples of a range are steady, compared to a step of `way`. */
 function stands(series, from, to, way) {
   const { mean, slope, rms } = straight(series, from, to);
   const drift = Math.abs(slope * (series.times[to - 1] - series.times[from]));
@@ -71,8 +71,8 @@ function stands(series, from, to, way) {
 }
 
 /**
- * How far it goes beyond its end, as a part of the way, with what a peak between two readings may be higher by (twice what a parabola through the
- * three around it has). Null where it is over in too few readings to say.
+ * Overshoot as a fraction of the step, and by how much a peak between two readings may be higher (twice what a parabola through the
+ * three around it has). Null where it is over in too few readings to setText.
  */
 function beyond({ times, values }, from, to, end, way, scatter) {
   const part = (at) => (values[at] - end) / way;
@@ -92,11 +92,11 @@ function beyond({ times, values }, from, to, end, way, scatter) {
 
 /**
  * The response to a step between two times. It begins at the mean of the first 5 % of the time and ends at that of the last 10 %, and
- * at both it has to stand: what goes on steadily is a ramp, and null, as is everything else that is not a step.
+ * it has to be steady at both: a ramp gives null, as does everything else that is not a step.
  *
- * `rise_s` is the time from 10 % to 90 % of the way, `overshoot` the greatest excess over the end as a part of the way, `settling_s` the
- * time from 10 % of the way until it stays within 2 % of the way around its end, each null if that is not seen. `grid_s` is what the
- * times may be off by, `overshoot_grid` the overshoot. With fewer than ten readings in its rise it is `{ few }`, how many there are.
+ * `rise_s` is the time from 10 % to 90 % of the step, `overshoot` the greatest excess over the end as a fraction of the step, `settling_s` the
+ * time from 10 % of the step until it stays within 2 % of the step around its end, each null if not seen. `grid_s` is the uncertainty of
+ * the times, `overshoot_grid` that of the overshoot. With fewer than ten readings in its rise the answer is `{ few }`, their number.
  */
 export function stepResponse(series, from_s, to_s) {
   const [first, end] = [series.at(Math.max(from_s, series.first_s())), series.at(Math.min(to_s, series.last_s()) + 1e-9)];
@@ -127,7 +127,7 @@ export function stepResponse(series, from_s, to_s) {
   return { from, to, rise_s: at90_s - at10_s, settling_s, grid_s, ...beyond(series, at10, end, to, way, after.scatter) };
 }
 
-/** A number with what it may be off by, and no more decimals than that has: `1.2 ± 0.2`. */
+/** A number with its uncertainty, and no more decimals than that has: `1.2 ± 0.2`. */
 export function within(value, grid) {
   const decimals = Math.min(6, Math.max(0, -Math.floor(Math.log10(grid))));
   const unit = 10 ** -decimals;
@@ -164,9 +164,9 @@ function transform(real, imaginary) {
 const MOST_LINES = 1 << 14;
 
 /**
- * What a series between two times is made of: a series of amplitudes over Hz, without its mean and its straight line, in a Hann window.
- * Its samples are taken as they lie on average, on straight lines between those that there are; so only what is slower than half
- * their rate says something. Null with fewer than 16 samples.
+ * Amplitude spectrum (over Hz) of a series between two times, without its mean and linear trend, in a Hann window.
+ * The series is resampled at its mean interval by linear interpolation, so only frequencies below half its mean
+ * sample rate are meaningful. Null with fewer than 16 samples.
  */
 export function spectrum(series, from_s, to_s) {
   const [begin_s, end_s] = [Math.max(from_s, series.first_s()), Math.min(to_s, series.last_s())];
@@ -176,7 +176,7 @@ export function spectrum(series, from_s, to_s) {
   const step_s = (end_s - begin_s) / (samples - 1);
   const first_s = end_s - (count - 1) * step_s;
   const real = Float64Array.from({ length: count }, (_, at) => between(series, first_s + at * step_s));
-  // The straight line through it by least squares: it is no vibration.
+  // The linear trend is not a vibration: it is removed by least squares.
   const middle = (count - 1) / 2;
   const average = real.reduce((sum, value) => sum + value, 0) / count;
   const slope = real.reduce((sum, value, at) => sum + (at - middle) * value, 0) / real.reduce((sum, _, at) => sum + (at - middle) ** 2, 0);

@@ -1,7 +1,7 @@
-// The Bus view: who is there.
+// The Bus view: the nodes of the bus.
 
 import { ask } from "./link.js";
-import { h, hex, number, say } from "./dom.js";
+import { h, hex, number, setText } from "./dom.js";
 import { pointed } from "./help.js";
 
 const COLUMNS = ["Node", "Model", "NMT state", "Heartbeat", "Power state", "Position", "Speed", "Fault", "Identity (1018h)"];
@@ -31,22 +31,22 @@ export function busView(shared, open) {
     return h("tr", { "data-node": String(node), onclick: look }, ...cells);
   }
 
-  /** Load, and what the controller and the connection tell of errors. */
+  /** Bus load, and the errors that the controller and the connection report. */
   function tellWire({ frames_per_s, load_percent, bitrate, health }) {
-    const rate = bitrate === null ? "bit rate not known" : `${bitrate / 1000} kbit/s`;
+    const rate = bitrate === null ? "bit rate unknown" : `${bitrate / 1000} kbit/s`;
     const load = load_percent === null ? "" : `, load ${number(load_percent, 1)} %`;
     const count = (value, what) => (value === null ? [] : [`${what} ${value}`]);
     const counters = [...count(health.transmit_errors, "transmit error counter"), ...count(health.receive_errors, "receive error counter")];
     const lost = health.frames_lost ? [`${health.frames_lost} frames lost`] : [];
-    const errors = health.state === null && !counters.length && !health.error_frames ? ["the bus has told of no errors"] : [health.state ?? "controller", ...counters, `${health.error_frames} error frames`];
-    say(wire, `${rate}, ${frames_per_s} frames/s${load} · ${[...errors, ...lost].join(", ")}`);
+    const errors = health.state === null && !counters.length && !health.error_frames ? ["no errors reported"] : [health.state ?? "controller", ...counters, `${health.error_frames} error frames`];
+    setText(wire, `${rate}, ${frames_per_s} frames/s${load} · ${[...errors, ...lost].join(", ")}`);
     wire.className = ["bus-off", "error-passive", "connection lost"].includes(health.state) || lost.length ? "bad" : "quiet";
   }
 
   function update(state) {
     tellWire(state.bus);
     scan.disabled = state.scanning;
-    say(scan, state.scanning ? "Scanning …" : "Scan");
+    setText(scan, state.scanning ? "Scanning …" : "Scan");
     const nodes = state.nodes.map((node) => String(node.node));
     if ([...rows.children].map((tr) => tr.dataset.node).join() !== nodes.join()) {
       rows.replaceChildren(...state.nodes.map((node) => row(node.node)));
@@ -54,24 +54,24 @@ export function busView(shared, open) {
     state.nodes.forEach((node, at) => {
       const cells = rows.children[at].children;
       const drive = node.drive;
-      say(cells[0].firstChild, String(node.node));
-      say(cells[1], node.title ?? "not known");
+      setText(cells[0].firstChild, String(node.node));
+      setText(cells[1], node.title ?? "unknown");
       cells[1].title = node.remark ?? "";
-      say(cells[2], node.nmt ?? "–");
-      say(cells[3], node.heartbeat_age_ms === null ? "none heard" : `${number(node.heartbeat_age_ms / 1000, 1)} s ago`);
-      say(cells[4], node.trouble ? "no answer" : (drive?.state ?? "–"));
+      setText(cells[2], node.nmt ?? "–");
+      setText(cells[3], node.heartbeat_age_ms === null ? "none heard" : `${number(node.heartbeat_age_ms / 1000, 1)} s ago`);
+      setText(cells[4], node.trouble ? "no answer" : (drive?.state ?? "–"));
       cells[4].className = drive?.state === "Operation enabled" ? "good" : "";
       pointed(cells[2], "nmt", node.nmt ?? "–", node.node);
       pointed(cells[4], "state", drive?.state ?? "–", node.node);
       pointed(cells[7], "fault", drive?.faults[0]?.name ?? "none", node.node);
-      say(cells[5], drive?.angle_degrees === null || !drive ? "–" : `${number(drive.angle_degrees, 1)}°`);
-      say(cells[6], drive?.velocity_rpm === null || !drive ? "–" : `${number(drive.velocity_rpm, 1)} r/min`);
+      setText(cells[5], drive?.angle_degrees === null || !drive ? "–" : `${number(drive.angle_degrees, 1)}°`);
+      setText(cells[6], drive?.velocity_rpm === null || !drive ? "–" : `${number(drive.velocity_rpm, 1)} r/min`);
       const fault = drive && drive.fault_code !== 0 ? `${hex(drive.fault_code, 4)} ${drive.faults.map((row) => row.name).join(", ")}` : "none";
-      say(cells[7], node.trouble ? node.trouble : drive ? fault : "–");
+      setText(cells[7], node.trouble ? node.trouble : drive ? fault : "–");
       cells[7].className = node.trouble || (drive && drive.fault_code !== 0) ? "bad" : "";
-      say(cells[8], [node.vendor_id, node.product_code, node.revision_number].map((part) => hex(part, 1)).join(" : "));
+      setText(cells[8], [node.vendor_id, node.product_code, node.revision_number].map((part) => hex(part, 1)).join(" : "));
     });
-    say(empty, state.nodes.length ? "" : state.scanning ? "Asking all 127 node-IDs …" : "Nobody answers. Check supply, cable, termination (60 Ω between CAN_H and CAN_L) and the bit rate, then scan.");
+    setText(empty, state.nodes.length ? "" : state.scanning ? "Asking all 127 node-IDs …" : "No node answers. Check supply, cable, termination (60 Ω between CAN_H and CAN_L) and bit rate, then scan again.");
   }
 
   return { root, update };

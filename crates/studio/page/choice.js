@@ -1,7 +1,7 @@
-// A choice of one of several, as a list of the page's own: the popup of a native <select> takes the keys while it is open, and Esc
-// and Space have to reach Stop whatever is open.
+// A drop-down list of the page's own: the popup of a native <select> takes the keys while it is open, and Esc
+// and Space must reach Stop whatever is open.
 
-import { h, say } from "./dom.js";
+import { h, setText } from "./dom.js";
 
 /** The choice whose list is open; null for none. */
 let open = null;
@@ -14,7 +14,7 @@ export function closeChoice() {
 addEventListener("pointerdown", (event) => open && !open.root.contains(event.target) && open.close(), true);
 
 /**
- * An element with `value` and `disabled`, which tells "change" when somebody has chosen. `offer` sets its options: `{ value, text,
+ * An element with `value` and `disabled`, which fires "change" when an option is chosen. `offer` sets its options: `{ value, text,
  * disabled, title }`; the value stays if it is still among them, else it is the first one's. `onopen` is called before its list is shown.
  */
 export function choice(id, label, options = [], { value, onopen = () => {}, onchange = () => {} } = {}) {
@@ -32,7 +32,7 @@ export function choice(id, label, options = [], { value, onopen = () => {}, onch
 
   function draw() {
     const text = all[place()]?.text ?? "";
-    say(shown, text);
+    setText(shown, text);
     button.title = text;
     list.replaceChildren(
       ...all.map(({ value, text, disabled, title }, at) =>
@@ -62,7 +62,7 @@ export function choice(id, label, options = [], { value, onopen = () => {}, onch
   }
 
   function pick(event, at) {
-    // A label around it would press the button again.
+    // A label around it would click the button again.
     event.preventDefault();
     if (!all[at] || all[at].disabled) return;
     const changed = all[at].value !== chosen;
@@ -91,9 +91,9 @@ export function choice(id, label, options = [], { value, onopen = () => {}, onch
     event.preventDefault();
     event.stopPropagation();
   });
-  // The keyboard has gone elsewhere.
+  // The focus has moved elsewhere.
   button.addEventListener("blur", () => setTimeout(() => open === mine && !root.contains(document.activeElement) && close()));
-  // A press in the list leaves the keyboard where it is.
+  // A press in the list does not move the focus.
   list.addEventListener("pointerdown", (event) => event.preventDefault());
 
   root.offer = (options) => {

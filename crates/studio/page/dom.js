@@ -13,10 +13,10 @@ function fill(element, properties, children) {
   return element;
 }
 
-/** An element with attributes; `onclick` and the like add listeners. The browser's own list under a field would take the keys of Stop. */
+/** An element with attributes; `onclick` and the like add listeners. Autocomplete is off: its list would take the keys of Stop. */
 export const h = (tag, properties = {}, ...children) => fill(document.createElement(tag), tag === "input" ? { autocomplete: "off", ...properties } : properties, children);
 
-/** Something that is on or off, as a button with `checked`: pressed by the pointer and by Enter, since Space is Stop. */
+/** A toggle button with `checked`: pressed by the pointer and by Enter, since Space is Stop. */
 export function toggle(id, text, on, onchange = () => {}, properties = {}) {
   const button = h("button", { type: "button", id, class: "toggle", "aria-pressed": String(on), ...properties }, text);
   Object.defineProperty(button, "checked", {
@@ -33,19 +33,19 @@ export function toggle(id, text, on, onchange = () => {}, properties = {}) {
 /** The same for SVG. */
 export const s = (tag, properties = {}, ...children) => fill(document.createElementNS(SVG, tag), properties, children);
 
-/** Sets a text, and touches the document only if it differs: what is selected or read aloud stays so. */
-export function say(element, text) {
+/** Sets a text, and touches the document only if it differs, which keeps a selection and does not repeat it to a screen reader. */
+export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** Puts children in place of those that are there, unless `key` says that nothing changed. */
+/** Replaces the children, unless `key` is that of the last call. */
 export function renew(element, key, make) {
   if (element.dataset.key === key) return;
   element.dataset.key = key;
   element.replaceChildren(...make());
 }
 
-/** A number with a fixed count of decimals, or a dash. */
+/** A number with a fixed number of decimals, or a dash. */
 export const number = (value, decimals) => (value === null || value === undefined ? "–" : value.toFixed(decimals));
 
 /** `1 write`, `2 writes`. */

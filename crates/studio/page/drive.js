@@ -1,7 +1,7 @@
-// The Drive view: what one drive says of itself, and why it does not move yet.
+// The Drive view: what one drive reports, and why it does not move yet.
 
 import { ask } from "./link.js";
-import { h, hex, number, renew, say } from "./dom.js";
+import { h, hex, number, renew, setText } from "./dom.js";
 import { term, terms } from "./help.js";
 import { powerMachine } from "./machine.js";
 
@@ -16,7 +16,7 @@ export const VALUES = [
   ["Power stage", "driver_celsius", 0, "°C"],
 ];
 
-/** Buttons to choose a drive by. */
+/** Buttons that choose a drive. */
 export function chooser(shared) {
   const root = h("div", { class: "chooser", role: "group", "aria-label": "Drive" });
   const update = (state) => {
@@ -40,7 +40,7 @@ export function tiles(values) {
     of.forEach(({ field, decimals, value, tile }) => {
       const known = drive?.[field] ?? null;
       tile.hidden = drive !== null && known === null;
-      say(value, number(known, decimals));
+      setText(value, number(known, decimals));
     });
   return { root, update };
 }
@@ -64,7 +64,7 @@ export function driveView(shared) {
       machine = powerMachine(table);
       picture.append(machine.root);
     })
-    .catch(() => picture.append("The state machine could not be fetched."));
+    .catch(() => picture.append("The state machine could not be loaded. Reload the page."));
   const root = h(
     "section",
     { class: "drive" },
@@ -80,13 +80,13 @@ export function driveView(shared) {
     const node = shared.node;
     explained = node;
     why.disabled = true;
-    findings.replaceChildren(h("p", { class: "quiet" }, "Listening to the bus, then reading what the drive says …"));
+    findings.replaceChildren(h("p", { class: "quiet" }, "Listening to the bus, then reading the drive …"));
     const answer = await ask({ do: "explain", node });
     why.disabled = false;
     if (explained !== node) return;
     if (!answer.ok) findings.replaceChildren(h("p", { class: "bad" }, answer.error.message));
     else if (!answer.result.findings.some((finding) => finding.cause)) {
-      findings.replaceChildren(h("p", { class: "good" }, `Node ${node}: nothing was found that keeps it from moving.`), ...answer.result.findings.map(shown));
+      findings.replaceChildren(h("p", { class: "good" }, `Node ${node}: found nothing that keeps it from moving.`), ...answer.result.findings.map(shown));
     } else findings.replaceChildren(...answer.result.findings.map(shown));
   }
 
@@ -95,7 +95,7 @@ export function driveView(shared) {
       "details",
       { class: finding.cause ? "cause" : "warning", open: finding.cause },
       h("summary", {}, `${finding.cause ? "Cause" : "Warning"} (${finding.topic}): ${finding.found}`),
-      h("dl", {}, h("dt", {}, "Expected"), h("dd", {}, finding.expected), h("dt", {}, "Follows"), h("dd", {}, finding.follows), h("dt", {}, "Do"), h("dd", {}, finding.remedy)),
+      h("dl", {}, h("dt", {}, "Expected"), h("dd", {}, finding.expected), h("dt", {}, "Consequence"), h("dd", {}, finding.follows), h("dt", {}, "Remedy"), h("dd", {}, finding.remedy)),
     );
 
   function update(state) {
@@ -106,19 +106,19 @@ export function driveView(shared) {
       explained = null;
       findings.replaceChildren();
     }
-    say(title, node ? `Node ${node.node}: ${node.title ?? "model not known"}` : "No drive");
-    say(remark, node?.remark ?? "");
-    say(trouble, node?.trouble ?? (node && !drive ? "It is no drive, or has not been read yet." : ""));
+    setText(title, node ? `Node ${node.node}: ${node.title ?? "unknown model"}` : "No drive");
+    setText(remark, node?.remark ?? "");
+    setText(trouble, node?.trouble ?? (node && !drive ? "Not a drive, or not read yet." : ""));
     large.update(drive);
     machine?.update(drive?.state ?? null, drive?.way ?? []);
     const steps = drive?.way.map((step) => `${hex(step.controlword, 2)} → ${step.to}`).join(", then ");
-    const without = drive && !drive.has_state_machine ? " This model has no power state machine: its statusword echoes the controlword, and the state shown is the one that comes closest." : "";
-    say(way, !drive ? "" : drive.state === "Operation enabled" ? `It follows set-points.${without}` : (steps ? `To Operation enabled: ${steps}.` : "It has to act first.") + without);
+    const without = drive && !drive.has_state_machine ? " This model has no power state machine: its statusword echoes the controlword, and the state shown is the closest one." : "";
+    setText(way, !drive ? "" : drive.state === "Operation enabled" ? `The drive follows set-points.${without}` : (steps ? `To Operation enabled: ${steps}.` : "Waiting for a transition that the drive makes itself.") + without);
     renew(faults, drive ? `${node.node} ${drive.fault_code} ${drive.faults.length}` : "", () => {
       if (!drive) return [];
       if (drive.fault_code === 0) return [h("li", { class: "good" }, "None")];
       const rows = drive.faults.map((row) => h("li", { class: "bad" }, term("fault", row.name, node.node), h("p", {}, row.remedy)));
-      return rows.length ? rows : [h("li", { class: "bad" }, `${hex(drive.fault_code, 4)}: no table here explains it`)];
+      return rows.length ? rows : [h("li", { class: "bad" }, `${hex(drive.fault_code, 4)}: not in the drive's description`)];
     });
     renew(words, drive ? `${node.node} ${drive.statusword} ${drive.controlword} ${drive.mode}` : "", () =>
       !drive
@@ -127,7 +127,7 @@ export function driveView(shared) {
             h("dt", {}, `Statusword ${hex(drive.statusword, 4)}`),
             h("dd", {}, ...(drive.status_bits.length ? terms("status_bit", drive.status_bits, node.node) : ["no bit is set"])),
             h("dt", {}, `Controlword ${hex(drive.controlword, 4)}`),
-            h("dd", {}, ...(drive.control_bits.length ? terms("control_bit", drive.control_bits, node.node) : [drive.controlword === null ? "the drive does not tell it" : "no bit is set"])),
+            h("dd", {}, ...(drive.control_bits.length ? terms("control_bit", drive.control_bits, node.node) : [drive.controlword === null ? "this drive does not report it" : "no bit is set"])),
             h("dt", {}, "Mode"),
             h("dd", {}, drive.mode === null ? "–" : `${drive.mode} `, drive.mode_name ? term("mode", drive.mode_name, node.node) : ""),
           ]);

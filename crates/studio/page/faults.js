@@ -1,17 +1,17 @@
-// The Faults view: what has happened to the drives, what to do about it, and the frames around. The studio keeps it, so that
+// The Faults view: what has happened to the drives, what to do about it, and the frames around it. The studio keeps the list, so that
 // what happened before this page was opened is there too.
 
-import { h, hex, number, renew, say, toggle } from "./dom.js";
-import { pointed, told } from "./help.js";
+import { h, hex, number, renew, setText, toggle } from "./dom.js";
+import { documented, pointed } from "./help.js";
 import { headRow, lineRow } from "./trace.js";
 
-/** How often it is asked for at most. */
+/** Least time between two requests. */
 const ASK_MS = 250;
-/** Frames before and behind a happening, in seconds. */
+/** Frames before and after an entry, in seconds. */
 const AROUND_S = 0.05;
-const COLUMNS = ["Time (s)", "Node", "What", "Code", "In words", "Over"];
+const COLUMNS = ["Time (s)", "Node", "What", "Code", "In words", "Ended"];
 const KINDS = { emcy: "EMCY", fault: "fault", silent: "silent", state: "power state", nmt: "NMT", stop: "stop" };
-/** Those that last until they are over. */
+/** The kinds that have an end. */
 const LASTING = ["emcy", "fault", "silent"];
 
 export function faultsView() {
@@ -57,7 +57,7 @@ export function faultsView() {
   const over = (entry) => {
     if (!LASTING.includes(entry.kind)) return "";
     const times = entry.count > 1 ? `${entry.count} times, ` : "";
-    return `${times}${entry.gone_s === null ? "goes on" : `after ${number(entry.gone_s - entry.at_s, 2)} s`}`;
+    return `${times}${entry.gone_s === null ? "lasting" : `after ${number(entry.gone_s - entry.at_s, 2)} s`}`;
   };
 
   function row(entry) {
@@ -68,9 +68,9 @@ export function faultsView() {
     return explained(h("button", state, ...cells.map((cell) => h("span", {}, cell))), entry);
   }
 
-  /** What `?` tells of a row: its own remedy where a description has one, or what such a thing is. */
+  /** The help of a row on `?`: its own remedy where a description has one, else what such an entry is. */
   function explained(row, { node, kind, code, what, remedy, source }) {
-    if (remedy) return told(row, { title: `${KINDS[kind]}${code === null ? "" : ` ${hex(code, 4)}`}: ${what}`, text: remedy, source });
+    if (remedy) return documented(row, { title: `${KINDS[kind]}${code === null ? "" : ` ${hex(code, 4)}`}: ${what}`, text: remedy, source });
     if (kind === "state") return pointed(row, "state", what.split(" → ").at(-1), node);
     if (kind !== "nmt") return pointed(row, "service", kind, node);
     const state = /^NMT state (.*)$/.exec(what)?.[1];
@@ -80,15 +80,15 @@ export function faultsView() {
   function draw() {
     const shown = [...entries.values()].filter((entry) => !only.checked || LASTING.includes(entry.kind)).sort((a, b) => b.number - a.number);
     const open = shown.filter((entry) => LASTING.includes(entry.kind) && entry.gone_s === null).length;
-    const older = oldest > 0 ? ` The first ${oldest} are not kept any more.` : "";
-    say(here, trouble ?? `${shown.length} shown, ${open} of them ${open === 1 ? "goes" : "go"} on.${older}`);
+    const older = oldest > 0 ? ` The first ${oldest} are no longer kept.` : "";
+    setText(here, trouble ?? `${shown.length} shown, ${open} of them still lasting.${older}`);
     const top = list.scrollTop;
     const focused = list.contains(document.activeElement) ? document.activeElement.dataset.number : undefined;
     renew(list, `${revision} ${only.checked}`, () => shown.map(row));
     list.scrollTop = top;
     for (const element of list.children) {
       element.setAttribute("aria-pressed", String(element.dataset.number === String(chosen)));
-      // Rows that are made anew take no key away from whoever goes through them.
+      // Rows that are made anew keep the focus of the one they replace.
       if (element.dataset.number === focused) element.focus({ preventScroll: true });
     }
     explain();
@@ -99,8 +99,8 @@ export function faultsView() {
     if (!entry) return;
     renew(detail, JSON.stringify(entry), () => {
       const code = entry.code === null ? "" : ` ${hex(entry.code, 4)}`;
-      const rows = [h("dt", {}, "Cause and remedy"), h("dd", { id: "remedy" }, entry.remedy ?? (LASTING.includes(entry.kind) ? "No table here explains it: see the drive's manual." : "Nothing is wrong with it."))];
-      if (entry.source) rows.push(h("dt", {}, "Written in"), h("dd", { id: "fault-source" }, entry.source));
+      const rows = [h("dt", {}, "Cause and remedy"), h("dd", { id: "remedy" }, entry.remedy ?? (LASTING.includes(entry.kind) ? "Not in the drive's description: see its manual." : "Nothing to do."))];
+      if (entry.source) rows.push(h("dt", {}, "Source"), h("dd", { id: "fault-source" }, entry.source));
       return [h("h2", {}, `Node ${entry.node}: ${KINDS[entry.kind]}${code}, ${entry.what}`), h("dl", {}, ...rows)];
     });
   }
@@ -119,32 +119,32 @@ export function faultsView() {
     const entry = entries.get(chosen);
     draw();
     frames.hidden = false;
-    frames.replaceChildren(h("p", { class: "quiet" }, "Fetching the frames around …"));
-    // The frames of the second half may still be on their way.
+    frames.replaceChildren(h("p", { class: "quiet" }, "Loading the frames around it …"));
+    // The frames after it may still be to come.
     await new Promise((resolve) => setTimeout(resolve, 2 * AROUND_S * 1000));
     const asked = new URLSearchParams({ from_s: Math.max(0, entry.at_s - AROUND_S).toFixed(6), until_s: (entry.at_s + AROUND_S).toFixed(6), count: "2000" });
     let lines = [];
     try {
       const answer = await fetch(`/api/trace?${asked}`);
-      const told = await answer.json();
-      if (!answer.ok) throw new Error(told.error.message);
-      lines = told.lines;
+      const body = await answer.json();
+      if (!answer.ok) throw new Error(body.error.message);
+      lines = body.lines;
     } catch (error) {
       frames.replaceChildren(h("p", { class: "bad" }, error.message));
       return;
     }
     if (chosen !== number_) return;
     if (lines.length === 0) {
-      frames.replaceChildren(h("p", { class: "quiet" }, "There are no frames of that time, or they are not kept any more."));
+      frames.replaceChildren(h("p", { class: "quiet" }, "There are no frames of that time, or they are no longer kept."));
       return;
     }
     const rows = lines.map(lineRow);
-    // The frame that told of it: the last one of the node up to then.
+    // The frame that reported it: the last one of the node up to then.
     const at = lines.findLastIndex((line) => line.node === entry.node && line.at_s <= entry.at_s + 1e-6);
     rows[at]?.classList.add("marked");
     asked.delete("count");
     const save = h("a", { class: "button", href: `/api/trace.log?${asked}`, download: `node${entry.node}_fault.log` }, "Save candump");
-    frames.replaceChildren(h("p", { class: "quiet" }, `The frames from ${AROUND_S * 1000} ms before to ${AROUND_S * 1000} ms after, as they are kept `, save), headRow(), ...rows);
+    frames.replaceChildren(h("p", { class: "quiet" }, `The kept frames from ${AROUND_S * 1000} ms before to ${AROUND_S * 1000} ms after `, save), headRow(), ...rows);
     rows[at]?.scrollIntoView({ block: "nearest" });
   }
 

@@ -1,9 +1,9 @@
 // Several drives as one motion, in the Motion view: to positions together, at speeds together, or as the two wheels of a base.
-// The paths are the studio's; held motions last as long as their button is held.
+// The studio plans the paths; held motions last as long as their button is held.
 
 import { ask, inControl, link } from "./link.js";
 import { choice } from "./choice.js";
-import { h, number, renew, say, toggle } from "./dom.js";
+import { h, number, renew, setText, toggle } from "./dom.js";
 import { guarding } from "./guarding.js";
 import { motionForm } from "./motion_form.js";
 
@@ -16,11 +16,11 @@ function holder(report) {
 
   async function begin(name, make, hold) {
     if (held || !inControl()) return;
-    const deed = make();
-    if (!deed) return;
+    const command = make();
+    if (!command) return;
     const mine = { timer: setInterval(() => renewed(mine, hold), HOLD_MS) };
     held = mine;
-    const answer = await ask(deed);
+    const answer = await ask(command);
     // The answer comes at the end.
     report(name, answer);
     if (held === mine) drop();
@@ -28,7 +28,7 @@ function holder(report) {
 
   async function renewed(mine, hold) {
     const answer = await ask(hold());
-    // Stopped, or let go too late: it does not begin anew by itself.
+    // Stopped, or held again too late: it does not restart by itself.
     if (!answer.ok && held === mine) drop();
   }
 
@@ -68,32 +68,32 @@ export function groupMotion(report) {
   /** Node to the fields of its line, in the order of the bus. */
   const lines = new Map();
   const body = h("tbody");
-  const heads = ["Node", "In the group", "Angle", "Speed", "Now", "Counts", "Does"];
+  const heads = ["Node", "In the group", "Angle", "Speed", "Now", "Counts", "State"];
   const table = h("table", {}, h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", {}, head)))), body);
   const relative = toggle("group-relative", "relative, from where each is", true);
   const rpm = input("group-rpm", "", { placeholder: "30" });
   const ramp = input("group-ramp", "", { placeholder: "60" });
   const within = input("group-within", "", { placeholder: "shortest" });
-  const told = h("p", { role: "status", id: "group-told", class: "quiet" });
-  const held = holder((name, answer) => tell(name, answer));
+  const notice = h("p", { role: "status", id: "group-told", class: "quiet" });
+  const held = holder((name, answer) => showAnswer(name, answer));
   const risk = guarding("group-guarding", report);
-  /** Which drives somebody wanted to move last. */
+  /** The drives of the last request to move. */
   let asked = [];
 
-  const tell = (name, answer) => {
-    told.className = answer.ok ? "good" : "bad";
-    say(told, answer.ok ? (answer.notes ?? []).join(" ") || `${name}: at rest, without power.` : answer.error.message);
-    // A press of stop, or another deed, has its own news.
+  const showAnswer = (name, answer) => {
+    notice.className = answer.ok ? "good" : "bad";
+    setText(notice, answer.ok ? (answer.notes ?? []).join(" ") || `${name}: at rest, power stage off.` : answer.error.message);
+    // A press of stop, or another command, has its own news.
     if (answer.ok || (answer.error.kind !== "stopped" && answer.error.kind !== "replaced")) report(name, answer);
   };
 
   const chosen = () => [...lines].filter(([, line]) => line.in.checked);
-  /** The axes of a deed with one value each; null, with the focus where it is missing. */
+  /** The axes of a command with one value each; null, with the focus where it is missing. */
   function axes(name, of) {
     const found = chosen().map(([node, line]) => ({ node, [name]: read(line[of]) }));
     if (found.length < 2) {
-      told.className = "bad";
-      say(told, "Choose two drives or more.");
+      notice.className = "bad";
+      setText(notice, "Choose two or more drives.");
       return null;
     }
     const bad = found.find((axis) => axis[name] === null || !Number.isFinite(axis[name]));
@@ -107,9 +107,9 @@ export function groupMotion(report) {
   async function move() {
     const to = axes("degrees", "angle");
     if (!to || !isAccepted(chosen().map(([node]) => node))) return;
-    told.className = "quiet";
-    say(told, "Moving …");
-    tell("Group", await ask({ do: "group_move", axes: to, relative: relative.checked, rpm: read(rpm), rpm_per_s: read(ramp), within_s: read(within) }));
+    notice.className = "quiet";
+    setText(notice, "Moving …");
+    showAnswer("Group", await ask({ do: "group_move", axes: to, relative: relative.checked, rpm: read(rpm), rpm_per_s: read(ramp), within_s: read(within) }));
   }
 
   const turn = (sign) => () => {
@@ -126,7 +126,7 @@ export function groupMotion(report) {
   const [speed, most, ramp_m] = [input("base-speed", "0.1"), input("base-most", "0.3"), input("base-ramp", "0.5")];
   const twist = (forward, round) => {
     const [v, b] = [Math.abs(read(speed) ?? 0), read(base_m)];
-    // To turn on the spot its wheels go as fast as they do straight on.
+    // On the spot its wheels turn as fast as they do straight on.
     return { linear_m_s: forward * v, angular_rad_s: round * (b ? (2 * v) / b : 0) * (forward === 0 ? 1 : 0.5) };
   };
   let wanted = null;
@@ -147,25 +147,25 @@ export function groupMotion(report) {
     h(
       "div",
       { class: "forms" },
-      motionForm("Move together", h("button", { type: "button", id: "group-move", onclick: move }, "Enable and move together"), relative, row("Speed", rpm, "r/min at most"), row("Ramp", ramp, "r/min/s at most"), row("Within", within, "s")),
-      h("div", { class: "form" }, h("h3", {}, "Turn together (hold to run)"), h("p", { class: "quiet" }, "Each at its own speed of the table; they gather it together."), h("div", { class: "bar" }, spin("group-back", "◀", -1, "Hold to turn all backwards"), spin("group-forward", "▶", 1, "Hold to turn all forwards"))),
+      motionForm("Move together", h("button", { type: "button", id: "group-move", onclick: move }, "Enable and move together"), relative, row("Speed", rpm, "r/min maximum"), row("Ramp", ramp, "r/min/s maximum"), row("Within", within, "s")),
+      h("div", { class: "form" }, h("h3", {}, "Turn together (hold to run)"), h("p", { class: "quiet" }, "Each at its own speed from the table; all reach it together."), h("div", { class: "bar" }, spin("group-back", "◀", -1, "Hold to turn all backward"), spin("group-forward", "▶", 1, "Hold to turn all forward"))),
       h(
         "div",
         { class: "form base" },
-        h("h3", {}, "Base on two wheels (hold to run)"),
+        h("h3", {}, "Two-wheeled base (hold to run)"),
         h("p", {}, "Left wheel ", left, " turns ", turns_left),
         h("p", {}, "Right wheel ", right, " turns ", turns_right),
         row("Wheel base", base_m, "m"),
         row("Wheel radius", radius_m, "m"),
         row("Speed", speed, "m/s"),
-        row("At most", most, "m/s of a wheel"),
+        row("Maximum", most, "m/s at the wheel"),
         row("Ramp", ramp_m, "m/s²"),
         h("div", { class: "bar" }, go("base-left-turn", "↺", "Hold to turn left on the spot", 0, 1), go("base-forward", "▲", "Hold to drive forward", 1, 0), go("base-back", "▼", "Hold to drive back", -1, 0), go("base-right-turn", "↻", "Hold to turn right on the spot", 0, -1)),
       ),
     ),
-    told,
+    notice,
   );
-  const details = h("details", { class: "homing", id: "group" }, h("summary", {}, "Groups: several drives as one motion"), h("p", { class: "quiet" }, "All begin with one SYNC and end together. When one faults, is lost or lags, all come to rest. They are enabled for it, also by a held button, and have no power afterwards. Their PDO mapping is set anew for it."), fields);
+  const details = h("details", { class: "homing", id: "group" }, h("summary", {}, "Groups: several drives as one motion"), h("p", { class: "quiet" }, "All start with one SYNC and end together. When one faults, is lost or lags, all stop. The drives are enabled for the motion, also by a held button, and disabled afterwards. Their PDO mapping is changed for it."), fields);
 
   function line(node) {
     const fields = { in: toggle(`group-in-${node}`, "", false, () => link.state && update(link.state), { "aria-label": `Node ${node} is in the group` }), angle: input(`group-angle-${node}`, "90"), speed: input(`group-speed-${node}`, "30"), now: h("td"), counts: h("td"), does: h("td") };
@@ -196,13 +196,13 @@ export function groupMotion(report) {
     risk.update(drives.filter(({ node, goes_on }) => goes_on && moved.has(node)), inControl());
     for (const { node, drive, doing, trouble } of drives) {
       const of = lines.get(node);
-      say(of.now, `${number(drive?.angle_degrees, 1)}° ${number(drive?.velocity_rpm, 1)} r/min`);
-      say(of.counts, number(drive?.position_counts, 0));
-      say(of.does, trouble ?? doing ?? drive?.state ?? "–");
+      setText(of.now, `${number(drive?.angle_degrees, 1)}° ${number(drive?.velocity_rpm, 1)} r/min`);
+      setText(of.counts, number(drive?.position_counts, 0));
+      setText(of.does, trouble ?? doing ?? drive?.state ?? "–");
     }
   }
 
-  /** True if these may be moved; else whoever wants that is asked. */
+  /** True if these may be moved; else asks for confirmation. */
   function isAccepted(nodes) {
     asked = nodes;
     if (link.state) update(link.state);

@@ -1,9 +1,9 @@
-// That nothing stops a drive when the studio dies: said in red before its first motion, and asked about once.
+// Shows in red, before the first motion of a drive, that nothing would stop it if the studio died, and asks once for confirmation.
 
 import { ask } from "./link.js";
 import { h, renew } from "./dom.js";
 
-/** `report` hears what became of it. `update` takes the nodes that are about to be moved. */
+/** `report` takes the answer. `update` takes the nodes that are about to be moved. */
 export function guarding(id, report) {
   const root = h("div", { class: "guarding", id, role: "status" });
   let open = [];
@@ -22,11 +22,11 @@ export function guarding(id, report) {
     const key = JSON.stringify([open, mine, nodes.map(({ node, goes_on, without_us }) => [node, goes_on, without_us])]);
     renew(root, key, () => [
       ...nodes.map(line).filter(Boolean),
-      ...(open.length && mine ? [h("p", {}, h("button", { type: "button", class: "danger", onclick: accept }, `Move ${open.length === 1 ? "it" : "them"} nevertheless`), " Until this is pressed nothing here moves it.")] : []),
+      ...(open.length && mine ? [h("p", {}, h("button", { type: "button", class: "danger", onclick: accept }, `Move ${open.length === 1 ? "it" : "them"} anyway`), " Until then this page does not move it.")] : []),
     ]);
   }
 
-  /** True if they may be moved; else whoever wants that is asked. */
+  /** True if they may be moved; else asks for confirmation. */
   function isAccepted() {
     if (!open.length) return true;
     const button = root.querySelector("button");

@@ -1,13 +1,13 @@
 // Any object that passes on the bus, as a series: mapped into a PDO each frame is a sample, read or written by SDO each transfer,
-// whoever asked. Times are those of the frames.
+// of any client. Times are those of the frames.
 
 import { choice } from "./choice.js";
-import { h, say } from "./dom.js";
+import { h, setText } from "./dom.js";
 import { Series } from "./series.js";
 
 const ASK_MS = 100;
 const KEPT_S = 60;
-/** As many as the studio gives at once. */
+/** The most that the studio gives at once. */
 const MOST = 32;
 
 /** By object, `4:606C:00`: `{ field, node, label, unit, decimals, series }`. */
@@ -18,28 +18,28 @@ let timer = null;
 /** Torque is current by another name. */
 const isCurrent = ({ name, unit }) => /current|torque/i.test(name ?? "") || /\bm?A\b/.test(unit ?? "");
 
-/** What was chosen, as quantities of the scope. */
+/** The chosen objects, as quantities of the scope. */
 export const heard = () => [...chosen.values()];
 
 async function fetchSeries(parameters) {
   const answer = await fetch(`/api/series?${new URLSearchParams(parameters)}`);
-  const told = await answer.json();
-  if (!answer.ok) throw new Error(told.error.message);
-  return told;
+  const body = await answer.json();
+  if (!answer.ok) throw new Error(body.error.message);
+  return body;
 }
 
-function take(told) {
-  for (const { object, points } of told.series) {
+function take(body) {
+  for (const { object, points } of body.series) {
     const series = chosen.get(object)?.series;
-    // The first answer of an object and the next one of all may tell the same frames.
+    // The first answer for an object and the next one for all may have the same frames.
     for (const [time_s, value] of points) if (series && time_s > series.last_s()) series.push(time_s, value);
   }
 }
 
-/** Buttons to choose objects by, and to let them go. */
+/** Buttons that choose objects, and remove them. */
 export function heardChooser() {
   const first = { value: "", text: "Add an object …" };
-  const list = choice("scope-object", "Add an object that passes on the bus", [first], { onopen: load, onchange: () => add(list.value) });
+  const list = choice("scope-object", "Add an object from the bus", [first], { onopen: load, onchange: () => add(list.value) });
   const shown = h("span", { class: "chooser", role: "group", "aria-label": "Objects shown" });
   const status = h("span", { class: "quiet", role: "status" });
   let known = [];
@@ -51,11 +51,11 @@ export function heardChooser() {
     loading = true;
     try {
       known = (await fetchSeries({})).series.filter(({ object }) => !chosen.has(object));
-      const title = ({ object, name, unit, count }) => `${object} ${name ?? ""}${unit ? ` [${unit}]` : ""}, ${count} lately`;
+      const title = ({ object, name, unit, count }) => `${object} ${name ?? ""}${unit ? ` [${unit}]` : ""}, ${count} recently`;
       list.offer([first, ...known.map((one) => ({ value: one.object, text: title(one) }))]);
-      say(status, "");
+      setText(status, "");
     } catch (error) {
-      say(status, error.message);
+      setText(status, error.message);
     }
     loading = false;
   }
@@ -64,19 +64,19 @@ export function heardChooser() {
     const one = known.find((known) => known.object === object);
     list.value = "";
     if (!one || chosen.has(object)) return;
-    if (chosen.size >= MOST) return say(status, `At most ${MOST} objects`);
+    if (chosen.size >= MOST) return setText(status, `At most ${MOST} objects`);
     chosen.set(object, { field: object, node: one.node, label: `${object} ${one.name ?? ""}`, unit: one.unit ? `[${one.unit}]` : "", decimals: 0, steps: !isCurrent(one), series: new Series(KEPT_S) });
-    const remove = h("button", { type: "button", "data-object": object, title: "Take it away" }, `× ${object}`);
+    const remove = h("button", { type: "button", "data-object": object, title: "Remove" }, `× ${object}`);
     remove.addEventListener("click", () => {
       chosen.delete(object);
       remove.remove();
     });
     shown.append(remove);
     try {
-      // What has passed already is a part of it.
+      // With the frames that have passed already.
       take(await fetchSeries({ objects: object }));
     } catch (error) {
-      say(status, error.message);
+      setText(status, error.message);
     }
     if (timer === null) ask();
   }
@@ -89,13 +89,13 @@ export function heardChooser() {
     }
     if (!document.hidden) {
       try {
-        const told = await fetchSeries({ objects: [...chosen.keys()].join(), ...(after === null ? {} : { after }) });
-        take(told);
-        after = told.to;
-        missed += told.skipped;
-        say(status, missed ? `${missed} frames were too many for this page and are not drawn` : "");
+        const body = await fetchSeries({ objects: [...chosen.keys()].join(), ...(after === null ? {} : { after }) });
+        take(body);
+        after = body.to;
+        missed += body.skipped;
+        setText(status, missed ? `${missed} frames are not drawn: too many for this page` : "");
       } catch (error) {
-        say(status, error.message);
+        setText(status, error.message);
       }
     }
     timer = setTimeout(ask, ASK_MS);

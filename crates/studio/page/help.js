@@ -1,10 +1,10 @@
-// What something means: the `?` key on the thing that has the focus or the pointer, or a press on a word that has a dotted line.
-// Every text is the studio's: the description of the drive with the section of its manual, or the standard's clause.
+// Help: the `?` key on the element that has the focus or the pointer, or a press on a word with a dotted line.
+// Every text comes from the studio: the description of the drive with the section of its manual, or the clause of the standard.
 
 import { ask } from "./link.js";
 import { h } from "./dom.js";
 
-/** Marks an element as something that can be pointed at and asked about; `node` where the answer is the model's. */
+/** Marks an element that has help; `node` where the answer depends on the model. */
 export function pointed(element, topic, name, node = null) {
   element.dataset.help = topic;
   element.dataset.name = name;
@@ -18,29 +18,29 @@ export function helped(element, topic, name, node = null) {
   return pointed(element, topic, name, node);
 }
 
-/** What is told with an element already, and needs no question. */
+/** Help texts that came with their element, and need no request. */
 const texts = new WeakMap();
 
-/** Marks an element whose meaning the studio has told with it: `{ title, text, source }`. */
-export function told(element, meaning) {
+/** Marks an element whose help came with it: `{ title, text, source }`. */
+export function documented(element, meaning) {
   texts.set(element, meaning);
   return pointed(element, "told", meaning.title);
 }
 
-/** A word that tells what it means when it is pressed. */
+/** A word that shows its help when pressed. */
 export const term = (topic, name, node = null) => helped(h("button", { type: "button", class: "term", title: "What is this? (?)" }, name), topic, name, node);
 
-/** Words with commas between them. */
+/** Words separated by commas. */
 export const terms = (topic, names, node) => names.flatMap((name, at) => [...(at ? [", "] : []), term(topic, name, node)]);
 
-/** `settings` stands at its end, whatever it shows. */
+/** `settings` is at its end, whatever it shows. */
 export function helpPanel(shared, settings) {
   const title = h("h3");
   const body = h("div");
   const close = h("button", { type: "button", id: "help-close", onclick: () => hide() }, "Close");
-  const root = h("aside", { id: "help", role: "dialog", "aria-label": "What it means", hidden: true }, h("div", { class: "bar" }, title, close), body, h("div", { class: "bar" }, settings));
+  const root = h("aside", { id: "help", role: "dialog", "aria-label": "Help", hidden: true }, h("div", { class: "bar" }, title, close), body, h("div", { class: "bar" }, settings));
   let before = null;
-  /** What else is offered: its name, whether it is there now, and what to call. */
+  /** Further entries: name, whether it is offered now, and what to call. */
   const offers = [];
 
   function hide() {
@@ -62,19 +62,19 @@ export function helpPanel(shared, settings) {
     const { help, name, of: node } = element.dataset;
     const answer = await ask({ do: "help", node: node ? Number(node) : shared.node, topic: help, name });
     if (!answer.ok) return open(name, h("p", {}, answer.error.message));
-    const told = answer.result;
+    const meaning = answer.result;
     const facts = [
-      ["Values", (told.meanings ?? []).map(([value, text]) => `${value}: ${text}`).join("; ")],
-      ["Takes", told.range],
-      ["Unit of one count", told.unit],
-      ["As delivered", told.default],
-      ["Access", told.access],
+      ["Values", (meaning.meanings ?? []).map(([value, text]) => `${value}: ${text}`).join("; ")],
+      ["Range", meaning.range],
+      ["Unit of one count", meaning.unit],
+      ["Default", meaning.default],
+      ["Access", meaning.access],
     ].filter(([, text]) => text);
     const list = facts.flatMap(([what, text]) => [h("dt", {}, what), h("dd", {}, text)]);
-    open(told.title, h("p", {}, told.text), ...(list.length ? [h("dl", {}, ...list)] : []), h("p", { class: "quiet" }, `Source: ${told.source}`));
+    open(meaning.title, h("p", {}, meaning.text), ...(list.length ? [h("dl", {}, ...list)] : []), h("p", { class: "quiet" }, `Source: ${meaning.source}`));
   }
 
-  /** Without anything that has the focus or the pointer: what can be asked about here. */
+  /** Where no element has the focus or the pointer: a list of what has help in this view. */
   function overview() {
     const seen = new Set();
     const all = [...document.querySelectorAll("#view [data-help]")].filter((element) => {
@@ -82,7 +82,7 @@ export function helpPanel(shared, settings) {
       return element.getClientRects().length && !seen.has(key) && seen.add(key);
     });
     const some = all.slice(0, 40).map((element) => h("li", {}, h("button", { type: "button", class: "term", onclick: () => about(element) }, element.dataset.name)));
-    open("What can be asked about here", h("p", {}, "Press ? on a thing that has the focus or the pointer, or press a word."), h("ul", { class: "plain-list" }, ...some), ...offers.filter(([, is_there]) => is_there()).map(([name, , take]) => h("button", { type: "button", class: "offer", onclick: () => (hide(), take()) }, name)));
+    open("Help in this view", h("p", {}, "Press ? on an element that has the focus or the pointer, or press a word."), h("ul", { class: "plain-list" }, ...some), ...offers.filter(([, is_there]) => is_there()).map(([name, , take]) => h("button", { type: "button", class: "offer", onclick: () => (hide(), take()) }, name)));
   }
 
   function key() {

@@ -1,9 +1,9 @@
 // The homing wizard of the Motion view: which methods the drive has and what each does, its speeds, its switches as they are
-// now, and how a run goes. What a method means is told by the studio, from the drive's description.
+// now, and the progress of a run. The meaning of a method comes from the studio, which has it from the drive's description.
 
 import { ask } from "./link.js";
 import { choice } from "./choice.js";
-import { h, number, renew, say } from "./dom.js";
+import { h, number, renew, setText } from "./dom.js";
 import { helped } from "./help.js";
 import { described, homingPicture } from "./homing_picture.js";
 
@@ -11,7 +11,7 @@ import { described, homingPicture } from "./homing_picture.js";
 const LOOK_MS = 1000;
 const RUNNING_MS = 250;
 
-/** `isAccepted` asks, where nothing stops the drive when the studio dies, and says whether it may be moved. */
+/** `isAccepted` returns whether the drive may be moved; it asks first where nothing would stop the drive if the studio died. */
 export function homingWizard(shared, report, isAccepted) {
   const choose = choice("home-method", "Method", [], { onchange: () => drawMethod() });
   const about = h("p", { id: "home-described" });
@@ -20,17 +20,17 @@ export function homingWizard(shared, report, isAccepted) {
   const remark = h("p", { class: "quiet" });
   const inputs = h("ul", { class: "inputs", id: "home-inputs" });
   const settings = h("form", { class: "settings", onsubmit: write });
-  const told = h("p", { role: "status", id: "home-told" });
+  const notice = h("p", { role: "status", id: "home-told" });
   const progress = h("p", { class: "status", role: "status", id: "home-progress" });
   const start = h("button", { type: "button", id: "home-start", class: "primary", onclick: run }, "Start homing");
   const body = h(
     "div",
     { class: "columns" },
     h("div", {}, h("p", {}, "Method ", choose), about, picture, missing, remark),
-    h("div", {}, h("h3", {}, "Switches now"), inputs, h("h3", {}, "How it is set"), settings, told),
+    h("div", {}, h("h3", {}, "Switches now"), inputs, h("h3", {}, "Settings"), settings, notice),
   );
-  const none = h("p", { class: "quiet" }, "Open it to read which methods the drive has.");
-  const details = h("details", { class: "homing", id: "homing" }, h("summary", {}, "Home: find the reference position"), none, body, h("div", { class: "bar" }, start, progress));
+  const none = h("p", { class: "quiet" }, "Open to read the methods of the drive.");
+  const details = h("details", { class: "homing", id: "homing" }, h("summary", {}, "Homing: find the reference position"), none, body, h("div", { class: "bar" }, start, progress));
   details.addEventListener("toggle", () => details.open && look(true));
 
   let node = null;
@@ -47,12 +47,12 @@ export function homingWizard(shared, report, isAccepted) {
     asked_at = 0;
     body.hidden = true;
     none.hidden = false;
-    say(told, "");
-    say(progress, "");
+    setText(notice, "");
+    setText(progress, "");
     start.disabled = true;
   }
 
-  /** Reads what the drive says; `fresh` also fills the fields anew. */
+  /** Reads the drive; `fresh` also refills the fields. */
   async function look(fresh) {
     if (asking || shared.node === null) return;
     if (shared.node !== node) forget(shared.node);
@@ -67,7 +67,7 @@ export function homingWizard(shared, report, isAccepted) {
       seen = null;
       body.hidden = true;
       none.hidden = false;
-      say(none, answer.error.message);
+      setText(none, answer.error.message);
       return;
     }
     const first = seen === null;
@@ -84,8 +84,8 @@ export function homingWizard(shared, report, isAccepted) {
     choose.offer(seen.methods.map(({ method, title }) => ({ value: String(method), text: title ? `${method}: ${title}` : String(method) })));
     const wanted = [kept, String(seen.method)].find((value) => seen.methods.some(({ method }) => String(method) === value));
     if (wanted !== undefined) choose.value = wanted;
-    say(remark, seen.remark);
-    settings.replaceChildren(...seen.settings.map(field), ...(seen.settings.length ? [h("button", { type: "submit", id: "home-write" }, "Write these")] : [h("p", { class: "quiet" }, "This model has no objects for it.")]));
+    setText(remark, seen.remark);
+    settings.replaceChildren(...seen.settings.map(field), ...(seen.settings.length ? [h("button", { type: "submit", id: "home-write" }, "Write")] : [h("p", { class: "quiet" }, "This model has no objects for homing.")]));
     drawMethod();
   }
 
@@ -96,7 +96,7 @@ export function homingWizard(shared, report, isAccepted) {
       h("span", {}, `${setting.title} (${setting.object}) `),
       h("input", { type: "text", inputmode: "decimal", value: setting.value, "data-object": setting.object, autocomplete: "off" }),
       helped(h("button", { type: "button", class: "term", "aria-label": `What is ${setting.name}?` }, "?"), "object", setting.object, node),
-      h("span", { class: "quiet" }, ` ${setting.unit} · now ${setting.text}${setting.takes ? `; takes ${setting.takes}` : ""}`),
+      h("span", { class: "quiet" }, ` ${setting.unit} · now ${setting.text}${setting.takes ? `; range ${setting.takes}` : ""}`),
     );
 
   const method = () => seen?.methods.find(({ method }) => String(method) === choose.value) ?? null;
@@ -104,39 +104,39 @@ export function homingWizard(shared, report, isAccepted) {
   function drawMethod() {
     const of = method();
     renew(picture, JSON.stringify(of), () => (of ? [homingPicture(of)] : []));
-    say(about, of ? described(of) : "The drive has no method.");
+    setText(about, of ? described(of) : "The drive has no homing method.");
     const parts = [];
-    if (of?.missing.length) parts.push(`No input of this drive is set to be its ${of.missing.join(" or ")}: the search would not end by itself.`);
-    if (of?.no_turn.length) parts.push(`Without ${of.no_turn.join(" and ")} it does not turn round there.`);
-    say(missing, parts.join(" "));
+    if (of?.missing.length) parts.push(`No input of this drive is configured as ${of.missing.join(" or ")}: the search would not end by itself.`);
+    if (of?.no_turn.length) parts.push(`Without ${of.no_turn.join(" and ")} it does not reverse there.`);
+    setText(missing, parts.join(" "));
   }
 
   function drawInputs() {
     renew(inputs, JSON.stringify(seen.inputs), () =>
       seen.inputs.length
         ? seen.inputs.map(({ name, signal, active }) =>
-            h("li", { class: active ? "on" : "" }, `${name}${signal && signal !== name ? ` (${signal})` : signal ? "" : " (no switch)"}: ${active === null ? "not told" : active ? "on" : "off"}`))
-        : [h("li", { class: "quiet" }, "No object of this model shows them.")]);
+            h("li", { class: active ? "on" : "" }, `${name}${signal && signal !== name ? ` (${signal})` : signal ? "" : " (no switch)"}: ${active === null ? "unknown" : active ? "on" : "off"}`))
+        : [h("li", { class: "quiet" }, "This model has no object for its switches.")]);
   }
 
   function drawProgress() {
-    const ended = { attained: "The statusword says: home was found.", failed: "The statusword says: home was not found." }[seen?.ended] ?? "";
+    const ended = { attained: "Statusword: homing attained.", failed: "Statusword: homing error." }[seen?.ended] ?? "";
     const now = seen?.running ? `Homing: ${seen.phase ?? "under way"}${position === null ? "" : `, at ${number(position, 1)}°`}` : outcome || ended;
-    progress.className = seen?.running ? "status" : outcome.startsWith("Not") || seen?.ended === "failed" ? "status bad" : "status good";
-    say(progress, now);
+    progress.className = seen?.running ? "status" : outcome.startsWith("Home not") || seen?.ended === "failed" ? "status bad" : "status good";
+    setText(progress, now);
   }
 
   async function write(event) {
     event.preventDefault();
     const of = node;
     const changed = [...settings.querySelectorAll("input")].filter((input) => input.value.trim() !== seen.settings.find(({ object }) => object === input.dataset.object)?.value);
-    if (!changed.length) return say(told, "Nothing is different from what the drive has.");
+    if (!changed.length) return setText(notice, "Nothing to write: the drive has these values.");
     const values = changed.map((input) => ({ object: input.dataset.object, value: input.value.trim() }));
     const answer = await ask({ do: "write_parameters", node: of, values });
     if (of !== node) return;
-    told.className = answer.ok ? "good" : "bad";
-    say(told, answer.ok ? "Written and read back." : answer.error.message);
-    // What was refused stays as it was typed.
+    notice.className = answer.ok ? "good" : "bad";
+    setText(notice, answer.ok ? "Written and read back." : answer.error.message);
+    // Refused values stay as typed.
     await look(answer.ok);
   }
 
@@ -148,7 +148,7 @@ export function homingWizard(shared, report, isAccepted) {
     asked_at = 0;
     const answer = report(`Node ${on}: Home`, await ask({ do: "home", node: on, method: of.method }));
     if (on !== node) return;
-    outcome = answer.ok ? `Home was found by method ${of.method}.` : `Not found: ${answer.error.message}`;
+    outcome = answer.ok ? `Home found by method ${of.method}.` : `Home not found: ${answer.error.message}`;
     await look(false);
   }
 
@@ -158,7 +158,7 @@ export function homingWizard(shared, report, isAccepted) {
     position = found?.drive?.angle_degrees ?? null;
     const running = found?.doing === "homing";
     start.disabled = !seen || running || !method();
-    say(start, found?.drive?.state === "Operation enabled" ? "Start homing" : "Enable and start homing");
+    setText(start, found?.drive?.state === "Operation enabled" ? "Start homing" : "Enable and start homing");
     if (seen) seen.running = running;
     if (!details.open || !found?.drive) return;
     if (seen) drawProgress();

@@ -1,5 +1,5 @@
-// A homing method as a picture, like the figures of CiA 402-2, clause 11: the axis from its negative to its positive end, the
-// switches on it, the way of the shaft, and the point that becomes home. Drawn from what the studio tells of the method; there
+// A drawing of a homing method, like the figures of CiA 402-2, clause 11: the axis from its negative to its positive end, the
+// switches on it, the path of the shaft, and the home position. Drawn from the studio's description of the method; there
 // is no table of methods here.
 
 import { s } from "./dom.js";
@@ -7,18 +7,18 @@ import { s } from "./dom.js";
 const LEFT = 40;
 const RIGHT = 600;
 const MIDDLE = (LEFT + RIGHT) / 2;
-/** Where each switch is on, from and to. */
+/** The range in which each switch is on. */
 const NEGATIVE_LIMIT = [LEFT, 110];
 const POSITIVE_LIMIT = [530, RIGHT];
 const HOME = [280, 360];
-/** How far the shaft goes on to turn round, and beyond an edge before it crosses it. */
+/** How far the shaft goes on before it reverses, and beyond an edge before it crosses it. */
 const TURN = 26;
-/** From one index pulse to the next. */
+/** Distance of two index pulses. */
 const PULSE = 70;
 
 const sign = (direction) => (direction === "negative" ? -1 : 1);
 
-/** Where the method's switch is on. One that does not turn round at a limit has its switch reaching to that end. */
+/** Where the switch of the method is on. If the method does not reverse at a limit, its switch reaches to that end. */
 function stretch(method) {
   if (method.switch === "negative limit") return NEGATIVE_LIMIT;
   if (method.switch === "positive limit") return POSITIVE_LIMIT;
@@ -26,13 +26,13 @@ function stretch(method) {
   return method.search === "positive" ? [HOME[1], RIGHT] : [LEFT, HOME[0]];
 }
 
-/** The edge at which home is, by the sense in which it is crossed. */
+/** The edge at the home position, by the direction in which it is crossed. */
 function edgeOf(method, [low, high]) {
   const going_on = method.edge === "on";
   return (method.crossing === "positive") === going_on ? low : high;
 }
 
-/** The turning points from a start, with the shaft coming upon the switch in `direction`. */
+/** The turning points from a start, with the shaft reaching the switch in `direction`. */
 function way(method, from, direction, before = []) {
   const [low, high] = stretch(method);
   const edge = edgeOf(method, [low, high]);
@@ -40,7 +40,7 @@ function way(method, from, direction, before = []) {
   const points = [from, ...before];
   const met = direction > 0 ? low : high;
   if (method.edge === "on") {
-    // It has to be off before it can go on: out of the switch on the side from which the edge is crossed.
+    // The switch has to be off before it can go on: leave it on the side from which the edge is crossed.
     if (direction === crossing) points.push(met + direction * TURN);
     points.push(edge - crossing * TURN);
   } else if (direction !== crossing) points.push(met + direction * TURN);
@@ -51,7 +51,7 @@ function way(method, from, direction, before = []) {
 
 const pulseAfter = (x, direction) => x + direction * (PULSE / 2);
 
-/** The ways that are drawn: from the side that the search begins on, and where it turns round also from the other. */
+/** The paths that are drawn: from the side on which the search begins, and where it reverses also from the other. */
 function ways(method) {
   if (method.here) return [[MIDDLE]];
   if (!method.switch) return [[MIDDLE, pulseAfter(MIDDLE, sign(method.index))]];
@@ -72,7 +72,7 @@ function switchRow(name, [low, high], y, kind) {
   return s("g", { class: `switch ${kind}` }, line(level, ""), text(RIGHT + 8, y + 4, name));
 }
 
-/** One way, a step down at each turn. */
+/** One path, a step down at each reversal. */
 function drawn(points, y, dashed) {
   const group = s("g", { class: dashed ? "homing-way other" : "homing-way" });
   let d = `M${points[0]} ${y}`;
@@ -85,15 +85,15 @@ function drawn(points, y, dashed) {
   return { group, end: [points[points.length - 1], end_y] };
 }
 
-/** A sentence that says the same as the picture. */
+/** The drawing in words. */
 export function described(method) {
-  if (method.here) return "Nothing moves: home is where the shaft is.";
+  if (method.here) return "Nothing moves: the present position becomes home.";
   const index = method.index ? `the first index pulse in ${method.index} direction` : "";
   if (!method.switch) return `The shaft turns slowly in ${method.index} direction; home is ${index}.`;
-  const turn = method.reverses_at_limit ? ", and turns round at a limit switch" : "";
+  const turn = method.reverses_at_limit ? ", and reverses at a limit switch" : "";
   const edge = `the edge at which the ${method.switch} goes ${method.edge} while the shaft moves in ${method.crossing} direction`;
   const home = index ? `Home is ${index} after ${edge}.` : `Home is ${edge}.`;
-  return `The shaft looks for the ${method.switch} in ${method.search} direction${turn}. ${home}`;
+  return `The shaft searches for the ${method.switch} in ${method.search} direction${turn}. ${home}`;
 }
 
 export function homingPicture(method) {

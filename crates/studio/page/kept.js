@@ -1,4 +1,4 @@
-// What the drives said in the last minute: a series for each value of each drive, kept also while another view is shown, and what
+// The values of the last minute: a series for each value of each drive, kept also while another view is shown, and what
 // happened meanwhile.
 
 import { on } from "./link.js";
@@ -7,7 +7,7 @@ import { Series } from "./series.js";
 const KEPT_S = 60;
 const MARKERS_KEPT = 200;
 
-/** What a drive says when it is looked at: field, label, unit, decimals. A current answers no step: it is what a step takes. */
+/** The values read from a drive: field, label, unit, decimals. A current has no step response. */
 export const QUANTITIES = [
   { field: "velocity_rpm", label: "Speed", unit: "r/min", decimals: 1 },
   { field: "angle_degrees", label: "Position", unit: "°", decimals: 1 },
@@ -15,13 +15,13 @@ export const QUANTITIES = [
   { field: "supply_v", label: "Supply", unit: "V", decimals: 1 },
 ];
 
-/** Further fields that are saved with them. */
+/** Further fields saved with them. */
 const SAVED = ["position_counts", "statusword"];
 
 /** By node: by field, a series. */
 const kept = new Map();
 
-/** What happened: `{ time_s, node, text }`, oldest first; node is null of what concerns no node. */
+/** What happened: `{ time_s, node, text }`, oldest first; node is null where it concerns no node. */
 export const markers = [];
 
 /** The series of a value; an empty one before it was ever read. */
@@ -52,7 +52,7 @@ on("state", (state) => {
 
 on("news", ({ time_s, node, text }) => {
   if (time_s === null || time_s === undefined) return;
-  // The time of the bus begins anew with a studio that was started anew.
+  // The time of the bus restarts with the studio.
   if (markers.length && time_s < markers.at(-1).time_s - 1) markers.length = 0;
   markers.push({ time_s, node: node ?? null, text });
   if (markers.length > MARKERS_KEPT) markers.shift();

@@ -1,25 +1,25 @@
-// The connection to the studio: what is known, since when, and what is asked for.
+// The connection to the studio: its newest state, how old that is, and requests.
 //
-// Messages have rising numbers and the word of this session, so that none counts twice. A picture that is older than half a second
-// shows nothing of now: then nothing is asked for but a stop, since what waits in a connection would be done much later. A
-// connection that is lost, or that brings nothing, is made anew; control has to be taken anew then.
+// Messages have rising numbers and the word of this session, so that none counts twice. A state that is older than half a second
+// is stale: then only a stop is sent, since a command that waits in a connection would be executed much later. A
+// connection that is lost, or silent, is opened again; control has to be taken again then.
 
 const RETRY_MS = 1000;
 const ALIVE_MS = 500;
-/** The studio sends a picture every 50 ms. */
+/** The studio sends its state every 50 ms. */
 const OLD_MS = 500;
-/** A connection that has brought nothing for so long is given up. */
+/** A connection that is silent for so long is given up. */
 const DEAD_MS = 3000;
 const LOOK_MS = 100;
 /** How long a stop may take to be confirmed. */
 const CONFIRM_MS = 300;
 
 export const link = {
-  /** The newest picture of everything; null before the first. */
+  /** The newest state; null before the first. */
   state: null,
   /** The welcome message of this connection; null without one. */
   welcome: null,
-  /** Whether the newest picture shows what is now. */
+  /** Whether the newest state is current. */
   fresh: false,
 };
 
@@ -30,55 +30,55 @@ const listeners = { state: [], news: [], change: [], sight: [], stop: [] };
 let socket = null;
 let seq = 0;
 const waiting = new Map();
-/** When the newest picture of this connection came, and when the connection was begun, by `performance.now()`. */
+/** When the newest state of this connection came, and when the connection was opened, by `performance.now()`. */
 let seen_at = -Infinity;
 let opened_at = -Infinity;
-/** When the newest picture of any connection came; at first when the page was opened. */
+/** When the newest state of any connection came; at first when the page was opened. */
 let last_at = performance.now();
 
 /**
- * Calls `listener` with each picture ("state"), piece of news ("news"), when the connection comes or goes ("change"), when what is
- * shown begins or ceases to be what is now, and again and again while it is not ("sight": `{ fresh, connected, age_ms, refused }`), and with
- * what became of a press of stop ("stop": `{ confirmed, after_ms }`).
+ * Calls `listener` with each state ("state"), each piece of news ("news"), when the connection opens or closes ("change"), when the
+ * shown state becomes current or stale, and repeatedly while it is stale ("sight": `{ fresh, connected, age_ms, refused }`), and with
+ * the outcome of a press of stop ("stop": `{ confirmed, after_ms }`).
  */
 export function on(what, listener) {
   listeners[what].push(listener);
 }
 
-const tell = (what, value) => listeners[what].forEach((listener) => listener(value));
+const emit = (what, value) => listeners[what].forEach((listener) => listener(value));
 
 /** True if this page may move drives. */
 export const inControl = () => link.welcome !== null && link.fresh && link.state?.controller === link.welcome.session;
 
 const refused = (kind, message) => Promise.resolve({ ok: false, error: { kind, message } });
 
-/** Sends a deed; resolves with the answer, and never rejects. */
-export function ask(deed) {
+/** Sends a command; resolves with the answer, and never rejects. */
+export function ask(command) {
   if (!link.welcome || socket?.readyState !== WebSocket.OPEN) return refused("no_connection", "There is no connection to the studio.");
-  if (!link.fresh && deed.do !== "stop_all") return refused("no_picture", "The studio shows nothing new: nothing was sent.");
+  if (!link.fresh && command.do !== "stop_all") return refused("no_picture", "Nothing was sent: the state of the studio is stale.");
   seq += 1;
-  const message = { seq, session: link.welcome.word, ...deed };
+  const message = { seq, session: link.welcome.word, ...command };
   socket.send(JSON.stringify(message));
   return new Promise((resolve) => waiting.set(message.seq, resolve));
 }
 
 /**
- * Quick-stops every drive: over the socket, and by a request of its own in case that the socket is in trouble. Only the answer of
- * whoever moves the drives confirms it; that a web server has taken the request does not.
+ * Quick-stops every drive: over the socket, and by a separate request in case the socket is stuck. Only the answer of
+ * the host that moves the drives confirms it; that the web server has taken the request does not.
  */
 export function stopAll() {
   const began = performance.now();
   let confirmed = false;
-  let told = false;
+  let reported = false;
   const missed = () => {
-    if (confirmed || told) return;
-    told = true;
-    tell("stop", { confirmed: false, after_ms: performance.now() - began });
+    if (confirmed || reported) return;
+    reported = true;
+    emit("stop", { confirmed: false, after_ms: performance.now() - began });
   };
   ask({ do: "stop_all" }).then((answer) => {
     if (!answer.ok) return missed();
     confirmed = true;
-    tell("stop", { confirmed: true, after_ms: performance.now() - began });
+    emit("stop", { confirmed: true, after_ms: performance.now() - began });
   });
   fetch("/api/stop", { method: "POST", keepalive: true }).catch(() => {});
   setTimeout(missed, CONFIRM_MS);
@@ -90,34 +90,34 @@ function take(message) {
       link.welcome = message;
       turned_away = null;
       seq = 0;
-      tell("change", true);
+      emit("change", true);
       break;
     case "state":
       link.state = message;
       seen_at = last_at = performance.now();
       look();
-      tell("state", message);
+      emit("state", message);
       break;
     case "answer":
       waiting.get(message.seq)?.(message);
       waiting.delete(message.seq);
       break;
     case "news":
-      tell("news", message);
+      emit("news", message);
       break;
     case "dropped":
-      // Pictures are replaced by newer ones; of news the loss has to be told.
-      if (message.what === "news") tell("news", { ...message, text: `${message.count} pieces of news were missed` });
+      // A state is replaced by the next one; lost news have to be reported.
+      if (message.what === "news") emit("news", { ...message, text: `${message.count} pieces of news were missed` });
       break;
   }
 }
 
-/** Connects, and goes on connecting. */
+/** Connects, and reconnects whenever the connection is lost. */
 export function connect() {
   const mine = new WebSocket(`ws://${location.host}/ws`);
   socket = mine;
   opened_at = performance.now();
-  // What one says that was given up counts no longer.
+  // Messages of a connection that was given up no longer count.
   mine.addEventListener("message", (event) => mine === socket && take(JSON.parse(event.data)));
   mine.addEventListener("close", () => mine === socket && lose());
 }
@@ -129,8 +129,8 @@ function lose() {
   }
   waiting.clear();
   look();
-  tell("change", false);
-  // Also where it is refused: the browser may be let in by another tab of it.
+  emit("change", false);
+  // Also where it is refused: another tab may get the browser admitted.
   findRefusal().then(() => setTimeout(connect, RETRY_MS));
 }
 
@@ -145,12 +145,12 @@ async function findRefusal() {
   look();
 }
 
-/** Looks how old the picture is. */
+/** Checks the age of the state. */
 function look() {
   const now = performance.now();
   const before = link.fresh;
   link.fresh = now - seen_at <= OLD_MS;
-  if (!link.fresh || !before) tell("sight", { fresh: link.fresh, connected: link.welcome !== null, age_ms: now - last_at, refused: turned_away });
+  if (!link.fresh || !before) emit("sight", { fresh: link.fresh, connected: link.welcome !== null, age_ms: now - last_at, refused: turned_away });
   if (socket && now - Math.max(seen_at, opened_at) > DEAD_MS) {
     const dead = socket;
     lose();
@@ -159,7 +159,7 @@ function look() {
 }
 setInterval(look, LOOK_MS);
 
-// Whoever has control shows that the page is there.
+// A page that has control shows that it is there.
 setInterval(() => {
   if (inControl()) ask({ do: "alive" });
 }, ALIVE_MS);

@@ -1,4 +1,4 @@
-// Exchanges the password for a cookie. The server looks at one a second.
+// Exchanges the password for a cookie. The server checks one password a second.
 const trouble = document.getElementById("trouble");
 
 document.getElementById("form").addEventListener("submit", async (event) => {

@@ -1,5 +1,5 @@
-// The power drive state machine (CiA 402-2, 8.2) as a picture. States and transitions come from the server; where they are
-// drawn is decided here, as in the standard's figure: enabled at the bottom, faults at the right.
+// The power drive state machine (CiA 402-2, 8.2), drawn. States and transitions come from the server; where they are
+// drawn is decided here, as in the figure of the standard: enabled at the bottom, faults at the right.
 
 import { s } from "./dom.js";
 import { helped } from "./help.js";
@@ -18,7 +18,7 @@ const PLACES = {
   Fault: [560, 110],
 };
 
-// By the standard's number: the line, and where the number stands.
+// By the number of the standard: the line, and the place of the number.
 const LINES = {
   1: ["M260 50V88", 248, 74],
   2: ["M235 130V168", 223, 154],
@@ -38,7 +38,7 @@ const LINES = {
   15: ["M465 105H357", 410, 99],
 };
 
-/** The picture, and what to call with the present state and the steps to Operation enabled. */
+/** The drawing, and the function that shows the present state and the steps to Operation enabled in it. */
 export function powerMachine(table) {
   const boxes = new Map();
   const arrows = new Map();

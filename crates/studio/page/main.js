@@ -2,7 +2,7 @@
 
 import { ask, connect, inControl, link, on, stopAll } from "./link.js";
 import { closeChoice } from "./choice.js";
-import { h, number, renew, say, toggle } from "./dom.js";
+import { h, number, renew, setText, toggle } from "./dom.js";
 import { busView } from "./bus.js";
 import { driveView } from "./drive.js";
 import { motionView } from "./motion.js";
@@ -19,19 +19,19 @@ import { worldView } from "./world.js";
 
 const byId = (id) => document.getElementById(id);
 const NEWS_KEPT = 200;
-/** What is told twice within this time is told once. */
+/** The same news within this time is shown once. */
 const SAME_NEWS_MS = 2000;
-/** How long it is shown that a stop was confirmed late. */
+/** How long a late confirmation of a stop is shown. */
 const LATE_MS = 6000;
-/** A page that has just been opened has no picture yet. */
+/** A page that has just been opened has no state yet. */
 const OPENING_MS = 1500;
 
-/** What the views share: which node is looked at. */
+/** Shared by the views: the chosen node. */
 const shared = { node: null };
 
-// Keys of one character, until somebody switches them off.
+// Single-character keys are on until they are switched off.
 const keepKeys = () => localStorage.setItem("character-keys", characters.checked ? "on" : "off");
-const characters = toggle("character-keys", "Keys of one character (1 to 9, ?, d, r, s, p)", localStorage.getItem("character-keys") !== "off", keepKeys);
+const characters = toggle("character-keys", "Single-character keys (1 to 9, ?, d, r, s, p)", localStorage.getItem("character-keys") !== "off", keepKeys);
 const help = helpPanel(shared, characters);
 document.body.append(help.root);
 byId("what").addEventListener("click", help.overview);
@@ -62,7 +62,7 @@ function show(name) {
   for (const tab of byId("tabs").children) {
     const isShown = tab.dataset.name === next.name;
     tab.setAttribute("aria-current", isShown ? "page" : "false");
-    // In a narrow window the views are a line that moves sideways.
+    // In a narrow window the views are a line that scrolls sideways.
     if (isShown) tab.scrollIntoView({ block: "nearest", inline: "center" });
   }
   if (location.hash !== `#${next.name}`) location.hash = next.name;
@@ -75,16 +75,16 @@ byId("tabs").append(
 );
 addEventListener("hashchange", () => show(location.hash.slice(1)));
 
-// Stop: pressed, not released, so that it acts at once.
+// Stop acts on press, not on release, so that it acts at once.
 byId("stop").addEventListener("pointerdown", stopAll);
 byId("stop").addEventListener("click", (event) => {
-  // By the keyboard there is no pointer.
+  // A press by the keyboard has no pointer event.
   if (event.detail === 0) stopAll();
 });
 
 /**
- * A space is a space in a text field, as long as the studio moves nothing and that is seen; and in the commands to a virtual world,
- * where no real motor turns.
+ * Space is a space in a text field while the studio moves nothing and its state is fresh, and in the commands to a virtual world,
+ * where no real motor turns; everywhere else it is Stop.
  */
 const isText = (target) =>
   target.matches("textarea, input:not([type]), input[type=text], input[type=search]") &&
@@ -97,7 +97,7 @@ addEventListener(
     const types = event.target.matches("input, textarea, [aria-expanded=true]");
     const meaning = meaningOf(event, { in_text: isText(event.target), types, characters: characters.checked });
     if (meaning === "stop") {
-      // Wherever the focus is: no button is pressed with a space.
+      // Wherever the focus is: Space never presses a button.
       event.preventDefault();
       event.stopPropagation();
       if (!event.repeat) stopAll();
@@ -112,7 +112,7 @@ addEventListener(
   true,
 );
 
-// Light and dark: as the system has it, until somebody chooses.
+// Light or dark: as the system has it, until chosen here.
 const chosen = localStorage.getItem("theme");
 if (chosen) document.documentElement.dataset.theme = chosen;
 byId("theme").addEventListener("click", () => {
@@ -122,7 +122,7 @@ byId("theme").addEventListener("click", () => {
   localStorage.setItem("theme", next);
 });
 
-/** Shows what became of a deed: notes, or why it was not done. */
+/** Shows the answer to a command: notes, or why it was refused. */
 export function report(title, answer) {
   if (answer.ok) {
     for (const note of answer.notes ?? []) addNews(null, `${title}: `, note, "note");
@@ -132,7 +132,7 @@ export function report(title, answer) {
   return answer;
 }
 
-/** The newest line below: who it is about, and what has happened. The answer to whoever asked and the news to all may be the same. */
+/** Adds a line of news: whom it concerns, and what happened. An answer and the news to all sessions may be the same text. */
 let newest = { text: "", at: -Infinity };
 function addNews(time_s, about, text, kind) {
   const list = byId("news");
@@ -149,7 +149,7 @@ function addNews(time_s, about, text, kind) {
 byId("news-all").addEventListener("click", ({ currentTarget }) => {
   const all = document.querySelector("footer").classList.toggle("all");
   currentTarget.setAttribute("aria-expanded", String(all));
-  say(currentTarget, all ? "The newest" : "All news");
+  setText(currentTarget, all ? "Newest only" : "All news");
   byId("news").scrollTop = 0;
 });
 
@@ -158,13 +158,13 @@ function updateControl(state) {
   const asking = mine && state.asking !== null ? state.asking : null;
   const key = `${link.fresh} ${link.welcome?.session} ${state.controller} ${state.sessions} ${state.asking}`;
   renew(byId("control"), key, () => {
-    if (!link.fresh) return [h("span", { class: "bad" }, "The studio shows nothing new")];
-    const others = state.sessions > 1 ? ` · ${state.sessions} pages open` : "";
+    if (!link.fresh) return [h("span", { class: "bad" }, "The state of the studio is stale")];
+    const others = state.sessions > 1 ? ` · ${state.sessions} sessions open` : "";
     if (mine) {
       return [
         h("span", { class: "good" }, `You have control${others} `),
         asking === null
-          ? h("button", { type: "button", id: "release", onclick: () => control("release_control") }, "Give up")
+          ? h("button", { type: "button", id: "release", onclick: () => control("release_control") }, "Release control")
           : h("button", { type: "button", id: "hand-over", onclick: () => control("hand_over", asking) }, `Hand over to session ${asking}`),
       ];
     }
@@ -174,19 +174,19 @@ function updateControl(state) {
     const asked = state.asking === link.welcome?.session;
     return [
       h("span", { class: "quiet" }, `Session ${state.controller} has control${others} `),
-      h("button", { type: "button", id: "ask", disabled: asked, onclick: () => control("ask_control") }, asked ? "Asked for it" : "Ask for control"),
+      h("button", { type: "button", id: "ask", disabled: asked, onclick: () => control("ask_control") }, asked ? "Asked for control" : "Ask for control"),
     ];
   });
 }
 
-async function control(deed, to) {
-  report("Control", await ask(to === undefined ? { do: deed } : { do: deed, to }));
+async function control(command, to) {
+  report("Control", await ask(to === undefined ? { do: command } : { do: command, to }));
 }
 
 on("state", (state) => {
   const load = state.bus.load_percent === null ? "" : `load ${number(state.bus.load_percent, 1)} % · `;
   const bus = `${load}${state.bus.frames_per_s} frames/s · ${state.bus.name}`;
-  say(byId("bus-line"), bus);
+  setText(byId("bus-line"), bus);
   byId("bus-line").title = bus;
   updateControl(state);
   const unseen = unseenStops(state);
@@ -199,7 +199,7 @@ on("state", (state) => {
   tour.update(state);
 });
 
-/** A text about no node, or that begins with it. */
+/** Whether a text concerns no node, or begins with the name of its node. */
 const isNamed = ({ node, text }) => node === null || node === undefined || text.toLowerCase().startsWith(`node ${node}`);
 
 on("news", (news) => addNews(news.time_s, isNamed(news) ? "" : `node ${news.node}: `, news.text, ""));
@@ -208,7 +208,7 @@ on("change", (connected) => {
   if (!connected) shown?.view.hide?.();
 });
 
-// What is not seen any more is grey, and what is known of it stands over the whole width.
+// A stale state is grey, and what is known of it is shown over the whole width.
 on("sight", ({ fresh, connected, age_ms, refused }) => {
   const wasFresh = !document.body.classList.contains("unseen");
   document.body.classList.toggle("unseen", !fresh);
@@ -223,18 +223,18 @@ on("sight", ({ fresh, connected, age_ms, refused }) => {
   }
 });
 
-// A stop that nobody has confirmed stays told until one is.
+// An unconfirmed stop stays on screen until one is confirmed.
 let late = null;
 on("stop", ({ confirmed, after_ms }) => {
   const notice = byId("stop-notice");
   clearTimeout(late);
   if (!confirmed) {
     notice.className = "unconfirmed";
-    say(notice, "STOP WAS NOT CONFIRMED: use the emergency stop");
+    setText(notice, "STOP WAS NOT CONFIRMED: use the emergency stop");
     notice.hidden = false;
   } else if (!notice.hidden) {
     notice.className = "";
-    say(notice, `The stop was confirmed after ${number(after_ms / 1000, 1)} s.`);
+    setText(notice, `The stop was confirmed after ${number(after_ms / 1000, 1)} s.`);
     late = setTimeout(() => (notice.hidden = true), LATE_MS);
   }
 });

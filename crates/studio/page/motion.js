@@ -1,7 +1,7 @@
-// The Motion view: everything that moves a drive. A jog lasts as long as it is held.
+// The Motion view: everything that moves a drive. A jog lasts as long as its button is held.
 
 import { ask, inControl, link } from "./link.js";
-import { h, say, toggle } from "./dom.js";
+import { h, setText, toggle } from "./dom.js";
 import { VALUES, chooser, tiles } from "./drive.js";
 import { groupMotion } from "./group.js";
 import { guarding } from "./guarding.js";
@@ -14,7 +14,7 @@ import { isSeenMoving } from "./sight.js";
 // Three within the 200 ms after which the studio stops what is not held.
 const HOLD_MS = 60;
 
-/** Hold to run: turns while held, stops when it is let go by any way there is. */
+/** Hold to run: turns while held, stops when released in any way. */
 function jogger(shared, speed, report, isAccepted) {
   let held = null;
 
@@ -24,7 +24,7 @@ function jogger(shared, speed, report, isAccepted) {
     const jog = { node, timer: setInterval(() => hold(jog), HOLD_MS) };
     held = jog;
     const answer = await ask({ do: "jog", node, rpm: direction * speed() });
-    // A press of stop, or another deed, has its own words.
+    // A press of stop, or another command, reports itself.
     if (!answer.ok && answer.error.kind !== "stopped" && answer.error.kind !== "replaced") {
       report("Jog", answer);
       if (held === jog) drop();
@@ -33,7 +33,7 @@ function jogger(shared, speed, report, isAccepted) {
 
   async function hold(jog) {
     const answer = await ask({ do: "jog_hold", node: jog.node });
-    // Stopped, or let go too late: it does not begin anew by itself.
+    // Stopped, or held again too late: it does not restart by itself.
     if (!answer.ok && held === jog) drop();
   }
 
@@ -88,17 +88,17 @@ export function motionView(shared, report) {
     return value;
   };
 
-  const send = async (name, deed) => {
-    if (deed) report(`Node ${deed.node}: ${name}`, await ask(deed));
+  const send = async (name, command) => {
+    if (command) report(`Node ${command.node}: ${name}`, await ask(command));
   };
-  /** The buttons that move, which enable the drive where it is not. */
+  /** The buttons that start a motion; they enable the drive if needed. */
   const starts = [];
   const act = (name, make) => () => {
-    const deed = make();
-    if (deed && risk.isAccepted()) send(name, { ...deed, node: shared.node });
+    const command = make();
+    if (command && risk.isAccepted()) send(name, { ...command, node: shared.node });
   };
   const form = (name, make, ...fields) => {
-    const go = h("button", { type: "button", id: `go-${name.toLowerCase()}`, title: "Ctrl and Enter in a field", onclick: act(name, make) }, name);
+    const go = h("button", { type: "button", id: `go-${name.toLowerCase()}`, title: "Ctrl+Enter in a field", onclick: act(name, make) }, name);
     starts.push([go, name]);
     return motionForm(name, go, ...fields);
   };
@@ -118,8 +118,8 @@ export function motionView(shared, report) {
   const power = (id, name, what, key) =>
     h("button", { type: "button", id, title: key ? `${name} (key ${key})` : name, onclick: () => send(name, { do: what, node: shared.node }) }, name);
 
-  const enables = h("p", { class: "quiet" }, "Holding one also enables the drive.");
-  /** Where the shaft of a node was a second before it was last read. */
+  const enables = h("p", { class: "quiet" }, "Holding a button also enables the drive.");
+  /** Shaft position of a node one second before its last reading. */
   const before_degrees = (node) => {
     const angles = series(node, "angle_degrees");
     return angles.value(angles.last_s() - 1);
@@ -134,7 +134,7 @@ export function motionView(shared, report) {
       power("enable", "Enable", "enable"),
       power("disable", "Disable", "disable", "d"),
       power("reset-fault", "Reset fault", "reset_fault", "r"),
-      power("gentle-stop", "Stop by ramp", "stop", "s"),
+      power("gentle-stop", "Stop (ramp)", "stop", "s"),
     ),
     h(
       "div",
@@ -145,7 +145,7 @@ export function motionView(shared, report) {
         h("h3", {}, "Jog (hold to run)"),
         jogSpeed.row,
         enables,
-        h("div", { class: "bar" }, jog.button("◀", -1, "Hold to turn backwards (left arrow)"), jog.button("▶", 1, "Hold to turn forwards (right arrow)")),
+        h("div", { class: "bar" }, jog.button("◀", -1, "Hold to turn backward (left arrow)"), jog.button("▶", 1, "Hold to turn forward (right arrow)")),
       ),
       form("Turn", () => {
         const rpm = required(speed);
@@ -158,7 +158,7 @@ export function motionView(shared, report) {
       form("Push", () => {
         const value = required(amperes);
         return value === null ? null : { do: "torque", amperes: value };
-      }, amperes.row, h("p", { class: "quiet" }, "The speed that comes of it is up to the load.")),
+      }, amperes.row, h("p", { class: "quiet" }, "The resulting speed depends on the load.")),
     ),
     homing.root,
     group.root,
@@ -168,13 +168,13 @@ export function motionView(shared, report) {
   function update(state) {
     choose.update(state);
     const node = state.nodes.find((node) => node.node === shared.node);
-    say(title, node ? `Node ${node.node}: ${node.title ?? "model not known"}` : "No drive");
+    setText(title, node ? `Node ${node.node}: ${node.title ?? "unknown model"}` : "No drive");
     large.update(node?.drive ?? null);
     const seen = node && isSeenMoving(node.drive, before_degrees(node.node));
     const parts = [node?.trouble ?? node?.drive?.state ?? "–", node?.doing, seen ? (node.moving ? "in motion by this studio" : "in motion") : null];
-    say(status, parts.filter(Boolean).join(" · "));
+    setText(status, parts.filter(Boolean).join(" · "));
     const enabled = node?.drive?.state === "Operation enabled";
-    for (const [go, name] of starts) say(go, enabled ? name : `Enable and ${name.toLowerCase()}`);
+    for (const [go, name] of starts) setText(go, enabled ? name : `Enable and ${name.toLowerCase()}`);
     enables.hidden = enabled;
     risk.update(node ? [node] : [], inControl());
     homing.update(state);
@@ -188,10 +188,10 @@ export function motionView(shared, report) {
     group.hide();
   }
 
-  /** What is not seen any more is not told, and cannot be moved. */
+  /** A stale state is not shown, and nothing can be moved. */
   function lose() {
     hide();
-    say(status, "Not known: the studio shows nothing new");
+    setText(status, "Unknown: the state of the studio is stale");
     controls.disabled = true;
   }
 

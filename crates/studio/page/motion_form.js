@@ -1,8 +1,8 @@
-// What moves a drive, as a group of fields with its button. Enter in a field moves nothing: only the button does, or Ctrl and Enter.
+// A motion command as a group of fields with its button. Enter in a field moves nothing: only the button does, or Ctrl+Enter.
 
 import { h } from "./dom.js";
 
-/** `go` is the button that does it. */
+/** `go` is the button that sends the command. */
 export function motionForm(name, go, ...fields) {
   const root = h("div", { class: "form", role: "group", "aria-label": name }, h("h3", {}, name), ...fields, go);
   root.addEventListener("keydown", (event) => {

@@ -1,11 +1,11 @@
-// Files of parameters in the Parameters view: backup, the three-way comparison, and applying one after its dry run.
+// Parameter files in the Parameters view: backup, three-way comparison, and applying a file after its dry run.
 
 import { ask, inControl } from "./link.js";
-import { count, h, say } from "./dom.js";
+import { count, h, setText } from "./dom.js";
 
-/** A message may have 64 KiB, and a character of the file may take two of it. */
+/** A message may have 64 KiB, and a character of the file may take two bytes of it. */
 const LARGEST = 30000;
-/** What is read at all, in bytes. */
+/** The largest file that is read, in bytes. */
 const LARGEST_FILE = 2 ** 20;
 
 const table = (heads, rows) =>
@@ -16,32 +16,32 @@ const table = (heads, rows) =>
     h("tbody", {}, ...rows.map(({ cells, kind }) => h("tr", { class: kind ?? "" }, ...cells.map((cell, at) => h("td", { "data-label": heads[at] }, cell))))),
   );
 
-/** `node` gives the drive that is looked at, `mark` hears what a file has, `written` when something was written. */
+/** `node` gives the chosen drive; `mark` takes the values of a file; `written` is called after a write. */
 export function parameterFile({ node, report, mark, written }) {
   const backups = ["toml", "dcf"].map((form) =>
     h("button", { type: "button", id: form === "toml" ? "parameters-backup" : "parameters-backup-dcf", onclick: () => save(form) }, form === "toml" ? "Back up" : "Back up as DCF"),
   );
-  const input = h("input", { type: "file", id: "parameters-file", accept: ".toml,.dcf", "aria-label": "File of parameters", onchange: load });
-  const dry = h("button", { type: "button", id: "parameters-plan", onclick: plan, disabled: true }, "What would be written");
-  const apply = h("button", { type: "button", id: "parameters-apply", class: "primary", onclick: write, hidden: true }, "Write all of it");
-  const told = h("p", { role: "status", id: "parameters-told" });
+  const input = h("input", { type: "file", id: "parameters-file", accept: ".toml,.dcf", "aria-label": "Parameter file", onchange: load });
+  const dry = h("button", { type: "button", id: "parameters-plan", onclick: plan, disabled: true }, "Dry run");
+  const apply = h("button", { type: "button", id: "parameters-apply", class: "primary", onclick: write, hidden: true }, "Write all");
+  const notice = h("p", { role: "status", id: "parameters-told" });
   const shown = h("div", { class: "parameters-diff" });
-  const root = h("div", {}, h("div", { class: "bar" }, ...backups, h("label", {}, "File ", input), dry, apply), told, shown);
+  const root = h("div", {}, h("div", { class: "bar" }, ...backups, h("label", {}, "File ", input), dry, apply), notice, shown);
   let text = null;
 
   const fail = (message) => {
-    told.className = "bad";
-    say(told, message);
+    notice.className = "bad";
+    setText(notice, message);
   };
-  const tell = (message) => {
-    told.className = "quiet";
-    say(told, message);
+  const inform = (message) => {
+    notice.className = "quiet";
+    setText(notice, message);
   };
 
   async function save(form) {
     const of = node();
     for (const one of backups) one.disabled = true;
-    tell("Reading all parameters …");
+    inform("Reading all parameters …");
     const answer = await ask({ do: "back_up", node: of, form });
     for (const one of backups) one.disabled = false;
     if (!answer.ok) return fail(answer.error.message);
@@ -49,15 +49,15 @@ export function parameterFile({ node, report, mark, written }) {
     const url = URL.createObjectURL(new Blob([answer.result.file], { type: "text/plain" }));
     h("a", { href: url, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(url), 1000);
-    const refused = answer.result.refused.map((why) => ` Not in it: ${why}.`).join("");
-    tell(`${name}: ${answer.result.values} values.${refused}`);
+    const refused = answer.result.refused.map((why) => ` Not included: ${why}.`).join("");
+    inform(`${name}: ${answer.result.values} values.${refused}`);
   }
 
-  /** A DCF, which is larger than a message may be, as the TOML of the same values. */
+  /** The TOML with the values of a DCF, since a DCF is larger than a message may be. */
   async function ofDcf(file) {
     const answer = await fetch(`/api/parameters.toml?node=${node()}`, { method: "POST", body: file }).catch(() => null);
     if (answer?.ok) return answer.text();
-    throw new Error(answer ? ((await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}`) : "the studio cannot be reached");
+    throw new Error(answer ? ((await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}`) : "the studio does not answer");
   }
 
   function forget() {
@@ -72,7 +72,7 @@ export function parameterFile({ node, report, mark, written }) {
     forget();
     const [chosen] = input.files;
     if (!chosen) return;
-    if (chosen.size > LARGEST_FILE) return fail(`${chosen.name} has ${chosen.size} bytes; a file of parameters has ${LARGEST_FILE} at most.`);
+    if (chosen.size > LARGEST_FILE) return fail(`${chosen.name} has ${chosen.size} bytes; a parameter file has at most ${LARGEST_FILE}.`);
     const of = node();
     let read;
     try {
@@ -81,8 +81,8 @@ export function parameterFile({ node, report, mark, written }) {
       return fail(`${chosen.name}: ${error.message}`);
     }
     if (of !== node()) return;
-    if (read.length > LARGEST) return fail(`${chosen.name} has ${read.length} characters; a file of parameters has ${LARGEST} at most: ferrodrive params apply takes larger ones.`);
-    tell(`Comparing ${chosen.name} with the drive …`);
+    if (read.length > LARGEST) return fail(`${chosen.name} has ${read.length} characters; the studio takes at most ${LARGEST}. Use ferrodrive params apply for a larger file.`);
+    inform(`Comparing ${chosen.name} with the drive …`);
     const answer = await ask({ do: "compare_parameters", node: of, file: read });
     if (of !== node()) return;
     if (!answer.ok) return fail(`${chosen.name}: ${answer.error.message}`);
@@ -91,12 +91,12 @@ export function parameterFile({ node, report, mark, written }) {
     const { objects } = answer.result;
     mark(new Map(objects.map((row) => [row.object, row.file_bytes])));
     const differ = objects.filter((row) => !row.drive_is_file || row.file_is_default === false);
-    tell(`${chosen.name}: ${objects.length} values; ${objects.filter((row) => !row.drive_is_file).length} are others in the drive.`);
+    inform(`${chosen.name}: ${objects.length} values; ${objects.filter((row) => !row.drive_is_file).length} differ from the drive.`);
     const cells = (row) => [row.object, row.name ?? "", row.default ?? "–", row.file, row.drive];
     shown.replaceChildren(
       differ.length
         ? table(["Object", "Name", "Default", "File", "Drive"], differ.map((row) => ({ cells: cells(row), kind: row.drive_is_file ? "" : "other" })))
-        : h("p", { class: "good" }, "The drive has what the file says, and all of it is as delivered."),
+        : h("p", { class: "good" }, "The drive has the values of the file, and all of them are its defaults."),
     );
   }
 
@@ -105,23 +105,23 @@ export function parameterFile({ node, report, mark, written }) {
     if (!answer.ok) return fail(answer.error.message);
     const { steps, left } = answer.result;
     apply.hidden = steps.length === 0;
-    tell(steps.length ? `${count(steps.length, "write")}, in this order. Nothing has been written.` : "Nothing is to be written.");
+    inform(steps.length ? `${count(steps.length, "write")}, in this order. Nothing has been written.` : "Nothing to write.");
     shown.replaceChildren(
-      table(["Object", "Name", "Has", "Gets", "What for"], steps.map((step) => ({ cells: [step.object, step.name ?? "", step.before ?? "?", step.after, step.purpose] }))),
-      ...left.map((of) => h("p", { class: "quiet" }, `${of.object} ${of.name ?? ""} is left out: ${of.why}`)),
+      table(["Object", "Name", "Now", "New", "Purpose"], steps.map((step) => ({ cells: [step.object, step.name ?? "", step.before ?? "?", step.after, step.purpose] }))),
+      ...left.map((of) => h("p", { class: "quiet" }, `${of.object} ${of.name ?? ""} is omitted: ${of.why}`)),
     );
   }
 
   async function write() {
     apply.disabled = true;
-    tell("Writing …");
+    inform("Writing …");
     const answer = await ask({ do: "write_parameters", node: node(), file: text });
     apply.disabled = false;
     if (!answer.ok) fail(answer.error.message);
     else {
       apply.hidden = true;
-      tell(`${count(answer.result.steps.length, "write")} done and read back. It acts now; a drive that does not store by itself has to be told to save.`);
-      report("Parameters", { ok: true, notes: answer.result.rounded.map((found) => `${found.object}: the drive made ${found.found} of ${found.asked}`) });
+      inform(`${count(answer.result.steps.length, "write")} done and read back. The values are in effect; store them in the drive unless it stores by itself.`);
+      report("Parameters", { ok: true, notes: answer.result.rounded.map((found) => `${found.object}: the drive rounded ${found.asked} to ${found.found}`) });
     }
     written();
   }
@@ -134,7 +134,7 @@ export function parameterFile({ node, report, mark, written }) {
   function clear() {
     forget();
     input.value = "";
-    say(told, "");
+    setText(notice, "");
   }
 
   return { root, update, clear };

@@ -1,25 +1,25 @@
-// The Parameters view: every object of the drive's description, read when it is looked at; changed, compared with a file,
-// kept and put back as a transaction of the studio.
+// The Parameters view: every object of the drive's description, read when it is in view; changed, compared with a file,
+// backed up and restored, in transactions of the studio.
 
 import { ask, inControl } from "./link.js";
-import { count, h, say, toggle } from "./dom.js";
+import { count, h, setText, toggle } from "./dom.js";
 import { chooser } from "./drive.js";
 import { helped } from "./help.js";
 import { parameterFile } from "./parameter_file.js";
 
-/** How often an open group is read again. */
+/** Period at which an open group is read again. */
 const REFRESH_MS = 2000;
-/** Objects in one request. */
+/** Objects per request. */
 const AT_ONCE = 32;
-/** Rows that a search shows at most. */
+/** The most rows that a search shows. */
 const MOST_FOUND = 100;
 
 export function parametersView(shared, report) {
   const choose = chooser(shared);
-  const search = h("input", { type: "search", id: "parameters-search", placeholder: "Index, name or words", "aria-label": "Search objects", oninput: draw });
+  const search = h("input", { type: "search", id: "parameters-search", placeholder: "Index, name or text", "aria-label": "Search objects", oninput: draw });
   const changed = toggle("parameters-changed", "changed only", false, () => draw());
   const all = h("button", { type: "button", id: "parameters-read", onclick: readAll }, "Read all");
-  const store = h("button", { type: "button", id: "parameters-store", title: "The drive keeps its parameters after a restart", onclick: () => keep() }, "Store in the drive");
+  const store = h("button", { type: "button", id: "parameters-store", title: "Keep the parameters over a restart", onclick: () => keep() }, "Store in the drive");
   const back = h("button", { type: "button", id: "parameters-back", onclick: rollBack }, "Roll back");
   const progress = h("progress", { hidden: true, max: 1, value: 0 });
   const about = h("p", { class: "quiet", role: "status" });
@@ -48,18 +48,18 @@ export function parametersView(shared, report) {
   async function fetchObjects(of, name) {
     [node, model, objects, values, fileBytes, open, chosen] = [of, name, [], new Map(), new Map(), new Set(), null];
     file.clear();
-    say(about, "Asking for the description …");
+    setText(about, "Loading the description …");
     draw();
     const answer = await ask({ do: "objects", node: of });
     if (node !== of || model !== name) return;
     if (answer.ok) {
       objects = answer.result.objects;
-      say(about, `${objects.length} objects of the ${answer.result.model}, by: ${answer.result.manual}. Values are read when a group is open.`);
-    } else say(about, answer.error.message);
+      setText(about, `${objects.length} objects of the ${answer.result.model}, from: ${answer.result.manual}. Open a group to read its values.`);
+    } else setText(about, answer.error.message);
     draw();
   }
 
-  /** Reads these, some at a time; true if all were read. */
+  /** Reads these, a few at a time; true if all were read. */
   async function read(rows, step = () => {}) {
     const [of, wanted] = [node, rows.filter((row) => row.readable)];
     for (let from = 0; from < wanted.length; from += AT_ONCE) {
@@ -67,7 +67,7 @@ export function parametersView(shared, report) {
       const answer = await ask({ do: "read_objects", node: of, objects: some.map((row) => row.object) });
       if (node !== of) return false;
       if (!answer.ok) {
-        say(about, answer.error.message);
+        setText(about, answer.error.message);
         return false;
       }
       for (const value of answer.result.values) values.set(value.object, value);
@@ -102,7 +102,7 @@ export function parametersView(shared, report) {
   async function keep() {
     const of = node;
     const answer = report(`Node ${of}: Store`, await ask({ do: "store", node: of }));
-    if (answer.ok) report("Store", { ok: true, notes: [`node ${of} has stored its parameters`] });
+    if (answer.ok) report("Store", { ok: true, notes: [`node ${of} stored its parameters`] });
   }
 
   async function rollBack() {
@@ -126,7 +126,7 @@ export function parametersView(shared, report) {
     if (sought.length || changed.checked) {
       const some = filtered.slice(0, MOST_FOUND);
       const more = filtered.length > some.length ? `, the first ${some.length}` : "";
-      const unread = changed.checked ? " Only what was read can be told to be changed: Read all." : "";
+      const unread = changed.checked ? " Only values that were read can be compared: press Read all." : "";
       list.replaceChildren(h("p", { class: "quiet" }, `${filtered.length} ${filtered.length === 1 ? "object" : "objects"}${more}.${unread}`), table(some));
     } else {
       const groups = [...new Set(objects.map((row) => row.group))];
@@ -176,10 +176,10 @@ export function parametersView(shared, report) {
     helped(of, "object", row.object, node);
     row.show = () => {
       const known = values.get(row.object);
-      say(value, known ? (known.text ?? `refused: ${known.refused}`) : row.readable ? "…" : "–");
+      setText(value, known ? (known.text ?? `refused: ${known.refused}`) : row.readable ? "…" : "–");
       of.classList.toggle("changed", isChanged(row));
       of.classList.toggle("other", isOther(row));
-      of.title = `${isChanged(row) ? "Not as delivered. " : ""}${isOther(row) ? "Not as in the file." : ""}`;
+      of.title = `${isChanged(row) ? "Not the default. " : ""}${isOther(row) ? "Differs from the file." : ""}`;
     };
     row.show();
     return of;
@@ -191,10 +191,10 @@ export function parametersView(shared, report) {
     list.querySelector("tr.chosen input")?.focus();
   }
 
-  /** What the description says of an object, and the form that changes it. */
+  /** The description of an object, and the form that changes it. */
   function detail(row) {
     const terms = [
-      ["In the manual's words", row.title],
+      ["Name in the manual", row.title],
       ["Type", row.type],
       ["Unit of one count", row.unit || "none"],
       ["Values", row.meanings.map(([value, text]) => `${value}: ${text}`).join("; ")],
@@ -204,7 +204,7 @@ export function parametersView(shared, report) {
     const show_line = row.show;
     row.show = () => {
       show_line();
-      say(bytes, values.get(row.object)?.bytes ?? "–");
+      setText(bytes, values.get(row.object)?.bytes ?? "–");
     };
     row.show();
     return h("div", {}, facts, row.parameter ? form(row) : h("p", { class: "quiet" }, refusal(row)));
@@ -212,12 +212,12 @@ export function parametersView(shared, report) {
 
   const refusal = (row) =>
     row.access === "ro" || row.access === "const"
-      ? "It can only be read."
-      : "A command or a set-point: it is not written here. What moves the drive is in the Motion view.";
+      ? "Read-only."
+      : "A command or a set-point: not written here. Use the Motion view to move the drive.";
 
   function form(row) {
     const input = h("input", { id: "parameter-value", autocomplete: "off", "aria-label": `New value of ${row.name}`, placeholder: row.unit ? `number, or with its unit (${row.unit})` : "number" });
-    const told = h("span", { role: "status", id: "parameter-told" });
+    const notice = h("span", { role: "status", id: "parameter-told" });
     const write = h("button", { type: "submit", id: "parameter-write", class: "primary", title: inControl() ? "" : "Take control first" }, "Write");
     const submit = async (event) => {
       event.preventDefault();
@@ -227,16 +227,16 @@ export function parametersView(shared, report) {
       write.disabled = false;
       if (node !== of) return;
       await read([row]);
-      told.className = answer.ok ? "good" : "bad";
-      say(told, answer.ok ? outcome(answer.result) : answer.error.message);
+      notice.className = answer.ok ? "good" : "bad";
+      setText(notice, answer.ok ? outcome(answer.result) : answer.error.message);
     };
-    return h("form", { class: "bar", onsubmit: submit }, input, write, told);
+    return h("form", { class: "bar", onsubmit: submit }, input, write, notice);
   }
 
   function outcome(result) {
-    if (!result.steps.length) return "It has this value already: nothing was written.";
-    const rounded = result.rounded.map((found) => ` The drive made ${found.found} of ${found.asked}.`).join("");
-    return `Written and read back.${rounded} It acts now; a drive that does not store by itself has to be told to save.`;
+    if (!result.steps.length) return "Nothing written: the drive has this value already.";
+    const rounded = result.rounded.map((found) => ` The drive rounded ${found.asked} to ${found.found}.`).join("");
+    return `Written and read back.${rounded} The value is in effect; store it in the drive unless it stores by itself.`;
   }
 
   function update(state) {
@@ -245,7 +245,7 @@ export function parametersView(shared, report) {
     const name = found?.model ?? null;
     if (shared.node !== node || name !== model) fetchObjects(shared.node, name);
     back.disabled = store.disabled = !inControl();
-    back.title = inControl() ? "Puts back what the last write changed" : "Take control first";
+    back.title = inControl() ? "Undo the last write" : "Take control first";
     file.update();
     if (shownRows.length && performance.now() - asked_at > REFRESH_MS) refresh();
   }

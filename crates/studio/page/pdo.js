@@ -1,24 +1,24 @@
-// The PDO view: how each PDO of a drive is set up and why it stays away; changes are made in drafts, shown with what they would
+// The PDO view: the configuration of each PDO of a drive and why it is not sent; changes are made in drafts, shown with what they would
 // write and do to the bus, and applied together or not at all.
 
 import { ask, inControl } from "./link.js";
-import { h, hex, number, say } from "./dom.js";
+import { h, hex, number, setText } from "./dom.js";
 import { chooser } from "./drive.js";
 import { pdoEditor } from "./pdo_editor.js";
 import { pdoPlan } from "./pdo_plan.js";
 
-const COLUMNS = ["PDO", "COB-ID", "When", "Inhibit", "Event timer", "Carries", "Bits", "Why it stays away", ""];
-/** What keeps a PDO away changes with the bus. All PDOs of a drive are some sixty objects to read. */
+const COLUMNS = ["PDO", "COB-ID", "When", "Inhibit", "Event timer", "Carries", "Bits", "Why it is not sent", ""];
+/** Why a PDO is not sent changes with the bus. All PDOs of a drive are about sixty objects to read. */
 const REFRESH_MS = 5000;
 
 const ms = (time) => (time === null ? "–" : `${number(time, time % 1 ? 1 : 0)} ms`);
 
-/** What a draft says to the studio: what was not touched is not named. */
+/** The request for a draft: unchanged fields are omitted. */
 const asked = (draft, now) => {
-  const told = { pdo: draft.pdo, valid: draft.valid };
-  if (JSON.stringify(draft.objects) !== JSON.stringify(now.objects)) told.objects = draft.objects.map(({ object, bits }) => ({ object, bits }));
-  for (const field of ["transmission", "inhibit_ms", "event_ms", "id"]) if (draft[field] !== now[field]) told[field] = draft[field];
-  return told;
+  const request = { pdo: draft.pdo, valid: draft.valid };
+  if (JSON.stringify(draft.objects) !== JSON.stringify(now.objects)) request.objects = draft.objects.map(({ object, bits }) => ({ object, bits }));
+  for (const field of ["transmission", "inhibit_ms", "event_ms", "id"]) if (draft[field] !== now[field]) request[field] = draft[field];
+  return request;
 };
 
 const differs = (draft, now) => draft.valid !== now.valid || Object.keys(asked(draft, now)).length > 2;
@@ -28,7 +28,7 @@ export function pdoView(shared, report) {
   const about = h("p", { class: "quiet", role: "status" });
   const nmt = h("button", { type: "button", id: "pdo-nmt", onclick: command });
   const undo = h("button", { type: "button", id: "pdo-undo", onclick: goBack }, "Undo the last change");
-  const store = h("button", { type: "button", id: "pdo-store", title: "The drive keeps its parameters after a restart", onclick: keep }, "Store in the drive");
+  const store = h("button", { type: "button", id: "pdo-store", title: "Keep the parameters over a restart", onclick: keep }, "Store in the drive");
   const rows = h("tbody");
   const table = h("table", { class: "pdos" }, h("thead", {}, h("tr", {}, ...COLUMNS.map((title) => h("th", { scope: "col" }, title)))), rows);
   const place = h("div");
@@ -37,7 +37,7 @@ export function pdoView(shared, report) {
 
   let node = null;
   let model = null;
-  let told = null;
+  let seen_pdos = null;
   let objects = null;
   let drafts = new Map();
   let open = null;
@@ -46,7 +46,7 @@ export function pdoView(shared, report) {
   let reading = false;
   let shownKey = "";
 
-  const now = (name) => told?.pdos.find((pdo) => pdo.pdo === name);
+  const now = (name) => seen_pdos?.pdos.find((pdo) => pdo.pdo === name);
   const changes = () => [...drafts.values()].filter((draft) => differs(draft, now(draft.pdo))).map((draft) => asked(draft, now(draft.pdo)));
 
   async function fetchPdos() {
@@ -56,12 +56,12 @@ export function pdoView(shared, report) {
     const answer = await ask({ do: "pdos", node: of });
     reading = false;
     if (node !== of) return;
-    if (!answer.ok) return say(about, answer.error.message);
+    if (!answer.ok) return setText(about, answer.error.message);
     const untouched = [...drafts].filter(([name, draft]) => now(name) && !differs(draft, now(name)));
-    told = answer.result;
-    plan.know(told.bitrate);
+    seen_pdos = answer.result;
+    plan.know(seen_pdos.bitrate);
     for (const name of [...drafts.keys()]) if (!now(name)) drafts.delete(name);
-    // A draft in which nobody changed anything follows what others write.
+    // An unchanged draft follows what other clients write.
     for (const [name, draft] of untouched) {
       if (!now(name) || !differs(draft, now(name))) continue;
       drafts.delete(name);
@@ -73,11 +73,11 @@ export function pdoView(shared, report) {
   }
 
   async function begin(of, name) {
-    [node, model, told, objects, drafts, open, shownKey] = [of, name, null, null, new Map(), null, ""];
+    [node, model, seen_pdos, objects, drafts, open, shownKey] = [of, name, null, null, new Map(), null, ""];
     rows.replaceChildren();
     place.replaceChildren();
     plan.clear();
-    say(about, of === null ? "No drive was found." : "Reading its PDOs …");
+    setText(about, of === null ? "No drive found." : "Reading the PDOs …");
     if (of === null) return;
     if (name !== null) {
       const answer = await ask({ do: "objects", node: of });
@@ -88,19 +88,19 @@ export function pdoView(shared, report) {
   }
 
   function draw() {
-    const known = told.model ? "" : " Its model is not known: its PDOs can be seen, not changed.";
-    const sync = told.sync_heard === false ? " No SYNC is heard." : "";
-    say(about, `${told.pdos.length} PDOs, counted as by CiA 301. The node is ${told.nmt ?? "in an NMT state that is not known"}.${sync}${known}`);
-    const key = JSON.stringify([told, [...drafts], open]);
+    const known = seen_pdos.model ? "" : " Its model is unknown: its PDOs can be read, not changed.";
+    const sync = seen_pdos.sync_heard === false ? " No SYNC on the bus." : "";
+    setText(about, `${seen_pdos.pdos.length} PDOs, numbered as in CiA 301. NMT state: ${seen_pdos.nmt ?? "unknown"}.${sync}${known}`);
+    const key = JSON.stringify([seen_pdos, [...drafts], open]);
     if (key === shownKey) return;
     shownKey = key;
-    rows.replaceChildren(...told.pdos.map(row));
+    rows.replaceChildren(...seen_pdos.pdos.map(row));
   }
 
   function row(pdo) {
     const draft = drafts.get(pdo.pdo);
     const changed = draft && differs(draft, pdo);
-    const edit = h("button", { type: "button", "data-edit": pdo.pdo, disabled: pdo.takes === null, title: pdo.takes === null ? "Its model is not known" : "", onclick: () => show(pdo.pdo) }, open === pdo.pdo ? "Close" : "Change");
+    const edit = h("button", { type: "button", "data-edit": pdo.pdo, disabled: pdo.takes === null, title: pdo.takes === null ? "Its model is unknown" : "", onclick: () => show(pdo.pdo) }, open === pdo.pdo ? "Close" : "Change");
     const cells = [
       h("span", {}, h("b", {}, pdo.pdo), pdo.manual ? h("span", { class: "quiet" }, ` (manual: ${pdo.manual})`) : null),
       pdo.valid ? hex(pdo.id, 3) : `${hex(pdo.id, 3)}, off`,
@@ -148,8 +148,8 @@ export function pdoView(shared, report) {
     if (node !== of) return answer;
     if (answer.ok) {
       forgetAll();
-      const rounded = answer.result.rounded.map(({ object, asked, found }) => ` The drive made ${found} of ${asked} (${object}).`).join("");
-      plan.tell("good", `${wanted.map((pdo) => pdo.pdo).join(", ")}: written and read back.${rounded} It acts now; ${told.can_store ? "Store in the drive keeps it after a restart." : "it is lost with the supply."}`);
+      const rounded = answer.result.rounded.map(({ object, asked, found }) => ` The drive rounded ${asked} to ${found} (${object}).`).join("");
+      plan.notify("good", `${wanted.map((pdo) => pdo.pdo).join(", ")}: written and read back.${rounded} The change is in effect; ${seen_pdos.can_store ? "Store in the drive keeps it over a restart." : "it is lost when the supply is switched off."}`);
     }
     await fetchPdos();
     return answer;
@@ -161,19 +161,19 @@ export function pdoView(shared, report) {
     if (node !== of) return;
     if (answer.ok) {
       forgetAll();
-      plan.tell("good", "The PDOs are as they were before the last change.");
-    } else plan.tell("bad", answer.error.message);
+      plan.notify("good", "The PDOs are back as before the last change.");
+    } else plan.notify("bad", answer.error.message);
     await fetchPdos();
   }
 
   async function keep() {
     const of = node;
     const answer = report(`Node ${of}: Store`, await ask({ do: "store", node: of }));
-    if (answer.ok) report("Store", { ok: true, notes: [`node ${of} has stored its parameters`] });
+    if (answer.ok) report("Store", { ok: true, notes: [`node ${of} stored its parameters`] });
   }
 
   async function command() {
-    report(`Node ${node}: NMT`, await ask({ do: "nmt", node, command: told?.nmt === "operational" ? "pre_operational" : "start" }));
+    report(`Node ${node}: NMT`, await ask({ do: "nmt", node, command: seen_pdos?.nmt === "operational" ? "pre_operational" : "start" }));
     setTimeout(fetchPdos, 300);
   }
 
@@ -182,22 +182,22 @@ export function pdoView(shared, report) {
     const found = state.nodes.find((known) => known.node === shared.node);
     const name = found?.model ?? null;
     if (shared.node !== node || name !== model) begin(shared.node, name);
-    // Somebody wrote, or the node has changed its state.
+    // Another client wrote, or the node has changed its state.
     const key = `${node} ${found?.can_roll_back} ${found?.mapped} ${found?.nmt}`;
-    if (told && (key !== seen || performance.now() - asked_at > REFRESH_MS)) fetchPdos();
+    if (seen_pdos && (key !== seen || performance.now() - asked_at > REFRESH_MS)) fetchPdos();
     seen = key;
     const mine = inControl();
     const moves = Boolean(found?.moving || found?.doing);
-    say(nmt, told?.nmt === "operational" ? "To pre-operational" : "Start the node (NMT)");
-    nmt.disabled = !mine || !told || (told.nmt === "operational" && moves);
-    undo.disabled = !mine || !told?.can_undo;
-    undo.title = mine ? (told?.can_undo ? "" : "The last write here was none of PDOs") : "Take control first";
-    store.disabled = !mine || !told?.can_store;
+    setText(nmt, seen_pdos?.nmt === "operational" ? "To pre-operational" : "Start the node (NMT)");
+    nmt.disabled = !mine || !seen_pdos || (seen_pdos.nmt === "operational" && moves);
+    undo.disabled = !mine || !seen_pdos?.can_undo;
+    undo.title = mine ? (seen_pdos?.can_undo ? "" : "The last write was not a change of PDOs") : "Take control first";
+    store.disabled = !mine || !seen_pdos?.can_store;
     plan.update(mine);
   }
 
   function hide() {
-    // What is shown next is read anew.
+    // The next view reads again.
     asked_at = 0;
   }
 

@@ -1,8 +1,8 @@
-// The editor of one PDO in the PDO view: what it carries, in order, within its 64 bits; when it is sent; its identifier. It
-// changes the draft that it was given and says so; what the drive does not let be changed is grey, with the reason.
+// The editor of one PDO in the PDO view: its mapped objects, in order, within 64 bits; its transmission; its identifier. It
+// changes the draft that it was given and calls back; what the drive does not let a client change is grey, with the reason.
 
 import { choice } from "./choice.js";
-import { h, say, toggle } from "./dom.js";
+import { h, setText, toggle } from "./dom.js";
 import { helped, pointed } from "./help.js";
 
 const BITS = 64;
@@ -15,10 +15,10 @@ export function pdoEditor({ draft, objects, node, changed }) {
   const fixed = takes.mapping;
   const bar = h("div", { class: "bit-bar", role: "img" });
   const budget = h("p", { class: "quiet", role: "status", id: "pdo-bits" });
-  const list = h("ol", { class: "mapped", "aria-label": "Objects in order; Alt and the arrow keys move one, Delete takes it away", onpointerdown: grasp, onpointermove: carry, onpointerup: letGo, onpointercancel: letGo });
-  const search = h("input", { type: "search", id: "pdo-search", placeholder: "Index, name or words", "aria-label": "Search an object to map", autocomplete: "off", oninput: find, onkeydown: (event) => event.key === "Enter" && found.querySelector("button:not([disabled])")?.click() });
+  const list = h("ol", { class: "mapped", "aria-label": "Objects in order; Alt and the arrow keys move one, Delete removes it", onpointerdown: grasp, onpointermove: carry, onpointerup: letGo, onpointercancel: letGo });
+  const search = h("input", { type: "search", id: "pdo-search", placeholder: "Index, name or text", "aria-label": "Search for an object to map", autocomplete: "off", oninput: find, onkeydown: (event) => event.key === "Enter" && found.querySelector("button:not([disabled])")?.click() });
   const found = h("ul", { class: "found" });
-  /** The place in the order of what the pointer carries; null for nothing. */
+  /** The index of the object that the pointer drags; null for none. */
   let carried = null;
 
   const bits = () => draft.objects.reduce((all, { bits }) => all + bits, 0);
@@ -26,16 +26,16 @@ export function pdoEditor({ draft, objects, node, changed }) {
   /** Why an object cannot be added; null if it can. */
   function refusal(row) {
     if (typeof row[direction] === "string") return row[direction];
-    if (draft.objects.length >= takes.objects) return `it takes ${takes.objects} objects at most`;
+    if (draft.objects.length >= takes.objects) return `at most ${takes.objects} objects`;
     const free = BITS - bits();
-    return row[direction] > free ? `it has ${row[direction]} bits, and ${free} are free` : null;
+    return row[direction] > free ? `${row[direction]} bits, ${free} free` : null;
   }
 
   function find() {
     const sought = search.value.trim().toLowerCase().split(/\s+/).filter(Boolean);
     const words = (row) => `${row.object} ${row.name} ${row.title}`.toLowerCase();
     const fits = (row) => typeof row[direction] === "number";
-    // Without words what may be mapped; with words what may not be too, and why.
+    // Without a search, what may be mapped; with one, also what may not, and why.
     const rows = objects.filter((row) => (sought.length ? sought.every((word) => words(row).includes(word)) : fits(row)));
     const first = [...rows].sort((one, other) => fits(other) - fits(one));
     found.replaceChildren(...first.slice(0, MOST_FOUND).map(offer), rows.length > MOST_FOUND ? h("li", { class: "quiet" }, `and ${rows.length - MOST_FOUND} more`) : "");
@@ -54,7 +54,7 @@ export function pdoEditor({ draft, objects, node, changed }) {
     changed();
   }
 
-  /** Puts an object elsewhere in the order; what has the focus keeps it. */
+  /** Moves an object in the order; the focus stays where it is. */
   function move(from, to) {
     if (to < 0 || to >= draft.objects.length || from === to) return;
     draft.objects.splice(to, 0, ...draft.objects.splice(from, 1));
@@ -72,12 +72,12 @@ export function pdoEditor({ draft, objects, node, changed }) {
 
   const places = () => [...list.children];
 
-  /** By pointer events and not by the browser's dragging, which a finger does not begin. */
+  /** By pointer events instead of the browser's dragging, which touch does not start. */
   function grasp(event) {
     const place = places().indexOf(event.target.closest("li"));
     if (fixed !== null || place < 0 || event.target.closest("button")) return;
     carried = place;
-    // The lines are drawn anew on the way.
+    // The lines are redrawn while dragging.
     list.setPointerCapture(event.pointerId);
   }
 
@@ -112,12 +112,12 @@ export function pdoEditor({ draft, objects, node, changed }) {
       h("span", { class: "grow" }, `${object} ${name ?? ""} `, h("span", { class: "quiet" }, `${bits} bits`)),
       button("↑", "Earlier", () => move(at, at - 1), at === 0),
       button("↓", "Later", () => move(at, at + 1), at === last),
-      button("×", "Take away", () => remove(at), false),
+      button("×", "Remove", () => remove(at), false),
     );
     return helped(of, "object", object, node);
   }
 
-  /** A part of the bar, as wide as its bits. */
+  /** A part of the bar, with a width in proportion to its bits. */
   function field(bits, kind, title, text) {
     const element = h("div", { class: `field ${kind}`, title }, text);
     element.style.flexGrow = String(bits);
@@ -133,7 +133,7 @@ export function pdoEditor({ draft, objects, node, changed }) {
     );
     const words = `${bits()} of ${BITS} bits, ${draft.objects.length} of ${takes.objects} objects`;
     bar.setAttribute("aria-label", words);
-    say(budget, words);
+    setText(budget, words);
     find();
   }
 
@@ -147,13 +147,13 @@ export function pdoEditor({ draft, objects, node, changed }) {
     return h("label", {}, `${label} `, input, why === null ? null : h("small", { class: "quiet" }, ` ${why}`));
   }
 
-  /** A choice of the types that have one meaning each; those with several have a number beside it. */
+  /** A choice of the transmission types; a range of types has a number field beside it. */
   function typeField() {
     const same = (type) => draft.transmission >= type.from && draft.transmission <= type.to;
     const title = (type) => `${type.from === type.to ? type.from : `${type.from} to ${type.to}`}: ${type.words}${type.why_not ? ` (${type.why_not})` : ""}`;
     const options = takes.types.map((type, at) => ({ value: String(at), text: title(type), disabled: type.why_not !== null }));
     const known = takes.types.findIndex(same);
-    const unknown = known >= 0 ? [] : [{ value: "", text: `${draft.transmission}: means nothing by CiA 301` }];
+    const unknown = known >= 0 ? [] : [{ value: "", text: `${draft.transmission}: not defined in CiA 301` }];
     const select = choice("pdo-type", "Transmission type", [...unknown, ...options], { value: known >= 0 ? String(known) : "" });
     select.disabled = takes.type !== null;
     select.title = takes.type ?? "";
@@ -209,7 +209,7 @@ export function pdoEditor({ draft, objects, node, changed }) {
   const root = h(
     "section",
     { class: "tile pdo-editor", "aria-label": `Change ${draft.pdo}` },
-    h("h3", {}, `${draft.pdo}${draft.manual ? `, in the manual ${draft.manual}` : ""}`),
+    h("h3", {}, `${draft.pdo}${draft.manual ? `; ${draft.manual} in the manual` : ""}`),
     fixed === null ? null : h("p", { class: "quiet", id: "pdo-fixed" }, `${fixed[0].toUpperCase()}${fixed.slice(1)}.`),
     bar,
     budget,

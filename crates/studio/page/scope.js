@@ -1,9 +1,9 @@
-// The Scope view: what the drives said in the last 60 s, over time or over frequency.
+// The Scope view: the values of the last 60 s, over time or over frequency.
 //
-// A sample is one reading of a drive, with the time at which it was read; between two readings a line is drawn and nothing is made up.
+// A sample is one reading of a drive, with its time; two readings are joined by a straight line, and nothing else is interpolated.
 
 import { choice } from "./choice.js";
-import { h, number, say } from "./dom.js";
+import { h, number, setText } from "./dom.js";
 import { chooser } from "./drive.js";
 import { heard, heardChooser } from "./heard.js";
 import { QUANTITIES, everything, markers, newest_s, series } from "./kept.js";
@@ -15,23 +15,23 @@ import { trigger } from "./scope_trigger.js";
 
 const SPANS_S = [1, 2, 5, 10, 30, 60];
 const LONGEST_MARK = 40;
-/** A pane that is lower cannot be read; the picture grows with its panes. */
+/** Least height of a legible pane; the picture grows with its panes. */
 const LOWEST_PANE = 76;
 
 const cut = (text) => (text.length > LONGEST_MARK ? `${text.slice(0, LONGEST_MARK - 1)}…` : text);
 
 export function scopeView(shared) {
   const choose = chooser(shared);
-  const canvas = h("canvas", { tabindex: "0", "aria-label": "Values over time. Click sets cursor A, Shift and click cursor B; the wheel zooms while paused." });
+  const canvas = h("canvas", { tabindex: "0", "aria-label": "Values over time. Click sets cursor A, Shift+click cursor B; the wheel zooms while paused." });
   const readout = h("p", { class: "readout", role: "status" });
   const seconds = choice("scope-window", "Time shown", SPANS_S.map((span) => ({ value: String(span), text: `${span} s` })), { value: "10" });
   const button = (id, text, onclick, title = "") => h("button", { type: "button", id, title, onclick }, text);
   const toggled = (id, text, onclick, title) => h("button", { type: "button", id, title, "aria-pressed": "false", onclick }, text);
   const pause = toggled("scope-pause", "Pause", pauseOrGoOn, "Key p");
-  const steps = toggled("scope-step", "Step response", () => press(steps), "Rise time, overshoot and settling time of what is shown, or between the cursors");
-  const frequencies = toggled("scope-fft", "Spectrum", () => press(frequencies), "What is shown, over frequency");
+  const steps = toggled("scope-step", "Step response", () => press(steps), "Rise time, overshoot and settling time of the values shown, or between the cursors");
+  const frequencies = toggled("scope-fft", "Spectrum", () => press(frequencies), "Spectrum of the values shown");
   const panes = h("span", { class: "chooser", role: "group", "aria-label": "Values shown" });
-  const others = h("span", { class: "chooser", role: "group", "aria-label": "Drives shown beside the chosen one" });
+  const others = h("span", { class: "chooser", role: "group", "aria-label": "Drives shown besides the chosen one" });
   const trip = trigger(thaw);
   const saved = h("p", { class: "bad", role: "status" });
   const root = h(
@@ -43,14 +43,14 @@ export function scopeView(shared) {
     saved,
     canvas,
     readout,
-    h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second and fewer with many drives; of an added object each frame that carries it. Click: cursor A; Shift and click: cursor B; key p: pause; paused, the wheel zooms and a drag moves."),
+    h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second, fewer with many drives; for an added object, each frame that carries it. Click: cursor A; Shift+click: cursor B; key p: pause. While paused, the wheel zooms and a drag moves."),
   );
-  /** While paused: which series, and until when. */
+  /** While paused: the series, and their end. */
   let frozen = null;
   let cursors = [null, null];
   let shown = false;
   let extent = null;
-  /** What the picture on the canvas depends on. */
+  /** The inputs of the picture on the canvas. */
   let picture = null;
   const liveEdge = edge();
   const hidden = new Set(["supply_v"]);
@@ -68,21 +68,21 @@ export function scopeView(shared) {
   const press = (one) => one.setAttribute("aria-pressed", String(one.getAttribute("aria-pressed") !== "true"));
   const isPressed = (one) => one.getAttribute("aria-pressed") === "true";
 
-  /** The drives that are drawn, the chosen one first. */
+  /** The drawn drives, the chosen one first. */
   const nodes = () => [shared.node, ...[...beside].filter((node) => node !== shared.node)].filter((node) => node !== null);
 
-  /** Keeps the picture as it is, or as it was when it ended at a time; `byTrigger` until that comes again. */
+  /** Holds the picture as it is, or as it was at an end time; `byTrigger`: until the trigger fires again. */
   function freeze(end_s = end(), byTrigger = false) {
     const copies = new Map(all().map(([node, field, one]) => [`${node} ${field}`, one.cut(one.first_s(), end_s + Number(seconds.value))]));
     frozen = { copies, end_s, span_s: Number(seconds.value), marks: [...markers], byTrigger };
     pause.setAttribute("aria-pressed", "true");
-    say(pause, "Go on");
+    setText(pause, "Resume");
   }
 
   function thaw() {
     frozen = null;
     pause.setAttribute("aria-pressed", "false");
-    say(pause, "Pause");
+    setText(pause, "Pause");
   }
 
   function pauseOrGoOn() {
@@ -93,17 +93,17 @@ export function scopeView(shared) {
 
   const ofSource = (node, field) => frozen?.copies.get(`${node} ${field}`) ?? heard().find((one) => one.field === field)?.series ?? series(node, field);
 
-  /** What the trigger looks at: a value of the chosen drive, or an object that was added. */
+  /** The source of the trigger: a value of the chosen drive, or an added object. */
   const live = (field) => heard().find((one) => one.field === field)?.series ?? series(shared.node, field);
 
-  /** When the newest of what may be drawn was read, and where the picture that runs ends. */
+  /** When the newest drawable value was read, and the end of the running picture. */
   const newest = () => Math.max(newest_s(shared.node), ...heard().map((one) => one.series.last_s()));
   const end = () => liveEdge(newest(), performance.now() / 1e3);
 
-  /** Every series of the drives that are drawn, and of the objects that were added: `[node, field, series]`. */
+  /** Every series of the drawn drives, and of the added objects: `[node, field, series]`. */
   const all = () => [...everything(nodes()), ...heard().map((one) => [one.node, one.field, one.series])];
 
-  /** What is drawn now. */
+  /** The panes that are drawn now. */
   function content() {
     const end_s = frozen ? frozen.end_s : end();
     const from_s = end_s - (frozen ? frozen.span_s : Number(seconds.value));
@@ -142,7 +142,7 @@ export function scopeView(shared) {
     }
   }
 
-  /** What the picture depends on: the same picture is not drawn a second time. */
+  /** The inputs of the picture: the same picture is not drawn twice. */
   function keyOf({ panes: all, from_s, to_s, markers: marks }, width, height, scale) {
     const lines = all.flatMap(({ field, level, lines: of }) => [field, level, ...of.map(({ name, series: one }) => `${name} ${one.first_s()} ${one.last_s()}`)]);
     const newest = marks.at(-1);
@@ -171,29 +171,29 @@ export function scopeView(shared) {
     const least = `${now.panes.length * LOWEST_PANE}px`;
     if (canvas.style.minHeight !== least) canvas.style.minHeight = least;
     extent = { ...frame(width), from_s: now.from_s, span_s: now.to_s - now.from_s };
-    say(readout, measured(now));
+    setText(readout, measured(now));
   }
 
-  /** Holds the picture once the trigger has come, with the part before it that was asked for. */
+  /** Holds the picture once the trigger has fired, with the wanted part before it. */
   function watchTrigger() {
     if (frozen && !(frozen.byTrigger && trip.comesAgain())) return;
     const end_s = trip.look(live(trip.field()), Number(seconds.value), crossing);
     if (end_s !== null) freeze(end_s, true);
   }
 
-  /** What stands at the cursors, what lies between, and what a step made of each line. */
+  /** The values at the cursors, their differences, and the step response of each line. */
   function measured({ panes: drawn, from_s, to_s }) {
     const all = drawn.flatMap(({ lines, ...quantity }) => lines.map((one) => ({ ...quantity, ...one, label: lines.length > 1 ? `${quantity.label} of ${one.name}` : quantity.label })));
     const lines = [];
     const [a, b] = cursors.map((at_s) => (at_s === null ? null : all.map((one) => one.series.value(at_s))));
-    const told = (values) => all.map(({ label, unit, decimals }, at) => `${label} ${number(values[at], decimals)} ${unit}`).join(", ");
+    const listed = (values) => all.map(({ label, unit, decimals }, at) => `${label} ${number(values[at], decimals)} ${unit}`).join(", ");
     [a, b].forEach((values, which) => {
-      if (values?.some((value) => value !== null)) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: ${told(values)}`);
-      else if (values) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: no reading so early`);
+      if (values?.some((value) => value !== null)) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: ${listed(values)}`);
+      else if (values) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: no reading that early`);
     });
     if (a && b) {
       const differences = all.map((_, at) => (a[at] === null || b[at] === null ? null : b[at] - a[at]));
-      lines.push(`B − A: ${number(cursors[1] - cursors[0], 3)} s, ${told(differences)}`);
+      lines.push(`B − A: ${number(cursors[1] - cursors[0], 3)} s, ${listed(differences)}`);
     }
     if (isPressed(steps)) {
       const [from, to] = a && b ? [Math.min(...cursors), Math.max(...cursors)] : [from_s, to_s];
@@ -201,18 +201,18 @@ export function scopeView(shared) {
         const step = takesSteps === false ? null : stepResponse(of, from, to);
         if (step) lines.push(`Step of ${label}: ${step.few === undefined ? shownStep(step, unit, decimals) : tooFew(step.few)}`);
       }
-      if (!lines.some((line) => line.startsWith("Step"))) lines.push("No step in what is shown: a value other than a current has to stand, change and stand again.");
+      if (!lines.some((line) => line.startsWith("Step"))) lines.push("No step found: a value other than a current has to be steady, change, and be steady again.");
     }
     return lines.join("\n");
   }
 
   function shownStep({ from, to, rise_s, overshoot, overshoot_grid, settling_s, grid_s }, unit, decimals) {
-    const above = overshoot === null ? "an overshoot too short for these readings" : overshoot === 0 ? "no overshoot seen" : `overshoot ${within(100 * overshoot, 100 * overshoot_grid)} %`;
+    const above = overshoot === null ? "overshoot too short for these readings" : overshoot === 0 ? "no overshoot" : `overshoot ${within(100 * overshoot, 100 * overshoot_grid)} %`;
     const settling = settling_s === null ? "not settled to 2 %" : `settled to 2 % in ${within(settling_s, grid_s)} s`;
     return `${number(from, decimals)} to ${number(to, decimals)} ${unit}, rise time (10 to 90 %) ${within(rise_s, grid_s)} s, ${above}, ${settling}`;
   }
 
-  const tooFew = (few) => `too few readings: ${few} in the rise, 10 are needed. Have the object sent in a TPDO by an event timer of 1 ms (view PDO), start the node, and add the object here.`;
+  const tooFew = (few) => `too few readings: ${few} in the rise, expected at least 10. Map the object into a TPDO with an event timer of 1 ms (PDO view), start the node, and add the object here.`;
 
   const timeAt = (x) => extent.from_s + ((x - extent.left) / (extent.right - extent.left)) * extent.span_s;
   let dragged = null;
@@ -235,7 +235,7 @@ export function scopeView(shared) {
   canvas.addEventListener("wheel", (event) => {
     if (!frozen || isPressed(frequencies)) return;
     event.preventDefault();
-    // Around the pointer: what is under it stays there.
+    // Zoom around the pointer: the point under it stays there.
     const around_s = timeAt(event.offsetX);
     const span_s = Math.min(60, Math.max(0.01, frozen.span_s * (event.deltaY > 0 ? 1.25 : 0.8)));
     frozen.end_s = around_s + ((frozen.end_s - around_s) * span_s) / frozen.span_s;
@@ -246,29 +246,29 @@ export function scopeView(shared) {
   });
 
   function saveCsv() {
-    // An object has its node in its name.
+    // The name of an object includes its node.
     const title = (node, field) => (nodes().length > 1 && !field.includes(":") ? `node${node}_${field}` : field);
     const [columns, rows] = table(title);
     const lines = rows.map(([time_s, row]) => [time_s, ...row].join(","));
     save([["at_s", ...columns].join(","), ...lines, ""].join("\n"), "text/csv", "csv");
   }
 
-  /** As a file of the recorder, with what happened meanwhile: the studio makes it of a table in the recorder's form. */
+  /** As a record with the events: the studio converts a table in the form of a CSV record. */
   async function saveMcap() {
     const title = (node, field) => `${node}.${field.includes(":") ? field.split(":").slice(1).join("_") : field}`;
     const [columns, rows] = table(title);
     const marks = (frozen ? frozen.marks : markers).filter(({ node }) => node === null || nodes().includes(node));
     const first_s = rows[0]?.[0] ?? Infinity;
-    const told = marks.filter(({ time_s }) => time_s >= first_s).map(({ time_s, text }) => [time_s, Array(columns.length).fill(""), `"${text.replaceAll('"', '""').replaceAll("\n", " ")}"`]);
-    const lines = [...rows, ...told].sort(([a], [b]) => a - b).map(([time_s, row, mark = ""]) => [time_s, ...row, mark].join(","));
+    const events = marks.filter(({ time_s }) => time_s >= first_s).map(({ time_s, text }) => [time_s, Array(columns.length).fill(""), `"${text.replaceAll('"', '""').replaceAll("\n", " ")}"`]);
+    const lines = [...rows, ...events].sort(([a], [b]) => a - b).map(([time_s, row, mark = ""]) => [time_s, ...row, mark].join(","));
     const body = [["t_s", ...columns, "mark"].join(","), ...lines, ""].join("\n");
     const answer = await fetch("/api/recording.mcap", { method: "POST", body }).catch(() => null);
     if (answer?.ok) return save(await answer.blob(), "application/octet-stream", "mcap");
-    const why = answer ? (await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}` : "the studio cannot be reached";
-    say(saved, `No MCAP was saved: ${why}`);
+    const why = answer ? (await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}` : "the studio does not answer";
+    setText(saved, `MCAP not saved: ${why}`);
   }
 
-  /** Titles of columns, and a row for each time at which something was read; what was not read then stays empty. */
+  /** Column titles, and a row for each time of a reading; values that were not read then are empty. */
   function table(title) {
     const columns = all()
       .map(([node, field]) => [title(node, field), ofSource(node, field)])
@@ -291,7 +291,7 @@ export function scopeView(shared) {
   }
 
   function save(text, type, ending) {
-    say(saved, "");
+    setText(saved, "");
     const address = URL.createObjectURL(new Blob([text], { type }));
     h("a", { href: address, download: `node${shared.node}.${ending}` }).click();
     URL.revokeObjectURL(address);

@@ -1,16 +1,16 @@
-// The right edge of the picture while it runs: it moves as evenly as time does, though readings come one by one or in bursts.
+// The right edge of the running picture: it moves evenly, though readings come one by one or in bursts.
 
-/** What of a difference between the two clocks is made good at each reading. */
+/** Fraction of the difference between the two clocks that is corrected at each reading. */
 const FOLLOWED = 0.1;
-/** A difference beyond this is no jitter: the bus stood still, runs at another speed, or began anew. */
+/** A larger difference is not jitter: the bus was paused, runs at another speed, or restarted. */
 const LEAP_S = 0.5;
-/** How far the edge goes on without a reading. */
+/** How far the edge moves on without a reading. */
 const ALONE_S = 0.5;
 
-/** The edge in s of the bus, of when the newest reading was made there and of the page's time now, in s each. */
+/** The edge in s of bus time, from the bus time of the newest reading and the page's time now, both in s. */
 export function edge() {
   let newest = null;
-  /** The bus's time less the page's. */
+  /** Bus time minus page time. */
   let offset_s = 0;
   return (newest_s, now_s) => {
     if (newest_s !== newest) {

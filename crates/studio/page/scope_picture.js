@@ -1,16 +1,16 @@
-// What the scope draws, on anything that has the pen of a canvas: lines over time or over frequency, one pane for each quantity.
+// Drawing of the scope, on anything with the interface of a canvas context: lines over time or frequency, one pane for each quantity.
 
 import { number } from "./dom.js";
 
 const [LEFT, RIGHT, BELOW] = [72, 12, 24];
 
-/** Room above the lines of a pane for its words. */
+/** Room above the lines of a pane for its labels. */
 const TITLE = 20;
 
-/** Each line of a pane has a colour and a pattern of its own. */
+/** Each line of a pane has its own colour and dash pattern. */
 const PATTERNS = [[], [7, 3], [2, 3], [9, 3, 2, 3]];
 
-/** Bounds that leave some room, and are never equal. */
+/** Bounds with some margin, never equal. */
 function bounds(low, high) {
   const room = Math.max((high - low) * 0.1, Math.abs(high) * 0.01, 1e-3);
   return [low - room, high + room];
@@ -25,12 +25,12 @@ function step(span, count) {
 
 const decimalsOf = (size) => (size < 1 ? Math.min(6, Math.ceil(-Math.log10(size) - 1e-9)) : 0);
 
-/** Where the panes lie: the same for the picture and for a pointer over it. */
+/** Layout of the panes, shared by the drawing and the pointer. */
 export const frame = (width) => ({ left: LEFT, right: width - RIGHT });
 
 /**
- * What is drawn of a line, in pixels across and values: each sample where they are few; where many share a pixel, from the least to the
- * greatest of them and to the last. With it the least and the most of all.
+ * The points drawn for a line, in pixels across and values: each sample where they are few; where many share a pixel, the least, the
+ * greatest and the last of them. Also the least and the greatest of all.
  */
 function thinned({ xs, ys, from, to }, x, pixels) {
   const [across, values] = [[], []];
@@ -48,14 +48,14 @@ function thinned({ xs, ys, from, to }, x, pixels) {
     }
     return { across, values, least, most };
   }
-  // The way of `x`, without a call for each sample: of a minute there are many.
+  // As `x`, but without a call for each sample: a minute has many.
   const first = xs[from];
   const begin = x(first) + 0.5;
   const per = (x(xs[to - 1]) + 0.5 - begin) / (xs[to - 1] - first);
   let column = Math.floor(begin);
   let low = ys[from];
   let [high, last] = [low, low];
-  // A line that stays level is put down where it ends: at this column, once it does.
+  // A level part of a line is added at its last column, once it ends.
   let [level, reached] = [NaN, null];
   const leave = () => {
     if (low < least) least = low;
@@ -97,7 +97,7 @@ function line(pen, { across, values }, y) {
 }
 
 /** A pane with its scale, and its lines: `{ name, xs, ys, from, to }` each. */
-function pane(pen, colours, { label, unit, decimals, level, tellsNewest = true }, lines, area, x) {
+function pane(pen, colours, { label, unit, decimals, level, showsNewest = true }, lines, area, x) {
   const { left, right, top, bottom } = area;
   const drawn = lines.map((one) => thinned(one, x, right - left));
   let least = Math.min(...drawn.map((one) => one.least));
@@ -126,7 +126,7 @@ function pane(pen, colours, { label, unit, decimals, level, tellsNewest = true }
   pen.clip();
   drawn.forEach((one, which) => {
     pen.strokeStyle = colours.lines[which % colours.lines.length];
-    // A line of one pixel or less takes a processor without a graphics unit a third of the time of a wider one.
+    // Without a graphics unit a line of at most one pixel is drawn in a third of the time of a wider one.
     pen.lineWidth = one.across.length > right - left ? 1 : 1.6;
     pen.setLineDash(PATTERNS[which % PATTERNS.length]);
     line(pen, one, y);
@@ -148,7 +148,7 @@ function pane(pen, colours, { label, unit, decimals, level, tellsNewest = true }
   pen.fillText(label, at, top + 12);
   at += pen.measureText(label).width + 10;
   lines.forEach(({ name, ys, to, from }, which) => {
-    const newest = tellsNewest && to > from ? ` ${number(ys[to - 1], decimals)} ${unit}` : "";
+    const newest = showsNewest && to > from ? ` ${number(ys[to - 1], decimals)} ${unit}` : "";
     const text = `${lines.length > 1 ? `${name}:` : ""}${newest}`.trim();
     pen.fillStyle = lines.length > 1 ? colours.lines[which % colours.lines.length] : colours.text;
     pen.fillText(text, at, top + 12);
@@ -169,7 +169,7 @@ function axis(pen, colours, from, to, x, height, unit) {
   for (let at = Math.ceil(from / size) * size; at <= to; at += size) pen.fillText(`${number(at, decimalsOf(size))} ${unit}`, x(at), height - 9);
 }
 
-/** An upright line with a text beside its top. */
+/** A vertical line with a label beside its top. */
 function upright(pen, colour, at, height, text, pattern = []) {
   pen.strokeStyle = colour;
   pen.fillStyle = colour;
@@ -218,7 +218,7 @@ export function overFrequency(pen, width, height, colours, panes) {
       .map(({ name, spectrum }) => ({ name, xs: spectrum.hertz, ys: spectrum.amplitude, from: 0, to: spectrum.hertz.length }));
     const strongest = lines.map(({ xs, ys }) => xs[ys.indexOf(ys.reduce((high, value) => Math.max(high, value), 0))]);
     const label = lines.length ? `${one.label} (${one.unit}): strongest at ${strongest.map((hertz) => number(hertz, 2)).join(", ")} Hz` : `${one.label}: too few samples`;
-    pane(pen, colours, { ...one, label, level: undefined, tellsNewest: false }, lines, area, x);
+    pane(pen, colours, { ...one, label, level: undefined, showsNewest: false }, lines, area, x);
   });
   axis(pen, colours, 0, most, x, height, "Hz");
 }

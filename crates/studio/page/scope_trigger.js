@@ -1,19 +1,19 @@
-// The trigger of the scope: which value has to cross which level, and how much is shown of what was before.
+// The trigger of the scope: the value, the level and edge that it has to cross, and how much is shown before it.
 
 import { choice } from "./choice.js";
-import { h, say } from "./dom.js";
+import { h, setText } from "./dom.js";
 
-/** `release` is called when a held picture is to go. What it may look at is offered by `offer`. */
+/** `release` is called when a held picture is to be released. `offer` sets the possible sources. */
 export function trigger(release) {
   const of = (id, label, options) => choice(id, label, options.map(([value, text]) => ({ value, text })));
-  const mode = of("trigger-mode", "Trigger", [["off", "off"], ["once", "once"], ["again", "again and again"]]);
+  const mode = of("trigger-mode", "Trigger", [["off", "off"], ["once", "once"], ["again", "repeat"]]);
   const field = of("trigger-field", "Value", []);
   const edge = of("trigger-edge", "Edge", [["rising", "rising through"], ["falling", "falling through"], ["either", "through"]]);
   const level = h("input", { id: "trigger-level", type: "number", value: "10", step: "any", "aria-label": "Level", size: "7" });
   const before = h("input", { id: "trigger-before", type: "number", value: "20", min: "0", max: "100", "aria-label": "Per cent shown before", size: "4" });
   const status = h("span", { id: "trigger-status", class: "quiet", role: "status" });
   const root = h("span", { class: "trigger bar" }, h("span", { class: "quiet" }, "Trigger"), mode, field, edge, level, h("span", { class: "quiet" }, "with"), before, h("span", { class: "quiet" }, "% before it"), status);
-  /** What comes after this time counts; null until something was read. */
+  /** Only crossings after this time count; null before the first reading. */
   let armed_s = null;
   let came_s = null;
 
@@ -23,15 +23,15 @@ export function trigger(release) {
   }
   for (const one of [mode, field, edge, level, before]) one.addEventListener("change", arm);
 
-  /** The end of the picture that is to be held, or null. `crossing` says when a series crosses a level after a time. */
+  /** The end of the picture that is to be held, or null. `crossing` returns when a series crosses a level after a time. */
   function look(series, span_s, crossing) {
     if (mode.value === "off" || !series.length) {
-      say(status, "");
+      setText(status, "");
       return null;
     }
     armed_s ??= series.last_s();
     came_s ??= crossing(series, Number(level.value), edge.value, armed_s);
-    say(status, came_s === null ? "waits" : `came at ${came_s.toFixed(3)} s`);
+    setText(status, came_s === null ? "waiting" : `fired at ${came_s.toFixed(3)} s`);
     const after_s = span_s * (1 - Math.min(100, Math.max(0, Number(before.value))) / 100);
     if (came_s === null || series.last_s() < came_s + after_s) return null;
     const end_s = came_s + after_s;
@@ -39,13 +39,13 @@ export function trigger(release) {
     return end_s;
   }
 
-  /** Waits for the next one, if it is to come again; else it is off. */
+  /** Waits for the next crossing if it is to repeat; else switches off. */
   function rearm(from_s) {
     if (mode.value === "once") mode.value = "off";
     [armed_s, came_s] = [from_s, null];
   }
 
-  /** The values that it may look at: `{ field, label, unit }`. One that is not there any more ends it. */
+  /** The possible sources: `{ field, label, unit }`. The trigger is switched off when its source disappears. */
   function offer(quantities) {
     const key = quantities.map(({ field }) => field).join(" ");
     if (field.dataset.key === key) return;

@@ -2,7 +2,7 @@
 
 const FIRST_ROOM = 256;
 
-/** Times in s, rising, and values. What is older than `kept_s` before the newest is dropped. */
+/** Rising times in s, and values. Samples older than `kept_s` before the newest are dropped. */
 export class Series {
   constructor(kept_s) {
     this.kept_s = kept_s;
@@ -16,7 +16,7 @@ export class Series {
     return this.end - this.start;
   }
 
-  /** Takes a sample. One that is not later than the newest is none; time that goes back begins a new series. */
+  /** Adds a sample. A repeated time is ignored; a time that goes back starts a new series. */
   push(time_s, value) {
     const newest = this.last_s();
     if (time_s === newest) return;
@@ -28,7 +28,7 @@ export class Series {
     while (this.times[this.start] < time_s - this.kept_s) this.start += 1;
   }
 
-  /** To the front, or into twice the room if more than half is in use. */
+  /** Moves the samples to the front, or into twice the room if more than half is in use. */
   makeRoom() {
     const used = this.length;
     const room = used > this.times.length / 2 ? 2 * this.times.length : this.times.length;
@@ -50,7 +50,7 @@ export class Series {
     return this.length ? this.times[this.end - 1] : -Infinity;
   }
 
-  /** The place of the first sample at or after a time. */
+  /** Index of the first sample at or after a time. */
   at(time_s) {
     let [low, high] = [this.start, this.end];
     while (low < high) {
@@ -61,14 +61,14 @@ export class Series {
     return low;
   }
 
-  /** The value at a time: of the newest sample that is not later; null before the first. */
+  /** The value at a time: that of the newest sample not later than it; null before the first. */
   value(time_s) {
     let place = this.at(time_s);
     if (place === this.end || this.times[place] > time_s) place -= 1;
     return place < this.start ? null : this.values[place];
   }
 
-  /** A series of the samples between two times, and one before them, so that a line reaches the edge. */
+  /** The samples between two times as a series, and one sample before them, so that a line reaches the edge. */
   cut(from_s, to_s) {
     const part = new Series(Infinity);
     const from = Math.max(this.at(from_s) - 1, this.start);

@@ -1,4 +1,4 @@
-// The pen of a canvas that writes SVG: the part of it that the scope's picture uses.
+// A canvas context that writes SVG: the part of its interface that the scope uses.
 
 const escaped = (text) => text.replace(/[&<>"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
 const ANCHORS = { left: "start", right: "end", center: "middle" };
@@ -12,7 +12,7 @@ export class SvgPen {
     this.clips = 0;
     this.depth = [];
     this.pattern = [];
-    // Of the same measure as what was drawn on the page.
+    // The measures of the picture on the page.
     this.ruler = document.createElement("canvas").getContext("2d");
     this.font = "12px system-ui, sans-serif";
   }

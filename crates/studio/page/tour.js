@@ -1,13 +1,13 @@
-// A tour of ten steps for a first visit: what to do next, with the control for it marked. A step is done when the state of the
-// bus says so, not when somebody presses "next". It can be left and taken up again.
+// A tour of ten steps for a first visit: what to do next, with the control for it marked. A step is done when the state of the bus
+// shows it, not on a press of "next". It can be left and resumed.
 
 import { inControl, link } from "./link.js";
-import { h, say } from "./dom.js";
+import { h, setText } from "./dom.js";
 
 const KEPT = "tour";
-/** Name of the machine inside the program. */
+/** Name of the embedded virtual bus. */
 const EMBEDDED = "sim";
-/** A shaft that turns, in r/min. */
+/** Least speed at which a shaft counts as turning, in r/min. */
 const TURNS_RPM = 5;
 
 const drives = (state) => state.nodes.filter((node) => node.drive);
@@ -16,28 +16,28 @@ const sum = (state, field) => state.nodes.reduce((all, node) => all + node[field
 const enabled = (node) => node.drive.state === "Operation enabled";
 /** A quick stop may end with the motor held. */
 const powered = (node) => ["Operation enabled", "Quick stop active", "Fault reaction active"].includes(node.drive.state);
-/** A parameter was put back. */
+/** A parameter was rolled back. */
 const isBack = (state, before) => sum(state, "can_roll_back") < sum(before, "can_roll_back");
 /** Nothing turns, and no motor has power. */
 const isAtRest = (state) => !drives(state).some((node) => fast(node) || powered(node));
 const faulty = (node) => node.drive.fault_code !== 0;
 
 /**
- * Each step: what to do, which view and which control, and what the state has to be. `before` is the state in which the step
- * began; a step that leads through two views tells which by both. Motion, parameters and PDOs are for any drive of the bus; the
+ * Each step: what to do, the view and the control, and the condition on the state. `before` is the state at which the step
+ * began; a step that leads through two views chooses by both. Motion, parameters and PDOs are for any drive of the bus; the
  * fault is the ZLAC8030L's.
  */
 const STEPS = [
   { title: "Enable", view: "motion", mark: () => (inControl() ? "#enable" : "#take"), text: "Take control, then enable a drive.", done: (state) => drives(state).some(enabled) },
-  { title: "Jog", view: "motion", mark: () => "button.jog:last-child", text: "Hold ▶, or the right arrow key. The shaft turns for as long as you hold it.", done: (state) => drives(state).some((node) => node.doing === "jogging" || (node.moving && fast(node))) },
+  { title: "Jog", view: "motion", mark: () => "button.jog:last-child", text: "Hold ▶, or the right arrow key. The shaft turns as long as you hold it.", done: (state) => drives(state).some((node) => node.doing === "jogging" || (node.moving && fast(node))) },
   { title: "Scope", view: "scope", mark: () => "canvas", text: "Press Turn in Motion, then look at the speed in the scope.", done: (state, _, view) => view === "scope" && drives(state).some(fast) },
-  { title: "Parameter", view: (state) => (isAtRest(state) ? "parameters" : "motion"), mark: (state) => (isAtRest(state) ? "#parameters-search" : drives(state).some(enabled) ? "#stop" : "#disable"), text: "Press STOP, Esc or Space: it stops every drive, in every view; then Disable. On the wheel (zlac8030l): search 2013, choose 2013h:01, the temperature at which the motor is protected, and write 100. That is 10 °C, and it is warmer.", done: (state, before) => sum(state, "can_roll_back") > sum(before, "can_roll_back") },
-  { title: "Fault", view: "faults", mark: () => ".timeline", text: "The drive is at fault now: the motor is too warm for what it was told. Read here what may have caused it and what to do.", done: (state, _, view) => view === "faults" && drives(state).some(faulty) },
-  { title: "Reset", view: (state, before) => (isBack(state, before) ? "motion" : "parameters"), mark: (state, before) => (isBack(state, before) ? "#reset-fault" : "#parameters-back"), text: "Roll back: the parameter gets the value that it had. The cause is gone then: reset the fault in Motion.", done: (state) => drives(state).length > 0 && !drives(state).some(faulty) },
-  { title: "PDO", view: "pdo", mark: () => (document.querySelector("#pdo-apply:not([disabled])") ? "#pdo-apply" : document.querySelector("#pdo-search") ? "#pdo-search" : "button[data-edit=TPDO1]"), text: "On the wheel (zlac8030l): change TPDO1, put an object into it, and apply. Before that you see what it would write and what it does to the bus.", done: (state, before) => sum(state, "mapped") > sum(before, "mapped") },
-  { title: "Save", view: "parameters", mark: () => "#parameters-store", text: "Store the parameters in the drive, so that it has them after a restart.", done: (state, before) => sum(state, "stored") > sum(before, "stored") },
-  { title: "Scenario", view: "world", mark: () => "[data-line='cable cut']", text: "What the world does to the machine: cut the cable of a drive, see in Bus and Faults what that looks like, and undo it. ferrodrive run plays such scenarios from a file.", done: (state, before) => state.changes > before.changes },
-  { title: "Recording", view: "trace", mark: () => "#trace-save", text: "Save what has passed on the bus, for ferrodrive dump and replay.", done: (state, before) => state.logs_saved > before.logs_saved },
+  { title: "Parameter", view: (state) => (isAtRest(state) ? "parameters" : "motion"), mark: (state) => (isAtRest(state) ? "#parameters-search" : drives(state).some(enabled) ? "#stop" : "#disable"), text: "Press STOP, Esc or Space: it stops every drive, in every view; then Disable. On the wheel (zlac8030l): search 2013, choose 2013h:01, the protection temperature of the motor, and write 100. That is 10 °C, and the motor is warmer.", done: (state, before) => sum(state, "can_roll_back") > sum(before, "can_roll_back") },
+  { title: "Fault", view: "faults", mark: () => ".timeline", text: "The drive is in fault now: the motor is warmer than the limit you wrote. Read here what may have caused it and what to do.", done: (state, _, view) => view === "faults" && drives(state).some(faulty) },
+  { title: "Reset", view: (state, before) => (isBack(state, before) ? "motion" : "parameters"), mark: (state, before) => (isBack(state, before) ? "#reset-fault" : "#parameters-back"), text: "Press Roll back: the parameter gets its old value and the cause of the fault is gone. Then reset the fault in Motion.", done: (state) => drives(state).length > 0 && !drives(state).some(faulty) },
+  { title: "PDO", view: "pdo", mark: () => (document.querySelector("#pdo-apply:not([disabled])") ? "#pdo-apply" : document.querySelector("#pdo-search") ? "#pdo-search" : "button[data-edit=TPDO1]"), text: "On the wheel (zlac8030l): change TPDO1, add an object, and apply. Before that you see what it would write and its effect on the bus.", done: (state, before) => sum(state, "mapped") > sum(before, "mapped") },
+  { title: "Save", view: "parameters", mark: () => "#parameters-store", text: "Store the parameters in the drive, so that it keeps them over a restart.", done: (state, before) => sum(state, "stored") > sum(before, "stored") },
+  { title: "Scenario", view: "world", mark: () => "[data-line='cable cut']", text: "Change the surroundings of the machine: cut the cable of a drive, see the effect in Bus and Faults, and undo it. ferrodrive run plays such scenarios from a file.", done: (state, before) => state.changes > before.changes },
+  { title: "Recording", view: "trace", mark: () => "#trace-save", text: "Save the frames of the bus, for ferrodrive dump and replay.", done: (state, before) => state.logs_saved > before.logs_saved },
 ];
 
 const read = () => {
@@ -57,14 +57,14 @@ export function tourBar(view, show) {
   const leave = h("button", { type: "button", id: "tour-leave", onclick: () => keep({ ...kept, on: false }) }, "Not now");
   const root = h("section", { id: "tour", "aria-label": "Tour", role: "status", hidden: true }, title, text, h("span", { class: "grow" }), go, start, leave);
   let kept = read();
-  // A step that another program of the page has left behind.
+  // A step stored by another version of the page.
   if (!Number.isInteger(kept.step) || kept.step < 0 || kept.step > STEPS.length) kept = { ...kept, step: 0 };
-  /** It moves drives and writes to them: on the machine inside the program alone. */
+  /** The tour moves drives and writes to them: on the embedded virtual bus only. */
   let embedded = false;
-  /** The state in which the step began; anew with the page, since the studio may be another one. */
+  /** The state at which the step began; not kept over a reload, since the studio may be another one. */
   let before = null;
 
-  /** Where a step is done; of some that changes on the way. */
+  /** The view of a step; for some it changes on the way. */
   const viewOf = (step) => (typeof step.view === "string" ? step.view : link.state ? step.view(link.state, before ?? link.state) : null);
 
   function keep(next) {
@@ -87,12 +87,12 @@ export function tourBar(view, show) {
     const ended = kept.step === STEPS.length;
     root.hidden = !embedded || kept.on === false;
     const step = kept.on ? STEPS[kept.step] : null;
-    say(title, step ? `${kept.step + 1} of ${STEPS.length}: ${step.title}. ` : ended ? "The tour is done. " : isNew ? "Here for the first time? " : "");
-    say(text, step ? step.text : ended ? "You have moved a drive, met a fault and kept what happened." : isNew ? "Ten steps show what there is, in about five minutes." : "");
+    setText(title, step ? `${kept.step + 1} of ${STEPS.length}: ${step.title}. ` : ended ? "The tour is done. " : isNew ? "Here for the first time? " : "");
+    setText(text, step ? step.text : ended ? "You have moved a drive, resolved a fault and saved a recording." : isNew ? "Ten steps show the studio, in about five minutes." : "");
     go.hidden = !step || viewOf(step) === view();
     start.hidden = Boolean(step);
-    say(start, ended ? "Again" : "Start the tour");
-    say(leave, step ? "Leave the tour" : ended ? "Close" : "Not now");
+    setText(start, ended ? "Again" : "Start the tour");
+    setText(leave, step ? "Leave the tour" : ended ? "Close" : "Not now");
     mark(step && viewOf(step) === view() ? step.mark(link.state, before ?? link.state) : null);
   }
 
@@ -109,7 +109,7 @@ export function tourBar(view, show) {
     draw();
   }
 
-  /** Takes it up where it was left, or begins it. */
+  /** Resumes the tour where it was left, or starts it. */
   function resume() {
     keep({ on: true, step: kept.step === STEPS.length ? 0 : kept.step });
   }

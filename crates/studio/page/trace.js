@@ -1,22 +1,22 @@
-// The Trace view: what passes on the bus, in words. The frames are kept in the studio; this page has a part of their lines,
-// asks for what is new while it is looked at, and for what is older when somebody scrolls there.
+// The Trace view: the frames on the bus, in words. The studio keeps the frames; this page has a part of their lines,
+// requests new ones while it is in view, and older ones when the list is scrolled there.
 
-import { h, number, say, toggle } from "./dom.js";
+import { h, number, setText, toggle } from "./dom.js";
 import { pointed } from "./help.js";
 
 const ASK_MS = 100;
 const PART = 500;
-/** Lines that the page has while it shows the newest; older ones are fetched again from the studio. */
+/** Lines kept in the page while it shows the newest; older ones are fetched again from the studio. */
 const LINES_KEPT = 20_000;
-/** Lines that it has at most: what the studio keeps. Somebody who looks at old ones that long is shown nothing new meanwhile. */
+/** The most lines in the page, as many as the studio keeps. A reader of old lines beyond it is shown nothing new meanwhile. */
 const MOST_LINES = 200_000;
 const ROW_PX = 24;
 const KINDS = ["nmt", "sync", "time", "emcy", "pdo", "sdo", "heartbeat", "lss", "other"];
-/** An object as lines have it. */
+/** An object as it is written in a line. */
 const OBJECT = /[0-9A-F]{4}h:[0-9A-F]{2}/;
 const COLUMNS = ["Time (s)", "From", "COB-ID", "What", "Bytes", "Took", "In words"];
 
-/** The titles over lines. */
+/** The column titles. */
 export const headRow = () => h("div", { class: "trace-row head" }, ...COLUMNS.map((title) => h("span", {}, title)));
 
 /** A line of the trace. */
@@ -25,7 +25,7 @@ export function lineRow(line) {
   const cells = [number(line.at_s, 6), line.from, line.id, line.kind, line.data, took, line.text];
   const spans = cells.map((cell) => h("span", {}, cell));
   const row = h("div", { class: `trace-row ${line.kind}`, "data-number": String(line.number), title: line.text }, ...spans);
-  // `?` on the words tells of the object that they name, elsewhere in the line of the service.
+  // `?` on the words explains the object that they name; elsewhere in the line, the service.
   const object = OBJECT.exec(line.text)?.[0];
   if (object) pointed(spans.at(-1), "object", object, line.node ?? null);
   return pointed(row, "service", line.kind);
@@ -33,12 +33,12 @@ export function lineRow(line) {
 
 export function traceView() {
   const nodes = h("input", { id: "trace-nodes", size: "8", placeholder: "all nodes", "aria-label": "Node-IDs, separated by commas", oninput: again });
-  const words = h("input", { id: "trace-text", size: "24", placeholder: "words, separated by commas", "aria-label": "Words that a line has to have, separated by commas", oninput: again });
+  const words = h("input", { id: "trace-text", size: "24", placeholder: "words, separated by commas", "aria-label": "Words that a line must contain, separated by commas", oninput: again });
   const kinds = h("div", { class: "chooser", role: "group", "aria-label": "Kinds of frames; none for all" }, ...KINDS.map((kind) => h("button", { type: "button", "data-kind": kind, "aria-pressed": "false", onclick: choose }, kind)));
   const whole = toggle("trace-transfers", "whole SDO transfers", true, () => again());
   const quiet = toggle("trace-quiet", "without the studio's readings", false, () => again());
   const pause = h("button", { type: "button", id: "trace-pause", "aria-pressed": "false", onclick: pauseOrGoOn }, "Pause");
-  const save = h("a", { id: "trace-save", class: "button", download: "trace.log", title: "All frames that are kept of these nodes and kinds, in the form of candump" }, "Save candump");
+  const save = h("a", { id: "trace-save", class: "button", download: "trace.log", title: "All kept frames of these nodes and kinds, as a candump log" }, "Save candump");
   const room = h("div", { class: "room" });
   const list = h("div", { class: "trace-list", tabindex: "0", role: "log", "aria-label": "Frames", onscroll: draw }, room);
   const status = h("p", { class: "quiet", role: "status" });
@@ -54,10 +54,10 @@ export function traceView() {
   let shown = false;
   let paused = false;
   let timer = null;
-  /** Counts the filters: an answer to an older one is of no use. */
+  /** Counts the filters: an answer to an older one is ignored. */
   let generation = 0;
   let lines = [];
-  /** The numbers of the frames that the lines are of: from, and below to. */
+  /** Range of the frame numbers of the lines: from, up to and not including to. */
   let [from, to] = [null, null];
   let oldest = 0;
   let next = 0;
@@ -81,7 +81,7 @@ export function traceView() {
     again();
   }
 
-  /** Begins anew, with the newest lines of another filter. */
+  /** Starts again, with the newest lines of another filter. */
   function again() {
     generation += 1;
     [lines, from, to, skipped, follows] = [[], null, null, 0, true];
@@ -100,19 +100,19 @@ export function traceView() {
     for (const [name, value] of Object.entries(more)) asked.set(name, String(value));
     const mine = generation;
     fetching = true;
-    let told = null;
+    let body = null;
     try {
       const answer = await fetch(`/api/trace?${asked}`);
-      told = await answer.json();
-      if (!answer.ok) throw new Error(told.error.message);
+      body = await answer.json();
+      if (!answer.ok) throw new Error(body.error.message);
     } catch (error) {
       if (mine === generation) [trouble, fetching] = [error.message, false];
       return null;
     }
-    // The filter is another one since.
+    // The filter has changed since.
     if (mine !== generation) return null;
-    [trouble, fetching, oldest, next] = [null, false, told.oldest, told.next];
-    return told;
+    [trouble, fetching, oldest, next] = [null, false, body.oldest, body.next];
+    return body;
   }
 
   const wantsNew = () => to === null || (!paused && (follows || lines.length < MOST_LINES));
@@ -121,14 +121,14 @@ export function traceView() {
     clearTimeout(timer);
     if (!shown) return;
     const mine = generation;
-    // The first lines of a filter are shown even while nothing new is wanted, and nobody looks at a hidden tab.
+    // The first lines of a filter are shown even while paused; a hidden tab requests nothing.
     if (wantsNew() && !document.hidden && !fetching) {
-      const told = await part(to === null ? {} : { after: to });
-      if (told) {
-        if (to === null) from = told.from;
-        skipped += told.skipped;
-        to = told.to;
-        for (const line of told.lines) lines.push(line);
+      const body = await part(to === null ? {} : { after: to });
+      if (body) {
+        if (to === null) from = body.from;
+        skipped += body.skipped;
+        to = body.to;
+        for (const line of body.lines) lines.push(line);
         if (follows && lines.length > LINES_KEPT) {
           lines = lines.slice(-LINES_KEPT);
           from = lines[0].number;
@@ -142,15 +142,15 @@ export function traceView() {
     }
   }
 
-  /** Fetches what lies before the first line. */
+  /** Fetches the lines before the first one. */
   async function askOlder() {
     if (fetching || from === null || from <= oldest || lines.length >= MOST_LINES) return;
-    const told = await part({ before: from });
-    if (!told) return;
-    from = told.from;
-    lines = told.lines.concat(lines);
-    // What was in view stays there.
-    const top = list.scrollTop + told.lines.length * ROW_PX;
+    const body = await part({ before: from });
+    if (!body) return;
+    from = body.from;
+    lines = body.lines.concat(lines);
+    // The lines in view stay there.
+    const top = list.scrollTop + body.lines.length * ROW_PX;
     room.style.height = `${lines.length * ROW_PX}px`;
     list.scrollTop = top;
     draw();
@@ -159,7 +159,7 @@ export function traceView() {
   function pauseOrGoOn() {
     paused = !paused;
     pause.setAttribute("aria-pressed", String(paused));
-    say(pause, paused ? "Go on" : "Pause");
+    setText(pause, paused ? "Resume" : "Pause");
     if (!paused) follows = true;
     draw();
   }
@@ -170,7 +170,7 @@ export function traceView() {
     return element;
   };
 
-  /** Draws the lines that are in view, and no others. */
+  /** Draws only the lines in view. */
   function draw(event) {
     if (event) follows = list.scrollTop + list.clientHeight >= list.scrollHeight - ROW_PX;
     room.style.height = `${lines.length * ROW_PX}px`;
@@ -179,19 +179,19 @@ export function traceView() {
     const last = Math.min(lines.length, first + Math.ceil(list.clientHeight / ROW_PX) + 4);
     room.replaceChildren(...lines.slice(first, last).map((line, at) => row(line, first + at)));
     if (event && list.scrollTop < ROW_PX) askOlder();
-    // A filter that lets little through: what fills the view lies further back.
+    // With a filter that few lines pass, the lines that fill the view are further back.
     else if (lines.length * ROW_PX < list.clientHeight) askOlder();
-    const missed = skipped ? ` ${skipped} frames were too many for this page and are not shown.` : "";
+    const missed = skipped ? ` ${skipped} frames are not shown: too many for this page.` : "";
     const kept = next - oldest;
     const searched = from === null ? 0 : next - from;
-    say(status, trouble ?? `${lines.length} ${lines.length === 1 ? "line" : "lines"} of the last ${searched} frames; the studio keeps ${kept}.${missed}${paused ? " Paused: the studio goes on keeping." : ""}`);
+    setText(status, trouble ?? `${lines.length} ${lines.length === 1 ? "line" : "lines"} of the last ${searched} frames; the studio keeps ${kept}.${missed}${paused ? " Paused: the studio keeps recording." : ""}`);
     status.classList.toggle("bad", trouble !== null);
   }
 
   function update() {
     if (shown) return;
     shown = true;
-    // What passed while nobody looked is fetched by its end, not frame by frame.
+    // After a pause only the newest frames are fetched, not each one since.
     if (paused) ask();
     else again();
   }

@@ -1,33 +1,33 @@
-// The World view: the machine around virtual drives, as it truly is and not as the drives say, and what may be done to it.
+// The World view: the machine around virtual drives, as it truly is and not as the drives setText, and what may be done to it.
 
 import { ask, inControl } from "./link.js";
-import { h, number, say } from "./dom.js";
+import { h, number, setText } from "./dom.js";
 import { alternatives, commandForm, subject } from "./world_form.js";
 import { drivePicture } from "./world_picture.js";
 
-/** Pictures a second: the next is asked for when the one before has come. */
+/** Drawings a second: the next state is requested when the previous one has come. */
 const PICTURE_MS = 33;
 const RETRY_MS = 1000;
 const CHANGES_SHOWN = 200;
-/** Of a group that is about no single drive. */
+/** Ending of the name of a group that is not about a single drive. */
 const ALL = " of all";
 
 const NOT_VIRTUAL =
-  "The drives on this bus are real, or another program's: nothing here can change what is around them. " +
-  "A simulator that serves its bus (ferrodrive sim) takes such commands on its standard input and by ferrodrive world; without --bus the studio has a virtual machine of its own.";
+  "The drives on this bus are real, or belong to another program: their surroundings cannot be changed here. " +
+  "Use ferrodrive world to change the surroundings in a running ferrodrive sim, or start the studio without --bus for its own virtual machine.";
 
 export function worldView(shared, report) {
   const about = h("p", { class: "quiet", role: "status" });
-  const cards = h("div", { class: "world-cards", role: "group", "aria-label": "The drives as they are" });
+  const cards = h("div", { class: "world-cards", role: "group", "aria-label": "The drives as they truly are" });
   const line = h("input", { id: "world-line", size: "36", placeholder: "4 supply 30 limit 5", "aria-label": "A command in words", autocomplete: "off" });
-  const free = h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); perform(line.value); } }, line, h("button", { id: "world-do" }, "Do"), h("span", { class: "quiet" }, "Any command in words, as ferrodrive sim takes it"));
+  const free = h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); perform(line.value); } }, line, h("button", { id: "world-do" }, "Do"), h("span", { class: "quiet" }, "Any command of ferrodrive sim"));
   const groups = h("div", { class: "world-groups" });
   const answer = h("p", { id: "world-answer", role: "status" });
   const list = h("ol", { class: "world-changes", reversed: true });
   const controls = h("fieldset", { class: "world-controls" }, free, h("h3", {}, "Done so far"), list, groups);
   const root = h("section", { class: "world" }, about, cards, answer, controls);
 
-  /** By place: the picture of a drive. */
+  /** The drawing of each drive, by place. */
   const pictures = new Map();
   let forms = null;
   let place = null;
@@ -39,13 +39,13 @@ export function worldView(shared, report) {
   let running = false;
 
   async function perform(text) {
-    const told = report("World", await ask({ do: "change_world", line: text }));
-    say(answer, told.ok ? (told.notes ?? []).join(" ") : told.error.message);
-    answer.className = told.ok ? "quiet" : "bad";
-    if (told.ok) line.value = "";
+    const reply = report("World", await ask({ do: "change_world", line: text }));
+    setText(answer, reply.ok ? (reply.notes ?? []).join(" ") : reply.error.message);
+    answer.className = reply.ok ? "quiet" : "bad";
+    if (reply.ok) line.value = "";
   }
 
-  /** A group of forms for each thing that can be done something with. */
+  /** A group of forms for each subject of commands. */
   function drawForms() {
     const names = (word) => (word === "body" ? bodies : inputs);
     const found = new Map();
@@ -55,13 +55,13 @@ export function worldView(shared, report) {
       const name = command.startsWith("NODE") ? subject(command) : `${subject(command)}${ALL}`;
       found.set(name, [...(found.get(name) ?? []), commandForm(command, { place: () => place, names, run: perform })]);
     }
-    groups.replaceChildren(...[...found].map(([name, of]) => h("div", { class: "form", "data-group": name }, name.endsWith(ALL) ? h("p", { class: "quiet" }, "The wire, for every node") : null, ...of)));
+    groups.replaceChildren(...[...found].map(([name, of]) => h("div", { class: "form", "data-group": name }, name.endsWith(ALL) ? h("p", { class: "quiet" }, "The bus, for every node") : null, ...of)));
   }
 
   function choose(next) {
     place = next;
     for (const [of, { root: card }] of pictures) card.setAttribute("aria-pressed", String(of === place));
-    say(about, `Chosen: drive ${place}. Drawn is where the shafts truly are. The forms below are for the chosen drive; choose another by its picture.`);
+    setText(about, `Chosen: drive ${place}. The drawings show where the shafts truly are. The forms below are for the chosen drive; press a drawing to choose another.`);
   }
 
   function take(seen) {
@@ -96,13 +96,13 @@ export function worldView(shared, report) {
     running = true;
     while (shown) {
       const began = performance.now();
-      // A page that nobody sees asks for nothing.
+      // A hidden page requests nothing.
       if (!document.hidden) {
         if (!forms) await fetchForms();
         if (forms) {
-          const told = await ask({ do: "look_around", after: newest });
-          if (told.ok) take(told.result);
-          else if (told.error.kind === "no_world") break;
+          const reply = await ask({ do: "look_around", after: newest });
+          if (reply.ok) take(reply.result);
+          else if (reply.error.kind === "no_world") break;
         }
       }
       const wait = forms && !document.hidden ? PICTURE_MS : RETRY_MS;
@@ -112,17 +112,17 @@ export function worldView(shared, report) {
   }
 
   async function fetchForms() {
-    const told = await ask({ do: "world_forms" });
-    if (!told.ok) return;
-    forms = told.result.forms;
-    const { is_virtual } = told.result;
+    const reply = await ask({ do: "world_forms" });
+    if (!reply.ok) return;
+    forms = reply.result.forms;
+    const { is_virtual } = reply.result;
     controls.hidden = !is_virtual;
-    if (!is_virtual) say(about, NOT_VIRTUAL);
+    if (!is_virtual) setText(about, NOT_VIRTUAL);
   }
 
   function update() {
     controls.disabled = !inControl();
-    controls.title = controls.disabled ? "Take control to change the world; everybody may look" : "";
+    controls.title = controls.disabled ? "Take control to change the world" : "";
     if (!shown) {
       shown = true;
       loop();

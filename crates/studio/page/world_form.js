@@ -1,10 +1,10 @@
-// What may be done to the world, as forms: each made from the simulator's own usage text, such as
+// Commands to the world, as forms: each made from the usage text of the simulator, such as
 // "NODE supply VOLTS [limit AMPERES] [resistance OHMS]". There is no table of commands here.
 
 import { choice } from "./choice.js";
 import { h } from "./dom.js";
 
-/** Each list of the forms has a name of its own. */
+/** Each list of the forms has its own id. */
 let ids = 0;
 const nextId = () => `world-choice-${(ids += 1)}`;
 const named = (word) => ({ value: word, text: word });
@@ -37,13 +37,13 @@ export function parts(command) {
   return { found, hint };
 }
 
-/** What a command is about: the words that stand before anything can be chosen. */
+/** The subject of a command: its words before the first choice. */
 export function subject(command) {
   const { found } = parts(command);
   return found[0].word ?? found[1]?.word ?? command;
 }
 
-/** A form for one command. `names(word)` are the names that may follow a word; `run(line)` does it; `place()` is the node. */
+/** A form for one command. `names(word)`: the names that may follow a word; `run(line)`: performs it; `place()`: the node. */
 export function commandForm(command, { place, names, run }) {
   const { found, hint } = parts(command);
   const fields = [];
@@ -81,7 +81,7 @@ export function commandForm(command, { place, names, run }) {
       title: hint || command,
       onsubmit: (event) => {
         event.preventDefault();
-        // With a choice at the end it is the choice that does it.
+        // If the last part is a choice, choosing performs the command.
         if (!last) run(line());
       },
     },

@@ -1,15 +1,15 @@
-// A drive as it truly is, as a picture: its shaft where it stands, not where the encoder says. What is drawn depends on what there
+// A drawing of a drive as it truly is: its shaft where it stands, not where the encoder reports it. What is drawn depends on what there
 // is: an arm behind a reducer, a carriage on a spindle where the drive does not measure its rotor, a wheel otherwise.
 
-import { h, number, s, say } from "./dom.js";
+import { h, number, s, setText } from "./dom.js";
 
 const [WIDTH, HEIGHT] = [260, 190];
 const [MIDDLE_X, MIDDLE_Y] = [130, 88];
 const RADIUS = 62;
-/** Turns of the spindle from one end of the picture to the other; the carriage comes in again on the other side. */
+/** Turns of the spindle from one end of the drawing to the other; the carriage re-enters on the other side. */
 const SPINDLE_TURNS = 10;
 const SPINDLE = [24, 236];
-/** A winding is cold at the surroundings and red at the limit of the usual insulation, class B (IEC 60085). */
+/** A winding is cold at ambient temperature and red at the limit of the usual insulation, class B (IEC 60085). */
 const [COLD_C, HOT_C] = [25, 130];
 
 const degrees = (rad) => (rad * 180) / Math.PI;
@@ -61,18 +61,18 @@ function spindle() {
 const shapeOf = (node) => (node.output_shaft ? "arm" : node.rotor_position !== undefined ? "spindle" : "wheel");
 const SHAPES = { arm, spindle, wheel };
 
-/** Names with a lamp each. */
+/** Inputs, each with a lamp. */
 function lamps(levels) {
   return Object.entries(levels).map(([name, level]) => h("span", { class: level ? "lamp on" : "lamp", title: level ? "on" : "off" }, `${level ? "●" : "○"} ${name}`));
 }
 
-/** A card for one drive. `title` is what it is called. */
+/** A card for one drive, with its title. */
 export function drivePicture(title) {
   const drawing = s("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": `${title} as it truly is` });
-  const told = h("p");
+  const readings = h("p");
   const inputs = h("p", { class: "lamps" });
   const state = h("p", { class: "quiet" });
-  const root = h("button", { type: "button", class: "world-card" }, h("b", {}, title), drawing, told, inputs, state);
+  const root = h("button", { type: "button", class: "world-card" }, h("b", {}, title), drawing, readings, inputs, state);
   let shape = null;
   let kind = "";
   const words = s("text", { x: MIDDLE_X, y: HEIGHT - 8, "text-anchor": "middle" });
@@ -88,17 +88,17 @@ export function drivePicture(title) {
     const heat = Math.min(1, Math.max(0, ((node.winding_c ?? COLD_C) - COLD_C) / (HOT_C - COLD_C)));
     shape.hub.style.fill = `color-mix(in srgb, #d62d20 ${Math.round(heat * 100)}%, var(--now))`;
     const load = node.load_torque_nm ? ` · load ${number(node.load_torque_nm, 2)} N·m` : "";
-    say(words, `${number(node.velocity_rpm, 1)} r/min${load}`);
-    say(brake, node.brake === "engaged" ? "▣ brake holds" : "");
+    setText(words, `${number(node.velocity_rpm, 1)} r/min${load}`);
+    setText(brake, node.brake === "engaged" ? "▣ brake holds" : "");
     const celsius = node.winding_c === undefined ? "" : `, winding ${number(node.winding_c, 0)} °C`;
-    say(told, `${number(node.supply_v, 1)} V, ${number(node.current_a, 2)} A${celsius}`);
+    setText(readings, `${number(node.supply_v, 1)} V, ${number(node.current_a, 2)} A${celsius}`);
     const levels = { ...node.inputs, ...node.outputs };
     const key = JSON.stringify(levels);
     if (inputs.dataset.key !== key) {
       inputs.dataset.key = key;
       inputs.replaceChildren(...lamps(levels));
     }
-    say(state, `power ${node.power}, bus ${node.bus}${node.damage ? `, ${node.damage}` : ""}`);
+    setText(state, `power ${node.power}, bus ${node.bus}${node.damage ? `, ${node.damage}` : ""}`);
     state.classList.toggle("bad", Boolean(node.damage));
     root.classList.toggle("dead", node.power === "off");
   }

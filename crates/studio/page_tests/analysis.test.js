@@ -43,7 +43,7 @@ function second(w) {
   return { value: (t) => 5 + 60 * value(t), rise_s: reaches(0.9, 0, Math.PI / d) - at10_s, settling_s: last_s - at10_s, overshoot: Math.exp((-Math.PI * z) / Math.sqrt(1 - z * z)) };
 }
 
-test("a lag of first or second order is measured within what it says it may be off by", () => {
+test("a lag of first or second order is measured within its stated uncertainty", () => {
   let measured = 0;
   for (const rate_hz of RATES_HZ) {
     for (const phase of PHASES) {
@@ -65,7 +65,7 @@ test("a lag of first or second order is measured within what it says it may be o
   assert.equal(measured, RATES_HZ.length * PHASES.length * 3 * 2);
 });
 
-test("what rises faster than the readings show is said to have too few of them", () => {
+test("a rise that is too fast for the readings is reported to have too few of them", () => {
   for (const rate_hz of RATES_HZ) {
     for (const phase of PHASES) {
       for (const readings of [0.01, 0.5, 1, 3, 8]) {
@@ -78,7 +78,7 @@ test("what rises faster than the readings show is said to have too few of them",
   }
 });
 
-test("neither a ramp nor what begins or ceases to be one is a step", () => {
+test("neither a ramp nor its beginning or end is a step", () => {
   const shapes = {
     ramp: (t) => 1028.9 + 360 * t,
     falling: (t) => -17.3 * t,
@@ -101,7 +101,7 @@ test("neither a ramp nor what begins or ceases to be one is a step", () => {
   }
 });
 
-test("noise of a step changes what it may be off by, and not what it is", () => {
+test("noise on a step changes its uncertainty, not its value", () => {
   const lag = second(4);
   const series = sampled((t) => lag.value(t) + 0.2 * Math.sin(t * 7919), 100, 0.4, 1, 9);
   const found = seen(series);
@@ -109,14 +109,14 @@ test("noise of a step changes what it may be off by, and not what it is", () => 
   near(found.overshoot, lag.overshoot, found.overshoot_grid + 0.4 / 60, "overshoot");
 });
 
-test("an overshoot of a few readings is not told", () => {
+test("an overshoot of a few readings is not reported", () => {
   // A rise by a ramp of a second, and a peak of 20 ms.
   const value = (t) => (t < 1 ? 60 * t : 60 + (t < 1.1 ? 6 * Math.sin((Math.PI * (t - 1)) / 0.1) : 0));
   assert.equal(seen(sampled(value, 12, 0.55, 2, 6)).overshoot, null);
   near(seen(sampled(value, 1000, 0.5, 2, 6)).overshoot, 0.1, 1e-3, "overshoot");
 });
 
-test("a number has no more decimals than what it may be off by", () => {
+test("a number has no more decimals than its uncertainty", () => {
   assert.equal(within(1.23456, 0.113), "1.2 ± 0.2");
   assert.equal(within(0.108, 0.001), "0.108 ± 0.001");
   assert.equal(within(16.3, 2.4), "16 ± 3");

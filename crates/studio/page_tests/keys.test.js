@@ -19,7 +19,7 @@ test("escape and space stop, with any setting and any modifier", () => {
   assert.equal(meaningOf({ key: " " }, { in_text: true, types: true, characters: true }), "none", "a space in a text");
 });
 
-test("keys of one character do nothing once they are switched off, and the others go on", () => {
+test("single-character keys do nothing once they are switched off, and the others still work", () => {
   for (const [key, meaning] of Object.entries({ 1: "view", 9: "view", 0: "own", "?": "help", d: "own", s: "own", r: "own", p: "own", é: "own" })) {
     assert.equal(meaningOf({ key }, on), meaning, key);
     assert.equal(meaningOf({ key }, { ...on, characters: false }), "none", key);

@@ -510,10 +510,10 @@ async fn a_parameter_is_found_changed_and_rolled_back() {
     stage.says(row, "1 r/min").await;
     stage.find("#parameters-file").await.send_keys(&kept.to_string_lossy()).await.expect("chosen");
     stage.says("#parameters-told", "node4.dcf").await;
-    stage.says("#parameters-told", "1 are others in the drive").await;
+    stage.says("#parameters-told", "1 differ from the drive").await;
     let file = stage.profile.join("node4.toml");
     stage.find("#parameters-file").await.send_keys(&file.to_string_lossy()).await.expect("chosen");
-    stage.says("#parameters-told", "1 are others in the drive").await;
+    stage.says("#parameters-told", "1 differ from the drive").await;
     stage.find(".parameters-diff tr.other").await;
     stage.click("#parameters-plan").await;
     stage.says("#parameters-told", "1 write, in this order").await;

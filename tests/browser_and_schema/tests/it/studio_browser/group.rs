@@ -24,7 +24,7 @@ async fn two_drives_move_together_turn_while_held_and_stop_together() {
     stage.take_the_wheel().await;
     stage.click("#group summary").await;
     stage.click("#group-move").await;
-    stage.says("#group-told", "Choose two drives or more").await;
+    stage.says("#group-told", "Choose two or more drives").await;
     stage.click("#group-in-2").await;
     stage.click("#group-in-4").await;
     stage.says("#group-guarding", "Node 2: if the studio dies, nothing stops it").await;
@@ -42,7 +42,7 @@ async fn two_drives_move_together_turn_while_held_and_stop_together() {
     stage.studio.wait("both turn", |state| all(state, |node| speed(node) > 20.0));
     stage.client.release_actions().await.expect("a release");
     stage.studio.wait("both rest", |state| all(state, |node| speed(node) < 2.0));
-    stage.says("#group-told", "at rest, without power").await;
+    stage.says("#group-told", "at rest, power stage off").await;
     stage.client.perform_actions(down).await.expect("a press");
     stage.studio.wait("both turn", |state| all(state, |node| speed(node) > 20.0));
     stage.client.perform_actions(press(Key::Escape.into())).await.expect("a press");

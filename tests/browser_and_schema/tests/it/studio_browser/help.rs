@@ -33,6 +33,6 @@ async fn a_question_mark_tells_what_the_thing_in_focus_means() {
     stage.click("#help-close").await;
     stage.click("#tabs [data-name=bus]").await;
     stage.click("#what").await;
-    stage.says("#help", "What can be asked about here").await;
+    stage.says("#help", "Help in this view").await;
     stage.close().await;
 }

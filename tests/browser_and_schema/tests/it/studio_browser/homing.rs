@@ -14,8 +14,8 @@ async fn homing_is_chosen_by_its_picture_and_ends_with_a_stop() {
     stage.find("#homing .columns:not([hidden]) #home-method li[data-value='24']").await;
     stage.choose("#home-method", "24").await;
     // ZLIM42-C user manual V1.03, 5.3.6; 2030h gives no input a meaning as delivered.
-    stage.says("#home-described", "looks for the home switch in positive direction, and turns round at a limit").await;
-    stage.says("#home-missing", "No input of this drive is set to be its home switch").await;
+    stage.says("#home-described", "searches for the home switch in positive direction, and reverses at a limit").await;
+    stage.says("#home-missing", "No input of this drive is configured as home switch").await;
     stage.find(".homing-picture circle.home").await;
     let details = "document.querySelector('#homing').scrollIntoView({ block: 'start' })";
     stage.client.execute(details, Vec::new()).await.expect("it scrolls");
@@ -36,7 +36,7 @@ async fn homing_is_chosen_by_its_picture_and_ends_with_a_stop() {
     stage.click("#theme").await;
     stage.shoot("homing_other_theme").await;
     stage.client.perform_actions(press(Key::Escape.into())).await.expect("a press");
-    stage.says("#home-progress", "Not found").await;
+    stage.says("#home-progress", "Home not found").await;
     stage.studio.wait("a stepper that rests", |state| speed(&state["nodes"][1]) < 2.0);
     stage.close().await;
 }

@@ -60,7 +60,7 @@ async fn a_pdo_is_mapped_seen_in_the_trace_and_undone() {
     // What does not fit any more, and what the drive does not let be mapped, is there with the reason.
     search.clear().await.expect("cleared");
     search.send_keys("velocity_actual").await.expect("typed");
-    stage.says(".found", "it has 32 bits, and 16 are free").await;
+    stage.says(".found", "32 bits, 16 free").await;
     search.clear().await.expect("cleared");
     search.send_keys("1017").await.expect("typed");
     stage.says(".found", "does not let it be mapped").await;

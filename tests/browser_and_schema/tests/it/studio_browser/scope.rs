@@ -89,7 +89,7 @@ async fn the_scope_draws_any_object_that_passes() {
     stage.click("#world-do").await;
     stage.says(".world-changes li:first-child b", "4 supply 24").await;
     stage.click("#tabs [data-name=scope]").await;
-    stage.says("#trigger-status", "came at").await;
+    stage.says("#trigger-status", "fired at").await;
     stage.find("#scope-pause[aria-pressed=true]").await;
     stage.shoot("scope_triggered").await;
     stage.close().await;
@@ -151,7 +151,7 @@ async fn the_scope_waits_for_its_trigger_and_measures_the_step() {
     stage.click("#go-turn").await;
     stage.turns();
     stage.click("#tabs [data-name=scope]").await;
-    stage.says("#trigger-status", "came at").await;
+    stage.says("#trigger-status", "fired at").await;
     // The part after it, 80 % of 10 s: while the wheel goes on turning.
     stage.find("#scope-pause[aria-pressed=true]").await;
     stage.click("#scope-step").await;
