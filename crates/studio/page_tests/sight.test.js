@@ -57,7 +57,7 @@ test("a page that a studio started anew does not let in says what to do, and not
   const refused = "open the address that `ferrodrive studio` printed";
   const nodes = [node(2, drive("Operation enabled", 60), { goes_on: true })];
   const text = lostSight({ state: { nodes }, connected: false, age_ms: 9000, refused }).map((line) => line.text).join("\n");
-  assert.match(text, /started anew and does not let this page in: open the address that `ferrodrive studio` printed\./);
+  assert.match(text, /restarted and does not admit this page: open the address that `ferrodrive studio` printed\./);
   assert.ok(!/Trying again/.test(text), text);
   assert.match(text, /Node 2 has nothing that stops it/, "what moves is as unknown as before");
 });

@@ -1,8 +1,8 @@
-//! Who is let in: a token of each launch, a cookie in its place, the page's own origin, and elsewhere a password.
+//! Access control: a token for each launch, a cookie in its place, the page's own origin, and a password for other machines.
 //!
-//! A page of another site can have a browser send requests to this server, with the cookie too. It cannot lie about its
-//! origin: every request that does something has to come from the page that this server gave out. A name of another site
-//! that leads here (DNS rebinding) is refused by its Host.
+//! A page of another site can make a browser send requests to this server, including the cookie. It cannot forge its
+//! origin: every request that changes something has to come from a page of this server. A name of another site
+//! that resolves to this server (DNS rebinding) is refused by its Host.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
@@ -10,33 +10,33 @@ use axum::http::HeaderMap;
 use axum::http::header::{AUTHORIZATION, COOKIE, HOST, HeaderName, ORIGIN};
 use subtle::ConstantTimeEq;
 
-/// Bytes of a secret: more than anybody guesses.
+/// Bytes of a secret: too many to guess.
 const SECRET_BYTES: usize = 16;
 
-/// The shortest token that is taken.
+/// The shortest accepted token, in characters.
 const SHORTEST_TOKEN: usize = 2 * SECRET_BYTES;
 
-/// The shortest password that is taken.
+/// The shortest accepted password, in characters.
 const SHORTEST_PASSWORD: usize = 12;
 
-/// Why a studio cannot be opened to others.
+/// Why a studio cannot be opened to other machines.
 #[derive(Debug, thiserror::Error)]
 pub enum AccessError {
     /// Others could move the drives.
-    #[error("{0} can be reached from other machines, and there is no password")]
+    #[error("{0} can be reached from other machines: a password is required")]
     NoPassword(SocketAddr),
-    /// It is soon guessed.
-    #[error("the password has {0} characters: at least {SHORTEST_PASSWORD} are wanted")]
+    /// The password is too easy to guess.
+    #[error("the password has {0} characters, expected at least {SHORTEST_PASSWORD}")]
     ShortPassword(usize),
-    /// It is soon guessed, or an address cannot have it.
+    /// The token is too easy to guess, or cannot be part of an address.
     #[error("expected a token of {SHORTEST_TOKEN} or more letters, digits, - and _")]
     BadToken,
-    /// The system gives no random numbers.
-    #[error("the system gives no random numbers for a token: {0}")]
+    /// The system has no random numbers.
+    #[error("cannot get random numbers for a token from the system: {0}")]
     NoRandom(getrandom::Error),
 }
 
-/// What people type who come from another machine.
+/// The password for clients on other machines.
 #[derive(Clone)]
 pub struct Password(String);
 
@@ -60,7 +60,7 @@ impl Password {
     }
 }
 
-/// What lets in whoever shows it, where it is kept over launches.
+/// A secret that admits its bearer, where it is kept over launches.
 #[derive(Clone)]
 pub struct Token(String);
 
@@ -89,21 +89,21 @@ impl Token {
         secret().map(Self)
     }
 
-    /// It, to be kept where nobody else reads it.
+    /// Its text, to be kept where only its owner can read it.
     pub fn text(&self) -> &str {
         &self.0
     }
 }
 
-/// Who is let in: a token of each launch, a cookie in its place, the page's own origin, and elsewhere a password.
+/// Access control: a token for each launch or a kept one, a cookie in its place, the page's own origin, and a password for other machines.
 pub struct Access {
     address: SocketAddr,
-    /// In the address that is printed.
+    /// Part of the printed address.
     token: String,
-    /// In the cookie that it is exchanged for.
+    /// The value of the cookie that replaces the token.
     pass: String,
     password: Option<Password>,
-    /// Names that this server is called by, too.
+    /// Further names of this server.
     hosts: Vec<String>,
 }
 
@@ -117,7 +117,7 @@ impl Access {
     /// New secrets for a server that listens at `address`.
     ///
     /// # Errors
-    /// [`AccessError::NoPassword`] where others than this machine reach it; [`AccessError::NoRandom`].
+    /// [`AccessError::NoPassword`] if other machines can reach it; [`AccessError::NoRandom`].
     pub fn new(address: SocketAddr, password: Option<Password>) -> Result<Self, AccessError> {
         if !address.ip().is_loopback() && password.is_none() {
             return Err(AccessError::NoPassword(address));
@@ -131,23 +131,23 @@ impl Access {
         Self { pass: token.clone(), token, ..self }
     }
 
-    /// Lets browsers call this server by these names, too: `drives.local`, whatever the port.
+    /// Accepts these host names, too: `drives.local`, with any port.
     #[must_use]
     pub fn with_hosts(self, hosts: Vec<String>) -> Self {
         Self { hosts, ..self }
     }
 
-    /// The address to open on this machine, with the token of this launch: it lets in without a password, from anywhere.
+    /// The address to open on this machine, with the token of this launch: it gives access without a password, from anywhere.
     pub fn url(&self) -> String {
         let mut address = self.address;
         if address.ip().is_unspecified() {
-            // Everywhere is no place to go to.
+            // The unspecified address cannot be opened.
             address.set_ip(if address.is_ipv4() { Ipv4Addr::LOCALHOST.into() } else { Ipv6Addr::LOCALHOST.into() });
         }
         format!("http://{address}/?token={}", self.token)
     }
 
-    /// True if somebody may come in by a password.
+    /// True if a password gives access.
     pub(crate) const fn has_password(&self) -> bool {
         self.password.is_some()
     }
@@ -160,13 +160,13 @@ impl Access {
         self.password.as_ref().is_some_and(|password| is_same(text, &password.0))
     }
 
-    /// The cookie that lets in. It stays with this browser until that is closed, goes to no other site's requests, and no
-    /// script reads it. Cookies know no ports: its name does.
+    /// The cookie that gives access. The browser keeps it until it is closed, sends it only with requests of this site, and hides
+    /// it from scripts. Cookies ignore ports: its name has the port.
     pub(crate) fn cookie(&self) -> String {
         format!("{}={}; Path=/; HttpOnly; SameSite=Strict", self.cookie_name(), self.pass)
     }
 
-    /// True if a request shows the cookie, or the token as a program does.
+    /// True if a request has the cookie, or the token as programs send it.
     pub(crate) fn lets_in(&self, headers: &HeaderMap) -> bool {
         let name = self.cookie_name();
         let cookies = headers.get_all(COOKIE).iter().filter_map(|value| value.to_str().ok());
@@ -176,18 +176,18 @@ impl Access {
         by_cookie || bearer.is_some_and(|token| self.is_token(token))
     }
 
-    /// True if a request is meant for this server, by the name that it calls it.
+    /// True if the Host of a request is a name of this server.
     pub(crate) fn is_for_us(&self, headers: &HeaderMap) -> bool {
         let Some(host) = text(headers, HOST) else { return false };
         let name = host.rsplit_once(':').map_or(host, |(name, port)| if port.ends_with(']') { host } else { name });
         let is_named = self.hosts.iter().any(|own| own.eq_ignore_ascii_case(name));
-        // A browser that was led here by another's name (DNS rebinding) says that name; an address is nobody else's.
+        // After DNS rebinding a browser sends the foreign name as Host; an address cannot be foreign.
         let is_address = host.parse::<SocketAddr>().is_ok() || name.trim_matches(['[', ']']).parse::<IpAddr>().is_ok();
         let elsewhere = !self.address.ip().is_loopback() && is_address;
         is_named || elsewhere || self.own_hosts().iter().any(|own| own == host)
     }
 
-    /// True if a request comes from a page of this very server.
+    /// True if a request comes from a page of this server.
     pub(crate) fn is_from_us(&self, headers: &HeaderMap) -> bool {
         match (text(headers, ORIGIN), text(headers, HOST)) {
             (Some(origin), Some(host)) => origin.strip_prefix("http://") == Some(host) && self.is_for_us(headers),
@@ -217,7 +217,7 @@ pub(crate) fn secret() -> Result<String, AccessError> {
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
-/// Compares in a time that does not tell how much of it is right.
+/// Compares in constant time.
 pub(crate) fn is_same(a: &str, b: &str) -> bool {
     a.as_bytes().ct_eq(b.as_bytes()).into()
 }
@@ -240,7 +240,7 @@ mod tests {
         let access = Access::new(elsewhere, Some(password)).expect("with a password");
         assert!(access.is_password("correct horse battery") && !access.is_password("correct horse batterz"));
         let here = Access::new("127.0.0.1:1".parse().expect("an address"), None).expect("loopback");
-        assert!(!here.is_password(""), "where there is none, none is right");
+        assert!(!here.is_password(""), "without a password, none is right");
     }
 
     #[test]

@@ -1,44 +1,44 @@
-//! Who looks, who moves, and how that goes over from one to the other.
+//! Sessions, which of them has control, and how control changes hands.
 //!
-//! A session is one open page. Any number may look; at most one has control, and gets it by taking what nobody has or by
-//! being handed it. Nobody can take it away: a stop is open to all, and a session that goes gives it up.
+//! A session is one open page. Any number may look; at most one has control: it takes control while it is free, or
+//! gets it handed over. Control cannot be taken away; a stop is open to all, and a session that ends releases control.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-/// A session, numbered from 1 in the order of coming. Numbers are not used again.
+/// A session, numbered from 1 in the order of connection. Numbers are not reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(transparent)]
 pub(crate) struct SessionId(pub(crate) u64);
 
-/// Why a session may not do what it asks for.
+/// Why a request of a session is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Refusal {
-    /// Another one has control.
-    #[error("session {} has control: ask it to hand control over", .0.0)]
+    /// Another session has control.
+    #[error("session {} has control: ask for it", .0.0)]
     ControlledBy(SessionId),
-    /// Nobody has.
-    #[error("nobody has control: take it first")]
+    /// No session has control.
+    #[error("no session has control: take control first")]
     NotTaken,
-    /// It has none to hand over.
-    #[error("this session has no control to hand over")]
+    /// It has no control to hand over.
+    #[error("this session does not have control")]
     NothingToGive,
     /// There is no such session.
     #[error("there is no session {}", .0.0)]
     NoSuchSession(SessionId),
-    /// A message came a second time, or out of order.
-    #[error("sequence number {got} is not above {last}: it was sent before, or is a copy")]
+    /// A message was repeated, or came out of order.
+    #[error("sequence number {got} is not above {last}: repeated or out of order")]
     Replayed {
-        /// The number that came.
+        /// The number of the message.
         got: u64,
-        /// The highest before.
+        /// The highest one before.
         last: u64,
     },
 }
 
 impl Refusal {
-    /// In a word that programs may rely on.
+    /// As a stable word for programs.
     pub(crate) const fn kind(self) -> &'static str {
         match self {
             Self::ControlledBy(_) | Self::NotTaken | Self::NothingToGive => "not_in_control",
@@ -55,12 +55,12 @@ pub(crate) struct Authority {
     sessions: BTreeMap<SessionId, u64>,
     newest: u64,
     controller: Option<SessionId>,
-    /// Who would like to have control.
+    /// The session that asked for control last.
     asking: Option<SessionId>,
 }
 
 impl Authority {
-    /// A further session.
+    /// Adds a session.
     pub(crate) fn join(&mut self) -> SessionId {
         self.newest += 1;
         let session = SessionId(self.newest);
@@ -68,7 +68,7 @@ impl Authority {
         session
     }
 
-    /// A session has gone; true if it had control.
+    /// Removes a session; true if it had control.
     pub(crate) fn leave(&mut self, session: SessionId) -> bool {
         self.sessions.remove(&session);
         if self.asking == Some(session) {
@@ -77,7 +77,7 @@ impl Authority {
         self.release(session)
     }
 
-    /// Takes note of a message's number, which has to be above all before.
+    /// Records the number of a message, which has to be above all before.
     pub(crate) fn accept(&mut self, session: SessionId, got: u64) -> Result<(), Refusal> {
         let last = self.sessions.get_mut(&session).ok_or(Refusal::NoSuchSession(session))?;
         if got <= *last {
@@ -87,7 +87,7 @@ impl Authority {
         Ok(())
     }
 
-    /// Takes control where nobody has it.
+    /// Takes control if no session has it.
     pub(crate) fn take(&mut self, session: SessionId) -> Result<(), Refusal> {
         match self.controller {
             Some(other) if other != session => Err(Refusal::ControlledBy(other)),
@@ -98,7 +98,7 @@ impl Authority {
         }
     }
 
-    /// Asks the one who has control for it; who has it, and who asked last, is shown to all.
+    /// Asks for control; all sessions are shown who has it and who asked last.
     pub(crate) fn ask(&mut self, session: SessionId) -> Result<(), Refusal> {
         match self.controller {
             None => Err(Refusal::NotTaken),
@@ -122,7 +122,7 @@ impl Authority {
         Ok(())
     }
 
-    /// Gives control up; true if the session had it.
+    /// Releases control; true if the session had it.
     pub(crate) fn release(&mut self, session: SessionId) -> bool {
         let had = self.controller == Some(session);
         if had {
@@ -140,17 +140,17 @@ impl Authority {
         }
     }
 
-    /// Who has control.
+    /// The session that has control.
     pub(crate) const fn controller(&self) -> Option<SessionId> {
         self.controller
     }
 
-    /// Who would like to have it.
+    /// The session that asked for control last.
     pub(crate) const fn asking(&self) -> Option<SessionId> {
         self.asking
     }
 
-    /// How many sessions there are.
+    /// The number of sessions.
     pub(crate) fn sessions(&self) -> usize {
         self.sessions.len()
     }
@@ -172,14 +172,14 @@ mod tests {
         let mut authority = Authority::default();
         let [first, second] = [authority.join(), authority.join()];
         assert_eq!(authority.may_move(first), Err(Refusal::NotTaken));
-        authority.take(first).expect("nobody has it");
+        authority.take(first).expect("it is free");
         assert_eq!(authority.take(second), Err(Refusal::ControlledBy(first)));
         assert_eq!(authority.may_move(second), Err(Refusal::ControlledBy(first)));
         assert_eq!(authority.hand_over(second, second), Err(Refusal::NothingToGive));
-        authority.ask(second).expect("somebody has it");
+        authority.ask(second).expect("another session has it");
         assert_eq!((authority.controller(), authority.asking()), (Some(first), Some(second)));
         assert_eq!(authority.hand_over(first, SessionId(9)), Err(Refusal::NoSuchSession(SessionId(9))));
-        authority.hand_over(first, second).expect("both are there");
+        authority.hand_over(first, second).expect("both are connected");
         assert_eq!((authority.controller(), authority.asking()), (Some(second), None));
         assert!(!authority.leave(first) && authority.leave(second));
         assert_eq!((authority.controller(), authority.sessions()), (None, 0));

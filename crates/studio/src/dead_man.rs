@@ -1,13 +1,13 @@
-//! A dead-man's switch: what is not renewed in time has lapsed, for good.
+//! A dead-man's switch: a hold that is not renewed in time lapses, for good.
 
 use std::time::Duration;
 
 use can::Instant;
 
-/// Somebody has to renew this within its span, again and again. Time is an argument.
+/// A hold that has to be renewed within its span, again and again. Time is an argument.
 ///
-/// A renewal that comes too late changes nothing: whoever held it has to begin anew, on purpose. Else messages that had been
-/// held up on their way would start a motion that has been stopped.
+/// A renewal that comes too late changes nothing: the motion has to be started again, on purpose. Else messages that had been
+/// delayed would restart a motion that has been stopped.
 ///
 /// ```
 /// use std::time::Duration;
@@ -31,7 +31,7 @@ impl DeadMan {
         Self { span, deadline: now + span }
     }
 
-    /// Holds on for another span; false if it has lapsed already.
+    /// Renews the hold for another span; false if it has lapsed already.
     pub fn renew(&mut self, now: Instant) -> bool {
         let in_time = !self.has_lapsed(now);
         if in_time {

@@ -1,7 +1,7 @@
-//! The channels between the web part and the host: requests in through a bounded one, snapshots out through one that keeps the newest.
+//! The channels between the web part and the host: a bounded one for requests, and one for states that keeps the newest.
 //!
-//! Nothing here grows with a client that is slow or greedy: a request that finds no room is refused, a snapshot that was
-//! not fetched is replaced, and news that were not fetched are counted. A stop has a channel of its own, which is never full.
+//! No client, however slow or greedy, makes anything here grow: a request that finds no room is refused, a state that was
+//! not fetched is replaced, and news that were not fetched are counted. A stop has its own channel, which is never full.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -13,18 +13,18 @@ use crate::message::{Answer, Command};
 use crate::timeline::Timeline;
 use crate::trace::Trace;
 
-/// Requests that may wait for the host, of all sessions together: it takes them far faster than they come.
+/// Requests of all sessions queued for the host, which takes them far faster than they come.
 const REQUESTS: usize = 256;
 
-/// News that may wait for a session; a slower one misses the oldest.
+/// News queued for a session; a slower one misses the oldest.
 const NEWS: usize = 256;
 
-/// A handle on the host: a cheap clone for each task of the web part.
+/// A handle to the host; cheap to clone, one for each task of the web part.
 #[derive(Clone, Debug)]
 pub struct HostHandle {
     requests: mpsc::Sender<Request>,
     stops: Arc<watch::Sender<u64>>,
-    pictures: watch::Receiver<StateUpdate>,
+    states: watch::Receiver<StateUpdate>,
     news: broadcast::Sender<Arc<str>>,
     trace: Arc<Trace>,
     timeline: Arc<Timeline>,
@@ -34,7 +34,7 @@ pub struct HostHandle {
 pub(crate) struct Inbox {
     pub(crate) requests: mpsc::Receiver<Request>,
     pub(crate) stops: watch::Receiver<u64>,
-    pub(crate) pictures: watch::Sender<StateUpdate>,
+    pub(crate) states: watch::Sender<StateUpdate>,
     pub(crate) news: broadcast::Sender<Arc<str>>,
     pub(crate) trace: Arc<Trace>,
     pub(crate) timeline: Arc<Timeline>,
@@ -43,41 +43,41 @@ pub(crate) struct Inbox {
 /// The state of everything, as JSON.
 #[derive(Clone, Debug)]
 pub(crate) struct StateUpdate {
-    /// Counts the pictures.
+    /// Counts the states.
     pub(crate) number: u64,
     pub(crate) json: Arc<str>,
 }
 
-/// What a session wants.
+/// A request to the host.
 #[derive(Debug)]
 pub(crate) enum Request {
-    /// To be one.
+    /// Opens a session.
     Join {
-        /// Is dropped with the session, however it ends.
+        /// Dropped with the session, however it ends.
         liveness: oneshot::Receiver<Infallible>,
         /// Its number; dropped if there are too many.
         welcome: oneshot::Sender<SessionId>,
     },
-    /// Something done.
+    /// A command of a session.
     Do { session: SessionId, seq: u64, command: Command, answer: oneshot::Sender<Answer> },
 }
 
-/// Both ends, with the trace and the timeline between them.
+/// Both ends, with the trace and the timeline that they share.
 pub(crate) fn channel(trace: Trace) -> (HostHandle, Inbox) {
     let (trace, timeline) = (Arc::new(trace), Arc::<Timeline>::default());
     let (requests, requested) = mpsc::channel(REQUESTS);
     let (stops, stopped) = watch::channel(0);
-    let (shown, pictures) = watch::channel(StateUpdate { number: 0, json: "{}".into() });
+    let (shown, states) = watch::channel(StateUpdate { number: 0, json: "{}".into() });
     let (news, _) = broadcast::channel(NEWS);
     let handle = HostHandle {
         requests,
         stops: Arc::new(stops),
-        pictures,
+        states,
         news: news.clone(),
         trace: Arc::clone(&trace),
         timeline: Arc::clone(&timeline),
     };
-    (handle, Inbox { requests: requested, stops: stopped, pictures: shown, news, trace, timeline })
+    (handle, Inbox { requests: requested, stops: stopped, states: shown, news, trace, timeline })
 }
 
 /// A session with the host. The host stops what it moved when this is dropped.
@@ -89,7 +89,7 @@ pub(crate) struct Session {
 }
 
 impl HostHandle {
-    /// A further session; `None` if there are too many, or no host any more.
+    /// Opens a session; `None` if there are too many, or the host has ended.
     pub(crate) async fn join(&self) -> Option<Session> {
         let (held, liveness) = oneshot::channel();
         let (welcome, welcomed) = oneshot::channel();
@@ -98,23 +98,23 @@ impl HostHandle {
         Some(Session { id, handle: self.clone(), _lifeline: held })
     }
 
-    /// Has every drive quick-stopped. Never waits and never fails while there is a host; false without one.
+    /// Requests a quick stop of every drive. Never waits and never fails while there is a host; false without one.
     pub(crate) fn stop_all(&self) -> bool {
         self.stops.send_modify(|count| *count = count.wrapping_add(1));
         self.stops.receiver_count() > 0
     }
 
-    /// The pictures from now on.
-    pub(crate) fn pictures(&self) -> watch::Receiver<StateUpdate> {
-        self.pictures.clone()
+    /// The states from now on.
+    pub(crate) fn states(&self) -> watch::Receiver<StateUpdate> {
+        self.states.clone()
     }
 
-    /// The frames that have passed.
+    /// The frames of the bus so far.
     pub(crate) fn trace(&self) -> &Trace {
         &self.trace
     }
 
-    /// What has happened.
+    /// The timeline of the drives.
     pub(crate) fn timeline(&self) -> &Timeline {
         &self.timeline
     }
@@ -131,7 +131,7 @@ impl Session {
         self.id
     }
 
-    /// Asks for something; where the answer will come, or the answer if there is no room.
+    /// Sends a command; returns the receiver of its answer, or the refusal if there is no room.
     pub(crate) fn ask(&self, seq: u64, command: Command) -> Result<oneshot::Receiver<Answer>, Answer> {
         if command == (Command::StopAll {}) {
             self.handle.stop_all();

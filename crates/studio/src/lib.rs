@@ -1,16 +1,16 @@
-//! A web front end to a CANopen bus: who is on the bus, what each drive says of itself, and moving it, by any number of
-//! people who look and one who moves.
+//! A web front end to a CANopen bus: its nodes, the values of each drive, and its motion, for any number of
+//! viewers and one operator.
 //!
 //! [`Host`] owns the master's [`Network`](master::Network) and everything that moves: it takes requests from a bounded channel,
-//! carries them out, and publishes what it knows. It has no clock, no thread and no socket: its time is that of the bus, so
+//! carries them out, and publishes its state. It has no clock, no thread and no socket: its time is that of the bus, so
 //! that the same host runs in virtual time in a test. [`app`] is the web part, an [`axum::Router`] that can be called
-//! without a socket; its handlers hold no knowledge of motion.
+//! without a socket; its handlers know nothing of motion.
 //!
-//! Every motion hangs on somebody who holds it: a jog on a message every 100 ms ([`JOG_SPAN`]), any other on a page that
-//! shows that it is there ([`PRESENCE_SPAN`]), and both on its connection. What is not held is quick-stopped.
+//! Every motion has to be held: a jog by a message every 100 ms ([`JOG_SPAN`]), any other by a page that
+//! shows that it is there ([`PRESENCE_SPAN`]), and both by its connection. A motion that is not held is quick-stopped.
 //!
-//! Beside the host stand what it only adds to and any page reads: the last frames of the bus, raw and put into words when asked
-//! for, and a timeline of what has happened to the drives.
+//! The host appends to two logs that any page may read: the last frames of the bus, raw and decoded on request,
+//! and a timeline of the drives.
 //!
 //! Not done here: opening a bus and a port, and running the two (`ferrodrive studio`).
 

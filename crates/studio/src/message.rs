@@ -1,7 +1,7 @@
-//! What a page may say, as JSON: one object a message, `{"seq":7,"session":"..","do":"enable","node":4}`.
+//! The messages of a page, as JSON: one object per message, `{"seq":7,"session":"..","do":"enable","node":4}`.
 //!
-//! `seq` rises from message to message, and `session` is the word that the page was welcomed with: a message that is sent
-//! again, or to another session, is refused. Units stand in the names: `rpm`, `degrees`, `amperes`, `rpm_per_s`.
+//! `seq` rises from message to message, and `session` is the word of the welcome message: a message that is sent
+//! again, or to another session, is refused. Units are in the names: `rpm`, `degrees`, `amperes`, `rpm_per_s`.
 
 use canopen::NodeId;
 use master::base::Twist;
@@ -11,21 +11,21 @@ use serde_json::Value;
 /// A message of a page.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Message {
-    /// Above those before.
+    /// Sequence number, above all before.
     pub(crate) seq: u64,
-    /// The word that the session was welcomed with.
+    /// The session word of the welcome message.
     pub(crate) word: String,
-    /// What is to be done.
+    /// The command.
     pub(crate) command: Command,
 }
 
-/// What a page may ask for.
+/// A command of a page.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Command {
-    /// The page is there; whoever has moved something says so at least every [`crate::PRESENCE_SPAN`].
+    /// Shows that the page is there; required at least every [`crate::PRESENCE_SPAN`] from a page that moves something.
     Alive {},
-    /// Takes control where nobody has it.
+    /// Takes control if no session has it.
     TakeControl {},
     /// Asks for control.
     AskControl {},
@@ -34,9 +34,9 @@ pub(crate) enum Command {
         /// Its number.
         to: u64,
     },
-    /// Gives control up.
+    /// Releases control.
     ReleaseControl {},
-    /// Limits the speed of what this session asks for, in r/min; `null` takes the limit away. What it has in motion is stopped by a
+    /// Limits the speed of the motions of this session, in r/min; `null` removes the limit. Motions under way are stopped by a
     /// limit that is lower than before.
     LimitSpeed {
         /// Above 0.
@@ -44,15 +44,15 @@ pub(crate) enum Command {
     },
     /// Quick-stops every drive. Open to all.
     StopAll {},
-    /// Looks who is on the bus.
+    /// Scans the bus for nodes.
     Scan {},
-    /// What can be done to the world around virtual drives.
+    /// Lists the commands to the world around virtual drives.
     WorldForms {},
-    /// How everything around virtual drives truly is, and what was done after the change of this number.
+    /// Reads the true state of the world around virtual drives, and the changes after the one with this number.
     LookAround { after: Option<u64> },
-    /// Does something to the world around virtual drives, in the words of `ferrodrive sim`.
+    /// Changes the world around virtual drives, by a command of `ferrodrive sim`.
     ChangeWorld { line: String },
-    /// Says what keeps a drive from moving.
+    /// Explains what keeps a drive from moving.
     Explain {
         #[serde(deserialize_with = "node")]
         node: NodeId,
@@ -82,7 +82,7 @@ pub(crate) enum Command {
         #[serde(deserialize_with = "node")]
         node: NodeId,
     },
-    /// Moves of this drive may begin, although nothing stops it when this program dies. Holds until control changes hands.
+    /// Allows motions of this drive although nothing stops it when this program dies. Holds until control changes hands.
     AcceptUnguarded {
         #[serde(deserialize_with = "node")]
         node: NodeId,
@@ -98,12 +98,12 @@ pub(crate) enum Command {
         #[serde(deserialize_with = "node")]
         node: NodeId,
     },
-    /// Lets a jog go: the drive stops by its ramp.
+    /// Ends a jog: the drive stops with its ramp.
     JogEnd {
         #[serde(deserialize_with = "node")]
         node: NodeId,
     },
-    /// Turns at a speed until told otherwise.
+    /// Turns at a speed until the next command.
     Velocity {
         #[serde(deserialize_with = "node")]
         node: NodeId,
@@ -119,7 +119,7 @@ pub(crate) enum Command {
         relative: bool,
         rpm: Option<f64>,
     },
-    /// Pushes with a current until told otherwise.
+    /// Applies a motor current until the next command.
     Torque {
         #[serde(deserialize_with = "node")]
         node: NodeId,
@@ -132,7 +132,7 @@ pub(crate) enum Command {
         method: i8,
         rpm: Option<f64>,
     },
-    /// What something means that the page shows.
+    /// Explains a term that the page shows.
     Help { node: Option<u8>, topic: Topic, name: String },
     /// Turns several drives to positions, or by angles, together.
     GroupMove(GroupMove),
@@ -144,25 +144,25 @@ pub(crate) enum Command {
     BaseTwist { linear_m_s: f64, angular_rad_s: f64 },
     /// Holds a group; at least every 100 ms.
     GroupHold {},
-    /// Lets a group go: it comes to rest within its limits.
+    /// Ends a group: it comes to rest within its limits.
     GroupEnd {},
-    /// Which homing methods a drive has and what each does, how it is set, what its switches are now.
+    /// Reads the homing methods of a drive, its homing settings and the present levels of its switches.
     Homing {
         #[serde(deserialize_with = "node")]
         node: NodeId,
     },
-    /// What the description says of each object of a drive.
+    /// Lists the objects in the description of a drive.
     Objects {
         #[serde(deserialize_with = "node")]
         node: NodeId,
     },
-    /// The values that objects have now.
+    /// Reads the present values of objects.
     ReadObjects {
         #[serde(deserialize_with = "node")]
         node: NodeId,
         objects: Vec<String>,
     },
-    /// What would be written, with nothing written: of values, or of a file.
+    /// Plans the writes for values or a file, without writing.
     PlanParameters {
         #[serde(deserialize_with = "node")]
         node: NodeId,
@@ -170,7 +170,7 @@ pub(crate) enum Command {
         values: Vec<NewValue>,
         file: Option<String>,
     },
-    /// The objects of a file: as delivered, in the file, in the drive.
+    /// Compares the objects of a file: default, file, drive.
     CompareParameters {
         #[serde(deserialize_with = "node")]
         node: NodeId,
@@ -184,44 +184,44 @@ pub(crate) enum Command {
         values: Vec<NewValue>,
         file: Option<String>,
     },
-    /// Puts back what the last write changed.
+    /// Undoes the last write.
     RollBack {
         #[serde(deserialize_with = "node")]
         node: NodeId,
     },
-    /// Has a drive store its parameters.
+    /// Makes a drive store its parameters.
     Store {
         #[serde(deserialize_with = "node")]
         node: NodeId,
     },
-    /// How the PDOs of a node are set up, what may be changed, and what keeps one away.
+    /// Reads the configuration of the PDOs of a node, what may be changed, and why one is not sent.
     Pdos {
         #[serde(deserialize_with = "node")]
         node: NodeId,
     },
-    /// What setting PDOs up would write and do to the bus, with nothing written.
+    /// Plans a configuration of PDOs, with its effect on the bus, without writing.
     PlanPdos {
         #[serde(deserialize_with = "node")]
         node: NodeId,
         pdos: Vec<NewPdo>,
-        /// Period of SYNC that the load is told for.
+        /// Period of SYNC for which the load is computed.
         cycle_ms: f64,
-        /// In bit/s, where the studio does not know it.
+        /// In bit/s, if the studio does not know it.
         bitrate: Option<u32>,
     },
-    /// Sets PDOs up, all or nothing.
+    /// Configures PDOs, all or nothing.
     WritePdos {
         #[serde(deserialize_with = "node")]
         node: NodeId,
         pdos: Vec<NewPdo>,
     },
-    /// Starts a node, or takes it out of operational: PDOs exist there alone (CiA 301, 7.3.2.2).
+    /// Starts a node, or takes it out of operational: PDOs exist only there (CiA 301, 7.3.2.2).
     Nmt {
         #[serde(deserialize_with = "node")]
         node: NodeId,
         command: NmtWish,
     },
-    /// All parameters of a drive, as a file.
+    /// Reads all parameters of a drive, as a file.
     BackUp {
         #[serde(deserialize_with = "node")]
         node: NodeId,
@@ -230,7 +230,7 @@ pub(crate) enum Command {
     },
 }
 
-/// What a file of parameters is written as.
+/// The format of a parameter file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum FileForm {
@@ -241,7 +241,7 @@ pub(crate) enum FileForm {
     Dcf,
 }
 
-/// What an object is to be set to, as people type it: `{"object":"6083","value":"600"}`.
+/// A new value of an object, as people type it: `{"object":"6083","value":"600"}`.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct NewValue {
@@ -249,7 +249,7 @@ pub(crate) struct NewValue {
     pub(crate) value: String,
 }
 
-/// How a PDO is to be set up; what is not named stays as it is:
+/// A configuration of a PDO; omitted fields stay as they are:
 /// `{"pdo":"TPDO1","valid":true,"objects":[{"object":"6041h:00","bits":16}],"transmission":255,"event_ms":100}`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -260,7 +260,7 @@ pub(crate) struct NewPdo {
     pub(crate) transmission: Option<u8>,
     pub(crate) inhibit_ms: Option<f64>,
     pub(crate) event_ms: Option<f64>,
-    /// Its identifier.
+    /// Its CAN-ID.
     pub(crate) id: Option<u16>,
 }
 
@@ -282,7 +282,7 @@ pub(crate) enum NmtWish {
     PreOperational,
 }
 
-/// What something is that a page asks the meaning of.
+/// The kind of a term to be explained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Topic {
@@ -298,13 +298,13 @@ pub(crate) enum Topic {
     Mode,
     /// An NMT state.
     Nmt,
-    /// What a frame belongs to, or what kind of thing has happened.
+    /// A service of CANopen, or a kind of timeline entry.
     Service,
     /// A fault or an alarm, by its name.
     Fault,
 }
 
-/// Where several drives are to go.
+/// Targets of several drives.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GroupMove {
@@ -314,11 +314,11 @@ pub(crate) struct GroupMove {
     /// The highest speed of each.
     pub(crate) rpm: Option<f64>,
     pub(crate) rpm_per_s: Option<f64>,
-    /// How long it is to take, instead of the shortest time.
+    /// Duration of the motion, instead of the shortest possible.
     pub(crate) within_s: Option<f64>,
 }
 
-/// Where a drive of a group is to go.
+/// The target of a drive of a group.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct AxisTarget {
@@ -327,7 +327,7 @@ pub(crate) struct AxisTarget {
     pub(crate) degrees: f64,
 }
 
-/// How fast a drive of a group is to turn.
+/// The speed of a drive of a group.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct AxisSpeed {
@@ -336,7 +336,7 @@ pub(crate) struct AxisSpeed {
     pub(crate) rpm: f64,
 }
 
-/// A base on two wheels and how it is to move.
+/// A two-wheeled base and its motion.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BaseJog {
@@ -347,7 +347,7 @@ pub(crate) struct BaseJog {
     pub(crate) turns: [f64; 2],
     pub(crate) wheel_base_m: f64,
     pub(crate) wheel_radius_m: f64,
-    /// The highest speed of a wheel over the ground, and how fast it may change.
+    /// The highest speed of a wheel over the ground, and its highest acceleration.
     pub(crate) most_m_s: f64,
     pub(crate) m_per_s2: f64,
     pub(crate) linear_m_s: f64,
@@ -355,14 +355,14 @@ pub(crate) struct BaseJog {
 }
 
 impl BaseJog {
-    /// How it is to move.
+    /// Its motion.
     pub(crate) const fn twist(&self) -> Twist {
         Twist { linear_m_s: self.linear_m_s, angular_rad_s: self.angular_rad_s }
     }
 }
 
 impl Command {
-    /// Whether only the session that has control may ask for it.
+    /// Whether it needs control.
     pub(crate) const fn needs_control(&self) -> bool {
         !matches!(
             self,
@@ -391,17 +391,17 @@ impl Command {
     }
 }
 
-/// A message that makes no sense.
+/// A malformed message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Malformed {
-    /// Its number, if that could be read.
+    /// Its number, if readable.
     pub(crate) seq: Option<u64>,
     /// What is wrong with it.
     pub(crate) why: String,
 }
 
 impl Message {
-    /// Reads a message.
+    /// Parses a message.
     pub(crate) fn parse(text: &str) -> Result<Self, Malformed> {
         let malformed = |seq, why: String| Malformed { seq, why };
         let value: Value = serde_json::from_str(text).map_err(|error| malformed(None, error.to_string()))?;
@@ -410,11 +410,11 @@ impl Message {
         };
         let seq = fields.remove("seq").and_then(|seq| seq.as_u64()).filter(|seq| *seq > 0);
         let Some(seq) = seq else {
-            return Err(malformed(None, "expected a whole number above 0 as seq".into()));
+            return Err(malformed(None, "expected seq to be a whole number above 0".into()));
         };
         let word = match fields.remove("session") {
             Some(Value::String(word)) => word,
-            _ => return Err(malformed(Some(seq), "expected as session the word of the welcome message".into())),
+            _ => return Err(malformed(Some(seq), "expected session to be the word of the welcome message".into())),
         };
         let command = serde_json::from_value(Value::Object(fields));
         let command = command.map_err(|error| malformed(Some(seq), error.to_string()))?;
@@ -424,13 +424,13 @@ impl Message {
 
 fn node<'de, D: Deserializer<'de>>(deserializer: D) -> Result<NodeId, D::Error> {
     let raw = u8::deserialize(deserializer)?;
-    NodeId::new(raw).ok_or_else(|| serde::de::Error::custom(format!("expected a node-ID from 1 to 127, not {raw}")))
+    NodeId::new(raw).ok_or_else(|| serde::de::Error::custom(format!("expected a node-ID from 1 to 127, got {raw}")))
 }
 
 fn nodes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[NodeId; 2], D::Error> {
     let raw = <[u8; 2]>::deserialize(deserializer)?;
     let known = |raw: u8| {
-        NodeId::new(raw).ok_or_else(|| serde::de::Error::custom(format!("expected node-IDs from 1 to 127, not {raw}")))
+        NodeId::new(raw).ok_or_else(|| serde::de::Error::custom(format!("expected node-IDs from 1 to 127, got {raw}")))
     };
     Ok([known(raw[0])?, known(raw[1])?])
 }
@@ -443,20 +443,20 @@ pub(crate) struct Answer {
     /// The number of the message; `null` if it could not be read.
     seq: Option<u64>,
     ok: bool,
-    /// What to know about it, in words.
+    /// Remarks, in words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     notes: Vec<String>,
-    /// What was asked for, where something was.
+    /// The result, for commands that have one.
     #[serde(skip_serializing_if = "Option::is_none")]
     result: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<Box<Trouble>>,
 }
 
-/// Why something was not done.
+/// Why a command was refused or failed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct Trouble {
-    /// In a word that programs may rely on.
+    /// A stable word for programs.
     pub(crate) kind: &'static str,
     /// In words.
     pub(crate) message: String,
@@ -465,29 +465,29 @@ pub(crate) struct Trouble {
 impl Answer {
     const KIND: &'static str = "answer";
 
-    /// It is done.
+    /// Success without a result.
     pub(crate) const fn done(seq: u64, notes: Vec<String>) -> Self {
         Self { kind: Self::KIND, seq: Some(seq), ok: true, notes, result: None, error: None }
     }
 
-    /// It is known.
+    /// Success with a result.
     pub(crate) const fn known(seq: u64, result: Value) -> Self {
         Self { kind: Self::KIND, seq: Some(seq), ok: true, notes: Vec::new(), result: Some(result), error: None }
     }
 
-    /// It is not done.
+    /// A refusal or failure.
     pub(crate) fn failed(seq: Option<u64>, kind: &'static str, message: impl Into<String>) -> Self {
         let error = Some(Box::new(Trouble { kind, message: message.into() }));
         Self { kind: Self::KIND, seq, ok: false, notes: Vec::new(), result: None, error }
     }
 
-    /// Whether it is done.
+    /// Whether it succeeded.
     #[cfg(test)]
     pub(crate) const fn is_ok(&self) -> bool {
         self.ok
     }
 
-    /// Why not, in a word; empty if it is done.
+    /// The word of the error; empty on success.
     #[cfg(test)]
     pub(crate) fn error_kind(&self) -> &'static str {
         self.error.as_ref().map_or("", |error| error.kind)
@@ -495,7 +495,7 @@ impl Answer {
 
     /// As JSON.
     pub(crate) fn json(&self) -> String {
-        // Strings, numbers and flags alone: there is nothing in it that JSON cannot say.
+        // Only strings, numbers and flags: serialising cannot fail.
         serde_json::to_string(self).unwrap_or_default()
     }
 }

@@ -1,6 +1,6 @@
-//! What a page is shown, as JSON: the bus, its nodes, and what each drive says of itself.
+//! The state that is sent to pages, as JSON: the bus, its nodes, and the values of each drive.
 //!
-//! Units stand in the names. What a device does not have or has not told is `null`.
+//! Units are in the names. Values that a device does not have or has not sent are `null`.
 
 use cia402::{Controlword, PowerEvent, PowerState, next_command, transition};
 use devices::PowerStyle;
@@ -17,7 +17,7 @@ use crate::authority::SessionId;
 pub(crate) struct Snapshot<'a> {
     #[serde(rename = "type")]
     pub(crate) kind: &'static str,
-    /// Counts the pictures; a gap is what a slow reader missed.
+    /// Counts the states; a gap shows how many a slow reader missed.
     pub(crate) number: u64,
     /// Time of the bus.
     pub(crate) time_s: f64,
@@ -25,17 +25,17 @@ pub(crate) struct Snapshot<'a> {
     /// A scan is under way.
     pub(crate) scanning: bool,
     pub(crate) sessions: usize,
-    /// Who may move drives.
+    /// The session that has control.
     pub(crate) controller: Option<SessionId>,
-    /// Who asked for that last.
+    /// The session that asked for it last.
     pub(crate) asking: Option<SessionId>,
-    /// The highest speed that whoever has control may ask for; `null` without a limit.
+    /// The speed limit of the session that has control, in r/min; `null` without a limit.
     pub(crate) speed_limit_rpm: Option<f64>,
     /// Rises when there is something new at `/api/faults`.
     pub(crate) happenings: u64,
-    /// How often the trace was saved since the studio began.
+    /// How often the trace was saved since the studio started.
     pub(crate) logs_saved: u64,
-    /// How much was done to the world around virtual drives.
+    /// Number of changes to the world around virtual drives.
     pub(crate) changes: u64,
     pub(crate) nodes: Vec<NodeView<'a>>,
 }
@@ -46,9 +46,9 @@ pub(crate) struct BusView<'a> {
     pub(crate) name: &'a str,
     pub(crate) bitrate: Option<u32>,
     pub(crate) frames_per_s: u32,
-    /// Part of the time that frames take; `null` where the bit rate is not known.
+    /// Bus load in per cent; `null` where the bit rate is unknown.
     pub(crate) load_percent: Option<f64>,
-    /// What the controller and the connection say.
+    /// Health as reported by the controller and the connection.
     pub(crate) health: Health,
 }
 
@@ -58,7 +58,7 @@ pub(crate) struct NodeView<'a> {
     pub(crate) node: u8,
     pub(crate) model: Option<&'a str>,
     pub(crate) title: Option<&'a str>,
-    /// What cannot be told of its model.
+    /// What is uncertain about its model.
     pub(crate) remark: Option<&'a str>,
     pub(crate) device_type: Option<u32>,
     pub(crate) vendor_id: Option<u32>,
@@ -66,27 +66,27 @@ pub(crate) struct NodeView<'a> {
     pub(crate) revision_number: Option<u32>,
     pub(crate) nmt: Option<String>,
     pub(crate) heartbeat_age_ms: Option<u64>,
-    /// Why nothing is known of it now.
+    /// Why its values are unknown now.
     pub(crate) trouble: Option<&'a str>,
-    /// What is being done with it.
+    /// The command in progress.
     pub(crate) doing: Option<&'static str>,
     /// This studio has set it in motion.
     pub(crate) moving: bool,
-    /// It was told to stop and has not been seen to stand since: it may still be moving.
+    /// A stop was commanded and it has not been seen at rest since: it may still be moving.
     pub(crate) stop_unseen: bool,
-    /// Writes of parameters that can be put back.
+    /// Writes of parameters that can be rolled back.
     pub(crate) can_roll_back: usize,
-    /// How often it has stored its parameters since the studio began.
+    /// How often it has stored its parameters since the studio started.
     pub(crate) stored: u32,
-    /// How often its PDOs were set up since the studio began.
+    /// How often its PDOs were configured since the studio started.
     pub(crate) mapped: u32,
-    /// What it does when this program dies; `null` where that is not known yet.
+    /// What it does when this program dies; `null` where that is not yet known.
     pub(crate) without_us: Option<String>,
-    /// Nothing stops it then: it goes on as it was told.
+    /// Nothing stops it then: it keeps moving.
     pub(crate) goes_on: bool,
-    /// Whoever has control has accepted that it goes on then.
+    /// The session that has control has accepted that it keeps moving then.
     pub(crate) accepted: bool,
-    /// Of a drive.
+    /// Present if the node is a drive.
     pub(crate) drive: Option<&'a DriveView>,
 }
 
@@ -96,7 +96,7 @@ pub(crate) struct DriveView {
     /// When it was read, in the time of the bus.
     pub(crate) at_s: f64,
     pub(crate) state: Option<&'static str>,
-    /// It has the power state machine of CiA 402; else its state is the one that comes closest.
+    /// It has the power state machine of CiA 402; else its state is the closest one.
     pub(crate) has_state_machine: bool,
     pub(crate) statusword: u16,
     /// Its bits that are set, in words.
@@ -132,7 +132,7 @@ pub(crate) struct FaultView {
     pub(crate) remedy: &'static str,
 }
 
-/// Bits of the controlword that mean the same in all modes (CiA 402-2, 8.4.1).
+/// Bits of the controlword with the same meaning in all modes (CiA 402-2, 8.4.1).
 pub(crate) const CONTROL_BITS: [(u16, &str); 6] = [
     (Controlword::SWITCH_ON, "switch on"),
     (Controlword::ENABLE_VOLTAGE, "enable voltage"),
@@ -143,7 +143,7 @@ pub(crate) const CONTROL_BITS: [(u16, &str); 6] = [
 ];
 
 impl DriveView {
-    /// What a drive said, with its controlword if it tells that.
+    /// The values read from a drive, with its controlword if it can be read.
     pub(crate) fn new(state: &DriveState, controlword: Option<u16>, at_s: f64) -> Self {
         let faults = state.faults.iter().map(|FaultRow { name, remedy, .. }| FaultView { name, remedy });
         let control_bits = CONTROL_BITS.iter().filter(|(mask, _)| controlword.is_some_and(|word| word & mask != 0));
@@ -179,7 +179,7 @@ fn way(style: PowerStyle, mut state: PowerState) -> Vec<Step> {
         return if state == enabled { Vec::new() } else { vec![step] };
     }
     let mut steps = Vec::new();
-    // No way is longer than there are states.
+    // The path is never longer than the number of states.
     while let Some(command) = next_command(state).filter(|_| steps.len() < PowerState::ALL.len()) {
         let Some(arrow) = transition(state, PowerEvent::Command(command)) else { break };
         state = arrow.to;
@@ -205,6 +205,6 @@ mod tests {
         assert_eq!(way(PowerStyle::Cia402, PowerState::Fault), from_fault);
         assert_eq!(way(PowerStyle::Cia402, PowerState::SwitchOnDisabled), from_fault[1..]);
         assert_eq!(way(PowerStyle::Cia402, PowerState::OperationEnabled), []);
-        assert_eq!(way(PowerStyle::Cia402, PowerState::NotReadyToSwitchOn), [], "it goes on by itself");
+        assert_eq!(way(PowerStyle::Cia402, PowerState::NotReadyToSwitchOn), [], "it leaves this state by itself");
     }
 }

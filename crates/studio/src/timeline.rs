@@ -1,6 +1,6 @@
-//! What has happened to the drives, with what it means and what to do about it. Kept whether a page is open or not.
+//! What has happened to the drives, with causes and remedies. Kept whether a page is open or not.
 //!
-//! Bounded: the newest are kept, and the same emergency message that comes again and again is one of them with a count.
+//! Bounded: the newest are kept, and a repeated emergency message is one entry with a count.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -9,10 +9,10 @@ use can::Instant;
 use canopen::NodeId;
 use serde::Serialize;
 
-/// How many are kept.
+/// Number of entries kept.
 const KEPT: usize = 1_000;
 
-/// What kind of thing happened.
+/// The kind of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Kind {
@@ -20,18 +20,18 @@ pub(crate) enum Kind {
     Emcy,
     /// The drive's fault object (603Fh, of some 260Eh) has a fault.
     Fault,
-    /// A node is not heard any more: its heartbeat or its answers stay away.
+    /// A node is silent: its heartbeat or its answers are missing.
     Silent,
-    /// Another power state (CiA 402-2, 8.2).
+    /// A change of the power state (CiA 402-2, 8.2).
     State,
-    /// A boot-up, or another NMT state.
+    /// A boot-up, or a change of the NMT state.
     Nmt,
     /// This studio stopped it.
     Stop,
 }
 
 impl Kind {
-    /// It lasts until something says that it is over.
+    /// It lasts until its end is reported.
     const fn lasts(self) -> bool {
         matches!(self, Self::Emcy | Self::Fault | Self::Silent)
     }
@@ -45,29 +45,29 @@ pub(crate) struct TimelineEvent {
     pub(crate) kind: Kind,
     /// In words.
     pub(crate) what: String,
-    /// As the drive tells it.
+    /// The code that the drive reports.
     pub(crate) code: Option<u16>,
-    /// What may cause it and what to do about it.
+    /// Possible causes and remedies.
     pub(crate) remedy: Option<&'static str>,
-    /// Where that is written: document and section.
+    /// Source of these: document and section.
     pub(crate) source: Option<String>,
 }
 
 impl TimelineEvent {
-    /// Something that explains itself.
+    /// An event that needs no explanation.
     pub(crate) fn new(at: Instant, node: NodeId, kind: Kind, what: impl Into<String>) -> Self {
         Self { at, node, kind, what: what.into(), code: None, remedy: None, source: None }
     }
 }
 
-/// A event as it is shown.
+/// An event as it is shown.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Entry {
     /// Numbers them from 0.
     number: u64,
     #[serde(skip)]
     revision: u64,
-    /// In the time of the bus: when it came, when it came last, and when it was over.
+    /// In bus time: when it first came, when it last came, and when it ended.
     at_s: f64,
     last_s: f64,
     gone_s: Option<f64>,
@@ -81,7 +81,7 @@ pub(crate) struct Entry {
     source: Option<String>,
 }
 
-/// The happenings so far. A cheap look, made by any thread.
+/// The events so far. Cheap to clone and to read from any thread.
 #[derive(Debug, Default)]
 pub(crate) struct Timeline {
     kept: Mutex<Kept>,
@@ -94,24 +94,24 @@ struct Kept {
     revision: u64,
 }
 
-/// What is new since a revision.
+/// The changes since a revision.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct News {
-    /// To ask on from.
+    /// The revision to continue from.
     revision: u64,
-    /// Number of the oldest that is kept: those before it are gone.
+    /// Number of the oldest kept event.
     oldest: u64,
     /// New or changed, oldest first.
     entries: Vec<Entry>,
 }
 
 impl Timeline {
-    /// Something happens. What goes on already is not told again; an emergency message is counted.
+    /// Adds an event. One that lasts already is not repeated; an emergency message is counted.
     pub(crate) fn push(&self, event: TimelineEvent) {
         self.lock().push(event);
     }
 
-    /// Things of this kind are over on a node, but for those with these codes.
+    /// Ends the events of this kind on a node, except those with these codes.
     pub(crate) fn end_but(&self, at: Instant, node: NodeId, kind: Kind, codes: &[Option<u16>]) {
         self.lock().end_but(seconds(at), node, kind, codes);
     }
@@ -121,7 +121,7 @@ impl Timeline {
         self.lock().revision
     }
 
-    /// What has come or changed since a revision; everything since 0.
+    /// New and changed events since a revision; everything since 0.
     pub(crate) fn since(&self, revision: u64) -> News {
         let kept = self.lock();
         let entries = kept.entries.iter().filter(|entry| entry.revision > revision).cloned().collect();
@@ -130,7 +130,7 @@ impl Timeline {
     }
 
     fn lock(&self) -> MutexGuard<'_, Kept> {
-        // Nothing is half done between two happenings, whoever panicked.
+        // Events are added whole: a panic elsewhere leaves the list consistent.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -213,11 +213,11 @@ mod tests {
         let node = NodeId::new(4).expect("a node-ID");
         timeline.end_but(Instant::from_secs(5), node, Kind::Emcy, &[Some(2)]);
         timeline.push(emcy(6, 4, 1));
-        let told: Vec<_> =
+        let shown: Vec<_> =
             timeline.since(0).entries.iter().map(|entry| (entry.node, entry.code, entry.count, entry.gone_s)).collect();
         let expected =
             [(4, Some(1), 3, Some(5.0)), (2, Some(1), 1, None), (4, Some(2), 1, None), (4, Some(1), 1, None)];
-        assert_eq!(told, expected);
+        assert_eq!(shown, expected);
     }
 
     #[test]

@@ -1,14 +1,14 @@
-//! What the controller and the connection say of the bus beside frames: whoever runs the bus puts it down here, the host shows it.
+//! Bus health beside frames, as reported by the controller and the connection: the run loop of the bus records it here, the host shows it.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::Serialize;
 
-/// News that wait for the host; older ones are forgotten.
+/// News queued for the host; older ones are dropped.
 const NEWS: usize = 64;
 
-/// A handle on both.
+/// A handle to health and news.
 #[derive(Clone, Debug, Default)]
 pub struct Wire(Arc<Mutex<Inner>>);
 
@@ -18,14 +18,14 @@ struct Inner {
     news: VecDeque<String>,
 }
 
-/// How the bus is, as far as it tells.
+/// Health of the bus, as far as it is reported.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Health {
-    /// Fault confinement of the controller (ISO 11898-1): `error-active`, `bus-off`; `None` where nothing was told.
+    /// Fault confinement of the controller (ISO 11898-1): `error-active`, `bus-off`; `None` where it was not reported.
     pub state: Option<&'static str>,
-    /// Its transmit error inbox.
+    /// Its transmit error counter.
     pub transmit_errors: Option<u16>,
-    /// Its receive error inbox.
+    /// Its receive error counter.
     pub receive_errors: Option<u16>,
     /// Error frames so far.
     pub error_frames: u64,
@@ -34,12 +34,12 @@ pub struct Health {
 }
 
 impl Wire {
-    /// Puts down what has changed.
+    /// Records the present health.
     pub fn update(&self, change: impl FnOnce(&mut Health)) {
         change(&mut self.lock().health);
     }
 
-    /// Something that every page is told.
+    /// Adds news for every page.
     pub fn tell(&self, text: &str) {
         let news = &mut self.lock().news;
         news.push_back(text.to_owned());
@@ -57,7 +57,7 @@ impl Wire {
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
-        // Nothing is half done, whoever panicked.
+        // Values are replaced whole: a panic elsewhere leaves them consistent.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,56 +1,56 @@
-//! The world around virtual drives: what is asked of whoever moves it, who answers between two of its steps.
+//! The world around virtual drives: requests to its run loop, which answers between two steps.
 //!
-//! Bounded: a question that finds no room is refused. One that nobody answers any more ends with the world.
+//! Bounded: a request that finds no room is refused. Unanswered ones end with the world.
 
 use serde_json::Value;
 use tokio::sync::{mpsc, oneshot};
 
-/// Questions that may wait; they are answered each millisecond.
+/// Queued requests; they are answered every millisecond.
 const MOST_WAITING: usize = 64;
 
-/// The world around virtual drives, as a host sees it: in words and values.
+/// The world around virtual drives, as a host sees it: command lines and values.
 pub trait Around {
-    /// Every form of a line that changes something.
+    /// The usage text of every command.
     fn forms(&self) -> Vec<&'static str>;
 
-    /// Every drive as it truly is, in `nodes`, and the names of the machines that several of them move, in `bodies`.
+    /// Every drive as it truly is, in `nodes`, and the names of the bodies that several drives move, in `bodies`.
     fn look(&mut self) -> Value;
 
-    /// Does what a line says.
+    /// Executes a command line.
     ///
     /// # Errors
-    /// Why not, in a word that programs may rely on, and in words; nothing is changed then.
+    /// A stable word for programs, and the reason; nothing is changed then.
     fn change(&mut self, line: &str) -> Result<Changed, (&'static str, String)>;
 }
 
-/// What a line has done.
+/// The result of a command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Changed {
-    /// The node that it is about, by the number under which it was added.
+    /// The node concerned, by the number under which it was added.
     pub node: Option<u8>,
-    /// The line as it was understood.
+    /// The command in its normal form.
     pub line: String,
-    /// What takes it back, where that does not depend on what was before.
+    /// The command that undoes it, if that does not depend on the state before.
     pub back: Option<String>,
-    /// What will come of it, where a person may not expect it.
+    /// Consequences that a person may not expect.
     pub note: Option<String>,
 }
 
-/// Where the host asks.
+/// The host's end.
 #[derive(Clone, Debug)]
 pub struct WorldDoor(mpsc::Sender<Ask>);
 
-/// What has been asked, for whoever moves the world.
+/// The end of the world's run loop.
 #[derive(Debug)]
 pub struct WorldAsks(mpsc::Receiver<Ask>);
 
-/// A way to ask a world, and what is asked.
+/// Both ends of the channel to a world.
 pub fn world_door() -> (WorldDoor, WorldAsks) {
     let (asks, asked) = mpsc::channel(MOST_WAITING);
     (WorldDoor(asks), WorldAsks(asked))
 }
 
-/// A question, and who waits for its answer.
+/// A request, and the sender of its answer.
 #[derive(Debug)]
 enum Ask {
     Forms(oneshot::Sender<Vec<&'static str>>),
@@ -58,22 +58,22 @@ enum Ask {
     Change(String, oneshot::Sender<Result<Changed, (&'static str, String)>>),
 }
 
-/// There is no world any more, or too much is asked of it.
+/// The world has ended, or too many requests are queued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NoAnswer;
 
 impl WorldDoor {
-    /// What may be said.
+    /// The usage texts.
     pub(crate) fn forms(&self) -> impl Future<Output = Result<Vec<&'static str>, NoAnswer>> + use<> {
         self.ask(Ask::Forms)
     }
 
-    /// How everything is.
+    /// The true state of everything.
     pub(crate) fn look(&self) -> impl Future<Output = Result<Value, NoAnswer>> + use<> {
         self.ask(Ask::Look)
     }
 
-    /// Does what a line says, whether or not somebody waits for the answer.
+    /// Executes a command line, whether or not the answer is awaited.
     pub(crate) fn change(
         &self,
         line: String,
@@ -95,12 +95,12 @@ impl WorldDoor {
 }
 
 impl WorldAsks {
-    /// Waits for a question in a thread that may wait, and answers it; false when nobody will ask any more.
+    /// Waits for a request (blocks the thread) and answers it; false when no host is left.
     pub fn answer_next(&mut self, around: &mut impl Around) -> bool {
         self.0.blocking_recv().map(|ask| ask.answer(around)).is_some()
     }
 
-    /// Answers what has been asked since.
+    /// Answers the queued requests.
     pub fn answer(&mut self, around: &mut impl Around) {
         while let Ok(ask) = self.0.try_recv() {
             ask.answer(around);
@@ -110,7 +110,7 @@ impl WorldAsks {
 
 impl Ask {
     fn answer(self, around: &mut impl Around) {
-        // Who asked may have gone.
+        // The requester may have gone.
         match self {
             Self::Forms(answer) => drop(answer.send(around.forms())),
             Self::Look(answer) => drop(answer.send(around.look())),

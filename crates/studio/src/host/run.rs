@@ -135,6 +135,6 @@ impl Host {
         // Names, numbers and lists alone: there is nothing in it that JSON cannot say.
         let json = serde_json::to_string(&snapshot).unwrap_or_default();
         // Somebody may look or nobody.
-        let _ = self.inbox.pictures.send(StateUpdate { number: self.pictures, json: json.into() });
+        let _ = self.inbox.states.send(StateUpdate { number: self.pictures, json: json.into() });
     }
 }

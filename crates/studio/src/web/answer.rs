@@ -5,7 +5,7 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
-/// Why a request is not done.
+/// Why a request is refused.
 pub(super) fn trouble(status: StatusCode, kind: &str, message: &str) -> Response {
     let body = json!({ "ok": false, "error": { "kind": kind, "message": message } });
     (status, json_text(body.to_string())).into_response()

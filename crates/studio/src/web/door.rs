@@ -1,7 +1,7 @@
-//! The door: connections of those who have shown no pass (the cookie, the token) are few, and none of them stays.
+//! Limits unauthenticated connections (without the cookie or the token) in number and time.
 //!
-//! A connection counts as a stranger's until a request on it has shown a pass. Strangers that say nothing, or half a header, keep
-//! neither places nor file descriptors from those who have one: a further stranger takes the place of the one that has been there
+//! A connection counts as a stranger's until a request on it was authenticated. Strangers that send nothing, or half a header, keep
+//! neither places nor file descriptors from authenticated clients: a further stranger takes the place of the one that has been connected
 //! for the longest, and each has [`PATIENCE`].
 
 use std::collections::VecDeque;
@@ -22,25 +22,25 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::oneshot;
 use tokio::time::Sleep;
 
-/// How long a stranger's connection may last: a request with its answer.
+/// How long a stranger's connection may last: one request and its answer.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Connections of strangers at once: a browser opens six.
 const MOST_STRANGERS: usize = 64;
 
-/// Pause after a failed accept (out of file descriptors): the connections that are there go on.
+/// Pause after a failed accept (out of file descriptors); existing connections are still served.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Serves `app` at `listener` until the future is dropped.
 ///
 /// # Errors
-/// What the listener says.
+/// Errors of the listener.
 pub async fn serve(listener: TcpListener, app: Router) -> io::Result<()> {
     let door = Door { listener, strangers: Strangers::default() };
     axum::serve(door, app.into_make_service_with_connect_info::<Visitor>()).await
 }
 
-/// Who is at the other end of a connection.
+/// The client at the other end of a connection.
 #[derive(Clone, Debug)]
 pub(super) struct Visitor(Arc<Inner>);
 
@@ -55,12 +55,12 @@ impl Visitor {
         Self(Arc::new(Inner { address, known: AtomicBool::new(false) }))
     }
 
-    /// Whose request this is, where it came over a connection.
+    /// The visitor of this request, if it came over a connection.
     pub(super) fn of(request: &Request) -> Option<&Self> {
         request.extensions().get::<ConnectInfo<Self>>().map(|ConnectInfo(visitor)| visitor)
     }
 
-    /// Where it comes from: of IPv6 the network, since a host there has as many addresses as it likes.
+    /// Its address; for IPv6 the /64 network, since one host has a whole network of addresses.
     pub(super) fn origin(visitor: Option<&Self>) -> IpAddr {
         match visitor.map(|visitor| visitor.0.address.ip().to_canonical()) {
             Some(IpAddr::V6(address)) => IpAddr::V6((address.to_bits() >> 64 << 64).into()),
@@ -69,7 +69,7 @@ impl Visitor {
         }
     }
 
-    /// It has shown a pass.
+    /// It is authenticated.
     pub(super) fn admit(&self) {
         self.0.known.store(true, Ordering::Relaxed);
     }
@@ -85,12 +85,12 @@ impl Connected<IncomingStream<'_, Door>> for Visitor {
     }
 }
 
-/// The strangers that are there, who came first first.
+/// The connected strangers, oldest first.
 #[derive(Debug, Default)]
 struct Strangers(VecDeque<(Visitor, oneshot::Sender<()>)>);
 
 impl Strangers {
-    /// Takes one more in; what it is given ends when another needs its place.
+    /// Adds a stranger; the returned receiver ends when another needs its place.
     fn take(&mut self, visitor: &Visitor) -> oneshot::Receiver<()> {
         self.0.retain(|(visitor, stay)| !visitor.is_known() && !stay.is_closed());
         if self.0.len() >= MOST_STRANGERS {
@@ -102,7 +102,7 @@ impl Strangers {
     }
 }
 
-/// Where connections come in.
+/// The listening socket.
 struct Door {
     listener: TcpListener,
     strangers: Strangers,
@@ -130,7 +130,7 @@ impl Listener for Door {
     }
 }
 
-/// A connection that ends unless its visitor becomes known in time.
+/// A connection that ends unless its visitor is authenticated in time.
 struct Connection {
     stream: TcpStream,
     visitor: Visitor,
@@ -140,7 +140,7 @@ struct Connection {
 }
 
 impl Connection {
-    /// The stream, unless the visitor is not to stay.
+    /// The stream, unless the visitor has to leave.
     fn stream(&mut self, context: &mut Context<'_>) -> io::Result<Pin<&mut TcpStream>> {
         if !self.sent_away && !self.visitor.is_known() {
             let displaced = Pin::new(&mut self.stay).poll(context).is_ready();
@@ -180,7 +180,7 @@ mod tests {
         let visitors: Vec<Visitor> = (0..=MOST_STRANGERS).map(|_| Visitor::new(([10, 0, 0, 1], 1).into())).collect();
         let mut stays: Vec<_> = visitors.iter().take(MOST_STRANGERS).map(|visitor| strangers.take(visitor)).collect();
         visitors[0].admit();
-        // The place of one that is known by now is free.
+        // A visitor that has been authenticated since needs no place.
         stays.push(strangers.take(&visitors[MOST_STRANGERS]));
         assert!(stays[1].try_recv() == Err(oneshot::error::TryRecvError::Empty));
         stays.push(strangers.take(&Visitor::new(([10, 0, 0, 2], 1).into())));

@@ -1,6 +1,6 @@
 //! The web part: files of the page, a few requests, and the socket that carries the rest.
 //!
-//! Who is let in is decided before anything else, in one place ([`guard`]). No handler knows a drive.
+//! Access is decided before anything else, in one place ([`guard`]). The handlers know nothing of drives.
 
 mod answer;
 mod door;
@@ -43,8 +43,8 @@ use openapi::{Operation, ROUTES};
 /// The largest message or body that is read.
 pub(crate) const LARGEST_MESSAGE: usize = 64 << 10;
 
-/// What every answer says to the browser: nothing but this server's own files runs in the page, nobody frames it, and it
-/// tells nobody where it was.
+/// Headers of every answer: only this server's own files run in the page, no site may frame it, and it sends
+/// no referrer.
 const HEADERS: [(HeaderName, &str); 5] = [
     (
         CONTENT_SECURITY_POLICY,
@@ -57,19 +57,19 @@ const HEADERS: [(HeaderName, &str); 5] = [
     (CACHE_CONTROL, "no-store"),
 ];
 
-/// What the handlers share.
+/// Shared by the handlers.
 #[derive(Clone)]
 struct Web {
     handle: HostHandle,
     access: Arc<Access>,
-    /// Who has just said a wrong password.
+    /// Addresses that have just sent a wrong password.
     guessers: Arc<Guessers>,
     doors: trace::Doors,
-    /// One record or file at a time: each takes memory.
+    /// One record or file at a time, to bound memory.
     records: Arc<Semaphore>,
 }
 
-/// The server of a studio: everything under one router, which needs no socket to be called.
+/// The server of a studio as one router, which can be called without a socket.
 pub fn app(handle: HostHandle, access: Arc<Access>) -> Router {
     let one = || Arc::new(Semaphore::new(1));
     let web = Web { handle, access, guessers: Arc::default(), doors: trace::Doors::default(), records: one() };
@@ -108,11 +108,11 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
     }
 }
 
-/// Who is let in, and with what every answer goes out.
+/// Access control, and the headers of every answer.
 async fn guard(State(web): State<Web>, request: Request, next: Next) -> Response {
     let wants_page = request.method() == Method::GET && accepts_html(request.headers());
     let mut response = match refuse(&web.access, &request) {
-        // A person looks at it: in a tab of an earlier launch, for one.
+        // Shown to a person: for instance in a tab from an earlier launch.
         Some(refusal) => refusal.answer(wants_page),
         None => in_json(next.run(request).await),
     };
@@ -127,16 +127,16 @@ struct Asked {
     token: Option<String>,
 }
 
-/// What somebody hears instead of what was asked for.
+/// The answer to a request that is not served.
 enum Refusal {
-    /// Go there, with this cookie.
+    /// A redirect with this cookie.
     Elsewhere(&'static str, Option<String>),
-    /// No, and why.
+    /// A refusal with its reason.
     Trouble(StatusCode, &'static str, &'static str),
 }
 
 impl Refusal {
-    /// For a person who looks at it, or for a program.
+    /// As a page for a person, or as JSON for a program.
     fn answer(self, wants_page: bool) -> Response {
         match self {
             Self::Elsewhere(to, None) => ([(LOCATION, to)], StatusCode::SEE_OTHER).into_response(),
@@ -153,20 +153,22 @@ fn accepts_html(headers: &HeaderMap) -> bool {
     headers.get(ACCEPT).and_then(|value| value.to_str().ok()).is_some_and(|types| types.contains("text/html"))
 }
 
-/// An error that the router has put into words of its own, as all others.
+/// Rewrites an error text of the router in the form of all others.
 fn in_json(response: Response) -> Response {
     let status = response.status();
-    let told = response.headers().get(CONTENT_TYPE).is_some_and(|kind| kind == "application/json");
-    if !status.is_client_error() || told {
+    let is_json = response.headers().get(CONTENT_TYPE).is_some_and(|kind| kind == "application/json");
+    if !status.is_client_error() || is_json {
         return response;
     }
     let (kind, text) = match status {
-        StatusCode::PAYLOAD_TOO_LARGE => ("too_large", "the body is larger than what is read here"),
-        StatusCode::METHOD_NOT_ALLOWED => ("method_not_allowed", "this path takes another method"),
+        StatusCode::PAYLOAD_TOO_LARGE => ("too_large", "the body is larger than this path takes"),
+        StatusCode::METHOD_NOT_ALLOWED => {
+            ("method_not_allowed", "this path takes another method: see /api/openapi.json")
+        }
         _ => ("malformed", "the request cannot be read"),
     };
     let mut answer = trouble(status, kind, text);
-    // Which methods there are, what a socket has to say: the head stays.
+    // The head stays: it has the allowed methods, or the headers of a socket.
     for (name, value) in
         response.headers().iter().filter(|(name, _)| **name != CONTENT_TYPE && **name != CONTENT_LENGTH)
     {
@@ -178,17 +180,17 @@ fn in_json(response: Response) -> Response {
 fn refuse(access: &Access, request: &Request) -> Option<Refusal> {
     let (headers, path) = (request.headers(), request.uri().path());
     if !access.is_for_us(headers) {
-        let text = "this server is not known by that name: call it by its address, or start it with --host NAME";
+        let text = "unknown host name: open the server by its address, or start it with --host NAME";
         return Some(Refusal::Trouble(StatusCode::FORBIDDEN, "foreign_host", text));
     }
     let changes = request.method() != Method::GET && request.method() != Method::HEAD;
     if (changes || path == "/ws") && !access.is_from_us(headers) {
-        let text = "this is for pages of this server: the Origin has to be http:// and the Host";
+        let text = "foreign origin: expected an Origin of http:// followed by the Host";
         return Some(Refusal::Trouble(StatusCode::FORBIDDEN, "foreign_origin", text));
     }
     let token = Query::<Asked>::try_from_uri(request.uri()).ok().and_then(|Query(asked)| asked.token);
     if path == "/" && token.is_some_and(|token| access.is_token(&token)) {
-        // The token leaves the address bar, and with it the history.
+        // Keeps the token out of the address bar and the history.
         Visitor::of(request).into_iter().for_each(Visitor::admit);
         return Some(Refusal::Elsewhere("/", Some(access.cookie())));
     }
@@ -196,7 +198,7 @@ fn refuse(access: &Access, request: &Request) -> Option<Refusal> {
         Visitor::of(request).into_iter().for_each(Visitor::admit);
         return None;
     }
-    // What is needed to ask for a password.
+    // Needed for the password page.
     let open = ["/login", "/api/login", "/page/login.js", "/page/style.css"];
     if access.has_password() && open.contains(&path) {
         return None;
@@ -213,7 +215,7 @@ fn refuse(access: &Access, request: &Request) -> Option<Refusal> {
 }
 
 async fn state(State(web): State<Web>) -> Response {
-    let json = web.handle.pictures().borrow().json.to_string();
+    let json = web.handle.states().borrow().json.to_string();
     json_text(json)
 }
 
@@ -224,10 +226,10 @@ struct Since {
     since: u64,
 }
 
-/// What has happened to the drives.
+/// The timeline of the drives.
 async fn faults(State(web): State<Web>, asked: Result<Query<Since>, QueryRejection>) -> Response {
     match asked {
-        // Numbers and texts alone: there is nothing in it that JSON cannot say.
+        // Only numbers and texts: serialising cannot fail.
         Ok(Query(Since { since })) => {
             json_text(serde_json::to_string(&web.handle.timeline().since(since)).unwrap_or_default())
         }
@@ -235,7 +237,7 @@ async fn faults(State(web): State<Web>, asked: Result<Query<Since>, QueryRejecti
     }
 }
 
-/// Needs no control, as the button of the page does not.
+/// Needs no control, as the button of the page.
 async fn stop(State(web): State<Web>) -> Response {
     if web.handle.stop_all() {
         (StatusCode::ACCEPTED, json_text(json!({ "ok": true }).to_string())).into_response()
@@ -260,14 +262,18 @@ async fn login(State(web): State<Web>, request: Request) -> Response {
     };
     let from = Visitor::origin(visitor.as_ref());
     if web.guessers.has(from) {
-        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "a wrong password came from your address: try again");
+        return trouble(
+            StatusCode::TOO_MANY_REQUESTS,
+            "busy",
+            "a wrong password came from your address: try again in a second",
+        );
     }
     if web.access.is_password(&password) {
         visitor.iter().for_each(Visitor::admit);
         return ([(SET_COOKIE, web.access.cookie())], json_text(json!({ "ok": true }).to_string())).into_response();
     }
     Arc::clone(&web.guessers).pay(from).await;
-    trouble(StatusCode::UNAUTHORIZED, "wrong_password", "this is not the password")
+    trouble(StatusCode::UNAUTHORIZED, "wrong_password", "wrong password")
 }
 
 async fn socket(State(web): State<Web>, upgrade: WebSocketUpgrade) -> Response {

@@ -1,4 +1,4 @@
-//! The requests that are answered, as a table: the router is made of it, and so is the document at `/api/openapi.json`.
+//! The table of requests, from which the router and the document at `/api/openapi.json` are made.
 
 use serde_json::{Map, Value, json};
 
@@ -25,23 +25,23 @@ pub(super) struct Route {
     pub(super) method: &'static str,
     pub(super) operation: Operation,
     summary: &'static str,
-    /// Each status that it is answered with, and what it means.
+    /// Each status of its answers, with its meaning.
     answers: &'static [(&'static str, &'static str)],
 }
 
-const LET_IN: (&str, &str) = ("401", "Neither cookie nor token");
-const MALFORMED: (&str, &str) = ("400", "A parameter makes no sense");
+const LET_IN: (&str, &str) = ("401", "Neither a cookie nor a token");
+const MALFORMED: (&str, &str) = ("400", "A parameter is not valid");
 const OVER: (&str, &str) = ("503", "The studio is ending");
-const FOREIGN: (&str, &str) = ("403", "The Origin or the Host is not this server's");
+const FOREIGN: (&str, &str) = ("403", "The Origin or the Host is not that of this server");
 
-/// All of them. None that is a GET changes anything; none moves a drive: motion goes through the socket, where it is held.
+/// All requests. No GET changes anything, and no request moves a drive: motion goes through the socket, where it is held.
 pub(super) const ROUTES: [Route; 12] = [
     Route {
         path: "/api/state",
         method: "get",
         operation: Operation::State,
-        summary: "The bus, its nodes, and what each drive says of itself",
-        answers: &[("200", "The newest picture"), LET_IN],
+        summary: "The bus, its nodes, and the values of each drive",
+        answers: &[("200", "The newest state"), LET_IN],
     },
     Route {
         path: "/api/power-states",
@@ -68,20 +68,20 @@ pub(super) const ROUTES: [Route; 12] = [
         path: "/api/login",
         method: "post",
         operation: Operation::Login,
-        summary: "Exchange the password for a cookie, where there is one",
+        summary: "Exchange the password for a cookie, if a password is set",
         answers: &[
             ("200", "The cookie is set"),
             ("400", "The body is not {\"password\":\"..\"}"),
             ("401", "Wrong password"),
             FOREIGN,
-            ("429", "Another one is being looked at"),
+            ("429", "Another password is being checked"),
         ],
     },
     Route {
         path: "/ws",
         method: "get",
         operation: Operation::Socket,
-        summary: "A WebSocket: pictures and news out, what a page asks for in, one JSON object a message",
+        summary: "A WebSocket: states and news to the page, commands from it, one JSON object per message",
         answers: &[("101", "Welcome"), LET_IN, FOREIGN],
     },
     Route {
@@ -89,13 +89,13 @@ pub(super) const ROUTES: [Route; 12] = [
         method: "get",
         operation: Operation::Faults,
         summary: "What has happened to the drives: emergency messages, faults with remedies, states",
-        answers: &[("200", "What is new or has changed since a revision, oldest first"), MALFORMED, LET_IN],
+        answers: &[("200", "New and changed entries since a revision, oldest first"), MALFORMED, LET_IN],
     },
     Route {
         path: "/api/series",
         method: "get",
         operation: Operation::Series,
-        summary: "Values of objects over time, from the PDOs and SDO transfers that are kept; without objects, which there are",
+        summary: "Values of objects over time, from the kept PDOs and SDO transfers; without objects, the list of objects",
         answers: &[
             ("200", "Times of the bus in s, and values in the unit of the object's row"),
             MALFORMED,
@@ -107,28 +107,28 @@ pub(super) const ROUTES: [Route; 12] = [
         path: "/api/trace",
         method: "get",
         operation: Operation::Trace,
-        summary: "The newest frames of those that are kept, in words",
-        answers: &[("200", "Lines, oldest first, and of which frames they are all"), MALFORMED, LET_IN, OVER],
+        summary: "The newest kept frames, in words",
+        answers: &[("200", "Lines, oldest first, and the range of frames that they cover"), MALFORMED, LET_IN, OVER],
     },
     Route {
         path: "/api/trace.log",
         method: "get",
         operation: Operation::TraceLog,
-        summary: "All frames that are kept, in the form of candump; text, transfers and quiet do not count here",
-        answers: &[("200", "One frame a line"), MALFORMED, LET_IN, ("429", "Others are fetching it"), OVER],
+        summary: "All kept frames, as a candump log; text, transfers and quiet are ignored",
+        answers: &[("200", "One frame per line"), MALFORMED, LET_IN, ("429", "Others are fetching it"), OVER],
     },
     Route {
         path: "/api/recording.mcap",
         method: "post",
         operation: Operation::RecordingMcap,
-        summary: "A record as MCAP; the body is one as CSV: t_s, a column for each signal such as 4.velocity_rpm, mark",
+        summary: "A record as MCAP; the body is the record as CSV: t_s, a column for each signal such as 4.velocity_rpm, mark",
         answers: &[
             ("200", "MCAP"),
-            ("400", "The body is no such CSV"),
+            ("400", "The body is not such a CSV"),
             LET_IN,
             FOREIGN,
             ("413", "More than 32 MB"),
-            ("429", "Another record is being made"),
+            ("429", "Another record is being converted"),
             OVER,
         ],
     },
@@ -136,10 +136,10 @@ pub(super) const ROUTES: [Route; 12] = [
         path: "/api/parameters.toml",
         method: "post",
         operation: Operation::ParametersToml,
-        summary: "The parameters in a DCF (CiA 306-1), which is the body, as the TOML of `ferrodrive params`",
+        summary: "The parameters of a DCF (CiA 306-1), the body, as the TOML of `ferrodrive params`",
         answers: &[
             ("200", "TOML"),
-            ("400", "The body is no DCF, or not whole"),
+            ("400", "The body is not a complete DCF"),
             LET_IN,
             FOREIGN,
             ("413", "More than 1 MB"),
@@ -149,7 +149,7 @@ pub(super) const ROUTES: [Route; 12] = [
     },
 ];
 
-/// What may stand behind the `?` of a request: name, JSON type, meaning.
+/// The query parameters of a request: name, JSON type, meaning.
 const fn parameters(operation: Operation) -> &'static [(&'static str, &'static str, &'static str)] {
     match operation {
         Operation::Trace | Operation::TraceLog => &[
@@ -157,8 +157,8 @@ const fn parameters(operation: Operation) -> &'static [(&'static str, &'static s
             ("before", "integer", "Only frames below this number"),
             ("from_s", "number", "Only frames from this time of the bus on"),
             ("until_s", "number", "Only frames before this time of the bus"),
-            ("count", "integer", "Lines at most, 1 to 2000; 500 if nothing is said"),
-            ("node", "string", "Only what is about these node-IDs, separated by commas"),
+            ("count", "integer", "Most lines, 1 to 2000; default 500"),
+            ("node", "string", "Only lines about these node-IDs, separated by commas"),
             (
                 "kind",
                 "string",
@@ -166,16 +166,18 @@ const fn parameters(operation: Operation) -> &'static [(&'static str, &'static s
             ),
             ("text", "string", "Only lines that have all these words, separated by commas"),
             ("transfers", "boolean", "One line for each SDO transfer, not for each of its frames"),
-            ("quiet", "boolean", "Without the SDO transfers by which the studio reads"),
+            ("quiet", "boolean", "Without the SDO transfers of the studio itself"),
         ],
         Operation::Series => &[
-            ("objects", "string", "Which, as NODE:INDEX:SUB in hexadecimal, separated by commas: 4:606C:00,4:6064:00"),
+            (
+                "objects",
+                "string",
+                "Objects, as NODE:INDEX:SUB in hexadecimal, separated by commas: 4:606C:00,4:6064:00",
+            ),
             ("after", "integer", "Only frames from this number on"),
         ],
-        Operation::ParametersToml => {
-            &[("node", "integer", "The node-ID that it is read for where it names none, 1 to 127")]
-        }
-        Operation::Faults => &[("since", "integer", "The revision that was told before; 0 for everything")],
+        Operation::ParametersToml => &[("node", "integer", "The node-ID to use if the file has none, 1 to 127")],
+        Operation::Faults => &[("since", "integer", "The revision of the last answer; 0 for everything")],
         _ => &[],
     }
 }

@@ -1,4 +1,4 @@
-//! The files of the page, which are in the program, and the tables that it draws.
+//! The files of the page, embedded in the program, and the tables that it draws.
 
 use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
@@ -65,13 +65,13 @@ pub(super) fn file(name: &str) -> Response {
     }
 }
 
-/// What somebody sees who is not let in, and what to do then.
+/// The page of a refused request: why, and what to do.
 pub(super) fn refused(status: StatusCode, reason: &str) -> Response {
     let text = include_str!("../../page/refused.html").replace("REASON", reason);
     (status, [(CONTENT_TYPE, HTML)], text).into_response()
 }
 
-/// The power drive state machine as the page draws it. Transitions 0 (start) and 13 (a fault, from everywhere) are no rows of
+/// The power drive state machine as the page draws it. Transitions 0 (start) and 13 (a fault, from any state) are not rows of
 /// the table.
 pub(super) fn power_states() -> String {
     let states: Vec<_> = PowerState::ALL.iter().map(|state| state.name()).collect();

@@ -1,4 +1,4 @@
-//! Files of parameters that a page has chosen, in the form that its requests carry.
+//! Parameter files chosen in a page, converted to the form that its requests carry.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use tokio::sync::Semaphore;
 
 use super::answer::trouble;
 
-/// The largest DCF that is taken, in bytes: one of 500 objects has a fifth of it.
+/// The largest accepted DCF in bytes: one with 500 objects has a fifth of it.
 pub(super) const LARGEST: usize = 1 << 20;
 
 #[derive(Deserialize)]
@@ -24,14 +24,14 @@ pub(super) struct Asked {
     node: Option<u8>,
 }
 
-/// The TOML of a DCF. It is read beside the task that moves drives.
+/// The TOML of a DCF, read in another thread than the task that moves drives.
 pub(super) async fn toml(files: Arc<Semaphore>, asked: Result<Query<Asked>, QueryRejection>, dcf: Bytes) -> Response {
     let malformed = |why: &str| trouble(StatusCode::BAD_REQUEST, "malformed", why);
     let node = match asked {
         Ok(Query(asked)) => NodeId::new(asked.node.unwrap_or(1)),
         Err(rejection) => return malformed(&rejection.body_text()),
     };
-    let Some(node) = node else { return malformed("a node-ID is 1 to 127") };
+    let Some(node) = node else { return malformed("expected a node-ID from 1 to 127") };
     let Ok(_permit) = files.try_acquire() else {
         return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another file is being read: try again");
     };

@@ -1,4 +1,4 @@
-//! What a page has kept, as a file of the recorder.
+//! Values kept in a page, as a record file.
 
 use std::sync::Arc;
 
@@ -11,13 +11,13 @@ use tokio::sync::Semaphore;
 
 use super::answer::trouble;
 
-/// The largest record that is taken, in bytes: a minute of twelve objects a thousand times a second has about half of it.
+/// The largest accepted record in bytes: a minute of twelve objects at 1 kHz has about half of it.
 pub(super) const LARGEST: usize = 32 << 20;
 
-/// An MCAP file of what is given as CSV. It is made beside the task that moves drives.
+/// Converts a CSV to MCAP, in another thread than the task that moves drives.
 pub(super) async fn mcap(records: Arc<Semaphore>, csv: Bytes) -> Response {
     let Ok(_permit) = records.try_acquire() else {
-        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another file is being made: try again");
+        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another record is being converted: try again");
     };
     match tokio::task::spawn_blocking(move || mcap_of_csv(&csv)).await {
         Ok(Ok(file)) => ([(CONTENT_TYPE, "application/octet-stream")], file).into_response(),

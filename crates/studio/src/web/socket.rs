@@ -1,8 +1,8 @@
-//! One page's socket: what it says is handed on at once, what it is told waits for nobody else.
+//! The socket of one page: its messages are passed on at once, and it waits for no other page.
 //!
-//! Reading and writing go on side by side, so that a page that reads slowly can still say stop. It is told the newest
-//! picture, and how many it missed; its answers and news are bounded. A page that reads nothing at all is let go, and what
-//! it moved is stopped, as with any end of a connection.
+//! Reading and writing are concurrent, so that a page that reads slowly can still send a stop. It is sent the newest
+//! state, and the number of states that it missed; its answers and news are bounded. A page that reads nothing at all is disconnected,
+//! and what it moved is stopped, as with any end of a connection.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,18 +19,18 @@ use crate::handle::{HostHandle, Session};
 use crate::host::{JOG_SPAN, PRESENCE_SPAN};
 use crate::message::{Answer, Command, Malformed, Message};
 
-/// Requests of one page that may be under way.
+/// Pending requests per page.
 const UNDER_WAY: usize = 64;
 
-/// Answers that may wait for a page.
+/// Answers queued per page.
 const ANSWERS: usize = 2 * UNDER_WAY;
 
-/// How long one message may take to be read by a page.
+/// How long a page may take to read one message.
 const READING_PATIENCE: Duration = Duration::from_secs(10);
 
 type Sink = SplitSink<WebSocket, Frame>;
 
-/// Serves a page until it goes.
+/// Serves a page until its connection ends.
 pub(super) async fn serve(mut socket: WebSocket, handle: HostHandle) {
     let (Some(session), Ok(word)) = (handle.join().await, secret()) else {
         let close = CloseFrame { code: close_code::AGAIN, reason: "too many pages are open".into() };
@@ -52,7 +52,7 @@ pub(super) async fn serve(mut socket: WebSocket, handle: HostHandle) {
     }
 }
 
-/// Hands on what the page says. Ends with the connection, and when the page leaves its answers lying.
+/// Passes on the messages of the page. Ends with the connection, and when the page does not read its answers.
 async fn read(mut stream: SplitStream<WebSocket>, session: &Session, word: &str, answers: mpsc::Sender<String>) {
     let mut under_way = FuturesUnordered::new();
     loop {
@@ -65,7 +65,7 @@ async fn read(mut stream: SplitStream<WebSocket>, session: &Session, word: &str,
                     }
                     Err(answer) => answer,
                 },
-                Some(Ok(Frame::Binary(_))) => Answer::failed(None, "malformed", "expected text, one JSON object a message"),
+                Some(Ok(Frame::Binary(_))) => Answer::failed(None, "malformed", "expected text, one JSON object per message"),
                 Some(Ok(Frame::Ping(_) | Frame::Pong(_))) => continue,
                 Some(Ok(Frame::Close(_)) | Err(_)) | None => return,
             },
@@ -85,25 +85,29 @@ fn take(text: &str, session: &Session, word: &str, is_full: bool) -> Result<ones
     let Message { seq, word: shown, command } =
         Message::parse(text).map_err(|Malformed { seq, why }| Answer::failed(seq, "malformed", why))?;
     if !is_same(&shown, word) {
-        let text = "the word is not that of this session: the message was meant for another";
+        let text = "wrong session word: the message was meant for another session";
         return Err(Answer::failed(Some(seq), "foreign_session", text));
     }
-    // A stop finds room always.
+    // A stop is always accepted.
     if is_full && command != (Command::StopAll {}) {
-        return Err(Answer::failed(Some(seq), "busy", "too many of this page's requests are under way"));
+        return Err(Answer::failed(
+            Some(seq),
+            "busy",
+            "too many pending requests of this page: wait for their answers",
+        ));
     }
     session.ask(seq, command)
 }
 
-/// Tells the page what it is to know. Ends when that cannot be told.
+/// Sends states, news and answers to the page. Ends when sending fails.
 async fn write(mut sink: Sink, handle: &HostHandle, welcome: String, mut answers: mpsc::Receiver<String>) {
-    let (mut pictures, mut news) = (handle.pictures(), handle.news());
-    let mut last = pictures.borrow_and_update().number;
+    let (mut states, mut news) = (handle.states(), handle.news());
+    let mut last = states.borrow_and_update().number;
     if !send(&mut sink, welcome).await {
         return;
     }
     loop {
-        let told = tokio::select! {
+        let sent = tokio::select! {
             biased;
             Some(answer) = answers.recv() => send(&mut sink, answer).await,
             heard = news.recv() => match heard {
@@ -111,18 +115,18 @@ async fn write(mut sink: Sink, handle: &HostHandle, welcome: String, mut answers
                 Err(RecvError::Lagged(missed)) => send(&mut sink, dropped("news", missed)).await,
                 Err(RecvError::Closed) => return,
             },
-            changed = pictures.changed() => {
+            changed = states.changed() => {
                 if changed.is_err() {
                     return;
                 }
-                let picture = pictures.borrow_and_update().clone();
-                let missed = picture.number.saturating_sub(last + 1);
-                last = picture.number;
-                let told = missed == 0 || send(&mut sink, dropped("pictures", missed)).await;
-                told && send(&mut sink, Arc::clone(&picture.json).to_string()).await
+                let state = states.borrow_and_update().clone();
+                let missed = state.number.saturating_sub(last + 1);
+                last = state.number;
+                let sent = missed == 0 || send(&mut sink, dropped("pictures", missed)).await;
+                sent && send(&mut sink, Arc::clone(&state.json).to_string()).await
             }
         };
-        if !told {
+        if !sent {
             return;
         }
     }
@@ -133,7 +137,7 @@ fn dropped(what: &str, count: u64) -> String {
     json!({ "type": "dropped", "what": what, "count": count }).to_string()
 }
 
-/// False if the page does not take it.
+/// False if the page does not read it.
 async fn send(sink: &mut Sink, text: String) -> bool {
     let sending = sink.send(Frame::Text(Utf8Bytes::from(text)));
     matches!(tokio::time::timeout(READING_PATIENCE, sending).await, Ok(Ok(())))

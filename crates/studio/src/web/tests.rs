@@ -1,4 +1,4 @@
-//! Who may connect, and what a socket withstands. The test stands in for the host.
+//! Who may connect, and what a socket withstands. The test takes the place of the host.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -60,7 +60,7 @@ async fn text(response: Response) -> String {
 
 #[tokio::test]
 async fn nothing_but_the_token_of_this_launch_opens_the_page() {
-    let (app, access, _counter) = server(None);
+    let (app, access, _inbox) = server(None);
     for path in ["/", "/api/state", "/api/openapi.json", "/page/main.js", "/ws", "/login"] {
         let response = ask(&app, "GET", path, &[("origin", "http://127.0.0.1:8402")], "").await;
         assert_eq!(response.status(), StatusCode::UNAUTHORIZED, "{path}");
@@ -71,7 +71,7 @@ async fn nothing_but_the_token_of_this_launch_opens_the_page() {
     assert_eq!((opened.status(), &opened.headers()["location"]), (StatusCode::SEE_OTHER, &"/".parse().expect("text")));
     let cookie = opened.headers()["set-cookie"].to_str().expect("text").to_owned();
     assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
-    assert!(!cookie.contains(&token(&access)), "the token is not the cookie");
+    assert!(!cookie.contains(&token(&access)), "the cookie is not the token");
     let cookie = cookie.split(';').next().expect("its value");
     let page = ask(&app, "GET", "/", &[("cookie", cookie)], "").await;
     assert_eq!(page.status(), StatusCode::OK);
@@ -128,7 +128,7 @@ async fn a_get_moves_and_stops_nothing() {
 
 #[tokio::test]
 async fn the_document_tells_of_every_request_and_of_no_other() {
-    let (app, access, _counter) = server(None);
+    let (app, access, _inbox) = server(None);
     let bearer = format!("Bearer {}", token(&access));
     let headers = [("authorization", bearer.as_str()), ("origin", "http://127.0.0.1:8402")];
     let document = text(ask(&app, "GET", "/api/openapi.json", &headers, "").await).await;
@@ -141,9 +141,9 @@ async fn the_document_tells_of_every_request_and_of_no_other() {
             let response = ask(&app, &method.to_uppercase(), path, &headers, "").await;
             let status = response.status();
             assert!(status != StatusCode::NOT_FOUND && status != StatusCode::METHOD_NOT_ALLOWED, "{method} {path}");
-            let told = operation["responses"].as_object().expect("responses");
+            let got = operation["responses"].as_object().expect("responses");
             // A plain request cannot become a socket.
-            assert!(path == "/ws" || told.contains_key(status.as_str()), "{method} {path}: {status}");
+            assert!(path == "/ws" || got.contains_key(status.as_str()), "{method} {path}: {status}");
         }
         let other = ask(&app, "PUT", path, &headers, "").await;
         assert_eq!(other.status(), StatusCode::METHOD_NOT_ALLOWED, "{path}");
@@ -153,7 +153,7 @@ async fn the_document_tells_of_every_request_and_of_no_other() {
 
 #[tokio::test(start_paused = true)]
 async fn a_password_opens_and_a_wrong_one_costs_time() {
-    let (app, _access, _counter) = server(Some("correct horse battery"));
+    let (app, _access, _inbox) = server(Some("correct horse battery"));
     let origin = [("origin", "http://127.0.0.1:8402")];
     let page = ask(&app, "GET", "/", &[], "").await;
     assert_eq!((page.status(), &page.headers()["location"]), (StatusCode::SEE_OTHER, &"/login".parse().expect("text")));
@@ -161,10 +161,10 @@ async fn a_password_opens_and_a_wrong_one_costs_time() {
     let guess = ask(&app, "POST", "/api/login", &origin, r#"{"password":"correct horse"}"#);
     let mut guess = std::pin::pin!(guess);
     let at_once = tokio::time::timeout(Duration::from_millis(500), guess.as_mut()).await;
-    assert!(at_once.is_err(), "so that nobody guesses fast");
+    assert!(at_once.is_err(), "guessing is slow");
     let meanwhile = ask(&app, "POST", "/api/login", &origin, r#"{"password":"correct horse battery"}"#).await;
     assert_eq!(guess.await.status(), StatusCode::UNAUTHORIZED);
-    assert_eq!(meanwhile.status(), StatusCode::TOO_MANY_REQUESTS, "nor many at a time");
+    assert_eq!(meanwhile.status(), StatusCode::TOO_MANY_REQUESTS, "and one at a time");
     assert_eq!(ask(&app, "POST", "/api/login", &origin, "password=x").await.status(), StatusCode::BAD_REQUEST);
     let foreign = [("origin", "http://evil.example")];
     let body = r#"{"password":"correct horse battery"}"#;
@@ -182,7 +182,7 @@ async fn a_password_opens_and_a_wrong_one_costs_time() {
 
 #[tokio::test(start_paused = true)]
 async fn who_guesses_at_one_address_holds_up_nobody_at_another() {
-    let (app, _access, _counter) = server(Some("correct horse battery"));
+    let (app, _access, _inbox) = server(Some("correct horse battery"));
     let login = async |from: [u8; 4], password: &str| {
         let body = serde_json::json!({ "password": password }).to_string();
         let request = Request::builder().method("POST").uri("/api/login").header("host", ADDRESS);
@@ -195,10 +195,10 @@ async fn who_guesses_at_one_address_holds_up_nobody_at_another() {
         let mut guess = std::pin::pin!(login(guesser, "incorrect horse"));
         let at_once = tokio::time::timeout(Duration::from_millis(100), guess.as_mut()).await;
         assert!(at_once.is_err());
-        // He hangs up, and waits all the same.
+        // Closing the connection does not shorten the wait.
     }
     assert_eq!(login(guesser, "correct horse battery").await, StatusCode::TOO_MANY_REQUESTS);
-    assert_eq!(login([10, 0, 0, 1], "correct horse battery").await, StatusCode::OK, "the owner comes in");
+    assert_eq!(login([10, 0, 0, 1], "correct horse battery").await, StatusCode::OK, "the owner is admitted");
     tokio::time::sleep(Duration::from_secs(1)).await;
     assert_eq!(login(guesser, "correct horse battery").await, StatusCode::OK);
 }
@@ -210,7 +210,7 @@ async fn elsewhere_a_name_has_to_be_one_that_was_said() {
     let here = access.url();
     assert!(here.starts_with("http://127.0.0.1:8402/?token="), "an address that can be opened: {here}");
     let access = Arc::new(access.with_hosts(vec!["drives.local".to_owned()]));
-    let (handle, _counter) = channel(Trace::new(master::Models::default(), Origin::default()));
+    let (handle, _inbox) = channel(Trace::new(master::Models::default(), Origin::default()));
     let app = app(handle, access);
     for host in
         ["192.168.1.5:8402", "[2001:db8::1]:8402", "[::1]", "localhost:8402", "drives.local:8402", "Drives.LOCAL"]
@@ -228,7 +228,7 @@ async fn elsewhere_a_name_has_to_be_one_that_was_said() {
 
 #[tokio::test]
 async fn a_person_without_a_token_reads_what_to_do_and_a_program_gets_json() {
-    let (app, access, _counter) = server(None);
+    let (app, access, _inbox) = server(None);
     let browser = ("accept", "text/html,application/xhtml+xml,*/*;q=0.8");
     for headers in [&[browser][..], &[browser, ("cookie", "ferrodrive_studio_8402=of an earlier launch")]] {
         let page = ask(&app, "GET", "/", headers, "").await;
@@ -251,18 +251,18 @@ async fn a_person_without_a_token_reads_what_to_do_and_a_program_gets_json() {
 }
 
 #[tokio::test]
-async fn whoever_has_the_token_is_served_however_many_say_nothing() {
-    let (access, _desk, _pictures) = listening().await;
+async fn a_client_with_the_token_is_served_however_many_connections_are_silent() {
+    let (access, _handle, _states) = listening().await;
     let mut silent = Vec::new();
     for _ in 0..200 {
         let mut stream = TcpStream::connect(host_of(&access)).await.expect("it takes connections");
         stream.write_all(b"GET / HTTP/1.1\r\nHost: ").await.expect("half a header");
         silent.push(stream);
     }
-    // The socket of a page that is open is not a stranger's.
-    let mut page = open(&access, &format!("http://{}", host_of(&access))).await.expect("it is let in");
+    // The socket of an open page is authenticated.
+    let mut page = open(&access, &format!("http://{}", host_of(&access))).await.expect("it is admitted");
     let mut rest = [0; 1];
-    let ended = tokio::time::timeout(PATIENCE, silent[0].read(&mut rest)).await.expect("it is sent away");
+    let ended = tokio::time::timeout(PATIENCE, silent[0].read(&mut rest)).await.expect("it is disconnected");
     assert!(matches!(ended, Ok(0) | Err(_)), "{ended:?}");
     for _ in 0..200 {
         silent.push(TcpStream::connect(host_of(&access)).await.expect("it takes connections"));
@@ -273,7 +273,7 @@ async fn whoever_has_the_token_is_served_however_many_say_nothing() {
 
 #[tokio::test(start_paused = true)]
 async fn half_a_header_has_five_seconds() {
-    let (access, _desk, _pictures) = listening().await;
+    let (access, _handle, _states) = listening().await;
     let mut stream = TcpStream::connect(host_of(&access)).await.expect("it takes connections");
     stream.write_all(b"GET / HTTP/1.1\r\nHost: ").await.expect("half a header");
     let mut rest = Vec::new();
@@ -309,7 +309,7 @@ async fn the_trace_is_asked_for_in_parts_and_saved_by_few_at_a_time() {
         }
         saving.push(log);
     }
-    assert!((1..100).contains(&saving.len()), "who saves holds frames that are not kept any more");
+    assert!((1..100).contains(&saving.len()), "a download holds frames that are no longer kept");
     for log in saving {
         let log = text(log).await;
         assert_eq!(log.lines().count() as u64, frames);
@@ -318,12 +318,12 @@ async fn the_trace_is_asked_for_in_parts_and_saved_by_few_at_a_time() {
     assert_eq!(ask(&app, "GET", "/api/trace.log", &headers, "").await.status(), StatusCode::OK, "there is room again");
 }
 
-/// A server at a port of its own, whose host answers that everything is done.
+/// A server at its own port, whose host answers every request with success.
 async fn listening() -> (Arc<Access>, HostHandle, tokio::sync::watch::Sender<StateUpdate>) {
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
     let access = Arc::new(Access::new(listener.local_addr().expect("bound"), None).expect("loopback"));
     let (handle, inbox) = channel(Trace::new(master::Models::default(), Origin::default()));
-    let Inbox { mut requests, pictures, .. } = inbox;
+    let Inbox { mut requests, states, .. } = inbox;
     let served = app(handle.clone(), Arc::clone(&access));
     tokio::spawn(serve(listener, served));
     tokio::spawn(async move {
@@ -343,7 +343,7 @@ async fn listening() -> (Arc<Access>, HostHandle, tokio::sync::watch::Sender<Sta
             }
         }
     });
-    (access, handle, pictures)
+    (access, handle, states)
 }
 
 fn host_of(access: &Access) -> String {
@@ -360,7 +360,7 @@ async fn open(access: &Access, origin: &str) -> Result<Socket, SocketError> {
 }
 
 async fn page(access: &Access) -> (Socket, Value) {
-    let mut socket = open(access, &format!("http://{}", host_of(access))).await.expect("it is let in");
+    let mut socket = open(access, &format!("http://{}", host_of(access))).await.expect("it is admitted");
     let welcome = next(&mut socket).await.expect("a welcome");
     assert_eq!(welcome["type"], "welcome");
     (socket, welcome)
@@ -377,23 +377,23 @@ async fn next(socket: &mut Socket) -> Option<Value> {
     }
 }
 
-async fn tell(socket: &mut Socket, text: String) -> Option<Value> {
+async fn send(socket: &mut Socket, text: String) -> Option<Value> {
     socket.send(Message::Text(text.into())).await.ok()?;
     next(socket).await
 }
 
 #[tokio::test]
 async fn a_socket_is_for_pages_of_this_server() {
-    let (access, _desk, _pictures) = listening().await;
+    let (access, _handle, _states) = listening().await;
     for origin in ["http://evil.example", "http://127.0.0.1", "null"] {
-        let Err(SocketError::Http(response)) = open(&access, origin).await else { panic!("{origin} came in") };
+        let Err(SocketError::Http(response)) = open(&access, origin).await else { panic!("{origin} was admitted") };
         assert_eq!(response.status(), StatusCode::FORBIDDEN, "{origin}");
     }
 }
 
 #[tokio::test]
 async fn messages_that_make_no_sense_are_answered_and_the_next_one_is_heard() {
-    let (access, _desk, _pictures) = listening().await;
+    let (access, _handle, _states) = listening().await;
     let (mut socket, welcome) = page(&access).await;
     let (_, elsewhere) = page(&access).await;
     let message = |seq: u64, word: &Value| format!(r#"{{"seq":{seq},"session":{word},"do":"alive"}}"#);
@@ -404,12 +404,12 @@ async fn messages_that_make_no_sense_are_answered_and_the_next_one_is_heard() {
         (message(1, &"x".into()), "foreign_session"),
         (message(1, &elsewhere["word"]), "foreign_session"),
     ] {
-        let answer = tell(&mut socket, text).await.expect("it is answered");
+        let answer = send(&mut socket, text).await.expect("it is answered");
         assert_eq!((&answer["ok"], &answer["error"]["kind"]), (&false.into(), &kind.into()));
     }
-    let heard = tell(&mut socket, message(1, &welcome["word"])).await.expect("it is answered");
+    let heard = send(&mut socket, message(1, &welcome["word"])).await.expect("it is answered");
     assert_eq!((&heard["ok"], &heard["seq"]), (&true.into(), &1.into()));
-    let again = tell(&mut socket, message(1, &welcome["word"])).await.expect("it is answered");
+    let again = send(&mut socket, message(1, &welcome["word"])).await.expect("it is answered");
     assert_eq!(again["error"]["kind"], "replayed");
     socket.send(Message::Binary(vec![0; 9].into())).await.expect("sent");
     assert_eq!(next(&mut socket).await.expect("answered")["error"]["kind"], "malformed");
@@ -417,58 +417,58 @@ async fn messages_that_make_no_sense_are_answered_and_the_next_one_is_heard() {
 
 #[tokio::test]
 async fn a_message_that_is_too_large_ends_its_connection() {
-    let (access, _desk, _pictures) = listening().await;
+    let (access, _handle, _states) = listening().await;
     let (mut socket, _) = page(&access).await;
-    assert_eq!(tell(&mut socket, " ".repeat(LARGEST_MESSAGE + 1)).await, None);
+    assert_eq!(send(&mut socket, " ".repeat(LARGEST_MESSAGE + 1)).await, None);
 }
 
 #[tokio::test]
-async fn two_hundred_pages_are_all_shown_the_newest_picture() {
-    let (access, _desk, pictures) = listening().await;
+async fn two_hundred_pages_all_get_the_newest_state() {
+    let (access, _handle, states) = listening().await;
     let mut pages = Vec::new();
     for _ in 0..200 {
         pages.push(page(&access).await.0);
     }
-    pictures.send_replace(StateUpdate { number: 7, json: r#"{"type":"state","number":7}"#.into() });
+    states.send_replace(StateUpdate { number: 7, json: r#"{"type":"state","number":7}"#.into() });
     for socket in &mut pages {
-        // What came before the page did is no loss of its.
-        let told = next(socket).await.expect("a picture");
-        let shown = if told["type"] == "dropped" { next(socket).await.expect("a picture") } else { told };
+        // States from before the page connected are not missed ones.
+        let got = next(socket).await.expect("a state");
+        let shown = if got["type"] == "dropped" { next(socket).await.expect("a state") } else { got };
         assert_eq!(shown["number"], 7);
     }
 }
 
 #[tokio::test]
 async fn a_page_that_reads_slowly_is_told_how_much_it_missed_and_costs_no_more_memory() {
-    let (access, handle, pictures) = listening().await;
+    let (access, handle, states) = listening().await;
     let (mut socket, _) = page(&access).await;
-    // More than what lies in the buffers of two sockets, by far.
+    // Far more than the buffers of two sockets hold.
     let filling = "x".repeat(256 << 10);
     let count = 200;
     for number in 1..=count {
         let json = format!(r#"{{"type":"state","number":{number},"filling":"{filling}"}}"#);
-        pictures.send_replace(StateUpdate { number, json: json.into() });
+        states.send_replace(StateUpdate { number, json: json.into() });
         tokio::task::yield_now().await;
     }
-    assert_eq!(handle.pictures().borrow().number, count, "nobody waited for the page");
+    assert_eq!(handle.states().borrow().number, count, "the host did not wait for the page");
     let (mut shown, mut missed) = (0, 0);
     loop {
-        let told = next(&mut socket).await.expect("a picture, or how many were missed");
-        match told["type"].as_str() {
-            Some("dropped") => missed += told["count"].as_u64().expect("a number"),
+        let got = next(&mut socket).await.expect("a state, or how many were missed");
+        match got["type"].as_str() {
+            Some("dropped") => missed += got["count"].as_u64().expect("a number"),
             _ => {
                 shown += 1;
-                if told["number"] == count {
+                if got["number"] == count {
                     break;
                 }
             }
         }
     }
     assert_eq!(shown + missed, count, "each is shown or counted");
-    assert!(missed > 0, "a picture has no room for all of them to wait");
+    assert!(missed > 0, "states are not queued");
 }
 
-/// One that never reads keeps its place from nobody; what it has of it ends.
+/// A client that never reads does not keep its place: its download ends.
 #[tokio::test(start_paused = true)]
 async fn who_takes_nothing_of_a_log_loses_its_place() {
     let (app, access, inbox) = server(None);
@@ -497,7 +497,7 @@ async fn who_takes_nothing_of_a_log_loses_its_place() {
 
 #[tokio::test]
 async fn what_a_page_has_kept_becomes_mcap() {
-    let (app, access, _counter) = server(None);
+    let (app, access, _inbox) = server(None);
     let bearer = format!("Bearer {}", token(&access));
     let headers = [("authorization", bearer.as_str()), ("origin", "http://127.0.0.1:8402")];
     let csv = "t_s,4.velocity_rpm,4.606C_00,mark\n0.5,60,,\n0.625,,600,world: 4 cable cut\n";
@@ -525,7 +525,7 @@ async fn what_a_page_has_kept_becomes_mcap() {
 
 #[tokio::test]
 async fn a_dcf_that_a_page_has_chosen_becomes_toml() {
-    let (app, access, _counter) = server(None);
+    let (app, access, _inbox) = server(None);
     let bearer = format!("Bearer {}", token(&access));
     let headers = [("authorization", bearer.as_str()), ("origin", "http://127.0.0.1:8402")];
     // CiA 306-1, 4.6.2 and 4.9: $NODEID in a value, and the node-ID of the DCF.

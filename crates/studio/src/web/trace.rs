@@ -1,4 +1,4 @@
-//! The trace: lines of it as JSON, and all of it as a log. Decoding is done beside the task that moves drives.
+//! The trace: lines of it as JSON, and all of it as a log. Decoding is done in another thread than the task that moves drives.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -17,17 +17,17 @@ use super::answer::{json_text, trouble};
 use crate::handle::HostHandle;
 use crate::trace::{Asked, AskedSeries, Held, Query};
 
-/// Readers whose lines are decoded at the same time; others wait for their turn. However many read, a second core is left to
-/// what moves drives.
+/// Readers whose lines are decoded at the same time; others wait their turn. However many read, a second core is free for
+/// the task that moves drives.
 const DECODING: usize = 1;
 
-/// Logs that are fetched at the same time. Each may hold the frames of its beginning for as long as it is read.
+/// Logs downloaded at the same time. Each may hold the frames of its start for as long as it is read.
 const SAVING: usize = 4;
 
-/// A client that takes nothing of its log for this long, and at most twice as long, has its place no more.
+/// A client that reads nothing of its log for this long (at most twice as long) loses its place.
 const SAVING_PATIENCE: Duration = Duration::from_secs(10);
 
-/// How many may come in at a time.
+/// Requests admitted at a time.
 #[derive(Clone)]
 pub(super) struct Doors {
     decoding: Arc<Semaphore>,
@@ -43,7 +43,7 @@ impl Default for Doors {
 /// The parameters of a request.
 pub(super) type InQuery = Result<InAddress<Asked>, QueryRejection>;
 
-/// The newest lines that are wanted.
+/// The newest lines that match the query.
 pub(super) async fn lines(handle: HostHandle, doors: Doors, asked: InQuery) -> Response {
     let query = match understand(asked) {
         Ok(query) => query,
@@ -77,14 +77,14 @@ pub(super) async fn series(
     }
 }
 
-/// All frames of the nodes and kinds that are wanted, in the form of candump.
+/// All frames of the chosen nodes and kinds, as a candump log.
 pub(super) fn log(handle: HostHandle, doors: &Doors, asked: InQuery) -> Response {
     let query = match understand(asked) {
         Ok(query) => query,
         Err(refusal) => return *refusal,
     };
     let Ok(door) = Arc::clone(&doors.saving).try_acquire_owned() else {
-        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "others are saving the trace: try again");
+        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "others are saving the trace: try again later");
     };
     handle.trace().note_saved();
     let held = Arc::new(handle.trace().held());
@@ -98,12 +98,12 @@ pub(super) fn log(handle: HostHandle, doors: &Doors, asked: InQuery) -> Response
         let part = work.await.ok()??;
         Some((Ok::<_, std::convert::Infallible>(part.text), Saving { next: part.next, ..saving }))
     });
-    // Its name is that of the address, or the one that the page gives it.
+    // The file name is that of the address, or the one that the page gives.
     let headers = [(CONTENT_TYPE, "text/plain; charset=utf-8"), (CONTENT_DISPOSITION, "attachment")];
     (headers, Body::from_stream(parts)).into_response()
 }
 
-/// A log on its way.
+/// A log being downloaded.
 struct Saving {
     handle: HostHandle,
     place: Arc<Place>,
@@ -111,15 +111,15 @@ struct Saving {
     next: u64,
 }
 
-/// One of the places for those who save: the frames that it holds, for as long as its client goes on taking them.
+/// One of the places for downloads, with the frames that it holds as long as its client keeps reading.
 struct Place {
     kept: Mutex<Option<(Arc<Held>, OwnedSemaphorePermit)>>,
-    /// How often something was taken.
+    /// Counts the reads.
     asked: AtomicU64,
 }
 
 impl Place {
-    /// The frames; `None` after they were given up, which ends the log.
+    /// The frames; `None` once they were released, which ends the log.
     fn held(&self) -> Option<Arc<Held>> {
         self.asked.fetch_add(1, Ordering::Relaxed);
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
@@ -127,7 +127,7 @@ impl Place {
     }
 }
 
-/// Gives a place to others when its client takes nothing.
+/// Releases a place when its client reads nothing.
 async fn give_up_idle(place: Weak<Place>) {
     let mut before = None;
     loop {

@@ -157,7 +157,7 @@ async fn an_old_tab_says_what_to_do_after_a_restart_and_goes_on_where_the_token_
     let token = stage.profile.join("token");
     let kept = ["--token-file", token.to_str().expect("a path")];
     stage.studio = Studio::start_at(&address, &[], &kept);
-    let told = stage.says("#banner:not([hidden])", "does not let this page in: open the address").await;
+    let told = stage.says("#banner:not([hidden])", "does not admit this page: open the address").await;
     assert!(!told.contains("Trying again"), "{told}");
     stage.shoot("restart").await;
     // The address that it printed, in the same browser; and once more, where nothing has to be done.
