@@ -1,23 +1,23 @@
 //! `ferrodrive gateway`: the ASCII protocol of CiA 309-3 over TCP.
 
 mod client;
+mod guards;
 mod places;
 mod request;
 
-use std::cell::{Cell, RefCell};
-use std::collections::BTreeMap;
+use std::cell::Cell;
 use std::net::SocketAddr;
 use std::time::Duration;
 
 use canopen::NodeId;
-use master::Drive;
-use master::core::Event;
+use master::core::{Event, NodeSet};
 use master::drive::{Stopped, SwitchedOff};
 use serde::Serialize;
 use tokio::net::TcpListener;
 use tokio::sync::{broadcast, mpsc};
 
 use client::Handle;
+use guards::Guards;
 use places::{MAX_CLIENTS, Places};
 use request::{Gone, Guard};
 
@@ -86,12 +86,12 @@ impl Gateway {
         let (guard, guards) = mpsc::channel(REQUESTS);
         // Unbounded in type only: each client goes once.
         let (gone, parted) = mpsc::unbounded_channel();
-        let guarded = Guarded::default();
+        let (left, unguarded) = mpsc::unbounded_channel();
         // Neither who comes nor who is to be stopped waits for a drive that does not answer.
         tokio::select! {
             () = let_in(context, &listener, guard, gone) => {}
-            () = see_off(context, parted, &guarded) => {}
-            () = see_guarded(context, guards, &guarded) => {}
+            () = see_off(context, parted, left) => {}
+            () = see_guarded(context, guards, unguarded) => {}
         }
         Ok(())
     }
@@ -139,42 +139,51 @@ async fn let_in(
     }
 }
 
-/// The drives that stop when this gateway dies.
-type Guarded = RefCell<BTreeMap<NodeId, Drive>>;
-
-/// Guards what is about to be moved.
-async fn see_guarded(context: &Context, mut guards: mpsc::Receiver<Guard>, guarded: &Guarded) {
-    while let Some(Guard(nodes, done)) = guards.recv().await {
-        for node in nodes.iter().filter(|node| !guarded.borrow().contains_key(node)) {
-            match guard(context, node).await {
-                Ok(drive) => drop(guarded.borrow_mut().insert(node, drive)),
-                Err(why) => context.tell(&format!("node {node}: nothing stops it when this gateway dies: {why}")),
+/// Guards what is about to be moved, and gives the guards back that no client needs any more; one at a time, so that no guard is given
+/// back while another client asks for it.
+async fn see_guarded(context: &Context, mut asked: mpsc::Receiver<Guard>, mut left: mpsc::UnboundedReceiver<NodeSet>) {
+    let mut guards = Guards::default();
+    loop {
+        tokio::select! {
+            biased;
+            // A client asks before it goes.
+            Some(Guard(nodes, done)) = asked.recv() => {
+                for node in guards.take(nodes).iter() {
+                    match guard(context, node).await {
+                        Ok(()) => guards.note(node),
+                        Err(why) => context.tell(&format!("node {node}: nothing stops it when this gateway dies: {why}")),
+                    }
+                }
+                // The client may have gone.
+                let _ = done.send(());
             }
+            Some(nodes) = left.recv() => {
+                // What has a watch and was not seen to stand is left to it.
+                let _ = context.network.release_guards(guards.give(nodes)).await;
+            }
+            else => return,
         }
-        // The client may have gone.
-        let _ = done.send(());
     }
 }
 
 /// Stops what was moved by who has gone.
-async fn see_off(context: &Context, mut parted: mpsc::UnboundedReceiver<Gone>, guarded: &Guarded) {
-    while let Some(Gone(nodes)) = parted.recv().await {
-        for Stopped { node, outcome, .. } in context.network.stop_moved(nodes).await {
+async fn see_off(context: &Context, mut parted: mpsc::UnboundedReceiver<Gone>, left: mpsc::UnboundedSender<NodeSet>) {
+    while let Some(Gone { moved, guarded }) = parted.recv().await {
+        for Stopped { node, outcome, .. } in context.network.stop_moved(moved).await {
             let text = match outcome {
                 Ok(_) => format!("node {node}: its client has gone; it has been quick-stopped and stands"),
                 Err(error) => format!("node {node}: its client has gone, and it may still be moving: {error}"),
             };
             context.tell(&text);
         }
-        nodes.iter().for_each(|node| drop(guarded.borrow_mut().remove(&node)));
-        // What has a watch and was not seen to stand is left to it.
-        let _ = context.network.release_guards(nodes).await;
+        // It ends with this.
+        let _ = left.send(guarded);
     }
 }
 
 /// Sees to it that the drive stops without this program, or says why nothing does.
-async fn guard(context: &Context, node: NodeId) -> Result<Drive, String> {
+async fn guard(context: &Context, node: NodeId) -> Result<(), String> {
     let drive = context.drive_to_stop(node).await.map_err(|failure| failure.what)?;
     let loss = drive.guard(SwitchedOff::Leave).await.map_err(|error| error.to_string())?;
-    if loss.stops_after().is_none() { Err(loss.to_string()) } else { Ok(drive) }
+    if loss.stops_after().is_none() { Err(loss.to_string()) } else { Ok(()) }
 }

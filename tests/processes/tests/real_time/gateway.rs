@@ -235,8 +235,12 @@ fn turn(client: &mut Client) {
 }
 
 fn speed_of(simulator: &Simulator) -> f64 {
+    speed_at(simulator, "4")
+}
+
+fn speed_at(simulator: &Simulator, node: &str) -> f64 {
     let control = simulator.address("control");
-    done(&["--json", "world", "--control", &control, "4", "get"]).json()["velocity_rpm"].as_f64().expect("a speed")
+    done(&["--json", "world", "--control", &control, node, "get"]).json()["velocity_rpm"].as_f64().expect("a speed")
 }
 
 /// A drive that a client of a gateway has turn.
@@ -263,6 +267,30 @@ fn a_client_that_goes_has_what_it_moved_stopped() {
     let told = gateway.told("its client has gone");
     assert!(told.contains("node 4") && told.contains("quick-stopped"), "{told}");
     wait_until("the drive stands", || speed_of(&simulator).abs() < 1.0);
+}
+
+/// The joint watches for the heartbeat of its host (M joint manual, 5.11.2), which a guard sends: whoever goes takes it from nobody else.
+#[test]
+fn a_client_that_goes_leaves_the_drives_of_another_guarded() {
+    let arguments = [&DRIVES[..], &["--serve", "socketcand://127.0.0.1:0", "--control", "127.0.0.1:0"]].concat();
+    let simulator = Simulator::start(&arguments);
+    let mut gateway = Gateway::start(&simulator.bus("socketcand"), &MODELS);
+    let (mut first, mut second) = (gateway.client(), gateway.client());
+    let turn = |client: &mut Client| {
+        for line in ["1 w 0x6060 0 i8 3", "1 w 0x6040 0 u16 15", "1 w 0x60FF 0 i32 30"] {
+            assert_eq!(client.ask(&format!("[1] {line}")), "[1] OK", "{line}");
+        }
+        wait_until("the joint turns", || speed_at(&simulator, "1") > 25.0);
+    };
+    turn(&mut first);
+    turn(&mut second);
+    drop(first);
+    gateway.told("node 1: its client has gone; it has been quick-stopped");
+    // A guard is given back after that, if it is.
+    assert!(second.ask("[2] 1 r 0x1016 1 u32").starts_with("[2] "));
+    turn(&mut second);
+    gateway.child.kill().unwrap();
+    wait_until("the joint stands", || speed_at(&simulator, "1").abs() < 1.0);
 }
 
 #[test]

@@ -31,23 +31,29 @@ pub(super) struct Handle {
 /// Serves a client until its connection ends or another needs its place, then has stopped what it moved.
 pub(super) async fn serve(stream: TcpStream, network: Network, mut handle: Handle, place: Place) {
     let mut session = Session::new(network);
+    let mut guarded = NodeSet::EMPTY;
     tokio::select! {
         // Whatever ended it, what it moved is stopped.
-        _ = converse(stream, &mut session, &mut handle, &place.vitals) => {}
+        _ = converse(stream, &mut session, &mut handle, &place.vitals, &mut guarded) => {}
         _ = place.stay => {}
     }
-    if !session.moved().is_empty() {
-        let _ = handle.gone.send(Gone(session.moved()));
+    if !session.moved().is_empty() || !guarded.is_empty() {
+        let _ = handle.gone.send(Gone { moved: session.moved(), guarded });
     }
 }
 
-async fn converse(stream: TcpStream, session: &mut Session, handle: &mut Handle, vitals: &Vitals) -> io::Result<()> {
+async fn converse(
+    stream: TcpStream,
+    session: &mut Session,
+    handle: &mut Handle,
+    vitals: &Vitals,
+    guarded: &mut NodeSet,
+) -> io::Result<()> {
     // Answers are small and waited for.
     stream.set_nodelay(true)?;
     let (input, mut output) = stream.into_split();
     let mut input = BufReader::new(input);
     let mut line = Line::default();
-    let mut guarded = NodeSet::EMPTY;
     loop {
         let said = tokio::select! {
             read = line.read(&mut input) => {
@@ -56,7 +62,7 @@ async fn converse(stream: TcpStream, session: &mut Session, handle: &mut Handle,
                     Read::End => return Ok(()),
                     Read::Unreadable => Some(Session::unreadable()),
                     Read::Line(text) => {
-                        guard(session, &text, &mut guarded, &handle.guards).await;
+                        guard(session, &text, guarded, &handle.guards).await;
                         let answer = session.answer(&text).await;
                         vitals.set_engaged(!session.moved().is_empty());
                         answer
@@ -82,15 +88,16 @@ async fn converse(stream: TcpStream, session: &mut Session, handle: &mut Handle,
 
 /// Has what a line is about to move guarded first.
 async fn guard(session: &Session, line: &str, guarded: &mut NodeSet, guards: &mpsc::Sender<Guard>) {
-    let nodes = session.about_to_move(line);
-    if nodes.iter().all(|node| guarded.contains(node)) {
+    let nodes: NodeSet = session.about_to_move(line).iter().filter(|node| !guarded.contains(*node)).collect();
+    if nodes.is_empty() {
         return;
     }
     let (done, answered) = oneshot::channel();
-    if guards.send(Guard(nodes, done)).await.is_ok() {
-        let _ = answered.await;
-    }
+    // What was asked for is given back when the client goes, which may be before the answer.
+    let Ok(permit) = guards.reserve().await else { return };
     nodes.iter().for_each(|node| guarded.insert(node));
+    permit.send(Guard(nodes, done));
+    let _ = answered.await;
 }
 
 async fn say(output: &mut OwnedWriteHalf, text: &str) -> io::Result<()> {
