@@ -13,33 +13,37 @@ import json
 import multiprocessing
 import os
 import sys
+from collections.abc import Iterable, Iterator
+from typing import Any, Optional, Union
 
 import ferrodrive
 
+#: What came of some runs, by their numbers.
+Outcomes = list[tuple[int, Union[ferrodrive.Outcome, ValueError]]]
 #: Runs that a worker is given at once: a run may take milliseconds, and handing it over takes one.
 RUNS_A_TASK = 5
 #: Memory of Ray on this machine in bytes for what tasks hand over; an outcome has some kB.
 OBJECT_STORE = 100 * 1024 * 1024
 
 
-def make_runs(sweep, numbers):
+def make_runs(sweep: ferrodrive.Sweep, numbers: range) -> Outcomes:
     """What a worker does: makes these runs, and returns what came of each."""
     return [(number, came_of(sweep, number)) for number in numbers]
 
 
-def came_of(sweep, number):
+def came_of(sweep: ferrodrive.Sweep, number: int) -> Union[ferrodrive.Outcome, ValueError]:
     try:
         return sweep.run(number)
     except ValueError as error:  # values that make no sense together: this run has failed, the others go on
         return error
 
 
-def with_processes(tasks, sweep, workers):
+def with_processes(tasks: Iterable[range], sweep: ferrodrive.Sweep, workers: int) -> Iterator[Outcomes]:
     """Yields what comes of the tasks, made by processes of this machine."""
     # A process that is forked would have the threads' locks of this one.
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(workers, mp_context=context) as pool:
-        waiting = set()
+        waiting: set[concurrent.futures.Future[Outcomes]] = set()
         for task in tasks:
             waiting.add(pool.submit(make_runs, sweep, task))
             while len(waiting) >= 2 * workers:
@@ -48,7 +52,9 @@ def with_processes(tasks, sweep, workers):
         yield from (future.result() for future in concurrent.futures.as_completed(waiting))
 
 
-def with_ray(tasks, sweep, workers, address=None):
+def with_ray(
+    tasks: Iterable[range], sweep: ferrodrive.Sweep, workers: int, address: Optional[str] = None
+) -> Iterator[Outcomes]:
     """Yields what comes of the tasks, made by Ray's workers: of a cluster, or as many as wanted on this machine."""
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     import ray
@@ -61,7 +67,7 @@ def with_ray(tasks, sweep, workers, address=None):
         ray.init(address=address)
     try:
         remote, shared = ray.remote(make_runs), ray.put(sweep)
-        waiting = []
+        waiting: list[Any] = []
         for task in tasks:
             waiting.append(remote.remote(shared, task))
             while len(waiting) >= 2 * workers:
@@ -74,7 +80,7 @@ def with_ray(tasks, sweep, workers, address=None):
         ray.shutdown()
 
 
-def main():
+def main() -> int:
     arguments = parse()
     first, last = arguments.seeds
     sweep = ferrodrive.Sweep(arguments.file, range(first, last + 1), dict(arguments.set))
@@ -92,7 +98,7 @@ def main():
     return 0 if report["ok"] else 1
 
 
-def parse():
+def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", help="the scenario")
     parser.add_argument("--seeds", type=seeds, default=(1, 20), metavar="FIRST..LAST")
@@ -106,12 +112,12 @@ def parse():
     return arguments
 
 
-def seeds(text):
+def seeds(text: str) -> tuple[int, int]:
     first, _, last = text.partition("..")
     return int(first), int(last)
 
 
-def parameter(text):
+def parameter(text: str) -> tuple[str, str]:
     name, _, value = text.partition("=")
     return name, value
 

@@ -40,8 +40,6 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, FromArgMatches};
 use clap_complete::env::CompleteEnv;
 
-use testbench::decode;
-
 use crate::args::{Cli, Command};
 use crate::command::completions::ASKED_BY;
 use crate::command::departures::DepartureList;

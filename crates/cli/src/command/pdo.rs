@@ -15,12 +15,12 @@ use master::units::parse_duration;
 use serde::Serialize;
 
 use crate::context::Context;
-use crate::decode::{self, decode};
 use crate::failure::Failure;
 use crate::frames::stamp::{Stamps, TimeForm};
 use crate::output::{Format, Report};
 use plot::Paint;
 use plot::Table;
+use testbench::decode::{self, decode};
 use testbench::words::node::node;
 
 /// Show how a node's PDOs are set up and why one stays away, what they carry as they come, or set them up

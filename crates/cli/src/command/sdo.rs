@@ -12,10 +12,10 @@ use master::{Drive, Error};
 use serde::Serialize;
 
 use crate::context::Context;
-use crate::decode::{Decoded, decode};
 use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
+use testbench::decode::{Decoded, decode};
 use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
 use testbench::words::value::{Typed, typed_alone, typed_for};

@@ -11,12 +11,12 @@ use serde::Serialize;
 
 use super::repeat::{Pace, Repeat, period};
 use crate::context::Context;
-use crate::decode::{Decoded, decode};
 use crate::failure::Failure;
 use crate::output::{Format, Report};
 use crate::progress::Screen;
 use plot::Paint;
 use plot::Table;
+use testbench::decode::{Decoded, decode};
 use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
 

@@ -97,7 +97,7 @@ class Aborted(MasterError):
     >>> try:
     ...     network.upload(5, 0x5FFF)
     ... except ferrodrive.Aborted as error:
-    ...     hex(error.abort_code)
+    ...     hex(error.abort_code or 0)
     '0x6020000'
     """
 

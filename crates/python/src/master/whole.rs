@@ -238,8 +238,8 @@ impl PlanOrder {
 #[pyfunction]
 pub(crate) fn plan(py: Python<'_>, network: &Bound<'_, Network>, order: PlanOrder) -> PyResult<Job> {
     let network = network.get();
-    let said = order.bitrate.as_deref().map(str::parse).transpose();
-    let said: Option<Bitrate> = said.map_err(|error| bad_value(format!("bitrate: {error}")))?;
+    let parse = |text: &str| text.parse::<Bitrate>().map_err(|error| bad_value(format!("{text:?}: {error}")));
+    let said = order.bitrate.as_deref().map(parse).transpose()?;
     let bitrate = said.map_or_else(|| network.bitrate(py), |said| Ok(Some(said)))?;
     let bitrate =
         bitrate.ok_or_else(|| bad_value("the bit rate of this bus is not known: state it, as in bitrate=500_000"))?;

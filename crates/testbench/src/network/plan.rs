@@ -110,19 +110,7 @@ impl PlanReport {
             notes,
         }
     }
-
-    /// Why the plan does not do, if it does not.
-    pub fn failure(&self) -> Option<Failure> {
-        let failure = Failure::new("not everything is there in time").of_kind("late");
-        let late = self.frames.iter().filter(|frame| !frame.in_time);
-        let failure =
-            late.take(MOST_NAMED).fold(failure, |failure, frame| failure.because(format!("late: {}", frame.frame)));
-        (!self.ok).then(|| self.notes.iter().fold(failure, Failure::next))
-    }
 }
-
-/// Frames that a failure names.
-const MOST_NAMED: usize = 8;
 
 /// What a drive sends: as it is set up, or as the machine file has it set up, and in the mode that is asked for or else in the cycles of
 /// what is moved.
