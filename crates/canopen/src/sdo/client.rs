@@ -210,6 +210,14 @@ impl Client {
         !matches!(self.state, State::Idle)
     }
 
+    /// How many bytes have come of an upload whose length the server has not declared; `None` if none is under way.
+    pub const fn undeclared_upload(&self) -> Option<usize> {
+        match self.state {
+            State::UploadSegments { declared: None, received, .. } => Some(received),
+            _ => None,
+        }
+    }
+
     /// Begins to read an entry. A transfer under way is forgotten: the server drops it when it sees the new one.
     pub fn upload(&mut self, mux: Mux, now: Instant) {
         self.ask(Request::InitiateUpload(mux), State::Upload { mux }, now);

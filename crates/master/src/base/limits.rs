@@ -133,7 +133,11 @@ pub enum BaseError {
     #[error("{0}")]
     Stopped(StopCause),
     /// The wheels were not enabled in time.
-    #[error("the wheels were not enabled within {} s: {left}; {right}. Drive::explain_refusal asks why", limit.as_secs())]
+    #[error(
+        "the wheels were not enabled within {} s: {left}; {right}. Look at the faults, the supply and the enable input of the wheel that \
+         is not enabled: `ferrodrive explain NODE` names the cause, `ferrodrive plan` says whether the bus carries the cycle",
+        limit.as_secs()
+    )]
     NotEnabled {
         /// How long it was waited for.
         limit: Duration,

@@ -146,16 +146,21 @@ impl Channel {
         self.ended.take()
     }
 
-    /// Lets the buffer grow to what the answer declares, or by a segment.
+    /// Lets the buffer grow to what the answer declares, or by a segment where it has declared nothing. What nobody asked for takes no
+    /// room.
     fn make_room(&mut self, frame: &Frame) {
+        let asked = self.active.as_ref().map(|active| active.mux);
         let wanted = match Reply::parse(frame.padded()) {
-            Reply::InitiateUpload(_, Initiation::Segmented { size: Some(size) }) => size as usize,
-            // Undeclared length: one segment more than ever came.
-            Reply::UploadSegment(segment) => self.buffer.len() + usize::from(segment.length),
+            Reply::InitiateUpload(mux, Initiation::Segmented { size: Some(size) }) if Some(mux) == asked => {
+                size as usize
+            }
+            Reply::UploadSegment(segment) => match self.client.undeclared_upload() {
+                Some(received) => received + usize::from(segment.length),
+                None => return,
+            },
             _ => return,
         };
-        let declared_fits = wanted > self.buffer.len() && wanted <= MAX_OBJECT;
-        if declared_fits {
+        if wanted > self.buffer.len() && wanted <= MAX_OBJECT {
             self.buffer.resize(wanted, 0);
         }
     }
@@ -184,5 +189,74 @@ const fn mux_of(reply: &Reply) -> Option<Mux> {
     match reply {
         Reply::InitiateUpload(mux, _) | Reply::InitiateDownload(mux) | Reply::Abort(mux, _) => Some(*mux),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::time::Duration;
+
+    use canopen::AbortCode;
+
+    use super::*;
+
+    const NAME: Mux = Mux::new(0x1008, 0);
+
+    fn frame(data: [u8; 8]) -> Frame {
+        Frame::new(can::CanId::standard(0x584), &data)
+    }
+
+    /// A channel that reads 1008h:00.
+    fn reading() -> Channel {
+        let node = NodeId::new(4).unwrap();
+        let mut channel = Channel::new(node);
+        let request = Request { node, mux: NAME, transfer: Transfer::Upload, timeout: Duration::from_secs(1) };
+        channel.push(Ticket(1), request, Instant::ZERO).unwrap();
+        channel.poll_transmit().unwrap();
+        channel
+    }
+
+    /// CiA 301, 7.2.4.3.5 and 7.2.4.3.6: initiate upload with or without a size, then segments of 7 bytes with a toggling bit.
+    fn read_in_segments(initiate: [u8; 8], segments: usize) -> (Channel, usize) {
+        let mut channel = reading();
+        channel.handle_frame(&frame(initiate), Instant::ZERO);
+        let mut most = 0;
+        for n in 0..segments {
+            channel.poll_transmit().unwrap();
+            let command = (n as u8 % 2) << 4 | u8::from(n + 1 == segments);
+            channel.handle_frame(&frame([command, 1, 2, 3, 4, 5, 6, 7]), Instant::ZERO);
+            most = most.max(channel.buffer.len());
+        }
+        (channel, most)
+    }
+
+    #[test]
+    fn the_buffer_is_as_long_as_what_comes_declared_or_not() {
+        for size in [[0x41, 0x08, 0x10, 0, 0xBC, 0x02, 0, 0], [0x40, 0x08, 0x10, 0, 0, 0, 0, 0]] {
+            let (mut channel, most) = read_in_segments(size, 100);
+            let ended = channel.poll_finished().unwrap();
+            assert_eq!(ended.outcome.unwrap().as_bytes().len(), 700, "{size:?}");
+            assert_eq!(most, 700, "{size:?}");
+        }
+    }
+
+    #[test]
+    fn what_nobody_asked_for_takes_no_room() {
+        let mut channel = reading();
+        for _ in 0..1000 {
+            // Segments before the transfer has begun, and the beginning of another object of 64 KiB.
+            for data in [[0x00, 1, 2, 3, 4, 5, 6, 7], [0x41, 0x09, 0x10, 0, 0, 0, 1, 0]] {
+                channel.handle_frame(&frame(data), Instant::ZERO);
+                assert!(channel.buffer.len() <= FIRST_ROOM, "{}", channel.buffer.len());
+            }
+        }
+        // A declared mebibyte is the most.
+        let mut channel = reading();
+        channel.handle_frame(&frame([0x41, 0x08, 0x10, 0, 1, 0, 0x10, 0]), Instant::ZERO);
+        assert!(channel.buffer.len() <= FIRST_ROOM);
+        assert!(matches!(
+            channel.poll_finished().unwrap().outcome,
+            Err(Failure::BadAnswer(_) | Failure::Aborted(AbortCode::OUT_OF_MEMORY))
+        ));
     }
 }
