@@ -61,7 +61,7 @@ def with_ray(
 
     if address is None:
         # Seen from nowhere else.
-        here = {"num_cpus": workers, "include_dashboard": False, "object_store_memory": OBJECT_STORE}
+        here: dict[str, Any] = {"num_cpus": workers, "include_dashboard": False, "object_store_memory": OBJECT_STORE}
         ray.init(_node_ip_address="127.0.0.1", log_to_driver=False, **here)
     else:
         ray.init(address=address)

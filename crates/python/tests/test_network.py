@@ -193,15 +193,22 @@ def test_parameters_are_kept_compared_written_and_checked(network, tmp_path):
     assert proved["saved"] and proved["proved"] == "an NMT reset" and number(network.upload(1, 0x6081)) == before
 
 
-def test_parameters_are_refused_before_a_write(network, tmp_path):
+def test_parameters_that_a_node_refuses_are_put_back(network, tmp_path):
     network.boot()
     parameters, wanted = network.params(1), tmp_path / "wanted.toml"
-    # A synchronous counter that overflows at 1 is reserved (CiA 301, 7.5.2.22): nothing of the file is written.
-    wanted.write_text('[values]\n"1017h:00" = 123\n"1019h:00" = 1\n', encoding="utf-8")
-    with pytest.raises(ferrodrive.MasterError, match="1019h") as raised:
+    # Transmission type F1h to FBh is reserved (CiA 301, 7.5.2.37): what was written before is put back.
+    wanted.write_text('[values]\n"1017h:00" = 123\n"1800h:02" = 251\n', encoding="utf-8")
+    with pytest.raises(ferrodrive.MasterError, match="was not done") as raised:
         parameters.apply(wanted)
-    assert raised.value.kind in ("unfit_parameters", "rolled_back")
+    error = raised.value
+    # CiA 301, 7.2.4.3.17: invalid value for parameter.
+    assert (error.kind, error.where, error.abort_code) == ("rolled_back", "node 1, 1800h:02", 0x06090030)
     assert number(network.upload(1, 0x1017)) == 200
+    # What the model cannot have is refused before: there is no mode 77 (CiA 402-2, 6060h).
+    wanted.write_text('[values]\n"6060h:00" = 77\n', encoding="utf-8")
+    with pytest.raises(ferrodrive.MasterError, match="6060h") as raised:
+        parameters.apply(wanted)
+    assert raised.value.kind == "bad_parameters"
     wanted.write_text('[values]\n"1017h:00" = 123\n', encoding="utf-8")
     network.drive(1).enable()
     with pytest.raises(ferrodrive.MasterError, match="at rest") as raised:
@@ -219,11 +226,11 @@ def test_a_group_of_the_file_moves_behind_its_gears(world, network):
     before = [world[node].shaft_angle_rad for node in (1, 2)]
     with network.group("arm") as group:
         begin = [axis["set_point_deg"] for axis in group.state()["axes"]]
-        # 90 degrees at 360 deg/s, 1800 deg/s^2 and 18000 deg/s^3: L/v + v/a + a/j.
-        assert group.move([begin[0] + 90, begin[1] + 9]) == pytest.approx(0.25 + 0.2 + 0.1, abs=1e-6)
+        # 180 degrees at 360 deg/s, 1800 deg/s^2 and 18000 deg/s^3, all of which are reached: L/v + v/a + a/j.
+        assert group.move([begin[0] + 180, begin[1] + 18]) == pytest.approx(0.5 + 0.2 + 0.1, abs=1e-6)
         network.sleep(0.3)
         turned = [math.degrees(world[node].shaft_angle_rad - angle) for node, angle in zip((1, 2), before)]
-        assert turned == pytest.approx([90, 90], abs=1)
+        assert turned == pytest.approx([180, 180], abs=1)
     with pytest.raises(ferrodrive.BadRequest, match="its groups: arm"):
         network.group("leg")
     with pytest.raises(ferrodrive.BadRequest, match=r"no \[base\]"):
