@@ -13,7 +13,7 @@ pub(crate) type Plain = (u32, bool, bool, u8, Vec<u8>);
 pub(crate) fn frame((id, extended, remote, dlc, data): Plain) -> PyResult<Frame> {
     let most = if extended { CanId::MAX_EXTENDED } else { CanId::MAX_STANDARD.into() };
     if id > most {
-        return Err(bad_value(format!("{id:X}h is no identifier; expected 0 to {most:X}h")));
+        return Err(bad_value(format!("{id:X}h is not an identifier; expected 0 to {most:X}h")));
     }
     if data.len() > 8 || dlc > 8 {
         return Err(bad_value(format!(

@@ -25,14 +25,14 @@ pub(crate) struct Live {
     said: Arc<Said>,
 }
 
-/// What the thread tells of its bus.
+/// What the thread reports of its bus.
 struct Said(Mutex<Words>);
 
 struct Words {
     notes: BusNotes,
     /// What no program has taken yet.
     waiting: VecDeque<String>,
-    /// Why there is no bus any more.
+    /// Why the bus is gone.
     ended: Option<String>,
     /// What was not seen to stand when the thread ended.
     moving: Vec<String>,
@@ -86,7 +86,7 @@ impl Live {
     /// Begins a job.
     ///
     /// # Errors
-    /// Why there is no bus any more.
+    /// Why the bus is gone.
     pub(crate) fn begin(&self, job: Job) -> Result<(), String> {
         let refusal = || self.lost().unwrap_or_else(|| "the network is closed".into());
         self.jobs.as_ref().ok_or_else(refusal)?.send(job).map_err(|_| refusal())

@@ -275,7 +275,7 @@ impl Network {
 }
 
 impl Drop for Network {
-    /// A network that nobody holds any more, and that was not closed, stops what it moved all the same.
+    /// A network that is dropped without being closed stops what it moved all the same.
     fn drop(&mut self) {
         if self.closed.load(Ordering::Relaxed) {
             return;
@@ -334,7 +334,7 @@ impl Network {
         Ok(self.core.node(node_id(raw)?))
     }
 
-    /// Begins a job with whoever works through them.
+    /// Begins a job where jobs are worked through.
     fn begin(
         &self,
         py: Python<'_>,

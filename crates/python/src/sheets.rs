@@ -43,5 +43,5 @@ pub(crate) fn model_of(name: &str) -> PyResult<&'static Description> {
 
 /// A node-ID, 1 to 127.
 pub(crate) fn node_id(raw: u8) -> PyResult<NodeId> {
-    NodeId::new(raw).ok_or_else(|| bad_value(format!("{raw} is no node-ID; expected 1 to 127")))
+    NodeId::new(raw).ok_or_else(|| bad_value(format!("{raw} is not a node-ID; expected 1 to 127")))
 }

@@ -118,7 +118,10 @@ impl State {
     }
 
     fn probe(&self, number: usize) -> PyResult<StationId> {
-        self.probes.get(number).copied().ok_or_else(|| bad_value(format!("there is no adapter {number} at this world")))
+        self.probes
+            .get(number)
+            .copied()
+            .ok_or_else(|| bad_value(format!("expected an adapter of this world, got {number}")))
     }
 
     /// Moves to the first thing that somebody waits for, at most to `until`.
@@ -281,7 +284,7 @@ impl World {
         }
     }
 
-    /// Has the world tell what happens in it from now on, or no more.
+    /// Notes what happens in the world from now on, or stops that.
     fn watch(&self, py: Python<'_>, on: bool) -> PyResult<()> {
         self.shared.lock(py)?.world.watch(on);
         Ok(())

@@ -4,6 +4,7 @@ import json
 import math
 import pathlib
 import subprocess
+import time
 
 import ferrodrive
 import pytest
@@ -317,3 +318,13 @@ def test_a_file_that_makes_no_sense_is_an_exception_before_the_bus_is_opened(tmp
         with pytest.raises(ferrodrive.BadRequest, match="zlac8030l") as raised:
             ferrodrive.Network(bus, machine=wrong)
         assert raised.value.do and f"{wrong}:2" in str(raised.value)
+
+
+def test_a_watch_goes_on_while_the_program_sleeps_in_virtual_time(world):
+    with ferrodrive.virtual_time(world), ferrodrive.Network(world) as network:
+        supervisor = network.supervise()
+        world[1].power_cut()
+        time.sleep(3)
+        # Nothing asked for it meanwhile.
+        assert [(event["kind"], event["node"]) for event in supervisor.events(within=0.01)][:1] == [("heartbeat_lost", 1)]
+        supervisor.close()

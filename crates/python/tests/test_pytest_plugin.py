@@ -155,9 +155,19 @@ def test_the_served_simulator_is_ready(pytester):
                 assert bus.recv(10).arbitration_id == 0x704
             with pytest.raises(Exception, match="refused"):
                 ferrodrive_sim.world("4 frobnicate")
+
+        @pytest.mark.ferrodrive(machine="machine.toml")
+        def test_machine(ferrodrive_sim):
+            assert ferrodrive_sim.world("4 get")["power"] == "on"
+
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4"], bitrate=250_000, timing="ideal", seed=7)
+        def test_marker(ferrodrive_sim):
+            words = " ".join(ferrodrive_sim.command_line)
+            assert "--bitrate 250000" in words and "--timing ideal" in words and "--seed 7" in words
         """
     )
-    pytester.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)
+    pytester.makefile(".toml", machine="seed = 5\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n")
+    pytester.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=3)
 
 
 def test_the_marker_says_the_timing_and_the_machine(pytester):

@@ -3,7 +3,7 @@
 The channel is a :class:`~ferrodrive.World`, the name of one (``World(channel="can0")``), or drives to make one of
 (``"zlac8030l@4 m4230e17b50@1"``). All buses of one channel are adapters on one wire.
 
-Time is virtual unless told otherwise: from the first bus that is opened until the last one is shut down it goes only as far as the
+Time is virtual unless a pace is given: from the first bus that is opened until the last one is shut down it goes only as far as the
 program waits (see :func:`ferrodrive.virtual_time`). With ``pace=1.0`` it is that of the clock, with ``pace=10.0`` ten times as
 fast.
 """

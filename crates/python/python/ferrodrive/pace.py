@@ -19,7 +19,7 @@ _of_world: weakref.WeakKeyDictionary[World, Pace] = weakref.WeakKeyDictionary()
 
 
 class Pace:
-    """Brings a world up to the clock whenever somebody uses its bus. Nothing runs in between: a world that nobody looks at stands
+    """Brings a world up to the clock each time that its bus is used. Nothing runs in between: a world that is not looked at stands
     still and catches up at once."""
 
     def __init__(self, world: World, speed: float) -> None:

@@ -74,9 +74,11 @@ def ferrodrive_sim(request: pytest.FixtureRequest) -> Iterator[Simulator]:
     extra = list(wanted.get("extra", ()))
     if "machine" in wanted:
         extra += ["--machine", os.fspath(machine_file(request, wanted))]
+    if "bitrate" in wanted:
+        extra += ["--bitrate", str(wanted["bitrate"])]
     if "timing" in wanted:
         extra += ["--timing", wanted["timing"]]
-    with Simulator(wanted.get("drives", ()), wanted.get("seed", 1), extra) as simulator:
+    with Simulator(wanted.get("drives", ()), wanted.get("seed"), extra) as simulator:
         # A clock that is moved by hand boots no drive by waiting.
         if "manual" not in simulator.command_line:
             simulator.wait_until_booted()

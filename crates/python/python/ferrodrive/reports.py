@@ -256,7 +256,7 @@ class BackupReport(TypedDict, total=False):
 
 
 class Difference(TypedDict):
-    """An object that differs; None is no value."""
+    """An object that differs; None where there is not a value."""
 
     object: str
     name: Optional[str]

@@ -47,7 +47,7 @@ class Simulator:
             sim.world("4 supply 48")
 
     :param drives: ``MODEL@NODE[,KEY=VALUE..]`` each
-    :param seed: decides everything random
+    :param seed: decides everything random; without it the machine file's (``extra=["--machine", FILE]``), or 1
     :param extra: further words of the command line (``ferrodrive sim --help``)
     :param path: the program; without it :func:`program`
 
@@ -57,11 +57,12 @@ class Simulator:
     """
 
     def __init__(
-        self, drives: Iterable[str], seed: int = 1, extra: Iterable[str] = (), path: Optional[str] = None
+        self, drives: Iterable[str], seed: Optional[int] = None, extra: Iterable[str] = (), path: Optional[str] = None
     ) -> None:
-        serve = ["--serve", "socketcand://127.0.0.1:0", "--seed", str(seed)]
+        serve = ["--serve", "socketcand://127.0.0.1:0", *([] if seed is None else ["--seed", str(seed)])]
         extra = list(extra)
-        if not any(word.partition("=")[0] == "--control" for word in extra):
+        self._has_own_control = not any(word.partition("=")[0] == "--control" for word in extra)
+        if self._has_own_control:
             serve += ["--control", "127.0.0.1:0"]
         self.command_line = [path or program(), "sim", *serve, *extra]
         self.drives = list(drives)
@@ -100,7 +101,7 @@ class Simulator:
         self.quit()
 
     def wait_until_booted(self, within: float = BOOT_TIMEOUT_S) -> None:
-        """Waits until the drives that it was started with have booted. They begin to when the program is ready and take about a
+        """Waits until the drives that it was started with, by words or by a machine file, have booted. They begin to when the program is ready and take about a
         second, in which they are deaf, as real ones are.
 
         :param within: longest time in s; after that :class:`~ferrodrive.SimulatorError` is raised
@@ -108,12 +109,19 @@ class Simulator:
         >>> sim.wait_until_booted()
         """
         until = REAL.monotonic() + within
-        for drive in self.drives:
-            node = re.search(r"@(\d+)[^@]*$", drive)
-            while node is not None and self.world(f"{node.group(1)} get")["power"] != "on":
+        for node in self._nodes():
+            while self.world(f"{node} get")["power"] != "on":
                 if REAL.monotonic() > until:
-                    raise SimulatorError(f"the drive {drive} has not booted within {within} s")
+                    raise SimulatorError(f"the drive at node {node} has not booted within {within} s")
                 REAL.sleep(0.02)
+
+    def _nodes(self) -> list[int]:
+        """The drives that it was started with; those of a machine file need a control connection that this program may use."""
+        if self._has_own_control:
+            with self.control() as control:
+                return [drive["node"] for drive in control.hello["nodes"]]
+        places = [re.search(r"@(\d+)[^@]*$", drive) for drive in self.drives]
+        return [int(place.group(1)) for place in places if place is not None]
 
     def port(self, protocol: str = "socketcand") -> int:
         """The port of a listener, as the ``ready`` line names it.

@@ -126,7 +126,7 @@ class VirtualTime:
         self.wait(self.begin("sleeps"), self.now_ns() + ns)
 
     def begin(self, reason: str) -> Wait:
-        """A wait of this thread, to be told to whoever shall end it before it is waited for."""
+        """A wait of this thread, to be handed to what ends it before it is waited for."""
         participant = self.current()
         if participant is None:
             raise RuntimeError("this thread takes no part in the virtual time")
@@ -265,7 +265,7 @@ class VirtualTime:
             if self._ready:
                 return self._ready.popleft()
             if not self._move_world(idle_since_ns + PATIENCE_NS):
-                self._interrupt_owner(Stalled(f"nobody can go on: {self._who_waits()}"))
+                self._interrupt_owner(Stalled(f"no thread can go on: {self._who_waits()}"))
 
     def _move_world(self, patience_ns: int) -> bool:
         """Moves the world to the first thing that somebody waits for; False if there will never be any."""
@@ -316,7 +316,7 @@ class VirtualTime:
                     self._from_outside.append(me.wait)
 
     def _leave(self, me: Participant) -> None:
-        """The end of a thread: whoever waits for it goes on, and the next one has its turn."""
+        """The end of a thread: those that wait for it go on, and the next one has its turn."""
         me.finished = True
         self._participants.pop(REAL.get_ident(), None)
         if self.closed:

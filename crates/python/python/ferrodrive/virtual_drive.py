@@ -290,7 +290,7 @@ class VirtualDrive:
         self.apply("load spring off" if off else f"load spring {number(stiffness_nm_rad or 0)} {number(rest_deg)}")
 
     def set_load_stop(self, low: Optional[int], high: Optional[int]) -> None:
-        """End stops at these actual positions in the drive's counts (``load stop -5000 max``); None is no stop on that side, and
+        """End stops at these actual positions in the drive's counts (``load stop -5000 max``); None leaves that side open, and
         two of them take both away (``load stop off``).
 
         >>> position = world[5].position

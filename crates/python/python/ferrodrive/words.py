@@ -13,7 +13,7 @@ def number(value: Number) -> str:
 
 
 def word(text: str) -> str:
-    """The text, if it is one word: a command must not be able to hide in a name."""
+    """The text, if it is one word: so that a name cannot hide a command."""
     if not text or text.split() != [text]:
         raise ValueError(f"{text!r} is not a name; expected one word")
     return text

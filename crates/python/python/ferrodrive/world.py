@@ -203,6 +203,7 @@ class World(_native.World):
         """
         copy = type(self)(self.bitrate)
         copy.become_copy_of(self)
+        copy.machine_file = self.machine_file
         return copy
 
     def restore(self, snapshot: World) -> None:
@@ -219,7 +220,7 @@ class World(_native.World):
     def events(self) -> Iterator[dict[str, Any]]:
         """What happened since the last call, oldest first: boots, changes of state, faults with their remedies, EMCY, arrivals,
         stores, errors of the bus. Each has ``t`` (s), ``t_ns``, ``kind``, ``text`` for people, ``node`` where it is about one,
-        ``remedy`` where there is one. The first call begins the watch, and has nothing to tell.
+        ``remedy`` where there is one. The first call begins the watch, and yields nothing.
 
         >>> list(world.events())
         []

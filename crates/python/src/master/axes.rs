@@ -1,5 +1,5 @@
 //! Groups and bases for Python: opened and enabled by one job, stepped in each cycle of SYNC by another one for as long as they are
-//! there, so that the drives are kept while the program does something else, and told where to go by further ones.
+//! there, so that the drives are kept while the program does something else, and sent where they are to go by further ones.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -161,7 +161,7 @@ impl From<BaseError> for Trouble {
     }
 }
 
-/// One that nobody holds any more is stepped no longer, and the master stops its drives.
+/// One that is dropped is not stepped any longer, and the master stops its drives.
 impl Drop for Group {
     fn drop(&mut self) {
         drop(self.slot.close());
@@ -356,7 +356,7 @@ pub(crate) struct Base {
     slot: Slot<MasterBase>,
 }
 
-/// One that nobody holds any more is stepped no longer, and the master stops its drives.
+/// One that is dropped is not stepped any longer, and the master stops its drives.
 impl Drop for Base {
     fn drop(&mut self) {
         drop(self.slot.close());
@@ -402,8 +402,8 @@ impl Base {
 
     /// The twist from the next cycle on, for as long as the watchdog lets it count.
     fn command(&self, py: Python<'_>, linear_m_s: f64, angular_rad_s: f64) -> PyResult<()> {
-        let told = self.slot.with(|base| Ok(base.command(Twist { linear_m_s, angular_rad_s })?));
-        told.map_err(|trouble| trouble.raised(py, None))
+        let taken = self.slot.with(|base| Ok(base.command(Twist { linear_m_s, angular_rad_s })?));
+        taken.map_err(|trouble| trouble.raised(py, None))
     }
 
     /// The twist for this long, and then to rest.
@@ -492,7 +492,7 @@ async fn next(core: &Core) -> Result<(), Trouble> {
     core.next_sync().await.map(drop).map_err(|error| Trouble::Said(error.to_string()))
 }
 
-/// Until the wheels are told no speed; a wheel that was lost before or meanwhile is told.
+/// Until the set speed of the wheels is 0; a wheel that was lost before or meanwhile is reported.
 async fn stand(core: &Core, slot: &Slot<MasterBase>) -> Result<Value, Trouble> {
     loop {
         let state = slot.with(|base| {

@@ -80,7 +80,7 @@ struct Outcome {
 #[derive(Default)]
 struct State {
     result: Option<Result<Value, Trouble>>,
-    /// Nobody wants the result any more, or nobody will ever give it.
+    /// The result is not wanted any more, or will never come.
     given_up: bool,
     /// Called when it has ended.
     callback: Option<Py<PyAny>>,
@@ -197,7 +197,7 @@ impl Job {
         callback.call0(py).map(|_| ())
     }
 
-    /// Gives it up. What it asked for is taken back; what a drive was told already stays.
+    /// Gives it up. What it asked for is taken back; what a drive has received already stays.
     fn cancel(&self, py: Python<'_>) -> PyResult<()> {
         self.outcome.lock().given_up = true;
         if let Runner::World(shared) = &*self.runner {

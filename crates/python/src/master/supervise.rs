@@ -60,7 +60,11 @@ impl Watch {
     }
 
     async fn keep(self: Arc<Self>, core: Core) -> Result<Value, Trouble> {
-        let Some((mut supervisor, others)) = self.lock().opened.take() else { return Ok(Value::None) };
+        let opened = self.lock().opened.take();
+        let Some((mut supervisor, others)) = opened else {
+            self.lock().released = Some(Ok(()));
+            return Ok(Value::None);
+        };
         while !self.closed.load(Ordering::Relaxed) {
             while let Some((at, frame)) = others.take() {
                 supervisor.hear(at, &frame);
@@ -82,6 +86,13 @@ impl Watch {
         let released = core.release_guards(NodeSet::ALL).await;
         self.lock().released = Some(released);
         Ok(Value::None)
+    }
+}
+
+/// One that is dropped watches no longer, and no drive waits for its heartbeat.
+impl Drop for Supervisor {
+    fn drop(&mut self) {
+        self.watch.closed.store(true, Ordering::Relaxed);
     }
 }
 
@@ -167,15 +178,16 @@ impl Supervisor {
         let (watch, core) = (Arc::clone(&self.watch), self.core.clone());
         let was_closed = watch.closed.swap(true, Ordering::Relaxed);
         self.network.get().begin_said(py, async move {
-            while !was_closed {
+            if was_closed {
+                return Ok(Value::None);
+            }
+            loop {
                 let released = watch.lock().released.take();
                 if let Some(released) = released {
-                    released?;
-                    break;
+                    return Ok(released.map(|()| Value::None)?);
                 }
                 core.sleep(LOOK).await;
             }
-            Ok(Value::None)
         })
     }
 }

@@ -219,7 +219,7 @@ impl Planned {
     }
 }
 
-/// Who is to be booted where no file says it: whom the command line names, what was told of the machine, else who answers.
+/// Who is to be booted where a file does not name them: the nodes that are asked for, those of known models, else those that answer.
 async fn found(
     network: &Network,
     known: &BTreeMap<NodeId, &'static Description>,
@@ -227,9 +227,9 @@ async fn found(
     only: &[NodeId],
     asked: impl FnMut(usize),
 ) -> Vec<(NodeId, Expectation)> {
-    let told = |node: NodeId| known.get(&node).copied().map_or_else(Expectation::of_unknown, Expectation::of);
+    let expected = |node: NodeId| known.get(&node).copied().map_or_else(Expectation::of_unknown, Expectation::of);
     if !only.is_empty() {
-        return only.iter().map(|node| (*node, told(*node))).collect();
+        return only.iter().map(|node| (*node, expected(*node))).collect();
     }
     if !known.is_empty() {
         return known.iter().map(|(node, model)| (*node, Expectation::of(model))).collect();

@@ -45,7 +45,7 @@ pub fn read(path: &Path) -> Result<Checked, Failure> {
         "yml" | "yaml" => read_as(path, check::of_bus_yml, "docs/handbook/ros2-canopen.md has a bus.yml that boots"),
         "toml" => read_as(path, check::of_machine, "docs/machine-file.md describes each key"),
         _ => Err(Failure::usage(format!("'{}' is neither NAME.yml nor NAME.toml", plain(&file)))
-            .because("the ending tells what it is: a bus.yml of ros2_canopen, or a machine file")
+            .because("the ending decides what it is: a bus.yml of ros2_canopen, or a machine file")
             .next("ferrodrive eds lint FILE checks a data sheet")),
     }
 }

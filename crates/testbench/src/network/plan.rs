@@ -84,7 +84,7 @@ impl PlanReport {
             notes.push("no PDO carries anything: --mode plans with what a mode of operation needs".into());
         }
         let fits = all.fits();
-        // What stops nothing but in the moment of a fault is no reason not to begin.
+        // What is late in the moment of a fault alone does not keep a motion from beginning.
         let ok = fits || moved.is_some() && cycle.fits();
         if ok && !fits && !all.is_tolerable(&cycle, TOLERANCE) {
             notes.push(format!(

@@ -43,17 +43,17 @@ pub struct ScannedNode {
     pub product_code: Option<u32>,
     /// 1018h:03.
     pub revision_number: Option<u32>,
-    /// What cannot be told, and why.
+    /// What is not certain, and why.
     pub remark: Option<String>,
 }
 
 impl ScannedNode {
     /// A node that was found, and which model it is said to be; `say` words how a person says which it is.
-    pub fn new(told: Option<&'static Description>, found: &Found, say: impl Fn(NodeId, &[&str]) -> String) -> Self {
+    pub fn new(known: Option<&'static Description>, found: &Found, say: impl Fn(NodeId, &[&str]) -> String) -> Self {
         let identity = found.identity.unwrap_or_default();
-        let contradiction = told.and_then(|told| contradiction(told, found));
+        let contradiction = known.and_then(|known| contradiction(known, found));
         let named = if let Knowledge::Named(model) = &found.knowledge { Some(model.0) } else { None };
-        let model = told.filter(|_| contradiction.is_none()).or(named);
+        let model = known.filter(|_| contradiction.is_none()).or(named);
         let guess = found.knowledge.guess().filter(|_| model.is_none());
         let evidence = guess.as_ref().and_then(|guess| guess.evidence());
         Self {
@@ -73,7 +73,7 @@ impl ScannedNode {
                 .twins
                 .map(two_devices)
                 .or(contradiction)
-                .or_else(|| found.doubt().filter(|_| told.is_none()).map(|doubt| remark(found, doubt, say))),
+                .or_else(|| found.doubt().filter(|_| known.is_none()).map(|doubt| remark(found, doubt, say))),
         }
     }
 }
@@ -99,20 +99,20 @@ impl ScannedNode {
 }
 
 /// What speaks against the model that a node is said to be.
-fn contradiction(told: &'static Description, found: &Found) -> Option<String> {
-    let said = format!("it is said to be a {}", told.name);
-    if !found.identity?.matches(&told.identity) {
+fn contradiction(known: &'static Description, found: &Found) -> Option<String> {
+    let said = format!("it is said to be a {}", known.name);
+    if !found.identity?.matches(&known.identity) {
         return Some(format!("{said}, but its identity is another one: say the right model"));
     }
     let guess = found.knowledge.guess()?;
-    let evidence = guess.evidence().filter(|_| guess.fitting().all(|model| model.name != told.name))?;
+    let evidence = guess.evidence().filter(|_| guess.fitting().all(|model| model.name != known.name))?;
     // A data sheet that has the object too is not spoken against.
-    let evidence = told.row(evidence).is_none().then_some(evidence)?;
+    let evidence = known.row(evidence).is_none().then_some(evidence)?;
     let fitting = guess.description().name;
     Some(format!("{said}, but has {evidence} as a {fitting} has: say the right model"))
 }
 
-/// What cannot be told, and what the user can do about it.
+/// What is not certain, and what the user can do about it.
 fn remark(found: &Found, doubt: String, say: impl Fn(NodeId, &[&str]) -> String) -> String {
     let candidates = match &found.knowledge {
         Knowledge::Named(_) => Vec::new(),

@@ -115,7 +115,7 @@ pub struct Deviates {
     pub name: Option<&'static str>,
     /// What it should have.
     pub wanted: Shown,
-    /// Null: the node did not tell.
+    /// Null: the node refused to show it.
     pub found: Option<Shown>,
     /// Why it was not read.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -128,7 +128,7 @@ pub struct Deviates {
 /// It is another device; silence.
 pub async fn verify_node(drive: &Drive, wanted: &Parameters, file: String) -> Result<VerifyReport, Failure> {
     let model = drive.description();
-    // A plan refuses another device, and what of the file is no parameter; what does not fit is a deviation here.
+    // A plan refuses another device, and what of the file is not a parameter; what does not fit is a deviation here.
     let left = match drive.plan_parameters(wanted, PlanOptions { address: true }).await {
         Ok(plan) => plan.left,
         Err(PlanError::Unfit { .. }) => Vec::new(),

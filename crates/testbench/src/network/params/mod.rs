@@ -181,7 +181,7 @@ fn notes(plan: &Plan, model: Option<&'static Description>) -> Vec<String> {
     notes
 }
 
-/// Whether the model keeps an object in its store; of an unknown model nobody knows, and the proof tells.
+/// Whether the model keeps an object in its store; of an unknown model that is not known, and the proof shows it.
 fn is_kept(model: Option<&'static Description>, object: Mux) -> bool {
     model.and_then(|model| model.row(object)).is_none_or(|row| row.is_kept())
 }
