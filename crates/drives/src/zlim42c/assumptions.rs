@@ -102,13 +102,18 @@ pub const CURRENT_KI_V_PER_A_S: f32 = 5.0;
 pub const MODULATION_LIMIT: f32 = 0.98;
 
 /// What a voltage vector at its limit does against the rotor's swing. A guess, as such drives damp a swing in the middle of
-/// their range of speed: 1 rad/A falls back about as far as the rotor does, since the current along the vector changes by
-/// `psi / L`, 1.6 and 1.2 A for a radian of the two lengths.
+/// their range of speed: 1 rad/A falls back about as far as the rotor does, since the current changes by `psi / L`, 1.6 and
+/// 1.2 A for a radian of the two lengths.
 pub const AT_LIMIT: AtLimit = AtLimit {
     turns_per_a: 1.0 / core::f32::consts::TAU,
-    // Behind 0.8 ms, between a bare rotor's swing (230 Hz at 0.3 N m) and one of ten times its inertia (70 Hz): there the way
-    // back comes a quarter of a swing late, which is what damps. Up to 30 ms: a load that stays turns nothing.
-    passed: [CONTROL_PERIOD_S / 0.8e-3, CONTROL_PERIOD_S / 30e-3],
+    // A swing shows along the vector as the sine of the angles of load and impedance, 1 without a load and 0.4 at pull-out, and
+    // across it as their cosine. More of that damps more near pull-out, and swings the rotor of 82 mm at half of it.
+    across_share: 0.15,
+    // Behind 0.7 ms, between a bare rotor's swing (230 Hz at 0.3 N m) and one of ten times its inertia (70 Hz): there the way
+    // back comes a quarter of a swing late, which is what damps. Up to 30 ms: a load that stays turns nothing. Of what swings
+    // slower the way back comes in time and damps nothing: a load of forty times the rotor's inertia (36 Hz) falls out of step
+    // above the corner speed. Behind 3 ms it would not, but then a bare rotor would.
+    passed: [CONTROL_PERIOD_S / 0.7e-3, CONTROL_PERIOD_S / 30e-3],
     // The integrals' own time is near the swing of a heavy load, which they feed.
     integral_share: 0.3,
 };

@@ -72,6 +72,9 @@ pub struct StepperGains {
 pub struct AtLimit {
     /// How far the vector falls back for what swings of the current along it, turns/A.
     pub turns_per_a: f32,
+    /// Share of the current across it, on the side from which the rotor pulls, that counts beside the one along it. The nearer the
+    /// rotor is to pull-out the less its swing shows along the vector, and the more across it.
+    pub across_share: f32,
     /// What swings is what passes the first of two low-passes and not the second: the share of the way that each goes in a
     /// control period.
     pub passed: [f32; 2],
@@ -206,8 +209,13 @@ impl Stepper {
             let dt_s = gains.at_limit.integral_share * model.control_period_s;
             self.d.settle(&gains.current, error_d, wanted_d, given_d, dt_s);
             self.q.settle(&gains.current, error_q, wanted_q, given_q, dt_s);
-            let along = (given_d * (wanted_d_a - error_d) + given_q * (wanted_q_a - error_q)) / limit;
-            turned(given_d, given_q, sin_cos_turns(angle_v - self.give_way(&gains.at_limit, along)))
+            let (d_a, q_a) = (wanted_d_a - error_d, wanted_q_a - error_q);
+            // Turning the other way everything is mirrored.
+            let ahead = if self.pulses_per_period < 0.0 { -1.0 } else { 1.0 };
+            let across = ahead * (given_d * q_a - given_q * d_a);
+            let swing = (given_d * d_a + given_q * q_a - gains.at_limit.across_share * across) / limit;
+            let back = ahead * self.give_way(&gains.at_limit, swing);
+            turned(given_d, given_q, sin_cos_turns(angle_v - back))
         } else {
             self.along_a = None;
             let (sin_v, cos_v) = sin_cos_turns(angle_v);
@@ -326,7 +334,7 @@ mod tests {
     const GAINS: StepperGains = StepperGains {
         current: PiGains { proportional: 15.0, integral_per_s: 1.5e3 },
         modulation_limit: 0.98,
-        at_limit: AtLimit { turns_per_a: 0.16, passed: [0.06, 1.7e-3], integral_share: 0.3 },
+        at_limit: AtLimit { turns_per_a: 0.16, across_share: 0.0, passed: [0.06, 1.7e-3], integral_share: 0.3 },
     };
     const CURRENTS: StepperCurrents = StepperCurrents { run_a: 1.2, hold_a: 0.6, hold_after: 200 };
     const RESISTANCE_OHM: f32 = 1.85;
