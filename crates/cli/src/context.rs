@@ -83,7 +83,7 @@ impl Context {
         let by_user = of_machine.chain(global.models.iter().copied()).map(|(node, model)| (node, Told::ByUser(model)));
         let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Told::ByBus(model)));
         let models: BTreeMap<_, _> = by_bus.chain(by_user).collect();
-        network.set_models(models::with_told(models.values().map(|told| told.description())));
+        network.set_models(models::with_files(models.values().map(|told| told.description())));
         // The file of an embedded bus has been read once, to make the bus.
         let of_bus = match &global.bus {
             BusSpec::Sim { file: Some(path) } => machine_file::read(path).ok(),

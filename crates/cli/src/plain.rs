@@ -34,15 +34,15 @@ mod tests {
     #[test]
     fn an_argument_of_ten_thousand_characters_is_cut_wherever_it_is_repeated() {
         let long = "x".repeat(10_000);
-        let text = format!("'{long}' is no node-ID; tip: to pass '{long}' as a value, use '-- {long}'");
+        let text = format!("'{long}' is not a node-ID; tip: to pass '{long}' as a value, use '-- {long}'");
         let cut = with_arguments_cut(&text, [long.clone(), "read".to_owned()]);
-        assert!(cut.len() < 400 && cut.contains("(10000 characters)' is no node-ID"), "{cut}");
+        assert!(cut.len() < 400 && cut.contains("(10000 characters)' is not a node-ID"), "{cut}");
         let cut = with_arguments_cut(
             &format!("'{long}' is no number"),
             [format!("--set=a={long}"), format!("--jobs={long}")],
         );
         assert!(cut.len() < 200, "{cut}");
-        assert_eq!(with_arguments_cut("'four' is no node-ID", ["four".to_owned()]), "'four' is no node-ID");
+        assert_eq!(with_arguments_cut("'four' is not a node-ID", ["four".to_owned()]), "'four' is not a node-ID");
     }
 
     #[test]

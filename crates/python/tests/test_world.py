@@ -372,7 +372,7 @@ def test_a_machine_file_that_makes_no_sense_is_told_with_its_place(tmp_path):
     with pytest.raises(ValueError, match=re.escape(f"{path}:2")):
         ferrodrive.World.machine(path)
     path.write_text("#" * (1 << 21))
-    with pytest.raises(ValueError, match="more than 1 MB"):
+    with pytest.raises(ValueError, match="larger than the limit of 1 MB"):
         ferrodrive.World.machine(path)
     with pytest.raises(ValueError, match="a directory"):
         ferrodrive.World.machine(tmp_path)

@@ -236,8 +236,8 @@ impl Bench {
         }
     }
 
-    /// Begins a row: sends a datagram that is no SDO request, and compares the one that answers it. Both are given as the
-    /// identifier and the bytes, `..` being any byte.
+    /// Begins a row: sends a datagram that is not an SDO request, and compares the one that answers it. Both are given
+    /// as the identifier and the bytes, `..` being any byte.
     pub(super) fn exchange_pdo(&mut self, step: impl Into<String>, request: &str, reply: &str) -> Option<Frame> {
         self.step(step);
         let (id, data) = reply.split_once(' ').unwrap_or((reply, ""));

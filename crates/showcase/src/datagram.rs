@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn an_abort_is_told_by_its_code() {
+    fn an_abort_is_reported_by_its_code() {
         assert_eq!(Pattern::sdo("80 16 10 00 00 00 02 06").expectation(), "abort 0602 0000h");
         assert_eq!(Pattern::sdo("60 40 60 00").expectation(), "6040600000000000");
     }

@@ -1,4 +1,4 @@
-//! A world as one looks at it and changes it while time passes by itself: in the words of the world commands, without those
+//! A world that is looked at and changed while its time passes on its own: by the world commands without those
 //! that move time.
 
 use serde_json::{Value, json};
@@ -38,7 +38,7 @@ pub struct Changed {
     pub line: String,
     /// What takes it back, where that does not depend on what was before.
     pub back: Option<String>,
-    /// What will come of it, where a person may not expect it.
+    /// The consequence, where it may be unexpected.
     pub note: Option<String>,
 }
 
@@ -48,15 +48,15 @@ pub struct Changed {
 /// Why not, in a word that programs may rely on, and in words; nothing is changed then.
 pub fn change(world: &mut World, line: &str) -> Result<Changed, (&'static str, String)> {
     let (command, changed) = understand(line)?;
-    let told = value(&perform(world, &command, Service::default()).map_err(failed)?);
-    Ok(Changed { note: told["note"].as_str().map(str::to_owned), ..changed })
+    let answer = value(&perform(world, &command, Service::default()).map_err(failed)?);
+    Ok(Changed { note: answer["note"].as_str().map(str::to_owned), ..changed })
 }
 
 fn failed(error: CommandError) -> (&'static str, String) {
     (error.kind(), error.to_string())
 }
 
-/// What a line will have done, without its note, when whoever has the world has done it.
+/// What a line will have changed once the owner of the world has performed it, without its note.
 ///
 /// # Errors
 /// Those of [`change`] that need no world to be found.
@@ -70,7 +70,7 @@ pub fn understand(line: &str) -> Result<(Command, Changed), (&'static str, Strin
         Command::Disturb(fault) => (None, fault.to_string(), fault.way_back().map(|back| back.to_string())),
         Command::ApplyToBody(name, stimulus) => (None, format!("body {name} {stimulus}"), None),
         Command::Now | Command::Help | Command::Quit | Command::Run(_) | Command::Get(_) | Command::GetBody(_) => {
-            return Err(("usage", "that changes nothing of the world: time passes by itself here".to_owned()));
+            return Err(("usage", "that changes nothing in the world; its time passes on its own here".to_owned()));
         }
     };
     Ok((command, Changed { node, line, back, note: None }))

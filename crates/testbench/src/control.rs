@@ -5,9 +5,9 @@
 //! standard input. Each gets one answer, with the request's `id`. What a client has subscribed to comes between the answers:
 //! events when they happen, values at a rate of the world's own time.
 //!
-//! [`Control`] holds the clients of one world. Whoever has the sockets calls [`Control::join`], [`Control::handle`] and
-//! [`Control::leave`], moves the world no further than [`Control::next_sample`], and calls [`Control::publish`] after each move.
-//! Lines for a client go to its [`Sink`]; an [`Outbox`] behind it keeps them within bounds.
+//! [`Control`] holds the clients of one world. The owner of the sockets calls [`Control::join`], [`Control::handle`]
+//! and [`Control::leave`], moves the world no further than [`Control::next_sample`], and calls [`Control::publish`]
+//! after each move. Lines for a client go to its [`Sink`]; an [`Outbox`] behind it keeps them within bounds.
 
 mod address;
 mod answer;

@@ -1,4 +1,4 @@
-//! Data sheets from the disk, for whoever shows, checks or uses them.
+//! Data sheets from the disk, to be shown, checked or used.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -13,7 +13,7 @@ use crate::failure::Failure;
 pub enum Unread {
     /// It cannot be read.
     File(io::Error),
-    /// It is no data sheet.
+    /// Not a data sheet.
     Refused(Refusal),
 }
 

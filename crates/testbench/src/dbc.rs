@@ -3,7 +3,7 @@
 //! In: which nodes there are, of which models, and how their PDOs are mapped. Out: the text. PDOs become messages with a signal
 //! for each mapped object: place, length, sign, factor and unit as the model's table has them; beside them NMT, SYNC, and of
 //! each node EMCY and heartbeat. SDO is left out: what a frame of it says depends on frames before. The text is ASCII, because
-//! a DBC file does not tell its encoding.
+//! a DBC file does not name its encoding.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -50,7 +50,7 @@ const MAX_NAME: usize = 32;
 const NMT_COMMANDS: [(i64, &str); 5] =
     [(1, "start"), (2, "stop"), (128, "enter pre-operational"), (129, "reset node"), (130, "reset communication")];
 
-/// NMT states as a heartbeat tells them (CiA 301, 7.2.8.3.2.2).
+/// NMT states as a heartbeat carries them (CiA 301, 7.2.8.3.2.2).
 const NMT_STATES: [(i64, &str); 4] = [(0, "boot-up"), (4, "stopped"), (5, "operational"), (127, "pre-operational")];
 
 /// What is behind the messages: comments and tables of values, in the order of the format.
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn dummies_are_gaps_what_is_too_long_is_left_out_and_names_are_told_apart() {
+    fn dummies_are_gaps_what_is_too_long_is_left_out_and_names_are_distinguished() {
         let text = print(&[node(&[(0x0005, 0, 8), (0x6061, 0, 8), (0x6061, 0, 8), (0x5FFF, 1, 16), (0x6064, 0, 32)])]);
         for line in [
             " SG_ modes_of_operation_display : 8|8@1- (1,0) [0|0] \"\" master",

@@ -1,4 +1,4 @@
-//! Events of a world ([`sim::events`]) as programs read them, and the choice of those that somebody wants to hear of.
+//! Events of a world ([`sim::events`]) as programs read them, and a filter for them.
 //!
 //! ```
 //! use core::time::Duration;
@@ -22,16 +22,16 @@ pub use sim::events::{Event, EventKind, KINDS};
 
 use crate::words::suggest::{did_you_mean, near};
 
-/// Which events somebody wants to hear of. The default: all.
+/// Which events are wanted. The default: all.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Filter {
     nodes: Vec<u8>,
     kinds: Vec<&'static str>,
 }
 
-/// There is no such kind of event.
+/// An unknown kind of event.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no kind of event {name:?}{}; expected one of {}", guess(name), names())]
+#[error("unknown kind of event {name:?}{}; expected one of {}", guess(name), names())]
 pub struct NoSuchKind {
     /// The name given.
     pub name: String,
@@ -54,7 +54,7 @@ impl Filter {
         Ok(Self { nodes: nodes.into_iter().collect(), kinds })
     }
 
-    /// Whether it is one of them. That events are missing is told to everybody.
+    /// Whether it is one of them. Every filter passes the note that events are missing.
     pub fn takes(&self, event: &Event) -> bool {
         let of_node = || event.place.is_some_and(|place| self.nodes.contains(&place.node));
         let of_kind = || self.kinds.contains(&event.kind.name());

@@ -27,11 +27,11 @@ pub fn resolve(text: &str) -> Result<&'static Description, String> {
     for word in choices.split(',') {
         let (key, choice) = word
             .split_once('=')
-            .ok_or_else(|| format!("'{word}' is no choice; expected KEY=CHOICE after the comma"))?;
+            .ok_or_else(|| format!("'{word}' is not a choice; expected KEY=CHOICE after the comma"))?;
         variant.choose(key.trim(), choice.trim()).map_err(|unknown| match unknown {
             NoSuchChoice::Choice(variation) => {
                 let known: Vec<_> = variation.choices.iter().map(|choice| choice.name).collect();
-                format!("{key} of a {name} is no '{choice}'; expected one of: {}", known.join(", "))
+                format!("'{choice}' is not a choice for {key} of a {name}; expected one of: {}", known.join(", "))
             }
             NoSuchChoice::Variation => {
                 let known: Vec<_> = model.variations.iter().map(|variation| variation.key).collect();
@@ -53,7 +53,11 @@ pub fn resolve_in(text: &str, folder: &Path) -> Result<&'static Description, Str
     let known = || models().map(|model| model.name);
     models().find(|model| model.name.eq_ignore_ascii_case(text)).ok_or_else(|| {
         let near = near(text, known());
-        format!("'{text}' is no model{}; expected one of: {}, or a file of it (FILE.eds)", did_you_mean(&near), names())
+        format!(
+            "'{text}' is not a model{}; expected one of: {}, or a file of it (FILE.eds)",
+            did_you_mean(&near),
+            names()
+        )
     })
 }
 
@@ -68,7 +72,7 @@ fn described(path: &Path) -> Result<&'static Description, String> {
     let shown = path.display();
     // Of a pipe the end might never come.
     if std::fs::metadata(path).is_ok_and(|kind| !kind.is_file()) {
-        return Err(format!("cannot read {shown}: it is no file but a directory, a pipe or a device"));
+        return Err(format!("cannot read {shown}: not a regular file"));
     }
     let reading = data_sheet::reading(path).map_err(|unread| match unread {
         Unread::File(error) => format!("cannot read {shown}: {error}"),
@@ -82,9 +86,9 @@ pub fn is_from_file(model: &Description) -> bool {
     !models().any(|known| model.is_edition_of(known))
 }
 
-/// The models known, and those told that are not among them.
-pub fn with_told(told: impl Iterator<Item = &'static Description>) -> Models {
-    told.filter(|model| is_from_file(model)).fold(Models::default(), |known, model| known.with(model))
+/// The models known, and those of `given` that come from files.
+pub fn with_files(given: impl Iterator<Item = &'static Description>) -> Models {
+    given.filter(|model| is_from_file(model)).fold(Models::default(), |known, model| known.with(model))
 }
 
 /// The drives on the embedded virtual bus and their node-IDs: one of each kind that is delivered with a node-ID, at that

@@ -10,7 +10,7 @@ use canopen::connection_set::Service;
 use canopen::{Mux, NodeId};
 use master::decode::Decoder;
 use serde::Serialize;
-use testbench::models::with_told;
+use testbench::models::with_files;
 use transport::log::{Direction, Entry, Record};
 
 use crate::command::dump::{open_log, unreadable};
@@ -226,7 +226,7 @@ impl Replay {
                 .because("what may move a drive is told before anything is sent")
                 .next("write it to a file first"));
         }
-        let mut decoder = Decoder::knowing(with_told(std::iter::empty()));
+        let mut decoder = Decoder::knowing(with_files(std::iter::empty()));
         for node in (1..=127).filter_map(NodeId::new) {
             if let Some(model) = context.told_model(node) {
                 decoder.set_model(node, model);

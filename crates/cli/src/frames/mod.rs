@@ -10,11 +10,11 @@ use master::decode::Decoder;
 
 use crate::global::Global;
 use testbench::machine_file::Machine;
-use testbench::models::{Description, with_told};
+use testbench::models::{Description, with_files};
 
 /// A decoder that knows the models of the command line and of the machine file, and those of an embedded bus.
 pub(crate) fn decoder(global: &Global, embedded: &[(NodeId, &'static Description)]) -> Decoder {
-    let mut decoder = Decoder::knowing(with_told(global.models.iter().map(|(_, model)| *model)));
+    let mut decoder = Decoder::knowing(with_files(global.models.iter().map(|(_, model)| *model)));
     let of_machine = global.machine.iter().flat_map(Machine::models);
     for (node, model) in embedded.iter().copied().chain(of_machine).chain(global.models.iter().copied()) {
         decoder.set_model(node, model);

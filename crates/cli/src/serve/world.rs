@@ -355,7 +355,7 @@ impl ServedWorld {
         let Some(FollowedCourse { execution, .. }) = &mut self.execution else { return };
         if self.world.is_watched() {
             for event in self.control.take_events(&mut self.world) {
-                execution.hear(&mut self.world, Occurrence::Told(&event));
+                execution.hear(&mut self.world, Occurrence::Event(&event));
                 if self.kept.is_some() && self.events.len() < MAX_WAITING {
                     self.events.push(event);
                 }

@@ -37,14 +37,14 @@ fn words_of_other_tools_are_answered_with_the_command_that_does_it() {
 fn nodes_are_checked() {
     refused(&["read", "0", "6064"], &["there is no node 0", "1 to 127", "e.g. 4"]);
     refused(&["read", "128", "6064"], &["there is no node 128"]);
-    refused(&["state", "four"], &["'four' is no node-ID"]);
+    refused(&["state", "four"], &["'four' is not a node-ID"]);
     refused(&["nmt", "everybody", "start"], &["or the word all"]);
     refused(&["nmt", "4", "begin"], &["pre-operational"]);
 }
 
 #[test]
 fn objects_and_values_are_checked() {
-    refused(&["read", "4", "60644"], &["is no object", "position_actual_value"]);
+    refused(&["read", "4", "60644"], &["is not an object", "position_actual_value"]);
     refused(&["read", "4", "6064:100"], &["sub-index", "00 to FF"]);
     refused(&["read", "4", "position_actual_vale"], &["did you mean position_actual_value?"]);
     refused(&["read", "4", "zzzz"], &["no object named 'zzzz'", "ferrodrive objects 4 WORD"]);
@@ -136,15 +136,15 @@ fn machine_files_are_checked() {
     std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nbattery = true\n").unwrap();
     refused(&["sim", "--machine", path], &["cannot use the machine file", "line 4, column 11", "has no battery"]);
     std::fs::write(&file, format!("# {}", "x".repeat(1 << 20))).unwrap();
-    refused(&["--bus", &bus, "scan"], &["more than 1 MB"]);
+    refused(&["--bus", &bus, "scan"], &["larger than the limit of 1 MB"]);
     #[cfg(unix)]
     {
         let pipe = directory.join("pipe.toml");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
         assert!(made.success());
         let pipe = pipe.to_str().unwrap();
-        refused(&["sim", "--machine", pipe], &["it is no file but a directory, a pipe or a device"]);
-        refused(&["--bus", &format!("sim:{pipe}"), "scan"], &["it is no file"]);
+        refused(&["sim", "--machine", pipe], &["not a regular file"]);
+        refused(&["--bus", &format!("sim:{pipe}"), "scan"], &["not a regular file"]);
     }
 }
 

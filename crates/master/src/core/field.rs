@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn a_type_that_is_too_short_or_of_another_sign_is_told_apart() {
+    fn a_type_that_is_too_short_or_of_another_sign_is_distinguished() {
         assert!(i32::suits(&field(16, NumberForm::Signed, 1.0)) && !i8::suits(&field(16, NumberForm::Signed, 1.0)));
         assert!(!u32::suits(&field(16, NumberForm::Signed, 1.0)) && !i32::suits(&field(32, NumberForm::Real, 1.0)));
     }

@@ -61,7 +61,7 @@ mod tests {
     use super::super::Decoder;
 
     #[test]
-    fn what_may_move_a_drive_is_told() {
+    fn what_may_move_a_drive_is_reported() {
         let mut decoder = Decoder::new();
         for (frame, why) in [
             // CiA 301, 7.2.8: NMT start, stop, reset.

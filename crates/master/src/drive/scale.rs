@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn a_difference_of_more_than_a_thousandth_is_told() {
+    fn a_difference_of_more_than_a_thousandth_is_reported() {
         let sent = |requested, commanded| {
             let (what, unit, object) = ("speed", "r/min", Mux::new(0x60FF, 0));
             Commanded { what, requested, commanded, unit, object, raw: commanded as i64 }

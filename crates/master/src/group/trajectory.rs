@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_moved_is_refused_and_said() {
+    fn what_cannot_be_moved_is_refused_with_the_reason() {
         let good = limits(2.0, 5.0, 40.0);
         let refused = |to: f64, limits: &AxisLimits| {
             Trajectory::to_rest_at(&[rest(0.0)], &[to], core::slice::from_ref(limits), None).unwrap_err().to_string()

@@ -170,7 +170,7 @@ mod tests {
     use crate::error::Error;
 
     #[test]
-    fn a_wrong_model_is_told_with_the_number_that_differs_and_no_other() {
+    fn a_wrong_model_is_reported_with_the_number_that_differs_and_no_other() {
         let wanted =
             devices::Identity { device_type: 0x0042_0192, vendor_id: 0x5A, product_code: 0xC1, revision_number: 1 };
         let found = Identity {

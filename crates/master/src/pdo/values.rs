@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_said_before_anybody_is_asked() {
+    fn what_does_not_fit_is_reported_before_any_request() {
         let refused = |config: PdoConfig| config.values(model(), node()).expect_err("it does not fit").to_string();
         let long = mapped(&[0x6041, 0x6064, 0x606C]);
         assert!(refused(long).contains("statusword (16), position_actual_value (32), velocity_actual_value (32)"));

@@ -397,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn what_is_wrong_is_reported() {
         let says = |text: &str| text.parse::<Angle>().unwrap_err().to_string();
         assert!(says("deg").starts_with("\"deg\" does not begin with a number"));
         assert!(says("90rpm").starts_with("\"rpm\" in \"90rpm\" is not a unit of this quantity"));

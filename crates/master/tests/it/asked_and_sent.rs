@@ -41,7 +41,7 @@ fn values(commanded: &[Commanded]) -> Vec<(&'static str, f64, f64, i64, bool)> {
 }
 
 #[test]
-fn a_speed_between_two_counts_is_told_with_what_was_sent_on_all_three_drives() {
+fn a_speed_between_two_counts_is_reported_with_what_was_sent_on_all_three_drives() {
     let (mut world, drives) = bench();
     for drive in &drives {
         // 60FFh counts whole r/min on each of them.
@@ -94,7 +94,7 @@ fn the_resolution_that_is_set_on_the_drive_counts() {
 }
 
 #[test]
-fn angles_currents_ramps_and_profile_velocities_are_told_too() {
+fn angles_currents_ramps_and_profile_velocities_are_reported_too() {
     let (mut world, [joint, stepper, servo]) = bench();
     let options = MotionOptions {
         speed: Some(Rpm(30.4)),

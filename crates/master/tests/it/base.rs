@@ -158,7 +158,7 @@ fn too_much_is_driven_more_slowly_on_the_same_circle() {
 }
 
 #[test]
-fn without_a_new_twist_it_stops_and_says_so() {
+fn without_a_new_twist_it_stops_and_reports_it() {
     let mut bench = Bench::new();
     let mut base = bench.open();
     bench.drive(&mut base, 0.4, 0.0, 2.0);
@@ -252,7 +252,7 @@ fn a_blocked_wheel_stops_both_before_the_base_has_turned_about_it() {
 }
 
 #[test]
-fn a_wheel_that_is_lost_while_the_base_stops_is_told() {
+fn a_wheel_that_is_lost_while_the_base_stops_is_reported() {
     let mut bench = Bench::new();
     let mut base = bench.open();
     bench.drive(&mut base, 0.8, 0.0, 2.0);

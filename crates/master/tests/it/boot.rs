@@ -96,7 +96,7 @@ fn all_three_drives_boot_at_once_and_each_says_what_stops_it() {
 }
 
 #[test]
-fn a_node_that_is_not_there_is_told_with_what_was_tried_and_others_boot() {
+fn a_node_that_is_not_there_is_reported_with_what_was_tried_and_others_boot() {
     let mut bench = Bench::new();
     let nodes = [(node(SERVO), expected("zlac8030l")), (node(9), expected("zlim42c"))];
     let began = bench.world.now();
@@ -110,7 +110,7 @@ fn a_node_that_is_not_there_is_told_with_what_was_tried_and_others_boot() {
 }
 
 #[test]
-fn a_drive_without_its_cable_is_told_with_when_it_was_last_heard() {
+fn a_drive_without_its_cable_is_reported_with_when_it_was_last_heard() {
     let mut bench = Bench::new();
     bench.apply(SERVO, "cable cut");
     bench.world.run_for(Duration::from_secs(12));
@@ -226,7 +226,7 @@ fn a_manager_s_dictionary_is_a_plan() {
 }
 
 #[test]
-fn a_mandatory_node_that_fails_stops_the_others_where_1f80h_says_so() {
+fn a_mandatory_node_that_fails_stops_the_others_with_bit_6_of_1f80h() {
     let mut bench = Bench::new();
     let mut plan = BootPlan::new([(node(SERVO), expected("zlac8030l")), (node(9), expected("zlim42c"))]);
     // CiA 302-2, 1F80h: bit 6 stops all nodes.
@@ -266,7 +266,7 @@ fn a_node_that_is_no_slave_is_not_asked_anything() {
 }
 
 #[test]
-fn nobody_on_the_bus_is_said_within_the_time_of_the_plan() {
+fn an_empty_bus_is_reported_within_the_time_of_the_plan() {
     let mut bus = Bus::new(Vec::new());
     let plan = BootPlan::new([(node(7), Expectation::of_unknown())]);
     let (network, began) = (bus.network.clone(), bus.now);
@@ -279,7 +279,7 @@ fn nobody_on_the_bus_is_said_within_the_time_of_the_plan() {
 /// A joint starts operational by itself (M joint manual, 4.2), and is left so (CiA 302-2, 1F81h bit 4): its configuration is not
 /// written. That is reported as long as it is so, and no longer.
 #[test]
-fn a_node_that_was_left_operational_without_its_configuration_is_told() {
+fn a_node_that_was_left_operational_without_its_configuration_is_reported() {
     let mut bench = Bench::new();
     let heartbeat = Mux::new(0x1017, 0);
     let of_joint = Expectation { configuration: vec![(heartbeat, vec![200, 0])], ..expected("m4230e17b50") };

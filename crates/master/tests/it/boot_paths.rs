@@ -85,7 +85,7 @@ fn a_program_that_cannot_be_compared_ends_with_g() {
 
 /// CiA 302-2, 1F81h: without bit 2 the node is not booted by this master, which only watches its heartbeat.
 #[test]
-fn a_slave_that_somebody_else_boots_is_neither_reset_nor_written_nor_started() {
+fn a_slave_that_another_device_boots_is_neither_reset_nor_written_nor_started() {
     for bits in [Assignment::SLAVE, Assignment::SLAVE | Assignment::MANDATORY | Assignment::VERIFY_SOFTWARE] {
         let mut bus = bus_of(device().u32(0x2000, 0, 1));
         let configuration = vec![(mux(0x2000, 0), 5_u32.to_le_bytes().to_vec())];
@@ -146,7 +146,7 @@ fn a_master_that_starts_no_node_leaves_it_pre_operational() {
 
 /// CiA 302-2, 1F80h, bit 4.
 #[test]
-fn a_mandatory_node_that_fails_resets_all_where_1f80h_says_so() {
+fn a_mandatory_node_that_fails_resets_all_with_bit_4_of_1f80h() {
     let mut bus = bus_of(device());
     let report = boot(&mut bus, Startup::RESET_ALL, Expectation { device_type: Some(1), ..expecting(SLAVE) });
     assert_eq!(letter(&report), Some('C'));

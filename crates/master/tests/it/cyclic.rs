@@ -381,7 +381,7 @@ fn a_program_that_gives_no_set_points_any_more_stops_its_drive() {
 }
 
 #[test]
-fn a_joint_whose_program_hangs_comes_to_rest_and_says_why() {
+fn a_joint_whose_program_hangs_comes_to_rest_and_gives_the_reason() {
     let mut bench = Bench::new();
     let (_, mut cyclic) = bench.open(JOINT, IP);
     let Turns(from) = bench.run(&mut cyclic, 50, |_| Demand::Hold).position.unwrap();
@@ -394,7 +394,7 @@ fn a_joint_whose_program_hangs_comes_to_rest_and_says_why() {
 }
 
 #[test]
-fn a_drive_that_falls_silent_is_told_and_stopped() {
+fn a_drive_that_falls_silent_is_reported_and_stopped() {
     let mut bench = Bench::new();
     let (_, mut cyclic) = bench.open(SERVO, PV);
     bench.run(&mut cyclic, 400, |_| Demand::Velocity(Rpm(100.0)));
@@ -458,7 +458,7 @@ fn a_drive_stops_when_the_whole_program_dies() {
 }
 
 #[test]
-fn what_nothing_stops_when_the_program_dies_is_told_before_it_moves() {
+fn what_nothing_stops_when_the_program_dies_is_reported_before_it_moves() {
     // The ZLIM42-C has no watch over its host.
     let mut bench = Bench::new();
     let (_, cyclic) = bench.open(STEPPER, PV);
@@ -522,7 +522,7 @@ fn a_fault_is_latched_explained_and_reset() {
 }
 
 #[test]
-fn what_is_not_mapped_or_no_mode_of_set_points_is_told_before_anything_moves() {
+fn what_is_not_mapped_or_not_a_mode_of_set_points_is_reported_before_anything_moves() {
     let mut bench = Bench::new();
     let (servo, joint) = (bench.drive(SERVO), bench.drive(JOINT));
     let options = CyclicOptions::default();

@@ -134,7 +134,7 @@ fn speeds_and_currents_of_each_cycle_are_followed_in_csv_and_cst() {
 }
 
 #[test]
-fn an_acceleration_of_zero_is_no_reason_to_wait_for_an_hour_and_is_told() {
+fn an_acceleration_of_zero_is_reported_and_not_waited_for() {
     let mut bench = Bench::new();
     let began = bench.world.now();
     let error = block_on(&mut bench.world, async {

@@ -97,7 +97,7 @@ fn a_drive_that_is_enabled_and_stands_keeps_its_power_when_a_program_takes_it_ov
 }
 
 #[test]
-fn nothing_is_said_to_a_drive_that_is_not_heard_and_off_is_said_to_it_nevertheless() {
+fn nothing_is_sent_to_a_drive_that_is_not_heard_but_switching_off() {
     let mut bench = Bench::new("zlac8030l", PV);
     // Its TPDO does not come: it was made invalid.
     let write = bench.drive.node().write(mux(0x1800, 1), 0x8000_0181_u32);

@@ -14,7 +14,7 @@ fn lines(decoder: &mut Decoder, frames: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn single_frame_services_are_told_in_words() {
+fn single_frame_services_are_reported_in_words() {
     let shown = lines(
         &mut Decoder::new(),
         &["000#0104", "000#8000", "080#", "704#00", "704#05", "084#1021020000000000", "184#R4", "000#01", "6FF#01"],
@@ -293,7 +293,7 @@ fn block_transfers_are_put_together_and_attributed_to_their_object() {
 }
 
 #[test]
-fn a_block_transfer_that_goes_wrong_is_told_and_forgotten() {
+fn a_block_transfer_that_goes_wrong_is_reported_and_forgotten() {
     let corrupt = ["604#C608100009000000", "584#A40810007F000000", "604#0131323334353637", "604#823838FFFFFFFFFF"];
     let mut decoder = Decoder::new();
     lines(&mut decoder, &corrupt);
@@ -311,7 +311,7 @@ fn a_block_transfer_that_goes_wrong_is_told_and_forgotten() {
 }
 
 #[test]
-fn frames_tell_their_service_their_node_and_their_objects() {
+fn frames_name_their_service_their_node_and_their_objects() {
     let mut decoder = Decoder::new();
     let mut about = |text: &str| {
         let decoded = decoder.decode(&text.parse::<Frame>().unwrap());

@@ -78,7 +78,7 @@ fn a_fault_is_reset_by_an_edge_and_one_that_stays_is_explained() {
 }
 
 #[test]
-fn a_drive_that_ignores_its_controlword_is_told_as_such() {
+fn a_drive_that_ignores_its_controlword_is_reported_as_such() {
     let (mut bus, drive) = bus_with(|toy| toy.drive.as_mut().unwrap().stubborn = true);
     let error = bus.block_on(drive.enable()).unwrap_err();
     assert!(error.to_string().contains("took the controlword 0006h (shutdown) and did not act on it"), "{error}");
@@ -367,7 +367,7 @@ fn the_second_axis_of_a_node_is_asked_at_its_own_objects() {
 }
 
 #[test]
-fn a_value_that_was_sent_before_the_drive_was_told_something_is_not_believed() {
+fn a_value_that_was_sent_before_the_last_write_to_the_drive_is_not_believed() {
     let mut toy = Toy::new(4).u16(0x6041, 0, 0x0231).u16(0x6040, 0, 0);
     toy = toy.u8(0x6061, 0, 0);
     let mut bus = Bus::new(vec![toy]);

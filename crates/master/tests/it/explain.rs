@@ -346,7 +346,7 @@ fn each_condition_is_named_with_what_to_do() {
 }
 
 #[test]
-fn an_input_is_told_by_its_name_and_object_of_the_manual_and_is_gone_when_released() {
+fn an_input_is_reported_by_its_name_and_object_of_the_manual_and_is_gone_when_released() {
     let mut bench = Bench::new("zlac8030l");
     press_emergency_stop(&mut bench);
     let explained = bench.explain();
@@ -488,7 +488,7 @@ fn map_controlword(bench: &mut Bench) -> u16 {
 }
 
 #[test]
-fn a_controlword_that_others_send_by_rpdo_is_told_with_its_value() {
+fn a_controlword_that_others_send_by_rpdo_is_reported_with_its_value() {
     for name in ["zlac8030l", "zlim42c", "cia402"] {
         let mut bench = Bench::new(name);
         let id = map_controlword(&mut bench);
@@ -505,7 +505,7 @@ fn a_controlword_that_others_send_by_rpdo_is_told_with_its_value() {
 }
 
 #[test]
-fn each_pdo_says_why_it_is_silent() {
+fn each_pdo_gives_the_reason_it_is_silent() {
     for name in ["zlac8030l", "zlim42c", "cia402"] {
         let mut bench = Bench::new(name);
         let drive = bench.drive.clone();

@@ -203,7 +203,7 @@ fn places_of(group: &Group, axes: [usize; 2]) -> Vec<f64> {
 }
 
 #[test]
-fn a_blocked_shaft_stops_the_group_and_its_lag_is_told() {
+fn a_blocked_shaft_stops_the_group_and_its_lag_is_reported() {
     let mut bench = Bench::servos(2);
     let mut group = bench.open();
     let to: Vec<_> = places(&group).iter().map(|from| from + 2.0).collect();
@@ -279,7 +279,7 @@ fn a_stop_leaves_the_group_ready() {
 }
 
 #[test]
-fn an_axis_that_is_lost_while_the_group_stops_by_request_is_told() {
+fn an_axis_that_is_lost_while_the_group_stops_by_request_is_reported() {
     for disabled in [false, true] {
         let mut bench = Bench::servos(2);
         let mut group = bench.open();

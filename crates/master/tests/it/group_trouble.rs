@@ -151,7 +151,7 @@ fn a_sync_that_stays_away_stops_all_axes_and_the_late_program_is_named() {
 }
 
 #[test]
-fn a_drive_with_a_fault_of_its_own_is_told_with_its_text_and_the_others_stop_together() {
+fn a_drive_with_a_fault_of_its_own_is_reported_with_its_text_and_the_others_stop_together() {
     let mut bench = Bench::moving();
     let broken = Stimulus::Fault(Component::Encoder, true);
     bench.world.apply(Place::node(2), &broken).unwrap().unwrap();

@@ -161,7 +161,7 @@ fn a_guarded_servo_is_kept_content_and_stops_a_second_after_the_last_frame() {
 }
 
 #[test]
-fn a_stepper_turns_on_and_the_guard_says_so() {
+fn a_stepper_turns_on_and_the_guard_reports_it() {
     let mut bench = Bench::new();
     assert_eq!(bench.guard(STEPPER), HostLoss::GoesOn);
     bench.turn(STEPPER);
@@ -303,7 +303,7 @@ fn a_reset_ends_the_alarm_of_a_lost_host_at_standstill() {
 }
 
 #[test]
-fn a_watch_that_somebody_switched_off_stays_so_unless_asked_for() {
+fn a_watch_that_was_switched_off_stays_so_unless_asked_for() {
     let mut bench = Bench::new();
     let (drive, object) = (bench.drive(SERVO), mux(0x2000, 0));
     let time = |bench: &mut Bench| bench.run(drive.node().read::<u16>(object)).unwrap();

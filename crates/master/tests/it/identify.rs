@@ -55,7 +55,7 @@ fn names(models: impl IntoIterator<Item = &'static devices::Description>) -> Vec
 }
 
 #[test]
-fn a_scan_says_that_it_cannot_tell_the_two_zl_drives_and_what_their_objects_speak_for() {
+fn a_scan_reports_that_the_two_zl_drives_are_ambiguous_and_what_their_objects_suggest() {
     let (mut world, network) = bench();
     let found = scan(&mut world, &network);
     let zl = ["zlac8030l", "zlim42c", "zlim42c-82"];
@@ -210,7 +210,7 @@ fn a_joint_in_alarm_is_operational_though_its_heartbeat_says_04h() {
 
 /// CiA 301, 7.2.4.3: one SDO channel has one client. Where there are two masters all the same, the answers to both mix.
 #[test]
-fn another_master_that_asks_too_keeps_nobody_from_being_found() {
+fn another_master_that_asks_too_keeps_no_node_from_being_found() {
     let (mut alone, first) = bench();
     let expected = scan(&mut alone, &first);
     for seed in 0..8 {

@@ -147,7 +147,7 @@ fn a_refused_mapping_puts_everything_back_and_says_what_stands() {
 }
 
 #[test]
-fn what_cannot_be_is_said_all_at_once_and_nothing_is_written() {
+fn what_cannot_be_written_is_reported_all_at_once_and_nothing_is_written() {
     let (mut world, drive) = zlac8030l();
     let before = backed_up(&mut world, &drive);
     let wrong = with(
@@ -173,7 +173,7 @@ fn what_cannot_be_is_said_all_at_once_and_nothing_is_written() {
 }
 
 #[test]
-fn commands_and_the_address_are_left_out_and_told() {
+fn commands_and_the_address_are_left_out_and_reported() {
     let (mut world, drive) = zlac8030l();
     let wanted = [(mux(0x6040, 0), vec![0x0F, 0]), (mux(0x60FF, 0), vec![60, 0, 0, 0]), (mux(0x200D, 0), vec![5, 0])];
     let wanted = Parameters { values: BTreeMap::from(wanted), ..Parameters::default() };
@@ -219,7 +219,7 @@ fn a_drive_at_work_is_left_alone() {
 }
 
 #[test]
-fn a_drive_that_falls_silent_is_told_with_what_is_left() {
+fn a_drive_that_falls_silent_is_reported_with_what_is_left() {
     let (mut world, drive) = zlac8030l();
     let before = backed_up(&mut world, &drive);
     let plan = planned(&mut world, &drive, &changed(model_of(&drive), &before)).expect("a plan");

@@ -61,7 +61,7 @@ fn a_tpdo_is_set_up_in_the_legal_order_and_then_received() {
 }
 
 #[test]
-fn a_value_that_does_not_read_back_is_told_and_the_pdo_put_back() {
+fn a_value_that_does_not_read_back_is_reported_and_the_pdo_put_back() {
     let mut toy = drive();
     toy.ignores.push((0x1800, 3));
     let mut bus = Bus::new(vec![toy]);
@@ -78,7 +78,7 @@ fn a_value_that_does_not_read_back_is_told_and_the_pdo_put_back() {
 }
 
 #[test]
-fn a_refused_object_is_told_with_the_abort_and_the_old_mapping_comes_back() {
+fn a_refused_object_is_reported_with_the_abort_and_the_old_mapping_comes_back() {
     let mut toy = drive();
     toy.aborts.insert((0x1600, 2), AbortCode::NOT_MAPPABLE.0);
     // Reading it is refused too, but only mapped entries are read.

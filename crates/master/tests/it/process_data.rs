@@ -115,7 +115,7 @@ fn what_a_field_cannot_hold_is_refused_and_the_image_stays() {
 }
 
 #[test]
-fn an_object_that_is_not_mapped_or_does_not_suit_is_told_with_what_is_there() {
+fn an_object_that_is_not_mapped_or_does_not_suit_is_reported_with_what_is_there() {
     let network = Network::new();
     let node = node_with_pdos(&network);
     let error = node.signal::<i32>(mux(0x606C, 0)).unwrap_err();
@@ -146,7 +146,7 @@ fn a_program_that_comes_late_finds_the_cycles_that_it_missed() {
 }
 
 #[test]
-fn a_runner_that_comes_late_has_its_missed_cycles_told() {
+fn a_runner_that_comes_late_has_its_missed_cycles_reported() {
     let mut network = Network::new();
     network.sync(Some(PERIOD));
     for at in [0, 10, 45, 50] {
@@ -159,7 +159,7 @@ fn a_runner_that_comes_late_has_its_missed_cycles_told() {
 }
 
 #[test]
-fn the_sync_of_another_node_is_followed_and_its_loss_told() {
+fn the_sync_of_another_node_is_followed_and_its_loss_reported() {
     let mut bus = Bus::new(vec![]);
     let network = bus.network.clone();
     let begin = bus.now;

@@ -261,7 +261,7 @@ fn reset_waits_for_the_boot_up_message_and_a_dead_node_is_explained() {
 }
 
 #[test]
-fn a_stopped_node_is_told_as_such() {
+fn a_stopped_node_is_reported_as_such() {
     let mut toy = Toy::new(4);
     toy.answers_left = Some(0);
     toy.send(0x700, &[4]);
@@ -287,7 +287,7 @@ fn a_lost_heartbeat_is_seen_by_who_waits_for_it() {
 }
 
 #[test]
-fn a_node_that_this_master_stopped_is_told_as_such_without_a_heartbeat() {
+fn a_node_that_this_master_stopped_is_reported_as_such_without_a_heartbeat() {
     let mut toy = Toy::new(4);
     toy.answers_left = Some(0);
     let mut bus = Bus::new(vec![toy]);
@@ -299,7 +299,7 @@ fn a_node_that_this_master_stopped_is_told_as_such_without_a_heartbeat() {
 }
 
 #[test]
-fn a_request_that_nobody_takes_from_the_master_is_told_as_such() {
+fn a_request_that_the_runner_does_not_take_is_reported_as_such() {
     // No runner takes frames: an interface that is down.
     let mut network = master::Network::new();
     let node = network.node(node(4)).with_timeout(Duration::from_millis(100));

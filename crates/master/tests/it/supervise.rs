@@ -104,7 +104,7 @@ impl Bench {
 
 /// Neither the one that was cut off, at the first heartbeat that it hears, nor the other that stopped for want of one.
 #[test]
-fn a_joint_whose_cable_is_joined_again_stands_until_somebody_moves_it() {
+fn a_joint_whose_cable_is_joined_again_stands_until_it_is_moved() {
     let mut bench = Bench::new();
     bench.turn(JOINT);
     bench.turn(DESCRIBED);
@@ -162,7 +162,7 @@ fn no_length_of_a_cut_lets_a_joint_go_on_after_it_has_stopped() {
 
 /// A supply that comes back leaves a drive with nothing to do; it is configured and armed again, and waits.
 #[test]
-fn a_drive_that_lost_its_supply_is_booted_again_and_started_when_somebody_says_so() {
+fn a_drive_that_lost_its_supply_is_booted_again_and_started_by_resume() {
     let mut bench = Bench::new();
     for id in [SERVO, DESCRIBED, JOINT] {
         bench.turn(id);
@@ -206,7 +206,7 @@ fn drives_that_came_back_stop_again_when_the_master_dies() {
 }
 
 #[test]
-fn another_device_in_the_place_of_a_drive_is_told_with_what_differs_and_not_started() {
+fn another_device_in_the_place_of_a_drive_is_reported_with_what_differs_and_not_started() {
     let mut bench = Bench::new();
     let old = bench.world.drive_id(SERVO).unwrap();
     bench.world.remove(old);
@@ -221,7 +221,7 @@ fn another_device_in_the_place_of_a_drive_is_told_with_what_differs_and_not_star
 }
 
 #[test]
-fn emergencies_are_told_with_fault_and_remedy_and_kept_until_they_are_gone() {
+fn emergencies_are_reported_with_fault_and_remedy_and_kept_until_they_are_gone() {
     let mut bench = Bench::new();
     bench.turn(SERVO);
     bench.reported.clear();
@@ -241,7 +241,7 @@ fn emergencies_are_told_with_fault_and_remedy_and_kept_until_they_are_gone() {
 
 /// Its answers would mix with ours; it is reported once.
 #[test]
-fn a_second_master_is_told_once_with_what_it_does() {
+fn a_second_master_is_reported_once_with_what_it_does() {
     let mut bench = Bench::new();
     for frame in ["604#4000100000000000", "604#4000100000000000", "000#0104", "000#0105"] {
         bench.supervisor.hear(bench.world.now(), &frame.parse().unwrap());

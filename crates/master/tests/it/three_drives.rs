@@ -106,7 +106,7 @@ fn torque_is_mode_4_and_not_6_velocity_is_mode_3_and_not_2_on_both_zl_drives() {
 }
 
 #[test]
-fn a_shaft_that_is_said_to_have_reached_its_target_stands_there() {
+fn a_shaft_that_is_reported_to_have_reached_its_target_stands_there() {
     // As delivered: the joint's ramp is 20000 (r/min)/s, and its bit 10 comes while it still turns.
     let (mut world, _, drives) = bench();
     for drive in &drives {
@@ -182,7 +182,7 @@ fn a_move_that_was_halted_gives_way_to_the_next_one_on_every_drive() {
 }
 
 #[test]
-fn a_move_after_a_speed_stops_first_and_says_so_on_every_drive() {
+fn a_move_after_a_speed_stops_first_and_reports_it_on_every_drive() {
     let (mut world, _, drives) = bench();
     for drive in &drives {
         block_on(&mut world, drive.velocity(Rpm(120.0), slowly())).unwrap().unwrap();
@@ -208,7 +208,7 @@ fn a_current_is_pushed_where_the_model_has_a_torque_mode_and_refused_where_not()
 }
 
 #[test]
-fn a_note_tells_what_each_drive_does_without_its_host() {
+fn a_note_describes_what_each_drive_does_without_its_host() {
     let (mut world, _, drives) = bench();
     for drive in &drives {
         let report = block_on(&mut world, drive.velocity(Rpm(30.0), slowly())).unwrap().unwrap();
@@ -397,7 +397,7 @@ fn every_drive_saves_by_its_own_command_and_restores_where_it_can() {
 }
 
 #[test]
-fn models_of_one_identity_and_different_tables_have_objects_that_tell_them_apart() {
+fn models_of_one_identity_and_different_tables_have_objects_that_distinguish_them() {
     let has = |profile: &Description, object| profile.dictionary.find(object).is_ok();
     for one in all().iter() {
         for other in all().iter() {

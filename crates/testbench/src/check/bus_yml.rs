@@ -1,4 +1,4 @@
-//! The bus of ros2_canopen: a `bus.yml`, which Lely's `dcfgen` reads too. What stands in it, with its places.
+//! The bus of ros2_canopen: a `bus.yml`, which Lely's `dcfgen` reads too. Its contents, with their places.
 //!
 //! `options` and `defaults` are for all nodes, `master` is the master, every other name is a node; newer files have the nodes below
 //! `nodes`.
@@ -158,7 +158,7 @@ pub(super) struct Write {
     pub(super) at: Place,
 }
 
-/// What is said of one PDO.
+/// The keys of one PDO.
 #[derive(Clone, Debug)]
 pub(super) struct Pdo {
     pub(super) at: Place,
@@ -170,7 +170,7 @@ pub(super) struct Pdo {
     pub(super) event_timer: Option<i64>,
     pub(super) sync_start: Option<i64>,
     pub(super) cob_id: Option<PdoId>,
-    /// Index and sub-index of what it carries, if that is said.
+    /// Index and sub-index of what it carries, if that is given.
     pub(super) mapping: Option<Vec<(u16, u8)>>,
 }
 
@@ -189,7 +189,7 @@ impl Slave {
         NodeId::new(u8::try_from(self.node_id.as_ref()?.value).ok()?)
     }
 
-    /// What is said of a PDO.
+    /// The keys of a PDO.
     pub(super) fn pdo(&self, is_transmit: bool, number: u16) -> Option<&Pdo> {
         self.pdos.iter().find(|pdo| pdo.is_transmit == is_transmit && pdo.number == number)
     }
@@ -201,12 +201,7 @@ pub(super) fn read(document: &Node<'_>, folder: &Path, report: &mut Reporter<'_>
     let entries = document.entries();
     let Some(master) = entries.iter().find(|entry| entry.key == "master") else {
         let next = "describe the master: `master:` with `node_id: 127`";
-        report.say(
-            Severity::Error,
-            document.at(),
-            "there is no `master`: this is no bus.yml, or not a whole one",
-            next,
-        );
+        report.say(Severity::Error, document.at(), "`master` is missing: not a bus.yml, or not a whole one", next);
         return None;
     };
     let defaults = entries.iter().find(|entry| entry.key == "defaults");
@@ -221,7 +216,7 @@ pub(super) fn read(document: &Node<'_>, folder: &Path, report: &mut Reporter<'_>
             let default = defaults.map(|entry| &entry.value);
             nodes.push(slave(entry, default, (folder, multiplier), report));
         } else {
-            let what = format!("'{}' is no node: it has no keys", entry.key);
+            let what = format!("'{}' is not a node: it has no keys", entry.key);
             report.say(
                 Severity::Error,
                 entry.at,
@@ -234,12 +229,7 @@ pub(super) fn read(document: &Node<'_>, folder: &Path, report: &mut Reporter<'_>
         unknown_keys(&defaults.value, &NODE_KEYS, report);
     }
     if nodes.is_empty() {
-        report.say(
-            Severity::Error,
-            document.at(),
-            "there is no node beside the master",
-            "add a name with `node_id` and `dcf`",
-        );
+        report.say(Severity::Error, document.at(), "no node beside the master", "add a name with `node_id` and `dcf`");
     }
     Some(Bus { master: of_master(master, multiplier, report), nodes })
 }
@@ -340,7 +330,7 @@ fn number(own: &Node<'_>, defaults: Option<&Node<'_>>, key: &str, report: &mut R
         report.say(
             Severity::Error,
             node.at(),
-            format!("`{key}` is no whole number"),
+            format!("`{key}` is not a whole number"),
             format!("expected a number: `{key}: 1`"),
         );
     }
@@ -367,7 +357,7 @@ fn pdo(entry: &Entry<'_>, is_transmit: bool, report: &mut Reporter<'_>) -> Optio
         report.say(
             Severity::Error,
             entry.at,
-            format!("'{}' is no number of a PDO", entry.key),
+            format!("'{}' is not a number of a PDO", entry.key),
             "expected 1 to 512: PDO 1 is 1400h or 1800h",
         );
         return None;
@@ -407,12 +397,7 @@ fn unknown_keys(node: &Node<'_>, known: &[&str], report: &mut Reporter<'_>) {
     for entry in node.entries().iter().filter(|entry| !known.contains(&entry.key.as_str())) {
         let near = near(&entry.key, known.iter().copied());
         let what =
-            format!("'{}' is no key that ros2_canopen or dcfgen is known to read{}", entry.key, did_you_mean(&near));
-        report.say(
-            Severity::Warning,
-            entry.at,
-            what,
-            "check its spelling: what is not known is passed over without a word",
-        );
+            format!("'{}' is not a key that ros2_canopen or dcfgen is known to read{}", entry.key, did_you_mean(&near));
+        report.say(Severity::Warning, entry.at, what, "check its spelling: an unknown key is ignored silently");
     }
 }

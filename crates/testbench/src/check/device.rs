@@ -21,7 +21,7 @@ pub(super) fn read(path: &Path, at: Place, report: &mut Reporter<'_>) -> Option<
     report.rule = "data-sheet";
     let shown = path.display();
     if std::fs::metadata(path).is_ok_and(|kind| !kind.is_file()) {
-        report.say(Severity::Error, at, format!("{shown} is no file"), "name an EDS or DCF file");
+        report.say(Severity::Error, at, format!("{shown} is not a regular file"), "name an EDS or DCF file");
         return None;
     }
     let reading = match data_sheet::reading(path) {
@@ -35,7 +35,7 @@ pub(super) fn read(path: &Path, at: Place, report: &mut Reporter<'_>) -> Option<
             report.say(
                 Severity::Error,
                 at,
-                format!("{shown} is no data sheet: {refusal}"),
+                format!("{shown} is not a data sheet: {refusal}"),
                 format!("ferrodrive eds lint {shown}"),
             );
             return None;
@@ -58,9 +58,9 @@ fn model_of(eds: &Eds) -> Option<&'static Description> {
         eds.objects.iter().map(|object| object.index).filter(|index| (0x2000..0x6000).contains(index)).collect();
     let shared = |model: &Description| own.iter().filter(|index| model.has_index(**index)).count();
     let fits = |model: &&Description| {
-        let told = vendor != 0 || product != 0;
+        let stated = vendor != 0 || product != 0;
         let same = (i128::from(model.identity.vendor_id), i128::from(model.identity.product_code)) == (vendor, product);
-        (same || !told) && !own.is_empty() && shared(model) * 10 >= own.len() * 8
+        (same || !stated) && !own.is_empty() && shared(model) * 10 >= own.len() * 8
     };
     // The first of those that fit alike: they have the same objects.
     models().filter(fits).reduce(|best, next| if shared(next) > shared(best) { next } else { best })

@@ -11,7 +11,7 @@ pub enum Severity {
     Note,
     /// It starts, and goes wrong in a case that the text names.
     Warning,
-    /// It does not start, or does what nobody wants.
+    /// It does not start, or does something unwanted.
     Error,
 }
 
@@ -46,7 +46,7 @@ pub struct Finding {
     pub at: Place,
     /// The node that it is about.
     pub node: Option<u8>,
-    /// What is so, and what comes of it.
+    /// What was found, and its consequence.
     pub what: String,
     /// What to do.
     pub next: String,

@@ -38,7 +38,7 @@ impl<'a> Generator<'a> {
     }
 
     /// The writes to one node. An object that its sheet does not have is left out: the generator refuses the file for it, which is
-    /// told elsewhere.
+    /// reported elsewhere.
     pub(super) fn writes(&mut self, slave: &Slave, device: &Device) -> Vec<Planned> {
         let Some(node) = slave.node() else { return Vec::new() };
         let mut writes = Writes { device, node, all: Vec::new() };

@@ -30,7 +30,7 @@ pub struct Intended {
     pub moved: Vec<MovedAt>,
     /// The master's heartbeat.
     pub host_heartbeat: Option<(NodeId, Duration)>,
-    /// Where what is about the whole bus is said.
+    /// The place of findings about the whole bus.
     pub at: Place,
 }
 
@@ -70,7 +70,7 @@ impl IntendedNode {
     }
 }
 
-/// Bit rate where nobody says one.
+/// Default bit rate.
 const BITRATE: Bitrate = Bitrate::K500;
 
 /// How long ros2_canopen waits for the boot-up of a node, where the file does not say it.
@@ -92,7 +92,7 @@ pub(super) fn of_bus_yml(bus: &Bus, devices: &[Option<Device>]) -> Result<Intend
         let description = match device.model {
             Some(model) => model,
             None => keep_of(&device.eds, &slave.name)
-                .map_err(|error| format!("of the data sheet of {} no device can be made: {error}", slave.name))?,
+                .map_err(|error| format!("the data sheet of {} cannot be simulated: {error}", slave.name))?,
         };
         let writes = generator.writes(slave, device);
         // The generator reads the file on; a node that is not booted is only listed.
@@ -140,7 +140,7 @@ fn of_sheet(device: &Device, node: NodeId, writes: &[Planned]) -> BTreeMap<Mux, 
     values.filter(|(object, _)| !writes.iter().any(|write| write.object == *object)).collect()
 }
 
-/// More than this is no patience but a slip in a unit.
+/// A longer time is a slip in a unit.
 const LONGEST_BOOT: Duration = Duration::from_secs(60);
 
 /// As said, else that of the first model that is delivered with one.

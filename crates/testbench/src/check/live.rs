@@ -104,9 +104,9 @@ async fn look(
         for (object, wanted, found) in identity {
             let Some(wanted) = wanted.filter(|wanted| Some(*wanted) != found) else { continue };
             let found = found.map_or_else(|| "does not have it".to_owned(), |found| format!("has {found:X}h"));
-            let what = format!("on the bus: {object} is to be {wanted:X}h, and the device {found}: it will not boot");
-            let next =
-                "another device, or another firmware, is there than the file means: exchange it, or correct the file";
+            let what =
+                format!("on the bus: {object} is expected to be {wanted:X}h, and the device {found}: it will not boot");
+            let next = "another device or firmware is there than the file expects: exchange it, or correct the file";
             report.say(Severity::Error, place.at, what, next);
         }
     }

@@ -18,7 +18,7 @@ use crate::document::reader::{self, Field, Parameters, Table};
 use crate::document::{BadFile, Problem};
 use crate::machine_file::{Machine, pdo_id};
 
-/// Where a drive of the file is told of.
+/// Where the file describes a drive.
 struct Places {
     node: Place,
     keys: BTreeMap<String, Place>,
@@ -54,7 +54,7 @@ impl Places {
 /// Everything for which it cannot be used.
 pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     let machine = Machine::parse_in(text, folder)?;
-    // What the world around the drives refuses is told too.
+    // What the world around the drives refuses is reported too.
     machine.build()?;
     let both = |file: &Table<'_>| Ok::<_, Vec<Problem>>((places(file), periods(file)));
     let (places, periods) = reader::read(text, &Parameters::new(), "a machine file", both).unwrap_or_default();
@@ -150,13 +150,12 @@ fn traps(node: NodeId, place: &IntendedNode, report: &mut Reporter<'_>) {
     let title = place.description.title;
     report.rule = "node-id";
     if node == NodeId::MAX {
-        let what =
-            "127 is the node-ID under which a master sends its heartbeat: this node and the master say they are one";
+        let what = "127 is the node-ID under which a master sends its heartbeat: this node and the master share it";
         report.say(Severity::Warning, place.at, what, "give the drive another node-ID");
     }
     report.rule = "heartbeat";
     if number(HEARTBEAT) == Some(0) {
-        let what = "its heartbeat is switched off: nobody notices when it has gone, or has restarted";
+        let what = "its heartbeat is switched off: its loss or restart goes unnoticed";
         report.say(Severity::Warning, place.place_of(Some(HEARTBEAT)), what, "set `heartbeat` to 100ms to 500ms");
     }
     report.rule = "host-watch";
@@ -170,7 +169,7 @@ fn traps(node: NodeId, place: &IntendedNode, report: &mut Reporter<'_>) {
             if number(object).is_some_and(|value| value & 0xFFFF == 0) =>
         {
             let what = format!("its watch over the host is switched off ({object}): when the master dies, it goes on");
-            let next = format!("leave {object} away, or give it a time");
+            let next = format!("leave {object} out, or give it a time");
             report.say(Severity::Warning, place.place_of(Some(object)), what, next);
         }
         _ => {}
@@ -178,7 +177,7 @@ fn traps(node: NodeId, place: &IntendedNode, report: &mut Reporter<'_>) {
     report.rule = "limits";
     let has = |index: u16| place.description.has_index(index);
     if has(0x607D) && !values.keys().any(|object| object.index == 0x607D) {
-        let what = "no limits of its position are set (607Dh): it moves as far as it is told";
+        let what = "no limits of its position are set (607Dh): it moves as far as commanded";
         report.say(
             Severity::Note,
             place.at,

@@ -76,11 +76,11 @@ impl Checked {
                 .map_err(|why| (intended.at, why)),
             Err(why) => Err((Place { line: 1, column: 1 }, why.clone())),
         };
-        // Of a file without a node that is told already.
+        // For a file without a node that is reported already.
         if let Some((at, why)) = predicted.as_ref().err().filter(|_| !self.nodes.is_empty()) {
             report.rule = "prediction";
-            let next = "mend what is told above; then the boot-up is foretold";
-            report.say(Severity::Note, *at, format!("how this bus boots cannot be told: {why}"), next);
+            let next = "fix the findings above; then the boot-up is predicted";
+            report.say(Severity::Note, *at, format!("the boot-up of this bus cannot be predicted: {why}"), next);
         }
         self.findings = found.into_sorted();
         predicted.ok()
@@ -111,7 +111,7 @@ impl Checked {
 /// Checks the text of a `bus.yml` whose data sheets are in `folder`.
 ///
 /// # Errors
-/// It is no YAML.
+/// It is not YAML.
 pub fn of_bus_yml(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     yaml::with_document(text, |document| {
         let mut found = Findings::default();

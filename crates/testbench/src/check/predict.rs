@@ -35,7 +35,7 @@ pub struct Prediction {
     pub fits: bool,
 }
 
-/// What becomes of a node.
+/// The outcome for a node.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct PredictedNode {
     /// Its node-ID.
@@ -97,10 +97,10 @@ pub(super) fn world(intended: &Intended) -> Result<World, String> {
     Ok(world)
 }
 
-/// Boots a bus in this world. What stands in its way is reported.
+/// Boots a bus in this world. What prevents it is reported.
 ///
 /// # Errors
-/// Why nothing can be told.
+/// Why nothing can be predicted.
 pub(super) fn predict(
     intended: &Intended,
     machine: Option<&Machine>,
@@ -112,7 +112,7 @@ pub(super) fn predict(
     world.run_for(SWITCHED_ON);
     let mut boot = intended.plan.clone();
     for expectation in boot.nodes.values_mut() {
-        // The number of a device that nobody has seen is no trap.
+        // The number of a device that is not there is not a trap.
         expectation.serial_number = None;
     }
     let booted = block_on_for(&mut world, LIMIT, network.boot(&boot)).map_err(|error| error.to_string())?;
@@ -154,7 +154,7 @@ pub(super) fn predict(
     })
 }
 
-/// The letter with which a master says how it ended. A node that starts by itself ends with L.
+/// The letter with which a master says how it ended. A node that starts on its own ends with L.
 fn status(place: &IntendedNode, node: &NodeReport) -> Option<ErrorStatus> {
     let by_itself = place.description.nmt.start_state == NmtState::Operational;
     node.status.or(by_itself.then_some(ErrorStatus::InitiallyOperational))
@@ -189,17 +189,15 @@ fn of_boot(intended: &Intended, booted: &BootReport, report: &mut Reporter<'_>) 
         }
         if let (Some(ErrorStatus::InitiallyOperational), Some(first)) = (node.status, place.writes.first()) {
             report.node = Some(node.node);
-            let what =
-                "it is operational by itself, and a boot-up leaves it so: what the file sets of it is not written";
-            let next =
-                "boot it with `ferrodrive boot FILE --reset`, which says with status 1 what is missing without that";
+            let what = "it becomes operational on its own, and a boot-up leaves it so: its settings in the file are not written";
+            let next = "boot it with `ferrodrive boot FILE --reset`, which ends with status 1 and lists what is missing otherwise";
             report.say(Severity::Warning, first.at, what, next);
         }
     }
     report.node = None;
 }
 
-/// What each node sends while something is moved in cycles; a drive that cannot be moved so is told.
+/// What each node sends while something is moved in cycles; a drive that cannot be moved so is reported.
 fn in_cycles(moved: &MovedAt, read: &[(Drive, NodeTraffic)], report: &mut Reporter<'_>) -> Vec<NodeTraffic> {
     report.rule = "cycle-mode";
     let traffic = read.iter().map(|(drive, traffic)| {
@@ -233,13 +231,14 @@ fn of_plan(
     report.rule = "bus-load";
     if !intended.moved.is_empty() {
         let alone = plan(traffic, &settings.cycle_alone(), intended.bitrate);
-        // A cycle that does not fit has been told.
+        // A cycle that does not fit has been reported.
         if alone.fits() && !planned.is_tolerable(&alone, TOLERANCE) {
             let what = format!(
                 "SDO requests and EMCY beside the cycle may keep a PDO away for more than the {TOLERANCE} cycles that are tolerated, and so \
                  stop the motion"
             );
-            let next = "take a longer period, or ask nothing while it moves; `ferrodrive plan` shows each frame";
+            let next =
+                "take a longer period, or send no SDO requests while it moves; `ferrodrive plan` shows each frame";
             report.say(Severity::Warning, intended.at, what, next);
         }
         if alone.load > 1.0 || alone.fits() {

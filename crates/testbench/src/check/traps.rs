@@ -69,7 +69,7 @@ pub(super) fn of_bus(bus: &Bus, report: &mut Reporter<'_>) {
             None => report.say(
                 Severity::Error,
                 id.at,
-                format!("{} is no node-ID", id.value),
+                format!("{} is not a node-ID", id.value),
                 "expected 1 to 127; 127 for a master",
             ),
             Some(node) => drop(nodes.insert(node.raw(), "the master")),
@@ -81,8 +81,8 @@ pub(super) fn of_bus(bus: &Bus, report: &mut Reporter<'_>) {
         if let Some(other) = nodes.insert(node.raw(), &slave.name) {
             report.node = Some(node);
             let what =
-                format!("{node} is the node-ID of {other} too: both answer each request, and the bus has errors");
-            report.say(Severity::Error, at, what, "give each a node-ID of its own; a master is best off with 127");
+                format!("{node} is also the node-ID of {other}: both answer each request, and the bus has errors");
+            report.say(Severity::Error, at, what, "give each a node-ID of its own; 127 suits a master best");
             report.node = None;
         }
     }
@@ -99,7 +99,7 @@ pub(super) fn of_bus(bus: &Bus, report: &mut Reporter<'_>) {
     report.rule = "master-heartbeat";
     if bus.master.heartbeat_producer_ms.as_ref().is_none_or(|time| time.value == 0) {
         let at = bus.master.heartbeat_producer_ms.as_ref().map_or(bus.master.at, |time| time.at);
-        let what = "the master sends no heartbeat: no drive notices that it has gone";
+        let what = "the master sends no heartbeat: no drive notices its loss";
         report.say(Severity::Warning, at, what, "add `heartbeat_producer: 100` (ms)");
     }
 }
@@ -111,7 +111,7 @@ fn node_id(case: &Case<'_>, report: &mut Reporter<'_>) {
             report.say(Severity::Error, slave.at, format!("{} has no `node_id`", slave.name), "add `node_id`, 1 to 127")
         }
         Some(id) if slave.node().is_none() => {
-            report.say(Severity::Error, id.at, format!("{} is no node-ID", id.value), "expected 1 to 127");
+            report.say(Severity::Error, id.at, format!("{} is not a node-ID", id.value), "expected 1 to 127");
         }
         Some(_) => {}
     }
@@ -146,7 +146,7 @@ fn heartbeat(case: &Case<'_>, report: &mut Reporter<'_>) {
     let at = case.slave.heartbeat_producer_ms.as_ref().map_or(case.slave.at, |time| time.at);
     match case.heartbeat_ms() {
         Some(0) => {
-            let what = "it sends no heartbeat: the master does not notice that it has gone, or has restarted";
+            let what = "it sends no heartbeat: the master does not notice its loss or restart";
             report.say(Severity::Warning, at, what, "add `heartbeat_producer: 200` (ms)");
         }
         Some(time) if time >= 1000 => {
@@ -174,7 +174,7 @@ fn boot_timeout(case: &Case<'_>, report: &mut Reporter<'_>) {
     }
 }
 
-/// dcfgen writes 0 to the consumer entries of a node that is not told to consume.
+/// dcfgen writes 0 to the consumer entries of a node without a heartbeat consumer in the file.
 fn host_watch(case: &Case<'_>, report: &mut Reporter<'_>) {
     let armed = case.value(0x1016, 1).filter(|entry| *entry != 0);
     let consumes = case.slave.heartbeat_consumer.as_ref();
@@ -194,7 +194,7 @@ fn host_silence(case: &Case<'_>, report: &mut Reporter<'_>) {
     let ms = case.value(time.index, time.sub_index).unwrap_or(0);
     if ms > 0 && !polls {
         let what = format!(
-            "it stops {ms} ms after the last frame for it ({time}); that neither SYNC nor the master's heartbeat is one is a guess, on which its manual is silent"
+            "it stops {ms} ms after the last frame for it ({time}); that neither SYNC nor the master's heartbeat counts is a guess: its manual is silent on it"
         );
         report.say(
             Severity::Note,
@@ -238,7 +238,7 @@ fn cia402_driver(case: &Case<'_>, report: &mut Reporter<'_>) {
         report.say(
             Severity::Error,
             driver.at,
-            "its data sheet has no statusword (6041h): it is no drive of CiA 402",
+            "its data sheet has no statusword (6041h): it is not a CiA 402 drive",
             "take `ros2_canopen::ProxyDriver`",
         );
     }
@@ -266,15 +266,15 @@ fn fixed_mapping(case: &Case<'_>, report: &mut Reporter<'_>) {
     }
     for pdo in case.slave.pdos.iter().filter(|pdo| pdo.mapping.is_some()) {
         let what = format!("the mapping of its {} cannot be changed: the node does not boot (error J)", name(pdo));
-        report.say(Severity::Error, pdo.at, what, "leave `mapping` away; the factory mapping is in its data sheet");
+        report.say(Severity::Error, pdo.at, what, "leave out `mapping`; the factory mapping is in its data sheet");
     }
 }
 
 /// Targets that a drive follows while it is enabled (CiA 402-2: 607Ah, 60C1h, 60FFh, 6071h).
 const SET_POINTS: [u16; 4] = [0x607A, 0x60C1, 0x60FF, 0x6071];
 
-/// A generated master sends each RPDO that is valid in the sheet, with zeros until it is told otherwise. Whoever names an RPDO in
-/// the file means to use it, or switches it off.
+/// A generated master sends each RPDO that is valid in the sheet, with zeros until it is given other values. Whoever
+/// names an RPDO in the file means to use it, or switches it off.
 fn set_point_by_sync(case: &Case<'_>, report: &mut Reporter<'_>) {
     let syncs = case.bus.master.sync_period_us.as_ref().is_some_and(|period| period.value > 0);
     for number in (1..=512).take_while(|_| syncs) {
@@ -287,7 +287,7 @@ fn set_point_by_sync(case: &Case<'_>, report: &mut Reporter<'_>) {
         let carried = (1..=8).filter_map(|entry| Some((case.value(at_index(0x1600), entry)? >> 16) as u16));
         if let Some(target) = carried.into_iter().find(|index| SET_POINTS.contains(index)) {
             let what = format!(
-                "its RPDO{number} carries {target:04X}h, is on as delivered and goes out with each SYNC: the master sends 0 until it is told otherwise, and an enabled drive goes there"
+                "its RPDO{number} carries {target:04X}h, is on as delivered and goes out with each SYNC: the master sends 0 until it is given a value, and an enabled drive goes there"
             );
             let next = format!("add `rpdo: {{{number}: {{enabled: false}}}}` unless you use it");
             report.say(Severity::Error, case.slave.at, what, next);
@@ -334,7 +334,7 @@ fn pdo_number(case: &Case<'_>, report: &mut Reporter<'_>) {
                     report.say(Severity::Error, pdo.at, what, "map an object that it has");
                 }
                 Some(variable) if !variable.pdo_mapping => {
-                    let what = format!("{index:04X}h:{sub_index:02X} may not be mapped, as its data sheet says");
+                    let what = format!("{index:04X}h:{sub_index:02X} may not be mapped, by its data sheet");
                     report.say(Severity::Error, pdo.at, what, "map another object, or read it by SDO");
                 }
                 _ => {}
@@ -359,13 +359,13 @@ fn sdo_object(case: &Case<'_>, report: &mut Reporter<'_>) {
             continue;
         };
         if !variable.access.is_writable() {
-            let what = format!("{object} cannot be written, as its data sheet says: the node does not boot (error J)");
-            report.say(Severity::Error, write.at, what, "leave it away");
+            let what = format!("{object} cannot be written, by its data sheet: the node does not boot (error J)");
+            report.say(Severity::Error, write.at, what, "leave it out");
         }
         match variable.data_type.range() {
             Some((low, high)) if !(low..=high).contains(&i128::from(write.value)) => {
-                let what = format!("{} does not fit {object}, which goes from {low} to {high}", write.value);
-                report.say(Severity::Error, write.at, what, "give a value within that");
+                let what = format!("{} does not fit {object}, which takes {low} to {high}", write.value);
+                report.say(Severity::Error, write.at, what, "give a value in that range");
             }
             _ => {}
         }
@@ -387,7 +387,8 @@ fn name(pdo: &Pdo) -> String {
 
 fn starts_by_itself(case: &Case<'_>, report: &mut Reporter<'_>) {
     if case.model().is_some_and(|model| model.nmt.start_state == NmtState::Operational) {
-        let what = "it is operational as soon as it has started: a master boots it with letter L, which is no failure";
+        let what =
+            "it is operational as soon as it has started: a master boots it with letter L, which is not an error";
         report.say(Severity::Note, case.slave.at, what, "nothing has to be done");
     }
 }

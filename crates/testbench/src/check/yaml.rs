@@ -16,7 +16,7 @@ pub(super) struct Entry<'a> {
 }
 
 /// Most columns before the first key or value of a line. Each level of a block takes one at least, and the reader of YAML, which
-/// bounds the depth of lists in brackets by itself, takes a piece of the stack for each.
+/// bounds the depth of lists in brackets itself, takes a piece of the stack for each.
 const MOST_INDENTED: usize = 200;
 
 /// Reads a file and hands its one document to `look`.
@@ -30,7 +30,7 @@ pub(super) fn with_document<T>(text: &str, look: impl FnOnce(Node<'_>) -> T) -> 
     }
     let documents = MarkedYaml::load_from_str(text).map_err(|error| {
         let at = error.marker();
-        bad(text, at.line(), at.col(), format!("this is no YAML: {}", error.info()))
+        bad(text, at.line(), at.col(), format!("this is not YAML: {}", error.info()))
     })?;
     match &documents[..] {
         [document] => Ok(look(Node(document))),
@@ -77,7 +77,7 @@ impl<'a> Node<'a> {
         matches!(self.0.data, YamlData::Mapping(_))
     }
 
-    /// The entries of a mapping; none of anything else. A key that is no text is printed as one.
+    /// The entries of a mapping; none of anything else. A key that is not text is printed as text.
     pub(super) fn entries(&self) -> Vec<Entry<'a>> {
         let YamlData::Mapping(mapping) = &self.0.data else { return Vec::new() };
         let entry = |(key, value): (&'a MarkedYaml<'a>, &'a MarkedYaml<'a>)| Entry {

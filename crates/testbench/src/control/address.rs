@@ -18,7 +18,7 @@ pub enum ControlAddress {
 /// A text that names no place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{0:?} is no place of a control connection; expected HOST:PORT, as in 127.0.0.1:4000, or the path of a Unix socket, as in /tmp/bench.sock"
+    "{0:?} is not an address of a control connection; expected HOST:PORT, as in 127.0.0.1:4000, or the path of a Unix socket, as in /tmp/bench.sock"
 )]
 pub struct NoAddress(String);
 
@@ -48,7 +48,7 @@ impl FromStr for ControlAddress {
         let address = text.strip_prefix("control://").unwrap_or(text);
         let (host, port) = address.rsplit_once(':').ok_or_else(|| NoAddress(text.to_owned()))?;
         let plain = !host.is_empty() && !host.contains(['/', ' ']) && port.parse::<u16>().is_ok();
-        // Without brackets nobody knows where an IPv6 address ends.
+        // Without brackets the end of an IPv6 address is ambiguous.
         let whole = !host.contains(':') || host.starts_with('[') && host.ends_with(']');
         (plain && whole).then(|| Self::Tcp(address.to_owned())).ok_or_else(|| NoAddress(text.to_owned()))
     }

@@ -19,7 +19,7 @@ pub struct ControlError {
     next: Option<String>,
 }
 
-/// The request that tells of all requests.
+/// The request that lists all requests.
 pub(super) const HELP: &str = r#"{"request":"help"}"#;
 
 impl ControlError {
@@ -28,7 +28,7 @@ impl ControlError {
         Self { kind, message: message.into(), node: None, next: None }
     }
 
-    /// The request makes no sense; unless something better is [said](Self::next), `help` tells what does.
+    /// The request makes no sense; unless a better remedy is [given](Self::next), `help` lists those that do.
     pub fn usage(message: impl Into<String>) -> Self {
         Self::new("usage", message).next(HELP)
     }

@@ -43,14 +43,14 @@ pub trait Sink {
     fn admit(&mut self) {}
 }
 
-/// What else is to be done about a request.
+/// What a request still needs from the caller.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// Nothing: it is answered.
     Answered,
-    /// The world is to be moved, and then [`Control::answer_run`] called.
+    /// Move the world, then call [`Control::answer_run`].
     Run(Pending),
-    /// The client is answered, and to be sent away.
+    /// The client is answered; close its connection.
     Close,
 }
 
@@ -92,7 +92,7 @@ struct Client<S> {
 }
 
 impl<S: Sink> Control<S> {
-    /// With nobody in it. With a `token` each client has to give it first.
+    /// Without clients. With a `token` each client has to give it first.
     pub fn new(token: Option<String>) -> Self {
         Self { clients: BTreeMap::new(), token, kept: None }
     }
@@ -102,7 +102,8 @@ impl<S: Sink> Control<S> {
         self.token = Some(token);
     }
 
-    /// Keeps every event for [`take_events`](Self::take_events) too, in a world that is watched for somebody else, such as a record.
+    /// Keeps every event for [`take_events`](Self::take_events) too, in a world that is watched for another purpose,
+    /// such as a record.
     pub fn keep_events(&mut self) {
         self.kept.get_or_insert_default();
     }
@@ -147,7 +148,7 @@ impl<S: Sink> Control<S> {
             if !client.admitted {
                 return client.refuse_stranger(None, NO_TOKEN);
             }
-            let reason = format!("the line is longer than {MAX_LINE_LENGTH} bytes, and was thrown away");
+            let reason = format!("the line is longer than {MAX_LINE_LENGTH} bytes, and was discarded");
             client.refuse(None, &ControlError::new("too_long", reason).next("give each request a line of its own"));
             return Outcome::Answered;
         };
@@ -156,7 +157,7 @@ impl<S: Sink> Control<S> {
         }
         // A browser would go on with lines that a page chose.
         if text.contains(" HTTP/") {
-            client.refuse(None, &ControlError::usage("this is no web server: lines of JSON or world commands"));
+            client.refuse(None, &ControlError::usage("this is not a web server: lines of JSON or world commands"));
             return Outcome::Close;
         }
         let Message { id, request } = match Message::parse(text) {
@@ -183,7 +184,7 @@ impl<S: Sink> Control<S> {
         Outcome::Answered
     }
 
-    /// Answers a request to move the world, with what has come of it as [`sim::command::Before`] tells it.
+    /// Answers a request to move the world, with the outcome as [`sim::command::Before`] gives it.
     pub fn answer_run(&mut self, pending: &Pending, done: Result<&str, ControlError>) {
         let Some(client) = self.clients.get_mut(&pending.client) else { return };
         match done {
@@ -243,7 +244,7 @@ impl<S: Sink> Control<S> {
         self.clients.is_empty()
     }
 
-    /// The world is watched while somebody wants its events.
+    /// The world is watched while a client wants its events.
     fn update_watch(&self, world: &mut World) {
         let mut all = self.clients.values().flat_map(|client| client.subscriptions.values());
         let is_wanted = all.any(|subscription| matches!(subscription, Subscription::Events(_)));
@@ -269,10 +270,10 @@ impl<S: Sink> Client<S> {
             self.sink.admit();
             return None;
         }
-        Some(self.refuse_stranger(id, if given.is_some() { "this is not the token" } else { NO_TOKEN }))
+        Some(self.refuse_stranger(id, if given.is_some() { "wrong token" } else { NO_TOKEN }))
     }
 
-    /// Whoever has not given the token learns nothing but that, and how it is given.
+    /// A client without the token learns nothing but that, and how to give it.
     fn refuse_stranger(&mut self, id: Option<&Id>, reason: &str) -> Outcome {
         self.refuse(id, &ControlError::new("token", reason).next(REQUESTS[0]));
         self.strange += 1;
@@ -291,16 +292,20 @@ impl<S: Sink> Client<S> {
             Request::Now => self.command(&Command::Now, world, service),
             Request::Get(place) => self.command(&Command::Get(place), world, service),
             Request::World(line) if line.len() > sim::command::MAX_LINE_LENGTH => Err(CommandError::TooLong.into()),
-            Request::World(line) => match line.parse()? {
-                Command::Quit => Err(ControlError::usage("quit is for who started the simulator")
+            Request::World(line) => {
+                match line.parse()? {
+                    Command::Quit => Err(ControlError::usage(
+                        "quit is not for clients, only for the standard input of the simulator",
+                    )
                     .next("close the connection; the simulator ends with `quit` on its standard input, or a signal")),
-                Command::Help => Ok(help()),
-                Command::Run(_) => {
-                    Err(ControlError::usage("time is moved by the request `run`, not by a world command")
-                        .next(REQUESTS[6]))
+                    Command::Help => Ok(help()),
+                    Command::Run(_) => {
+                        Err(ControlError::usage("time is moved by the request `run`, not by a world command")
+                            .next(REQUESTS[6]))
+                    }
+                    command => self.command(&command, world, service),
                 }
-                command => self.command(&command, world, service),
-            },
+            }
             Request::SubscribeEvents(filter) => self.subscribe(Subscription::Events(filter)),
             Request::SubscribeValues(values) => {
                 check_places(&values, world)?;
@@ -383,7 +388,7 @@ fn help() -> String {
     json!({ "ok": true, "help": REQUESTS, "world": FORMS, "kinds": kinds, "signals": signals }).to_string()
 }
 
-/// A line that nobody asked for just now: `{"subscription":1,"event":{..}}`.
+/// An unrequested line: `{"subscription":1,"event":{..}}`.
 fn line(subscription: u64, what: &str, value: &Value) -> String {
     json!({ "subscription": subscription, what: value }).to_string()
 }
@@ -392,7 +397,7 @@ fn seconds(at: Instant) -> f64 {
     sim::json::rounded(at.as_nanos() as f64 / 1e9)
 }
 
-/// Takes as long for a wrong token as for the right one, so that nobody finds it letter by letter.
+/// Takes as long for a wrong token as for the right one, so that it cannot be found letter by letter.
 fn equal(token: &[u8], given: &[u8]) -> bool {
     let differences = token.iter().zip(given.iter().chain(core::iter::repeat(&0))).fold(0, |sum, (a, b)| sum | (a ^ b));
     core::hint::black_box(differences) == 0 && token.len() == given.len()

@@ -3,7 +3,7 @@
 /// Longest request in bytes: many times a subscription to every signal of a bus.
 pub const MAX_LINE_LENGTH: usize = 64 * 1024;
 
-/// What has come in and is no whole line yet.
+/// Input that is not a whole line yet.
 #[derive(Clone, Debug, Default)]
 pub struct LineBuffer {
     bytes: Vec<u8>,
@@ -14,7 +14,7 @@ pub struct LineBuffer {
 /// A line that has ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReadLine {
-    /// Its text without its end; bytes that are no UTF-8 are replaced.
+    /// Its text without its end; bytes that are not UTF-8 are replaced.
     Text(String),
     /// Longer than [`MAX_LINE_LENGTH`]; it was not kept.
     TooLong,

@@ -1,10 +1,11 @@
-//! Lines that wait for one client, within bounds: of values and events the oldest go when nobody reads, and how many is said.
+//! Lines that wait for one client, within bounds: the oldest values and events are dropped when the client does not
+//! read, and their number is reported.
 
 use std::collections::VecDeque;
 
 use serde_json::json;
 
-/// What a line is, which decides what becomes of it when the client does not read.
+/// The kind of a line, which decides whether it is dropped when the client does not read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// The answer to a request. Never dropped: a client with many unread answers is not listened to instead.

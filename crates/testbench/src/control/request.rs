@@ -40,7 +40,7 @@ pub enum Request {
     Get(Place),
     /// A world command, as a line.
     World(String),
-    /// Moves a world whose time nobody else moves.
+    /// Moves a world whose time is moved by clients only.
     Run(Run),
     /// Events from now on.
     SubscribeEvents(Filter),
@@ -78,9 +78,8 @@ impl Message {
         if !line.starts_with('{') {
             return Ok(Self { id: None, request: Request::World(line.to_owned()) });
         }
-        let syntax = |error: serde_json::Error| {
-            (None, ControlError::new("syntax", format!("this is no JSON: {error}")).next(HELP))
-        };
+        let syntax =
+            |error: serde_json::Error| (None, ControlError::new("syntax", format!("not JSON: {error}")).next(HELP));
         let mut fields: Map<String, Value> = serde_json::from_str(line).map_err(syntax)?;
         let id = match fields.remove("id") {
             None | Some(Value::Null) => None,
@@ -94,7 +93,7 @@ impl Message {
 }
 
 impl Request {
-    /// How far the world is to be moved, if that is asked for.
+    /// How far to move the world, if that is asked for.
     pub(super) fn run(&self) -> Option<Run> {
         match self {
             Self::Run(run) => Some(*run),
@@ -187,7 +186,7 @@ struct UnsubscribeFields {
 impl Request {
     fn of(mut fields: Map<String, Value>) -> Result<Self, ControlError> {
         let Some(Value::String(name)) = fields.remove("request") else {
-            return Err(ControlError::usage("\"request\" is missing, the name of what is asked for").next(REQUESTS[1]));
+            return Err(ControlError::usage("\"request\", the name of the request, is missing").next(REQUESTS[1]));
         };
         match name.as_str() {
             "hello" => {
@@ -266,11 +265,11 @@ fn run(fields: &RunFields) -> Result<Run, ControlError> {
     };
     let refused = |reason: String| ControlError::usage(reason).next(REQUESTS[6]);
     if !time.starts_with(|first: char| first.is_ascii_digit() || first == '.') {
-        return Err(refused(format!("{time:?} is no time; expected a number and its unit, as in 20ms")));
+        return Err(refused(format!("{time:?} is not a time; expected a number and its unit, as in 20ms")));
     }
     match format!("{words} {time}").parse() {
         Ok(Command::Run(run)) => Ok(run),
-        Ok(_) => Err(refused(format!("{time:?} is no time"))),
+        Ok(_) => Err(refused(format!("{time:?} is not a time"))),
         Err(error) => Err(refused(error.to_string())),
     }
 }

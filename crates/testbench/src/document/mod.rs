@@ -13,22 +13,22 @@ use std::path::Path;
 /// Largest file that is read. A bus has 127 drives, and a drive some lines.
 pub const LARGEST: u64 = 1 << 20;
 
-/// The text of a file of sensible size. A pipe or a device, which may never end, is none.
+/// The text of a file of sensible size. A pipe or a device, which may never end, is refused.
 ///
 /// # Errors
 /// Why it cannot be read, in a sentence.
 pub fn read_text(path: &Path) -> Result<String, String> {
     let kind = std::fs::metadata(path).map_err(|error| error.to_string())?;
     if !kind.is_file() {
-        return Err("it is no file but a directory, a pipe or a device".into());
+        return Err("not a regular file".into());
     }
     let mut text = String::new();
     let file = File::open(path).map_err(|error| error.to_string())?;
-    let read = file.take(LARGEST + 1).read_to_string(&mut text).map_err(|_| "it is no text".to_owned())?;
+    let read = file.take(LARGEST + 1).read_to_string(&mut text).map_err(|_| "not text in UTF-8".to_owned())?;
     if read as u64 > LARGEST {
-        return Err("it has more than 1 MB; nobody needs that".into());
+        return Err("larger than the limit of 1 MB".into());
     }
-    // A byte order mark of an editor is no part of the text.
+    // A byte order mark of an editor is not a part of the text.
     if text.starts_with('\u{feff}') {
         text.remove(0);
     }

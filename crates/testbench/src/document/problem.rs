@@ -76,7 +76,7 @@ pub struct BadFile {
     pub problems: Vec<Located>,
 }
 
-/// So many problems are shown; a file that is no such file at all has hundreds.
+/// So many problems are shown; a file of another kind has hundreds.
 const MOST_SHOWN: usize = 20;
 
 /// So much of a line is shown: a file of one line has a million letters.
@@ -157,8 +157,8 @@ mod tests {
     fn the_line_is_shown_with_a_mark_below_what_is_meant() {
         let text = "a = 1\n\u{e4}\u{f6} = 'slip'\nc = 3";
         let at = text.find("'slip'").expect("it is there");
-        let bad = BadFile::new(text, vec![Problem::new(at..at + 6, "it is no number")]).named("m.toml");
-        assert_eq!(bad.to_string(), "m.toml:2:6: it is no number\n  2 | \u{e4}\u{f6} = 'slip'\n    |      ^^^^^^");
+        let bad = BadFile::new(text, vec![Problem::new(at..at + 6, "not a number")]).named("m.toml");
+        assert_eq!(bad.to_string(), "m.toml:2:6: not a number\n  2 | \u{e4}\u{f6} = 'slip'\n    |      ^^^^^^");
     }
 
     #[test]

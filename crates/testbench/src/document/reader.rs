@@ -1,4 +1,4 @@
-//! The values of a TOML file, each with its line, and what is wrong with them in the words of whoever wrote the file.
+//! The values of a TOML file, each with its line, and what is wrong with them, quoting the file.
 //!
 //! In: text. Out: numbers, texts and tables, or a [`Problem`]: the place, the name and what is expected there. What the
 //! names mean is not known here. A text may stand for a parameter of the file, `{name}`, whose value is put in its place.
@@ -41,7 +41,7 @@ pub struct Field<'a> {
 /// Reads a whole file and hands its outermost table over.
 ///
 /// # Errors
-/// That it is no TOML, or what `take` finds.
+/// The file is not TOML, or what `take` finds.
 pub fn read<T>(
     text: &str,
     parameters: &Parameters,

@@ -101,7 +101,7 @@ fn base(table: &Table<'_>) -> Result<DifferentialDriveModel, Problem> {
     let (mass_kg, wheel_base_m) = (needed(table, "mass_kg")?, needed(table, "wheel_base_m")?);
     Ok(DifferentialDriveModel {
         mass_kg,
-        // Unless it is said: a square plate as wide as the wheels are apart.
+        // By default: a square plate as wide as the wheels are apart.
         yaw_inertia_kg_m2: number(table, "yaw_inertia_kg_m2", mass_kg * wheel_base_m * wheel_base_m / 6.0)?,
         wheel_base_m,
         wheel_radius_m: needed(table, "wheel_radius_m")?,
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_body_is_said_at_its_place() {
+    fn what_is_wrong_with_a_body_is_reported_at_its_place() {
         let with = |lines: &str| refusal(&format!("{DRIVES}[[body]]\nname = 'b'\n{lines}"));
         let shaft = "kind = 'common-shaft'\ndrives = ";
         assert!(

@@ -157,7 +157,7 @@ fn heartbeat(field: &Field<'_>, model: &'static Description) -> Result<Vec<u8>, 
     }
     let time = time(field)?;
     let ms = u16::try_from(time.as_millis()).ok().filter(|ms| Duration::from_millis((*ms).into()) == time);
-    let ms = ms.ok_or_else(|| field.problem("1017h counts whole ms, up to 65535; \"0ms\" is no heartbeat"))?;
+    let ms = ms.ok_or_else(|| field.problem("1017h counts whole ms; expected \"1ms\" to \"65535ms\""))?;
     Ok(ms.to_le_bytes().to_vec())
 }
 
@@ -173,7 +173,7 @@ pub fn pdo_id(text: &str) -> Result<PdoId, String> {
         Some(PdoId { direction, number })
     });
     found.ok_or_else(|| {
-        format!("'{text}' is no PDO; expected tpdo1 to tpdo512 or rpdo1 to rpdo512, counted as by CiA 301")
+        format!("'{text}' is not a PDO; expected tpdo1 to tpdo512 or rpdo1 to rpdo512, counted as by CiA 301")
     })
 }
 
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_at_its_place() {
+    fn what_is_wrong_is_reported_at_its_place() {
         let pdo = |said: &str| refusal(&format!("pdos = {{ tpdo1 = {{ {said} }} }}"));
         assert!(pdo("objects = ['status']").contains("line 4, column 31"), "{}", pdo("objects = ['status']"));
         assert!(pdo("objects = ['statusword', '6064', '606C']").contains("would have 80 bits"));
@@ -277,11 +277,11 @@ mod tests {
         assert!(pdo("objects = ['6041'], inhibit = 5").contains("expected a time as text"));
         assert!(pdo("objects = ['6041'], id = 0x601").contains("another service"));
         assert!(pdo("objects = ['6041'], id = 0x800").contains("expected an identifier"));
-        assert!(refusal("pdos = { pdo1 = 'off' }").contains("'pdo1' is no PDO"));
+        assert!(refusal("pdos = { pdo1 = 'off' }").contains("'pdo1' is not a PDO"));
         assert!(refusal("pdos = { tpdo1 = 'on' }").contains("expected \"off\", or a table"));
         assert!(refusal("heartbeat = 200").contains("expected a time as text"));
         assert!(refusal("heartbeat = '2d'").contains("expected"));
-        assert!(refusal("heartbeat = '2h'").contains("up to 65535"));
+        assert!(refusal("heartbeat = '2h'").contains("to \"65535ms\""));
         assert!(refusal("limits = { position = [5, 1] }").contains("is not below the upper"));
         assert!(refusal("limits = { pace = 5 }").contains("has no 'pace'"));
         assert!(refusal("start_up = { 1017 = 5 }\nheartbeat = '5ms'").contains("1017h:00 gets a value twice"));

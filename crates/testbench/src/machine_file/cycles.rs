@@ -70,7 +70,8 @@ impl CyclePlan {
         }
     }
 
-    /// What one of its drives sends while it is moved so, out of what it sends by itself; of another drive that is all.
+    /// What one of its drives sends while it is moved so, out of what it sends on its own; of another drive that is
+    /// all.
     ///
     /// # Errors
     /// It cannot be moved so.
@@ -97,7 +98,7 @@ pub struct TooFull {
     pub next: String,
 }
 
-/// Whether a bus can carry a cycle at all: what it needs without SDO and EMCY is no more than there is. What `check`, `plan` and
+/// Whether a bus can carry a cycle at all: what it needs without SDO and EMCY fits. What `check`, `plan` and
 /// those who move say of it is this.
 pub fn too_full(nodes: &[NodeTraffic], settings: &Settings, bitrate: Bitrate, alone: &Plan) -> Option<TooFull> {
     if alone.load <= 1.0 {
@@ -111,7 +112,7 @@ pub fn too_full(nodes: &[NodeTraffic], settings: &Settings, bitrate: Bitrate, al
     };
     Some(TooFull {
         what: format!(
-            "a cycle of {} ms does not fit the bus: what is sent in it takes up to {:.0} % of {rate} kbit/s",
+            "a cycle of {} ms does not fit the bus: its frames take up to {:.0} % of {rate} kbit/s",
             ms(settings.cycle),
             alone.load * 100.0
         ),
@@ -131,8 +132,8 @@ impl Machine {
         self.drives.iter().find(|drive| drive.spec.node == node).map_or(Gear::DIRECT, |drive| drive.gear)
     }
 
-    /// The drive at a node as the file has it: its model, and what stands behind its shaft. Whoever moves a drive of a machine file
-    /// by its model takes it from here, so that the same intent is the same counts.
+    /// The drive at a node as the file has it: its model, and the gear behind its shaft. A program that moves a drive
+    /// of a machine file by its model takes it from here, so that the same intent is the same counts.
     pub fn drive(&self, node: Node) -> Drive {
         let gear = self.gear(node.id());
         let drive = match self.models().find(|(id, _)| *id == node.id()) {

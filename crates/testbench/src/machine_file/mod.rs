@@ -70,11 +70,11 @@ pub const DRIVE_KEYS: &[&str] = &[
 pub struct Machine {
     /// The bus's rate, where it says one.
     pub bitrate: Option<Bitrate>,
-    /// What decides everything random, where it says so.
+    /// The seed of everything random, where it is given.
     pub seed: Option<u64>,
-    /// Whether its drives have the noise and the flaws of real ones, where it says so.
+    /// Whether its drives have the noise and the flaws of real ones, where it is given.
     pub realism: Option<Realism>,
-    /// Whether its drives take the time that such drives take, where it says so; a drive may say otherwise.
+    /// Whether its drives take the time that such drives take, where it is given; a drive may have its own.
     pub timing: Option<TimingMode>,
     /// The drives, each at a node of its own.
     pub drives: Vec<Placed>,
@@ -94,7 +94,7 @@ pub struct Placed {
     source: Source,
     /// Where the supply is described.
     source_at: Option<Located>,
-    /// What is around it, and where the file says so.
+    /// What is around it, with the places in the file.
     around: Vec<(Stimulus, Located)>,
     /// The keys that the file has of it for a simulated machine.
     keys: Vec<&'static str>,
@@ -458,14 +458,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_place_and_what_is_expected() {
+    fn what_is_wrong_is_reported_with_its_place_and_what_is_expected() {
         let with = |line: &str| refusal(&format!("{DRIVE}{line}"));
         assert!(refusal("").contains("no [[drive]]"));
         assert_eq!(with("colour = 1").split("; it has").next(), Some("line 4, column 1: a drive has no 'colour'"));
         assert!(with("suply_v = 1").contains("did you mean supply_v?"));
         assert!(
             refusal("[[drive]]\nmodel = 'zlac803'\nnode = 4")
-                .contains("line 2, column 9: 'zlac803' is no model; did you mean zlac8030l?")
+                .contains("line 2, column 9: 'zlac803' is not a model; did you mean zlac8030l?")
         );
         assert!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 200").contains("no node 200"));
         assert!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 300").contains("'node' is 300; expected a node-ID"));
@@ -486,7 +486,7 @@ mod tests {
         assert!(with("rotor_locked = 'yes'").contains("expected true or false"));
         assert!(with("faults = 'hall'").contains("expected a list of components"));
         assert!(with("faults = ['gear']").contains("line 4, column 11: 'fault gear on' cannot be done: "));
-        assert!(with("inputs = { 'X0 1\\n4 rotor lock' = true }").contains("is no name"));
+        assert!(with("inputs = { 'X0 1\\n4 rotor lock' = true }").contains("is not the name of an"));
         assert!(refusal("drive = 3").contains("begun by [[drive]]"));
         assert!(refusal(&format!("bitrate = '7k'\n{DRIVE}")).contains("bit rate must be"));
         assert!(refusal(&format!("bitrate = 500\n{DRIVE}")).contains("expected a bit rate as text"));
@@ -522,24 +522,24 @@ mod tests {
     }
 
     #[test]
-    fn all_that_is_wrong_is_said_at_once_in_the_order_of_the_file() {
+    fn all_that_is_wrong_is_reported_at_once_in_the_order_of_the_file() {
         let bad = Machine::parse("colour = 1\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nload = { torque_nm = 'much' }\nfaults = ['gear']\n[[drive]]\nmodel = 'x'\nnode = 5\n").err();
         let lines: Vec<_> = bad.iter().flat_map(|bad| &bad.problems).map(|problem| problem.line).collect();
         assert_eq!(lines, [1, 5, 6, 8]);
     }
 
-    fn lines_told(text: &str) -> Vec<usize> {
+    fn lines_reported(text: &str) -> Vec<usize> {
         let bad = Machine::parse(text).and_then(|machine| machine.build()).err();
         bad.iter().flat_map(|bad| &bad.problems).map(|problem| problem.line).collect()
     }
 
     #[test]
-    fn one_drives_table_tells_all_that_is_wrong_with_it() {
+    fn all_that_is_wrong_with_one_drives_table_is_reported() {
         // In what it says: each number of a part, each entry of a list, a model and a node that there are not.
         let said = "[[drive]]\nmodel = 'x'\nnode = 200\nsupply_v = 'a'\nbattery = 1\nrotor_locked = 2\n[drive.load]\ntorque_nm = 'b'\n\
                     inertia_kg_m2 = 'c'\nmass = 1\n[drive.load.gear]\nratio = 'd'\nbacklash_deg = 'e'\n[drive.load.stop]\nrange = 1\n\
                     damping_nm_s_rad = 3\n[drive.inputs]\nX0 = 1\nX1 = 2\n[drive.temperatures_c]\nmotor = 'hot'\ndriver = 'cold'\n";
-        assert_eq!(lines_told(said), [2, 3, 4, 5, 6, 8, 9, 10, 12, 13, 14, 15, 18, 19, 21, 22]);
+        assert_eq!(lines_reported(said), [2, 3, 4, 5, 6, 8, 9, 10, 12, 13, 14, 15, 18, 19, 21, 22]);
         // In what the drives refuse, in both of two tables.
         let drive = |node| format!("[[drive]]\nmodel = 'zlac8030l'\nnode = {node}\nsupply_v = 300\nbattery = false\n");
         let refused = format!(
@@ -547,11 +547,11 @@ mod tests {
             drive(4),
             drive(5)
         );
-        assert_eq!(lines_told(&refused), [4, 5, 9, 10, 12, 13]);
+        assert_eq!(lines_reported(&refused), [4, 5, 9, 10, 12, 13]);
     }
 
     #[test]
-    fn what_only_a_machine_refuses_is_said_at_its_place() {
+    fn what_only_a_machine_refuses_is_reported_at_its_place() {
         let bad = refusal(&format!("{DRIVE}battery = false"));
         assert!(
             bad.starts_with("line 4, column 11: '4 battery off' cannot be done: a zlac8030l has no battery"),
@@ -561,7 +561,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_master_does_not_use_is_told() {
+    fn what_a_master_does_not_use_is_reported() {
         let text = format!("seed = 3\n{DRIVE}load = {{ torque_nm = 0.5 }}\nfaults = []");
         assert_eq!(parsed(&text).unused_by_a_master().as_deref(), Some("seed; load, faults of node 4"));
         assert_eq!(parsed(DRIVE).unused_by_a_master(), None);
@@ -573,9 +573,9 @@ mod tests {
         std::fs::write(&path, format!("{DRIVE}# {}", " ".repeat(crate::document::LARGEST as usize))).unwrap();
         let said = machine(path.to_str().unwrap()).err().unwrap_or_default();
         std::fs::remove_file(&path).unwrap();
-        assert!(said.contains("more than 1 MB"), "{said}");
-        assert!(machine("/").is_err_and(|said| said.contains("no file")));
+        assert!(said.contains("limit of 1 MB"), "{said}");
+        assert!(machine("/").is_err_and(|said| said.contains("not a regular file")));
         #[cfg(unix)]
-        assert!(machine("/dev/zero").is_err_and(|said| said.contains("no file")));
+        assert!(machine("/dev/zero").is_err_and(|said| said.contains("not a regular file")));
     }
 }

@@ -1,5 +1,5 @@
 //! Axes that move as one, in a machine file: `[[group]]` and `[base]`. A master uses them (`ferrodrive group`, `ferrodrive
-//! drive-base`); a simulated machine moves by nobody's plan.
+//! drive-base`); a simulated machine does not use it.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -79,7 +79,7 @@ pub struct BasePlan {
     pub limits: BaseLimits,
 }
 
-/// How long a twist counts where nothing is said.
+/// How long a twist counts by default.
 pub const WATCHDOG: Duration = Duration::from_millis(300);
 
 /// All groups of a file with drives at these nodes, and its base. What is wrong is added to `problems`.
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_group_is_said_at_its_place() {
+    fn what_is_wrong_with_a_group_is_reported_at_its_place() {
         let with = |from: &str, to: &str| refusal(&format!("{DRIVES}{GROUP}{}", AXIS.replace(from, to)));
         assert!(with("node = 4", "node = 9").contains("line 11, column 8: the file has no [[drive]] at node 9"));
         assert!(with("velocity_deg_s = 360\n", "").contains("an axis of a group needs 'velocity_deg_s'"));
@@ -252,7 +252,7 @@ mod tests {
         assert!(zero.contains("the limit of axis 1 for a jerk is 0 deg/s^3"), "{zero}");
         assert!(with("[-90, 180]", "[180, -90]").contains("state the lower one first"));
         assert!(with("[-90, 180]", "[1]").contains("'range_deg' is a list of 1; expected two bounds in degrees"));
-        assert!(with("'pv'", "'fast'").contains("'fast' is no mode of operation"));
+        assert!(with("'pv'", "'fast'").contains("'fast' is not a mode of operation"));
         assert!(refusal(&format!("{DRIVES}{GROUP}")).contains("a group needs 'axis'"));
         assert!(refusal(&format!("{DRIVES}{GROUP}{AXIS}{AXIS}")).contains("node 4 is two axes of the group 'arm'"));
         let twice = format!("{DRIVES}{GROUP}{AXIS}{GROUP}{AXIS}");
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_base_is_said_at_its_place() {
+    fn what_is_wrong_with_a_base_is_reported_at_its_place() {
         let with = |from: &str, to: &str| refusal(&format!("{DRIVES}{}", BASE.replace(from, to)));
         assert!(with("[4, 5]", "[4, 4]").contains("line 8, column 10: node 4 cannot be both wheels"));
         assert!(

@@ -284,5 +284,9 @@ fn word<'a>(field: &'a Field<'_>) -> Result<&'a str, Problem> {
 /// A name that is one word: it must not bring words of its own into a world command.
 fn one_word<'a>(field: &Field<'_>, name: &'a str) -> Result<&'a str, Problem> {
     let word = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
-    if word { Ok(name) } else { Err(field.problem(format!("'{name}' is no name of anything on a drive"))) }
+    if word {
+        Ok(name)
+    } else {
+        Err(field.problem(format!("'{name}' is not the name of an input or a part of a drive")))
+    }
 }

@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_gear_is_told_with_its_place() {
+    fn what_is_not_a_gear_is_reported_with_its_place() {
         let says = |line: &str, what: &str| {
             let said = read(line).expect_err("it is wrong");
             assert!(said.starts_with("line 4") && said.contains(what), "{line}: {said}");

@@ -44,7 +44,7 @@ impl Form {
             "bin" | "cdcf" => Self::Concise,
             _ => {
                 return Err(format!(
-                    "'{}' does not say what it is: parameters are in a file .dcf (CiA 306), .toml, or .bin (concise DCF)",
+                    "'{}' has an unknown extension; expected .dcf (CiA 306), .toml, or .bin (concise DCF)",
                     path.display()
                 ));
             }
@@ -79,7 +79,7 @@ fn dcf(path: &Path, node: NodeId) -> Result<Parameters, String> {
 fn concise(path: &Path, node: NodeId) -> Result<Parameters, String> {
     let length = std::fs::metadata(path).map_err(|error| error.to_string())?;
     if !length.is_file() || length.len() > LARGEST {
-        return Err("it is no file of less than 1 MB".into());
+        return Err("not a regular file of at most 1 MB".into());
     }
     let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
     of_concise(&bytes, node)

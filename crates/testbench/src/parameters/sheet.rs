@@ -120,9 +120,7 @@ pub fn values_of(
             Ok((mux, bytes_of(field, row, resolution)?))
         });
         match value {
-            Ok((mux, _)) if values.contains_key(&mux) => {
-                problems.push(field.problem(format!("{mux} stands here twice")))
-            }
+            Ok((mux, _)) if values.contains_key(&mux) => problems.push(field.problem(format!("{mux} is given twice"))),
             Ok((mux, bytes)) => {
                 values.insert(mux, bytes);
             }
@@ -166,7 +164,7 @@ fn bytes_of(field: &Field<'_>, row: Option<&'static Entry>, resolution: i64) -> 
     }
     let Some(row) = row else {
         return typed_alone(&text).map(|typed| typed.bytes()).map_err(|reason| {
-            field.problem(format!("'{}' is no object of a model that is known here: {reason}", field.name()))
+            field.problem(format!("'{}' is not an object of any known model: {reason}", field.name()))
         });
     };
     let typed = typed_for(row, &text, resolution).map_err(refused)?;
@@ -304,13 +302,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_at_its_place() {
+    fn what_is_wrong_is_reported_at_its_place() {
         assert!(refusal("node = 4\n").contains("needs 'values'"));
         assert!(refusal("[values]\nprofile_velocty = 1").contains("did you mean profile_velocity?"));
         assert!(refusal("[values]\n1017 = 70000").contains("line 2, column 8"));
         assert!(refusal("[values]\n1017 = [1]").contains("'1017' is a list of 1; expected a whole number"));
         assert!(refusal("[values]\n6081 = -1").contains("6081h:00"));
-        assert!(refusal("[values]\n1017 = 1\n\"1017:00\" = 2").contains("stands here twice"));
+        assert!(refusal("[values]\n1017 = 1\n\"1017:00\" = 2").contains("is given twice"));
         assert!(refusal("[values]\n5555 = 1").contains("needs its type"));
         assert!(refusal("[values]\n1017 = \"hex:01\"").contains("1 bytes for '1017', which has 2"));
         assert!(refusal("model = 'zlim42c'\n[values]").contains("the node is a zlac8030l"));

@@ -10,7 +10,7 @@ use sim::recorder::{Channel, Signal};
 
 use crate::words::suggest::{did_you_mean, near};
 
-/// What a column tells about.
+/// What a column is about.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Subject {
     /// An axis of a node.
@@ -106,7 +106,8 @@ impl FromStr for Column {
 
     /// `4.velocity_rpm`, `5.2.velocity_rpm`, `base.x_m`.
     fn from_str(name: &str) -> Result<Self, String> {
-        let (subject, signal) = name.rsplit_once('.').ok_or_else(|| format!("'{name}' is no NODE.SIGNAL"))?;
+        let (subject, signal) =
+            name.rsplit_once('.').ok_or_else(|| format!("'{name}' is not of the form NODE.SIGNAL"))?;
         let Ok(subject) = subject.parse();
         let known = Signal::ALL.into_iter().find(|known| known.name() == signal);
         let unit = known.map_or_else(|| unit_of(signal).into(), |known| Cow::from(known.unit()));
@@ -185,7 +186,7 @@ fn nothing_like(pattern: &str, names: &[String]) -> String {
     // Who names a node means one signal of it; who does not, means a kind.
     let candidates = if pattern.contains('.') { names } else { &signals };
     let hint = did_you_mean(&near(pattern, candidates.iter().map(String::as_str)));
-    format!("there is no signal '{pattern}'{hint}\nsignals: {}", signals.join(", "))
+    format!("unknown signal '{pattern}'{hint}\nsignals: {}", signals.join(", "))
 }
 
 #[cfg(test)]
@@ -202,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_tells_what_the_column_is() {
+    fn a_name_gives_the_kind_of_its_column() {
         for column in columns_of_drives([Place::node(4), "5.2".parse().unwrap()]) {
             assert_eq!(column.name().parse(), Ok(column.clone()));
             assert_eq!(Subject::of_topic(&column.subject.topic()), Some(column.subject));

@@ -9,11 +9,11 @@ use super::piece::Kind;
 use super::read::{CsvLines, note};
 use super::record::Record;
 
-/// An MCAP file of what stands in a CSV file. A subject of which a line tells nothing has no message of that time: columns that were
-/// sampled at times of their own take no more room than their samples.
+/// An MCAP file with the contents of a CSV file. A subject without values in a line has no message of that time:
+/// columns that were sampled at times of their own take no more room than their samples.
 ///
 /// # Errors
-/// A sentence: it is no such CSV file.
+/// Not a CSV file of this kind, in a sentence.
 pub fn mcap_of_csv(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let mut lines = CsvLines::of(bytes)?;
     let memory = Memory::default();
@@ -99,7 +99,7 @@ mod tests {
         }
         let speed = is.series.iter().find(|series| series.column.signal == "velocity_rpm").expect("a speed");
         assert_eq!(speed.column.unit, "r/min");
-        // Nothing is told of a node at the times of another.
+        // A node has no messages at the times of another.
         assert_eq!(speed.points.len(), 2);
         assert_eq!(
             (is.marks[0].text.as_str(), is.marks[0].at),

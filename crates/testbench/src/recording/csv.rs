@@ -49,7 +49,7 @@ impl Csv {
     }
 
     pub(super) fn mark(&mut self, mark: &Mark) -> io::Result<()> {
-        /// A line that nobody would read.
+        /// A line without values.
         const LONGEST: usize = 4096;
         if self.marks.len() > LONGEST {
             self.write_marks()?;

@@ -18,10 +18,10 @@ const LONGEST_CHUNK: u64 = 64 << 20;
 
 pub(super) fn read_mcap(bytes: &[u8]) -> Result<Recorded, String> {
     if !bytes.starts_with(mcap::MAGIC) {
-        return Err("it is no MCAP file: it does not begin as one".into());
+        return Err("not an MCAP file: it does not begin as one".into());
     }
     let records = LinearReader::new_with_options(bytes, Options::IgnoreEndMagic.into())
-        .map_err(|error| format!("it is no MCAP file: {error}"))?;
+        .map_err(|error| format!("not an MCAP file: {error}"))?;
     let mut reading = Reading::default();
     reading.recorded.torn = !bytes.ends_with(mcap::MAGIC);
     for record in records {

@@ -4,8 +4,8 @@
 //! whose end is missing. Two kinds of file:
 //!
 //! - MCAP (<https://mcap.dev/spec>), which Foxglove, PlotJuggler and Rerun open: a topic for each axis (`/node/4`,
-//!   `/node/5/2`) and body (`/body/base`) with JSON messages and a JSON schema that tells the units, `/can` with the frames
-//!   and `/events` with what happened, as log lines.
+//!   `/node/5/2`) and body (`/body/base`) with JSON messages and a JSON schema that gives the units, `/can` with the
+//!   frames and `/events` with what happened, as log lines.
 //! - CSV: `t_s`, a column for each signal (`4.velocity_rpm`), and `mark`, what happened since the line before. It has no
 //!   frames.
 //!

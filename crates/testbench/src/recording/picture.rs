@@ -7,10 +7,10 @@ use plot::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
 use super::column::{Column, Subject, select};
 use super::piece::{Recorded, Series, Severity};
 
-/// What is drawn when nobody says what.
+/// What is drawn by default.
 const USUAL: [&str; 8] = ["position", "velocity", "current", "supply", "x_m", "y_m", "heading", "joint"];
 
-/// Kinds of events that are not marked: the curves show them, or what comes of them.
+/// Kinds of events that are not marked: the curves show them, or their consequences.
 const QUIET: [&str; 6] = ["boot", "nmt", "mode", "state", "store_begun", "target_reached"];
 
 /// A picture of `recorded` within `span`, in s. `patterns` are as [`select`] takes them; none asks for the usual signals.
@@ -199,13 +199,13 @@ mod tests {
     }
 
     #[test]
-    fn a_span_is_cut_out_and_an_empty_one_is_told() {
+    fn a_span_is_cut_out_and_an_empty_one_is_reported() {
         let poster = drawn(&["4.position_counts"], 0.2..=0.3).unwrap();
         let points = &poster.rows[0][0].panels[0].traces[0].points;
         assert!(points.iter().all(|(at, _)| (0.2..=0.3).contains(at)) && points.len() >= 10);
         let refusal = |patterns: &[&str], span| drawn(patterns, span).err().unwrap_or_default();
         assert_eq!(refusal(&[], 5.0..=6.0), "it was recorded from 0.000 s to 0.990 s");
-        assert!(refusal(&["speed"], 0.0..=1.0).contains("no signal 'speed'"));
+        assert!(refusal(&["speed"], 0.0..=1.0).contains("unknown signal 'speed'"));
         assert!(picture("", &Recorded::default(), &[], 0.0..=1.0).unwrap_err().contains("nothing is recorded"));
     }
 }

@@ -1,7 +1,7 @@
 //! A record's file, read back.
 //!
 //! A file whose writer was killed, or that is still being written, ends in the middle of something: what stands before that
-//! is taken, and [`Recorded::torn`] says so.
+//! is taken, and [`Recorded::torn`] is set.
 
 use can::Instant;
 
@@ -9,10 +9,10 @@ use super::column::Column;
 use super::mcap_read::read_mcap;
 use super::piece::{Kind, Mark, Recorded, Series, Severity};
 
-/// What stands in a file of this kind.
+/// The contents of a file of this kind.
 ///
 /// # Errors
-/// A sentence: it is no such file at all, or nothing in it is a record.
+/// Not a file of this kind, or without a record, in a sentence.
 pub fn read(kind: Kind, bytes: &[u8]) -> Result<Recorded, String> {
     let mut recorded = match kind {
         Kind::Mcap => read_mcap(bytes)?,
@@ -27,7 +27,7 @@ fn read_csv(bytes: &[u8]) -> Result<Recorded, String> {
     let series = lines.columns.iter().map(|column| Series { column: column.clone(), points: Vec::new() });
     let mut recorded = Recorded { torn: lines.torn, series: series.collect(), marks: Vec::new() };
     while let Some((at, values, text)) = lines.next()? {
-        // A line that has nothing but marks is no sample.
+        // A line that has nothing but marks is not a sample.
         if text.is_empty() || values.iter().any(|value| !value.is_nan()) {
             recorded.series.iter_mut().zip(values).for_each(|(series, value)| series.points.push((at, *value)));
         }
@@ -65,7 +65,7 @@ impl<'a> CsvLines<'a> {
         // The line in which a writer was killed is none; no field holds the end of a line.
         let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
         let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..whole]);
-        let header = reader.headers().map_err(|error| format!("it is no CSV file: {error}"))?.clone();
+        let header = reader.headers().map_err(|error| format!("not a CSV file: {error}"))?.clone();
         if header.get(0) != Some("t_s") {
             return Err("its first column is not t_s, the time in s".into());
         }
@@ -81,14 +81,16 @@ impl<'a> CsvLines<'a> {
 
     /// The next line.
     pub(super) fn next(&mut self) -> Result<Option<CsvLine<'_>>, String> {
-        if !self.reader.read_record(&mut self.line).map_err(|error| format!("it is no CSV file: {error}"))? {
+        if !self.reader.read_record(&mut self.line).map_err(|error| format!("not a CSV file: {error}"))? {
             return Ok(None);
         }
         let line = &self.line;
         let row = line.position().map_or(0, csv::Position::line);
         let number = |place: usize| match line.get(place) {
             Some("") => Ok(f64::NAN),
-            Some(text) => text.parse().map_err(|_| format!("line {row}, column {}: '{text}' is no number", place + 1)),
+            Some(text) => {
+                text.parse().map_err(|_| format!("line {row}, column {}: '{text}' is not a number", place + 1))
+            }
             None => Err(format!("line {row} has {} fields; the first line has {}", line.len(), self.width)),
         };
         let at: f64 = number(0)?;
@@ -196,11 +198,11 @@ mod tests {
 
     #[test]
     fn a_file_that_is_something_else_is_refused_with_the_reason() {
-        assert!(read(Kind::Mcap, b"t_s,4.velocity_rpm\n").unwrap_err().contains("no MCAP file"));
-        assert!(read(Kind::Mcap, b"").unwrap_err().contains("no MCAP file"));
+        assert!(read(Kind::Mcap, b"t_s,4.velocity_rpm\n").unwrap_err().contains("not an MCAP file"));
+        assert!(read(Kind::Mcap, b"").unwrap_err().contains("not an MCAP file"));
         assert!(read(Kind::Csv, b"a,b\n1,2\n").unwrap_err().contains("t_s"));
         let bad = read(Kind::Csv, b"t_s,4.velocity_rpm,mark\n0,1,\n1,fast,\n").unwrap_err();
-        assert_eq!(bad, "line 3, column 2: 'fast' is no number");
+        assert_eq!(bad, "line 3, column 2: 'fast' is not a number");
         assert!(read(Kind::Csv, b"t_s,4.velocity_rpm,mark\n0\n1,2,\n").unwrap_err().contains("line 2 has 1 fields"));
         assert!(read(Kind::Csv, b"t_s,4.velocity_rpm,mark\n-1,1,\n").unwrap_err().contains("a time of -1 s"));
         assert!(read(Kind::Csv, b"t_s,4.velocity_rpm,mark\n").unwrap().series.is_empty());

@@ -39,7 +39,7 @@ pub const FORMS: &[&str] = &[
     "wait for CONDITION [within TIME]",
 ];
 
-/// How long a condition is waited for if nothing is said.
+/// How long a condition is waited for by default.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// One thing that a host does.
@@ -95,7 +95,7 @@ pub enum Command {
     WaitFor(Condition, Duration),
 }
 
-/// How a motion is to be made, as it is typed: along a way too, which becomes a rotation by the [gear](Drive::gear) of a drive.
+/// The options of a motion, as typed: along a way too, which becomes a rotation by the [gear](Drive::gear) of a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Manner {
     /// Largest speed on the way.
@@ -202,7 +202,9 @@ impl FromStr for Command {
                 period => Ok(Self::Sync(Some(period))),
             },
             ["heartbeat", number, period] => Ok(Self::Heartbeat(node(number)?, time(period)?)),
-            ["send", frame] => frame.parse().map(Self::Send).map_err(|error| format!("'{frame}' is no frame: {error}")),
+            ["send", frame] => {
+                frame.parse().map(Self::Send).map_err(|error| format!("'{frame}' is not a frame: {error}"))
+            }
             ["wait", "for", ref rest @ ..] => {
                 let (condition, within) = match rest {
                     [condition @ .., "within", limit] => (condition, time(limit)?),
@@ -213,13 +215,13 @@ impl FromStr for Command {
             ["wait", duration] => Ok(Self::Wait(time(duration)?)),
             ["all", "nmt", command] => Ok(Self::Nmt(None, nmt(command)?)),
             [place, ref rest @ ..] if place.parse::<Place>().is_ok() => of_node(place, rest),
-            _ => Err(format!("'{line}' is nothing that a host does; expected one of: {}", FORMS.join("; "))),
+            _ => Err(format!("'{line}' is not a host command; expected one of: {}", FORMS.join("; "))),
         }
     }
 }
 
 fn of_node(place_word: &str, words: &[&str]) -> Result<Command, String> {
-    let place: Place = place_word.parse().map_err(|()| format!("'{place_word}' is no node"))?;
+    let place: Place = place_word.parse().map_err(|()| format!("'{place_word}' is not a node"))?;
     let id = || node(&place.node.to_string());
     match *words {
         [word] if INTENTS.iter().any(|(name, _)| *name == word) => {
@@ -243,7 +245,7 @@ fn of_node(place_word: &str, words: &[&str]) -> Result<Command, String> {
         ["home", method, ref rest @ ..] => {
             let method = method
                 .parse()
-                .map_err(|_| format!("'{method}' is no homing method; expected a number, as in: home 17"))?;
+                .map_err(|_| format!("'{method}' is not a homing method; expected a number, as in: home 17"))?;
             let (manner, within) = manner(rest)?;
             Ok(Command::Home { place, method, within, manner })
         }
@@ -267,7 +269,7 @@ fn pdo(words: &[&str]) -> Result<PdoCommand, String> {
         ["read", name] => Ok(PdoCommand::Read(object(name)?)),
         _ => {
             let forms: Vec<_> = FORMS.iter().filter(|form| form.starts_with("NODE pdo")).copied().collect();
-            Err(format!("'pdo {}' is nothing that a host does; expected one of: {}", words.join(" "), forms.join("; ")))
+            Err(format!("'pdo {}' is not a host command; expected one of: {}", words.join(" "), forms.join("; ")))
         }
     }
 }
@@ -276,7 +278,9 @@ fn pdo_id(direction: &str, number: &str) -> Result<PdoId, String> {
     let direction = match direction {
         "rpdo" => Direction::Rpdo,
         "tpdo" => Direction::Tpdo,
-        _ => return Err(format!("'{direction}' is no kind of PDO; expected rpdo (to the device) or tpdo (from it)")),
+        _ => {
+            return Err(format!("'{direction}' is not a kind of PDO; expected rpdo (to the device) or tpdo (from it)"));
+        }
     };
     let number = number.parse().ok().and_then(PdoNumber::new);
     let number =
@@ -286,13 +290,13 @@ fn pdo_id(direction: &str, number: &str) -> Result<PdoId, String> {
 
 fn transmission_type(text: &str) -> Result<TransmissionType, String> {
     text.parse().map(TransmissionType).map_err(|_| {
-        format!("'{text}' is no transmission type; expected 0 to 255 (CiA 301, tables 64 and 68), as in: type 1 for each SYNC")
+        format!("'{text}' is not a transmission type; expected 0 to 255 (CiA 301, tables 64 and 68), as in: type 1 for each SYNC")
     })
 }
 
 fn unknown(words: &[&str]) -> String {
     let forms: Vec<_> = FORMS.iter().filter(|form| form.starts_with("NODE")).copied().collect();
-    format!("'{}' is nothing that a host does with a node; expected one of: {}", words.join(" "), forms.join("; "))
+    format!("'{}' is not a host command for a node; expected one of: {}", words.join(" "), forms.join("; "))
 }
 
 fn movement(place: Place, to: &str, relative: bool, rest: &[&str]) -> Result<Command, String> {
@@ -312,7 +316,7 @@ fn manner(mut words: &[&str]) -> Result<(Manner, Option<Duration>), String> {
         }
         let Some((&value, rest)) = rest.split_first() else {
             return Err(format!(
-                "'{word}' stands alone; expected [at SPEED] [acceleration RAMP] [deceleration RAMP] [within TIME] [no-wait]"
+                "'{word}' has no value; expected [at SPEED] [acceleration RAMP] [deceleration RAMP] [within TIME] [no-wait]"
             ));
         };
         words = rest;
@@ -323,7 +327,7 @@ fn manner(mut words: &[&str]) -> Result<(Manner, Option<Duration>), String> {
             "within" => within = Some(time(value)?),
             _ => {
                 return Err(format!(
-                    "'{word}' says nothing about a motion; expected at, acceleration, deceleration, within or no-wait"
+                    "'{word}' is not an option of a motion; expected at, acceleration, deceleration, within or no-wait"
                 ));
             }
         }
@@ -347,7 +351,7 @@ fn nmt(word: &str) -> Result<NmtCommand, String> {
     let known = NMT.iter().find(|(name, _)| *name == word);
     known
         .map(|(_, command)| *command)
-        .ok_or_else(|| format!("'{word}' is no command; expected {}", NMT.map(|(name, _)| name).join(", ")))
+        .ok_or_else(|| format!("'{word}' is not a command; expected {}", NMT.map(|(name, _)| name).join(", ")))
 }
 
 #[cfg(test)]
@@ -355,7 +359,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_is_an_intent_and_what_is_none_is_told_what_may_be_said() {
+    fn a_line_is_an_intent_and_other_lines_are_refused_with_the_possible_forms() {
         for line in [
             "4 enable",
             "4 velocity -60rpm acceleration 500ms no-wait",
@@ -386,8 +390,8 @@ mod tests {
             ("4 dance", "NODE enable"),
             ("4 velocity", "NODE enable"),
             ("4 velocity fast", "does not begin with a number"),
-            ("4 velocity 60rpm at 5rpm", "nothing that a host does"),
-            ("4 move 90deg at", "stands alone"),
+            ("4 velocity 60rpm at 5rpm", "is not a host command"),
+            ("4 move 90deg at", "has no value"),
             ("4 nmt go", "expected start"),
             ("4 pdo", "NODE pdo map"),
             ("4 pdo map tpdo 1", "NODE pdo map"),

@@ -1,7 +1,7 @@
 //! What a scenario waits for and expects, in words: `4 velocity > 50`, `4 statusword bit 10`, `frame 084#1032`.
 //!
 //! A condition about values holds for some time; one about what happens ([`Condition::is_event`]: frames, events of the world) holds
-//! at that instant only. Words that are no condition are refused with what may be said.
+//! at that instant only. Words that are not a condition are refused with the possible forms.
 
 use std::fmt;
 
@@ -47,7 +47,7 @@ pub enum Condition {
     Signal(Place, Signal, Comparison),
     /// A bit of the statusword is set.
     Bit(Place, u8),
-    /// The power state as the statusword tells it.
+    /// The power state by the statusword.
     Power(Place, PowerState),
     /// The supply is switched on.
     Powered(Place),
@@ -67,7 +67,7 @@ pub enum Condition {
     Frame(Pattern),
     /// Now an attempt to send a frame has failed.
     ErrorFrame,
-    /// Now the world has told of such an event.
+    /// The world has just reported such an event.
     Event(EventPattern),
     /// The step or the host of this name is done.
     Done(String),
@@ -139,7 +139,8 @@ impl Pattern {
 
     /// `084#1032`, `184#3706..`, `704#`: what follows the bytes may be anything.
     fn parse(text: &str) -> Result<Self, String> {
-        let wrong = || format!("'{text}' is no frame; expected ID#DATA in hexadecimal, as in 084#1032 or 184#37..00");
+        let wrong =
+            || format!("'{text}' is not a frame; expected ID#DATA in hexadecimal, as in 084#1032 or 184#37..00");
         let (id, data) = text.split_once('#').ok_or_else(wrong)?;
         let number = u32::from_str_radix(id, 16).ok().filter(|_| !id.starts_with('+')).ok_or_else(wrong)?;
         let extended = id.len() > 3;
@@ -185,7 +186,7 @@ impl Condition {
         }
     }
 
-    /// True if it is about events that only a watched world tells of.
+    /// True if it is about events that only a watched world reports.
     pub fn needs_events(&self) -> bool {
         match self {
             Self::Event(_) => true,
@@ -231,7 +232,7 @@ impl Condition {
                 matches!(view.occurrence, Some(Occurrence::Wire(WireEvent::Frame { frame, .. })) if pattern.matches(frame))
             }
             Self::ErrorFrame => matches!(view.occurrence, Some(Occurrence::Wire(WireEvent::Error { .. }))),
-            Self::Event(pattern) => matches!(view.occurrence, Some(Occurrence::Told(event)) if pattern.matches(event)),
+            Self::Event(pattern) => matches!(view.occurrence, Some(Occurrence::Event(event)) if pattern.matches(event)),
             Self::Body(name, signal, comparison) => {
                 of_body(view.world, name, signal).is_some_and(|value| comparison.holds(value))
             }
@@ -271,7 +272,7 @@ impl Condition {
         }
     }
 
-    /// What is to be seen of it now, for people.
+    /// Its present state, for people.
     pub fn seen(&self, view: &mut View<'_>) -> String {
         match self {
             Self::Frame(_) | Self::ErrorFrame | Self::Event(_) => match (view.occurrence, self) {
@@ -357,7 +358,7 @@ fn short_name(signal: Signal) -> &'static str {
     if signal.unit().is_empty() { name } else { name.rsplit_once('_').map_or(name, |(name, _)| name) }
 }
 
-/// The signal that somebody means: `velocity`, `velocity_rpm`.
+/// The signal that is meant: `velocity`, `velocity_rpm`.
 ///
 /// # Errors
 /// That there is none, and which there are.
@@ -366,7 +367,7 @@ pub fn signal(word: &str) -> Result<Signal, String> {
     found.ok_or_else(|| {
         let near = did_you_mean(&near(word, Signal::ALL.into_iter().map(short_name)));
         let known: Vec<_> = Signal::ALL.into_iter().map(short_name).collect();
-        format!("'{word}' is nothing to look at{near}; a node has: {}, and what is said of it: state, fault, powered, damaged, brake, output, bus, boots, emcy, event", known.join(", "))
+        format!("'{word}' is not a signal of a node{near}; a node has: {}, and: state, fault, powered, damaged, brake, output, bus, boots, emcy, event", known.join(", "))
     })
 }
 
@@ -385,12 +386,12 @@ impl std::str::FromStr for Condition {
 
 /// One condition, without `and`.
 fn one(words: &[&str]) -> Result<Condition, String> {
-    let wrong = |form: &str| format!("'{}' is no condition; expected: {form}", words.join(" "));
+    let wrong = |form: &str| format!("'{}' is not a condition; expected: {form}", words.join(" "));
     match words {
         [] => Err(format!("a condition is missing; one of: {}", FORMS.join("; "))),
         ["not", rest @ ..] => match one(rest)? {
             part if part.is_event() => {
-                Err("what happens, happens at an instant: that it does not is said with never = \"..\"".into())
+                Err("an event holds at an instant only; to expect its absence use never = \"..\"".into())
             }
             part => Ok(Condition::Not(Box::new(part))),
         },
@@ -411,7 +412,7 @@ fn one(words: &[&str]) -> Result<Condition, String> {
 }
 
 fn of_node(place: Place, words: &[&str]) -> Result<Condition, String> {
-    let wrong = |form: &str| format!("'{}' is no condition of a node; expected: {form}", words.join(" "));
+    let wrong = |form: &str| format!("'{}' is not a condition of a node; expected: {form}", words.join(" "));
     Ok(match words {
         ["event", rest @ ..] => Condition::Event(EventPattern::parse(Some(place), rest)?),
         ["powered"] => Condition::Powered(place),
@@ -431,7 +432,7 @@ fn of_node(place: Place, words: &[&str]) -> Result<Condition, String> {
             let names = || PowerState::ALL.map(|known| spelled(known.name())).join(", ");
             Condition::Power(
                 place,
-                known.ok_or_else(|| format!("'{state}' is no state; expected one of: {}", names()))?,
+                known.ok_or_else(|| format!("'{state}' is not a state; expected one of: {}", names()))?,
             )
         }
         ["bus", state] => Condition::Bus(
@@ -485,7 +486,7 @@ fn comparison(unit: &str, order: &str, words: &[&str]) -> Result<Comparison, Str
 /// A number in the signal's unit, which may stand behind it; also `0x1F`.
 fn number(unit: &str, text: &str) -> Result<f64, String> {
     let wrong =
-        || format!("'{text}' is no number{}", if unit.is_empty() { String::new() } else { format!(" in {unit}") });
+        || format!("'{text}' is not a number{}", if unit.is_empty() { String::new() } else { format!(" in {unit}") });
     if let Some(digits) = text.strip_prefix("0x") {
         return u32::from_str_radix(digits, 16).map(f64::from).map_err(|_| wrong());
     }
@@ -514,7 +515,7 @@ mod tests {
     }
 
     #[test]
-    fn words_become_conditions_and_what_is_none_is_told_what_may_be_said() {
+    fn words_become_conditions_and_others_are_refused_with_the_possible_forms() {
         for text in [
             "4 velocity > 50",
             "4 velocity = 60rpm +- 3",
@@ -538,20 +539,20 @@ mod tests {
             ("4", "what about node 4?"),
             ("four velocity > 5", "NODE SIGNAL"),
             ("4 velocty > 5", "did you mean velocity"),
-            ("4 velocity > fast", "'fast' is no number in r/min"),
-            ("4 velocity > nan", "'nan' is no number"),
+            ("4 velocity > fast", "'fast' is not a number in r/min"),
+            ("4 velocity > nan", "'nan' is not a number"),
             ("4 velocity > 5 +- 1", "expected: NODE SIGNAL"),
             ("4 velocity", "expected: NODE SIGNAL"),
             ("4 statusword bit 16", "bit 0 to 15"),
             ("4 state running", "operation-enabled"),
-            ("frame 84", "is no frame"),
-            ("frame 800#", "is no frame"),
-            ("frame 084#1", "is no frame"),
+            ("frame 84", "is not a frame"),
+            ("frame 800#", "is not a frame"),
+            ("frame 084#1", "is not a frame"),
             ("not frame 084#", "never ="),
             ("not 4 event fault", "never ="),
             ("4 event falt", "did you mean fault"),
             ("body base", "body NAME SIGNAL"),
-            ("body base x_m > far", "'far' is no number"),
+            ("body base x_m > far", "'far' is not a number"),
             ("4 powered and", "a condition is missing"),
         ] {
             assert!(refusal(text).contains(said), "{text}: {}", refusal(text));

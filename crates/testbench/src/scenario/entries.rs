@@ -116,7 +116,7 @@ pub(super) fn step(table: &Table<'_>) -> Many<Step> {
     let parts = (|| {
         let when = table.get("when").map(|field| condition(&field)).transpose()?;
         if let (None, Some(field)) = (&when, table.get("within")) {
-            return Err(field.problem("'within' is about 'when', which is not there"));
+            return Err(field.problem("'within' needs 'when'"));
         }
         let fields = texts(table, EXPECTED)?;
         Ok((
@@ -163,7 +163,7 @@ fn act(field: &Field<'_>, words: &str) -> Result<Act, Problem> {
         Ok(WorldCommand::Apply(place, stimulus)) => Ok(Act::World(place, stimulus)),
         Ok(WorldCommand::Disturb(fault)) => Ok(Act::Wire(fault)),
         Ok(WorldCommand::ApplyToBody(name, stimulus)) => Ok(Act::Body(name, stimulus)),
-        Ok(_) => Err(field.problem(format!("'{words}' does nothing to the machine; [[expect]] looks at it"))),
+        Ok(_) => Err(field.problem(format!("'{words}' changes nothing; use [[expect]] to look at the machine"))),
         Err(error) => Err(field.problem(error.to_string())),
     }
 }
@@ -242,7 +242,7 @@ fn expectation(table: &Table<'_>, n: usize) -> Result<Expect, Problem> {
     let condition = condition(&field)?;
     let at = optional_time(table, "at")?;
     if condition.is_event() && (at.is_some() || law == Law::Always) {
-        return Err(field.problem("it happens at an instant: give that or never, and a stretch of time"));
+        return Err(field.problem("an event holds at an instant only: use that or never, and a span of time"));
     }
     let (from, until) = match (at, table.get("until"), table.get("within")) {
         (Some(at), None, None) if table.get("from").or(table.get("after")).is_none() => (Base::At(at), Until::At(at)),

@@ -1,5 +1,5 @@
-//! A scenario under way in a world that somebody else moves: what it does, looks at and waits for, without a clock of its own.
-//! [`Runner`](super::Runner) moves the world in virtual time.
+//! A scenario under way in a world that the caller moves: what it does, looks at and waits for, without a clock of its
+//! own. [`Runner`](super::Runner) moves the world in virtual time.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -23,15 +23,15 @@ use super::outcome::{Outcome, Row, RowKind, Verdict};
 use super::script::Script;
 use crate::document::BadFile;
 use crate::machine_file::{Machine, SEED};
-use crate::models::with_told;
+use crate::models::with_files;
 
-/// Frames that the outcome of a failed run tells.
+/// Frames that the outcome of a failed run lists.
 const FRAMES_TOLD: usize = 24;
 
-/// A scenario that goes along with a world which somebody else moves.
+/// A scenario that goes along with a world which the caller moves.
 ///
-/// Whoever moves the world goes no further than [`Execution::next_time`] and calls [`Execution::look`] there, hands on what happens with
-/// [`Execution::hear`], and calls [`Execution::go_on`] after each of these.
+/// The caller moves the world no further than [`Execution::next_time`] and calls [`Execution::look`] there, hands on
+/// what happens with [`Execution::hear`], and calls [`Execution::go_on`] after each of these.
 pub struct Execution {
     scenario: Scenario,
     seed: u64,
@@ -50,7 +50,7 @@ struct Task {
     woken: Arc<Woken>,
 }
 
-/// Remembers that somebody called the waker.
+/// Remembers that the waker was called.
 struct Woken(AtomicBool);
 
 impl Wake for Woken {
@@ -72,7 +72,7 @@ impl Execution {
         let seed = seed.or(scenario.seed).or(scenario.machine.seed).unwrap_or(SEED);
         let mut world = Machine { seed: Some(seed), ..scenario.machine.clone() }.build()?;
         let network = Network::new();
-        network.set_models(with_told(scenario.machine.models().map(|(_, model)| model)));
+        network.set_models(with_files(scenario.machine.models().map(|(_, model)| model)));
         let host = world.add_station(network.clone());
         let shared = Rc::new(RefCell::new(Shared::default()));
         let machine = Rc::new(scenario.machine.clone());
@@ -164,7 +164,7 @@ impl Execution {
         self.look_at(world, Some(occurrence));
     }
 
-    /// Ends the run where it stands, and tells what came of it.
+    /// Ends the run where it stands, and gives the outcome.
     pub fn conclude(mut self, world: &mut World) -> Outcome {
         self.script.conclude(&self.scenario, world);
         self.conclude_hosts();

@@ -31,10 +31,10 @@ pub const KEYS: &[&str] = &[
     "host",
     "expect",
 ];
-/// Virtual time after which a run ends in any case, if nothing is said.
+/// Virtual time after which a run ends in any case, by default.
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// How often values are looked at, if nothing is said; and the least that may be said.
+/// How often values are looked at by default, and the shortest interval that may be given.
 const SAMPLE: Duration = Duration::from_millis(1);
 const SHORTEST_SAMPLE: Duration = Duration::from_micros(10);
 
@@ -47,7 +47,7 @@ pub struct Scenario {
     pub about: String,
     /// The machine.
     pub machine: Machine,
-    /// What decides everything random, where it says so.
+    /// The seed of everything random, where it is given.
     pub seed: Option<u64>,
     /// The parameters and their values.
     pub parameters: Parameters,
@@ -86,7 +86,7 @@ impl Scenario {
     /// The same scenario with other values of some of its parameters. What is given a value is not swept any more.
     ///
     /// # Errors
-    /// A name that is no parameter of it, or what becomes wrong with the value.
+    /// A name that is not a parameter of it, or what the value breaks.
     pub fn with(&self, values: &Parameters) -> Result<Self, BadFile> {
         Self::parse_with(&self.text, &self.folder, values)
     }
@@ -201,7 +201,7 @@ impl Scenario {
             _ => None,
         });
         spoken_of.extend(figures);
-        // What is wrong with a machine that cannot be built is told by whoever builds it to run.
+        // What is wrong with a machine that cannot be built is reported when it is built to run.
         let Some(mut world) = (!spoken_of.is_empty()).then(|| self.machine.build().ok()).flatten() else {
             return Vec::new();
         };
@@ -247,7 +247,7 @@ impl Scenario {
         steps.chain(lines).chain(self.expects.iter().map(|expect| (&expect.condition, &expect.place)))
     }
 
-    /// Whether it waits for events that only a watched world tells of.
+    /// Whether it waits for events that only a watched world reports.
     pub(super) fn needs_events(&self) -> bool {
         self.conditions().any(|(condition, _)| condition.needs_events())
     }

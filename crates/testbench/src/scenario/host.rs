@@ -1,6 +1,7 @@
 //! The host of a scenario at work: its lines, one after the other, as one future over a [`Network`].
 //!
-//! What it waits for beyond the bus (a condition, a time) it asks of the [`Shared`], which whoever steps the world looks at.
+//! What it waits for beyond the bus (a condition, a time) it asks of the [`Shared`], which the stepper of the world
+//! looks at.
 
 use std::cell::RefCell;
 use std::future::{Future, poll_fn};
@@ -33,7 +34,7 @@ const BOOT_PATIENCE: Duration = Duration::from_secs(5);
 /// After booting a drive looks at its supply, sensors and inputs for some tens of milliseconds before it judges them.
 const SETTLING_TIME: Duration = Duration::from_millis(200);
 
-/// What hosts and the one who steps the world tell each other.
+/// What hosts and the stepper of the world exchange.
 #[derive(Default)]
 pub(super) struct Shared {
     /// What hosts wait for.
@@ -134,7 +135,7 @@ impl HostTask {
     }
 
     fn drive(&self, place: Place) -> Result<Drive, String> {
-        let id = NodeId::new(place.node).ok_or("there is no such node")?;
+        let id = NodeId::new(place.node).ok_or("expected a node of 1 to 127")?;
         let drive = self.machine.drive(self.network.node(id));
         drive.axis(place.axis).map_err(|error| error.to_string())
     }
@@ -282,7 +283,7 @@ impl HostTask {
         let (mux, row) = self.resolve(node, object)?;
         let bits = row.map(|row| row.data_type.bits()).filter(|bits| *bits > 0);
         let bits =
-            bits.ok_or_else(|| format!("how long {mux} of node {node} is, is not known: it cannot be mapped"))?;
+            bits.ok_or_else(|| format!("the length of {mux} of node {node} is not known: it cannot be mapped"))?;
         Ok(MappingRecord { mux, bits })
     }
 

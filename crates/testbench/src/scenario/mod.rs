@@ -21,9 +21,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Values (signals, states, faults) are looked at every `sample` of virtual time, 1 ms if nothing else is said, and at each time
+//! Values (signals, states, faults) are looked at every `sample` of virtual time, 1 ms by default, and at each time
 //! that an expectation names; what is about frames is decided at the last bit of the frame, and what is about events when the world
-//! tells of them.
+//! reports them.
 
 pub mod command;
 pub mod condition;

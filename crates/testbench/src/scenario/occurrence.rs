@@ -1,4 +1,5 @@
-//! What holds at an instant only: a frame or an attempt at one on the wire, and what a world tells of itself ([`sim::events`]).
+//! What holds at an instant only: a frame or an attempt at one on the wire, and what a world reports of itself
+//! ([`sim::events`]).
 //!
 //! `4 event fault 0x0020` and `event bus_state bus-off` in a scenario are an [`EventPattern`]: a kind of event, of one node or of
 //! any, and what is special about it.
@@ -19,8 +20,8 @@ use crate::words::suggest::{did_you_mean, near};
 pub enum Occurrence<'a> {
     /// On the wire.
     Wire(&'a WireEvent),
-    /// What the world tells of a drive, the bus or a hand from outside.
-    Told(&'a Event),
+    /// An event of a drive, the bus or an intervention from outside.
+    Event(&'a Event),
 }
 
 /// For people: `frame 704#00`, `node 4: fault 0020h, over-current`.
@@ -32,7 +33,7 @@ impl fmt::Display for Occurrence<'_> {
                 write!(f, "error frame ({}, of {frame})", cause.word())
             }
             Self::Wire(WireEvent::State { state, .. }) => write!(f, "a controller is {}", state.word()),
-            Self::Told(event) => event.fmt(f),
+            Self::Event(event) => event.fmt(f),
         }
     }
 }
@@ -56,7 +57,7 @@ enum Detail {
 }
 
 impl EventPattern {
-    /// The node that it is about; `None` for any, and for what is of no node.
+    /// The node that it is about; `None` for any, and for what has no node.
     pub fn place(&self) -> Option<Place> {
         self.place
     }
@@ -108,7 +109,7 @@ fn kind<'a, 'b>(words: &'a [&'b str]) -> Result<(&'static str, &'a [&'b str]), S
             None => format!("a kind of event is missing; expected one of: {}", all.join(", ")),
             Some(word) => {
                 let guess = did_you_mean(&near(word, names()));
-                format!("there is no kind of event '{word}'{guess}; expected one of: {}", all.join(", "))
+                format!("unknown kind of event '{word}'{guess}; expected one of: {}", all.join(", "))
             }
         }
     })
@@ -118,7 +119,7 @@ fn detail(kind: &'static str, words: &[&str]) -> Result<Detail, String> {
     if matches!(kind, "fault" | "fault_reset" | "emcy") {
         return match words {
             [word] => code(word).map(Detail::Code),
-            _ => Err(format!("behind 'event {kind}' stands one code, as in 0x3220")),
+            _ => Err(format!("'event {kind}' takes one code, as in 0x3220")),
         };
     }
     let said = words.join(" ");
@@ -132,10 +133,8 @@ fn detail(kind: &'static str, words: &[&str]) -> Result<Detail, String> {
     let known = details(kind);
     match known.is_empty() {
         false if known.contains(&said) => Ok(Detail::Words(said)),
-        false => {
-            Err(format!("'{said}' is nothing that comes behind 'event {kind}'; expected one of: {}", known.join(", ")))
-        }
-        true => Err(format!("nothing stands behind 'event {kind}', and not '{said}'")),
+        false => Err(format!("'event {kind}' does not take '{said}'; expected one of: {}", known.join(", "))),
+        true => Err(format!("'event {kind}' takes nothing further, got '{said}'")),
     }
 }
 
@@ -180,7 +179,7 @@ pub(super) fn spelled(words: &str) -> String {
 pub(super) fn code(text: &str) -> Result<u32, String> {
     let digits = text.strip_prefix("0x").or_else(|| text.strip_suffix('h')).unwrap_or(text);
     let number = u32::from_str_radix(digits, 16).ok().filter(|_| !digits.starts_with('+'));
-    number.ok_or_else(|| format!("'{text}' is no code; expected hexadecimal digits, as in 0x3220"))
+    number.ok_or_else(|| format!("'{text}' is not a code; expected hexadecimal digits, as in 0x3220"))
 }
 
 fn code_of(kind: &EventKind) -> Option<u32> {
@@ -253,16 +252,16 @@ mod tests {
     }
 
     #[test]
-    fn what_names_no_event_is_told_what_does() {
+    fn what_names_no_event_is_refused_with_the_known_ones() {
         for (words, said) in [
             ("", "a kind of event is missing"),
             ("falt", "did you mean fault"),
-            ("fault motor", "'motor' is no code"),
+            ("fault motor", "'motor' is not a code"),
             ("fault 1 2", "one code"),
             ("nmt running", "pre-operational"),
             ("state on", "switched-on"),
             ("mode fast", "profile-velocity"),
-            ("boot again", "nothing stands behind 'event boot'"),
+            ("boot again", "'event boot' takes nothing further"),
             ("cable open", "cut, joined"),
         ] {
             let refused = pattern(words).expect_err(words);

@@ -1,4 +1,5 @@
-//! What came of a scenario: a row for each step, line and expectation, the named figures, and how the run can be told apart.
+//! The outcome of a scenario: a row for each step, line and expectation, the named figures, and a digest that
+//! distinguishes the run.
 
 use can::Instant;
 use serde::Serialize;

@@ -87,7 +87,7 @@ pub(super) struct Expect {
     pub(super) place: Located,
 }
 
-/// How often it is to be so.
+/// How often it has to hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Law {
     /// At least once.
@@ -109,7 +109,7 @@ pub(super) enum Until {
     Within(Duration),
 }
 
-/// A number that a run is told by.
+/// A number that a run reports.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Figure {
     pub(super) name: String,

@@ -11,7 +11,7 @@ use super::occurrence::Occurrence;
 use super::outcome::Outcome;
 use crate::document::BadFile;
 
-/// A run of a scenario: stepped by whoever wants to look in between, or [run](Self::run) to its end.
+/// A run of a scenario: stepped by a caller that looks in between, or [run](Self::run) to its end.
 pub struct Runner {
     world: World,
     execution: Execution,
@@ -92,12 +92,12 @@ impl Runner {
         true
     }
 
-    /// Ends the run where it stands, and tells what came of it.
+    /// Ends the run where it stands, and gives the outcome.
     pub fn conclude(mut self) -> Outcome {
         self.execution.conclude(&mut self.world)
     }
 
-    /// Hands on what has happened, with what comes of that.
+    /// Hands on what has happened, with its consequences.
     fn hear(&mut self) {
         while let Some(event) = self.world.log_mut().pull() {
             if let (WireEvent::Frame { end, frame, .. }, Some(kept)) = (event, &mut self.kept) {
@@ -106,7 +106,7 @@ impl Runner {
             self.execution.hear(&mut self.world, Occurrence::Wire(&event));
         }
         while let Some(event) = self.world.poll_event() {
-            self.execution.hear(&mut self.world, Occurrence::Told(&event));
+            self.execution.hear(&mut self.world, Occurrence::Event(&event));
             if let Some(kept) = &mut self.kept {
                 kept.events.push(event);
             }

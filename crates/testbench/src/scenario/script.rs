@@ -201,7 +201,7 @@ impl Script {
             let done = |name: &str| self.is_done(name);
             let seen = when.seen(&mut View { world, occurrence: None, done: &done });
             self.steps[n] = Progress::Done;
-            self.row_of_step(step, Some(now), Verdict::Failed, format!("its condition was not so in time: {seen}"));
+            self.row_of_step(step, Some(now), Verdict::Failed, format!("its condition did not hold in time: {seen}"));
         }
     }
 

@@ -1,4 +1,4 @@
-//! Runs that need not be made: where nothing is random, one seed tells what all do.
+//! Runs that need not be made: where nothing is random, all seeds give the run of one.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -9,19 +9,19 @@ use crate::scenario::Outcome;
 /// Settings that are kept: the seed changes first from run to run, so that those which are under way are near each other.
 const MOST_KEPT: usize = 64;
 
-/// What came of settings of the parameters in which nothing is random. May be shared by threads.
+/// Outcomes of settings of the parameters in which nothing is random. May be shared by threads.
 #[derive(Debug, Default)]
 pub struct Alike(Mutex<BTreeMap<u64, Outcome>>);
 
 impl Alike {
-    /// What comes of the run of this number, if one of another seed has told it.
+    /// The outcome of the run of this number, if it is known from another seed.
     pub fn of(&self, sweep: &Sweep, number: u64) -> Option<Outcome> {
         let known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let outcome = known.get(&sweep.setting(number))?;
         Some(Outcome { seed: sweep.point(number).seed, ..outcome.clone() })
     }
 
-    /// Keeps what came of a run for the other seeds, if nothing in it was random.
+    /// Keeps the outcome of a run for the other seeds, if nothing in it was random.
     pub fn keep(&self, sweep: &Sweep, number: u64, outcome: &Outcome) {
         if outcome.is_random || sweep.seeds_of_a_setting() == 1 {
             return;
@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_in_which_nothing_is_random_tells_those_of_other_seeds_and_of_no_other_value() {
+    fn a_run_in_which_nothing_is_random_gives_those_of_other_seeds_and_of_no_other_value() {
         let sweep = sweep("");
         let alike = Alike::default();
         assert_eq!(alike.of(&sweep, 0), None);
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_in_which_anything_is_random_tells_nothing_of_another() {
+    fn a_run_in_which_anything_is_random_gives_nothing_for_another() {
         let sources = [
             "realism = 'full'",
             "timing = 'device'",

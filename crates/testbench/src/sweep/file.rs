@@ -52,7 +52,7 @@ fn axis(field: &Field<'_>) -> Result<Axis, Problem> {
     // Half a step of grace, so that 0 to 1 by 0.1 ends at 1.
     let steps = ((to - from) / step + 1e-9).floor();
     if !(0.0..MOST_VALUES as f64).contains(&steps) {
-        let what = format!("from {from} to {to} by {step} is no range of 1 to {MOST_VALUES} values");
+        let what = format!("from {from} to {to} by {step} does not give 1 to {MOST_VALUES} values");
         return Err(field.problem(what));
     }
     let values = (0..=steps as usize).map(|n| shown(from + n as f64 * step)).collect();

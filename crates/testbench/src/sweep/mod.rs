@@ -1,7 +1,7 @@
 //! Sweeps: one scenario with many seeds and values of its parameters.
 //!
-//! A [`Sweep`] numbers its runs; whoever has threads makes [`Sweep::run`] of the numbers in any order, and adds what comes of
-//! them to a [`Summary`]. The summary does not depend on that order, and its size not on the number of runs.
+//! A [`Sweep`] numbers its runs; a caller with threads makes [`Sweep::run`] of the numbers in any order, and adds the
+//! outcome of them to a [`Summary`]. The summary does not depend on that order, and its size not on the number of runs.
 
 mod alike;
 pub mod file;
@@ -131,7 +131,7 @@ impl Sweep {
         self.runner(number).map(Runner::run)
     }
 
-    /// The run of this number at its begin, for whoever wants to look in between.
+    /// The run of this number at its beginning, for a caller that looks in between.
     ///
     /// # Errors
     /// That a value of it makes no sense in the scenario.

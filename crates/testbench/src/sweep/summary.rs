@@ -8,7 +8,7 @@ use super::{Point, Sweep};
 use crate::document::BadFile;
 use crate::scenario::Outcome;
 
-/// Failed runs that are told: those with the lowest numbers.
+/// Failed runs that are listed: those with the lowest numbers.
 const MOST_TOLD: usize = 10;
 
 /// Values of a figure that are kept for its median; of more runs every second, every fourth and so on.
@@ -151,7 +151,7 @@ impl Summary {
         }
     }
 
-    /// Adds the digest of a run, which tells whether seeds make a difference.
+    /// Adds the digest of a run, which shows whether seeds make a difference.
     pub fn add_digest(&mut self, sweep: &Sweep, number: u64, digest: u64) {
         let setting = sweep.setting(number);
         if setting < MOST_COMPARED {
@@ -318,7 +318,7 @@ mod tests {
 
     /// Of a sweep of 11 values of one parameter with 2 of another, and 3 seeds, every run above 0.6 fails.
     #[test]
-    fn each_value_has_its_runs_counted_and_its_first_failure_told_before_a_second_of_another() {
+    fn each_value_has_its_runs_counted_and_its_first_failure_listed_before_a_second_of_another() {
         let sweep = sweep(3);
         let (mut forth, mut back) = (Summary::default(), Summary::default());
         let add = |summary: &mut Summary, number: u64| {
@@ -336,17 +336,18 @@ mod tests {
         assert_eq!((a.len(), a[6], a[7], a[10]), (11, ("0.6", 6, 6, 0), ("0.7", 6, 0, 6), ("1", 6, 0, 6)));
         assert_eq!(counts("b"), [("x", 33, 21, 12), ("it is", 33, 21, 12)]);
         assert_eq!((forth.passed(), forth.failures()), (42, 24));
-        let told = |summary: &Summary| -> Vec<_> { summary.failed().map(|failed| failed.point.options()).collect() };
-        let said = told(&forth);
-        assert_eq!(said, told(&back));
+        let listed = |summary: &Summary| -> Vec<_> { summary.failed().map(|failed| failed.point.options()).collect() };
+        let expected = listed(&forth);
+        assert_eq!(expected, listed(&back));
         // All eight settings, and the second seed of the first two of them.
-        let settings: std::collections::BTreeSet<_> = said.iter().map(|options| &options["--seed 1".len()..]).collect();
-        assert_eq!((said.len(), settings.len()), (10, 8), "{said:?}");
-        assert_eq!(said[..2], ["--seed 1 --set a=0.7 --set b=x", "--seed 2 --set a=0.7 --set b=x"]);
+        let settings: std::collections::BTreeSet<_> =
+            expected.iter().map(|options| &options["--seed 1".len()..]).collect();
+        assert_eq!((expected.len(), settings.len()), (10, 8), "{expected:?}");
+        assert_eq!(expected[..2], ["--seed 1 --set a=0.7 --set b=x", "--seed 2 --set a=0.7 --set b=x"]);
     }
 
     #[test]
-    fn that_no_seed_makes_a_difference_is_told_and_one_that_differs_is_enough() {
+    fn that_no_seed_makes_a_difference_is_reported_and_one_that_differs_is_enough() {
         let sweep = sweep(3);
         let with_digest = |digest: u64| outcome(1.0).map(|outcome| Outcome { digest, ..outcome });
         let mut summary = Summary::default();

@@ -17,7 +17,7 @@ pub struct DriveSpec {
     pub model: &'static Description,
     /// Its node-ID at the first start.
     pub node: NodeId,
-    /// Whether it takes the time that such a drive takes, where it says so.
+    /// Whether it takes the time that such a drive takes, where it is given.
     pub timing: Option<TimingMode>,
     /// Whether it waits for LSS (CiA 305) to give it a node-ID; `node` is what the world calls it until then.
     pub unconfigured: bool,
@@ -67,13 +67,13 @@ impl DriveSpec {
             }
             "node-id" if value != "none" => {
                 return Err(format!(
-                    "'node-id={value}': its node-ID stands behind the @; node-id=none is a device that waits for LSS"
+                    "'node-id={value}': the node-ID belongs after the @; node-id=none is a device that waits for LSS"
                 ));
             }
             "node-id" if !self.model.lss => {
                 let name = self.model.name;
                 return Err(format!(
-                    "a {name} has no LSS (CiA 305) by its manual or its file, so nobody could give it a node-ID"
+                    "a {name} has no LSS (CiA 305) by its manual or its file, so it could not be given a node-ID"
                 ));
             }
             "node-id" => {
@@ -86,12 +86,16 @@ impl DriveSpec {
             Ok(()) => Ok(()),
             Err(NoSuchChoice::Choice(variation)) => {
                 let known: Vec<_> = variation.choices.iter().map(|choice| choice.name).collect();
-                Err(format!("{key} of a {} is no '{value}'; expected one of: {}", self.model.name, known.join(", ")))
+                Err(format!(
+                    "'{value}' is not a choice for {key} of a {}; expected one of: {}",
+                    self.model.name,
+                    known.join(", ")
+                ))
             }
             Err(NoSuchChoice::Variation) => {
                 let object = self.object(key).ok_or_else(|| self.unknown(key))?;
                 let number = number(value)
-                    .ok_or_else(|| format!("'{value}' is no value for {object}; expected a whole number or 0x.."))?;
+                    .ok_or_else(|| format!("'{value}' is not a value for {object}; expected a whole number or 0x.."))?;
                 self.presets.push(Preset { object, value: number });
                 Ok(())
             }
@@ -127,7 +131,7 @@ impl DriveSpec {
     }
 }
 
-/// The object that somebody means by a name, an index or an index with a sub-index.
+/// The object that is meant by a name, an index or an index with a sub-index.
 fn object_of(model: &Description, text: &str) -> Option<Mux> {
     let (mux, _) = object::object(text).ok()?.resolve(Some(model.dictionary)).ok()?;
     Some(mux)
@@ -146,12 +150,12 @@ pub fn drive_spec(text: &str) -> Result<DriveSpec, String> {
     let place = words.next().unwrap_or_default();
     let (name, number) = place
         .rsplit_once('@')
-        .ok_or_else(|| format!("'{place}' is no drive; expected MODEL@NODE, e.g. zlac8030l@4"))?;
+        .ok_or_else(|| format!("'{place}' is not a drive; expected MODEL@NODE, e.g. zlac8030l@4"))?;
     let mut spec = DriveSpec::new(resolve(name)?, node(number)?);
     for word in words {
         let (key, value) = word
             .split_once('=')
-            .ok_or_else(|| format!("'{word}' is no option of a drive; expected KEY=VALUE after the comma"))?;
+            .ok_or_else(|| format!("'{word}' is not an option of a drive; expected KEY=VALUE after the comma"))?;
         spec.set(key.trim(), value.trim())?;
     }
     Ok(spec)

@@ -29,7 +29,7 @@ pub fn mode(text: &str) -> Result<ModeOfOperation, String> {
         let short = ABBREVIATIONS.map(|(short, _)| short).join(", ");
         let names: Vec<_> = named().map(|(_, name)| name).collect();
         format!(
-            "'{text}' is no mode of operation; expected its number (6060h), or one of: {short}, {}",
+            "'{text}' is not a mode of operation; expected its number (6060h), or one of: {short}, {}",
             names.join(", ")
         )
     })

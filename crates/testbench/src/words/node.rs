@@ -6,7 +6,7 @@ const EXPECTED: &str = "a node-ID is a number from 1 to 127, e.g. 4";
 
 /// `4`.
 pub fn node(text: &str) -> Result<NodeId, String> {
-    let number: u8 = text.parse().map_err(|_| format!("'{text}' is no node-ID; {EXPECTED}"))?;
+    let number: u8 = text.parse().map_err(|_| format!("'{text}' is not a node-ID; {EXPECTED}"))?;
     NodeId::new(number).ok_or_else(|| format!("there is no node {number}; {EXPECTED}"))
 }
 

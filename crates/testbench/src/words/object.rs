@@ -33,7 +33,7 @@ pub fn object(text: &str) -> Result<ObjectArg, String> {
         (Some(index), Some(sub_index)) => Ok(ObjectArg::Mux(Mux::new(index, sub_index as u8))),
         (Some(_), None) => Err(format!("the sub-index of '{text}' is not 00 to FF; {EXPECTED}")),
         (None, _) if is_name(text) => Ok(ObjectArg::Name(text.to_ascii_lowercase().replace('-', "_"))),
-        (None, _) => Err(format!("'{text}' is no object; {EXPECTED}")),
+        (None, _) => Err(format!("'{text}' is not an object; {EXPECTED}")),
     }
 }
 

@@ -23,7 +23,7 @@ const EXPECTED: &str =
 pub fn selection(text: &str) -> Result<Selection, String> {
     let number = |text: &str| match object(text)? {
         ObjectArg::Mux(mux) => Ok(mux),
-        ObjectArg::Name(_) => Err(format!("'{text}' is no index; {EXPECTED}")),
+        ObjectArg::Name(_) => Err(format!("'{text}' is not an index; {EXPECTED}")),
     };
     if let Some(index) = text.strip_suffix(":*") {
         return Ok(Selection::SubIndices(number(index)?.index, None));

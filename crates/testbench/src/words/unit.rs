@@ -124,7 +124,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_and_units_are_told_apart() {
+    fn numbers_and_units_are_distinguished() {
         assert_eq!(split_number("60rpm"), Some((60.0, "rpm")));
         assert_eq!(split_number(" -1.5 A "), Some((-1.5, "A")));
         assert_eq!(split_number("1e3"), Some((1000.0, "")));

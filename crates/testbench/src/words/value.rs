@@ -5,7 +5,7 @@ use canopen::od::{DataType, Entry, Kind};
 use super::suggest::{did_you_mean, near};
 use super::unit::{Unit, split_number};
 
-/// Reads what `row` is to be set to, where `resolution` counts make one of its unit. Its data type bounds the value; its
+/// Reads the new value of `row`, where `resolution` counts make one of its unit. Its data type bounds the value; its
 /// limits are for the drive to check.
 pub fn value(row: &Entry, text: &str, resolution: i64) -> Result<i64, String> {
     let (low, high) = row.data_type.range();
@@ -53,7 +53,7 @@ impl Typed {
     }
 }
 
-/// Reads what `row` is to be set to, of any type: a number as [`value`] has it, a real, a text, or `hex:..` for bytes.
+/// Reads the new value of `row`, of any type: a number as [`value`] has it, a real, a text, or `hex:..` for bytes.
 pub fn typed_for(row: &Entry, text: &str, resolution: i64) -> Result<Typed, String> {
     let data_type = row.data_type;
     match data_type.kind() {
@@ -62,7 +62,7 @@ pub fn typed_for(row: &Entry, text: &str, resolution: i64) -> Result<Typed, Stri
             let real = text.trim().parse::<f64>().ok().filter(|real| real.is_finite());
             let fits = |real: &f64| data_type != DataType::Real32 || real.abs() <= f64::from(f32::MAX);
             real.filter(fits).map(|real| Typed::Real(data_type, real)).ok_or_else(|| {
-                format!("'{text}' is no value of {} ({}); expected a number, e.g. 1.5", row.mux(), data_type.name())
+                format!("'{text}' is not a value of {} ({}); expected a number, e.g. 1.5", row.mux(), data_type.name())
             })
         }
         Kind::Bytes | Kind::Time => match text.strip_prefix("hex:") {
@@ -103,7 +103,7 @@ pub fn typed_alone(text: &str) -> Result<Typed, String> {
         Some(("hex", digits)) => bytes_in_hexadecimal(digits).map(Typed::Bytes),
         Some(("text", text)) => visible(text),
         Some(("i64", number)) => {
-            let value = integer(number).ok_or_else(|| format!("'{number}' is no whole number of 64 bits"))?;
+            let value = integer(number).ok_or_else(|| format!("'{number}' is not a whole number of 64 bits"))?;
             Ok(Typed::Number(DataType::Integer64, value))
         }
         _ => typed_value(text).map(|(data_type, number)| Typed::Number(data_type, number)),
@@ -121,9 +121,9 @@ pub fn typed_value(text: &str) -> Result<(DataType, i64), String> {
         "u8" => DataType::Unsigned8,
         "u16" => DataType::Unsigned16,
         "u32" => DataType::Unsigned32,
-        _ => return Err(format!("'{name}' is no type; {EXPECTED}")),
+        _ => return Err(format!("'{name}' is not a type; {EXPECTED}")),
     };
-    let value = integer(number).ok_or_else(|| format!("'{number}' is no whole number; {EXPECTED}"))?;
+    let value = integer(number).ok_or_else(|| format!("'{number}' is not a whole number; {EXPECTED}"))?;
     let (low, high) = data_type.range();
     if (low..=high).contains(&value) {
         return Ok((data_type, value));
@@ -154,7 +154,7 @@ fn with_unit(row: &Entry, text: &str, number: f64, unit: &str) -> Result<i64, St
         return Err(format!("{} has no unit; expected a whole number, e.g. {}", row.mux(), example(row)));
     };
     let expected = || format!("expected {} in a unit of {}, or a whole number of them", row.mux(), row.unit);
-    let given = Unit::named(unit).ok_or_else(|| format!("'{text}' is no value; {}", expected()))?;
+    let given = Unit::named(unit).ok_or_else(|| format!("'{text}' is not a value; {}", expected()))?;
     if given.dimension != own.dimension {
         return Err(format!("'{unit}' does not measure what {} holds; {}", row.mux(), expected()));
     }
@@ -174,12 +174,12 @@ fn word(row: &Entry, text: &str) -> Result<i64, String> {
         return Ok(value);
     }
     if row.values.is_empty() {
-        return Err(format!("'{text}' is no value; expected a number, e.g. {}", example(row)));
+        return Err(format!("'{text}' is not a value; expected a number, e.g. {}", example(row)));
     }
     let words: Vec<String> = meanings().map(|(_, meaning)| meaning).collect();
     let listed: Vec<String> = row.values.iter().map(|(value, meaning)| format!("{value} ({meaning})")).collect();
     let near = near(&typed, words.iter().map(String::as_str));
-    Err(format!("'{text}' is no value of {}{}; expected {}", row.mux(), did_you_mean(&near), listed.join(", ")))
+    Err(format!("'{text}' is not a value of {}{}; expected {}", row.mux(), did_you_mean(&near), listed.join(", ")))
 }
 
 /// Lower case, with blanks for the marks between words.

@@ -96,7 +96,7 @@ fn each_trap_is_found_at_its_line_and_is_gone_without_it() {
         (Z, &[BEATS], "sdo: [{index: 0x6083, value: -1}]", "sdo-object", Severity::Error),
     ];
     for (model, right, wrong, rule, severity) in traps {
-        // Where a line that is missing is wrong too, the right one stands in its place.
+        // Where a line that is missing is wrong too, it is replaced by the right one.
         let mended = match rule {
             "heartbeat" => Some(BEATS),
             "host-watch" => Some(CONSUMES),
@@ -124,7 +124,7 @@ fn each_trap_is_found_at_its_line_and_is_gone_without_it() {
 }
 
 #[test]
-fn what_is_no_bus_is_told_with_its_line() {
+fn what_is_not_a_bus_is_reported_with_its_line() {
     let folder = sheets("shapes", &["zlac8030l"]);
     let twice = bus("zlac8030l", &[BEATS]) + "other:\n  node_id: 4\n  dcf: zlac8030l.eds\n  heartbeat_producer: 200\n";
     let no_sheet = bus("nothing", &[BEATS]);
@@ -142,7 +142,7 @@ fn what_is_no_bus_is_told_with_its_line() {
         let found = found.unwrap_or_else(|| panic!("{text}: {:#?}", checked.findings));
         assert_eq!(found.at.line, line, "{text}: {found:?}");
     }
-    // A sheet that is no file but a folder.
+    // A sheet that is a folder.
     let folder_as_sheet = bus("zlac8030l", &[]).replace("zlac8030l.eds", ".");
     assert!(rules(&of_bus_yml(&folder_as_sheet, &folder).unwrap()).contains(&("data-sheet", Severity::Error)));
 }
@@ -243,7 +243,7 @@ fn what_the_generator_writes_is_foretold_in_its_order() {
 }
 
 #[test]
-fn what_a_drive_will_refuse_is_told_at_its_line_with_the_letter() {
+fn what_a_drive_will_refuse_is_reported_at_its_line_with_the_letter() {
     let folder = sheets("refused", &[J, Z]);
     let joint = [BEATS, CONSUMES, NO_RPDO4];
     // 2614h is the joint's save command, which takes 1 alone (its manual, 5.04).
@@ -251,13 +251,13 @@ fn what_a_drive_will_refuse_is_told_at_its_line_with_the_letter() {
     for (lines, boots) in [(refused.as_slice(), false), (&joint, true)] {
         let mut checked = of_bus_yml(&bus(J, lines), &folder).unwrap();
         let predicted = checked.predict().unwrap();
-        let told = checked.findings.iter().find(|finding| finding.rule == "boot");
-        assert_eq!(told.is_none(), boots, "{:#?}", checked.findings);
+        let finding = checked.findings.iter().find(|finding| finding.rule == "boot");
+        assert_eq!(finding.is_none(), boots, "{:#?}", checked.findings);
         // A joint starts by itself: L is how its boot-up ends.
         assert_eq!(predicted.nodes[0].letter, Some(if boots { 'L' } else { 'J' }));
-        if let Some(told) = told {
-            assert_eq!((told.at.line, told.severity, told.node), (11, Severity::Error, Some(4)));
-            assert!(told.what.contains("2614h:00") && told.what.contains("letter J"), "{told:?}");
+        if let Some(finding) = finding {
+            assert_eq!((finding.at.line, finding.severity, finding.node), (11, Severity::Error, Some(4)));
+            assert!(finding.what.contains("2614h:00") && finding.what.contains("letter J"), "{finding:?}");
         }
     }
     // Another revision than the device says: N.
@@ -283,7 +283,7 @@ fn the_buses_of_the_examples_pass_and_boot() {
 }
 
 #[test]
-fn a_bus_that_is_too_full_or_has_no_sync_is_told() {
+fn a_bus_that_is_too_full_or_has_no_sync_is_reported() {
     let folder = sheets("full", &[Z]);
     let tpdo = "tpdo: {1: {cob_id: auto, transmission: 1, mapping: [{index: 0x6041}, {index: 0x6064}]}}";
     let full = |period: &str, rate: &str| {
@@ -305,7 +305,7 @@ fn a_bus_that_is_too_full_or_has_no_sync_is_told() {
 }
 
 #[test]
-fn two_pdos_of_one_identifier_are_told() {
+fn two_pdos_of_one_identifier_are_reported() {
     let node = |name: &str, id: u8| {
         format!(
             "{name}:\n  node_id: {id}\n  dcf: {Z}.eds\n  {BEATS}\n  tpdo: {{1: {{cob_id: 0x184, mapping: [{{index: 0x6041}}]}}}}\n"
@@ -322,11 +322,11 @@ fn two_pdos_of_one_identifier_are_told() {
 }
 
 #[test]
-fn what_cannot_be_foretold_says_why() {
+fn what_cannot_be_predicted_is_reported_with_the_reason() {
     let mut checked = of_bus_yml(&bus("nothing", &[BEATS]), &sheets("none", &[])).unwrap();
     assert!(checked.predict().is_none());
-    let told = checked.findings.iter().find(|finding| finding.rule == "prediction").unwrap();
-    assert!(told.what.contains("no data sheet"), "{told:?}");
+    let finding = checked.findings.iter().find(|finding| finding.rule == "prediction").unwrap();
+    assert!(finding.what.contains("no data sheet"), "{finding:?}");
     // Of a file that is something else one complaint is enough.
     let mut other = of_bus_yml("services:\n  web:\n    image: a\n", &sheets("none", &[])).unwrap();
     assert!(other.predict().is_none());
@@ -378,15 +378,15 @@ fn live_drives_are_only_read() {
     assert_eq!(differ, ["1017h:00", "6083h:00"]);
     assert!(placed(&checked).contains(&("live-value", Severity::Note, 9)), "{:#?}", checked.findings);
     assert!(!rules(&checked).iter().any(|(rule, _)| *rule == "live-sheet"), "{:#?}", checked.findings);
-    // A note is no warning: the boot-up writes what differs.
+    // A note is not a warning: the boot-up writes what differs.
     assert_eq!(checked.count(Severity::Error), 0, "{:#?}", checked.findings);
 }
 
 #[test]
-fn drives_that_are_not_as_the_file_means_are_told() {
+fn drives_that_differ_from_the_file_are_reported() {
     let clean = |name: &str| of_bus_yml(&bus(Z, &[BEATS]), &sheets(name, &[Z])).unwrap();
-    // Nobody there, and somebody whom the file does not have.
-    let mut checked = clean("nobody");
+    // No node there, and one that the file does not have.
+    let mut checked = clean("no_node");
     let (live, _) = asked(&mut checked, &[(J, 9)], async |_| ());
     assert!(!live[0].answers);
     assert!(placed(&checked).contains(&("live-silent", Severity::Error, 5)), "{:#?}", checked.findings);
@@ -395,8 +395,8 @@ fn drives_that_are_not_as_the_file_means_are_told() {
     let mut checked = clean("other");
     let (live, _) = asked(&mut checked, &[("cia402", 4)], async |_| ());
     assert_eq!(live[0].product_code, Some(402));
-    let told = checked.findings.iter().find(|finding| finding.rule == "live-identity").unwrap();
-    assert!(told.severity == Severity::Error && told.what.contains("to be 40192h"), "{told:?}");
+    let finding = checked.findings.iter().find(|finding| finding.rule == "live-identity").unwrap();
+    assert!(finding.severity == Severity::Error && finding.what.contains("to be 40192h"), "{finding:?}");
     // A PDO that is not as the sheet says: the generator would leave it so.
     let mut checked = clean("sheet");
     let change = async |network: &Network| {
@@ -404,8 +404,8 @@ fn drives_that_are_not_as_the_file_means_are_told() {
         node.write(Mux::new(0x1800, 2), 7_u8).await.unwrap();
     };
     asked(&mut checked, &[(Z, 4)], change);
-    let told = checked.findings.iter().find(|finding| finding.rule == "live-sheet").unwrap();
-    assert!(told.severity == Severity::Warning && told.what.contains("1800h:02 has 7h"), "{told:?}");
+    let finding = checked.findings.iter().find(|finding| finding.rule == "live-sheet").unwrap();
+    assert!(finding.severity == Severity::Warning && finding.what.contains("1800h:02 has 7h"), "{finding:?}");
 }
 
 const DRIVE: &str = "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n";

@@ -69,7 +69,7 @@ impl Bench {
         answers[0].clone()
     }
 
-    /// As whoever has the clock does it: no further than the next sample.
+    /// As the owner of the clock does it: no further than the next sample.
     fn run_for(&mut self, duration: Duration) {
         let end = self.world.now() + duration;
         while self.world.now() < end {
@@ -225,7 +225,7 @@ fn subscriptions_do_not_change_the_run() {
 }
 
 #[test]
-fn of_two_clients_that_contradict_the_last_wins_and_both_are_told_who_did_what() {
+fn of_two_clients_that_contradict_the_last_wins_and_both_hear_who_did_what() {
     let mut bench = Bench::new(None);
     let (one, two) = (bench.join(1), bench.join(2));
     bench.ask(1, &one, &json!({ "request": "hello", "name": "left hand" }));
@@ -238,9 +238,12 @@ fn of_two_clients_that_contradict_the_last_wins_and_both_are_told_who_did_what()
     bench.say(2, "2 supply 24");
     for inbox in [one, two] {
         let events = inbox.all().into_iter().filter(|(class, _)| *class == Class::Event);
-        let told: Vec<_> =
+        let stimuli: Vec<_> =
             events.map(|(_, line)| (line["event"]["words"].clone(), line["event"]["by"].clone())).collect();
-        assert_eq!(told, [(json!("supply 30"), json!("left hand")), (json!("supply 40"), json!("control client 2"))]);
+        assert_eq!(
+            stimuli,
+            [(json!("supply 30"), json!("left hand")), (json!("supply 40"), json!("control client 2"))]
+        );
     }
     bench.run_for(Duration::from_secs(1));
     assert!((bench.world.report(4).unwrap().supply_v - 40.0).abs() < 0.1);

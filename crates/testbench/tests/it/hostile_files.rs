@@ -1,4 +1,4 @@
-//! Files that nobody means well with: each is refused with a place, in good time and without much memory, or is bounded.
+//! Hostile files: each is refused with a place, in good time and without much memory, or is bounded.
 
 use std::path::Path;
 use std::time::Duration;
@@ -39,22 +39,22 @@ fn times_that_make_no_sense_are_refused_with_their_place() {
 #[test]
 fn what_does_not_fit_together_is_refused() {
     for (rest, said) in [
-        ("[[step]]\nafter = 'nobody'\ndo = '4 rotor lock'", "there is no step or host 'nobody'"),
+        ("[[step]]\nafter = 'missing'\ndo = '4 rotor lock'", "there is no step or host 'missing'"),
         ("[[step]]\nafter = 'x'\nat = '1s'\ndo = '4 rotor lock'", "it has 'at' already"),
         ("[[step]]\ndo = '5 rotor lock'", "the machine has no node 5; it has: 4"),
-        ("[[step]]\ndo = '4 get'", "does nothing to the machine"),
+        ("[[step]]\ndo = '4 get'", "changes nothing; use [[expect]]"),
         ("[[step]]\ndo = '4 dance'", "unknown command"),
-        ("[[step]]\nwithin = '1s'\ndo = '4 rotor lock'", "'within' is about 'when'"),
+        ("[[step]]\nwithin = '1s'\ndo = '4 rotor lock'", "'within' needs 'when'"),
         ("[[expect]]\nwhy = 'x'", "needs 'that', 'always' or 'never'"),
         ("[[expect]]\nthat = '4 powered'\nnever = '4 fault'", "make another expectation of this"),
-        ("[[expect]]\nalways = '4 boots'", "it happens at an instant"),
+        ("[[expect]]\nalways = '4 boots'", "an event holds at an instant only"),
         ("[[expect]]\nthat = '4 powered'\nat = '1s'\nuntil = '2s'", "'at' is an instant"),
         ("[[expect]]\nthat = '4 powered'\nfrom = '3s'\nuntil = '2s'", "it ends before it begins"),
         ("[[host]]\ndo = [{ do = '4 enable', is = 5 }]", "'is' needs something that is read"),
         ("[[host]]\ndo = 5", "expected what the host does as text"),
         ("[sweep]\ntorque = [1]", "there is no parameter 'torque'"),
-        ("[parameters]\na = 1\n[sweep]\na = { from = 0, to = 1, step = 0 }", "is no range"),
-        ("[parameters]\na = 1\n[sweep]\na = { from = 0, to = 1e12, step = 1 }", "is no range"),
+        ("[parameters]\na = 1\n[sweep]\na = { from = 0, to = 1, step = 0 }", "does not give 1 to"),
+        ("[parameters]\na = 1\n[sweep]\na = { from = 0, to = 1e12, step = 1 }", "does not give 1 to"),
         ("[[step]]\ndo = '4 supply {volts}'", "there is no parameter 'volts'"),
         ("[figures]\na = 'most 4 current'", "min, max, mean, peak or last"),
         ("[stpe]\n", "did you mean step?"),
@@ -73,7 +73,7 @@ fn a_scenario_that_names_itself_as_its_machine_is_none() {
     std::fs::remove_file(&path).expect("the file");
     assert!(refused.contains("a machine file has no 'machine'"), "{refused}");
     let nowhere = parse("machine = '/dev/zero'").err().map(|bad| bad.to_string()).unwrap_or_default();
-    assert!(nowhere.contains("it is no file") || cfg!(not(unix)), "{nowhere}");
+    assert!(nowhere.contains("not a regular file") || cfg!(not(unix)), "{nowhere}");
 }
 
 #[test]

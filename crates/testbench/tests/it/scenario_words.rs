@@ -20,7 +20,7 @@ fn row<'a>(outcome: &'a Outcome, asked: &str) -> (Verdict, &'a str) {
 
 /// Objects and units: ZLAC8030L CANopen communication of motor drive V1.00: 60FFh in r/min, 606Ch in 0.1 r/min.
 #[test]
-fn process_data_turns_a_wheel_with_each_sync_and_tells_its_speed() {
+fn process_data_turns_a_wheel_with_each_sync_and_shows_its_speed() {
     let outcome = run(
         "[[host]]\ndo = ['4 write 6060 3', '4 nmt pre-operational', '4 pdo map rpdo 1 6040 60FF type 1', \
          '4 pdo map tpdo 1 6041 606C type 1', '4 nmt start', 'sync 10ms', '4 pdo write 6040 6', 'wait 50ms', \
@@ -45,7 +45,7 @@ fn a_pdo_is_taken_as_the_device_has_it_and_what_cannot_be_mapped_is_refused() {
 }
 
 #[test]
-fn events_happen_once_each_and_are_told_with_the_time_at_which_they_do() {
+fn events_happen_once_each_and_are_reported_with_the_time_at_which_they_do() {
     let outcome = run("[[step]]\nname = 'low'\nat = '1s'\ndo = '4 supply 12'\n\
          [[step]]\nname = 'heard'\nwhen = '4 event fault 0x0002'\ndelay = '10ms'\ndo = '4 supply 48'\n\
          [[expect]]\nthat = 'event stimulus supply'\nafter = 'low'\n\
@@ -84,7 +84,7 @@ fn a_body_that_drives_move_is_a_machine_that_steps_act_on() {
         let refused = parse(&format!("{}[[expect]]\n{expect}\n", text("base"))).err().map(|bad| bad.to_string());
         assert!(refused.as_ref().is_some_and(|refused| refused.contains(said)), "{expect}: {refused:?}");
     }
-    // Down a slope of 5 degrees, uphill being along x, it rolls backwards: nobody holds it.
+    // Down a slope of 5 degrees, uphill being along x, it rolls backwards: nothing holds it.
     let expects = "[[expect]]\nthat = 'body base x_m < -0.01'\n[figures]\nway = 'last body base x_m'\n";
     let scenario = parse(&format!("end = '3s'\n{}{expects}", text("base"))).unwrap_or_else(|bad| panic!("{bad}"));
     let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();

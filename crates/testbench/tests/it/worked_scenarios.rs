@@ -16,7 +16,7 @@ fn run(scenario: &Scenario, seed: u64) -> Outcome {
     Runner::new(scenario, Some(seed)).unwrap_or_else(|bad| panic!("{bad}")).run()
 }
 
-fn told(outcome: &Outcome) -> String {
+fn failures(outcome: &Outcome) -> String {
     let row = |row: &testbench::scenario::Row| {
         let at = row.at.map_or("never".into(), |at| at.to_string());
         format!("{:?} line {} {} [{}]: {}: {}", row.verdict, row.place, row.kind.word(), at, row.asked, row.seen)
@@ -30,8 +30,8 @@ fn passes(name: &str) {
     let scenario = read(name);
     for seed in 1..=5 {
         let outcome = run(&scenario, seed);
-        assert!(outcome.passed(), "seed {seed}: {}", told(&outcome));
-        assert!(outcome.end < scenario_limit(), "it ran into its limit: {}", told(&outcome));
+        assert!(outcome.passed(), "seed {seed}: {}", failures(&outcome));
+        assert!(outcome.end < scenario_limit(), "it ran into its limit: {}", failures(&outcome));
     }
 }
 
@@ -74,10 +74,10 @@ fn the_same_seed_gives_the_same_run_and_a_sweep_goes_through_the_parameter() {
     let held = |time: &str| {
         let other = scenario.with(&[("held".to_owned(), time.to_owned())].into()).expect("a parameter of it");
         let outcome = run(&other, 1);
-        assert!(outcome.passed(), "{time}: {}", told(&outcome));
+        assert!(outcome.passed(), "{time}: {}", failures(&outcome));
         8000.0 - outcome.figures[0].1
     };
-    // 8 pulses a millisecond, give or take the turns of the field around where the rotor is let go.
+    // 8 pulses a millisecond, give or take the turns of the field around where the rotor is released.
     let (short, long) = (held("30ms"), held("333ms"));
     assert!((80.0..=560.0).contains(&short) && (2340.0..=2990.0).contains(&long), "{short} and {long} pulses lost");
 }
@@ -88,7 +88,7 @@ fn a_false_expectation_fails_and_says_what_was_seen() {
     let text = text.replace("that = \"4 fault 0x0002\"", "that = \"4 fault 0x0001\"");
     let outcome = run(&Scenario::parse(&text, &folder()).unwrap_or_else(|bad| panic!("{bad}")), 1);
     let failed: Vec<_> = outcome.failures().collect();
-    assert_eq!(failed.len(), 1, "{}", told(&outcome));
+    assert_eq!(failed.len(), 1, "{}", failures(&outcome));
     assert_eq!((failed[0].verdict, failed[0].seen.as_str()), (Verdict::Failed, "fault 0002h"));
     assert!(!outcome.last_frames.is_empty());
     assert!(

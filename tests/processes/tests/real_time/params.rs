@@ -342,7 +342,7 @@ fn what_a_pdo_cannot_carry_is_said_before_anything_is_written() {
         (&["tpdo1=statusword", "--id", "0x601"], "another service"),
         (&["tpdo1=statusword", "tpdo2=6064", "--id", "0x185"], "--id is of one PDO"),
         (&["tpdo1"], "expected a PDO and its objects"),
-        (&["pdo1=statusword"], "is no PDO; expected tpdo1"),
+        (&["pdo1=statusword"], "is not a PDO; expected tpdo1"),
         (&[], "which PDOs?"),
     ] {
         let ended = ferrodrive(&[&["pdo", "apply", "4"], asked].concat());

@@ -36,7 +36,7 @@ const TARGET: Meddling = (
 );
 
 #[test]
-fn a_move_that_another_master_stops_is_not_said_to_be_reached() {
+fn a_move_that_another_master_stops_is_not_reported_as_reached() {
     for name in models() {
         for (what, frames, says) in [HALT, TARGET] {
             let mut bench = Bench::new(name);
@@ -61,7 +61,7 @@ fn a_move_that_another_master_stops_is_not_said_to_be_reached() {
 }
 
 #[test]
-fn a_speed_that_another_master_takes_away_is_not_said_to_be_kept() {
+fn a_speed_that_another_master_takes_away_is_not_reported_as_kept() {
     for name in models() {
         let mut bench = Bench::new(name);
         let other = Network::new();

@@ -522,7 +522,7 @@ impl Bench {
 }
 
 #[test]
-fn a_program_that_was_frozen_says_so_and_does_not_set_a_drive_going_again() {
+fn a_program_that_was_frozen_reports_it_and_does_not_set_a_drive_going_again() {
     for name in models().filter(|name| model(name).unwrap().host_watch != HostWatch::None) {
         let mut bench = Bench::new(name);
         let [drive, _] = bench.drives.clone();
@@ -542,7 +542,7 @@ fn a_program_that_was_frozen_says_so_and_does_not_set_a_drive_going_again() {
 }
 
 #[test]
-fn a_drive_that_was_not_seen_to_stand_keeps_its_watch_and_is_said_to_move() {
+fn a_drive_that_was_not_seen_to_stand_keeps_its_watch_and_is_reported_as_moving() {
     for name in models() {
         let mut bench = Bench::new(name);
         let [drive, other] = bench.drives.clone();

@@ -144,9 +144,9 @@ fn what_makes_no_sense_is_refused_with_what_was_expected_and_leaves_no_trace() {
         page.must(Command::TakeControl {}).await;
         for (line, kind, part) in [
             ("4 supply much", "usage", "NODE supply VOLTS"),
-            ("quit", "usage", "changes nothing of the world"),
-            ("run 5s", "usage", "changes nothing of the world"),
-            ("4 get", "usage", "changes nothing of the world"),
+            ("quit", "usage", "changes nothing in the world"),
+            ("run 5s", "usage", "changes nothing in the world"),
+            ("4 get", "usage", "changes nothing in the world"),
             ("9 cable cut", "no_such_node", "there is 4, 2"),
             ("4 input X9 1", "refused", "X9"),
             ("4 supply 1000000", "refused", "supply"),
