@@ -87,7 +87,7 @@ def test_what_breaks_a_limit_moves_nothing(world, network):
         group.move([0, 0])
     with pytest.raises(ferrodrive.MasterError, match="state a finite number above 0"):
         network.group(servos(velocity_rpm=0))
-    with pytest.raises(ValueError, match="no mode of operation"):
+    with pytest.raises(ValueError, match="not a mode of operation"):
         network.group(servos(mode="fast"))
 
 

@@ -103,7 +103,7 @@ def test_the_seed_of_the_file_counts_when_none_is_given(one_fails):
 def test_a_bad_file_a_strange_parameter_and_a_value_of_no_sense_are_told(tmp_path, one_fails):
     with pytest.raises(FileNotFoundError, match="absent.toml"):
         ferrodrive.run(tmp_path / "absent.toml")
-    with pytest.raises(ValueError, match="a directory"):
+    with pytest.raises(ValueError, match="not a regular file"):
         ferrodrive.run(tmp_path)
     with pytest.raises(ValueError, match="no parameter 'sped'"):
         ferrodrive.run(one_fails, set={"sped": 60})

@@ -21,7 +21,7 @@ use super::row::Row;
 use super::set_points::{Axis, SetPoints};
 use plot::{Event, EventKind};
 
-/// Is told of each section as it begins.
+/// Called for each section as it begins.
 pub(super) type Progress = Rc<dyn Fn(&str)>;
 
 /// Decides everything random on the bus: runs are repeatable.
@@ -255,14 +255,14 @@ impl Bench {
     }
 
     /// Sends a datagram to the drive's SDO server within a row that speaks of something else.
-    pub(super) fn tell(&mut self, request: &str) {
+    pub(super) fn send_sdo(&mut self, request: &str) {
         let answered = self.exchange(&bytes(request));
         if answered.is_none_or(|reply| reply[0] == 0x80) {
             self.row().compare("an answer", "refused, or none", false);
         }
     }
 
-    /// Sends a frame that nobody answers, within the row.
+    /// Sends a frame that has no answer, within the row.
     pub(super) fn send(&mut self, frame: Frame) {
         self.row().asked = frame.to_string();
         self.transmit(frame);
@@ -374,7 +374,7 @@ impl Bench {
         is_upload.then(|| row.data_type.value(raw))
     }
 
-    /// Reads a number to compare; not a number if there was no answer.
+    /// Reads a number to compare; NaN if there was no answer.
     pub(super) fn read_f64(&mut self, index: u16, sub_index: u8) -> f64 {
         self.read(index, sub_index).map_or(f64::NAN, |value| value as f64)
     }

@@ -115,7 +115,7 @@ pub struct Showcase {
     pub poster: Poster,
 }
 
-/// Runs everything, or the part of one model. `progress` is told of each section as it begins.
+/// Runs everything, or the part of one model. `progress` is called for each section as it begins.
 pub fn run(only: Option<&'static Description>, progress: impl Fn(&str) + 'static) -> Result<Showcase, Error> {
     let progress: bench::Progress = Rc::new(progress);
     let mut parts = Vec::new();

@@ -22,7 +22,7 @@ fn main() -> ExitCode {
     match run() {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => {
-            eprintln!("error: the drives did not do everything as their manuals say: look for DIFFERS in the table");
+            eprintln!("error: a drive did not do what its manual says: look for DIFFERS in the table");
             ExitCode::FAILURE
         }
         Err(error) => {
@@ -60,7 +60,7 @@ fn run() -> Result<bool, String> {
 fn save(path: &Path, svg: &str) -> io::Result<()> {
     if fs::read(path).is_ok_and(|earlier| !earlier.starts_with(b"<svg")) {
         return Err(io::Error::other(
-            "it exists and is not a picture of this program; remove it or go to another folder",
+            "it exists and is not a picture of this program: remove it or go to another folder",
         ));
     }
     fs::write(path, svg)

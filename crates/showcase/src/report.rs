@@ -94,7 +94,7 @@ fn table<'a>(rows: impl Iterator<Item = &'a Row>, paint: Paint) -> String {
         let number = if row.section == section { "" } else { row.section };
         section = row.section;
         if row.checks.is_empty() {
-            // Nobody answers a frame of this kind.
+            // A frame of this kind has no answer.
             table.row([number, &row.step, &row.asked]);
         }
         for (place, check) in row.checks.iter().enumerate() {

@@ -63,7 +63,7 @@ pub(super) fn sdo_format(bench: &mut Bench) {
     bench.ask("write what can only be read (1000h)", "23 00 10 00 01 00 00 00", "80 00 10 00 02 00 01 06");
 }
 
-/// 5.11.2: the joint stops when the heartbeats of node 7Fh, once heard, stay away for 2 s; alarm 20h goes by itself.
+/// 5.11.2: the joint stops when the heartbeats of node 7Fh, once heard, stay away for 2 s; alarm 20h clears itself.
 pub(super) fn host_heartbeat(bench: &mut Bench) {
     bench.section("5.11.2", "host heartbeat");
     bench.write("speed mode", 0x6060, 0, 3);
@@ -100,7 +100,7 @@ pub(super) fn host_heartbeat(bench: &mut Bench) {
     idle(bench);
 }
 
-/// 5.08.1 has no row for NMT; the commands of CiA 301 act, and the heartbeat tells the state.
+/// 5.08.1 has no row for NMT; the commands of CiA 301 act, and the heartbeat carries the state.
 pub(super) fn nmt(bench: &mut Bench) {
     bench.section("5.08.1", "NMT");
     bench.ask("interval 100 ms", "2B 17 10 00 64 00", "60 17 10 00");

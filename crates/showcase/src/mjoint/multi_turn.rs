@@ -85,12 +85,12 @@ pub(super) fn return_to_origin(bench: &mut Bench) {
     bench.write("acceleration 10005", 0x6083, 0, 10_005);
     save(bench);
     power_cycle(bench);
-    bench.mark("returns by itself", EventKind::Note);
+    bench.mark("returns on its own", EventKind::Note);
     bench.aim_at(0.0);
     let begin = bench.now();
     bench.run_ms(500);
     let speed = bench.report().velocity_rpm;
-    bench.moved(format!("{speed:.0} r/min by itself"));
+    bench.moved(format!("{speed:.0} r/min on its own"));
     bench.expect("speed", Expect::Near(-600.0, 10.0), "r/min", speed);
     bench.run_until(Duration::from_secs(4), |word| word & TARGET_REACHED != 0);
     let took_s = (bench.now() - begin).as_secs_f64();

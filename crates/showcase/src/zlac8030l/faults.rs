@@ -94,10 +94,10 @@ fn provoke(bench: &mut Bench, fault: &Provocation) {
     bench.step(format!("{}: {}", fault.name, fault.cause));
     bench.machine(fault.cause);
     match fault.motion {
-        Starting => bench.tell("23 FF 60 00 32 00 00 00"),
+        Starting => bench.send_sdo("23 FF 60 00 32 00 00 00"),
         Moving => {
-            bench.tell("23 7A 60 00 00 7D 00 00");
-            bench.tell("2B 40 60 00 5F 00 00 00");
+            bench.send_sdo("23 7A 60 00 00 7D 00 00");
+            bench.send_sdo("2B 40 60 00 5F 00 00 00");
         }
         Still | Turning => {}
     }

@@ -50,7 +50,7 @@ pub(super) fn enable_again(bench: &mut Bench) {
     bench.step("enable (06h, 07h, 0Fh)");
     let mut nibbles = Vec::new();
     for (request, _) in ENABLE {
-        bench.tell(request);
+        bench.send_sdo(request);
         bench.run(Duration::from_millis(20));
         nibbles.push(format!("{:X}", bench.statusword().unwrap_or_default() & 0xF));
     }

@@ -15,7 +15,7 @@ use plot::EventKind;
 
 const ACCEPTED: &str = "60 40 60 00 00 00 00 00";
 
-/// The last move crosses the edge at 6099h:02, and the input's filter (10 ms, 3.2) tells of it later.
+/// The last move crosses the edge at 6099h:02, and the input's filter (10 ms, 3.2) passes it on later.
 const FILTER_PULSES: f64 = 60.0 * PULSES_S_PER_RPM * 0.010;
 
 /// Bits 8 (homed), 10 (at the end), 14 (running).

@@ -4,7 +4,7 @@ use crate::bench::Bench;
 use crate::datagram::frame;
 use crate::expect::Expect;
 
-/// 5.3.2: bit 13 tells that the motor is energised.
+/// 5.3.2: bit 13 shows that the motor is energised.
 const ENERGISED: u16 = 1 << 13;
 
 /// 5.3.2: the example after power-on, with the low nibble and whether the motor is free.

@@ -22,7 +22,7 @@ pub(super) fn enable_in(bench: &mut Bench, mode: i64) {
     bench.step("enable (06h, 07h, 0Fh)");
     let mut nibbles = Vec::new();
     for request in ["2B 40 60 00 06 00 00 00", "2B 40 60 00 07 00 00 00", "2B 40 60 00 0F 00 00 00"] {
-        bench.tell(request);
+        bench.send_sdo(request);
         bench.run_ms(10);
         nibbles.push(format!("{:X}", bench.statusword().unwrap_or_default() & 0xF));
     }

@@ -73,7 +73,7 @@ pub(super) fn limits_and_emergency_stop(bench: &mut Bench) {
     // 605Ah = 5: a normal stop.
     let took_s = until_standing(bench);
     bench.expect("stands after", Expect::Near(FILTER_S + 0.3, 0.004), "s", took_s);
-    bench.step("X3 off: nothing starts by itself");
+    bench.step("X3 off: nothing starts on its own");
     bench.machine("input X3 0");
     bench.run_ms(300);
     bench.expect_object(0x606C, 0, Expect::Near(0.0, 0.0), "r/min");
@@ -93,8 +93,8 @@ fn turn(bench: &mut Bench, rpm: i32) {
 /// 2030h:0D and 0E, the functions of Y0 and Y1; 2030h:0C, inversion; 2004h.
 pub(super) fn outputs(bench: &mut Bench) {
     bench.section("5.4", "outputs");
-    bench.write("Y0 tells alarms", 0x2030, 0x0D, 1);
-    bench.write("Y1 tells in position", 0x2030, 0x0E, 4);
+    bench.write("Y0 signals alarms", 0x2030, 0x0D, 1);
+    bench.write("Y1 signals in position", 0x2030, 0x0E, 4);
     go_to(bench, 1000);
     expect_outputs(bench, "in position: Y1", 0b10);
     bench.write("target 3000", 0x607A, 0, 3000);
