@@ -57,6 +57,11 @@ impl Failure {
         Self { status: Status::Usage, kind: "usage", ..Self::new(what) }
     }
 
+    /// A file that the command is to work by is missing, or is not what it is to be.
+    pub(crate) fn bad_file(what: impl Into<String>) -> Self {
+        Self { kind: "bad_file", ..Self::new(what) }
+    }
+
     /// What the command has to say does not get out.
     pub(crate) fn of_stdout(error: std::io::Error) -> Self {
         Self::new("cannot write to standard output")

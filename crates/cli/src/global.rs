@@ -10,7 +10,9 @@ use transport::BusSpec;
 
 use crate::failure::Failure;
 use crate::recording::{LogPath, log_path};
-use testbench::machine_file::{self, Machine};
+use crate::scope::heeds_machine;
+use crate::session::read_machine;
+use testbench::machine_file::Machine;
 use testbench::models::Description;
 use testbench::words::drive::node_model;
 
@@ -38,8 +40,8 @@ pub(crate) struct Global {
     /// On a real bus the `model`, `node` and `units` of each [[drive]] count, and what is moved as one. On the virtual bus of a command's
     /// own it is the short form of --bus sim:FILE.toml, and `sim` serves the drives that it describes. A command that takes a machine
     /// file as an argument takes it here too.
-    #[arg(long, value_name = "FILE.toml", value_parser = machine_file::machine, env = "FERRODRIVE_MACHINE", global = true)]
-    pub(crate) machine: Option<Machine>,
+    #[arg(id = "machine", long = "machine", value_name = "FILE.toml", env = "FERRODRIVE_MACHINE", global = true)]
+    pub(crate) machine_path: Option<PathBuf>,
 
     /// Show every frame that the command sends and hears, in words, on standard error
     #[arg(long, short = 'v', global = true)]
@@ -61,6 +63,10 @@ pub(crate) struct Global {
     #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "500ms", global = true)]
     pub(crate) timeout: Duration,
 
+    /// What it says.
+    #[arg(skip)]
+    pub(crate) machine: Option<Machine>,
+
     /// Where the machine file is, and whether the command line names it.
     #[arg(skip)]
     pub(crate) machine_file: Option<MachineFile>,
@@ -79,23 +85,26 @@ impl Global {
     /// there.
     ///
     /// # Errors
-    /// Where `--bus` names another file than `--machine`.
+    /// Where the file cannot be used, or `--bus` names another one than `--machine`.
     pub(crate) fn with_machine_file(mut self, matches: &ArgMatches) -> Result<Self, Failure> {
-        let path = matches.get_raw("machine").and_then(|mut values| values.next()).map(PathBuf::from);
-        let (Some(path), Some(_)) = (path, &self.machine) else { return Ok(self) };
+        let command = matches.subcommand_name().unwrap_or_default();
+        let Some(path) = self.machine_path.clone().filter(|_| heeds_machine(command)) else { return Ok(self) };
         let is_typed = matches.value_source("machine") == Some(ValueSource::CommandLine);
         // A check reads its file, and asks only a bus that is named; a simulator makes its drives itself.
-        let makes_its_own = matches!(matches.subcommand_name(), Some("check" | "sim"));
+        let makes_its_own = matches!(command, "check" | "sim");
         match &self.bus {
             BusSpec::Sim { file: None } if !makes_its_own => self.bus = BusSpec::Sim { file: Some(path.clone()) },
             BusSpec::Sim { file: Some(other) } if *other != path => {
                 if is_typed {
                     return Err(two_files(other, &path));
                 }
-                self.machine = None;
                 return Ok(self);
             }
             _ => {}
+        }
+        // A check says of a bad file all that it finds.
+        if command != "check" {
+            self.machine = Some(read_machine(&path)?);
         }
         self.machine_file = Some(MachineFile { path, is_typed });
         Ok(self)

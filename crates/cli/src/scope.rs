@@ -152,6 +152,11 @@ pub(crate) fn heeded() -> clap::Command {
     command
 }
 
+/// Whether a machine file means something to a command.
+pub(crate) fn heeds_machine(command: &str) -> bool {
+    !UNHEEDED.iter().any(|row| row.command == command && row.options.contains(&MACHINE))
+}
+
 /// Refuses typed options that the command does not heed, and options that contradict each other.
 pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgMatches) -> Result<(), Failure> {
     let typed = |option: &str| matches.value_source(option) == Some(ValueSource::CommandLine);

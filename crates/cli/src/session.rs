@@ -191,7 +191,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     }
     let mut context = Context::new(global, network.clone(), embedded.as_deref(), progress.clone(), traffic.clone());
     (context.world, context.wire) = (world, health);
-    if let Some(unused) = global.machine.as_ref().and_then(Machine::unused_by_a_master) {
+    if let Some(unused) = global.machine.as_ref().filter(|_| embedded.is_none()).and_then(Machine::unused_by_a_master) {
         let text = format!(
             "of the machine file a command on a real bus does not use: {unused}; `ferrodrive sim --machine FILE` and `ferrodrive run` do"
         );
@@ -313,7 +313,12 @@ fn without_this_command(loss: Option<HostLoss>, failure: Failure) -> Failure {
 /// A failure of the bus itself, with every cause that is known.
 pub(crate) fn bus_failure(global: &Global, error: &dyn Error) -> Failure {
     let failure = failure_of(error);
-    Failure { what: format!("bus {}: {}", global.bus, failure.what), kind: "bus", ..failure }
+    let failure = Failure { what: format!("bus {}: {}", global.bus, failure.what), kind: "bus", ..failure };
+    if failure.next.is_empty() {
+        return failure
+            .next("see that it is there and spelt rightly; `ferrodrive help options` lists the forms of --bus");
+    }
+    failure
 }
 
 /// An error with every cause that is known.

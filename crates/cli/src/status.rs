@@ -3,9 +3,9 @@
 /// How a command ended; the process ends with the same number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Status {
-    /// The operation failed.
+    /// It was tried and did not come out, or a file that it was to be done by is bad or missing.
     Failed = 1,
-    /// The command line makes no sense.
+    /// The command line itself makes no sense: no bus and no file is needed to see that.
     Usage = 2,
     /// The terminal was closed. Signals as shells number them: 128 + SIGHUP.
     HungUp = 129,

@@ -23,7 +23,7 @@ use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Error, Gear, Network as Core, Node};
 use pyo3::prelude::*;
 use testbench::machine_file::Machine;
-use testbench::models::{Description, with_told};
+use testbench::models::{Description, with_files};
 use testbench::network::read_machine;
 use transport::BusSpec;
 
@@ -300,7 +300,7 @@ fn read_machine_of(py: Python<'_>, path: Option<PathBuf>) -> PyResult<Option<Arc
 impl Network {
     fn new(core: Core, traffic: Traffic, runner: Runner, machine: Option<Arc<Machine>>) -> Self {
         let described = machine.iter().flat_map(|machine| machine.models()).map(|(_, model)| model);
-        core.set_models(with_told(described));
+        core.set_models(with_files(described));
         Self { core, traffic, runner: Arc::new(runner), closed: AtomicBool::new(false), machine }
     }
 

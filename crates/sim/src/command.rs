@@ -1,7 +1,7 @@
 //! World commands: the lines that `ferrodrive sim` takes on standard input, each answered by one line of JSON.
 //!
 //! A line is parsed into a [`Command`], applied to a [`World`], and answered with `{"ok":true,"t":12.5}`
-//! (`t` is virtual time in seconds) or `{"ok":false,"error":"..."}`. A line that is refused changes nothing. A blank line
+//! (`t` is virtual time in seconds) or `{"ok":false,"error":{"kind":"..","message":"..",..}}`. A line that is refused changes nothing. A blank line
 //! and a comment (`# ...`) have no answer.
 //! Node numbers are those under which drives were added, whatever their node-IDs are by now.
 
@@ -249,23 +249,24 @@ pub fn asks_for_an_answer(line: &str) -> bool {
 #[derive(Serialize)]
 struct Refusal<'a> {
     ok: bool,
-    error: String,
+    error: RefusalBody<'a>,
+}
+
+/// The fields that an error has everywhere (docs/json.md).
+#[derive(Serialize)]
+struct RefusalBody<'a> {
     kind: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    message: String,
     node: Option<u8>,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    object: Option<&'a str>,
+    abort: Option<u32>,
     next: Option<&'a str>,
 }
 
-/// The answer to a line that was not done: why in words, and beside it what a program goes by.
+/// The answer to a line that was not done: why in words, and what a program goes by.
 pub fn refused(error: &CommandError) -> String {
-    json::line(&Refusal {
-        ok: false,
-        error: error.to_string(),
-        kind: error.kind(),
-        node: error.node(),
-        next: error.next(),
-    })
+    let (kind, message, node, next) = (error.kind(), error.to_string(), error.node(), error.next());
+    json::line(&Refusal { ok: false, error: RefusalBody { kind, message, node, object: None, abort: None, next } })
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ pub fn to_string(value: &(impl Serialize + ?Sized)) -> serde_json::Result<String
 
 /// One line of JSON that answers somebody. Answers are flags, numbers and texts: they always become JSON.
 pub fn line(answer: &impl Serialize) -> String {
-    to_string(answer).unwrap_or_else(|_| r#"{"ok":false,"error":"an answer cannot be written"}"#.to_owned())
+    to_string(answer).unwrap_or_else(|_| r#"{"ok":false,"error":{"kind":"failed","message":"an answer cannot be written","node":null,"object":null,"abort":null,"next":null}}"#.to_owned())
 }
 
 /// A number without the digits that come of binary fractions.

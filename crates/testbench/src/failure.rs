@@ -53,6 +53,11 @@ impl Failure {
         Self { kind: "usage", is_usage: true, ..Self::new(what) }
     }
 
+    /// A file that the request names is missing, or is not what it is to be.
+    pub fn bad_file(what: impl Into<String>) -> Self {
+        Self { kind: "bad_file", ..Self::new(what) }
+    }
+
     /// A file that was asked for cannot be written.
     pub fn of_writing(what: &str, path: &std::path::Path, error: &std::io::Error) -> Self {
         Self::new(format!("cannot write {what} {}", path.display())).of_kind("file").because(error).next(
@@ -150,13 +155,17 @@ impl fmt::Display for Failure {
 }
 
 impl From<master::Error> for Failure {
-    /// The master's errors have what, why and what to do; how a model is named is the caller's to add. What is beyond a limit was
-    /// mistyped.
+    /// The master's errors have what, why and what to do; how a model is named is the caller's to add.
     fn from(error: master::Error) -> Self {
         use master::Error;
         let subject = Subject { node: Some(error.node()), object: error.object(), abort: error.abort() };
-        let is_usage = matches!(error, Error::OutOfLimits { .. } | Error::TooFine { .. });
-        Self { kind: error.kind(), subject, is_usage, ..parts(&error) }
+        let failure = Self { kind: error.kind(), subject, ..parts(&error) };
+        match error {
+            Error::OutOfLimits { .. } | Error::TooFine { .. } if failure.next.is_empty() => {
+                failure.next("ask for a value that the drive takes, or change the setting that limits it")
+            }
+            _ => failure,
+        }
     }
 }
 

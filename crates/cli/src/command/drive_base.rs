@@ -261,10 +261,11 @@ fn within_limits(asked: Twist, plan: &BasePlan, limits: &BaseLimits) -> Result<(
     }
     let shown = |twist: Twist| format!("{} m/s and {} rad/s", Shown(twist.linear_m_s), Shown(twist.angular_rad_s));
     let [linear, angular, wheel] = [limits.linear_m_s, limits.angular_rad_s, limits.wheel_m_s].map(Shown);
-    Err(Failure::usage(format!(
+    Err(Failure::new(format!(
         "{} is more than this base is to do: [base] allows {linear} m/s, {angular} rad/s and {wheel} m/s at a wheel",
         shown(asked)
     ))
+    .of_kind("out_of_limits")
     .next(format!("ask for {}, the most on the same way, or raise the limits in [base]", shown(driven))))
 }
 
@@ -405,9 +406,8 @@ fn twist_of(context: &Context, line: &str, seen: &mut Seen) -> Option<Twist> {
 fn failure(error: BaseError) -> Failure {
     match error {
         BaseError::Drive(error) => error.into(),
-        BaseError::BadLimit { .. } | BaseError::BadTwist { .. } | BaseError::BeyondDrive { .. } => {
-            Failure::usage(error.to_string())
-        }
+        BaseError::BadLimit { .. } | BaseError::BadTwist { .. } => Failure::usage(error.to_string()),
+        BaseError::BeyondDrive { .. } => Failure::new(error.to_string()).of_kind("out_of_limits"),
         BaseError::NotEnabled { limit, left, right } => {
             let what = format!("the wheels were not enabled within {} s: {left}; {right}", limit.as_secs());
             Failure::new(what).of_kind("base").next("ferrodrive explain NODE says what keeps each of them")

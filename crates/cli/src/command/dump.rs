@@ -396,8 +396,11 @@ impl Sink {
 
 /// Opens a log to be read.
 pub(crate) fn open_log(path: &Path) -> Result<AnyLogReader, Failure> {
-    AnyLogReader::open(path)
-        .map_err(|error| Failure::new(format!("cannot open the log {}", path.display())).of_kind("bus").because(error))
+    AnyLogReader::open(path).map_err(|error| {
+        Failure::bad_file(format!("cannot open the log {}", path.display()))
+            .because(error)
+            .next("give the path of a log: .log, .asc, .blf or .pcapng")
+    })
 }
 
 /// A log that cannot be read on.

@@ -434,8 +434,10 @@ fn failure(error: GroupError) -> Failure {
         GroupError::NotEnabled { node, .. } => {
             Failure::new(error.to_string()).of_kind("group").at_node(node).next(ask_why(node))
         }
-        GroupError::Path(_) | GroupError::Period { .. } | GroupError::BeyondDrive { .. } => {
-            Failure::usage(error.to_string())
+        GroupError::Period { .. } => Failure::usage(error.to_string()),
+        // The path is beyond what the axes may do, or one of them takes.
+        GroupError::Path(_) | GroupError::BeyondDrive { .. } => {
+            Failure::new(error.to_string()).of_kind("out_of_limits")
         }
         error => Failure::new(error.to_string()).of_kind("group"),
     }

@@ -272,7 +272,7 @@ impl Replay {
         }
         let all: u64 = reasons.values().sum();
         let counts: Vec<String> = reasons.iter().map(|(why, count)| format!("{count} x {why}")).collect();
-        let failure = Failure::usage(format!("{all} frames of {} may set a drive in motion", self.file.display()))
+        let failure = Failure::new(format!("{all} frames of {} may set a drive in motion", self.file.display()))
             .of_kind("motion")
             .because(counts.join(", "));
         let failure = examples.into_iter().fold(failure, Failure::because);

@@ -336,7 +336,7 @@ fn add_drive(
 }
 
 fn unusable(bad: BadFile) -> Failure {
-    Failure::usage("cannot use the machine file").because(bad).next("docs/machine-file.md describes each key")
+    Failure::bad_file("cannot use the machine file").because(bad).next("docs/machine-file.md describes each key")
 }
 
 /// Says it if a drive is not where the command line puts it, because its EEPROM contents say otherwise.

@@ -135,7 +135,7 @@ mod tests {
         let (mcap, csv) = (place.join("a.mcap"), place.join("a.csv"));
         fs::write(&mcap, b"\x89MCAP0\r\nand more").unwrap();
         fs::write(&csv, "t_s,4.velocity_rpm,mark\n").unwrap();
-        assert!(create_record(&csv, Kind::Mcap).unwrap_err().to_string().contains("no MCAP file"));
+        assert!(create_record(&csv, Kind::Mcap).unwrap_err().to_string().contains("not an MCAP file"));
         for (path, kind) in [(&mcap, Kind::Mcap), (&csv, Kind::Csv)] {
             drop(create_record(path, kind).unwrap());
             assert_eq!(fs::read(path).unwrap(), b"");

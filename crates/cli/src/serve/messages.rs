@@ -8,6 +8,9 @@ use std::io::{self, Write};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use serde::Serialize;
+
+use crate::failure::{Failure, FailureBody};
 use crate::plain::plain;
 
 /// Bytes that may wait: some 7,000 answers to `get`.
@@ -16,6 +19,14 @@ const MAX_BYTES: usize = 4 << 20;
 /// Speaks to one stream. A copy speaks to the same.
 #[derive(Clone)]
 pub(crate) struct Messages(Arc<Shared>);
+
+/// What stands for answers that nobody read in time.
+#[derive(Serialize)]
+struct Gap {
+    ok: bool,
+    error: FailureBody,
+    dropped: u64,
+}
 
 struct Shared {
     queue: Mutex<Queue>,
@@ -41,8 +52,10 @@ impl Messages {
     /// Standard output, of lines that answer world commands.
     pub(crate) fn of_answers(warned: Messages) -> Self {
         let gap = |dropped| {
-            let error = format!("{dropped} answers are missing here: nobody read them in time");
-            format!(r#"{{"ok":false,"error":"{error}","dropped":{dropped}}}"#)
+            let failure = Failure::new(format!("{dropped} answers are missing here: nobody read them in time"))
+                .of_kind("dropped")
+                .next("read the answers as they come");
+            sim::json::line(&Gap { ok: false, error: (&failure).into(), dropped })
         };
         Self::start(io::stdout(), gap, Some(warned))
     }

@@ -96,7 +96,7 @@ fn a_group_is_spoken_of_in_degrees() {
     let counts = ferrodrive(&["--json", "group", "move", &file, "1=100counts"]);
     assert_eq!(counts.status, Some(0), "{}", counts.out);
     let beyond = ferrodrive(&["group", "move", &file, "1=200deg"]);
-    assert_eq!(beyond.status, Some(2));
+    assert_eq!(beyond.status, Some(1));
     assert!(beyond.err.contains("at 200 deg") && beyond.err.contains("-170 to 170 deg"), "{}", beyond.err);
 }
 

@@ -11,5 +11,6 @@ mod machine;
 mod on_sim;
 mod plan;
 mod run;
+mod status;
 mod units;
 mod usage;

@@ -123,7 +123,7 @@ fn of_several_scenarios_each_is_a_row_and_a_suite_and_one_that_fails_is_enough()
     assert_eq!((xml.matches("<testsuite ").count(), xml.matches("<failure ").count()), (2, 1), "{xml}");
 
     let broken_too = ferrodrive(&["run", &broken, &fine, &wrong, "--json", "--junit", &junit]);
-    assert_eq!(broken_too.status, Some(2), "{}", broken_too.out);
+    assert_eq!(broken_too.status, Some(1), "{}", broken_too.out);
     let said = broken_too.json();
     let counts = [&said["passed"], &said["failed"], &said["unusable"], &said["complete"]];
     assert_eq!(counts, [&Value::from(1), &1.into(), &1.into(), &true.into()], "{said:#}");
@@ -166,15 +166,20 @@ fn what_cannot_be_run_is_refused_with_its_place() {
     )
     .unwrap();
     let path = file.to_str().unwrap();
-    let refused = |arguments: &[&str], said: &str| {
+    let ended_with = |status: i32, arguments: &[&str], said: &str| {
         let ended = ferrodrive(arguments);
-        assert_eq!(ended.status, Some(2), "{arguments:?}: {}", ended.err);
+        assert_eq!(ended.status, Some(status), "{arguments:?}: {}", ended.err);
         assert!(ended.err.contains(said), "{arguments:?}: {}", ended.err);
     };
-    refused(&["run", path], "bad.toml:3:8: the machine has no node 5; it has: 4");
-    refused(&["run", &scenario("step_loss.toml"), "--set", "hold=1s"], "it has no parameter 'hold'; it has: held");
-    refused(&["run", &scenario("step_loss.toml"), "--set", "held=long"], "does not begin with a number");
-    refused(&["run", "/nowhere.toml"], "cannot use the scenario /nowhere.toml");
+    let refused = |arguments: &[&str], said: &str| ended_with(2, arguments, said);
+    ended_with(1, &["run", path], "bad.toml:3:8: the machine has no node 5; it has: 4");
+    ended_with(
+        1,
+        &["run", &scenario("step_loss.toml"), "--set", "hold=1s"],
+        "it has no parameter 'hold'; it has: held",
+    );
+    ended_with(1, &["run", &scenario("step_loss.toml"), "--set", "held=long"], "does not begin with a number");
+    ended_with(1, &["run", "/nowhere.toml"], "cannot use the scenario /nowhere.toml");
     refused(&["run", path, "--seeds", "9..1"], "FIRST..LAST");
     refused(&["--timeout", "1s", "run", path], "--timeout means nothing to run");
 }

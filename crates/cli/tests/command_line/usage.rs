@@ -4,8 +4,19 @@ use processes::{done, ferrodrive, scratch};
 
 #[track_caller]
 fn refused(arguments: &[&str], parts: &[&str]) {
+    ended_with(2, arguments, parts);
+}
+
+/// A file that is missing or bad, and a value that a drive or a machine does not take.
+#[track_caller]
+fn not_taken(arguments: &[&str], parts: &[&str]) {
+    ended_with(1, arguments, parts);
+}
+
+#[track_caller]
+fn ended_with(status: i32, arguments: &[&str], parts: &[&str]) {
     let ended = ferrodrive(arguments);
-    assert_eq!(ended.status, Some(2), "{arguments:?}: {}", ended.err);
+    assert_eq!(ended.status, Some(status), "{arguments:?}: {}", ended.err);
     assert!(ended.out.is_empty(), "{arguments:?} printed {}", ended.out);
     for part in parts {
         assert!(ended.err.contains(part), "{arguments:?} should say {part:?}, but says: {}", ended.err);
@@ -69,15 +80,15 @@ fn quantities_are_checked() {
 
 #[test]
 fn what_is_beyond_the_drives_limits_is_refused_before_anything_moves() {
-    refused(&["velocity", "4", "20000rpm"], &["out of range"]);
-    refused(&["torque", "4", "31A"], &["out of range", "-30000 to 30000"]);
+    not_taken(&["velocity", "4", "20000rpm"], &["out of range"]);
+    not_taken(&["torque", "4", "31A"], &["out of range", "-30000 to 30000"]);
 }
 
 #[test]
 fn buses_are_checked() {
     refused(&["--bus", "http://x", "scan"], &["socketcand://HOST:PORT/can0", "slcan://HOST:PORT"]);
     refused(&["--bus", "socketcand://localhost:99999/can0", "scan"], &["'99999' is not a port"]);
-    refused(&["--bus", "sim:/nowhere/machine.toml", "scan"], &["/nowhere/machine.toml", "[[drive]]"]);
+    not_taken(&["--bus", "sim:/nowhere/machine.toml", "scan"], &["/nowhere/machine.toml", "[[drive]]"]);
     refused(&["--bus", "log:trace.log", "scan"], &["nobody there can answer", "dump"]);
 }
 
@@ -123,7 +134,7 @@ fn machine_files_are_checked() {
     std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nswitches = { X0 = [1, 2, 3] }\n").unwrap();
     let bus = format!("sim:{path}");
     for arguments in [&["--bus", &bus, "scan"][..], &["sim", "--machine", path], &["--machine", path, "scan"]] {
-        refused(
+        not_taken(
             arguments,
             &[
                 "machine.toml:4:19: 'X0' is a list of 3; expected two bounds, [low, high]",
@@ -132,19 +143,19 @@ fn machine_files_are_checked() {
         );
     }
     std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nfaults = ['gear']\n").unwrap();
-    refused(&["sim", "--machine", path], &["machine.toml:4:11: 'fault gear on' cannot be done"]);
+    not_taken(&["sim", "--machine", path], &["machine.toml:4:11: 'fault gear on' cannot be done"]);
     std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nbattery = true\n").unwrap();
-    refused(&["sim", "--machine", path], &["cannot use the machine file", "line 4, column 11", "has no battery"]);
+    not_taken(&["sim", "--machine", path], &["cannot use the machine file", "line 4, column 11", "has no battery"]);
     std::fs::write(&file, format!("# {}", "x".repeat(1 << 20))).unwrap();
-    refused(&["--bus", &bus, "scan"], &["larger than the limit of 1 MB"]);
+    not_taken(&["--bus", &bus, "scan"], &["larger than the limit of 1 MB"]);
     #[cfg(unix)]
     {
         let pipe = directory.join("pipe.toml");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
         assert!(made.success());
         let pipe = pipe.to_str().unwrap();
-        refused(&["sim", "--machine", pipe], &["not a regular file"]);
-        refused(&["--bus", &format!("sim:{pipe}"), "scan"], &["not a regular file"]);
+        not_taken(&["sim", "--machine", pipe], &["not a regular file"]);
+        not_taken(&["--bus", &format!("sim:{pipe}"), "scan"], &["not a regular file"]);
     }
 }
 
@@ -179,7 +190,7 @@ fn control_characters_of_others_are_not_echoed() {
     }
     for ended in ended {
         let said = [ended.out, ended.err].concat();
-        assert_eq!(ended.status, Some(2), "{said:?}");
+        assert!(matches!(ended.status, Some(1 | 2)), "{said:?}");
         assert!(!said.contains(|c: char| c.is_control() && c != '\n'), "{said:?}");
     }
 }
@@ -242,7 +253,7 @@ fn a_log_of_no_known_form_is_neither_written_nor_read() {
 #[test]
 fn a_twist_beyond_the_limits_of_a_base_is_refused_with_the_most_that_there_is() {
     let base = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/base.toml");
-    refused(
+    not_taken(
         &["drive-base", base, "--linear", "30", "--for", "1s"],
         &[
             "30 m/s and 0 rad/s is more than this base is to do",
@@ -260,7 +271,7 @@ fn an_overlong_argument_is_not_repeated_as_a_whole() {
     for arguments in [&["read", &long, "6064"][..], &[&long], &["--bus", &long, "scan"], &["run", &long, "--set", &set]]
     {
         let ended = ferrodrive(arguments);
-        assert_eq!(ended.status, Some(2));
+        assert!(matches!(ended.status, Some(1 | 2)), "{:?}", ended.status);
         assert!(ended.err.len() < 2_000 && ended.err.contains("10000 characters"), "{}", &ended.err[..500]);
         let json = ferrodrive(&[&["--json"], arguments].concat());
         assert!(json.out.len() < 2_000, "{}", json.out.len());

@@ -194,14 +194,17 @@ fn a_drive_has_the_axes_that_it_has_and_its_objects_are_its_own() {
     world.add_drive(4, Box::new(crate::machine::zlac8030l(4, 1))).expect("the first drive");
     let mut json = |line: &str| answer(&mut world, line).expect("an answer").json;
     assert!(json("4.1 get").contains("\"node\":4"));
-    assert_eq!(json("4.2 get"), r#"{"ok":false,"error":"a zlac8030l has no axis 2; it has 1","kind":"refused"}"#);
+    assert_eq!(
+        json("4.2 get"),
+        r#"{"ok":false,"error":{"kind":"refused","message":"a zlac8030l has no axis 2; it has 1","node":null,"object":null,"abort":null,"next":null}}"#
+    );
     assert_eq!(
         json("4.2 load torque 1"),
-        r#"{"ok":false,"error":"a zlac8030l has no axis 2; it has 1","kind":"refused"}"#
+        r#"{"ok":false,"error":{"kind":"refused","message":"a zlac8030l has no axis 2; it has 1","node":null,"object":null,"abort":null,"next":null}}"#
     );
     assert_eq!(
         json("4 set 6041 0"),
-        r#"{"ok":false,"error":"a zlac8030l sets its objects by itself; write 6041h:00 over the bus, as its host does","kind":"refused"}"#
+        r#"{"ok":false,"error":{"kind":"refused","message":"a zlac8030l sets its objects by itself; write 6041h:00 over the bus, as its host does","node":null,"object":null,"abort":null,"next":null}}"#
     );
 }
 

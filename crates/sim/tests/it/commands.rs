@@ -31,7 +31,7 @@ fn refusal(world: &mut World, line: &str) -> String {
     let answer = ask(world, line);
     assert_eq!(answer["ok"], false, "{line}");
     assert_eq!(world.digest(), before);
-    answer["error"].as_str().unwrap().to_string()
+    answer["error"]["message"].as_str().unwrap().to_string()
 }
 
 #[test]
@@ -50,7 +50,7 @@ fn drives_boot_when_they_are_added_and_answer_on_the_bus() {
 fn a_refusal_begins_as_every_answer_does_and_says_what_is_expected() {
     let (mut world, _) = world();
     let json = answer(&mut world, "fly").unwrap().json;
-    assert!(json.starts_with(r#"{"ok":false,"error":""#), "{json}");
+    assert!(json.starts_with(r#"{"ok":false,"error":{"kind":""#), "{json}");
     let error = refusal(&mut world, "4");
     assert!(error.contains("after node 4") && error.contains("power") && error.contains("4 get"), "{error}");
 }

@@ -207,7 +207,10 @@ fn a_free_base_rolls_down_a_slope_and_is_seen_in_what_is_got() {
         ("4 load gear 2 1", "part of a coupled machine"),
     ] {
         let answer = told(&mut world, line);
-        assert!(answer["ok"] == false && answer["error"].as_str().unwrap().contains(expected), "{line}: {answer}");
+        assert!(
+            answer["ok"] == false && answer["error"]["message"].as_str().unwrap().contains(expected),
+            "{line}: {answer}"
+        );
     }
 }
 

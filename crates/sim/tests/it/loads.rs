@@ -37,7 +37,7 @@ fn refused(world: &mut World, line: &str) -> String {
     let before = world.digest();
     let answer = told(world, line);
     assert_eq!((&answer["ok"], world.digest()), (&Value::Bool(false), before), "{line}: {answer}");
-    answer["error"].as_str().unwrap().to_owned()
+    answer["error"]["message"].as_str().unwrap().to_owned()
 }
 
 fn after(world: &mut World, node: u8, seconds: f64) -> Report {

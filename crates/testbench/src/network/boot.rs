@@ -188,7 +188,7 @@ impl Planned {
             }
             Self::Manager(values) => {
                 let plan = BootPlan::from_objects(|object| values.get(&object).cloned());
-                let mut plan = plan.map_err(|bad| match (Failure::usage(bad.to_string()), bad.node()) {
+                let mut plan = plan.map_err(|bad| match (Failure::bad_file(bad.to_string()), bad.node()) {
                     (failure, Some(node)) => failure.at_node(node),
                     (failure, None) => failure,
                 })?;
@@ -210,7 +210,7 @@ impl Planned {
         plan.nodes.retain(|node, _| only.is_empty() || only.contains(node));
         if plan.nodes.is_empty() {
             return Err(match self {
-                Self::Manager(_) => Failure::usage("the file has no slave: 1F81h says of no node that it is one")
+                Self::Manager(_) => Failure::bad_file("the file has no slave: 1F81h says of no node that it is one")
                     .next("give the DCF of the CANopen manager, not that of a device"),
                 _ => Failure::new("nobody is on the bus").of_kind("nobody").next("ferrodrive scan says more"),
             });
@@ -268,13 +268,13 @@ fn check(path: &Path, eds: &Eds) -> Result<(), Failure> {
     if eds.object(0x1F81).is_some() {
         return Ok(());
     }
-    Err(Failure::usage(format!("{} has no 1F81h: it is not the file of a CANopen manager", path.display()))
+    Err(Failure::bad_file(format!("{} has no 1F81h: it is not the file of a CANopen manager", path.display()))
         .next("give the DCF of the manager, which lists its slaves there (CiA 302-2), or a machine file"))
 }
 
 fn configuration(path: &Path, object: Mux) -> Result<Vec<u8>, Failure> {
     let unreadable = |why: String| {
-        Failure::usage(format!("cannot read {}, which {object} names", path.display()))
+        Failure::bad_file(format!("cannot read {}, which {object} names", path.display()))
             .because(why)
             .next("it is looked for beside the DCF; is it there?")
     };

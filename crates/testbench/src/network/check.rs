@@ -56,12 +56,16 @@ fn read_as(
     next: &'static str,
 ) -> Result<Checked, Failure> {
     let file = path.display().to_string();
-    let unread = |reason| Failure::new(format!("cannot read {}", plain(&file))).of_kind("file").because(reason);
+    let unread = |reason| {
+        Failure::bad_file(format!("cannot read {}", plain(&file)))
+            .because(reason)
+            .next("give the path of a bus.yml or of a machine file")
+    };
     let text = read_text(path).map_err(unread)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     of(&text, folder).map_err(|bad| {
         let what = format!("cannot use {}", plain(&file));
-        Failure::usage(what).because(plain(&bad.named(&file).to_string())).next(next)
+        Failure::bad_file(what).because(plain(&bad.named(&file).to_string())).next(next)
     })
 }
 

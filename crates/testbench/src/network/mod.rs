@@ -28,7 +28,7 @@ pub fn read_machine(path: &Path) -> Result<Machine, Failure> {
 
 /// That a machine file makes no sense.
 pub fn unusable(path: &Path, reason: String) -> Failure {
-    Failure::usage(format!("cannot use the machine file {}", path.display()))
+    Failure::bad_file(format!("cannot use the machine file {}", path.display()))
         .because(reason)
         .next(machine_file::example())
 }

@@ -203,17 +203,60 @@ fn the_commands_of_a_running_simulator_print_the_same_form() {
 }
 
 #[test]
-fn the_page_names_every_command_and_every_kind_that_tests_meet() {
+fn the_page_names_every_command_and_shows_a_failure() {
     let page = page("json.md");
     for (arguments, _) in COMMANDS.iter().filter(|(arguments, _)| arguments[0] != "fly") {
         assert!(page.contains(&format!("`{}", arguments[0])), "docs/json.md does not name {}", arguments[0]);
     }
-    for kind in
-        ["usage", "no_answer", "aborted", "not_reached", "no_such_mode", "out_of_limits", "bus", "control", "no_log"]
-    {
-        assert!(page.contains(&format!("`{kind}`")), "docs/json.md does not name {kind}");
-    }
     let printed = page.lines().find(|line| line.starts_with("{\"ok\":false")).expect("an example");
     let example = Ended { status: Some(1), out: printed.to_owned(), err: String::new() };
     hold(&example, "failure", "the example of the page");
+}
+
+/// The kinds of errors in the sources: `of_kind("..")`, `kind: ".."`, `new("..", ` of control errors, and the words of `fn kind`.
+fn kinds_in(text: &str) -> Vec<String> {
+    let word = |rest: &str| {
+        let (word, _) = rest.split_once('"')?;
+        (!word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c == '_')).then(|| word.to_owned())
+    };
+    let behind = |mark: &str| text.split(mark).skip(1).filter_map(word).collect::<Vec<_>>();
+    let mut kinds = [behind("of_kind(\""), behind(" kind: \""), behind("\"kind\":\""), behind("Self::new(\"")].concat();
+    for body in text.split("fn kind(&self) -> &'static str {").skip(1) {
+        let body = body.split("\n    }\n").next().unwrap_or_default();
+        kinds.extend(body.split("=> \"").skip(1).filter_map(word));
+    }
+    kinds
+}
+
+fn sources(folder: &std::path::Path, found: &mut Vec<String>) {
+    for entry in std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()) {
+        if entry.is_dir() {
+            sources(&entry, found);
+        } else if entry.extension().is_some_and(|ending| ending == "rs") && !entry.ends_with("tests.rs") {
+            let text = std::fs::read_to_string(&entry).expect("UTF-8");
+            found.push(text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default().to_owned());
+        }
+    }
+}
+
+#[test]
+fn the_page_lists_every_kind_of_the_code_and_no_other() {
+    let crates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../crates");
+    let mut texts = Vec::new();
+    for folder in ["cli/src", "master/src/error", "sim/src/command", "testbench/src/control"] {
+        sources(&crates.join(folder), &mut texts);
+    }
+    texts.push(std::fs::read_to_string(crates.join("sim/src/command.rs")).expect("UTF-8"));
+    let mut of_code: Vec<String> = texts.iter().flat_map(|text| kinds_in(text)).collect();
+    of_code.sort();
+    of_code.dedup();
+    assert!(of_code.len() > 50, "{of_code:?}");
+    let page = page("json.md");
+    let table = page.split_once("| `kind` | means |").expect("the table").1;
+    let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let cells = rows.filter_map(|row| row.split('|').nth(1));
+    let mut of_page: Vec<String> =
+        cells.flat_map(|cell| cell.split(',').map(|kind| kind.trim().trim_matches('`').to_owned())).collect();
+    of_page.sort();
+    assert_eq!(of_page, of_code, "docs/json.md, left, and the sources");
 }

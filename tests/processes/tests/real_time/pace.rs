@@ -138,7 +138,7 @@ fn what_cannot_be_is_refused_with_what_can() {
     }
     let mut simulator = Simulator::start(&drive[1..]);
     let refused = simulator.ask("run 20ms");
-    assert!(refused["error"].as_str().is_some_and(|error| error.contains("--clock manual")), "{refused}");
+    assert!(refused["error"]["message"].as_str().is_some_and(|error| error.contains("--clock manual")), "{refused}");
     let refused = simulator.ask("run fast");
-    assert!(refused["error"].as_str().is_some_and(|error| error.contains("run 20ms")), "{refused}");
+    assert!(refused["error"]["message"].as_str().is_some_and(|error| error.contains("run 20ms")), "{refused}");
 }

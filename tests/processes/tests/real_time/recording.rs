@@ -137,7 +137,7 @@ fn a_picture_is_written_over_a_picture_and_nothing_else() {
     refused(&["plot", "/nowhere/run.mcap"], &["cannot read the record"]);
     let wrong = place.join("wrong.mcap");
     std::fs::write(&wrong, text).unwrap();
-    refused(&["plot", wrong.to_str().unwrap()], &["no MCAP file"]);
+    refused(&["plot", wrong.to_str().unwrap()], &["not an MCAP file"]);
 }
 
 #[test]

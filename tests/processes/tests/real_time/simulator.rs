@@ -61,7 +61,7 @@ fn world_commands_are_answered_line_by_line() {
     for wrong in ["fly", "5 get", "4 supply", "4 input X9 1", "4 fault wing on", "128 get"] {
         let answer = simulator.ask(wrong);
         assert_eq!(answer["ok"], false, "{wrong}");
-        assert!(answer["error"].as_str().is_some_and(|error| !error.is_empty()), "{answer}");
+        assert!(answer["error"]["message"].as_str().is_some_and(|error| !error.is_empty()), "{answer}");
     }
     // Blank lines have no answer: the next one belongs to the next command.
     simulator.send("");

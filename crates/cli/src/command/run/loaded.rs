@@ -46,14 +46,14 @@ impl<'a> Loaded<'a> {
 }
 
 fn unusable(file: &Path, reason: &str) -> Failure {
-    Failure::usage(format!("cannot use the scenario {}", file.display()))
+    Failure::bad_file(format!("cannot use the scenario {}", file.display()))
         .because(reason)
         .next("docs/scenarios.md describes each key; examples/scenarios has ten of them")
 }
 
 /// The machine of a scenario cannot be built.
 pub(super) fn unbuildable(file: &Path, bad: BadFile) -> Failure {
-    Failure::usage(format!("cannot build the machine of {}", file.display()))
+    Failure::bad_file(format!("cannot build the machine of {}", file.display()))
         .because(bad)
         .next("docs/machine-file.md describes each key of a machine")
 }

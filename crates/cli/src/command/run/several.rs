@@ -138,8 +138,8 @@ impl SeveralReport<'_> {
         let failure = match (unusable, failed) {
             (0, 0) => return None,
             (0, _) => Failure::new(format!("{failed} of {of} scenarios failed")).of_kind("scenario"),
-            (_, 0) => Failure::usage(format!("{unusable} of {of} scenarios cannot be used")),
-            _ => Failure::usage(format!("{unusable} of {of} scenarios cannot be used, {failed} failed")),
+            (_, 0) => Failure::bad_file(format!("{unusable} of {of} scenarios cannot be used")),
+            _ => Failure::bad_file(format!("{unusable} of {of} scenarios cannot be used, {failed} failed")),
         };
         let first = self.each().find_map(|(file, result)| match result.as_ref()? {
             Ok(outcome) => RunReport::new(outcome, file).failure(),

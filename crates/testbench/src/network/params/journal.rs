@@ -155,7 +155,7 @@ pub fn read(path: &Path, node: NodeId) -> Result<Journal, Failure> {
     let text = read_text(path).map_err(unusable)?;
     let journal = Journal::parse(&text).map_err(|bad| unusable(bad.named(path.display().to_string()).to_string()))?;
     if journal.node != node {
-        return Err(Failure::usage(format!("{} is of node {}, not of node {node}", path.display(), journal.node))
+        return Err(Failure::bad_file(format!("{} is of node {}, not of node {node}", path.display(), journal.node))
             .next(format!("ferrodrive params rollback {} {}", journal.node, path.display())));
     }
     Ok(journal)

@@ -35,7 +35,7 @@ pub fn read(path: &Path, model: Option<&'static Description>, node: Option<NodeI
 pub fn of_machine(machine: &Machine, node: NodeId) -> Result<(Parameters, String), Failure> {
     let found = machine.parameters(node).filter(|parameters| !parameters.values.is_empty());
     let found = found.ok_or_else(|| {
-        Failure::usage(format!("the machine file does not say what node {node} is to be set to"))
+        Failure::bad_file(format!("the machine file does not say what node {node} is to be set to"))
             .next("give its [[drive]] pdos, limits, heartbeat or start_up (docs/machine-file.md), or name a file of parameters")
     })?;
     Ok((found, "the machine file".to_owned()))

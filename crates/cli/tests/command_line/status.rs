@@ -1,0 +1,141 @@
+//! The exit status by one rule, over all commands: 0 done; 1 it was tried and did not come out, or a file is missing or bad; 2 the
+//! command line itself makes no sense. With it goes one line of JSON of one form.
+
+use processes::{done, ferrodrive, scratch};
+use serde_json::Value;
+
+/// Ends with `status` and one line of JSON that says why and what to do; its error.
+#[track_caller]
+fn failed(arguments: &[&str], status: i32) -> Value {
+    let ended = ferrodrive(&[&["--json"], arguments].concat());
+    assert_eq!(ended.status, Some(status), "{arguments:?}: {}{}", ended.out, ended.err);
+    assert_eq!(ended.out.lines().count(), 1, "{arguments:?}: {}", ended.out);
+    let said = ended.json();
+    let error = &said["error"];
+    assert_eq!(said["ok"], false, "{arguments:?}: {said}");
+    assert!(error["message"].as_str().is_some_and(|text| !text.is_empty()), "{arguments:?}: {said}");
+    assert!(error["next"].as_str().is_some_and(|text| !text.is_empty()), "{arguments:?} says what to do: {said}");
+    assert_eq!(error["kind"] == "usage", status == 2, "{arguments:?}: {said}");
+    error.clone()
+}
+
+/// Every command, as the help lists them.
+fn commands() -> Vec<String> {
+    let help = done(&["-h"]).out;
+    let groups = help.lines().skip_while(|line| *line != "Simulate:").take_while(|line| !line.is_empty());
+    let names = groups.filter(|line| line.starts_with("  ")).flat_map(str::split_whitespace);
+    names.filter(|name| *name != "help").map(ToOwned::to_owned).collect()
+}
+
+/// A line of each command that takes a machine file.
+const LINES: &[&str] = &[
+    "boot",
+    "check",
+    "dcf 4",
+    "decode a.log",
+    "disable 4",
+    "drive-base",
+    "dump",
+    "emcy watch",
+    "enable 4",
+    "estop",
+    "explain 4",
+    "export dbc",
+    "gateway",
+    "group move 4=90deg",
+    "home 4 --method 17",
+    "latency",
+    "lss scan",
+    "move 4 90deg",
+    "nmt 4 start",
+    "objects 4",
+    "params backup 4",
+    "pdo show 4",
+    "plan",
+    "quick-stop 4",
+    "read 4 6064",
+    "record 4 6064 -o a.csv",
+    "replay a.log",
+    "reset 4",
+    "restore 4",
+    "save 4",
+    "scan",
+    "send 000#0104",
+    "sim",
+    "state 4",
+    "stop 4",
+    "studio",
+    "supervise",
+    "sync",
+    "time",
+    "top",
+    "torque 4 1A",
+    "velocity 4 60rpm",
+    "watch 4 6064",
+    "write 4 6060 3",
+];
+
+#[test]
+fn an_option_that_is_not_there_is_a_2_of_every_command() {
+    let commands = commands();
+    assert!(commands.len() > 50, "{commands:?}");
+    for name in &commands {
+        failed(&[name, "--no-such-option"], 2);
+    }
+}
+
+#[test]
+fn a_machine_file_that_is_missing_or_bad_is_a_1_of_every_command_that_takes_one() {
+    let directory = scratch("bad_machine");
+    let bad = directory.join("bad.toml");
+    std::fs::write(&bad, "[[drive]]\nmodel = 'toaster'\nnode = 4\n").unwrap();
+    for name in commands() {
+        let takes_one = done(&[&name, "-h"]).out.contains(" --machine");
+        let line = LINES.iter().find(|line| line.split(' ').next() == Some(&name));
+        assert_eq!(takes_one, line.is_some(), "{name}");
+        let Some(line) = line else { continue };
+        for file in ["/no/such/machine.toml", bad.to_str().unwrap()] {
+            let words = [&["--machine", file], &line.split(' ').collect::<Vec<_>>()[..]].concat();
+            let error = failed(&words, 1);
+            assert_eq!(error["kind"], "bad_file", "{words:?}: {error}");
+        }
+    }
+}
+
+#[test]
+fn an_input_file_that_is_missing_is_a_1() {
+    for line in [
+        "boot /no/such/m.toml",
+        "boot /no/such/m.dcf",
+        "supervise /no/such/m.toml",
+        "plan /no/such/m.toml",
+        "check /no/such/m.toml",
+        "check /no/such/bus.yml",
+        "group move /no/such/m.toml 4=90deg",
+        "drive-base /no/such/m.toml --linear 0.2 --for 1s",
+        "--bus sim:/no/such/m.toml scan",
+        "--bus log:/no/such/a.log dump",
+        "run /no/such/s.toml",
+        "params apply 4 /no/such/p.toml",
+        "params plan 4 /no/such/p.dcf",
+        "params verify 4 /no/such/p.bin",
+        "params diff 4 /no/such/p.toml",
+        "decode /no/such/a.log",
+        "convert /no/such/a.log b.asc",
+        "replay /no/such/a.log",
+        "plot /no/such/run.csv",
+        "eds show /no/such/a.eds",
+        "eds diff /no/such/a.eds zlac8030l",
+        "dcf 4 --eds /no/such/a.eds",
+        "write 4 6060 --from /no/such/a.bin",
+    ] {
+        failed(&line.split(' ').collect::<Vec<_>>(), 1);
+    }
+}
+
+#[test]
+fn what_a_drive_does_not_take_is_a_1_however_it_is_asked_for() {
+    for line in ["velocity 4 20000rpm", "write 4 60FF 1001", "torque 4 31A"] {
+        failed(&line.split(' ').collect::<Vec<_>>(), 1);
+    }
+}
