@@ -515,7 +515,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_is_told_with_its_number() {
+    fn a_malformed_message_is_refused_with_its_number() {
         for (text, seq, why) in [
             ("", None, "EOF"),
             ("[]", None, "expected an object"),

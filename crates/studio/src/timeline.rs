@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn who_asks_on_is_told_what_is_new_and_what_has_changed() {
+    fn a_reader_gets_new_and_changed_events_since_its_revision() {
         let timeline = Timeline::default();
         timeline.push(emcy(1, 4, 1));
         timeline.push(emcy(1, 4, 2));

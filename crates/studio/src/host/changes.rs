@@ -1,4 +1,4 @@
-//! What was done to the world around virtual drives since the studio began.
+//! The changes of the world around virtual drives since the studio started.
 
 use std::collections::VecDeque;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::world::Changed;
 
-/// Changes that are kept; older ones are forgotten.
+/// Number of changes kept; older ones are dropped.
 const KEPT: usize = 200;
 
 /// See the [module](self).
@@ -16,28 +16,28 @@ pub(super) struct Changes {
     next: u64,
 }
 
-/// One thing that was done.
+/// One change.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Change {
     /// Numbers them from 0.
     number: u64,
-    /// In the time of the bus.
+    /// In bus time.
     time_s: f64,
-    /// As it was understood.
+    /// The command in its normal form.
     line: String,
-    /// What takes it back, where anything does.
+    /// The command that undoes it, if there is one.
     back: Option<String>,
-    /// What will come of it, where a person may not expect it.
+    /// Consequences that a person may not expect.
     note: Option<String>,
 }
 
 impl Changes {
-    /// How many there have been.
+    /// The number of changes so far.
     pub(super) const fn count(&self) -> u64 {
         self.next
     }
 
-    /// Keeps one more.
+    /// Adds a change.
     pub(super) fn add(&mut self, time_s: f64, Changed { line, back, note, .. }: Changed) {
         self.kept.push_back(Change { number: self.next, time_s, line, back, note });
         self.next += 1;
@@ -46,7 +46,7 @@ impl Changes {
         }
     }
 
-    /// Those after the one of this number, or all that are kept.
+    /// The changes after the one with this number, or all that are kept.
     pub(super) fn after(&self, number: Option<u64>) -> impl Iterator<Item = &Change> {
         self.kept.iter().filter(move |change| number.is_none_or(|number| change.number > number))
     }

@@ -1,4 +1,4 @@
-//! What a page asks for, one by one: who may, what it means for the drive, and what is answered.
+//! The commands of a page, one by one: permission, effect on the drive, and answer.
 
 use can::Instant;
 use canopen::NodeId;
@@ -12,17 +12,17 @@ use tokio::sync::oneshot;
 use super::guarding::{UNGUARDED, guard};
 use super::parameters::STORING;
 use super::state::{Host, JOG_SPAN, PRESENCE_SPAN};
-use super::work::{Asked, Done, LISTENING_TIME, Listening, Outcome, Running, STOPPING, quietly, refusal_of, say};
+use super::work::{Asked, Done, LISTENING_TIME, Listening, Outcome, Running, STOPPING, quietly, refusal_of, send};
 use super::world::conclude_looking_around;
 use crate::authority::{Refusal, SessionId};
 use crate::dead_man::DeadMan;
 use crate::message::{Answer, Command};
 
-/// Questions for an explanation that may be under way.
+/// Explanations that may be under way.
 const MOST_LISTENING: usize = 32;
 
 impl Host {
-    /// Does what a session asks for, or begins it.
+    /// Executes a command of a session, or starts it.
     pub(super) fn take_command(
         &mut self,
         session: SessionId,
@@ -33,14 +33,14 @@ impl Host {
         if command.needs_control()
             && let Err(refusal) = self.authority.may_move(session)
         {
-            return say(answer, refused(seq, refusal));
+            return send(answer, refused(seq, refusal));
         }
         if let Err((kind, text)) = self.within_speed_limit(session, &command) {
-            return say(answer, Answer::failed(Some(seq), kind, text));
+            return send(answer, Answer::failed(Some(seq), kind, text));
         }
         let asked = (seq, answer);
         match command {
-            // The stop itself went another way, past whatever waits here.
+            // The stop itself came by its own channel, past everything that waits here.
             Command::Alive {} | Command::StopAll {} => done(asked),
             Command::TakeControl {} => {
                 let taken = self.authority.take(session);
@@ -57,7 +57,7 @@ impl Host {
             }
             Command::LimitSpeed { rpm } => self.limit_speed(session, rpm, asked),
             Command::Scan {} => self.begin_scan(Some(asked)),
-            Command::WorldForms {} => self.tell_world_forms(asked),
+            Command::WorldForms {} => self.send_world_forms(asked),
             Command::LookAround { after } => self.look_around(after, asked),
             Command::ChangeWorld { line } => self.change_world(line, asked),
             Command::Explain { node } => self.listen_for(node, asked),
@@ -97,29 +97,29 @@ impl Host {
         }
     }
 
-    /// Begins what a drive is asked to do.
+    /// Starts a command of a drive.
     fn take_motion(&mut self, command: Command, asked: Asked) {
         let Some((id, drive)) = subject(&command).and_then(|id| Some((id, self.nodes.get(&id)?.drive.clone()?))) else {
             let (seq, answer) = asked;
-            let text = "no drive is known at this node: scan the bus, and see whether it has power";
-            return say(answer, Answer::failed(Some(seq), "no_such_drive", text));
+            let text = "no drive is known at this node: scan the bus, and check its supply";
+            return send(answer, Answer::failed(Some(seq), "no_such_drive", text));
         };
         if self.parameters.is_writing(id) {
-            // Half a set of parameters moves nothing.
+            // Nothing moves with half a set of parameters.
             let (seq, answer) = asked;
-            let text = "its parameters are being written: try again when that is done";
-            return say(answer, Answer::failed(Some(seq), "busy", text));
+            let text = "its parameters are being written: try again afterwards";
+            return send(answer, Answer::failed(Some(seq), "busy", text));
         }
         let stops = matches!(command, Command::Stop { .. } | Command::Disable { .. });
         if !stops && self.is_in_group(id) {
             let (seq, answer) = asked;
-            let text = "it belongs to a group that is under way: stop that first";
-            return say(answer, Answer::failed(Some(seq), "busy", text));
+            let text = "it belongs to a group that is moving: stop the group first";
+            return send(answer, Answer::failed(Some(seq), "busy", text));
         }
         match command {
-            // Held from its beginning: what is let go while the drive is being enabled never turns.
+            // Held from its start: a jog that is released while the drive is being enabled never turns.
             Command::Jog { .. } => drop(self.jogs.insert(id, DeadMan::new(JOG_SPAN, self.network.now()))),
-            // These change nothing of how it turns: a jog goes on, and so does its dead man.
+            // These do not change the motion: a jog continues, and so does its dead man.
             Command::Enable { .. } | Command::ResetFault { .. } => {}
             _ => drop(self.jogs.remove(&id)),
         }
@@ -148,18 +148,18 @@ impl Host {
             Command::Torque { amperes, .. } => {
                 self.begin(id, "pushing", true, asked, async move {
                     guard(&drive, accepted).await?;
-                    told(drive.torque(Amperes(amperes)).await)
+                    motion_outcome(drive.torque(Amperes(amperes)).await)
                 });
             }
             Command::Home { method, rpm, .. } => {
                 self.begin(id, "homing", true, asked, home(drive, accepted, method, rpm));
             }
-            // The others concern no drive, or have been done.
+            // The others concern no drive, or are done.
             _ => {}
         }
     }
 
-    /// Begins a command on a node, in place of the one that is under way there.
+    /// Starts a command on a node, replacing the one under way there.
     pub(super) fn begin(
         &mut self,
         node: NodeId,
@@ -168,16 +168,16 @@ impl Host {
         asked: Option<Asked>,
         command: impl Future<Output = Outcome> + 'static,
     ) {
-        // Who goes on alone leaves the others of its group without their set-points.
+        // A drive that continues alone leaves the others of its group without set-points.
         let others = self.leave_group(node);
         self.generation += 1;
         let (running, future) = Running::new(node, self.generation, what, moves, asked, command);
         if let Some(before) = self.running.insert(node, running) {
-            before.cut_short("replaced", "something else was asked of the drive before this was done");
+            before.cut_short("replaced", "replaced by another command to the drive");
         }
         self.work.push(future);
         for other in others {
-            self.quick_stop_one(other, "another drive of its group was told something else", None);
+            self.quick_stop_one(other, "another drive of its group got another command", None);
         }
     }
 
@@ -189,14 +189,14 @@ impl Host {
         }
     }
 
-    /// Control goes over to another, or to nobody: what the one before has moved stops.
+    /// Control changes hands or is released: what the previous session has moved stops.
     fn change_control(&mut self, asked: Asked, change: Result<(), Refusal>) {
         if change.is_ok() {
             let controller = self.authority.controller();
             if controller != self.held_by {
                 self.stop_moved("control changed hands");
                 self.held_by = controller;
-                // Who has it now has been told nothing yet.
+                // The new session has not commanded anything yet.
                 self.accepted.clear();
             }
             self.presence = controller.map(|_| DeadMan::new(PRESENCE_SPAN, self.network.now()));
@@ -206,14 +206,14 @@ impl Host {
 
     fn listen_for(&mut self, node: NodeId, (seq, answer): Asked) {
         if self.listening.len() == MOST_LISTENING {
-            return say(answer, Answer::failed(Some(seq), "busy", "others are being explained something: try again"));
+            return send(answer, Answer::failed(Some(seq), "busy", "too many explanations are under way: try again"));
         }
         let now = self.network.now();
         let heard = Overheard::from(now);
         self.listening.push(Listening { node, until: now + LISTENING_TIME, heard, seq, answer });
     }
 
-    /// Looks closely at drives of which enough was heard.
+    /// Examines the drives to which the explanation has listened long enough.
     pub(super) fn explain_what_was_heard(&mut self, now: Instant) {
         let ready: Vec<Listening> = self.listening.extract_if(.., |listening| listening.until <= now).collect();
         for listening in ready {
@@ -227,7 +227,7 @@ impl Host {
         }
     }
 
-    /// Takes in what has come to its end.
+    /// Handles work that has ended.
     pub(super) fn finish(&mut self, done: Done) {
         match done {
             Done::Read(node, read) => self.take_in(node, read),
@@ -246,19 +246,19 @@ impl Host {
             Done::Group(generation, outcome) => self.conclude_group(generation, outcome),
             Done::Explained(seq, answer, explained) => {
                 let findings: Vec<_> = explained.findings.iter().map(shown).collect();
-                say(answer, Answer::known(seq, json!({ "node": explained.node.raw(), "findings": findings })));
+                send(answer, Answer::known(seq, json!({ "node": explained.node.raw(), "findings": findings })));
             }
         }
     }
 
     fn conclude(&mut self, node: NodeId, generation: u64, outcome: Option<Outcome>) {
         if self.running.get(&node).is_none_or(|running| running.generation != generation) {
-            // Something else is being done with the drive since.
+            // The drive has got another command since.
             return;
         }
         let Some(running) = self.running.remove(&node) else { return };
         match &outcome {
-            // It does what it is asked for: it stands, or is in hand again.
+            // It follows commands: it is at rest, or under control again.
             Some(Ok(_)) => drop(self.unseen_stops.remove(&node)),
             Some(Err(_)) if running.what == STOPPING => drop(self.unseen_stops.insert(node, 0)),
             _ => {}
@@ -266,20 +266,20 @@ impl Host {
         match outcome {
             Some(Ok(notes)) if running.what == STORING => {
                 self.parameters.note_stored(node);
-                running.tell(|seq| Answer::done(seq, notes));
+                running.reply(|seq| Answer::done(seq, notes));
             }
-            Some(Ok(notes)) => running.tell(|seq| Answer::done(seq, notes)),
+            Some(Ok(notes)) => running.reply(|seq| Answer::done(seq, notes)),
             Some(Err((kind, text))) => {
                 let text = if running.what == STOPPING { format!("it may still be moving: {text}") } else { text };
                 if kind == UNGUARDED {
-                    // A question to whoever asked is not news to the others, and nothing has begun that would have to be stopped.
+                    // A request for acceptance is not news to the others, and nothing has started that would have to be stopped.
                     self.jogs.remove(&node);
                 } else {
-                    self.say_news(Some(node), &text);
+                    self.send_news(Some(node), &text);
                 }
                 let moves = running.moves;
-                running.tell(|seq| Answer::failed(Some(seq), kind, text));
-                // What went wrong on the way may have left it turning.
+                running.reply(|seq| Answer::failed(Some(seq), kind, text));
+                // The failure may have left it turning.
                 if moves && (self.jogs.contains_key(&node) || self.network.moved().contains(node)) {
                     self.quick_stop_one(node, "", None);
                 }
@@ -289,7 +289,7 @@ impl Host {
     }
 }
 
-/// The node that a command is about.
+/// The node of a command.
 const fn subject(command: &Command) -> Option<NodeId> {
     match command {
         Command::Enable { node }
@@ -315,14 +315,14 @@ async fn stop(drive: Drive) -> Outcome {
 
 async fn turn(drive: Drive, accepted: bool, rpm: f64, options: MotionOptions) -> Outcome {
     guard(&drive, accepted).await?;
-    told(drive.velocity(Rpm(rpm), options).await)
+    motion_outcome(drive.velocity(Rpm(rpm), options).await)
 }
 
 async fn position(drive: Drive, accepted: bool, degrees: f64, relative: bool, rpm: Option<f64>) -> Outcome {
     guard(&drive, accepted).await?;
     let options = MotionOptions { speed: rpm.map(Rpm), ..MotionOptions::default() };
     let angle = Angle::Turns(degrees / 360.0);
-    told(match relative {
+    motion_outcome(match relative {
         true => drive.move_relative(angle, options).await,
         false => drive.move_absolute(angle, options).await,
     })
@@ -331,12 +331,12 @@ async fn position(drive: Drive, accepted: bool, degrees: f64, relative: bool, rp
 async fn home(drive: Drive, accepted: bool, method: i8, rpm: Option<f64>) -> Outcome {
     guard(&drive, accepted).await?;
     let options = HomingOptions { speed: rpm.map(Rpm), ..HomingOptions::default() };
-    told(drive.home(method, options).await)
+    motion_outcome(drive.home(method, options).await)
 }
 
-/// What there is to know of a motion: values that had to be rounded, and the like. What the drive does without this program is shown
+/// Remarks on a motion: rounded values, and the like. What the drive does without this program is shown
 /// all the time.
-fn told(moved: Result<MotionReport, Error>) -> Outcome {
+fn motion_outcome(moved: Result<MotionReport, Error>) -> Outcome {
     let report = moved.map_err(|error| refusal_of(&error))?;
     let rounded = report.commanded.iter().filter(|commanded| commanded.is_rounded()).map(ToString::to_string);
     let notes = report.notes.iter().filter(|note| !matches!(note, Note::HostLoss(_))).map(ToString::to_string);
@@ -360,14 +360,14 @@ fn refused(seq: u64, refusal: Refusal) -> Answer {
 }
 
 pub(super) fn done((seq, answer): Asked) {
-    say(answer, Answer::done(seq, Vec::new()));
+    send(answer, Answer::done(seq, Vec::new()));
 }
 
 fn settle((seq, answer): Asked, outcome: Result<(), Refusal>) {
-    say(answer, outcome.map_or_else(|refusal| refused(seq, refusal), |()| Answer::done(seq, Vec::new())));
+    send(answer, outcome.map_or_else(|refusal| refused(seq, refusal), |()| Answer::done(seq, Vec::new())));
 }
 
 fn not_held((seq, answer): Asked, node: NodeId) {
-    let text = format!("node {node} is not being jogged by this page: begin anew");
-    say(answer, Answer::failed(Some(seq), "not_held", text));
+    let text = format!("node {node} is not being jogged by this page: start the jog again");
+    send(answer, Answer::failed(Some(seq), "not_held", text));
 }

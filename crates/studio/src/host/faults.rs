@@ -1,4 +1,4 @@
-//! What the timeline is told: emergency messages, faults and states that drives show, and what stopped them.
+//! The entries of the timeline: emergency messages, faults and states of drives, and why they were stopped.
 
 use can::Instant;
 use canopen::emcy::{Emcy, EmcyErrorCode};
@@ -13,26 +13,26 @@ use crate::snapshot::DriveView;
 use crate::timeline::{Kind, TimelineEvent};
 
 const STATUSWORD: Mux = Mux::new(0x6041, 0);
-/// The present code, where a model does not say another object (CiA 402-2).
+/// The present error code, unless a model has another object for it (CiA 402-2).
 const ERROR_CODE: Mux = Mux::new(0x603F, 0);
 
 const CHECK_SUPPLY: &str =
     "Check its supply and its cable; it may also have restarted with another node-ID or bit rate.";
 
 impl Host {
-    /// Something that the network noticed.
+    /// An event of the network.
     pub(super) fn note_event(&self, at: Instant, event: &Event) {
         match event {
             Event::Emcy(node, emcy) => self.note_emcy(at, *node, *emcy),
             Event::BootUp(node) => {
-                // A device begins without errors (CiA 301, 7.2.7.1).
+                // A device starts without errors (CiA 301, 7.2.7.1).
                 self.inbox.timeline.end_but(at, *node, Kind::Emcy, &[]);
-                self.tell(TimelineEvent::new(at, *node, Kind::Nmt, "booted"));
+                self.report(TimelineEvent::new(at, *node, Kind::Nmt, "booted"));
             }
             Event::NmtState(node, state) => self.note_nmt(at, *node, *state),
             Event::HeartbeatLost(node, time) => {
                 let what = format!("no heartbeat for {} ms", time.as_millis());
-                self.tell(TimelineEvent {
+                self.report(TimelineEvent {
                     remedy: Some(CHECK_SUPPLY),
                     ..TimelineEvent::new(at, *node, Kind::Silent, what)
                 });
@@ -51,24 +51,24 @@ impl Host {
         let name = row.map_or_else(|| emcy.code.to_string(), |row| row.name.to_owned());
         let what = format!("{name}, error register {:02X}h", emcy.error_register);
         let event = TimelineEvent { code: Some(emcy.code.0), ..TimelineEvent::new(at, node, Kind::Emcy, what) };
-        self.tell(explained(event, model, row));
+        self.report(explained(event, model, row));
     }
 
     fn note_nmt(&self, at: Instant, node: NodeId, state: NmtState) {
         let tells_alarm = self.description(node).is_some_and(|model| model.tells_alarm(state));
         let what = match tells_alarm {
-            true => "its heartbeat tells an alarm".to_owned(),
+            true => "its heartbeat reports an alarm".to_owned(),
             false => format!("NMT state {state}"),
         };
-        self.tell(TimelineEvent::new(at, node, Kind::Nmt, what));
+        self.report(TimelineEvent::new(at, node, Kind::Nmt, what));
     }
 
-    /// A drive was looked at: what has changed since the last look.
+    /// A drive was read: reports what has changed since the last reading.
     pub(super) fn note_look(&self, id: NodeId, view: &DriveView) {
         let looked_at = Instant::from_nanos((view.at_s * 1e9).round() as u64);
         let model = self.description(id);
-        // The frame that told, where it was an answer to the look.
-        let told_at = |object: Mux| {
+        // The time of the reporting frame, if it was an answer to a reading.
+        let reported_at = |object: Mux| {
             let held = self.inbox.trace.held();
             held.answered_at(id, self.object_of_axis(id, object), looked_at).unwrap_or(looked_at)
         };
@@ -79,11 +79,11 @@ impl Host {
             && let Some(now) = view.state
             && before != now
         {
-            self.tell(TimelineEvent::new(told_at(STATUSWORD), id, Kind::State, format!("{before} → {now}")));
+            self.report(TimelineEvent::new(reported_at(STATUSWORD), id, Kind::State, format!("{before} → {now}")));
         }
         let rows: Vec<_> = model.map(|model| rows(model, view)).unwrap_or_default();
         let codes: Vec<_> = match rows.as_slice() {
-            // A code that no table here explains is one too.
+            // A code that is in no table is a fault too.
             [] => Some(view.fault_code).filter(|code| *code != 0).into_iter().map(Some).collect(),
             rows => rows.iter().map(|row| Some(row.code)).collect(),
         };
@@ -91,36 +91,36 @@ impl Host {
         if codes.is_empty() {
             return;
         }
-        let at = told_at(model.and_then(|model| model.faults.code).unwrap_or(ERROR_CODE));
+        let at = reported_at(model.and_then(|model| model.faults.code).unwrap_or(ERROR_CODE));
         for code in codes {
             let row = rows.iter().copied().find(|row| Some(row.code) == code);
-            let what = row.map_or("a fault that no table here explains", |row| row.name);
-            self.tell(explained(TimelineEvent { code, ..TimelineEvent::new(at, id, Kind::Fault, what) }, model, row));
+            let what = row.map_or("a fault that is not in its description", |row| row.name);
+            self.report(explained(TimelineEvent { code, ..TimelineEvent::new(at, id, Kind::Fault, what) }, model, row));
         }
     }
 
     /// A drive does not answer.
     pub(super) fn note_silence(&self, id: NodeId, error: &Error) {
         let event = TimelineEvent::new(self.network.now(), id, Kind::Silent, error.to_string());
-        self.tell(TimelineEvent { remedy: Some(CHECK_SUPPLY), ..event });
+        self.report(TimelineEvent { remedy: Some(CHECK_SUPPLY), ..event });
     }
 
     /// This studio stops a drive.
     pub(super) fn note_stop(&self, id: NodeId, why: &str) {
-        self.tell(TimelineEvent::new(self.network.now(), id, Kind::Stop, why));
+        self.report(TimelineEvent::new(self.network.now(), id, Kind::Stop, why));
     }
 
-    fn tell(&self, event: TimelineEvent) {
+    fn report(&self, event: TimelineEvent) {
         self.inbox.timeline.push(event);
     }
 
-    /// An object of the first axis, of the axis that the drive is looked at.
+    /// The object of the observed axis that corresponds to one of the first axis.
     fn object_of_axis(&self, id: NodeId, object: Mux) -> Mux {
         let drive = self.nodes.get(&id).and_then(|node| node.drive.as_ref());
         drive.and_then(Drive::axis_description).map_or(object, |axis| axis.object(object))
     }
 
-    /// An event in words: of an emergency message those of the model's fault table.
+    /// An event in words: an emergency message in those of the model's fault table.
     pub(super) fn words_of(&self, event: &Event) -> String {
         let Event::Emcy(node, emcy) = event else { return event.to_string() };
         match self.description(*node).and_then(|model| model.fault_told_by(emcy.code)) {
@@ -134,7 +134,7 @@ impl Host {
     }
 }
 
-/// The faults that a look showed.
+/// The faults found by a reading.
 fn rows(model: &'static Description, view: &DriveView) -> Vec<&'static FaultRow> {
     let shown = |row: &&FaultRow| view.faults.iter().any(|fault| fault.name == row.name);
     model.faults.table.iter().filter(shown).collect()

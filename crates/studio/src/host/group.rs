@@ -2,7 +2,7 @@
 //!
 //! The motion is the master's ([`Group`], [`Base`]): set-points in each cycle of SYNC, limited in jerk or acceleration, and a
 //! fault of one drive stops all. Held like any other motion: speeds and twists by a dead man, all of them by the presence of
-//! their page. There is one group at a time, since SYNC is the bus's. It is made for each motion, and its drives have no power
+//! their page. There is one group at a time, since a bus has one SYNC. A group is made for each motion, and its drives are disabled
 //! afterwards.
 
 use std::cell::Cell;
@@ -22,37 +22,37 @@ use super::group_run::{GroupOutcome, GroupRun, Wanted};
 use super::guarding::{UNGUARDED, expect_guard};
 use super::state::{Host, JOG_SPAN};
 use super::transactions::Refusal;
-use super::work::{Asked, Running, say};
+use super::work::{Asked, Running, send};
 use crate::dead_man::DeadMan;
 use crate::message::{Answer, AxisSpeed, AxisTarget, BaseJog, Command, GroupMove};
 
-/// From one SYNC to the next: at 500 kbit/s eight drives take half of it.
+/// SYNC period: at 500 kbit/s eight drives take half of it.
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// Cycles in a row for which this program may be late, or a drive's TPDO: less than the dead man's time. A desktop is late.
+/// Consecutive cycles that this program, or the TPDO of a drive, may be late: less than the time of the dead man. Desktops are late.
 const TOLERANCE: u32 = 15;
 
-/// Axes of a group: what a bus of 500 kbit/s carries in one period beside what the studio reads.
+/// Most axes of a group: as many as a bus at 500 kbit/s carries in one period besides the readings of the studio.
 const MOST_AXES: usize = 8;
 
-/// How long shafts may take to come to their last set-points.
+/// How long shafts may take to reach their last set-points.
 const SETTLING: Duration = Duration::from_millis(300);
 
-/// Cycles in a row for which a stream goes on at its last speed: the most that it may be.
+/// Cycles for which a stream continues at its last speed: the maximum.
 const GRACE: u32 = 10;
 
-/// Points of a path that are sent before the first counts, and kept ready.
+/// Points of a path that are sent ahead of the first one in use, and kept ready.
 const READY: usize = 2;
 
 impl Host {
-    /// Begins a motion of several drives, or holds one.
+    /// Starts a motion of several drives, or holds one.
     pub(super) fn take_group(&mut self, command: Command, asked: Asked) {
         match command {
             Command::GroupHold {} => self.hold_group(asked, |_| {}),
             Command::BaseTwist { linear_m_s, angular_rad_s } => {
                 self.hold_group(asked, |wanted| wanted.twist = Twist { linear_m_s, angular_rad_s });
             }
-            Command::GroupEnd {} => self.hold_group(asked, |wanted| wanted.let_go = true),
+            Command::GroupEnd {} => self.hold_group(asked, |wanted| wanted.released = true),
             Command::GroupMove(asked_for) => {
                 let nodes: Vec<_> = asked_for.axes.iter().map(|axis| axis.node).collect();
                 self.begin_group(&nodes, "moving together", false, asked, move |drives, _| {
@@ -67,11 +67,11 @@ impl Host {
             }
             Command::BaseJog(asked_for) => {
                 self.begin_group(&asked_for.wheels.clone(), "driving", true, asked, move |drives, wanted| {
-                    wanted.set(Wanted { twist: asked_for.twist(), let_go: false });
+                    wanted.set(Wanted { twist: asked_for.twist(), released: false });
                     Box::pin(drive_base(drives, asked_for, wanted))
                 });
             }
-            // The others are no motions of several drives.
+            // The others are not motions of several drives.
             _ => {}
         }
     }
@@ -86,7 +86,7 @@ impl Host {
     ) {
         let drives = match self.drives_of(nodes) {
             Ok(drives) => drives,
-            Err((kind, text)) => return say(answer, Answer::failed(Some(seq), kind, text)),
+            Err((kind, text)) => return send(answer, Answer::failed(Some(seq), kind, text)),
         };
         self.generation += 1;
         let wanted = Rc::<Cell<Wanted>>::default();
@@ -102,7 +102,7 @@ impl Host {
         for (node, running) in nodes.iter().zip(running) {
             self.jogs.remove(node);
             if let Some(before) = self.running.insert(*node, running) {
-                before.cut_short("replaced", "something else was asked of the drive before this was done");
+                before.cut_short("replaced", "replaced by another command to the drive");
             }
         }
         let held = held.then(|| DeadMan::new(JOG_SPAN, self.network.now()));
@@ -110,13 +110,13 @@ impl Host {
         self.work.push(future);
     }
 
-    /// The drives of a group to be, if all of them can be moved now.
+    /// The drives for a group, if all of them can be moved now.
     fn drives_of(&self, nodes: &[NodeId]) -> Result<Vec<Drive>, Refusal> {
         if self.group.is_some() {
-            return Err(("busy", "a group is under way: there is one at a time. Stop it first".into()));
+            return Err(("busy", "another group is moving, and there is one at a time: stop it first".into()));
         }
         if nodes.len() < 2 || nodes.len() > MOST_AXES {
-            return Err(("malformed", format!("expected 2 to {MOST_AXES} drives, not {}", nodes.len())));
+            return Err(("malformed", format!("expected 2 to {MOST_AXES} drives, got {}", nodes.len())));
         }
         let mut drives = Vec::new();
         for (at, node) in nodes.iter().enumerate() {
@@ -124,11 +124,11 @@ impl Host {
                 return Err(("malformed", format!("node {node} is named twice")));
             }
             if self.parameters.is_writing(*node) {
-                let text = format!("the parameters of node {node} are being written: try again when that is done");
+                let text = format!("the parameters of node {node} are being written: try again afterwards");
                 return Err(("busy", text));
             }
             let drive = self.nodes.get(node).and_then(|known| known.drive.clone()).ok_or_else(|| {
-                let text = format!("no drive is known at node {node}: scan the bus, and see whether it has power");
+                let text = format!("no drive is known at node {node}: scan the bus, and check its supply");
                 ("no_such_drive", text)
             })?;
             drives.push(drive);
@@ -143,20 +143,20 @@ impl Host {
             renewed.then_some(group)
         });
         let Some(group) = held else {
-            let text = "no group is being held by this page: begin anew";
-            return say(answer, Answer::failed(Some(seq), "not_held", text));
+            let text = "this page holds no group: start the motion again";
+            return send(answer, Answer::failed(Some(seq), "not_held", text));
         };
         let mut wanted = group.wanted.get();
         change(&mut wanted);
         group.wanted.set(wanted);
-        if wanted.let_go {
-            // It comes to rest by itself now, as any motion does that is not held.
+        if wanted.released {
+            // It comes to rest by itself now, as any motion that is not held.
             group.held = None;
         }
-        say(answer, Answer::done(seq, Vec::new()));
+        send(answer, Answer::done(seq, Vec::new()));
     }
 
-    /// True of a node that is moved as one with others.
+    /// True if a node is moved in a group.
     pub(super) fn is_in_group(&self, node: NodeId) -> bool {
         self.group.as_ref().is_some_and(|group| group.nodes.contains(&node))
     }
@@ -167,14 +167,14 @@ impl Host {
         lapsed.map_or_else(Vec::new, |group| group.nodes.clone())
     }
 
-    /// The others of the group to which a node belongs: who is stopped with it. The group has ended with that.
+    /// The other nodes of the group of a node, to be stopped with it. The group ends with this.
     pub(super) fn leave_group(&mut self, node: NodeId) -> Vec<NodeId> {
         let Some(group) = self.group.take_if(|group| group.nodes.contains(&node)) else { return Vec::new() };
         self.network.sync(None);
         group.nodes.into_iter().filter(|other| *other != node).collect()
     }
 
-    /// A group has come to its end by itself.
+    /// A group has ended by itself.
     pub(super) fn conclude_group(&mut self, generation: u64, outcome: Option<GroupOutcome>) {
         let Some(group) = self.group.take_if(|group| group.generation == generation) else { return };
         let mut asked = Vec::new();
@@ -187,15 +187,17 @@ impl Host {
         }
         match outcome {
             Some(Ok(notes)) => {
-                asked.into_iter().for_each(|running| running.tell(|seq| Answer::done(seq, notes.clone())));
+                asked.into_iter().for_each(|running| running.reply(|seq| Answer::done(seq, notes.clone())));
             }
             Some(Err((kind, text))) => {
                 if kind != UNGUARDED {
-                    self.say_news(None, &text);
+                    self.send_news(None, &text);
                 }
-                asked.into_iter().for_each(|running| running.tell(|seq| Answer::failed(Some(seq), kind, text.clone())));
+                asked
+                    .into_iter()
+                    .for_each(|running| running.reply(|seq| Answer::failed(Some(seq), kind, text.clone())));
                 self.network.sync(None);
-                // What went wrong on the way may have left one turning.
+                // The failure may have left one turning.
                 let left: Vec<_> = group.nodes.iter().filter(|node| self.network.moved().contains(**node)).collect();
                 left.into_iter().for_each(|node| self.quick_stop_one(*node, "", None));
             }
@@ -215,7 +217,7 @@ async fn open(drives: &[Drive], limits: impl Fn(usize) -> AxisLimits) -> Result<
     Group::open(&axes, PERIOD, options).await
 }
 
-/// Closes a group, and tells what became of its motion: the drive that stopped it in its own words.
+/// Closes a group, and returns the outcome of its motion, with the reason of the drive that stopped it.
 async fn close(mut group: Group, moved: Result<Vec<String>, GroupError>) -> GroupOutcome {
     let reason = match &moved {
         Err(GroupError::Stopped(_)) => group.explain_stop().await,
@@ -237,7 +239,7 @@ fn refusal(error: GroupError) -> Refusal {
     }
 }
 
-/// The limits of an axis: the careful ones, but for what was asked for.
+/// The limits of an axis: the conservative defaults, except those that were given.
 fn limits(rpm: Option<f64>, rpm_per_s: Option<f64>) -> AxisLimits {
     let careful = AxisLimits::careful();
     let acceleration_turns_s2 = rpm_per_s.map_or(careful.acceleration_turns_s2, |rate| rate / 60.0);
@@ -284,7 +286,7 @@ async fn carry_out(
     let lags = axes.iter().zip(&largest_turns);
     let lags: Vec<_> = lags.map(|(axis, turns)| format!("node {} {:.1} deg", axis.node, turns * 360.0)).collect();
     let time = format!("{} drives moved together in {:.3} s", axes.len(), time.as_secs_f64());
-    Ok(vec![format!("{time}; largest lag: {}. They have no power now", lags.join(", "))])
+    Ok(vec![format!("{time}; largest lag: {}. They are disabled now", lags.join(", "))])
 }
 
 async fn turn_together(
@@ -294,9 +296,9 @@ async fn turn_together(
     wanted: Rc<Cell<Wanted>>,
 ) -> GroupOutcome {
     if let Some(axis) = axes.iter().find(|axis| !axis.rpm.is_finite()) {
-        return Err(("malformed", format!("expected a finite speed of node {}", axis.node)));
+        return Err(("malformed", format!("expected a finite speed for node {}", axis.node)));
     }
-    // A drive that is to stand has limits too.
+    // A drive that stays at rest has limits too.
     let least_rpm = AxisLimits::careful().velocity_turns_s * 60.0;
     let of_axis = |at: usize| limits(Some(axes[at].rpm.abs().max(least_rpm) * ROOM), rpm_per_s);
     let mut group = open(&drives, of_axis).await.map_err(refusal)?;
@@ -304,10 +306,10 @@ async fn turn_together(
     close(group, turned).await
 }
 
-/// By how much the limits of a stream are wider than what it is given: its points are rounded.
+/// Factor by which the limits of a stream are wider than its points need, since these are rounded.
 const ROOM: f64 = 1.01;
 
-/// Points of shafts that gather speed together, until they are let go. The share of the speeds rises as 3x^2 - 2x^3, whose
+/// Points of shafts that accelerate together, until they are released. The fraction of the speeds rises as 3x^2 - 2x^3, whose
 /// steepest slope is 1.5.
 async fn stream_speeds(
     group: &mut Group,
@@ -322,7 +324,7 @@ async fn stream_speeds(
     let mut points: Vec<_> = group.points().iter().map(|point| Turns(point.position_turns)).collect();
     group.start_stream(StreamOptions { capacity: 8, prefill: READY, grace: GRACE })?;
     let mut time_s = 0.0;
-    while !wanted.get().let_go {
+    while !wanted.get().released {
         while group.stream().is_some_and(|stream| stream.queued() < READY) {
             time_s += period_s;
             let x = (time_s / ramp_s).min(1.0);
@@ -354,7 +356,7 @@ async fn drive_base(drives: Vec<Drive>, asked: BaseJog, wanted: Rc<Cell<Wanted>>
         angular_rad_s: 2.0 * asked.most_m_s / asked.wheel_base_m,
         wheel_m_s: asked.most_m_s,
         wheel_m_s2: asked.m_per_s2,
-        // Held by the page's dead man; this is for a host that is late.
+        // The dead man of the page holds the motion; this covers a late host.
         watchdog: JOG_SPAN,
         lag_m: BaseLimits::lag_for(asked.most_m_s),
     };
@@ -374,15 +376,15 @@ async fn drive_base(drives: Vec<Drive>, asked: BaseJog, wanted: Rc<Cell<Wanted>>
     })?;
     closed.map_err(refused)?;
     let heading = pose.heading_rad.to_degrees();
-    Ok(vec![format!("it came {:.3} m along, {:.3} m to the left and {heading:.1} deg round", pose.x_m, pose.y_m)])
+    Ok(vec![format!("moved {:.3} m forward, {:.3} m to the left, turned {heading:.1} deg", pose.x_m, pose.y_m)])
 }
 
 async fn follow_twists(base: &mut Base, wanted: &Cell<Wanted>) -> Result<(), BaseError> {
     base.enable().await?;
-    while !wanted.get().let_go {
+    while !wanted.get().released {
         base.command(wanted.get().twist)?;
         if let Some(cause) = base.cycle().await?.cause.filter(|cause| cause.wheel().is_some()) {
-            // Both wheels come to rest before it is told.
+            // Both wheels come to rest before the outcome is reported.
             base.stop().await?;
             return Err(BaseError::Stopped(cause));
         }
@@ -390,7 +392,7 @@ async fn follow_twists(base: &mut Base, wanted: &Cell<Wanted>) -> Result<(), Bas
     base.stop().await
 }
 
-/// Cyclic synchronous velocity where the model has it.
+/// Cyclic synchronous velocity if the model has it.
 fn speed_mode(drive: &Drive) -> ModeOfOperation {
     let csv = ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY;
     let has = drive.axis_description().is_some_and(|axis| axis.modes.contains(&csv));

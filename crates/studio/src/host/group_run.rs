@@ -1,4 +1,4 @@
-//! A motion of several drives that is under way, and what it is told.
+//! A motion of several drives under way, and its present command.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -9,23 +9,23 @@ use master::base::Twist;
 use super::transactions::Refusal;
 use crate::dead_man::DeadMan;
 
-/// The group that is under way.
+/// The group under way.
 pub(super) struct GroupRun {
-    /// That of what runs on each of its nodes.
+    /// Number of the work that runs on each of its nodes.
     pub(super) generation: u64,
     pub(super) nodes: Vec<NodeId>,
     /// Speeds and twists are held.
     pub(super) held: Option<DeadMan>,
-    /// What it was last told.
+    /// Its last command.
     pub(super) wanted: Rc<Cell<Wanted>>,
 }
 
-/// What a held motion is told.
+/// The command of a held motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Wanted {
     pub(super) twist: Twist,
-    pub(super) let_go: bool,
+    pub(super) released: bool,
 }
 
-/// What a group tells when it is done.
+/// The outcome of a group.
 pub(super) type GroupOutcome = Result<Vec<String>, Refusal>;

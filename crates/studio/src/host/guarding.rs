@@ -1,5 +1,5 @@
-//! Every motion is guarded first: where the drive can, it stops by itself if this program dies. Where nothing stops it, whoever
-//! has control has to have accepted that before the first motion; until then nothing is begun.
+//! Every motion is guarded first: a drive that can stops by itself if this program dies. Where nothing stops it, the session that
+//! has control has to accept that before the first motion; until then nothing is started.
 
 use canopen::NodeId;
 use master::Drive;
@@ -7,25 +7,25 @@ use master::drive::SwitchedOff;
 
 use super::state::Host;
 use super::transactions::Refusal;
-use super::work::{Asked, refusal_of, say};
+use super::work::{Asked, refusal_of, send};
 use crate::message::Answer;
 
 /// The kind of the refusal, for programs.
 pub(super) const UNGUARDED: &str = "unguarded";
 
 impl Host {
-    /// Whoever has control wants a drive to be moved although it goes on when this program dies.
+    /// The session that has control accepts that a drive keeps moving when this program dies.
     pub(super) fn accept_unguarded(&mut self, node: NodeId, (seq, answer): Asked) {
         let is_drive = self.nodes.get(&node).is_some_and(|node| node.drive.is_some());
         if !is_drive {
-            let text = "no drive is known at this node: scan the bus, and see whether it has power";
-            return say(answer, Answer::failed(Some(seq), "no_such_drive", text));
+            let text = "no drive is known at this node: scan the bus, and check its supply";
+            return send(answer, Answer::failed(Some(seq), "no_such_drive", text));
         }
         self.accepted.insert(node);
-        say(answer, Answer::done(seq, Vec::new()));
+        send(answer, Answer::done(seq, Vec::new()));
     }
 
-    /// Of these drives those whose loss of the host nobody has accepted.
+    /// Those of these drives whose loss of the host has not been accepted.
     pub(super) fn not_accepted(&self, drives: &[Drive]) -> Vec<Drive> {
         drives.iter().filter(|drive| !self.accepted.contains(&drive.node().id())).cloned().collect()
     }
@@ -34,7 +34,7 @@ impl Host {
 /// Guards a drive for a motion.
 ///
 /// # Errors
-/// Nothing stops it when this program dies, and that is not accepted; those of the master.
+/// Nothing stops it when this program dies, and that was not accepted; errors of the master.
 pub(super) async fn guard(drive: &Drive, accepted: bool) -> Result<(), Refusal> {
     if !accepted {
         expect_guard(drive).await?;
@@ -42,19 +42,18 @@ pub(super) async fn guard(drive: &Drive, accepted: bool) -> Result<(), Refusal> 
     drive.guard(SwitchedOff::Leave).await.map(drop).map_err(|error| refusal_of(&error))
 }
 
-/// Expects that a guard will stop a drive. Changes nothing.
+/// Checks that a guard will stop a drive. Changes nothing.
 ///
 /// # Errors
-/// It will not; those of the master.
+/// It will not; errors of the master.
 pub(super) async fn expect_guard(drive: &Drive) -> Result<(), Refusal> {
     let loss = drive.host_loss_if_guarded().await.map_err(|error| refusal_of(&error))?;
     match loss.stops_after() {
         Some(_) => Ok(()),
         None => {
             let node = drive.node().id();
-            let text = format!(
-                "node {node} was not moved: if this program dies in the middle of it, {loss}. Accept that first"
-            );
+            let text =
+                format!("node {node} was not moved: if this program dies during the motion, {loss}. Accept that first");
             Err((UNGUARDED, text))
         }
     }

@@ -1,10 +1,10 @@
-//! Which identifiers were heard lately: whether SYNC comes, and whether a PDO does.
+//! Identifiers seen recently: whether SYNC is on the bus, and whether a PDO is.
 
 use std::time::Duration;
 
 use can::{CanId, Frame, Instant};
 
-/// Slower cycles than this are no cycles of a machine.
+/// Longest cycle that is expected of a machine.
 const LATELY: Duration = Duration::from_secs(1);
 
 /// Identifiers of 11 bits.
@@ -18,12 +18,12 @@ pub(super) struct HeardIds {
 }
 
 impl HeardIds {
-    /// Listens from now on.
+    /// Starts to listen now.
     pub(super) fn from(now: Instant) -> Self {
         Self { since: now, last: vec![None; IDENTIFIERS].into() }
     }
 
-    /// A frame has passed. One that asks for a PDO is none.
+    /// Records a frame. A remote frame requests a PDO and does not count.
     pub(super) fn note(&mut self, frame: &Frame, at: Instant) {
         let id = frame.standard_data_id();
         if let Some(last) = id.and_then(|id| self.last.get_mut(usize::from(id))) {
@@ -31,7 +31,7 @@ impl HeardIds {
         }
     }
 
-    /// Whether frames with this identifier come; `None` where that cannot be told, or not yet.
+    /// Whether frames with this identifier are sent; `None` if that is not known, or not yet.
     pub(super) fn comes(&self, id: CanId, now: Instant) -> Option<bool> {
         let last = self.last.get(usize::from(id.as_standard()?))?;
         let comes = last.is_some_and(|last| now - last <= LATELY);
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_came_a_second_ago_comes_and_before_that_second_nobody_can_tell() {
+    fn a_frame_counts_for_one_second_and_before_the_first_second_nothing_is_known() {
         let mut heard = HeardIds::from(Instant::ZERO);
         let (sync, other) = (CanId::standard(0x80), CanId::standard(0x181));
         let at = Instant::from_millis;

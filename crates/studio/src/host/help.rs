@@ -1,6 +1,6 @@
-//! What a page shows on `?`: the text of an object, a state, a bit, a mode or a fault, and where that is written.
+//! The help of a page on `?`: the text of an object, a state, a bit, a mode or a fault, and its source.
 //!
-//! What belongs to the model is told from its description with the manual's section, the rest from the glossary.
+//! Terms of the model come from its description with the section of the manual, all others from the glossary.
 
 use canopen::NodeId;
 use devices::Description;
@@ -10,20 +10,20 @@ use testbench::words::object::object;
 use super::object_rows::row_json;
 use super::state::Host;
 use super::transactions::Refusal;
-use super::work::{Asked, say};
+use super::work::{Asked, send};
 use crate::glossary::{self, Word};
 use crate::message::{Answer, Topic};
 
 impl Host {
-    /// Tells what something means.
+    /// Explains a term.
     pub(super) fn help(&self, node: Option<NodeId>, topic: Topic, name: &str, (seq, answer): Asked) {
         let known = node.and_then(|node| self.nodes.get(&node));
         let model = known.and_then(|known| known.drive.as_ref()).and_then(master::Drive::description);
-        let told = explain(node, model, topic, name);
-        say(
+        let shown = explain(node, model, topic, name);
+        send(
             answer,
-            match told {
-                Ok(told) => Answer::known(seq, told),
+            match shown {
+                Ok(shown) => Answer::known(seq, shown),
                 Err((kind, text)) => Answer::failed(Some(seq), kind, text),
             },
         );
@@ -55,18 +55,18 @@ fn explain(
     let homing: &[Word] = if topic == Topic::StatusBit { &glossary::HOMING_BITS } else { &[] };
     let of_words = words.iter().chain(homing).find(|word| word.name == name);
     let of_words = of_words.map(|word| json!({ "title": word.name, "text": word.text, "source": word.source }));
-    of_model.or(of_words).ok_or_else(|| ("unknown_word", format!("no table here explains '{name}'")))
+    of_model.or(of_words).ok_or_else(|| ("unknown_word", format!("no help for '{name}'")))
 }
 
 fn of_object(node: Option<NodeId>, model: &'static Description, name: &str) -> Result<Option<Value>, Refusal> {
     let found = object(name).and_then(|object| object.resolve(Some(model.dictionary)));
     let (mux, row) = found.map_err(|why| ("unknown_object", why))?;
     let (Some(row), Some(node)) = (row, node) else { return Ok(None) };
-    let mut told = row_json(model, row, node);
-    told["text"] = json!(if row.description.is_empty() { row.title } else { row.description });
-    told["title"] = json!(format!("{mux} {}", row.name));
-    told["source"] = json!(source(model, model.section(row.index)));
-    Ok(Some(told))
+    let mut shown = row_json(model, row, node);
+    shown["text"] = json!(if row.description.is_empty() { row.title } else { row.description });
+    shown["title"] = json!(format!("{mux} {}", row.name));
+    shown["source"] = json!(source(model, model.section(row.index)));
+    Ok(Some(shown))
 }
 
 fn of_fault(model: &Description, name: &str) -> Option<Value> {
@@ -79,7 +79,7 @@ fn of_fault(model: &Description, name: &str) -> Option<Value> {
     }))
 }
 
-/// A bit that the model's own table names.
+/// A bit of the model's own table.
 fn of_own_bit(model: &Description, name: &str) -> Option<Value> {
     let bits = model.first_axis()?.statusword_bits;
     let (mask, name) = bits.iter().find(|(_, own)| *own == name)?;
@@ -104,31 +104,31 @@ mod tests {
 
     use super::*;
 
-    fn told(model: &str, topic: Topic, name: &str) -> Value {
+    fn shown(model: &str, topic: Topic, name: &str) -> Value {
         let model = devices::model(model).expect("a model");
         explain(NodeId::new(1), Some(model), topic, name).unwrap_or_else(|why| panic!("{name}: {why:?}"))
     }
 
     #[test]
-    fn every_object_fault_and_bit_of_every_model_has_a_text_and_says_where_it_is_from() {
+    fn every_object_fault_and_bit_of_every_model_has_a_text_and_a_source() {
         for model in devices::all().iter() {
             for row in model.dictionary.rows() {
-                let told = told(model.name, Topic::Object, &row.mux().to_string());
-                let source = told["source"].as_str().expect("a text");
+                let shown = shown(model.name, Topic::Object, &row.mux().to_string());
+                let source = shown["source"].as_str().expect("a text");
                 assert!(
                     source.starts_with(model.manual) && source.len() > model.manual.len(),
-                    "{}: {told}",
+                    "{}: {shown}",
                     model.name
                 );
-                assert_ne!(told["text"], "", "{}: {told}", model.name);
+                assert_ne!(shown["text"], "", "{}: {shown}", model.name);
             }
             for row in model.faults.table {
-                let told = told(model.name, Topic::Fault, row.name);
-                assert_eq!(told["text"], row.remedy);
-                assert!(told["source"].as_str().expect("a text").ends_with(model.faults.section), "{told}");
+                let shown = shown(model.name, Topic::Fault, row.name);
+                assert_eq!(shown["text"], row.remedy);
+                assert!(shown["source"].as_str().expect("a text").ends_with(model.faults.section), "{shown}");
             }
             for (_, name) in model.axes.iter().flat_map(|axis| axis.statusword_bits) {
-                assert!(told(model.name, Topic::StatusBit, name)["text"].as_str().expect("a text").contains("6041h"));
+                assert!(shown(model.name, Topic::StatusBit, name)["text"].as_str().expect("a text").contains("6041h"));
             }
         }
     }
@@ -136,16 +136,16 @@ mod tests {
     #[test]
     fn every_state_and_mode_has_a_text() {
         for state in PowerState::ALL {
-            assert_eq!(told("zlac8030l", Topic::State, state.name())["source"], "CiA 402-2, 8.2");
+            assert_eq!(shown("zlac8030l", Topic::State, state.name())["source"], "CiA 402-2, 8.2");
         }
         for mode in (0..=10).filter_map(|mode| ModeOfOperation(mode).name()) {
-            told("zlac8030l", Topic::Mode, mode);
+            shown("zlac8030l", Topic::Mode, mode);
         }
         for word in glossary::SERVICES {
-            assert_eq!(told("zlac8030l", Topic::Service, word.name)["source"], word.source);
+            assert_eq!(shown("zlac8030l", Topic::Service, word.name)["source"], word.source);
         }
         for state in ["initialising", "pre-operational", "operational", "stopped"] {
-            told("zlac8030l", Topic::Nmt, state);
+            shown("zlac8030l", Topic::Nmt, state);
         }
     }
 
@@ -153,12 +153,12 @@ mod tests {
     #[test]
     fn every_bit_that_can_be_shown_has_a_text() {
         for (_, name) in crate::snapshot::CONTROL_BITS {
-            told("zlac8030l", Topic::ControlBit, name);
+            shown("zlac8030l", Topic::ControlBit, name);
         }
         for mode in 0..=10 {
             for power in PowerState::ALL {
                 for name in shows_all(ModeOfOperation(mode), power).statusword_words() {
-                    told("zlac8030l", Topic::StatusBit, name);
+                    shown("zlac8030l", Topic::StatusBit, name);
                 }
             }
         }

@@ -1,7 +1,7 @@
-//! What the homing wizard shows of a drive: its methods with what each does (CiA 402-2, clause 11, or the drive's own),
-//! how it is set, what its switches are now, and how far a run has come. Reads only; the run is [`Command::Home`].
+//! Data of the homing wizard: the methods of a drive and what each does (CiA 402-2, clause 11, or the drive's own),
+//! its homing settings, the levels of its switches, and the progress of a run. Reads only; the run is [`Command::Home`].
 //!
-//! What a method does stands in the description ([`HomingRules::sequence`]), and the page draws it from what is told here.
+//! The sequence of a method is in the description ([`HomingRules::sequence`]); the page draws it from this data.
 //!
 //! [`Command::Home`]: crate::message::Command::Home
 
@@ -14,53 +14,53 @@ use serde_json::{Value, json};
 
 use super::object_rows::value_text;
 use super::state::Host;
-use super::work::{Asked, Done, refusal_of, say};
+use super::work::{Asked, Done, refusal_of, send};
 use crate::message::Answer;
 
-/// How homing is set (CiA 402-2, 11.2): speed to the switch, speed to the edge, acceleration, and where zero is.
+/// Homing settings (CiA 402-2, 11.2): speed to the switch, speed to the edge, acceleration, and home offset.
 const SETTINGS: [Mux; 4] = [Mux::new(0x6099, 1), Mux::new(0x6099, 2), Mux::new(0x609A, 0), Mux::new(0x607C, 0)];
 
 const STATUSWORD: Mux = Mux::new(0x6041, 0);
 
-/// Below this a shaft counts as one that stands, in r/min: what the actual velocity of a shaft at rest may show.
+/// Below this speed in r/min a shaft counts as at rest: the actual velocity of a shaft at rest may be as high.
 const STANDS_RPM: f64 = 1.0;
 
 impl Host {
-    /// Reads what the wizard shows of a drive.
+    /// Reads the data of the wizard from a drive.
     pub(super) fn look_at_homing(&mut self, node: NodeId, (seq, answer): Asked) {
         let known = self.nodes.get(&node).and_then(|known| known.drive.clone());
         let found = known.and_then(|drive| Some((drive.description()?, drive.axis_description()?, drive)));
         let Some((model, axis, drive)) = found else {
-            let text = "its model is not known: scan the bus, or name it with --model";
-            return say(answer, Answer::failed(Some(seq), "no_such_drive", text));
+            let text = "its model is unknown: scan the bus, or give it with --model";
+            return send(answer, Answer::failed(Some(seq), "no_such_drive", text));
         };
         let Some(rules) = axis.homing else {
             let text = format!("the {} has no homing mode", model.title);
-            return say(answer, Answer::failed(Some(seq), "no_such_mode", text));
+            return send(answer, Answer::failed(Some(seq), "no_such_mode", text));
         };
         if !self.parameters.begin_reading() {
-            let text = "others are reading objects: try again when that is done";
-            return say(answer, Answer::failed(Some(seq), "busy", text));
+            let text = "too many reads are under way: try again";
+            return send(answer, Answer::failed(Some(seq), "busy", text));
         }
         let running = self.running.get(&node).is_some_and(|running| running.what == "homing");
         self.work.push(Box::pin(async move {
             let outcome = Seen::look(&drive, model, axis, rules).await;
-            let told = outcome.map(|seen| seen.told(node, running)).map_err(|error| refusal_of(&error));
-            Done::Looked((seq, answer), told)
+            let shown = outcome.map(|seen| seen.to_json(node, running)).map_err(|error| refusal_of(&error));
+            Done::Looked((seq, answer), shown)
         }));
     }
 }
 
-/// What was read of a drive.
+/// The values read from a drive.
 struct Seen {
     model: &'static Description,
     rules: HomingRules,
     /// Value of 6098h.
     method: i64,
     settings: Vec<Value>,
-    /// Name of each input, what it is set to be, and whether it is active.
+    /// Name, function and level of each input.
     inputs: Vec<(&'static str, Option<InputSignal>, Option<bool>)>,
-    /// Of a drive in mode 6.
+    /// For a drive in mode 6.
     statusword: Option<Statusword>,
     velocity_rpm: Option<f64>,
 }
@@ -69,22 +69,22 @@ struct Seen {
 #[derive(Debug, PartialEq, Serialize)]
 struct MethodView {
     method: i8,
-    /// What the drive's table says of it.
+    /// Its entry in the drive's table.
     title: &'static str,
-    /// Nothing moves: home is where the shaft is.
+    /// Nothing moves: the present position becomes home.
     here: bool,
-    /// The switch looked for.
+    /// The switch that it searches for.
     switch: Option<&'static str>,
     search: Option<&'static str>,
     reverses_at_limit: bool,
     /// The switch goes on or off at the home position.
     edge: Option<&'static str>,
     crossing: Option<&'static str>,
-    /// The index pulse that is looked for then, or alone.
+    /// The index pulse that it searches for then, or alone.
     index: Option<&'static str>,
-    /// Switches that it looks for and no input is set to be; empty where the inputs are not known.
+    /// Switches that it needs and no input is configured as; empty where the inputs are unknown.
     missing: Vec<&'static str>,
-    /// Limit switches that would turn the search round and are not there.
+    /// Limit switches that would reverse the search and are missing.
     no_turn: Vec<&'static str>,
 }
 
@@ -123,9 +123,9 @@ impl Seen {
         Ok(Self { model, rules, method, settings, inputs, statusword, velocity_rpm })
     }
 
-    fn told(&self, node: NodeId, running: bool) -> Value {
+    fn to_json(&self, node: NodeId, running: bool) -> Value {
         let row = self.model.row(self.rules.method);
-        // A table of values, or a range; a number that stands for nothing is left out.
+        // A table of values, or a range; numbers without a meaning are omitted.
         let offered = (i8::MIN..=i8::MAX).filter(|number| {
             row.is_some_and(|row| {
                 let (low, high) = row.limits_at(1);
@@ -190,8 +190,8 @@ impl Seen {
         }
     }
 
-    /// Whether an input is set to be this switch; `None` where the drive does not tell. An input whose meaning the method
-    /// chooses is there for any method that gives it one.
+    /// Whether an input is configured as this switch; `None` where the drive does not report it. An input whose function the method
+    /// chooses counts for any method that gives it one.
     fn has(&self, switch: HomingSwitch) -> Option<bool> {
         let signal = signal_of(switch);
         if self.inputs.is_empty() {
@@ -206,7 +206,7 @@ impl Seen {
         Some(by_method || self.inputs.iter().any(|(_, set_to, _)| *set_to == Some(signal)))
     }
 
-    /// What a run is doing, by its switch and the sense in which the shaft turns.
+    /// The phase of a run, by its switch and the direction in which the shaft turns.
     fn phase(&self, sequence: HomingSequence) -> String {
         let velocity = self.velocity_rpm.unwrap_or_default();
         let heading = match velocity {
@@ -214,25 +214,24 @@ impl Seen {
             _ if velocity < 0.0 => Some(Direction::Negative),
             _ => Some(Direction::Positive),
         };
-        let moving =
-            heading.map_or_else(|| "standing".to_owned(), |heading| format!("moving {}ly", direction(heading)));
-        let Some(row) = sequence.switch else { return format!("{moving}, looking for the index pulse") };
+        let moving = heading.map_or_else(|| "at rest".to_owned(), |heading| format!("moving {}ly", direction(heading)));
+        let Some(row) = sequence.switch else { return format!("{moving}, searching for the index pulse") };
         let switch = signal_of(row.switch);
         let name = switch.name();
         let state = self.inputs.iter().find(|(_, signal, _)| *signal == Some(switch)).and_then(|(.., active)| *active);
         match state {
             None => format!("{moving}; no input shows the {name}"),
             Some(true) => format!("{moving} on the {name}, to its edge"),
-            Some(false) if heading == Some(row.search) => format!("{moving}, looking for the {name}"),
+            Some(false) if heading == Some(row.search) => format!("{moving}, searching for the {name}"),
             Some(false) if row.reverses_at_limit => {
-                format!("{moving} off the {name}, turned round or coming back to its edge")
+                format!("{moving} off the {name}, reversed or returning to its edge")
             }
-            Some(false) => format!("{moving} off the {name}, coming back to its edge"),
+            Some(false) => format!("{moving} off the {name}, returning to its edge"),
         }
     }
 }
 
-/// What each input is set to be, and whether it is active.
+/// Function and level of each input.
 async fn inputs(
     drive: &Drive,
     model: &'static Description,
@@ -267,7 +266,7 @@ async fn number(drive: &Drive, model: &'static Description, mux: Mux) -> Result<
     Ok(bytes.map(|bytes| row.data_type.value(raw(&bytes))))
 }
 
-/// What an object has; `None` if the drive refuses to tell.
+/// The value of an object; `None` if the drive refuses to read it.
 async fn bytes(drive: &Drive, mux: Mux) -> Result<Option<Vec<u8>>, Error> {
     match drive.node().upload(mux).await {
         Ok(payload) => Ok(Some(payload.as_bytes().to_vec())),

@@ -1,19 +1,19 @@
-//! What outlives this program if it dies in the middle of a transaction.
+//! Rollback journals, which outlive this program if it dies during a transaction.
 
 use canopen::NodeId;
 use testbench::parameters::journal::Journal;
 
-/// Where what leads back from a transaction is kept until it has come to its end, so that a death of this program loses nothing.
+/// Rollback journals of open transactions, so that the values before are not lost if this program dies.
 pub trait Journals: core::fmt::Debug + Send + Sync {
-    /// Keeps it, onto the disk itself, before the first write.
+    /// Saves a journal, synchronised to the disk, before the first write.
     ///
     /// # Errors
-    /// That it cannot be kept, for people.
+    /// Why it cannot be saved, for people.
     fn begin(&self, journal: &Journal) -> Result<(), String>;
 
-    /// The transaction has come to its end: the drive is as it should be, or as it was.
+    /// The transaction has ended: the drive has the new values, or the old ones.
     ///
     /// # Errors
-    /// That it is still there, for people.
+    /// Why it could not be deleted, for people.
     fn end(&self, node: NodeId) -> Result<(), String>;
 }

@@ -1,4 +1,4 @@
-//! A node that was found, and what it last said.
+//! A node that was found, and its last known state.
 
 use can::Instant;
 use cia402::PowerState;
@@ -12,21 +12,21 @@ use crate::snapshot::DriveView;
 #[derive(Debug)]
 pub(super) struct KnownNode {
     pub(super) identity: Option<Identity>,
-    /// What cannot be told of its model.
+    /// What is uncertain about its model.
     pub(super) remark: Option<String>,
-    /// How it is moved, if it is a drive.
+    /// The handle to move it, if it is a drive.
     pub(super) drive: Option<Drive>,
-    /// Somebody is looking at it already.
+    /// It is being read already.
     pub(super) is_looked_at: bool,
     pub(super) view: Option<Box<DriveView>>,
-    /// What it would do if this program died in the middle of a motion, and when that was read.
+    /// What it would do if this program died during a motion, and when that was read.
     pub(super) loss: Option<(HostLoss, Instant)>,
-    /// Why nothing is known of it now.
+    /// Why its values are unknown now.
     pub(super) trouble: Option<String>,
 }
 
 impl KnownNode {
-    /// True unless it has said that its motor has no power.
+    /// True unless it has reported that its motor has no power.
     pub(super) fn may_move(&self) -> bool {
         self.drive.is_some() && self.view.as_ref().is_none_or(|view| has_power(view.state))
     }

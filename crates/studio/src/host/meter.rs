@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Frame, INTERFRAME_SPACE_BITS, Instant, frame_bits};
 
-/// Over which time a rate is taken.
+/// The averaging time of a rate.
 const INTERVAL: Duration = Duration::from_millis(500);
 
 /// See the [module](self).
@@ -23,13 +23,13 @@ impl Meter {
         Self { bitrate, since: now, frames: 0, bits: 0, frames_per_s: 0, load: 0.0 }
     }
 
-    /// Counts a frame. Its length is exact but for error frames, which nobody tells of.
+    /// Counts a frame. Lengths are exact, except that error frames are not reported.
     pub(super) fn note(&mut self, frame: &Frame) {
         self.frames = self.frames.saturating_add(1);
         self.bits += u64::from(frame_bits(frame) + INTERFRAME_SPACE_BITS);
     }
 
-    /// Takes the rates when it is time.
+    /// Updates the rates when they are due.
     pub(super) fn look(&mut self, now: Instant) {
         let passed = (now - self.since).as_secs_f64();
         if now - self.since < INTERVAL {
@@ -45,7 +45,7 @@ impl Meter {
         self.frames_per_s
     }
 
-    /// Part of the time that frames take; `None` where the bit rate is not known.
+    /// Bus load in per cent; `None` where the bit rate is unknown.
     pub(super) fn load_percent(&self) -> Option<f64> {
         self.bitrate.map(|_| self.load)
     }
@@ -58,7 +58,7 @@ mod tests {
     #[test]
     fn a_full_bus_is_a_load_of_a_hundred_percent() {
         let mut meter = Meter::new(Instant::ZERO, Some(Bitrate::K500));
-        // 8 data bytes of AAh have no run of equal bits; what is stuffed elsewhere is counted by frame_bits.
+        // 8 data bytes of AAh have no run of equal bits; stuff bits elsewhere are counted by frame_bits.
         let frame: Frame = "181#AAAAAAAAAAAAAAAA".parse().expect("a frame");
         let bits = frame_bits(&frame) + INTERFRAME_SPACE_BITS;
         let frames = 500_000 / bits;

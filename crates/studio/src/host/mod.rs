@@ -1,7 +1,7 @@
-//! The one task that owns the network: it takes requests, moves drives, stops them, and publishes what it knows.
+//! The one task that owns the network: it takes requests, moves drives, stops them, and publishes their state.
 //!
-//! Time is that of the bus, told by the master's core. Nothing here waits: work is a set of futures that are polled together,
-//! so that a stop is never behind something slow. What comes first in each round is what stops.
+//! Time is bus time, from the core of the master. Nothing here blocks: work is a set of futures that are polled together,
+//! so that a stop never waits for anything slow. Each round handles stops first.
 
 mod changes;
 mod commands;

@@ -1,4 +1,4 @@
-//! Who is on the bus: found by a scan, looked at again and again, and shown.
+//! The nodes of the bus: found by a scan, read periodically, and shown.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::known_node::KnownNode;
 use super::state::Host;
-use super::work::{Asked, Done, Look, say};
+use super::work::{Asked, Done, Look, send};
 use crate::message::Answer;
 use crate::snapshot::{DriveView, NodeView};
 
@@ -20,24 +20,24 @@ const CONTROLWORD: Mux = Mux::new(0x6040, 0);
 /// The device profile of a drive in the low half of 1000h (CiA 402-1).
 const DRIVE_PROFILE: u32 = 402;
 
-/// How often a drive is looked at: about nine objects, which are 4 % of a 500 kbit/s bus.
+/// Period at which a drive is read: about nine objects, which are 4 % of a bus at 500 kbit/s.
 const LOOK_INTERVAL: Duration = Duration::from_millis(100);
 
-/// By how much longer each further drive makes that: so that many drives take no more of the bus than a few.
+/// Increase of that period with each further drive, so that many drives take no more of the bus than a few.
 const LOOK_INTERVAL_OF_EACH: Duration = Duration::from_millis(25);
 
-/// How often a drive is asked for what it would do if this program died: somebody may set it.
+/// Period at which it is read what a drive would do if this program died: other clients may change it.
 const LOSS_INTERVAL: Duration = Duration::from_secs(2);
 
-/// How often one is asked that does not answer.
+/// Period at which a drive that does not answer is tried again.
 const SILENT_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Host {
-    /// Asks all node-IDs who they are, unless that is being done.
+    /// Scans all node-IDs, unless a scan is under way.
     pub(super) fn begin_scan(&mut self, asked: Option<Asked>) {
         if self.scanning {
             if let Some((seq, answer)) = asked {
-                say(answer, Answer::failed(Some(seq), "busy", "a scan is under way"));
+                send(answer, Answer::failed(Some(seq), "busy", "a scan is under way"));
             }
             return;
         }
@@ -46,7 +46,7 @@ impl Host {
         self.work.push(Box::pin(async move { Done::Scanned(network.scan(timeout, |_| {}).await, asked) }));
     }
 
-    /// Takes in who was found. A node that did not answer this time stays, with what is known of it.
+    /// Adds the nodes that were found. A node that did not answer this time stays, with what is known of it.
     pub(super) fn take_scan(&mut self, found: Vec<Found>) {
         self.scanning = false;
         for found in found {
@@ -68,23 +68,23 @@ impl Host {
 
     fn known(&self, found: &Found) -> KnownNode {
         let node = self.network.node(found.node).with_timeout(self.setting.timeout);
-        let told = self.setting.models.get(&found.node).copied();
+        let given = self.setting.models.get(&found.node).copied();
         let fits =
-            |told: &&devices::Description| found.identity.is_none_or(|identity| identity.matches(&told.identity));
-        let contradiction = told
-            .filter(|told| !fits(told))
-            .map(|told| format!("it is said to be a {}, but its identity is another one", told.name));
+            |given: &&devices::Description| found.identity.is_none_or(|identity| identity.matches(&given.identity));
+        let contradiction = given
+            .filter(|given| !fits(given))
+            .map(|given| format!("configured as a {}, but its identity (1018h) differs", given.name));
         let is_drive = found
             .identity
             .and_then(|identity| identity.device_type)
             .is_some_and(|device_type| device_type & 0xFFFF == DRIVE_PROFILE);
-        let drive = match told.filter(fits) {
+        let drive = match given.filter(fits) {
             Some(model) => Drive::new(node, model),
             None => Drive::known_as(node, found.knowledge.clone()),
         };
         let drive = drive.behind(self.setting.gears.get(&found.node).copied().unwrap_or_default());
         let is_drive = is_drive || drive.axis_description().is_some();
-        let doubt = || found.doubt().filter(|_| told.is_none());
+        let doubt = || found.doubt().filter(|_| given.is_none());
         KnownNode {
             identity: found.identity,
             remark: contradiction.or_else(doubt),
@@ -96,7 +96,7 @@ impl Host {
         }
     }
 
-    /// Looks at a drive after a time.
+    /// Reads a drive after a delay.
     fn look_at(&mut self, id: NodeId, after: Duration) {
         let Some(node) = self.nodes.get_mut(&id) else { return };
         let Some(drive) = node.drive.clone() else { return };
@@ -109,7 +109,7 @@ impl Host {
         }));
     }
 
-    /// Takes in what a drive said, and looks at it again.
+    /// Stores the values of a drive, and schedules the next reading.
     pub(super) fn take_in(&mut self, id: NodeId, read: Result<Box<Look>, Error>) {
         match &read {
             Ok(look) => self.note_look(id, &look.view),
@@ -165,18 +165,18 @@ impl Host {
         }
     }
 
-    /// Passes on what the network has noticed. A node that nobody knew has come: look who it is.
+    /// Passes on the events of the network. An unknown node triggers a scan.
     pub(super) fn hear_events(&mut self) {
         while let Some((at, event)) = self.network.poll_event() {
             self.note_event(at, &event);
             let node = match event {
                 Event::BootUp(node) => {
-                    // Neither is one known that was heard and did not answer.
+                    // A node that was heard and did not answer is unknown too.
                     if self.nodes.get(&node).is_none_or(|known| known.identity.is_none()) {
                         self.scans_again = self.scanning;
                         self.begin_scan(None);
                     }
-                    // What was not stored is as it was before.
+                    // Values that were not stored are lost.
                     self.learn_pdos(node);
                     Some(node)
                 }
@@ -184,19 +184,19 @@ impl Host {
                 | Event::HeartbeatLost(node, _)
                 | Event::HeartbeatBack(node)
                 | Event::Emcy(node, _) => Some(node),
-                // What an answer says to whoever asked is no news to the others.
+                // The contents of an answer to one session are not news to the others.
                 Event::NoAnswer(..) | Event::Aborted(..) => continue,
                 _ => None,
             };
-            self.say_news(node, &self.words_of(&event));
+            self.send_news(node, &self.words_of(&event));
         }
     }
 
-    /// Tells every page something.
-    pub(super) fn say_news(&self, node: Option<NodeId>, text: &str) {
+    /// Sends news to every page.
+    pub(super) fn send_news(&self, node: Option<NodeId>, text: &str) {
         let time_s = (self.network.now() - Instant::ZERO).as_secs_f64();
         let news = json!({ "type": "news", "time_s": time_s, "node": node.map(NodeId::raw), "text": text });
-        // Nobody may listen.
+        // There may be no receiver.
         let _ = self.inbox.news.send(news.to_string().into());
     }
 }
@@ -204,10 +204,10 @@ impl Host {
 async fn read(drive: &Drive, asks_loss: bool) -> Result<Look, Error> {
     let state = drive.state().await?;
     let object = drive.axis_description().map_or(CONTROLWORD, |axis| axis.object(CONTROLWORD));
-    // Some drives do not tell it.
+    // Some drives do not report it.
     let controlword = drive.node().read::<u16>(object).await.ok();
     let at_s = (drive.node().network().now() - Instant::ZERO).as_secs_f64();
-    // Of a model that is not known nobody can say.
+    // Unknown for an unknown model.
     let loss = if asks_loss { drive.host_loss_if_guarded().await.ok() } else { None };
     Ok(Look { view: DriveView::new(&state, controlword, at_s), loss })
 }

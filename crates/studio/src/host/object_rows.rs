@@ -1,4 +1,4 @@
-//! Rows of a description and values of objects as a page is shown them.
+//! Rows of a description and values of objects, as sent to a page.
 
 use canopen::od::{Entry, ValueRange};
 use canopen::pdo::{Direction, PdoId, PdoNumber};
@@ -15,7 +15,7 @@ const AREAS: [(u16, u16, &str); 8] = [
     (0x1400, 0x17FF, "Receive PDOs"),
     (0x1800, 0x1BFF, "Transmit PDOs"),
     (0x1C00, 0x1FFF, "Further communication"),
-    (0x2000, 0x5FFF, "The maker's own"),
+    (0x2000, 0x5FFF, "Manufacturer-specific"),
     (0x6000, 0x9FFF, "Drive profile"),
     (0xA000, 0xBFFF, "Interface profile"),
     (0, 0xFFFF, "Others"),
@@ -34,7 +34,7 @@ const DRIVE_PARTS: [(&str, &[(u16, u16)]); 9] = [
     ("Inputs and outputs", &[(0x60B8, 0x60BD), (0x60FD, 0x60FE)]),
 ];
 
-/// Where a page shows an object.
+/// The group in which a page shows an object.
 fn group_of(index: u16) -> &'static str {
     // A block of 800h for each axis (CiA 402-1).
     let on_first_axis = 0x6000 | index & 0x7FF;
@@ -46,7 +46,7 @@ fn group_of(index: u16) -> &'static str {
     }
 }
 
-/// What the description says of an object.
+/// The description of an object.
 pub(super) fn row_json(model: &Description, row: &Entry, node: NodeId) -> Value {
     let range = row.limits.map(|limits| match limits {
         ValueRange::Integer(low, high) => format!("{low} to {high}"),
@@ -74,7 +74,7 @@ pub(super) fn row_json(model: &Description, row: &Entry, node: NodeId) -> Value 
     })
 }
 
-/// The bits that it takes in PDOs of a direction, or why it cannot be there.
+/// The bits that it takes in PDOs of a direction, or why it cannot be mapped.
 fn in_pdo(model: &Description, row: &Entry, direction: Direction) -> Value {
     match record_of(model, PdoId { direction, number: PdoNumber::FIRST }, row.mux()) {
         Ok(record) => json!(record.bits),
@@ -95,10 +95,10 @@ fn plain_value(row: &Entry, bytes: &[u8]) -> String {
 /// A value in words, with its unit where it has one.
 pub(super) fn value_text(model: &'static Description, mux: Mux, bytes: &[u8]) -> String {
     let value = master::decode::Value::new(mux, bytes, Some(model));
-    let told = value.to_string();
-    // The object and its name stand before.
-    let text = told.split_once(" = ").map_or(told.as_str(), |(_, text)| text);
-    // A log says [0.1 A] for the unit of one count.
+    let decoded = value.to_string();
+    // The object and its name come before.
+    let text = decoded.split_once(" = ").map_or(decoded.as_str(), |(_, text)| text);
+    // In a log the unit of one count is [0.1 A].
     let unit = value.unit();
     let times = if unit.starts_with(|first: char| first.is_ascii_digit()) { "× " } else { "" };
     text.replacen(&format!("[{unit}]"), &format!("{times}{unit}"), 1)
@@ -133,7 +133,7 @@ mod tests {
             (0x1017, "Device and communication"),
             (0x1400, "Receive PDOs"),
             (0x1A00, "Transmit PDOs"),
-            (0x2000, "The maker's own"),
+            (0x2000, "Manufacturer-specific"),
             (0x6040, "Device control"),
             (0x6840, "Device control"),
             (0x6081, "Profile position"),

@@ -1,8 +1,8 @@
 //! Parameters of a drive: its dictionary, values on demand, and the transactions of [`master::parameters`].
 //!
-//! Reading needs no control. What is written is planned first, written to a drive at rest only, all or nothing, and can be
-//! rolled back as long as the studio runs. A transaction goes on to its end when its page goes: half of it is worse than all
-//! of it. Commands and set-points are refused: what moves a motor has its dead man in the Motion view.
+//! Reading needs no control. Writes are planned first, go to a drive at rest only, all or nothing, and can be
+//! rolled back as long as the studio runs. A transaction is completed even if its page disconnects: half of it is worse than all
+//! of it. Commands and set-points are refused: motion has its dead man, in the Motion view.
 
 use std::collections::BTreeMap;
 
@@ -22,17 +22,17 @@ use super::journals::Journals;
 use super::object_rows::{bytes_text, row_json, value_text};
 use super::state::Host;
 use super::transactions::{Change, MOST_KEPT, Refusal, Written};
-use super::work::{Asked, Done, quietly, say};
+use super::work::{Asked, Done, quietly, send};
 use crate::message::{Answer, Command, FileForm, NewValue};
 
-/// Objects that one request may read.
+/// Most objects in one request to read.
 const MOST_READ: usize = 64;
 
-/// What is being done while a drive stores its parameters.
+/// Shown while a drive stores its parameters.
 pub(super) const STORING: &str = "storing";
 
 impl Host {
-    /// Does what is asked about the parameters of a drive, or begins it.
+    /// Executes a command about the parameters of a drive, or starts it.
     pub(super) fn take_parameters(&mut self, command: Command, asked: Asked) {
         let Some(node) = node_of(&command) else { return };
         let (drive, model) = match self.known_model(node) {
@@ -44,7 +44,7 @@ impl Host {
             Command::WriteParameters { values, file, .. } => self.begin_writing(&drive, model, values, file, asked),
             Command::Store { .. } => self.begin_storing(drive, asked),
             Command::RollBack { .. } => self.begin_rolling_back(&drive, model, asked),
-            _ if !self.parameters.begin_reading() => refuse(asked, busy("others are reading objects")),
+            _ if !self.parameters.begin_reading() => refuse(asked, busy("too many reads are under way")),
             reading => {
                 self.work.push(Box::pin(async move {
                     let outcome = match reading {
@@ -69,12 +69,12 @@ impl Host {
         let known = self.nodes.get(&node).and_then(|known| known.drive.clone());
         known.and_then(|drive| drive.description().map(|model| (drive.clone(), model))).ok_or_else(|| {
             let text =
-                format!("the model of node {node} is not known: scan the bus, or name it with --model {node}=MODEL");
+                format!("the model of node {node} is unknown: scan the bus, or give it with --model {node}=MODEL");
             ("no_such_drive", text)
         })
     }
 
-    /// Objects were read, or could not be.
+    /// A read has ended.
     pub(super) fn conclude_looking(&mut self, asked: Asked, outcome: Result<Value, Refusal>) {
         self.parameters.reading = self.parameters.reading.saturating_sub(1);
         answer(asked, outcome);
@@ -95,7 +95,7 @@ impl Host {
         });
     }
 
-    /// A drive that is doing something is left at it: some stand still while they write their memory.
+    /// A busy drive is not interrupted: some drives stop while they write their memory.
     fn begin_storing(&mut self, drive: Drive, asked: Asked) {
         let node = drive.node().id();
         let is_busy = self.running.contains_key(&node)
@@ -103,7 +103,7 @@ impl Host {
             || self.network.moved().contains(node)
             || self.parameters.is_writing(node);
         if is_busy {
-            return refuse(asked, busy("something else is being done with the drive"));
+            return refuse(asked, busy("the drive is busy with another command"));
         }
         self.begin(node, STORING, false, Some(asked), async move { quietly(drive.save().await) });
     }
@@ -111,7 +111,7 @@ impl Host {
     fn begin_rolling_back(&mut self, drive: &Drive, model: &'static Description, asked: Asked) {
         let (drive, node, journals) = (drive.clone(), drive.node().id(), self.setting.journals.clone());
         let Some(wanted) = self.parameters.before.get(&node).and_then(|before| before.last()).cloned() else {
-            let text = format!("nothing was written to the parameters of node {node} since the studio began");
+            let text = format!("no parameters of node {node} were written since the studio started");
             return refuse(asked, ("nothing_to_roll_back", text));
         };
         self.begin_transaction(node, Change::Back, asked, async move {
@@ -127,7 +127,7 @@ impl Host {
         writing: impl Future<Output = Result<(Value, Option<Parameters>), (Refusal, Option<Parameters>)>> + 'static,
     ) {
         if self.running.contains_key(&node) || !self.parameters.writing.insert(node) {
-            return refuse(asked, busy("something else is being done with the drive"));
+            return refuse(asked, busy("the drive is busy with another command"));
         }
         self.work.push(Box::pin(async move {
             let (outcome, before) = match writing.await {
@@ -138,13 +138,13 @@ impl Host {
         }));
     }
 
-    /// A transaction has ended, one way or the other.
+    /// A transaction has ended, successfully or not.
     pub(super) fn conclude_writing(&mut self, asked: Asked, written: Written) {
         let Written { node, outcome, before, change } = written;
         self.parameters.writing.remove(&node);
         let kept = self.parameters.before.entry(node).or_default();
         match (&outcome, before) {
-            // The way back has been gone: it is no step to go back from.
+            // This was the rollback itself: it cannot be rolled back.
             (Ok(_), _) if change == Change::Back => drop(kept.pop()),
             (_, Some(before)) if change != Change::Back => {
                 if kept.len() == MOST_KEPT {
@@ -156,18 +156,18 @@ impl Host {
         }
         let left = kept.len();
         match &outcome {
-            Err((_, text)) => self.say_news(Some(node), text),
+            Err((_, text)) => self.send_news(Some(node), text),
             Ok(done) => {
                 if change == Change::Pdos {
                     self.parameters.note_mapped(node);
                 }
-                // What leads back is still there: whoever takes it for the way back from another write undoes this one.
+                // The journal is still there: a rollback from it after another write would undo this one.
                 if let Some(why) = done["journal"].as_str().filter(|why| !why.is_empty()) {
-                    self.say_news(Some(node), why);
+                    self.send_news(Some(node), why);
                 }
             }
         }
-        // A mapping may be another one now.
+        // A mapping may have changed.
         self.learn_pdos(node);
         answer(
             asked,
@@ -179,7 +179,7 @@ impl Host {
     }
 }
 
-/// The node whose parameters a command is about.
+/// The node of a command about parameters.
 const fn node_of(command: &Command) -> Option<NodeId> {
     match command {
         Command::Objects { node }
@@ -201,7 +201,10 @@ fn dictionary(node: NodeId, model: &Description) -> Value {
 
 async fn read(drive: &Drive, model: &'static Description, objects: &[String]) -> Result<Value, Refusal> {
     if objects.len() > MOST_READ {
-        return Err(("malformed", format!("expected at most {MOST_READ} objects at once, not {}", objects.len())));
+        return Err((
+            "malformed",
+            format!("expected at most {MOST_READ} objects in one request, got {}", objects.len()),
+        ));
     }
     let mut read = Vec::new();
     for text in objects {
@@ -237,14 +240,14 @@ fn is_same(mux: Mux, first: &[u8], second: &[u8]) -> bool {
     diff(&one(first), &one(second)).is_empty()
 }
 
-/// An object of the description by what a page calls it.
+/// An object of the description, by the text that a page sends.
 pub(super) fn row(model: &'static Description, text: &str) -> Result<&'static Entry, Refusal> {
     let found = object(text).and_then(|object| object.resolve(Some(model.dictionary)));
     let (mux, row) = found.map_err(|why| ("unknown_object", why))?;
     row.ok_or_else(|| ("unknown_object", format!("{mux} is not in the description of the {}", model.name)))
 }
 
-/// What was typed, or what stands in a file, as values.
+/// Typed values, or the values of a file.
 async fn wanted(
     drive: &Drive,
     model: &'static Description,
@@ -270,7 +273,7 @@ async fn typed(drive: &Drive, model: &'static Description, values: &[NewValue]) 
         let mux = row.mux();
         if row.access.is_writable() && !is_parameter(row) {
             let text = format!(
-                "{mux} {} is a command or a set-point, not a parameter: it is not written here. What moves the drive is in the \
+                "{mux} {} is a command or a set-point, not a parameter: it is not written here. To move the drive, use the \
                  Motion view",
                 row.name
             );
@@ -278,7 +281,7 @@ async fn typed(drive: &Drive, model: &'static Description, values: &[NewValue]) 
         }
         if model.storage.address.contains(&mux) {
             let text = format!(
-                "{mux} {} chooses node-ID or bit rate: the drive would be gone after its restart. ferrodrive write does it",
+                "{mux} {} sets node-ID or bit rate: the drive would be unreachable after its restart. Use ferrodrive write",
                 row.name
             );
             return Err(("address", text));
@@ -301,8 +304,8 @@ pub(super) async fn plan(drive: &Drive, model: &'static Description, wanted: &Pa
     drive.plan_parameters(wanted, PlanOptions::default()).await.map_err(|error| refusal_of(&error, model))
 }
 
-/// Writes all or nothing, with what leads back kept until that is done. Gives what the objects had before, if they may have
-/// something else now.
+/// Writes all or nothing, with a journal until that is done. Returns the values before, if the objects may have
+/// others now.
 pub(super) async fn write(
     drive: &Drive,
     model: &'static Description,
@@ -315,7 +318,7 @@ pub(super) async fn write(
         let journal = Journal { node: plan.node, identity: plan.identity, undo: plan.undo() };
         journals.begin(&journal).map_err(|why| (("journal", format!("nothing was written: {why}")), None))?;
     }
-    // One that is not ended leads back later: ferrodrive params rollback.
+    // A journal that is left can be applied later: ferrodrive params rollback.
     let end = || match journals.map_or(Ok(()), |journals| journals.end(plan.node)) {
         Ok(()) => String::new(),
         Err(why) => format!(". {why}"),
@@ -346,7 +349,7 @@ pub(super) async fn write(
             let then = if is_back { end() } else { String::new() };
             Err(((kind, refused_write(&error, model) + &then), before.filter(|_| !is_back)))
         }
-        // Silence when everything had been written, which leaves the journal; the others are before the first write.
+        // A timeout after everything was written, which leaves the journal; the others are before the first write.
         Err(error @ PlanError::Node(_)) => Err((refusal_of(&error, model), before)),
         Err(error) => {
             let (kind, text) = refusal_of(&error, model);
@@ -357,7 +360,7 @@ pub(super) async fn write(
 
 fn refused_write(error: &ApplyError, model: &Description) -> String {
     let name = model.row(error.object).map_or("", |row| row.name);
-    let limits = error.limits.as_ref().map_or_else(String::new, |limits| format!(" It takes {limits}."));
+    let limits = error.limits.as_ref().map_or_else(String::new, |limits| format!(" Expected {limits}."));
     format!("{} {name} was not written: {}.{limits} {}", error.object, error.why, error.undone)
 }
 
@@ -370,7 +373,7 @@ fn refusal_of(error: &PlanError, model: &Description) -> Refusal {
     }
 }
 
-/// What is or was to be written, in its order.
+/// The planned writes, in order.
 pub(super) fn plan_json(plan: &Plan, model: &'static Description) -> Value {
     let text = |mux: Mux, bytes: &[u8]| value_text(model, mux, bytes);
     let steps = plan.steps.iter().map(|step| {
@@ -388,7 +391,7 @@ pub(super) fn plan_json(plan: &Plan, model: &'static Description) -> Value {
     json!({ "steps": steps.collect::<Vec<_>>(), "left": left.collect::<Vec<_>>() })
 }
 
-/// Each object of a file in which default, file and drive are not all the same.
+/// The objects of a file for which default, file and drive are not all equal.
 async fn compare(drive: &Drive, model: &'static Description, file: &str) -> Result<Value, Refusal> {
     let parameters = of_file(drive, model, file)?;
     let mut rows = Vec::new();
@@ -424,7 +427,7 @@ async fn back_up(drive: &Drive, model: &'static Description, form: FileForm) -> 
         FileForm::Toml => sheet::print(&backup.parameters, Some(model)),
         FileForm::Dcf => {
             let bytes = to_dcf(&backup.parameters, model, &format!("node{}.dcf", drive.node().id()));
-            // The sheets that we write are ASCII.
+            // The data sheets that we write are ASCII.
             String::from_utf8_lossy(&bytes.map_err(|why| ("bad_parameters", why))?).into_owned()
         }
     };
@@ -432,7 +435,7 @@ async fn back_up(drive: &Drive, model: &'static Description, form: FileForm) -> 
 }
 
 pub(super) fn busy(what: &str) -> Refusal {
-    ("busy", format!("{what}: try again when that is done"))
+    ("busy", format!("{what}: try again"))
 }
 
 pub(super) fn refuse(asked: Asked, refusal: Refusal) {
@@ -440,7 +443,7 @@ pub(super) fn refuse(asked: Asked, refusal: Refusal) {
 }
 
 pub(super) fn answer((seq, answer): Asked, outcome: Result<Value, Refusal>) {
-    say(
+    send(
         answer,
         match outcome {
             Ok(known) => Answer::known(seq, known),

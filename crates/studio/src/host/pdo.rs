@@ -1,7 +1,7 @@
-//! PDOs of a node: how they are set up and why one stays away, what a change would write and do to the bus, and the change as a
+//! PDOs of a node: their configuration and why one is not sent, the writes of a change and its effect on the bus, and the change as a
 //! transaction.
 //!
-//! A change goes the way of parameters: planned in the order of CiA 301 (7.5.2.35 to 7.5.2.38), written to a drive at rest, each
+//! A change is handled as for parameters: planned in the order of CiA 301 (7.5.2.35 to 7.5.2.38), written to a drive at rest, each
 //! value read back, all or nothing. Reading needs no control.
 
 use std::collections::BTreeMap;
@@ -29,14 +29,14 @@ use super::transactions::{Change, Refusal};
 use super::work::{Asked, Done};
 use crate::message::{Command, NewEntry, NewPdo, NmtWish};
 
-/// PDOs that one request may set up.
+/// Most PDOs in one request.
 const MOST_PDOS: usize = 64;
 
-/// Periods of SYNC that a load is told for: shorter ones hold no two frames at 1 Mbit/s.
+/// Periods of SYNC for which a load is computed: shorter ones do not hold two frames at 1 Mbit/s.
 const CYCLES: std::ops::RangeInclusive<Duration> = Duration::from_micros(250)..=Duration::from_secs(60);
 
 impl Host {
-    /// Does what is asked about the PDOs of a node, or begins it.
+    /// Executes a command about the PDOs of a node, or starts it.
     pub(super) fn take_pdos(&mut self, command: Command, asked: Asked) {
         match command {
             Command::Pdos { node } => self.begin_reading_pdos(node, asked),
@@ -60,10 +60,10 @@ impl Host {
 
     fn begin_reading_pdos(&mut self, node: NodeId, asked: Asked) {
         if !self.nodes.contains_key(&node) {
-            return refuse(asked, ("no_such_drive", format!("nobody was found at node {node}: scan the bus")));
+            return refuse(asked, ("no_such_drive", format!("no node was found at node-ID {node}: scan the bus")));
         }
         if !self.parameters.begin_reading() {
-            return refuse(asked, busy("others are reading objects"));
+            return refuse(asked, busy("too many reads are under way"));
         }
         let drive = self.drive_or_unknown(node);
         self.work.push(Box::pin(async move {
@@ -72,14 +72,14 @@ impl Host {
         }));
     }
 
-    /// PDOs were read, or could not be.
+    /// A read of PDOs has ended.
     pub(super) fn conclude_reading_pdos(&mut self, asked: Asked, node: NodeId, read: Result<NodeTraffic, Refusal>) {
-        let told = read.map(|traffic| {
-            let told = self.pdos_json(&traffic);
+        let shown = read.map(|traffic| {
+            let shown = self.pdos_json(&traffic);
             self.traffic.insert(node, traffic);
-            told
+            shown
         });
-        self.conclude_looking(asked, told);
+        self.conclude_looking(asked, shown);
     }
 
     fn pdos_json(&self, traffic: &NodeTraffic) -> Value {
@@ -136,7 +136,7 @@ impl Host {
             (Err(why), _) | (_, Err(why)) => return refuse(asked, ("malformed", why)),
         };
         if !self.parameters.begin_reading() {
-            return refuse(asked, busy("others are reading objects"));
+            return refuse(asked, busy("too many reads are under way"));
         }
         self.work.push(Box::pin(async move {
             let planning = async {
@@ -148,14 +148,14 @@ impl Host {
         }));
     }
 
-    /// A change was planned, or cannot be: what it does to the bus is computed of what is known of all nodes.
+    /// A change was planned, or refused: its effect on the bus is computed from what is known of all nodes.
     pub(super) fn conclude_planning_pdos(&mut self, asked: Asked, planned: Result<PlannedPdos, Refusal>) {
-        let told = planned.and_then(|planned| self.planned_json(planned));
-        self.conclude_looking(asked, told);
+        let shown = planned.and_then(|planned| self.planned_json(planned));
+        self.conclude_looking(asked, shown);
     }
 
     fn planned_json(&self, planned: PlannedPdos) -> Result<Value, Refusal> {
-        let PlannedPdos { node, model, wanted, plan: mut told, cycle, bitrate } = planned;
+        let PlannedPdos { node, model, wanted, plan: mut shown, cycle, bitrate } = planned;
         let now = self.traffic.get(&node).ok_or_else(|| busy("the PDOs of the node are being read"))?;
         let after = now.pdos.iter().map(|(config, cob_id)| config.with_values(*cob_id, &wanted, model));
         let changed = NodeTraffic { pdos: after.collect(), ..now.clone() };
@@ -165,19 +165,19 @@ impl Host {
         let pdos = changed.pdos.iter().filter(|(config, _)| is_asked(config.pdo)).map(|(config, cob_id)| {
             config_json(Some(model), config, *cob_id, &self.why_silent(node, Some(model), config, *cob_id, at))
         });
-        told["pdos"] = pdos.collect();
-        told["bus"] = json!(bitrate.map(|bitrate| compared(&self.traffic, changed, cycle, bitrate)));
-        Ok(told)
+        shown["pdos"] = pdos.collect();
+        shown["bus"] = json!(bitrate.map(|bitrate| compared(&self.traffic, changed, cycle, bitrate)));
+        Ok(shown)
     }
 
-    /// A node whose PDOs nobody needs may be taken out of operational; one that moves by them may not.
+    /// A node may be taken out of operational unless it is moved by its PDOs.
     fn command_nmt(&mut self, node: NodeId, command: NmtWish, asked: Asked) {
         if !self.nodes.contains_key(&node) {
-            return refuse(asked, ("no_such_drive", format!("nobody was found at node {node}: scan the bus")));
+            return refuse(asked, ("no_such_drive", format!("no node was found at node-ID {node}: scan the bus")));
         }
         let is_at_work = self.running.contains_key(&node) || self.network.moved().contains(node);
         if command == NmtWish::PreOperational && is_at_work {
-            return refuse(asked, busy("the drive is moved by this studio"));
+            return refuse(asked, busy("this studio is moving the drive"));
         }
         self.network.node(node).nmt(match command {
             NmtWish::Start => NmtCommand::Start,
@@ -189,18 +189,18 @@ impl Host {
 
 fn cycle_of(cycle_ms: f64) -> Result<Duration, String> {
     let cycle = Duration::try_from_secs_f64(cycle_ms / 1e3).ok().filter(|cycle| CYCLES.contains(cycle));
-    cycle.ok_or_else(|| format!("expected a period of SYNC from 0.25 to 60000 ms, not {cycle_ms}"))
+    cycle.ok_or_else(|| format!("expected a SYNC period from 0.25 to 60000 ms, got {cycle_ms}"))
 }
 
 fn bitrate_of(bits_per_second: u32) -> Result<Bitrate, String> {
     let known = Bitrate::new(bits_per_second);
-    known.ok_or_else(|| format!("expected a bit rate of 1000 to 1000000 bit/s, not {bits_per_second}"))
+    known.ok_or_else(|| format!("expected a bit rate from 1000 to 1000000 bit/s, got {bits_per_second}"))
 }
 
-/// The values that the objects of these PDOs get. What a page does not say stays as it is in the drive.
+/// The values for the objects of these PDOs. Omitted fields stay as they are in the drive.
 async fn wanted(drive: &Drive, model: &'static Description, pdos: &[NewPdo]) -> Result<Parameters, Refusal> {
     if pdos.is_empty() || pdos.len() > MOST_PDOS {
-        return Err(("malformed", format!("expected 1 to {MOST_PDOS} PDOs, not {}", pdos.len())));
+        return Err(("malformed", format!("expected 1 to {MOST_PDOS} PDOs, got {}", pdos.len())));
     }
     let node = drive.node().id();
     let mut values = BTreeMap::new();
@@ -220,7 +220,7 @@ async fn wanted(drive: &Drive, model: &'static Description, pdos: &[NewPdo]) -> 
     Ok(Parameters { node: Some(node), values, ..Parameters::default() })
 }
 
-/// The values of one PDO, which is set up as `now`.
+/// The values of one PDO, whose present configuration is `now`.
 fn values_of(
     model: &'static Description,
     node: NodeId,
@@ -265,7 +265,7 @@ fn mapped(model: &'static Description, text: &str) -> Result<Mux, Refusal> {
     }
 }
 
-/// The COB-ID with another identifier, on or off; its flags stay the drive's.
+/// The COB-ID with another identifier, valid or not; its other flags stay as in the drive.
 fn cob_id_of(new: &NewPdo, pdo: PdoId, now: CobId) -> Result<CobId, Refusal> {
     let kept = match new.id {
         Some(id) => now.0 & CobId::NO_RTR | u32::from(id),
@@ -274,11 +274,11 @@ fn cob_id_of(new: &NewPdo, pdo: PdoId, now: CobId) -> Result<CobId, Refusal> {
     let wanted = CobId(if new.valid { kept } else { kept | CobId::INVALID });
     let refused = |why: String| Err(("bad_value", format!("{pdo}: {why}")));
     match new.id {
-        Some(id) if id > 0x7FF => refused(format!("{id:X}h is no identifier of 11 bits; expected 181h to 77Fh")),
+        Some(id) if id > 0x7FF => refused(format!("{id:X}h is not an 11-bit identifier; expected 181h to 77Fh")),
         Some(id) if CobId::standard(id).check_identifier().is_err() => {
-            refused(format!("{id:03X}h is kept for another service (CiA 301, table 41)"))
+            refused(format!("{id:03X}h is reserved for another service (CiA 301, table 41)"))
         }
-        None if new.valid && wanted.can_id().raw() == 0 => refused("it has no identifier yet: give it one".to_owned()),
+        None if new.valid && wanted.can_id().raw() == 0 => refused("it has no identifier yet: set one".to_owned()),
         _ => Ok(wanted),
     }
 }
@@ -286,7 +286,7 @@ fn cob_id_of(new: &NewPdo, pdo: PdoId, now: CobId) -> Result<CobId, Refusal> {
 fn time(pdo: PdoId, what: &str, ms: Option<f64>) -> Result<Option<Duration>, Refusal> {
     let read = |ms: f64| {
         let time = Duration::try_from_secs_f64(ms / 1e3);
-        time.map_err(|_| ("bad_value", format!("{pdo}: expected {what} in ms, 0 or more, not {ms}")))
+        time.map_err(|_| ("bad_value", format!("{pdo}: expected {what} in ms, 0 or more, got {ms}")))
     };
     ms.map(read).transpose()
 }

@@ -1,4 +1,4 @@
-//! What a change of PDOs does to the bus: its load and the longest time of each frame, with and without it, by the master's
+//! The effect of a change of PDOs on the bus: load and worst-case delay of each frame, with and without it, by the master's
 //! analysis.
 
 use std::collections::BTreeMap;
@@ -10,19 +10,19 @@ use devices::Description;
 use master::plan::{NodeTraffic, Plan, PlannedFrame, Settings, plan};
 use serde_json::{Value, json};
 
-/// A change that was planned.
+/// A planned change.
 pub(super) struct PlannedPdos {
     pub(super) node: NodeId,
     pub(super) model: &'static Description,
-    /// The values that objects get.
+    /// The new values of objects.
     pub(super) wanted: BTreeMap<Mux, Vec<u8>>,
-    /// The writes, as a page is shown them.
+    /// The writes, as sent to a page.
     pub(super) plan: Value,
     pub(super) cycle: Duration,
     pub(super) bitrate: Option<Bitrate>,
 }
 
-/// What is taken for granted of the host, by which the page explains the figures.
+/// Assumptions about the host, with which the page explains the figures.
 const ASSUMED: &str = "a host that is always in time and sends every RPDO once in a cycle; SDO requests of the host are at least 10 ms apart, and EMCY of one node \
                        at least 100 ms";
 
@@ -54,7 +54,7 @@ pub(super) fn compared(
     })
 }
 
-/// Each frame that there is before or after, the most urgent of those after first.
+/// Every frame from before or after, by the priorities after.
 fn frames(before: &Plan, after: &Plan) -> Vec<Value> {
     let find = |plan: &'_ Plan, of: &PlannedFrame| {
         plan.frames.iter().find(|frame| frame.purpose == of.purpose && frame.node == of.node).cloned()

@@ -1,4 +1,4 @@
-//! PDOs as a page is shown them: how each is set up, what keeps it away, and what of it may be changed.
+//! PDOs as sent to a page: the configuration of each, why it is not sent, and what may be changed.
 
 use std::time::Duration;
 
@@ -9,24 +9,24 @@ use devices::Description;
 use master::pdo::{PdoConfig, Silence, TimerUnits, TransmissionType, most_objects};
 use serde_json::{Value, json};
 
-/// How a PDO is set up, and what may be changed of it; nothing where the model is not known.
+/// The configuration of a PDO, and what may be changed; nothing where the model is unknown.
 pub(super) fn pdo_json(
     model: Option<&'static Description>,
     config: &PdoConfig,
     cob_id: CobId,
     silent: &[Silence],
 ) -> Value {
-    let mut told = config_json(model, config, cob_id, silent);
+    let mut shown = config_json(model, config, cob_id, silent);
     let takes = match model {
         Some(model) => takes(model, config.pdo),
         None => Value::Null,
     };
-    told["manual"] = json!(model.and_then(|model| manual_name(model, config.pdo)));
-    told["takes"] = takes;
-    told
+    shown["manual"] = json!(model.and_then(|model| manual_name(model, config.pdo)));
+    shown["takes"] = takes;
+    shown
 }
 
-/// How a PDO is or would be set up.
+/// The present or planned configuration of a PDO.
 pub(super) fn config_json(
     model: Option<&'static Description>,
     config: &PdoConfig,
@@ -58,7 +58,7 @@ pub(super) fn config_json(
     })
 }
 
-/// What the manual calls it, where it counts otherwise than CiA 301.
+/// Its name in the manual, where that counts otherwise than CiA 301.
 fn manual_name(model: &Description, pdo: PdoId) -> Option<String> {
     let first = model.pdo.first_in_manual;
     (first != 1).then(|| format!("{}{}", pdo.direction, pdo.number.position() + usize::from(first)))
@@ -90,7 +90,7 @@ fn mapping_refusal(model: &Description, pdo: PdoId) -> Option<String> {
 fn refusal(model: &Description, row: Option<&Entry>, what: &str) -> Option<String> {
     match row {
         None => Some(format!("a {} does not have {what}", model.name)),
-        Some(row) if !row.access.is_writable() => Some(format!("{what} can only be read{}", source(model, row.index))),
+        Some(row) if !row.access.is_writable() => Some(format!("{what} is read-only{}", source(model, row.index))),
         Some(_) => None,
     }
 }
@@ -116,7 +116,7 @@ fn types(model: &'static Description, direction: Direction, row: &Entry) -> Vec<
     let types = if direction == Direction::Tpdo { &TPDO_TYPES[..] } else { &RPDO_TYPES[..] };
     let one = |(from, to): &(u8, u8)| {
         let taken: Vec<u8> = (*from..=*to).filter(|value| row.check_value((*value).into()).is_ok()).collect();
-        let why_not = || format!("the {} takes {}{}", model.name, allowed(row), source(model, row.index));
+        let why_not = || format!("the {} accepts {}{}", model.name, allowed(row), source(model, row.index));
         json!({
             "from": taken.first().unwrap_or(from),
             "to": taken.last().unwrap_or(to),
@@ -132,9 +132,9 @@ fn words(model: &Description, direction: Direction, from: u8, to: u8) -> String 
         (Direction::Tpdo, _, 2) if to > 2 => "after every n-th SYNC".to_owned(),
         (Direction::Tpdo, EventTrigger::AnswersRpdo, 254 | 255) => "as the answer to the RPDO of its number".to_owned(),
         (Direction::Tpdo, EventTrigger::ChangeOr255ByTimer, 255) => {
-            "by its event timer; on a change if that is 0".to_owned()
+            "by its event timer, or on change if that is 0".to_owned()
         }
-        (Direction::Tpdo, _, 254 | 255) => "on a change, and by its event timer".to_owned(),
+        (Direction::Tpdo, _, 254 | 255) => "on change, and by its event timer".to_owned(),
         _ => {
             let number = canopen::pdo::PdoNumber::FIRST;
             let config = PdoConfig::new(PdoId { direction, number }, master::core::PdoMap::default());
@@ -160,7 +160,7 @@ mod tests {
 
     /// M4230E17B50 and its siblings, 5.08: the mapping is fixed, and transmission types are those of its list.
     #[test]
-    fn what_a_manual_forbids_comes_with_its_reason() {
+    fn settings_that_a_manual_forbids_have_a_reason() {
         let joint = devices::model("m4230e17b50").expect("a model");
         let takes = takes(joint, TPDO1);
         let mapping = takes["mapping"].as_str().expect("a reason");

@@ -1,4 +1,4 @@
-//! The loop: what came in, what is due, what has ended, and a picture of it all.
+//! The loop: handles requests, deadlines and ended work, and publishes the state.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use can::{Bitrate, Instant};
 use futures_util::StreamExt;
 
 use super::state::{Host, PRESENCE_SPAN, TICK};
-use super::work::say;
+use super::work::send;
 use crate::authority::SessionId;
 use crate::dead_man::DeadMan;
 use crate::handle::{Request, StateUpdate};
@@ -14,15 +14,15 @@ use crate::message::Answer;
 use crate::snapshot::{BusView, Snapshot};
 use crate::trace::BusFrame;
 
-/// How often a picture is made while somebody looks, and while nobody does.
-const PICTURE_INTERVAL: Duration = Duration::from_millis(50);
+/// Period of the state while a page is connected, and while none is.
+const STATE_INTERVAL: Duration = Duration::from_millis(50);
 const UNSEEN_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Sessions at once; a further one is turned away.
+/// Most sessions at once; a further one is refused.
 const MAX_SESSIONS: usize = 256;
 
 impl Host {
-    /// Serves until every handle is gone. `passed` gives the frames that have passed since it was last asked.
+    /// Serves until every handle is dropped. `passed` returns the frames since its last call.
     pub async fn run(mut self, mut passed: impl FnMut() -> Option<BusFrame>) {
         self.begin_scan(None);
         let mut tick = self.network.sleep(TICK);
@@ -34,7 +34,7 @@ impl Host {
                     Err(_) => return,
                 },
                 Some(session) = self.lifelines.next(), if !self.lifelines.is_empty() => self.leave(session),
-                // Before requests: a flood of requests does not keep a dead man from being noticed.
+                // Before requests: a flood of requests must not delay a dead man.
                 () = &mut tick => {
                     tick = self.network.sleep(TICK);
                     self.tick(&mut passed);
@@ -63,9 +63,9 @@ impl Host {
         self.explain_what_was_heard(now);
         self.hear_events();
         while let Some(text) = self.setting.wire.take_news() {
-            self.say_news(None, &text);
+            self.send_news(None, &text);
         }
-        let interval = if self.authority.sessions() > 0 { PICTURE_INTERVAL } else { UNSEEN_INTERVAL };
+        let interval = if self.authority.sessions() > 0 { STATE_INTERVAL } else { UNSEEN_INTERVAL };
         if now - self.shown_at >= interval {
             self.shown_at = now;
             self.show(now);
@@ -79,7 +79,7 @@ impl Host {
                     return;
                 }
                 let session = self.authority.join();
-                // A session that has gone before it was welcomed ends at once.
+                // A session that disconnected before its welcome ends at once.
                 let _ = welcome.send(session);
                 self.lifelines.push(Box::pin(async move {
                     let _ = liveness.await;
@@ -88,7 +88,7 @@ impl Host {
             }
             Request::Do { session, seq, command, answer } => {
                 if let Err(refusal) = self.authority.accept(session, seq) {
-                    say(answer, Answer::failed(Some(seq), refusal.kind(), refusal.to_string()));
+                    send(answer, Answer::failed(Some(seq), refusal.kind(), refusal.to_string()));
                     return;
                 }
                 if self.authority.controller() == Some(session) {
@@ -104,16 +104,16 @@ impl Host {
         if self.authority.leave(session) {
             (self.presence, self.held_by) = (None, None);
             self.accepted.clear();
-            self.stop_moved("the page that moved it has gone");
+            self.stop_moved("the page that moved it has disconnected");
         }
     }
 
-    /// Makes a picture of everything.
+    /// Publishes the state of everything.
     fn show(&mut self, now: Instant) {
-        self.pictures += 1;
+        self.states += 1;
         let snapshot = Snapshot {
             kind: "state",
-            number: self.pictures,
+            number: self.states,
             time_s: (now - Instant::ZERO).as_secs_f64(),
             bus: BusView {
                 name: &self.setting.bus,
@@ -132,9 +132,9 @@ impl Host {
             changes: self.changes.count(),
             nodes: self.nodes.iter().map(|(id, node)| self.view(*id, node, now)).collect(),
         };
-        // Names, numbers and lists alone: there is nothing in it that JSON cannot say.
+        // Only names, numbers and lists: serialising cannot fail.
         let json = serde_json::to_string(&snapshot).unwrap_or_default();
-        // Somebody may look or nobody.
-        let _ = self.inbox.states.send(StateUpdate { number: self.pictures, json: json.into() });
+        // There may be no receiver.
+        let _ = self.inbox.states.send(StateUpdate { number: self.states, json: json.into() });
     }
 }

@@ -1,4 +1,4 @@
-//! The speed limit of a session: what it asks for beyond that is refused before anything is sent. Kept here and not by the page,
+//! The speed limit of a session: faster motions are refused before anything is sent. Enforced here and not by the page,
 //! which may be an old one, or a program.
 
 use std::f64::consts::TAU;
@@ -8,7 +8,7 @@ use master::group::AxisLimits;
 use super::commands::done;
 use super::state::Host;
 use super::transactions::Refusal;
-use super::work::{Asked, say};
+use super::work::{Asked, send};
 use crate::authority::SessionId;
 use crate::message::{Answer, BaseJog, Command};
 
@@ -16,13 +16,13 @@ use crate::message::{Answer, BaseJog, Command};
 pub(super) const TOO_FAST: &str = "speed_limit";
 
 impl Host {
-    /// A session limits what it asks for, in r/min of the shaft, or takes its limit away. What this studio has in motion for it was
-    /// begun under another limit: a lower one stops it.
+    /// A session sets its speed limit, in r/min of the shaft, or removes it. What this studio has in motion for it was
+    /// started under another limit: a lower one stops it.
     pub(super) fn limit_speed(&mut self, session: SessionId, rpm: Option<f64>, asked: Asked) {
         if let Some(rpm) = rpm.filter(|rpm| !(rpm.is_finite() && *rpm > 0.0)) {
             let (seq, answer) = asked;
             let text = format!("expected a speed limit above 0 r/min, got {rpm}");
-            return say(answer, Answer::failed(Some(seq), "malformed", text));
+            return send(answer, Answer::failed(Some(seq), "malformed", text));
         }
         let before = match rpm {
             Some(rpm) => self.speed_limits.insert(session, rpm),
@@ -35,36 +35,36 @@ impl Host {
         done(asked);
     }
 
-    /// Whether what a session asks for keeps to its limit.
+    /// Whether a command of a session keeps to its limit.
     pub(super) fn within_speed_limit(&self, session: SessionId, command: &Command) -> Result<(), Refusal> {
         self.speed_limits.get(&session).map_or(Ok(()), |limit_rpm| keeps_to(command, *limit_rpm))
     }
 }
 
-/// What a command lets a shaft turn at.
+/// The speed of a shaft in a command.
 enum Speed {
-    /// At this at most, in r/min.
+    /// At most this, in r/min.
     Rpm(f64),
-    /// At what the drive is set to.
+    /// The speed set in the drive.
     AsSet,
-    /// At whatever its load allows.
+    /// Any speed that its load allows.
     UpToTheLoad,
-    /// It sets nothing in motion.
+    /// The command does not move it.
     None,
 }
 
 fn keeps_to(command: &Command, limit_rpm: f64) -> Result<(), Refusal> {
     let limit = format!("beyond the speed limit of this session, {limit_rpm} r/min");
     match fastest(command) {
-        // A speed that is not a number is not within it.
+        // A speed that is not a number is not within the limit.
         Speed::Rpm(rpm) if rpm.abs() <= limit_rpm => Ok(()),
         Speed::Rpm(rpm) => {
-            Err((TOO_FAST, format!("{:.1} r/min is {limit}: ask for less, or raise the limit", rpm.abs())))
+            Err((TOO_FAST, format!("{:.1} r/min is {limit}: use a lower speed, or raise the limit", rpm.abs())))
         }
-        Speed::AsSet => Err((TOO_FAST, format!("the speed that the drive is set to may be {limit}: name a speed"))),
+        Speed::AsSet => Err((TOO_FAST, format!("the speed set in the drive may be {limit}: give a speed"))),
         Speed::UpToTheLoad => Err((
             TOO_FAST,
-            format!("with a current the speed is up to the load and may be {limit}: take the limit away first"),
+            format!("with a current the speed depends on the load and may be {limit}: remove the limit first"),
         )),
         Speed::None => Ok(()),
     }
@@ -78,7 +78,7 @@ fn fastest(command: &Command) -> Speed {
         Command::GroupMove(group) => Speed::Rpm(group.rpm.unwrap_or(AxisLimits::careful().velocity_turns_s * 60.0)),
         Command::GroupJog { axes, .. } => Speed::Rpm(axes.iter().map(|axis| axis.rpm).fold(0.0, faster)),
         Command::BaseJog(BaseJog { turns, wheel_radius_m, most_m_s, .. }) => {
-            // No twist that follows is faster: these are the limits of the base.
+            // No later twist is faster: these are the limits of the base.
             let wheel_rpm = most_m_s / (TAU * wheel_radius_m) * 60.0;
             Speed::Rpm(turns.iter().map(|turns| turns * wheel_rpm).fold(0.0, faster))
         }
@@ -86,7 +86,7 @@ fn fastest(command: &Command) -> Speed {
     }
 }
 
-/// The larger of two amounts, and what is not a number where one of them is not.
+/// The larger of two amounts, NaN if one of them is.
 fn faster(one: f64, other: f64) -> f64 {
     if one.is_nan() || one.abs() > other.abs() { one } else { other }
 }

@@ -1,4 +1,4 @@
-//! The host: what it holds, and what it is told at its start. What it does stands in the files beside this one.
+//! The host: its state, and its settings. Its behaviour is in the other files of this folder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -26,38 +26,38 @@ use crate::trace::{Origin, Trace};
 use crate::wire::Wire;
 use crate::world::WorldDoor;
 
-/// How long a jog goes on without being renewed. Looked at every 10 ms: a drive is told to stop within 200 ms.
+/// How long a jog continues without being renewed. Checked every 10 ms: a drive is commanded to stop within 200 ms.
 pub const JOG_SPAN: Duration = Duration::from_millis(190);
 
-/// How long any other motion goes on without a sign of the session that commands it. A browser calls the timers of a tab in
+/// How long any other motion continues without a sign of the session that commands it. A browser runs the timers of a tab in
 /// the background once a second.
 pub const PRESENCE_SPAN: Duration = Duration::from_secs(3);
 
-/// How often the clock is looked at.
+/// Period at which the clock is checked.
 pub(super) const TICK: Duration = Duration::from_millis(10);
 
-/// What a host is told at its start.
+/// Settings of a host.
 #[derive(Clone, Debug)]
 pub struct Setting {
-    /// The bus as it was named.
+    /// The bus, as it was given.
     pub bus: String,
-    /// Its bit rate, where it is known.
+    /// Its bit rate, if known.
     pub bitrate: Option<Bitrate>,
     /// Longest wait for each answer of a node.
     pub timeout: Duration,
-    /// Models that need not be found out.
+    /// Models that need not be identified.
     pub models: BTreeMap<NodeId, &'static Description>,
-    /// What stands behind the drives' shafts, where anything does.
+    /// The gears behind the shafts of drives, if any.
     pub gears: BTreeMap<NodeId, Gear>,
     /// Name of the bus in a log: that of its CAN interface, or `can0`.
     pub interface: String,
     /// Unix time of the bus's zero, for a log.
     pub unix_zero: Duration,
-    /// Where what leads back from a transaction is kept meanwhile; nowhere on a bus that ends with this program.
+    /// Rollback journals of open transactions; none on a bus that ends with this program.
     pub journals: Option<Arc<dyn Journals>>,
     /// The world around the drives, where they are virtual ones of this program.
     pub world: Option<WorldDoor>,
-    /// What the bus says beside frames.
+    /// Health and news of the bus.
     pub wire: Wire,
 }
 
@@ -67,41 +67,41 @@ pub struct Host {
     pub(super) setting: Setting,
     pub(super) inbox: Inbox,
     pub(super) authority: Authority,
-    /// Whose motions these are.
+    /// The sessions, and which of them has control.
     pub(super) held_by: Option<SessionId>,
     /// The session that has control is there.
     pub(super) presence: Option<DeadMan>,
     pub(super) nodes: BTreeMap<NodeId, KnownNode>,
     pub(super) scanning: bool,
-    /// Somebody came while that was going on, and may have been missed.
+    /// A node appeared during a scan, and may have been missed.
     pub(super) scans_again: bool,
     pub(super) running: BTreeMap<NodeId, Running>,
     pub(super) jogs: BTreeMap<NodeId, DeadMan>,
-    /// What each session has limited itself to, in r/min.
+    /// The speed limit of each session, in r/min.
     pub(super) speed_limits: BTreeMap<SessionId, f64>,
     /// Drives that may be moved although nothing stops them when this program dies.
     pub(super) accepted: BTreeSet<NodeId>,
-    /// Drives whose stop was not seen, and in how many looks in a row each has stood since.
+    /// Drives whose stop was not seen, and in how many consecutive readings each has been at rest since.
     pub(super) unseen_stops: BTreeMap<NodeId, u32>,
-    /// What was last told of a stop of each node, and when.
+    /// The last reported stop of each node, and its time.
     pub(super) stops_told: BTreeMap<NodeId, (Instant, &'static str)>,
     /// Several drives as one motion.
     pub(super) group: Option<GroupRun>,
     pub(super) listening: Vec<Listening>,
     pub(super) parameters: Transactions,
-    /// What was done to the world.
+    /// The changes of the world.
     pub(super) changes: Changes,
-    /// Numbers what runs, so that the end of something that was replaced is told from the end of what replaced it.
+    /// Numbers the work that runs, so that the end of replaced work is not taken for the end of its replacement.
     pub(super) generation: u64,
     pub(super) work: Work,
     pub(super) lifelines: FuturesUnordered<Lifeline>,
-    /// Nodes whose PDO mappings are being read, and whether they have to be read again after that.
+    /// Nodes whose PDO mappings are being read, and whether they have to be read again afterwards.
     pub(super) learning: BTreeMap<NodeId, bool>,
-    /// What each node sends, as it was last read.
+    /// The traffic of each node, as it was last read.
     pub(super) traffic: BTreeMap<NodeId, NodeTraffic>,
     pub(super) heard_ids: HeardIds,
     pub(super) meter: Meter,
-    pub(super) pictures: u64,
+    pub(super) states: u64,
     pub(super) shown_at: Instant,
 }
 
@@ -147,7 +147,7 @@ impl Host {
             generation: 0,
             work: Work::new(),
             lifelines: FuturesUnordered::new(),
-            pictures: 0,
+            states: 0,
             shown_at: now,
         };
         (host, handle)

@@ -1,4 +1,4 @@
-//! The host against virtual drives, in virtual time: who may move, and what stops.
+//! The host against virtual drives, in virtual time: permission to move, and stops.
 
 mod faults;
 mod group;
@@ -33,7 +33,7 @@ use crate::wire::Wire;
 const WHEEL: NodeId = node(4);
 const ARM: NodeId = node(2);
 
-/// How long the quick stop ramp of a drive as delivered may take from 60 r/min, and be seen to have ended.
+/// How long a quick stop from 60 r/min may take with the default ramp, until its end is seen.
 const STOPPED_WITHIN: Duration = Duration::from_millis(600);
 
 const fn node(raw: u8) -> NodeId {
@@ -43,7 +43,7 @@ const fn node(raw: u8) -> NodeId {
     }
 }
 
-/// Pages before a studio on a bus with two drives.
+/// A studio on a bus with two drives, for pages.
 struct Stage {
     network: Network,
     handle: HostHandle,
@@ -105,7 +105,7 @@ impl Stage {
         panic!("node {id} turns at {} r/min, not {rpm}", self.speed(id).await);
     }
 
-    /// Waits until a shaft rests, and tells how long that took from now on.
+    /// Waits until a shaft rests, and returns how long that took.
     async fn rests(&self, id: NodeId) -> Duration {
         let from = self.network.now();
         while self.speed(id).await > 2.0 {
@@ -115,7 +115,7 @@ impl Stage {
         self.network.now() - from
     }
 
-    /// Whether the drive has been told to turn still (60FFh): what a stop ends at once, whatever the ramp takes.
+    /// The power state: a stop leaves Operation enabled at once, however long the ramp takes.
     async fn power_state(&self, id: NodeId) -> cia402::PowerState {
         let word: u16 = self.network.node(id).read(Mux::new(0x6041, 0)).await.expect("it answers");
         cia402::Statusword(word).state().expect("a state of CiA 402")
@@ -128,7 +128,7 @@ impl Stage {
     }
 }
 
-/// A network whose frames are seen as they pass.
+/// A network that records its frames.
 #[derive(Clone)]
 struct Tap {
     network: Network,
@@ -137,11 +137,11 @@ struct Tap {
 
 impl Tap {
     fn take(&self) -> Option<BusFrame> {
-        self.passed.lock().expect("nobody panicked").pop_front()
+        self.passed.lock().expect("not poisoned").pop_front()
     }
 
     fn note(&self, frame: &Frame, at: Instant, own: bool) {
-        self.passed.lock().expect("nobody panicked").push_back(BusFrame { at, frame: *frame, own });
+        self.passed.lock().expect("not poisoned").push_back(BusFrame { at, frame: *frame, own });
     }
 }
 
@@ -184,7 +184,7 @@ fn setting() -> Setting {
     }
 }
 
-/// Plays a scene before a studio that runs.
+/// Runs a scene with a running studio.
 fn play(scene: impl AsyncFnOnce(&Stage)) {
     play_acts(scene, |_| {}, async |_| {}, |_| {}, async |_| {});
 }
@@ -195,7 +195,7 @@ fn play_with(journals: Arc<dyn Journals>, scene: impl AsyncFnOnce(&Stage)) {
     play_in(setting, scene, |_| {}, async |_| {}, |_| {}, async |_| {});
 }
 
-/// Plays three scenes before a studio that runs on; between them the world changes.
+/// Runs three scenes with one studio; between them the world changes.
 fn play_acts(
     first: impl AsyncFnOnce(&Stage),
     then: impl FnOnce(&mut World),
@@ -241,7 +241,7 @@ fn play_in(
 fn act(world: &mut World, serving: Pin<&mut impl Future<Output = ()>>, scene: impl Future<Output = ()>) {
     let playing = async {
         tokio::select! {
-            () = serving => panic!("a host runs as long as there is a handle"),
+            () = serving => panic!("the host ended although there is a handle"),
             () = scene => {}
         }
     };
@@ -253,7 +253,7 @@ fn jog(rpm: f64) -> Command {
 }
 
 #[test]
-fn who_has_no_control_moves_nothing_and_stops_everything() {
+fn a_session_without_control_moves_nothing_and_can_stop_everything() {
     play(async |stage| {
         let (mut first, mut second) = (stage.page().await, stage.page().await);
         assert_eq!(first.ask(jog(60.0)).await.error_kind(), "not_in_control");
@@ -279,21 +279,21 @@ fn a_jog_that_is_held_goes_on_and_one_that_is_not_stops() {
             page.must(Command::JogHold { node: WHEEL }).await;
         }
         assert!((stage.speed(WHEEL).await - 60.0).abs() < 5.0, "held for 3 s it turns");
-        let let_go = stage.network.now();
+        let released = stage.network.now();
         while stage.power_state(WHEEL).await == cia402::PowerState::OperationEnabled {
             stage.sleep(1).await;
         }
-        let told = stage.network.now() - let_go;
+        let shown = stage.network.now() - released;
         let limit = Duration::from_millis(200);
-        assert!(told > JOG_SPAN - TICK && told < limit + Duration::from_millis(5), "quick stop after {told:?}");
+        assert!(shown > JOG_SPAN - TICK && shown < limit + Duration::from_millis(5), "quick stop after {shown:?}");
         stage.rests(WHEEL).await;
         assert_eq!(page.ask(Command::JogHold { node: WHEEL }).await.error_kind(), "not_held", "too late");
         stage.sleep(500).await;
-        assert!(stage.speed(WHEEL).await < 2.0, "what comes too late moves nothing");
+        assert!(stage.speed(WHEEL).await < 2.0, "a late renewal moves nothing");
     });
 }
 
-/// As a person does who presses `e` with the arrow key held: the dead man stays.
+/// A person may press `e` with the arrow key held: the dead man stays.
 #[test]
 fn a_jog_stays_held_whatever_else_is_asked_of_the_drive() {
     play(async |stage| {
@@ -306,7 +306,7 @@ fn a_jog_stays_held_whatever_else_is_asked_of_the_drive() {
                 page.must(Command::JogHold { node: WHEEL }).await;
             }
             assert!(stage.speed(WHEEL).await > 50.0);
-            // An answer that a fault was reset where there is none is not what this is about.
+            // Whether a reset without a fault is answered with success is not tested here.
             page.ask(other).await;
             stage.sleep(200).await;
             assert!(stage.rests(WHEEL).await < STOPPED_WITHIN);
@@ -347,7 +347,7 @@ fn a_page_that_goes_stops_all_that_it_moved_and_gives_control_up() {
 }
 
 #[test]
-fn a_page_that_falls_silent_stops_what_it_moved() {
+fn the_motions_of_a_page_that_falls_silent_are_stopped() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
@@ -363,7 +363,7 @@ fn a_page_that_falls_silent_stops_what_it_moved() {
 }
 
 #[test]
-fn control_that_is_handed_over_takes_no_motion_along() {
+fn a_handover_of_control_stops_the_motions_of_the_previous_session() {
     play(async |stage| {
         let (mut first, mut second) = (stage.page().await, stage.page().await);
         first.must(Command::TakeControl {}).await;
@@ -413,9 +413,9 @@ fn a_stop_during_the_start_of_a_motion_keeps_it_from_beginning() {
 }
 
 #[test]
-fn every_drive_that_has_power_is_stopped_whoever_moves_it() {
+fn every_powered_drive_is_stopped_even_if_another_program_moves_it() {
     play(async |stage| {
-        // As another program on the bus does it: this studio knows of no motion of its own.
+        // As another program on the bus does it: not a motion of this studio.
         let arm = stage.network.node(ARM);
         arm.write(Mux::new(0x6060, 0), 3_i8).await.expect("profile velocity");
         for controlword in [0x06_u16, 0x07, 0x0F] {
@@ -432,7 +432,7 @@ fn every_drive_that_has_power_is_stopped_whoever_moves_it() {
 }
 
 #[test]
-fn what_is_shown_is_what_the_drive_says() {
+fn the_state_has_the_values_of_the_drive() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
@@ -466,7 +466,7 @@ fn a_drive_that_does_not_move_is_explained() {
 }
 
 #[test]
-fn a_drive_that_loses_power_is_told_and_one_that_comes_back_too() {
+fn loss_and_return_of_a_drive_are_reported() {
     play(async |stage| {
         let mut page = stage.page().await;
         let mut news = stage.handle.news();
@@ -481,14 +481,14 @@ fn a_drive_that_loses_power_is_told_and_one_that_comes_back_too() {
 }
 
 #[test]
-fn who_boots_while_others_are_asked_is_found() {
+fn a_node_that_boots_during_the_scan_is_found() {
     let network = Network::new();
     let mut world = World::new(Bitrate::K500, 1);
     world.add_station(network.clone());
-    // One is there, so that frames are acknowledged; the other gets its power now, and boots in the middle of the scan.
+    // One is present, so that frames are acknowledged; the other gets its power now, and boots during the scan.
     world.add_drive(2, Box::new(zlim42c(2, 1))).expect("the first");
     world.run_for(Duration::from_secs(1));
-    // As long as the real one takes: later than it is asked, sooner than all have been.
+    // As long as the real one takes: after it has been asked, before the scan has ended.
     world.set_timing(TimingMode::Device);
     world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the second");
     let timeout = Duration::from_millis(300);
@@ -497,7 +497,7 @@ fn who_boots_while_others_are_asked_is_found() {
     let stage = Stage { network, handle };
     let playing = async {
         tokio::select! {
-            () = host.run(|| None) => panic!("a host runs as long as there is a handle"),
+            () = host.run(|| None) => panic!("the host ended although there is a handle"),
             () = async {
                 while stage.state()["nodes"][1]["drive"].is_null() {
                     stage.sleep(100).await;

@@ -1,4 +1,4 @@
-//! What the trace is told beside the frames: models, and the mappings of PDOs.
+//! Input of the trace besides frames: models, and the mappings of PDOs.
 
 use canopen::NodeId;
 use master::Drive;
@@ -8,14 +8,14 @@ use super::state::Host;
 use super::work::Done;
 
 impl Host {
-    /// Puts what a node that was found says in its model's words, and reads how its PDOs are set up. The trace learns from the
-    /// answers as they pass, as it does when others ask; the analysis of the bus is made of them.
+    /// Makes the trace decode a found node by its model, and reads the configuration of its PDOs. The trace learns from the
+    /// answers as they pass, as it does from those to other clients; the analysis of the bus uses them, too.
     pub(super) fn learn_pdos(&mut self, id: NodeId) {
         let Some(node) = self.nodes.get(&id) else { return };
         if let Some(model) = node.drive.as_ref().and_then(Drive::description) {
             self.inbox.trace.set_model(id, model);
         }
-        // What changes while it is being read has to be read once more.
+        // A mapping that changes while it is being read has to be read again.
         if let Some(again) = self.learning.get_mut(&id) {
             *again = true;
             return;
@@ -23,7 +23,7 @@ impl Host {
         self.learning.insert(id, false);
         let drive = self.drive_or_unknown(id);
         self.work.push(Box::pin(async move {
-            // A node without PDOs, or that is gone by now, has none to tell.
+            // A node without PDOs, or one that has disappeared, has none.
             Done::Learned(id, NodeTraffic::of(&drive).await.ok().map(Box::new))
         }));
     }

@@ -1,4 +1,4 @@
-//! What is under way with the parameters of drives, and how to go back.
+//! Reads and transactions of the parameters of drives under way, and the history for rollbacks.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,32 +7,32 @@ use canopen::pdo::PdoId;
 use master::parameters::Parameters;
 use serde_json::Value;
 
-/// Transactions of one node that can be rolled back.
+/// Most transactions of one node that can be rolled back.
 pub(super) const MOST_KEPT: usize = 20;
 
-/// Why something was not done: a word for programs, and words for people.
+/// Why a command was refused: a word for programs, and a text for people.
 pub(super) type Refusal = (&'static str, String);
 
-/// Requests for objects that may be under way, of all pages together.
+/// Most reads under way, of all pages together.
 const MOST_UNDER_WAY: usize = 32;
 
-/// What is under way, and what was.
+/// Work under way, and its history.
 #[derive(Debug, Default)]
 pub(super) struct Transactions {
-    /// Requests for values.
+    /// Reads under way.
     pub(super) reading: usize,
     /// Nodes whose parameters are being written.
     pub(super) writing: BTreeSet<NodeId>,
-    /// What the objects of each transaction had before it, oldest first.
+    /// The values before each transaction, oldest first.
     pub(super) before: BTreeMap<NodeId, Vec<Parameters>>,
     /// How often each node has stored its parameters.
     stored: BTreeMap<NodeId, u32>,
-    /// How often PDOs of each node were set up.
+    /// How often PDOs of each node were configured.
     mapped: BTreeMap<NodeId, u32>,
 }
 
 impl Transactions {
-    /// Counts a request for values; false if too many are under way.
+    /// Counts a read; false if too many are under way.
     pub(super) const fn begin_reading(&mut self) -> bool {
         let is_free = self.reading < MOST_UNDER_WAY;
         if is_free {
@@ -47,23 +47,23 @@ impl Transactions {
         *stored = stored.saturating_add(1);
     }
 
-    /// How often a node has stored its parameters since the studio began.
+    /// How often a node has stored its parameters since the studio started.
     pub(super) fn stored(&self, node: NodeId) -> u32 {
         self.stored.get(&node).copied().unwrap_or_default()
     }
 
-    /// PDOs of a node were set up.
+    /// PDOs of a node were configured.
     pub(super) fn note_mapped(&mut self, node: NodeId) {
         let mapped = self.mapped.entry(node).or_default();
         *mapped = mapped.saturating_add(1);
     }
 
-    /// How often PDOs of a node were set up since the studio began.
+    /// How often PDOs of a node were configured since the studio started.
     pub(super) fn mapped(&self, node: NodeId) -> u32 {
         self.mapped.get(&node).copied().unwrap_or_default()
     }
 
-    /// The transaction that is rolled back next is of PDOs alone.
+    /// The transaction that is rolled back next is about PDOs only.
     pub(super) fn last_was_of_pdos(&self, node: NodeId) -> bool {
         let last = self.before.get(&node).and_then(|before| before.last());
         last.is_some_and(|before| before.values.keys().all(|object| PdoId::of_object(object.index).is_some()))
@@ -80,14 +80,14 @@ impl Transactions {
     }
 }
 
-/// What a transaction is for.
+/// The kind of a transaction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Change {
     /// Values of parameters.
     Values,
     /// PDOs.
     Pdos,
-    /// The way back from another.
+    /// The rollback of another.
     Back,
 }
 
@@ -95,7 +95,7 @@ pub(super) enum Change {
 pub(super) struct Written {
     pub(super) node: NodeId,
     pub(super) outcome: Result<Value, Refusal>,
-    /// What the objects had that may have others now.
+    /// The values before, of objects that may have others now.
     pub(super) before: Option<Parameters>,
     pub(super) change: Change,
 }

@@ -1,4 +1,4 @@
-//! What is under way, and how the futures of it are held.
+//! Work under way, and the futures that do it.
 
 use std::time::Duration;
 
@@ -23,17 +23,17 @@ use crate::world::{Changed, NoAnswer};
 /// Everything under way.
 pub(super) type Work = FuturesUnordered<LocalBoxFuture<'static, Done>>;
 
-/// Who waits for an answer to which message.
+/// A message number, and the sender of its answer.
 pub(super) type Asked = (u64, oneshot::Sender<Answer>);
 
-/// What a drive is on while it is being quick-stopped.
+/// Shown while a drive is being quick-stopped.
 pub(super) const STOPPING: &str = "stopping";
 
-/// Something has come to its end.
+/// Work that has ended.
 pub(super) enum Done {
-    /// A drive was looked at.
+    /// A drive was read.
     Read(NodeId, Result<Box<Look>, Error>),
-    /// All node-IDs were asked.
+    /// A scan has ended.
     Scanned(Vec<Found>, Option<Asked>),
     /// A command on a drive has ended; `None` if it was cut short.
     Command(NodeId, u64, Option<Outcome>),
@@ -41,44 +41,44 @@ pub(super) enum Done {
     Group(u64, Option<GroupOutcome>),
     /// The PDO mappings of a node were read; `None` if it did not answer.
     Learned(NodeId, Option<Box<NodeTraffic>>),
-    /// They were read for a page.
+    /// PDOs were read for a page.
     PdosRead(Asked, NodeId, Box<Result<NodeTraffic, Refusal>>),
     /// A change of PDOs was planned.
     PdosPlanned(Asked, Box<Result<PlannedPdos, Refusal>>),
-    /// Objects were looked at.
+    /// Objects were read.
     Looked(Asked, Result<serde_json::Value, Refusal>),
     /// Parameters were written, or not.
     Written(Asked, Box<Written>),
-    /// The world was looked at.
+    /// The world was read.
     LookedAround(Asked, Result<serde_json::Value, NoAnswer>),
-    /// Something was done to the world, or not.
+    /// The world was changed, or not.
     WorldChanged(Asked, Result<Result<Changed, (&'static str, String)>, NoAnswer>),
-    /// A drive was looked at closely.
+    /// A drive was examined for an explanation.
     Explained(u64, oneshot::Sender<Answer>, Box<Explained>),
 }
 
-/// What a motion tells when it is done, or why it was not done.
+/// The remarks of a motion that was done, or why it was not done.
 pub(super) type Outcome = Result<Vec<String>, Refusal>;
 
-/// What was seen of a drive.
+/// The values read from a drive.
 pub(super) struct Look {
     pub(super) view: DriveView,
-    /// What it would do if this program died, where that was asked for and is known.
+    /// What it would do if this program died, if read and known.
     pub(super) loss: Option<HostLoss>,
 }
 
-/// A command on a drive that is under way. There is one for each node: a further one replaces it.
+/// A command under way on a drive. There is one for each node: a further one replaces it.
 pub(super) struct Running {
     pub(super) generation: u64,
     /// For people: "moving".
     pub(super) what: &'static str,
-    /// It moves the drive, and ends with whoever commanded it.
+    /// It moves the drive, and ends with the session that commanded it.
     pub(super) moves: bool,
     abort: AbortHandle,
     answer: Option<Asked>,
 }
 
-/// Frames of others that are gathered before a drive is explained.
+/// Frames of other programs that are gathered before a drive is explained.
 pub(super) struct Listening {
     pub(super) node: NodeId,
     pub(super) until: Instant,
@@ -87,7 +87,7 @@ pub(super) struct Listening {
     pub(super) answer: oneshot::Sender<Answer>,
 }
 
-/// How long others are listened to before: one and a half of the heartbeat period that most drives come with.
+/// How long other programs are listened to before: 1.5 times the usual default heartbeat period.
 pub(super) const LISTENING_TIME: Duration = Duration::from_millis(1500);
 
 impl Running {
@@ -120,31 +120,31 @@ impl Running {
         (nodes.iter().map(one).collect(), future)
     }
 
-    /// Ends it before its time: it asks nothing further of the drive from here on.
+    /// Cancels it: it sends nothing further to the drive.
     pub(super) fn cut_short(self, kind: &'static str, why: &str) {
         self.abort.abort();
-        self.tell(|seq| Answer::failed(Some(seq), kind, why));
+        self.reply(|seq| Answer::failed(Some(seq), kind, why));
     }
 
-    /// Answers whoever asked for it.
-    pub(super) fn tell(self, answer: impl FnOnce(u64) -> Answer) {
+    /// Answers its requests.
+    pub(super) fn reply(self, answer: impl FnOnce(u64) -> Answer) {
         if let Some((seq, waiting)) = self.answer {
-            say(waiting, answer(seq));
+            send(waiting, answer(seq));
         }
     }
 }
 
-/// Gives an answer to whoever waits for it; the page may have gone.
-pub(super) fn say(answer: oneshot::Sender<Answer>, text: Answer) {
+/// Sends an answer to the task that waits for it; the page may have disconnected.
+pub(super) fn send(answer: oneshot::Sender<Answer>, text: Answer) {
     let _ = answer.send(text);
 }
 
-/// What there is to know of something that shows itself: nothing, where it was done.
+/// The outcome of a command whose effect is visible: no remarks.
 pub(super) fn quietly(done: Result<(), Error>) -> Outcome {
     done.map(|()| Vec::new()).map_err(|error| refusal_of(&error))
 }
 
-/// What the master says, as it is answered.
+/// An error of the master, as a refusal.
 pub(super) fn refusal_of(error: &Error) -> Refusal {
     (error.kind(), error.to_string())
 }

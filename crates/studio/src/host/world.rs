@@ -1,23 +1,23 @@
-//! The World view: what the outer world does to virtual drives, what was done and what takes it back, and how everything truly is.
+//! The World view: changes of the surroundings of virtual drives, their history and undo, and the true state of everything.
 
 use can::Instant;
 use canopen::NodeId;
 use serde_json::{Value, json};
 
 use super::state::Host;
-use super::work::{Asked, Done, say};
+use super::work::{Asked, Done, send};
 use crate::message::Answer;
 use crate::world::{Changed, NoAnswer};
 
-/// Longest line: many times the longest that makes sense.
+/// Longest line in bytes: many times the longest useful one.
 const LONGEST_LINE: usize = 400;
 
 impl Host {
-    /// What may be done.
-    pub(super) fn tell_world_forms(&mut self, asked: Asked) {
+    /// The usage texts of the commands.
+    pub(super) fn send_world_forms(&mut self, asked: Asked) {
         let Some(world) = &self.setting.world else {
             let (seq, answer) = asked;
-            return say(answer, Answer::known(seq, json!({ "is_virtual": false, "forms": [] })));
+            return send(answer, Answer::known(seq, json!({ "is_virtual": false, "forms": [] })));
         };
         let forms = world.forms();
         self.work.push(Box::pin(async move {
@@ -26,7 +26,7 @@ impl Host {
         }));
     }
 
-    /// How everything truly is, and what was done after the change of this number.
+    /// The true state of everything, and the changes after the one with this number.
     pub(super) fn look_around(&mut self, after: Option<u64>, asked: Asked) {
         let Some(world) = &self.setting.world else { return no_world(asked) };
         let looked = world.look();
@@ -40,13 +40,13 @@ impl Host {
         }));
     }
 
-    /// Does what a line says.
+    /// Executes a command line.
     pub(super) fn change_world(&mut self, line: String, asked: Asked) {
         let Some(world) = &self.setting.world else { return no_world(asked) };
         if line.len() > LONGEST_LINE {
             let (seq, answer) = asked;
             let text = format!("the line is longer than {LONGEST_LINE} bytes; expected a command such as 4 supply 30");
-            return say(answer, Answer::failed(Some(seq), "usage", text));
+            return send(answer, Answer::failed(Some(seq), "usage", text));
         }
         let done = world.change(line);
         self.work.push(Box::pin(async move { Done::WorldChanged(asked, done.await) }));
@@ -59,27 +59,27 @@ impl Host {
     ) {
         let changed = match done {
             Ok(Ok(changed)) => changed,
-            Ok(Err((kind, why))) => return say(answer, Answer::failed(Some(seq), kind, why)),
-            Err(NoAnswer) => return say(answer, busy(seq)),
+            Ok(Err((kind, why))) => return send(answer, Answer::failed(Some(seq), kind, why)),
+            Err(NoAnswer) => return send(answer, busy(seq)),
         };
         let time_s = (self.network.now() - Instant::ZERO).as_secs_f64();
-        self.say_news(changed.node.and_then(NodeId::new), &format!("world: {}", changed.line));
+        self.send_news(changed.node.and_then(NodeId::new), &format!("world: {}", changed.line));
         let notes = changed.note.iter().cloned().collect();
         self.changes.add(time_s, changed);
-        say(answer, Answer::done(seq, notes));
+        send(answer, Answer::done(seq, notes));
     }
 }
 
-/// What was seen, for whoever asked.
+/// Answers with the state of the world.
 pub(super) fn conclude_looking_around((seq, answer): Asked, seen: Result<Value, NoAnswer>) {
-    say(answer, seen.map_or_else(|NoAnswer| busy(seq), |seen| Answer::known(seq, seen)));
+    send(answer, seen.map_or_else(|NoAnswer| busy(seq), |seen| Answer::known(seq, seen)));
 }
 
 fn no_world((seq, answer): Asked) {
-    let text = "the world around these drives is the real one, or another program's: to a simulator that runs speaks `ferrodrive studio --control`";
-    say(answer, Answer::failed(Some(seq), "no_world", text));
+    let text = "these drives are real, or belong to another program: connect to a running simulator with `ferrodrive studio --control`";
+    send(answer, Answer::failed(Some(seq), "no_world", text));
 }
 
 fn busy(seq: u64) -> Answer {
-    Answer::failed(Some(seq), "busy", "the world is busy, or there is none any more: try again")
+    Answer::failed(Some(seq), "busy", "the world is busy, or has ended: try again")
 }

@@ -1,22 +1,22 @@
-//! A frame that passed, and how it stands in a log.
+//! A frame of the bus, and its line in a log.
 
 use core::fmt::Write;
 use std::time::Duration;
 
 use can::{Frame, Instant};
 
-/// A frame that passed.
+/// A frame of the bus.
 #[derive(Clone, Copy, Debug)]
 pub struct BusFrame {
-    /// When, in the time of the bus.
+    /// Its bus time.
     pub at: Instant,
-    /// Which.
+    /// The frame.
     pub frame: Frame,
     /// This program sent it.
     pub own: bool,
 }
 
-/// What a log says beside the frames.
+/// The contents of a log besides frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Origin {
     /// Name of the bus's interface, a single word.
@@ -37,7 +37,7 @@ impl Origin {
         let at = passed.at + self.unix_zero;
         let (seconds, micros) = (at.as_nanos() / 1_000_000_000, at.as_nanos() % 1_000_000_000 / 1_000);
         let direction = if passed.own { 'T' } else { 'R' };
-        // A string takes everything.
+        // Writing to a string cannot fail.
         let _ = writeln!(out, "({seconds:010}.{micros:06}) {} {} {direction}", self.interface, passed.frame);
     }
 }

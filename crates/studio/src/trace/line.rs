@@ -14,11 +14,11 @@ use super::bus_frame::BusFrame;
 /// A line of the trace.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Line {
-    /// Of the frame, from 0 in the order of the bus.
+    /// Number of the frame, from 0 in bus order.
     pub(super) number: u64,
-    /// Time of the bus.
+    /// Bus time.
     pub(super) at_s: f64,
-    /// Who sent it, as far as that can be told: `studio`, `node 4`, `others`.
+    /// The sender, as far as known: `studio`, `node 4`, `others`.
     pub(super) from: String,
     /// COB-ID, hexadecimal.
     pub(super) id: String,
@@ -26,10 +26,10 @@ pub(super) struct Line {
     pub(super) data: String,
     /// Its service.
     pub(super) kind: &'static str,
-    /// The one node that it is about.
+    /// The one node concerned.
     pub(super) node: Option<u8>,
     pub(super) text: String,
-    /// Of a whole transfer: from its first frame to its last, where that was seen.
+    /// Duration of a whole transfer, from its first frame to its last, if that was seen.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) took_ms: Option<f64>,
 }
@@ -68,7 +68,7 @@ impl Line {
         Some(Self { text, from, took_ms: begun.map(|begun| millis(passed.at - begun.at)), ..line })
     }
 
-    /// Whether every word stands somewhere in it. Words are in lower case.
+    /// Whether it contains every word. Words are in lower case.
     pub(super) fn has(&self, words: &[String]) -> bool {
         if words.is_empty() {
             return true;
@@ -87,7 +87,7 @@ fn bytes(frame: &Frame) -> String {
     bytes.join(" ")
 }
 
-/// CAN tells no sender: of what a device alone sends it is the device.
+/// CAN frames have no sender: for frames that only a device sends it is the device.
 fn sender(own: bool, decoded: &Decoded) -> String {
     let of_device = match decoded {
         Decoded::Emcy(..) | Decoded::BootUp(_) | Decoded::Heartbeat(..) | Decoded::AlarmHeartbeat(_) => true,
@@ -105,11 +105,11 @@ fn sender(own: bool, decoded: &Decoded) -> String {
 const OWN: &str = "studio";
 const OTHERS: &str = "others";
 
-/// The SDO transfers under way: when each began, and who asked.
+/// The SDO transfers under way: the start of each, and its client.
 #[derive(Debug, Default)]
 pub(super) struct Transfers(BTreeMap<NodeId, Begun>);
 
-/// The beginning of a transfer.
+/// The start of a transfer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Begun {
     at: Instant,
@@ -120,7 +120,7 @@ pub(super) struct Begun {
 }
 
 impl Transfers {
-    /// Takes a frame, and tells how the transfer began that it is part of, if that was seen.
+    /// Adds a frame, and returns the start of its transfer, if that was seen.
     pub(super) fn follow(&mut self, passed: &BusFrame, sdo: &Sdo) -> Option<Begun> {
         if sdo.step.is_end() {
             return self.0.remove(&sdo.node);
@@ -130,7 +130,7 @@ impl Transfers {
         let is_first = match sdo.step {
             SdoStep::Read(_) => true,
             SdoStep::Begin(..) | SdoStep::BlockBegin(..) => sdo.from == Side::Client,
-            // The last segment of a download says the whole value too.
+            // The last segment of a download also has the whole value.
             SdoStep::Write(..) => self.0.get(&sdo.node).is_none_or(|begun| !begun.has_parts),
             _ => false,
         };
@@ -142,7 +142,7 @@ impl Transfers {
 }
 
 impl Begun {
-    /// This program reads something.
+    /// A read by this program.
     pub(super) const fn is_own_reading(&self) -> bool {
         self.own && self.reads
     }

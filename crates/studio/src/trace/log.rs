@@ -1,10 +1,10 @@
-//! What is kept as a log in the form of candump, which `ferrodrive dump` and can-utils read.
+//! The kept frames as a candump log, which `ferrodrive dump` and can-utils read.
 
 use super::bus_frame::Origin;
 use super::query::Query;
 use super::ring::{CHUNK, Held};
 
-/// Some frames of a log, and where the next ones begin.
+/// A part of a log, and where the next one begins.
 #[derive(Debug)]
 pub(crate) struct Part {
     pub(crate) text: String,
@@ -13,7 +13,7 @@ pub(crate) struct Part {
 
 impl Query {
     /// The next lines of the log, of frames from this number on; `None` at its end. Nodes and services are chosen as for the view;
-    /// words are not, since a transfer without some of its frames says nothing.
+    /// words are not, since a transfer cannot be decoded without some of its frames.
     pub(crate) fn log_part(&self, held: &Held, origin: &Origin, from: u64) -> Option<Part> {
         let (floor, ceiling) = self.bounds(held);
         let from = from.max(floor);

@@ -1,7 +1,7 @@
-//! The last frames of the bus, raw, and their words for whoever asks.
+//! The last frames of the bus, raw, decoded on request.
 //!
-//! In: every frame that passes. Out: parts of what is kept, decoded then ([`Query`]), or as a log ([`Origin`]). The memory is
-//! bounded, and nobody who reads keeps the host waiting: the lock is held for a push, or for the copy of some pointers.
+//! In: every frame of the bus. Out: parts of the kept frames, decoded then ([`Query`]), or as a log ([`Origin`]). The memory is
+//! bounded, and no reader makes the host wait: the lock is held for a push, or for the copy of some pointers.
 
 mod bus_frame;
 mod line;

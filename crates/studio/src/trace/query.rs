@@ -1,4 +1,4 @@
-//! Which part of the trace is wanted, and the part.
+//! Queries to the trace, and their results.
 
 use std::collections::VecDeque;
 
@@ -10,17 +10,17 @@ use serde::{Deserialize, Serialize};
 use super::line::{Line, Transfers};
 use super::ring::Held;
 
-/// Lines that are given where nobody says how many, and at most.
+/// Default number of lines, and most lines.
 const COUNT: usize = 500;
 const MOST: usize = 2_000;
 
-/// Frames that are looked through for one answer: some 50 ms of work.
+/// Most frames searched for one answer: about 50 ms of work.
 pub(super) const MOST_SEARCHED: u64 = 20_000;
 
-/// Frames before the first wanted one in which the beginning of an SDO transfer is looked for that ends behind it.
+/// Frames before the first wanted one that are searched for the start of an SDO transfer that ends after it.
 const LOOK_BACK: u64 = 1_000;
 
-/// What is asked for, in the words of a request.
+/// The parameters of a request, unparsed.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Asked {
@@ -41,8 +41,8 @@ pub(crate) struct Asked {
     quiet: bool,
 }
 
-/// Which part of the trace is wanted. Of nodes and kinds any that is named will do, or all if none is; words have to be there
-/// all.
+/// A parsed query. A line matches if it has any of the nodes and any of the kinds (all, if none is given), and
+/// every word.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Query {
     after: Option<u64>,
@@ -53,35 +53,35 @@ pub(crate) struct Query {
     nodes: Vec<NodeId>,
     kinds: Vec<ServiceKind>,
     words: Vec<String>,
-    /// Of an SDO transfer one line.
+    /// One line for each SDO transfer.
     transfers: bool,
-    /// Without what this program reads.
+    /// Without the reads of this program.
     quiet: bool,
 }
 
-/// A part of the trace: all lines that are wanted of the frames from `from` to below `to`, oldest first.
+/// A part of the trace: all matching lines of the frames from `from` to below `to`, oldest first.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Selection {
     pub(super) from: u64,
     pub(super) to: u64,
-    /// Frames between what the reader has and this, of which nothing is said: they were too many, or are not kept any more.
+    /// Frames between those of the reader and this part that are skipped: they were too many, or are no longer kept.
     pub(super) skipped: u64,
-    /// Of the oldest frame that is kept.
+    /// Number of the oldest kept frame.
     pub(super) oldest: u64,
-    /// Of the frame that comes next.
+    /// Number of the next frame.
     pub(super) next: u64,
     pub(super) lines: VecDeque<Line>,
 }
 
 impl Asked {
-    /// What that means.
+    /// Parses the parameters.
     ///
     /// # Errors
-    /// In words, what is none: a node, a service, a time.
+    /// The parameter that is not valid: a node, a service, a time.
     pub(crate) fn understand(self) -> Result<Query, String> {
         let time = |seconds: Option<f64>| match seconds {
             Some(seconds) if !(0.0..=1e9).contains(&seconds) => {
-                Err(format!("{seconds} is no time of the bus in seconds"))
+                Err(format!("expected a bus time in seconds, 0 or more, got {seconds}"))
             }
             Some(seconds) => Ok(Some(Instant::from_nanos((seconds * 1e9) as u64))),
             None => Ok(None),
@@ -107,22 +107,22 @@ fn parts(list: &str) -> impl Iterator<Item = &str> {
 
 pub(super) fn node(text: &str) -> Result<NodeId, String> {
     let raw = text.parse().ok().and_then(NodeId::new);
-    raw.ok_or_else(|| format!("'{text}' is no node-ID; expected 1 to 127, several separated by commas"))
+    raw.ok_or_else(|| format!("'{text}' is not a node-ID; expected 1 to 127, several separated by commas"))
 }
 
 fn kind(text: &str) -> Result<ServiceKind, String> {
     let known = || ServiceKind::ALL.map(ServiceKind::word).join(", ");
     let kind = ServiceKind::ALL.into_iter().find(|kind| kind.word() == text);
-    kind.ok_or_else(|| format!("'{text}' is no kind of frame; expected some of {}", known()))
+    kind.ok_or_else(|| format!("'{text}' is not a kind of frame; expected some of {}", known()))
 }
 
 impl Query {
-    /// The newest lines that are wanted, as many as are asked for.
+    /// The newest matching lines, as many as requested.
     pub(crate) fn select(&self, held: &Held) -> Selection {
         let (floor, ceiling) = self.bounds(held);
         let mut lines = VecDeque::new();
         let mut from = ceiling;
-        // Backwards in steps, since the newest are wanted; within a step forwards, as frames are understood.
+        // Backwards in steps, since the newest are wanted; forwards within a step, as frames are decoded in order.
         while from > floor && lines.len() < self.count && ceiling - from < MOST_SEARCHED {
             let start = match self.wants_all() {
                 true => from.saturating_sub(self.count as u64),
@@ -147,7 +147,7 @@ impl Query {
         }
     }
 
-    /// The numbers between which it looks, the second one not included.
+    /// The range of frame numbers, the second one excluded.
     pub(super) fn bounds(&self, held: &Held) -> (u64, u64) {
         let floor = [Some(held.oldest()), self.after, self.from.map(|from| held.number_at(from))];
         let ceiling = [Some(held.next()), self.before, self.until.map(|until| held.number_at(until))];
@@ -156,7 +156,7 @@ impl Query {
         (floor, ceiling.max(floor.min(held.next())))
     }
 
-    /// True if nodes and service are those that are wanted.
+    /// True if node and service match.
     pub(super) fn chooses(&self, decoded: &Decoded) -> bool {
         (self.nodes.is_empty() || self.nodes.iter().any(|node| decoded.concerns(*node)))
             && (self.kinds.is_empty() || self.kinds.contains(&decoded.service()))
@@ -190,7 +190,7 @@ impl Query {
         lines
     }
 
-    /// True if a frame can be told only with those before it.
+    /// True if a frame can be decoded only with those before it.
     const fn follows_transfers(&self) -> bool {
         self.transfers || self.quiet
     }

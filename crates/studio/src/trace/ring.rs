@@ -1,4 +1,4 @@
-//! The ring, and what a reader holds of it.
+//! The ring buffer of frames, and the snapshot of a reader.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -13,14 +13,14 @@ use master::decode::{Decoded, Decoder};
 
 use super::bus_frame::{BusFrame, Origin};
 
-/// Frames that are kept at least: some seven minutes of a bus with three drives, half a minute of a full one at 1 Mbit/s.
+/// Least number of kept frames: about seven minutes of a bus with three drives, half a minute of a full one at 1 Mbit/s.
 pub(super) const KEPT: usize = 200_000;
 
-/// Frames of a chunk: so few that those before a wanted one are passed over at once, so many that a decoder for each
-/// chunk is little beside them.
+/// Frames of a chunk: few enough to skip those before a wanted one quickly, many enough that a decoder for each
+/// chunk is small beside them.
 pub(super) const CHUNK: usize = 4_000;
 
-/// A model that is found begins a chunk of its own. There are not more than this, however often that happens.
+/// Most chunks: each model that is found starts a chunk, however often that happens.
 const MOST_CHUNKS: usize = 2 * KEPT / CHUNK;
 
 /// The frames of a bus, numbered from 0 in their order.
@@ -36,48 +36,48 @@ struct Ring {
     chunks: VecDeque<Chunk>,
     held: usize,
     next: u64,
-    /// Knows what the frames so far have taught.
+    /// The decoder, which has learned from the frames so far.
     decoder: Decoder,
     models: BTreeMap<NodeId, &'static Description>,
 }
 
-/// Frames in a row.
+/// Consecutive frames.
 #[derive(Clone, Debug)]
 pub(super) struct Chunk {
     /// Number of the first one.
     first: u64,
-    /// As it was before the first one.
+    /// The decoder before the first one.
     before: Arc<Decoder>,
     frames: Arc<Vec<BusFrame>>,
 }
 
 impl Trace {
-    /// Somebody saves it.
+    /// Counts a save.
     pub(crate) fn note_saved(&self) {
         self.logs_saved.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// How often it was saved.
+    /// The number of saves.
     pub(crate) fn logs_saved(&self) -> u64 {
         self.logs_saved.load(Ordering::Relaxed)
     }
 
-    /// A trace that looks for nodes among these models.
+    /// A trace that identifies nodes among these models.
     pub(crate) fn new(models: Models, origin: Origin) -> Self {
         let decoder = Decoder::knowing(models);
         let ring = Ring { chunks: VecDeque::new(), held: 0, next: 0, decoder, models: BTreeMap::new() };
         Self { ring: Mutex::new(ring), origin, logs_saved: AtomicU64::new(0) }
     }
 
-    /// Takes a frame; times must not go back.
+    /// Adds a frame; times must not go back.
     pub(crate) fn append(&self, passed: BusFrame) {
         self.lock().append(passed);
     }
 
-    /// Puts what this node says in its model's words, from the next frame on.
+    /// Decodes this node by its model, from the next frame on.
     pub(crate) fn set_model(&self, node: NodeId, model: &'static Description) {
         let mut ring = self.lock();
-        // Said again it would set the mappings that were learned back to those of the factory.
+        // Setting it again would reset the learned mappings to the defaults.
         if ring.models.get(&node).is_some_and(|known| core::ptr::eq(*known, model)) {
             return;
         }
@@ -86,19 +86,19 @@ impl Trace {
         ring.begin_chunk();
     }
 
-    /// What is kept now. It stays as it is while more comes.
+    /// A snapshot of the kept frames, unaffected by further ones.
     pub(crate) fn held(&self) -> Held {
         let ring = self.lock();
         Held { chunks: ring.chunks.iter().cloned().collect(), next: ring.next }
     }
 
-    /// What a log says beside the frames.
+    /// The contents of a log besides frames.
     pub(crate) const fn origin(&self) -> &Origin {
         &self.origin
     }
 
     fn lock(&self) -> MutexGuard<'_, Ring> {
-        // Nothing is half done between two frames, whoever panicked.
+        // Frames are added whole: a panic elsewhere leaves the ring consistent.
         self.ring.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -110,7 +110,7 @@ impl Ring {
         }
         self.decoder.pass(&passed.frame);
         if let Some(chunk) = self.chunks.back_mut() {
-            // Copied only if somebody reads it just now.
+            // Copied only if a reader holds it now.
             Arc::make_mut(&mut chunk.frames).push(passed);
             self.held += 1;
             self.next += 1;
@@ -133,7 +133,7 @@ impl Ring {
     }
 }
 
-/// What was kept at one moment.
+/// A snapshot of the kept frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
     chunks: Vec<Chunk>,
@@ -146,7 +146,7 @@ impl Held {
         self.chunks.first().map_or(self.next, |chunk| chunk.first)
     }
 
-    /// Number of the frame that comes next.
+    /// Number of the next frame.
     pub(crate) const fn next(&self) -> u64 {
         self.next
     }
@@ -154,14 +154,14 @@ impl Held {
     /// Number of the first frame at or after a time.
     pub(super) fn number_at(&self, at: Instant) -> u64 {
         let chunk = self.chunks.partition_point(|chunk| chunk.frames.first().is_some_and(|passed| passed.at < at));
-        // It may be in the one before, behind its first frame.
+        // It may be in the previous chunk, after its first frame.
         let Some(before) = chunk.checked_sub(1).map(|place| &self.chunks[place]) else { return self.oldest() };
         before.first + before.frames.partition_point(|passed| passed.at < at) as u64
     }
 
-    /// When a node last said the value of an object by SDO, up to then and within a second before.
+    /// When a node last sent the value of an object by SDO, within the second up to a time.
     pub(crate) fn answered_at(&self, node: NodeId, object: Mux, until: Instant) -> Option<Instant> {
-        /// Longer than a drive is looked at.
+        /// Longer than the reading period of a drive.
         const SECOND: u64 = 1_000_000_000;
         let id = connection_set::sdo_reply(node);
         let said = |passed: &&BusFrame| {
@@ -174,12 +174,12 @@ impl Held {
         recent.find(said).map(|passed| passed.at)
     }
 
-    /// Number of the frame with which the chunk of this one begins.
+    /// Number of the first frame in the chunk of this one.
     pub(super) fn chunk_start(&self, number: u64) -> u64 {
         self.overlapping(number, number + 1).next().map_or(number, |chunk| chunk.first)
     }
 
-    /// Gives each frame with a number from `from` to below `to`, in words.
+    /// Visits each frame with a number from `from` to below `to`, decoded.
     pub(super) fn decode(&self, from: u64, to: u64, mut each: impl FnMut(u64, &BusFrame, &Decoded)) {
         for chunk in self.overlapping(from, to) {
             let mut decoder = (*chunk.before).clone();
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_held_stays_while_more_comes() {
+    fn a_snapshot_does_not_change_while_frames_are_added() {
         let trace = trace_of(10);
         let held = trace.held();
         trace.append(BusFrame { at: Instant::from_secs(9), frame: "704#05".parse().expect("a frame"), own: false });
@@ -267,13 +267,13 @@ mod tests {
         Frame::new(CanId::standard(base + u16::from(node)), &[command, low, high, sub_index, a, b, c, d])
     }
 
-    /// What is read in parts, from anywhere, is what a decoder says that has seen all.
+    /// Parts read from anywhere are decoded as by a decoder that has seen all frames.
     #[test]
     fn every_part_reads_as_if_all_before_it_had_been_read() {
         let mut random = Prng::new(7);
         let trace = trace_of(0);
         let mut whole = Decoder::new();
-        let mut told = Vec::new();
+        let mut texts = Vec::new();
         let model = devices::model("zlac8030l").expect("a model");
         for number in 0..3 * CHUNK {
             if number == CHUNK + CHUNK / 2 {
@@ -283,16 +283,16 @@ mod tests {
             }
             let frame = random_frame(&mut random);
             trace.append(BusFrame { at: Instant::from_millis(number as u64), frame, own: false });
-            told.push(whole.decode(&frame).to_string());
+            texts.push(whole.decode(&frame).to_string());
         }
         let held = trace.held();
-        assert!(told.iter().any(|text| text.contains("velocity_actual_value")), "PDOs were mapped");
+        assert!(texts.iter().any(|text| text.contains("velocity_actual_value")), "PDOs were mapped");
         for _ in 0..50 {
-            let from = random.below(told.len() as u64);
-            let to = (from + random.below(200)).min(told.len() as u64);
+            let from = random.below(texts.len() as u64);
+            let to = (from + random.below(200)).min(texts.len() as u64);
             let mut part = Vec::new();
             held.decode(from, to, |_, _, decoded| part.push(decoded.to_string()));
-            assert_eq!(part, told[from as usize..to as usize], "from {from}");
+            assert_eq!(part, texts[from as usize..to as usize], "from {from}");
         }
     }
 

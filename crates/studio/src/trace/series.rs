@@ -1,5 +1,5 @@
-//! The values of objects over time, from the frames that carry them: what is mapped into PDOs, and what is read or written by
-//! SDO, by whomever.
+//! The values of objects over time, from the frames that carry them: mapped into PDOs, or read or written by
+//! SDO, by any client.
 
 use std::collections::BTreeMap;
 
@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 use super::query::{MOST_SEARCHED, node};
 use super::ring::Held;
 
-/// Objects that may be asked for at once.
+/// Most objects in one request.
 const MOST_OBJECTS: usize = 32;
 
-/// What is asked for, in the words of a request.
+/// The parameters of a request, unparsed.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct AskedSeries {
@@ -23,7 +23,7 @@ pub(crate) struct AskedSeries {
     objects: String,
 }
 
-/// Objects of nodes; none for a list of all that carry numbers.
+/// Objects of nodes; none for a list of all objects with numbers.
 #[derive(Clone, Debug)]
 pub(crate) struct SeriesQuery {
     after: Option<u64>,
@@ -35,35 +35,35 @@ pub(crate) struct SeriesQuery {
 pub(crate) struct Values {
     from: u64,
     to: u64,
-    /// Frames between what the reader has and this: they were too many, or are not kept any more.
+    /// Frames between those of the reader and this part: they were too many, or are no longer kept.
     skipped: u64,
     series: Vec<Series>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 struct Series {
-    /// As it is asked for: `4:606C:00`.
+    /// As in the request: `4:606C:00`.
     object: String,
     node: u8,
     name: Option<&'static str>,
     unit: &'static str,
-    /// How many values there are.
+    /// The number of values.
     count: usize,
-    /// Time of the bus in s, and value, of an object that was asked for.
+    /// Bus time in s and value, for a requested object.
     points: Vec<(f64, i64)>,
 }
 
 impl AskedSeries {
-    /// What that means.
+    /// Parses the parameters.
     ///
     /// # Errors
-    /// In words, what is none.
+    /// The parameter that is not valid.
     pub(crate) fn understand(self) -> Result<SeriesQuery, String> {
         let parts = self.objects.split(',').map(str::trim).filter(|part| !part.is_empty());
         let objects: Vec<_> = parts.map(object).collect::<Result<_, _>>()?;
         match objects.len() {
             0..=MOST_OBJECTS => Ok(SeriesQuery { after: self.after, objects }),
-            more => Err(format!("{more} objects are too many; ask for at most {MOST_OBJECTS}")),
+            more => Err(format!("expected at most {MOST_OBJECTS} objects, got {more}")),
         }
     }
 }
@@ -72,7 +72,7 @@ impl AskedSeries {
 fn object(text: &str) -> Result<(NodeId, Mux), String> {
     let wrong = || {
         format!(
-            "'{text}' is no object of a node; expected NODE:INDEX:SUB with index and sub-index in hexadecimal, e.g. 4:606C:00"
+            "'{text}' is not an object of a node; expected NODE:INDEX:SUB with index and sub-index in hexadecimal, e.g. 4:606C:00"
         )
     };
     let mut parts = text.split(':');
@@ -85,7 +85,7 @@ fn object(text: &str) -> Result<(NodeId, Mux), String> {
 }
 
 impl SeriesQuery {
-    /// The values that were asked for, or the objects of which there are any.
+    /// The requested values, or the list of objects that have any.
     pub(crate) fn values(&self, held: &Held) -> Values {
         let to = held.next();
         let wanted_from = self.after.unwrap_or_default();

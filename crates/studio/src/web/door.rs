@@ -175,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_stranger_that_came_first_makes_room_and_nobody_who_has_shown_a_pass() {
+    fn the_oldest_stranger_makes_room_and_no_authenticated_visitor() {
         let mut strangers = Strangers::default();
         let visitors: Vec<Visitor> = (0..=MOST_STRANGERS).map(|_| Visitor::new(([10, 0, 0, 1], 1).into())).collect();
         let mut stays: Vec<_> = visitors.iter().take(MOST_STRANGERS).map(|visitor| strangers.take(visitor)).collect();

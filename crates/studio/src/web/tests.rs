@@ -127,7 +127,7 @@ async fn a_get_moves_and_stops_nothing() {
 }
 
 #[tokio::test]
-async fn the_document_tells_of_every_request_and_of_no_other() {
+async fn the_document_lists_exactly_the_requests_that_exist() {
     let (app, access, _inbox) = server(None);
     let bearer = format!("Bearer {}", token(&access));
     let headers = [("authorization", bearer.as_str()), ("origin", "http://127.0.0.1:8402")];
@@ -181,7 +181,7 @@ async fn a_password_opens_and_a_wrong_one_costs_time() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn who_guesses_at_one_address_holds_up_nobody_at_another() {
+async fn guessing_from_one_address_delays_no_other_address() {
     let (app, _access, _inbox) = server(Some("correct horse battery"));
     let login = async |from: [u8; 4], password: &str| {
         let body = serde_json::json!({ "password": password }).to_string();
@@ -392,7 +392,7 @@ async fn a_socket_is_for_pages_of_this_server() {
 }
 
 #[tokio::test]
-async fn messages_that_make_no_sense_are_answered_and_the_next_one_is_heard() {
+async fn malformed_messages_are_answered_and_the_next_one_is_processed() {
     let (access, _handle, _states) = listening().await;
     let (mut socket, welcome) = page(&access).await;
     let (_, elsewhere) = page(&access).await;
@@ -439,7 +439,7 @@ async fn two_hundred_pages_all_get_the_newest_state() {
 }
 
 #[tokio::test]
-async fn a_page_that_reads_slowly_is_told_how_much_it_missed_and_costs_no_more_memory() {
+async fn a_page_that_reads_slowly_gets_the_number_of_missed_states_and_costs_no_more_memory() {
     let (access, handle, states) = listening().await;
     let (mut socket, _) = page(&access).await;
     // Far more than the buffers of two sockets hold.
@@ -470,7 +470,7 @@ async fn a_page_that_reads_slowly_is_told_how_much_it_missed_and_costs_no_more_m
 
 /// A client that never reads does not keep its place: its download ends.
 #[tokio::test(start_paused = true)]
-async fn who_takes_nothing_of_a_log_loses_its_place() {
+async fn a_client_that_does_not_read_its_log_loses_its_place() {
     let (app, access, inbox) = server(None);
     let bearer = format!("Bearer {}", token(&access));
     let headers = [("authorization", bearer.as_str())];
@@ -496,7 +496,7 @@ async fn who_takes_nothing_of_a_log_loses_its_place() {
 }
 
 #[tokio::test]
-async fn what_a_page_has_kept_becomes_mcap() {
+async fn values_kept_in_a_page_become_mcap() {
     let (app, access, _inbox) = server(None);
     let bearer = format!("Bearer {}", token(&access));
     let headers = [("authorization", bearer.as_str()), ("origin", "http://127.0.0.1:8402")];

@@ -1,4 +1,4 @@
-//! What happens to virtual drives, as the timeline tells it.
+//! The timeline of virtual drives.
 
 use std::cell::RefCell;
 
@@ -10,7 +10,7 @@ use super::{ARM, Stage, WHEEL, play, play_acts};
 use crate::message::Command;
 
 impl Stage {
-    /// Everything that has happened, oldest first.
+    /// The whole timeline, oldest first.
     pub(super) fn happened(&self) -> Vec<Value> {
         let news = serde_json::to_value(self.handle.timeline().since(0)).expect("JSON");
         news["entries"].as_array().expect("entries").clone()
@@ -30,7 +30,7 @@ pub(super) fn change(world: &mut World, node: canopen::NodeId, words: &str) {
 
 /// ZLAC8030L quick start guide V1.00, chapters 8 and 9: 0001h is over-voltage.
 #[test]
-fn a_fault_is_told_with_its_remedy_and_where_that_is_written_until_it_is_over() {
+fn a_fault_is_reported_with_its_remedy_and_its_source_until_it_ends() {
     let news = RefCell::new(None);
     play_acts(
         async |stage| {
@@ -44,14 +44,14 @@ fn a_fault_is_told_with_its_remedy_and_where_that_is_written_until_it_is_over() 
             let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
             assert!(heard.iter().any(|news| news.contains("node 4: emergency 0001h (over-voltage)")), "{heard:?}");
             for kind in ["emcy", "fault"] {
-                let told = stage.find(WHEEL, kind);
-                assert_eq!((&told["code"], &told["gone_s"]), (&1.into(), &Value::Null), "{told}");
-                assert!(told["what"].as_str().expect("text").starts_with("over-voltage"), "{told}");
-                assert!(told["remedy"].as_str().expect("text").contains("bleeder"), "{told}");
-                assert_eq!(told["source"], "ZLAC8030L quick start guide V1.00, chapters 8 and 9");
+                let shown = stage.find(WHEEL, kind);
+                assert_eq!((&shown["code"], &shown["gone_s"]), (&1.into(), &Value::Null), "{shown}");
+                assert!(shown["what"].as_str().expect("text").starts_with("over-voltage"), "{shown}");
+                assert!(shown["remedy"].as_str().expect("text").contains("bleeder"), "{shown}");
+                assert_eq!(shown["source"], "ZLAC8030L quick start guide V1.00, chapters 8 and 9");
             }
             assert_eq!(stage.find(WHEEL, "state")["what"], "Switch on disabled → Fault");
-            // Their times are those of the answers that told of them, as the page marks them.
+            // Their times are those of the answers that reported them, which the page marks.
             for (kind, object) in [("fault", "603Fh"), ("state", "6041h")] {
                 let at_s = stage.find(WHEEL, kind)["at_s"].as_f64().expect("a time");
                 let around =
@@ -74,8 +74,8 @@ fn a_fault_is_told_with_its_remedy_and_where_that_is_written_until_it_is_over() 
             page.must(Command::ResetFault { node: WHEEL }).await;
             stage.sleep(500).await;
             for kind in ["emcy", "fault"] {
-                let told = stage.find(WHEEL, kind);
-                assert!(told["gone_s"].as_f64().expect("it is over") > told["at_s"].as_f64().expect("a time"));
+                let shown = stage.find(WHEEL, kind);
+                assert!(shown["gone_s"].as_f64().expect("it is over") > shown["at_s"].as_f64().expect("a time"));
             }
             assert_eq!(stage.find(WHEEL, "state")["what"], "Fault → Switch on disabled");
         },
@@ -89,11 +89,11 @@ fn a_drive_that_is_cut_off_is_silent_until_it_answers_again() {
         |world| change(world, ARM, "cable cut"),
         async |stage| {
             stage.sleep(2000).await;
-            let told = stage.find(ARM, "silent");
-            assert_eq!(told["gone_s"], Value::Null);
-            assert!(told["remedy"].as_str().expect("text").contains("cable"), "{told}");
+            let shown = stage.find(ARM, "silent");
+            assert_eq!(shown["gone_s"], Value::Null);
+            assert!(shown["remedy"].as_str().expect("text").contains("cable"), "{shown}");
             let silent = stage.happened().into_iter().filter(|entry| entry["kind"] == "silent").count();
-            assert_eq!(silent, 1, "told once, however often it is asked");
+            assert_eq!(silent, 1, "shown once, however often it is asked");
         },
         |world| change(world, ARM, "cable join"),
         async |stage| {
@@ -104,7 +104,7 @@ fn a_drive_that_is_cut_off_is_silent_until_it_answers_again() {
 }
 
 #[test]
-fn what_was_there_before_a_page_came_is_known_and_so_are_stops_and_boot_ups() {
+fn faults_from_before_a_page_connected_are_known_and_so_are_stops_and_boot_ups() {
     play(async |stage| {
         stage.network.node(ARM).nmt(NmtCommand::ResetNode);
         stage.sleep(1500).await;
@@ -119,7 +119,7 @@ fn what_was_there_before_a_page_came_is_known_and_so_are_stops_and_boot_ups() {
         stage.sleep(500).await;
         assert!(
             stage.state()["happenings"].as_u64().expect("a number") > before,
-            "pages are told that there is something"
+            "pages are shown that there is something"
         );
     });
 }

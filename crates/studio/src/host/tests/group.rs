@@ -1,4 +1,4 @@
-//! Several virtual drives as one motion: together to their ends, and stopped together by whatever stops one.
+//! Several virtual drives as one motion: they end together, and whatever stops one stops all.
 
 use std::time::Duration;
 
@@ -35,7 +35,7 @@ fn base() -> BaseJog {
 type Answered = tokio::sync::oneshot::Receiver<Answer>;
 
 impl Page {
-    /// Asks, and does not wait for the answer.
+    /// Sends a command without waiting for its answer.
     fn begin(&mut self, command: Command) -> Answered {
         self.seq += 1;
         self.session.ask(self.seq, command).expect("there is room")
@@ -67,7 +67,7 @@ impl Stage {
 }
 
 #[test]
-fn drives_move_together_to_their_positions_and_have_no_power_then() {
+fn drives_move_together_to_their_positions_and_are_disabled_then() {
     play(async |stage| {
         let mut page = stage.page().await;
         assert_eq!(page.ask(to(90.0, -45.0)).await.error_kind(), "not_in_control");
@@ -97,7 +97,7 @@ fn drives_move_together_to_their_positions_and_have_no_power_then() {
 }
 
 #[test]
-fn what_is_no_group_is_refused() {
+fn an_invalid_group_is_refused() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
@@ -114,7 +114,7 @@ fn what_is_no_group_is_refused() {
         fast.wheel_radius_m = 0.0;
         assert_eq!(page.ask(Command::BaseJog(fast)).await.error_kind(), "group");
         assert_eq!(page.ask(Command::GroupHold {}).await.error_kind(), "not_held");
-        let Command::GroupMove(mut soon) = to(3600.0, 0.0) else { unreachable!("it is one") };
+        let Command::GroupMove(mut soon) = to(3600.0, 0.0) else { unreachable!("it is a group move") };
         soon.within_s = Some(-1.0);
         assert_eq!(page.ask(Command::GroupMove(soon.clone())).await.error_kind(), "malformed");
         soon.within_s = Some(0.5);
@@ -125,7 +125,7 @@ fn what_is_no_group_is_refused() {
 }
 
 #[test]
-fn speeds_that_are_held_go_on_together_and_end_by_their_ramps() {
+fn held_speeds_continue_together_and_end_with_their_ramps() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
@@ -150,8 +150,8 @@ fn a_group_that_is_not_held_stops_within_200_ms() {
             let begun = page.begin(command);
             page.hold(stage, &Command::GroupHold {}, 30).await;
             assert!(stage.velocity(WHEEL).abs() > 15.0 && stage.velocity(ARM).abs() > 15.0);
-            let told = stop_of_both(stage, stage.network.now()).await;
-            assert!(told < Duration::from_millis(200) + TICK, "told after {told:?}");
+            let shown = stop_of_both(stage, stage.network.now()).await;
+            assert!(shown < Duration::from_millis(200) + TICK, "stopped after {shown:?}");
             assert_eq!(begun.await.expect("answered").error_kind(), "stopped");
             assert_eq!(page.ask(Command::GroupHold {}).await.error_kind(), "not_held", "too late");
         }
@@ -160,21 +160,21 @@ fn a_group_that_is_not_held_stops_within_200_ms() {
 
 /// Until neither is in Operation enabled, and then at rest.
 async fn stop_of_both(stage: &Stage, from: Instant) -> Duration {
-    let mut told = Duration::ZERO;
+    let mut shown = Duration::ZERO;
     for id in [WHEEL, ARM] {
         while stage.power_state(id).await == cia402::PowerState::OperationEnabled {
             stage.sleep(1).await;
         }
-        told = stage.network.now() - from;
+        shown = stage.network.now() - from;
     }
     for id in [WHEEL, ARM] {
         assert!(stage.rests(id).await < STOPPED_WITHIN, "node {id}");
     }
-    told
+    shown
 }
 
 #[test]
-fn a_page_that_goes_and_a_press_of_stop_end_a_group() {
+fn a_page_that_disconnects_and_a_press_of_stop_end_a_group() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
@@ -182,8 +182,8 @@ fn a_page_that_goes_and_a_press_of_stop_end_a_group() {
         stage.sleep(1500).await;
         assert!(stage.velocity(WHEEL) > 20.0 && stage.velocity(ARM) > 20.0);
         drop(page);
-        let told = stop_of_both(stage, stage.network.now()).await;
-        assert!(told < Duration::from_millis(200), "{told:?}");
+        let shown = stop_of_both(stage, stage.network.now()).await;
+        assert!(shown < Duration::from_millis(200), "{shown:?}");
 
         let (mut page, mut other) = (stage.page().await, stage.page().await);
         page.take_control_of_all().await;
@@ -197,7 +197,7 @@ fn a_page_that_goes_and_a_press_of_stop_end_a_group() {
 }
 
 #[test]
-fn who_stops_one_of_a_group_stops_all_of_it() {
+fn stopping_one_drive_of_a_group_stops_all() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
@@ -213,7 +213,7 @@ fn who_stops_one_of_a_group_stops_all_of_it() {
 }
 
 #[test]
-fn a_drive_of_a_group_does_nothing_else_meanwhile() {
+fn a_drive_of_a_group_takes_no_other_command_meanwhile() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
@@ -233,7 +233,7 @@ fn a_drive_of_a_group_does_nothing_else_meanwhile() {
 }
 
 #[test]
-fn a_fault_of_one_stops_the_others_and_says_which() {
+fn a_fault_of_one_stops_the_others_and_names_it() {
     fn change(world: &mut World, words: &str) {
         let stimulus = words.parse().expect("a stimulus");
         world.apply(Place::node(WHEEL.raw()), &stimulus).expect("it is there").expect("it has that");
@@ -283,7 +283,7 @@ fn a_base_is_driven_by_its_twist() {
         assert!((wheel + rpm).abs() < 2.0 && (arm + rpm).abs() < 2.0, "{wheel} and {arm}, not {rpm}");
         page.must(Command::GroupEnd {}).await;
         let answer = driven.await.expect("answered");
-        assert!(answer.is_ok() && answer.json().contains("m along"), "{}", answer.json());
+        assert!(answer.is_ok() && answer.json().contains("m forward"), "{}", answer.json());
         assert!(stage.speed(WHEEL).await < 2.0);
     });
 }

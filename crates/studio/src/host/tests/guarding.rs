@@ -15,7 +15,7 @@ impl Stage {
     }
 }
 
-/// Whatever moves the stepper.
+/// All commands that move the stepper.
 fn motions() -> Vec<Command> {
     let both = |rpm| [WHEEL, ARM].map(|node| AxisSpeed { node, rpm }).to_vec();
     let axes = [WHEEL, ARM].map(|node| AxisTarget { node, degrees: 90.0 }).to_vec();
@@ -46,22 +46,22 @@ async fn is_refused(stage: &Stage, page: &mut Page, command: Command) {
 
 /// ZLIM42-C user manual V1.03 has no watch over the host; of the ZLAC8030L 2000h is one, with 1000 ms as delivered.
 #[test]
-fn what_goes_on_without_the_program_is_shown_before_it_moves_and_refused_until_that_is_accepted() {
+fn a_drive_that_nothing_stops_is_shown_before_it_moves_and_refused_until_that_is_accepted() {
     play(async |stage| {
         let mut page = stage.page().await;
         stage.sleep(500).await;
         let [arm, wheel] = [stage.shown(0), stage.shown(1)];
         assert_eq!((&arm["goes_on"], &arm["accepted"]), (&true.into(), &false.into()), "{arm}");
-        assert!(arm["without_us"].as_str().is_some_and(|told| told.contains("nothing stops it")), "{arm}");
+        assert!(arm["without_us"].as_str().is_some_and(|shown| shown.contains("nothing stops it")), "{arm}");
         assert_eq!(wheel["goes_on"], false, "{wheel}");
-        assert!(wheel["without_us"].as_str().is_some_and(|told| told.contains("1000 ms")), "{wheel}");
+        assert!(wheel["without_us"].as_str().is_some_and(|shown| shown.contains("1000 ms")), "{wheel}");
         assert_eq!(page.ask(Command::AcceptUnguarded { node: ARM }).await.error_kind(), "not_in_control");
         page.must(Command::TakeControl {}).await;
         let mut news = stage.handle.news();
         for command in motions() {
             is_refused(stage, &mut page, command).await;
         }
-        assert!(news.try_recv().is_err(), "a question to one page is not news to all");
+        assert!(news.try_recv().is_err(), "a request for acceptance is not news to all");
         page.must(Command::AcceptUnguarded { node: ARM }).await;
         for command in motions() {
             page.seq += 1;
@@ -75,9 +75,9 @@ fn what_goes_on_without_the_program_is_shown_before_it_moves_and_refused_until_t
     });
 }
 
-/// Who gets control has not been asked, and a drive whose watch is switched off is one that goes on.
+/// A session that gets control has accepted nothing, and a drive whose watch is switched off keeps moving.
 #[test]
-fn who_takes_over_is_asked_anew_and_so_is_who_finds_a_watch_switched_off() {
+fn a_new_session_has_to_accept_again_and_so_it_is_when_a_watch_is_switched_off() {
     play(async |stage| {
         let (mut first, mut second) = (stage.page().await, stage.page().await);
         first.take_control_of_all().await;
@@ -92,7 +92,7 @@ fn who_takes_over_is_asked_anew_and_so_is_who_finds_a_watch_switched_off() {
         let wheel = stage.network.node(WHEEL);
         wheel.write(canopen::Mux::new(0x2000, 0), 0_u16).await.expect("it takes it");
         assert_eq!(first.ask(Command::Jog { node: WHEEL, rpm: 30.0 }).await.error_kind(), "unguarded");
-        // Looked at every two seconds.
+        // Read every two seconds.
         stage.sleep(2500).await;
         assert_eq!(stage.shown(1)["goes_on"], true);
         wheel.write(canopen::Mux::new(0x2000, 0), 1000_u16).await.expect("it takes it");
@@ -100,15 +100,15 @@ fn who_takes_over_is_asked_anew_and_so_is_who_finds_a_watch_switched_off() {
     });
 }
 
-/// A press comes over the socket and as a request of its own.
+/// A press comes over the socket and as a separate request.
 #[test]
-fn a_stop_that_comes_by_two_ways_is_told_once() {
+fn a_stop_that_comes_by_two_channels_is_reported_once() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
         page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
         let mut news = stage.handle.news();
-        let mut told = || {
+        let mut shown = || {
             let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
             heard.iter().filter(|news| news.contains("a press of stop")).count()
         };
@@ -117,18 +117,18 @@ fn a_stop_that_comes_by_two_ways_is_told_once() {
         stage.sleep(5).await;
         stage.handle.stop_all();
         stage.sleep(600).await;
-        assert_eq!((told(), stops(stage)), (1, 1));
-        // Another press, later, is another one.
+        assert_eq!((shown(), stops(stage)), (1, 1));
+        // A later press is reported again.
         page.must(Command::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
         page.must(Command::StopAll {}).await;
         stage.sleep(600).await;
-        assert_eq!((told(), stops(stage)), (1, 2));
+        assert_eq!((shown(), stops(stage)), (1, 2));
     });
 }
 
-/// The stepper has no watch over its host, so that it turns on behind a cable that is cut.
+/// The stepper has no watch over its host, so it keeps turning when its cable is cut.
 #[test]
-fn a_drive_that_a_stop_does_not_reach_is_shown_until_it_was_seen_to_stand() {
+fn a_drive_that_a_stop_does_not_reach_is_shown_until_it_is_seen_at_rest() {
     let page = RefCell::new(None);
     let unseen = |stage: &Stage| [0, 1].map(|at| stage.shown(at)["stop_unseen"] == true);
     play_acts(
@@ -144,7 +144,7 @@ fn a_drive_that_a_stop_does_not_reach_is_shown_until_it_was_seen_to_stand() {
         |world| change(world, ARM, "cable cut"),
         async |stage| {
             let mut mine = page.take().expect("it stays open");
-            // The stop is confirmed, and that is all that is known.
+            // The stop is confirmed, which is all that is known.
             mine.must(Command::StopAll {}).await;
             for _ in 0..6 {
                 stage.sleep(500).await;
@@ -158,7 +158,7 @@ fn a_drive_that_a_stop_does_not_reach_is_shown_until_it_was_seen_to_stand() {
         },
         async |stage| {
             let mut mine = page.take().expect("it stays open");
-            // It turns still, and is told anew as soon as it answers: nobody has to press again.
+            // It still turns, and is stopped as soon as it answers, without another press.
             let mut turned = 0.0_f64;
             for _ in 0..30 {
                 turned = turned.max(stage.shown(0)["drive"]["velocity_rpm"].as_f64().unwrap_or(0.0));

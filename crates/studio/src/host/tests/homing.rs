@@ -19,9 +19,9 @@ fn change(world: &mut World, node: NodeId, words: &str) {
     world.apply(Place::node(node.raw()), &stimulus).expect("it is there").expect("it has that");
 }
 
-fn method(told: &Value, number: i64) -> &Value {
-    let methods = told["methods"].as_array().expect("methods");
-    methods.iter().find(|method| method["method"] == number).unwrap_or_else(|| panic!("no {number}: {told}"))
+fn method(shown: &Value, number: i64) -> &Value {
+    let methods = shown["methods"].as_array().expect("methods");
+    methods.iter().find(|method| method["method"] == number).unwrap_or_else(|| panic!("no {number}: {shown}"))
 }
 
 async fn set_input(stage: &Stage, sub_index: u8, function: u16) {
@@ -30,29 +30,29 @@ async fn set_input(stage: &Stage, sub_index: u8, function: u16) {
 
 /// ZLIM42-C user manual V1.03: 5.3.6 has methods 17, 18, 24 and 29; 2030h:02 of 1 makes X0 the home switch.
 #[test]
-fn a_drive_tells_its_methods_its_switches_and_how_it_is_set() {
+fn the_wizard_shows_methods_switches_and_settings() {
     play_acts(
         async |stage| {
             let mut page = stage.page().await;
-            let told = page.homing(ARM).await;
+            let shown = page.homing(ARM).await;
             let numbers: Vec<_> =
-                told["methods"].as_array().expect("methods").iter().map(|method| method["method"].clone()).collect();
-            assert_eq!(numbers, [json!(17), json!(18), json!(24), json!(29)], "0 is no method: {told}");
-            assert_eq!(method(&told, 24)["missing"], json!(["home switch"]), "no input is one as delivered");
-            assert_eq!(method(&told, 24)["no_turn"], json!(["negative limit", "positive limit"]));
-            // By its labels it stops on the negative limit switch; CiA 402-2 leaves it again.
-            let seventeen = method(&told, 17);
+                shown["methods"].as_array().expect("methods").iter().map(|method| method["method"].clone()).collect();
+            assert_eq!(numbers, [json!(17), json!(18), json!(24), json!(29)], "0 is not a method: {shown}");
+            assert_eq!(method(&shown, 24)["missing"], json!(["home switch"]), "no input is one by default");
+            assert_eq!(method(&shown, 24)["no_turn"], json!(["negative limit", "positive limit"]));
+            // By the labels of the manual it stops on the negative limit switch; CiA 402-2 leaves it again.
+            let seventeen = method(&shown, 17);
             assert_eq!((&seventeen["switch"], &seventeen["edge"]), (&json!("negative limit"), &json!("on")));
-            let speed = &told["settings"][0];
+            let speed = &shown["settings"][0];
             assert_eq!(
                 (&speed["object"], &speed["value"], &speed["unit"]),
                 (&"6099h:01".into(), &"120".into(), &"r/min".into())
             );
             assert!(speed["takes"].as_str().expect("limits").starts_with("5 to 3000"), "{speed}");
             set_input(stage, 2, 1).await;
-            let told = page.homing(ARM).await;
-            assert_eq!(method(&told, 24)["missing"], json!([]));
-            assert_eq!(told["inputs"][0], json!({ "name": "X0", "signal": "home switch", "active": false }));
+            let shown = page.homing(ARM).await;
+            assert_eq!(method(&shown, 24)["missing"], json!([]));
+            assert_eq!(shown["inputs"][0], json!({ "name": "X0", "signal": "home switch", "active": false }));
             assert_eq!(page.ask(Command::Homing { node: WHEEL }).await.error_kind(), "no_such_mode");
         },
         |world| change(world, ARM, "input X0 1"),
@@ -66,7 +66,7 @@ fn a_drive_tells_its_methods_its_switches_and_how_it_is_set() {
 }
 
 #[test]
-fn a_run_is_told_on_its_way_and_at_its_end() {
+fn a_run_is_reported_while_it_runs_and_at_its_end() {
     play_acts(
         async |stage| {
             // X0 is the negative limit.
@@ -81,10 +81,10 @@ fn a_run_is_told_on_its_way_and_at_its_end() {
             page.seq += 1;
             let homed = page.session.ask(page.seq, Command::Home { node: ARM, method: 17, rpm: None }).expect("room");
             stage.sleep(1000).await;
-            let told = page.homing(ARM).await;
-            assert_eq!(told["running"], true, "{told}");
-            assert_eq!(told["phase"], "moving negatively, looking for the negative limit");
-            assert_eq!(told["ended"], Value::Null);
+            let shown = page.homing(ARM).await;
+            assert_eq!(shown["running"], true, "{shown}");
+            assert_eq!(shown["phase"], "moving negatively, searching for the negative limit");
+            assert_eq!(shown["ended"], Value::Null);
             let mut homed = homed;
             loop {
                 tokio::select! {
@@ -97,17 +97,17 @@ fn a_run_is_told_on_its_way_and_at_its_end() {
                     () = stage.network.sleep(std::time::Duration::from_millis(500)) => page.must(Command::Alive {}).await,
                 }
             }
-            let told = page.homing(ARM).await;
-            assert_eq!((&told["running"], &told["ended"]), (&false.into(), &"attained".into()), "{told}");
+            let shown = page.homing(ARM).await;
+            assert_eq!((&shown["running"], &shown["ended"]), (&false.into(), &"attained".into()), "{shown}");
         },
         |_| {},
         async |_| {},
     );
 }
 
-/// A search that nobody holds any more ends like any other motion.
+/// A search that is no longer held ends like any other motion.
 #[test]
-fn a_page_that_goes_ends_a_search() {
+fn a_page_that_disconnects_ends_a_search() {
     play_acts(
         async |stage| {
             let mut page = stage.page().await;
@@ -115,7 +115,7 @@ fn a_page_that_goes_ends_a_search() {
             page.seq += 1;
             let _homed = page.session.ask(page.seq, Command::Home { node: ARM, method: 17, rpm: None }).expect("room");
             stage.sleep(1000).await;
-            assert!(stage.speed(ARM).await > 50.0, "it looks for a switch that is not there");
+            assert!(stage.speed(ARM).await > 50.0, "it searches for a missing switch");
             drop(page);
             stage.rests(ARM).await;
         },

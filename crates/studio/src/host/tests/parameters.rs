@@ -1,6 +1,6 @@
-//! Parameters of virtual drives: what is read, written, refused and put back.
+//! Parameters of virtual drives: reads, writes, refusals and rollbacks.
 //!
-//! Figures: ZLAC8030L quick start guide V1.00, chapter 9: 6081h is 120 r/min as delivered and takes 1 to 1000, 6083h is
+//! Figures: ZLAC8030L quick start guide V1.00, chapter 9: 6081h is 120 r/min by default and takes 1 to 1000, 6083h is
 //! 500 ms and takes 0 to 32767, 2008h is 1 r/min and is stored, 2009h restores or stores.
 
 use std::sync::{Arc, Mutex};
@@ -32,22 +32,22 @@ impl Stage {
 }
 
 impl Page {
-    async fn told(&mut self, command: Command) -> Value {
+    async fn answer(&mut self, command: Command) -> Value {
         serde_json::from_str(&self.ask(command).await.json()).expect("JSON")
     }
 
-    /// The result of what has to be done.
+    /// The result of a command that has to succeed.
     pub(super) async fn knows(&mut self, command: Command) -> Value {
-        let told = self.told(command).await;
-        assert_eq!(told["ok"], true, "{told}");
-        told["result"].clone()
+        let shown = self.answer(command).await;
+        assert_eq!(shown["ok"], true, "{shown}");
+        shown["result"].clone()
     }
 
-    /// The kind and the words of a refusal.
+    /// The kind and the text of a refusal.
     pub(super) async fn refused(&mut self, command: Command) -> (String, String) {
-        let told = self.told(command).await;
-        assert_eq!(told["ok"], false, "{told}");
-        let text = |name: &str| told["error"][name].as_str().expect("text").to_owned();
+        let shown = self.answer(command).await;
+        assert_eq!(shown["ok"], false, "{shown}");
+        let text = |name: &str| shown["error"][name].as_str().expect("text").to_owned();
         (text("kind"), text("message"))
     }
 }
@@ -69,7 +69,7 @@ fn a_parameter_is_changed_read_back_and_rolled_back() {
         let values = page.knows(read(&["6081h:00", "6083h:00", "1000h:00"])).await;
         let is_default = |at: usize| values["values"][at]["is_default"].clone();
         assert_eq!(
-            [is_default(0), is_default(1), is_default(2)].map(|told| told.as_bool()),
+            [is_default(0), is_default(1), is_default(2)].map(|shown| shown.as_bool()),
             [Some(false), Some(false), Some(true)],
             "{values}"
         );
@@ -82,7 +82,7 @@ fn a_parameter_is_changed_read_back_and_rolled_back() {
 }
 
 #[test]
-fn what_a_drive_cannot_have_and_what_would_move_it_is_not_written() {
+fn invalid_values_and_commands_are_not_written() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
@@ -112,7 +112,7 @@ fn what_a_drive_cannot_have_and_what_would_move_it_is_not_written() {
 }
 
 #[test]
-fn a_file_is_kept_compared_shown_before_and_applied_as_a_whole() {
+fn a_file_is_saved_compared_planned_and_applied_as_a_whole() {
     play(async |stage| {
         let mut page = stage.page().await;
         let mut backed_up = async |form| {
@@ -120,7 +120,7 @@ fn a_file_is_kept_compared_shown_before_and_applied_as_a_whole() {
             answer["file"].as_str().expect("text").to_owned()
         };
         let file = backed_up(FileForm::Toml).await;
-        // The same values, in a form that other tools read.
+        // The same values, in a format of other tools.
         let other = testbench::parameters::of_dcf(backed_up(FileForm::Dcf).await.as_bytes(), WHEEL).expect("a DCF");
         let model = &devices::zltech::zlac8030l::ZLAC8030L;
         assert_eq!(other.values, testbench::parameters::sheet::parse(&file, Some(model)).expect("parameters").values);
@@ -146,7 +146,7 @@ fn a_file_is_kept_compared_shown_before_and_applied_as_a_whole() {
 }
 
 #[test]
-fn a_transaction_goes_on_without_its_page_and_the_drive_is_not_enabled_meanwhile() {
+fn a_transaction_is_completed_without_its_page_and_the_drive_is_not_enabled_meanwhile() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
@@ -162,10 +162,10 @@ fn a_transaction_goes_on_without_its_page_and_the_drive_is_not_enabled_meanwhile
     });
 }
 
-/// What is told to the keeper of journals, in order; one with a full disk keeps none.
+/// A store of journals that records its calls; one with a full disk saves none.
 #[derive(Debug, Default)]
 struct Keeper {
-    told: Mutex<Vec<String>>,
+    shown: Mutex<Vec<String>>,
     is_full: bool,
     keeps_all: bool,
 }
@@ -175,18 +175,18 @@ impl Journals for Keeper {
         if self.is_full {
             return Err("the disk is full".into());
         }
-        self.told.lock().expect("whole").push(format!("{} leads back by {}", journal.node, journal.undo.len()));
+        self.shown.lock().expect("whole").push(format!("{} undoes {}", journal.node, journal.undo.len()));
         Ok(())
     }
 
     fn end(&self, node: NodeId) -> Result<(), String> {
-        self.told.lock().expect("whole").push(format!("{node} is done"));
+        self.shown.lock().expect("whole").push(format!("{node} is done"));
         if self.keeps_all { Err("the journal could not be deleted".into()) } else { Ok(()) }
     }
 }
 
 #[test]
-fn what_leads_back_is_kept_from_the_first_write_to_the_last_and_without_it_nothing_is_written() {
+fn a_journal_is_kept_from_the_first_write_to_the_last_and_without_it_nothing_is_written() {
     let keeper = Arc::new(Keeper::default());
     play_with(keeper.clone(), async |stage| {
         let mut page = stage.page().await;
@@ -197,8 +197,8 @@ fn what_leads_back_is_kept_from_the_first_write_to_the_last_and_without_it_nothi
         page.refused(setting("6081h:00", "5000")).await;
         page.knows(Command::RollBack { node: WHEEL }).await;
     });
-    let told = keeper.told.lock().expect("whole").clone();
-    assert_eq!(told, ["4 leads back by 1", "4 is done", "4 leads back by 1", "4 is done"]);
+    let shown = keeper.shown.lock().expect("whole").clone();
+    assert_eq!(shown, ["4 undoes 1", "4 is done", "4 undoes 1", "4 is done"]);
     play_with(Arc::new(Keeper { is_full: true, ..Keeper::default() }), async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
@@ -209,7 +209,7 @@ fn what_leads_back_is_kept_from_the_first_write_to_the_last_and_without_it_nothi
 }
 
 #[test]
-fn a_journal_that_stays_behind_is_news_for_every_page_and_the_write_holds() {
+fn a_journal_that_cannot_be_deleted_is_news_for_every_page_and_the_write_holds() {
     play_with(Arc::new(Keeper { keeps_all: true, ..Keeper::default() }), async |stage| {
         let (mut page, mut news) = (stage.page().await, stage.handle.news());
         page.must(Command::TakeControl {}).await;
@@ -220,10 +220,10 @@ fn a_journal_that_stays_behind_is_news_for_every_page_and_the_write_holds() {
     });
 }
 
-/// Step by step what the tour asks for: a parameter that makes a fault, its way back, and the store. ZLAC8030L quick start
+/// The steps of the tour: a parameter that causes a fault, its rollback, and the store. ZLAC8030L quick start
 /// guide V1.00, chapters 8 and 9: 2013h:01 is the motor's temperature threshold in 0.1 degC, fault 0800h.
 #[test]
-fn what_the_tour_asks_for_happens_and_is_told_in_the_state() {
+fn the_steps_of_the_tour_work_and_are_seen_in_the_state() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;

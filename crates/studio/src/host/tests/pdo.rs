@@ -1,4 +1,4 @@
-//! PDOs of virtual drives: what is shown, planned, written, refused half way and undone.
+//! PDOs of virtual drives: shown, planned, written, refused half-way and undone.
 //!
 //! The ZLAC8030L counts PDOs from 0, in 0.5 ms, and comes with nothing in its TPDOs (quick start guide V1.00, chapters 6 and 9).
 
@@ -44,24 +44,24 @@ impl Stage {
     }
 }
 
-fn named<'a>(told: &'a Value, name: &str) -> &'a Value {
-    let pdos = told["pdos"].as_array().expect("a list");
-    pdos.iter().find(|pdo| pdo["pdo"] == name).unwrap_or_else(|| panic!("{name} in {told}"))
+fn named<'a>(shown: &'a Value, name: &str) -> &'a Value {
+    let pdos = shown["pdos"].as_array().expect("a list");
+    pdos.iter().find(|pdo| pdo["pdo"] == name).unwrap_or_else(|| panic!("{name} in {shown}"))
 }
 
 #[test]
-fn every_pdo_is_told_with_what_keeps_it_away_and_what_may_be_changed() {
+fn every_pdo_is_shown_with_why_it_is_not_sent_and_what_may_be_changed() {
     play(async |stage| {
         let mut page = stage.page().await;
         stage.sleep(1100).await;
-        let told = page.knows(Command::Pdos { node: WHEEL }).await;
+        let shown = page.knows(Command::Pdos { node: WHEEL }).await;
         let names: Vec<&str> =
-            told["pdos"].as_array().expect("a list").iter().filter_map(|pdo| pdo["pdo"].as_str()).collect();
+            shown["pdos"].as_array().expect("a list").iter().filter_map(|pdo| pdo["pdo"].as_str()).collect();
         assert_eq!(names, ["TPDO1", "TPDO2", "TPDO3", "TPDO4", "RPDO1", "RPDO2", "RPDO3", "RPDO4"]);
-        let tpdo = named(&told, "TPDO1");
+        let tpdo = named(&shown, "TPDO1");
         assert_eq!((&tpdo["manual"], &tpdo["id"], &tpdo["valid"]), (&json!("TPDO0"), &json!(0x184), &json!(true)));
         assert_eq!((&tpdo["when"], &tpdo["silent"]), (&json!("on events"), &json!(["nothing is mapped into it"])));
-        let rpdo = named(&told, "RPDO1");
+        let rpdo = named(&shown, "RPDO1");
         assert_eq!(rpdo["objects"], json!([{ "object": "6040h:00", "name": "controlword", "bits": 16 }]));
         let silent = json!([
             "the node is pre-operational, and PDOs are sent and taken in operational only",
@@ -71,17 +71,17 @@ fn every_pdo_is_told_with_what_keeps_it_away_and_what_may_be_changed() {
         let takes = &tpdo["takes"];
         assert_eq!((&takes["objects"], &takes["mapping"], &takes["id"]), (&json!(4), &Value::Null, &Value::Null));
         assert_eq!((&takes["event"]["step_ms"], &takes["event"]["most_ms"]), (&json!(0.5), &json!(32767.5)));
-        assert_eq!((&told["can_undo"], &told["sync_heard"]), (&json!(false), &json!(false)));
+        assert_eq!((&shown["can_undo"], &shown["sync_heard"]), (&json!(false), &json!(false)));
     });
 }
 
 #[test]
-fn a_change_is_told_before_with_its_writes_and_what_it_does_to_the_bus() {
+fn a_change_is_planned_with_its_writes_and_its_effect_on_the_bus() {
     play(async |stage| {
         let mut page = stage.page().await;
-        let told = page.knows(planned(vec![state_and_position()])).await;
+        let shown = page.knows(planned(vec![state_and_position()])).await;
         let steps: Vec<_> =
-            told["steps"].as_array().expect("a list").iter().map(|step| (&step["object"], &step["purpose"])).collect();
+            shown["steps"].as_array().expect("a list").iter().map(|step| (&step["object"], &step["purpose"])).collect();
         let expected = [
             ("1800h:01", "off while it is changed"),
             ("1A00h:01", "map an object"),
@@ -96,17 +96,17 @@ fn a_change_is_told_before_with_its_writes_and_what_it_does_to_the_bus() {
             expected.iter().map(|(object, purpose)| (object, purpose)).collect::<Vec<_>>(),
             "CiA 301, 7.5.2.38"
         );
-        let tpdo = named(&told, "TPDO1");
+        let tpdo = named(&shown, "TPDO1");
         assert_eq!((&tpdo["bits"], &tpdo["when"]), (&json!(48), &json!("after every SYNC")));
         // The longest frame of 6 bytes has 55 + 10 * 6 bits (Davis et al., equation 1): 115 of 5000 in 10 ms at 500 kbit/s.
-        let load = |when: &str| told["bus"]["cycle_load_percent"][when].as_f64().expect("a number");
-        assert!((load("after") - load("before") - 2.3).abs() < 0.02, "{}", told["bus"]);
-        let frames = told["bus"]["frames"].as_array().expect("a list");
+        let load = |when: &str| shown["bus"]["cycle_load_percent"][when].as_f64().expect("a number");
+        assert!((load("after") - load("before") - 2.3).abs() < 0.02, "{}", shown["bus"]);
+        let frames = shown["bus"]["frames"].as_array().expect("a list");
         let of =
             |name: &str| frames.iter().find(|frame| frame["frame"] == name && frame["node"] == 4).expect("it is there");
         assert_eq!((&of("TPDO1")["before"], &of("TPDO1")["after"]["bytes"]), (&Value::Null, &json!(6)));
         assert!(of("TPDO1")["after"]["worst_ms"].as_f64().expect("a bound") > 0.0);
-        // What is less urgent waits for it too: each of its frames has the bus first.
+        // Frames of lower priority wait for it too.
         let answer = frames.iter().find(|frame| frame["frame"] == "SDO answer").expect("it is there");
         let worst = |when: &str| answer[when]["worst_ms"].as_f64().expect("a bound");
         assert!(worst("after") > worst("before"), "{answer}");
@@ -131,8 +131,8 @@ fn a_mapping_is_written_seen_in_the_trace_by_name_and_undone() {
         let lines = stage.lines(json!({ "kind": "pdo", "text": "position_actual_value" }));
         let text = lines.last().and_then(|line| line["text"].as_str()).unwrap_or_default();
         assert!(text.contains("TPDO1") && text.contains("statusword"), "{lines:?}");
-        let told = page.knows(Command::Pdos { node: WHEEL }).await;
-        assert_eq!((&told["can_undo"], &named(&told, "TPDO1")["silent"]), (&json!(true), &json!([])));
+        let shown = page.knows(Command::Pdos { node: WHEEL }).await;
+        assert_eq!((&shown["can_undo"], &named(&shown, "TPDO1")["silent"]), (&json!(true), &json!([])));
         assert_eq!(stage.state()["nodes"][1]["mapped"], 1);
         page.knows(Command::RollBack { node: WHEEL }).await;
         assert_eq!((stage.cell(COUNT).await, stage.cell(FIRST).await), (0, 0));
@@ -146,7 +146,7 @@ fn a_write_that_is_refused_half_way_leaves_every_pdo_as_it_was() {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
         let before = page.knows(Command::Pdos { node: WHEEL }).await["pdos"].clone();
-        // Entries longer than their object are taken by this drive; that a shorter one is not, it alone says.
+        // This drive accepts entries longer than their object; only the drive knows that it refuses a shorter one.
         let half = pdo("TPDO2", &[("6064h:00", 16)]);
         let (kind, text) = page.refused(written(vec![state_and_position(), half])).await;
         assert!(kind == "rolled_back" && text.contains("1A01h:01"), "{kind}: {text}");
@@ -157,7 +157,7 @@ fn a_write_that_is_refused_half_way_leaves_every_pdo_as_it_was() {
 }
 
 #[test]
-fn what_a_pdo_cannot_be_is_refused_with_the_reason_and_writes_nothing() {
+fn an_invalid_pdo_is_refused_with_the_reason_and_writes_nothing() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
@@ -170,7 +170,7 @@ fn what_a_pdo_cannot_be_is_refused_with_the_reason_and_writes_nothing() {
             (pdo("TPDO1", &[("5FFF", 16)]), "unknown_object", "not in the description"),
             (pdo("RPDO1", &[("6041", 16)]), "unfit_pdo", "only be read"),
             (id(0x601), "bad_value", "another service"),
-            (id(0x801), "bad_value", "11 bits"),
+            (id(0x801), "bad_value", "an 11-bit identifier"),
             (NewPdo { event_ms: Some(-1.0), ..state_and_position() }, "bad_value", "0 or more"),
             (NewPdo { event_ms: Some(40_000.0), ..state_and_position() }, "unfit_pdo", "32.7675s"),
         ];
@@ -195,18 +195,18 @@ fn what_a_pdo_cannot_be_is_refused_with_the_reason_and_writes_nothing() {
     });
 }
 
-/// As many bits in half of the time are twice the load, and at twice the bit rate half of it.
+/// Half the period is twice the load, and twice the bit rate half of it.
 #[test]
-fn the_load_is_told_for_the_cycle_and_the_bit_rate_that_were_asked_for() {
+fn the_load_is_computed_for_the_given_cycle_and_bit_rate() {
     play(async |stage| {
         let mut page = stage.page().await;
         let mut load = async |cycle_ms, bitrate| {
             let pdos = vec![state_and_position()];
-            let told = page.knows(Command::PlanPdos { node: WHEEL, pdos, cycle_ms, bitrate }).await["bus"].clone();
-            told["cycle_load_percent"]["after"].as_f64().expect("a number")
+            let shown = page.knows(Command::PlanPdos { node: WHEEL, pdos, cycle_ms, bitrate }).await["bus"].clone();
+            shown["cycle_load_percent"]["after"].as_f64().expect("a number")
         };
         let (usual, twice, half) = (load(10.0, None).await, load(5.0, None).await, load(10.0, Some(1_000_000)).await);
-        // Nothing is here but the cycle: no heartbeat as delivered (1017h is 0). Told to the hundredth.
+        // The bus has only the cycle: no heartbeat by default (1017h is 0). Given to two decimals.
         assert!((twice - 2.0 * usual).abs() < 0.02 && (half - usual / 2.0).abs() < 0.02, "{usual} {twice} {half}");
     });
 }
@@ -236,7 +236,7 @@ fn a_node_goes_to_operational_and_back_and_not_while_it_turns() {
 }
 
 #[test]
-fn a_pdo_is_switched_off_and_what_is_not_said_stays() {
+fn a_pdo_is_switched_off_and_omitted_fields_stay() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;

@@ -1,4 +1,4 @@
-//! The values of objects over time, as they pass.
+//! The values of objects over time.
 
 use std::time::Duration;
 
@@ -22,9 +22,9 @@ fn points(series: &Value) -> Vec<(f64, f64)> {
     points.map(|point| (point[0].as_f64().expect("a time"), point[1].as_f64().expect("a value"))).collect()
 }
 
-/// ZLAC8030L: 606Ch counts tenths of r/min. Of the PDO each sample counts, with the time at which it passed.
+/// ZLAC8030L: 606Ch counts tenths of r/min. Each PDO is a sample with its own time.
 #[test]
-fn a_mapped_object_is_a_series_with_each_frame_and_any_that_is_read_is_one() {
+fn mapped_objects_and_objects_that_are_read_are_series() {
     play(async |stage| {
         let wheel = stage.network.node(WHEEL);
         wheel.write(Mux::new(0x1800, 1), 0x8000_0184_u32).await.expect("off");
@@ -42,14 +42,14 @@ fn a_mapped_object_is_a_series_with_each_frame_and_any_that_is_read_is_one() {
         stage.network.sync(Some(Duration::from_millis(5)));
         stage.sleep(500).await;
         let took_s = (stage.network.now() - before).as_secs_f64();
-        let told = stage.series(json!({ "objects": "4:606C:00,2:6064:0", "after": begin }));
-        let series = told["series"].as_array().expect("series");
-        assert_eq!((&told["skipped"], series.len()), (&0.into(), 2), "{told}");
+        let shown = stage.series(json!({ "objects": "4:606C:00,2:6064:0", "after": begin }));
+        let series = shown["series"].as_array().expect("series");
+        assert_eq!((&shown["skipped"], series.len()), (&0.into(), 2), "{shown}");
         let (arm, wheel) = (&series[0], &series[1]);
         assert_eq!((&arm["object"], &arm["name"]), (&"2:6064:00".into(), &"position_actual_value".into()));
         assert_eq!((&wheel["object"], &wheel["unit"]), (&"4:606C:00".into(), &"0.1 r/min".into()));
         let speeds = points(wheel);
-        assert!(speeds.len() > 95, "each SYNC brings one, beside those that are read: {}", speeds.len());
+        assert!(speeds.len() > 95, "each SYNC gives one, besides those that are read: {}", speeds.len());
         assert!(speeds.is_sorted_by(|a, b| a.0 <= b.0));
         let span_s = speeds[speeds.len() - 1].0 - speeds[0].0;
         assert!((span_s - took_s).abs() < 0.05, "{span_s} of {took_s}");
@@ -62,10 +62,10 @@ fn a_mapped_object_is_a_series_with_each_frame_and_any_that_is_read_is_one() {
 }
 
 #[test]
-fn what_is_no_object_is_told() {
+fn a_text_that_is_not_an_object_is_refused() {
     for wrong in ["606C", "4:606C", "0:606C:00", "4:606G:00", "4:606C:100", "4:606C:00:1"] {
         let asked: AskedSeries = serde_json::from_value(json!({ "objects": wrong })).expect("parameters");
-        let refused = asked.understand().expect_err("it makes no sense");
+        let refused = asked.understand().expect_err("it is not valid");
         assert!(refused.contains("expected"), "{refused}");
     }
     let many = vec!["4:606C:00"; 33].join(",");

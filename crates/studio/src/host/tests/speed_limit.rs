@@ -1,4 +1,4 @@
-//! The speed limit of a session, against programs that ask for more than a page would.
+//! The speed limit of a session, against programs that request more than a page would.
 
 use cia402::PowerState;
 
@@ -7,7 +7,7 @@ use crate::message::{AxisSpeed, AxisTarget, BaseJog, Command, GroupMove};
 
 const LIMIT_RPM: f64 = 20.0;
 
-/// What turns a drive faster than the limit, or may.
+/// Commands that turn a drive faster than the limit, or may.
 fn too_fast() -> Vec<Command> {
     let axes = |degrees| [WHEEL, ARM].map(|node| AxisTarget { node, degrees }).to_vec();
     let speeds = |rpm| vec![AxisSpeed { node: WHEEL, rpm: 1.0 }, AxisSpeed { node: ARM, rpm }];
@@ -18,7 +18,7 @@ fn too_fast() -> Vec<Command> {
         jog(f64::NAN),
         Command::Velocity { node: WHEEL, rpm: -21.0, rpm_per_s: None },
         Command::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: Some(60.0) },
-        // What the drive is set to is 120 r/min as delivered.
+        // The drive is set to 120 r/min by default.
         Command::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None },
         Command::Home { node: ARM, method: 17, rpm: None },
         Command::Home { node: ARM, method: 17, rpm: Some(21.0) },
@@ -46,7 +46,7 @@ fn base(most_m_s: f64) -> BaseJog {
 }
 
 #[test]
-fn nothing_beyond_the_limit_of_a_session_is_begun() {
+fn no_motion_beyond_the_limit_of_a_session_is_started() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::LimitSpeed { rpm: Some(LIMIT_RPM) }).await;
@@ -66,7 +66,7 @@ fn nothing_beyond_the_limit_of_a_session_is_begun() {
         assert!(stage.network.moved().is_empty());
         stage.sleep(100).await;
         assert_eq!(stage.state()["speed_limit_rpm"], LIMIT_RPM);
-        // What keeps to it turns.
+        // A motion within the limit turns.
         page.must(Command::Velocity { node: WHEEL, rpm: -20.0, rpm_per_s: None }).await;
         stage.turns(WHEEL, 20.0).await;
         page.must(Command::StopAll {}).await;
@@ -79,7 +79,7 @@ fn nothing_beyond_the_limit_of_a_session_is_begun() {
 }
 
 #[test]
-fn a_lower_limit_stops_what_was_begun_under_another() {
+fn a_lower_limit_stops_a_motion_from_before() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.take_control_of_all().await;
@@ -91,7 +91,7 @@ fn a_lower_limit_stops_what_was_begun_under_another() {
         stage.turns(WHEEL, 60.0).await;
         page.must(Command::LimitSpeed { rpm: Some(30.0) }).await;
         stage.rests(WHEEL).await;
-        // A higher one stops nothing, and neither does that of a page that only looks.
+        // A higher limit stops nothing, and neither does that of a page without control.
         page.must(Command::Velocity { node: WHEEL, rpm: 30.0, rpm_per_s: None }).await;
         stage.turns(WHEEL, 30.0).await;
         page.must(Command::LimitSpeed { rpm: Some(60.0) }).await;
@@ -102,8 +102,8 @@ fn a_lower_limit_stops_what_was_begun_under_another() {
             page.must(Command::Alive {}).await;
         }
         assert!((stage.speed(WHEEL).await - 30.0).abs() < 5.0);
-        assert_eq!(stage.state()["speed_limit_rpm"], 60.0, "that of who has control");
-        // Who is given control has a limit of its own, from before.
+        assert_eq!(stage.state()["speed_limit_rpm"], 60.0, "that of the session in control");
+        // The session that gets control has its own limit, from before.
         page.must(Command::HandOver { to: other.session.id().0 }).await;
         stage.rests(WHEEL).await;
         assert_eq!(other.ask(jog(2.0)).await.error_kind(), "speed_limit");

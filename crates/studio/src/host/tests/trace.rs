@@ -1,4 +1,4 @@
-//! The trace of virtual drives: what stands in its lines, and what is left out.
+//! The trace of virtual drives: the contents of its lines, and filters.
 
 use can::Instant;
 use canopen::Mux;
@@ -8,7 +8,7 @@ use super::{ARM, Stage, WHEEL, play};
 use crate::trace::{Asked, BusFrame, Origin, Trace};
 
 impl Stage {
-    /// What is selected by a request.
+    /// The answer to a query.
     fn trace(&self, asked: Value) -> Value {
         let asked: Asked = serde_json::from_value(asked).expect("parameters");
         let query = asked.understand().expect("it makes sense");
@@ -19,7 +19,7 @@ impl Stage {
         self.trace(asked)["lines"].as_array().expect("lines").clone()
     }
 
-    /// Lets what has passed be taken in.
+    /// Lets the host process the frames so far.
     async fn settle(&self) {
         self.sleep(50).await;
     }
@@ -30,7 +30,7 @@ fn text(line: &Value) -> &str {
 }
 
 #[test]
-fn an_sdo_transfer_is_one_line_in_words_with_who_asked_and_how_long_it_took() {
+fn an_sdo_transfer_is_one_line_in_words_with_its_client_and_its_duration() {
     play(async |stage| {
         let begin = stage.trace(json!({}))["next"].clone();
         stage.network.node(ARM).read::<u32>(Mux::new(0x1000, 0)).await.expect("it has a type");
@@ -87,7 +87,7 @@ fn segments_of_a_transfer_are_one_line_with_the_time_from_the_first_to_the_last(
 }
 
 #[test]
-fn filters_let_through_what_they_name_and_hide_the_rest() {
+fn filters_show_only_matching_lines() {
     play(async |stage| {
         stage.network.node(ARM).nmt(canopen::NmtCommand::ResetNode);
         stage.sleep(1000).await;
@@ -95,9 +95,9 @@ fn filters_let_through_what_they_name_and_hide_the_rest() {
         assert!(all.iter().any(|line| line["node"] == 4));
         assert!(!of_arm.is_empty() && of_arm.iter().all(|line| line["node"] == 2), "{of_arm:?}");
         let booted = stage.lines(json!({ "kind": "nmt,heartbeat", "node": "2", "count": 1000 }));
-        let told: Vec<_> = booted.iter().map(text).collect();
-        let reset = told.iter().position(|text| *text == "NMT reset node, node 2").expect("the command");
-        assert!(told[reset..].contains(&"boot-up node 2"), "{told:?}");
+        let shown: Vec<_> = booted.iter().map(text).collect();
+        let reset = shown.iter().position(|text| *text == "NMT reset node, node 2").expect("the command");
+        assert!(shown[reset..].contains(&"boot-up node 2"), "{shown:?}");
         assert_eq!(booted[reset]["from"], "studio");
         assert!(booted.iter().any(|line| line["from"] == "node 2"));
         let by_id = stage.lines(json!({ "text": "702" }));
@@ -107,7 +107,7 @@ fn filters_let_through_what_they_name_and_hide_the_rest() {
 }
 
 #[test]
-fn what_the_studio_reads_can_be_left_out() {
+fn the_reads_of_the_studio_can_be_omitted() {
     play(async |stage| {
         stage.network.node(WHEEL).write(Mux::new(0x60FF, 0), 60_i32).await.expect("it is taken");
         stage.sleep(300).await;
@@ -125,24 +125,24 @@ fn what_the_studio_reads_can_be_left_out() {
 }
 
 #[test]
-fn what_makes_no_sense_is_told() {
+fn an_invalid_query_is_refused_with_the_reason() {
     for (asked, why) in [
         (json!({ "node": "128" }), "1 to 127"),
-        (json!({ "node": "4,x" }), "'x' is no node-ID"),
+        (json!({ "node": "4,x" }), "'x' is not a node-ID"),
         (json!({ "kind": "sdos" }), "expected some of nmt, sync"),
-        (json!({ "from_s": -1.0 }), "no time of the bus"),
+        (json!({ "from_s": -1.0 }), "expected a bus time"),
     ] {
         let asked: Asked = serde_json::from_value(asked).expect("parameters");
-        let refused = asked.understand().expect_err("it makes no sense");
+        let refused = asked.understand().expect_err("it is not valid");
         assert!(refused.contains(why), "{refused}");
     }
-    assert!(serde_json::from_value::<Asked>(json!({ "nodes": "4" })).is_err(), "a parameter that is not known");
+    assert!(serde_json::from_value::<Asked>(json!({ "nodes": "4" })).is_err(), "an unknown parameter");
 }
 
-/// Parts that are fetched one after the other give each line once, and a reader that is too slow is told how many frames it
-/// is not shown.
+/// Consecutive parts have each line once, and a reader that is too slow is given the number of frames
+/// that were skipped.
 #[test]
-fn a_reader_goes_on_where_it_was_and_is_told_what_it_missed() {
+fn a_reader_continues_where_it_was_and_gets_the_number_of_skipped_frames() {
     play(async |stage| {
         let first = stage.trace(json!({ "count": 10 }));
         assert_eq!(first["lines"].as_array().expect("lines").len(), 10);
@@ -162,7 +162,7 @@ fn a_reader_goes_on_where_it_was_and_is_told_what_it_missed() {
     });
 }
 
-/// What another program changes over SDO, and what was set up before the studio came, both count.
+/// Both changes by another program over SDO and mappings from before the studio count.
 #[test]
 fn a_pdo_is_split_by_the_mapping_that_is_in_the_drive() {
     play(async |stage| {

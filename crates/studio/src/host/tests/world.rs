@@ -1,4 +1,4 @@
-//! The world around virtual drives: what is done to it, what the drives say of it, what takes it back.
+//! The world around virtual drives: changes, their effect on the drives, and undo.
 
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
@@ -7,7 +7,7 @@ use super::*;
 use crate::world::{Around, Changed, WorldAsks, world_door};
 use testbench::around;
 
-/// The world for a host that is asked about it.
+/// A world for a host.
 struct Outside<'a>(&'a mut World);
 
 impl Around for Outside<'_> {
@@ -25,7 +25,7 @@ impl Around for Outside<'_> {
     }
 }
 
-/// Plays a scene before a studio whose world can be asked.
+/// Runs a scene with a studio that has a world.
 fn play_around(scene: impl AsyncFnOnce(&Stage)) {
     let network = Network::new();
     let mut world = World::new(Bitrate::K500, 1);
@@ -40,14 +40,14 @@ fn play_around(scene: impl AsyncFnOnce(&Stage)) {
     let stage = Stage { network, handle };
     let whole = async {
         tokio::select! {
-            () = host.run(|| None) => panic!("a host runs as long as there is a handle"),
+            () = host.run(|| None) => panic!("the host ended although there is a handle"),
             () = async { stage.scanned().await; scene(&stage).await } => {}
         }
     };
     run(&mut world, &mut asks, whole);
 }
 
-/// Moves the world by milliseconds, as the bus of a program does, and answers what it is asked between two.
+/// Steps the world by milliseconds, as the bus of a program does, and answers its requests between the steps.
 fn run(world: &mut World, asks: &mut WorldAsks, whole: impl Future<Output = ()>) {
     let mut whole = pin!(whole);
     let mut context = Context::from_waker(Waker::noop());
@@ -79,7 +79,7 @@ fn node_seen(seen: &Value, place: &str) -> Value {
 }
 
 #[test]
-fn a_load_is_felt_by_the_drive_and_taken_back() {
+fn a_load_is_measured_by_the_drive_and_undone() {
     play_around(async |stage| {
         let mut page = stage.page().await;
         assert_eq!(page.ask(doing("4 load torque 2")).await.error_kind(), "not_in_control");
@@ -108,7 +108,7 @@ fn a_load_is_felt_by_the_drive_and_taken_back() {
 }
 
 #[test]
-fn what_happens_to_a_drive_is_seen_on_the_bus_and_in_the_news() {
+fn changes_of_the_world_are_seen_on_the_bus_and_in_the_news() {
     play_around(async |stage| {
         let mut news = stage.handle.news();
         let mut page = stage.page().await;
@@ -127,18 +127,18 @@ fn what_happens_to_a_drive_is_seen_on_the_bus_and_in_the_news() {
         page.must(doing("4 power off")).await;
         stage.sleep(3_000).await;
         assert_eq!(node_seen(&seen(&mut page, None).await, "4")["power"], "off");
-        let mut told = Vec::new();
+        let mut shown = Vec::new();
         while let Ok(text) = news.try_recv() {
-            told.push(text.to_string());
+            shown.push(text.to_string());
         }
         for line in ["world: 2 input x0 1", "world: 4 cable cut", "world: 4 cable join", "world: 4 power off"] {
-            assert!(told.iter().any(|news| news.contains(line)), "{line}: {told:?}");
+            assert!(shown.iter().any(|news| news.contains(line)), "{line}: {shown:?}");
         }
     });
 }
 
 #[test]
-fn what_makes_no_sense_is_refused_with_what_was_expected_and_leaves_no_trace() {
+fn an_invalid_line_is_refused_with_what_was_expected_and_changes_nothing() {
     play_around(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
@@ -161,9 +161,9 @@ fn what_makes_no_sense_is_refused_with_what_was_expected_and_leaves_no_trace() {
     });
 }
 
-/// Of what was done only the newest are kept, and they know their numbers.
+/// Only the newest changes are kept, with their numbers.
 #[test]
-fn what_was_done_is_bounded() {
+fn the_list_of_changes_is_bounded() {
     play_around(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
@@ -178,7 +178,7 @@ fn what_was_done_is_bounded() {
 }
 
 #[test]
-fn without_a_world_that_is_said() {
+fn without_a_world_commands_to_it_are_refused() {
     play(async |stage| {
         let mut page = stage.page().await;
         page.must(Command::TakeControl {}).await;
@@ -190,9 +190,9 @@ fn without_a_world_that_is_said() {
 }
 
 #[test]
-fn what_the_bus_says_beside_frames_is_shown_and_told() {
+fn the_health_of_the_bus_is_in_the_state_and_its_notes_are_news() {
     let wire = Wire::default();
-    let told = wire.clone();
+    let shown = wire.clone();
     let setting = Setting { wire, ..setting() };
     play_in(
         setting,
@@ -200,12 +200,12 @@ fn what_the_bus_says_beside_frames_is_shown_and_told() {
             let mut news = stage.handle.news();
             let _page = stage.page().await;
             assert_eq!(stage.state()["bus"]["health"]["state"], Value::Null);
-            told.update(|health| (health.state, health.transmit_errors) = (Some("error-passive"), Some(136)));
-            told.tell("nobody acknowledges what is sent");
+            shown.update(|health| (health.state, health.transmit_errors) = (Some("error-passive"), Some(136)));
+            shown.tell("no node acknowledges what is sent");
             stage.sleep(200).await;
             let health = stage.state()["bus"]["health"].clone();
             assert_eq!((&health["state"], &health["transmit_errors"]), (&"error-passive".into(), &136.into()));
-            assert!(news.try_recv().expect("it is told").contains("nobody acknowledges"));
+            assert!(news.try_recv().expect("it is shown").contains("no node acknowledges"));
         },
         |_| {},
         async |_| {},
