@@ -20,13 +20,13 @@ pub struct Gear {
 pub enum GearError {
     /// The ratio is not a number above 0 within what gears have.
     #[error(
-        "a gear ratio of {} is none: expected turns of the drive's shaft for one turn of the output, {LEAST_RATIO} to {MOST_RATIO}. \
+        "a gear ratio of {} is out of range: expected turns of the drive's shaft for one turn of the output, {LEAST_RATIO} to {MOST_RATIO}. \
          For a machine that turns the other way round see polarity (607Eh), or the drive's own object for it",
         Shown(*.0)
     )]
     Ratio(f64),
     /// The feed is not a length above 0.
-    #[error("a feed constant of {} m is none: expected the way for one turn of the output, 1 um to 100 m", Shown(*.0))]
+    #[error("a feed constant of {} m is out of range: expected the way for one turn of the output, 1 um to 100 m", Shown(*.0))]
     Feed(f64),
 }
 

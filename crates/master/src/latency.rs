@@ -130,7 +130,7 @@ mod tests {
 
     const NODE: NodeId = NodeId::new(4).expect("4 is a node-ID");
 
-    /// A conversation: `>` sent, `<` heard, the time in µs, the frame; what came of it.
+    /// A conversation: `>` sent, `<` heard, the time in µs, the frame; the samples.
     fn measured(meter: &mut Meter, lines: &[(char, u64, &str)]) -> Vec<Sample> {
         for (_, micros, frame) in lines {
             let (frame, at): (Frame, _) = (frame.parse().unwrap(), Instant::from_micros(*micros));

@@ -24,7 +24,7 @@ use plot::{Event, EventKind};
 /// Called for each section as it begins.
 pub(super) type Progress = Rc<dyn Fn(&str)>;
 
-/// Decides everything random on the bus: runs are repeatable.
+/// The seed of everything random on the bus: runs are repeatable.
 const SEED: u64 = 1;
 
 /// How often something is asked while a motor runs whose drive watches its host: the ZLAC8030L stops it when it hears

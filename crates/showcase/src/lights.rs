@@ -27,7 +27,7 @@ pub(super) fn red_flashes(bench: &mut Bench) -> Vec<Duration> {
                 seen.push(lit);
             }
             (lit, dark) = (Duration::ZERO, dark + LOOK);
-            // A round is counted from its begin only.
+            // A round is counted from its start only.
             in_round |= dark >= PAUSE;
         }
         seen

@@ -41,7 +41,7 @@ impl Filter {
     /// Events of these nodes and of these kinds; of all, where none is named.
     ///
     /// # Errors
-    /// A kind that is none of [`KINDS`].
+    /// A kind that is not among [`KINDS`].
     pub fn new<S: AsRef<str>>(
         nodes: impl IntoIterator<Item = u8>,
         kinds: impl IntoIterator<Item = S>,
@@ -95,7 +95,7 @@ pub fn json(event: &Event) -> Value {
     Value::Object(map)
 }
 
-/// What only this kind of event has.
+/// Fields of this kind of event only.
 fn own(kind: &EventKind) -> Value {
     match kind {
         EventKind::Power(phase) => json!({ "to": phase.word() }),

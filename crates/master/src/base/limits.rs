@@ -69,7 +69,7 @@ impl BaseLimits {
 /// Why a base cannot be made, or did not do what it should.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum BaseError {
-    /// No length.
+    /// Not a length.
     #[error("{what} is {value}: state a finite length above 0, in metres")]
     BadLength {
         /// Which.
@@ -85,9 +85,9 @@ pub enum BaseError {
         /// What was given.
         value: f64,
     },
-    /// A twist that is infinite or no number.
+    /// A twist that is infinite or not a number.
     #[error(
-        "a twist of {linear_m_s} m/s and {angular_rad_s} rad/s: both have to be finite numbers. The last one counts on"
+        "a twist of {linear_m_s} m/s and {angular_rad_s} rad/s: both have to be finite numbers. The last one stays in force"
     )]
     BadTwist {
         /// What was given.
@@ -96,7 +96,7 @@ pub enum BaseError {
         angular_rad_s: f64,
     },
     /// Two networks.
-    #[error("both wheels have to be on one network, which one SYNC joins")]
+    #[error("both wheels have to be on one network, with one SYNC")]
     OtherNetwork,
     /// Another base or group has the wheel.
     #[error("node {node} ({controlword}) already belongs to a group or a base: close that first")]
@@ -108,7 +108,7 @@ pub enum BaseError {
     },
     /// The limit is more than the drive does.
     #[error(
-        "node {node}: wheel_m_s needs {} r/min, and the drive does {} r/min at most, by {bound}. State less",
+        "node {node}: wheel_m_s needs {} r/min, and the drive does {} r/min at most, by {bound}. Lower wheel_m_s",
         Shown(*needed_rpm), Shown(*most_rpm)
     )]
     BeyondDrive {

@@ -1,6 +1,6 @@
 //! The bits that a CANopen manager's objects 1F80h and 1F81h are made of. Source: CiA 302-2.
 
-/// NMT startup, 1F80h: what the master does of itself.
+/// NMT startup, 1F80h: what the master does on its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Startup(pub u32);
 

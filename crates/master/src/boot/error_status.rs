@@ -29,7 +29,7 @@ pub enum ErrorStatus {
     ConfigurationFailed,
     /// K: no heartbeat when its watch was begun.
     NoHeartbeatAtStart,
-    /// L: it was operational before, and was left so. No failure.
+    /// L: it was operational before, and was left so. Not a failure.
     InitiallyOperational,
     /// M: another product code (1018h:02) than 1F86h has.
     OtherProduct,
@@ -49,7 +49,7 @@ use ErrorStatus::{
 };
 
 const WRONG_DEVICE: &str =
-    "another device is at this node-ID than was planned: look which one is wired there, or correct the plan";
+    "another device than planned is at this node-ID: check which one is wired there, or correct the plan";
 
 /// Every status once, in the order of the letters.
 const TABLE: [Row; 15] = [
@@ -77,7 +77,7 @@ const TABLE: [Row; 15] = [
     (
         NoProgram,
         'G',
-        "its program cannot be compared, or is another than expected (1F55h) and none is at hand",
+        "its program cannot be compared, or is another than expected (1F55h) and none is available",
         "load the program with its maker's tool, or correct 1F55h and bit 5 of 1F81h",
     ),
     (
@@ -98,14 +98,14 @@ const TABLE: [Row; 15] = [
         InitiallyOperational,
         'L',
         "it was operational before, and was left as it is",
-        "to configure it, stop what it does and reset it",
+        "to configure it, stop it and reset it",
     ),
     (OtherProduct, 'M', "its product code (1018h:02) is not the expected one (1F86h)", WRONG_DEVICE),
     (
         OtherRevision,
         'N',
         "its revision number (1018h:03) is not the expected one (1F87h)",
-        "another firmware or hardware is there than was planned: update it, or correct the plan",
+        "its firmware or hardware differs from the plan: update it, or correct the plan",
     ),
     (
         OtherSerial,

@@ -29,7 +29,7 @@ const HEARTBEAT: Duration = Duration::from_millis(500);
 /// Everything that the boot-up of a network goes by.
 #[derive(Clone, Debug)]
 pub struct BootPlan {
-    /// What the master does of itself.
+    /// What the master does on its own.
     pub startup: Startup,
     /// The nodes, and what is expected of each.
     pub nodes: BTreeMap<NodeId, Expectation>,
@@ -73,12 +73,12 @@ pub struct Expectation {
     pub restore: u8,
     /// The longest time between its heartbeats (1016h of the master); `None`: by its own 1017h.
     pub heartbeat: Option<Duration>,
-    /// What it is, where that is known.
+    /// Its model, where that is known.
     pub description: Option<&'static Description>,
 }
 
 impl Expectation {
-    /// What a model says of itself, as a mandatory node that is not disturbed while it is operational.
+    /// The identity of a model, as a mandatory node that is not disturbed while it is operational.
     pub fn of(description: &'static Description) -> Self {
         let identity = description.identity;
         // A description without a number (0: 1018h is mandatory, the number may be unknown) expects none.

@@ -223,7 +223,7 @@ impl<'a> NodeBoot<'a> {
             return Ok(());
         }
         let Some(expected) = self.expectation.software else {
-            let found = Found::Text("a plan that does not say which (1F55h is 0)".to_owned());
+            let found = Found::Text("a plan without one (1F55h is 0)".to_owned());
             return self.fail(StepKind::Software, Some(SOFTWARE), Expected::Answer, found, ErrorStatus::NoProgram);
         };
         let allowed = assignment.has(Assignment::UPDATE_SOFTWARE) && !assignment.has(Assignment::KEEP_ALIVE);

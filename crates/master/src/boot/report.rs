@@ -1,4 +1,4 @@
-//! What came of a boot-up.
+//! The results of a boot-up.
 
 use core::fmt;
 
@@ -7,7 +7,7 @@ use canopen::{NmtState, NodeId};
 use super::error_status::ErrorStatus;
 use super::step::{Step, Verdict};
 
-/// What came of the boot-up of a network.
+/// The result of the boot-up of a network.
 #[derive(Clone, Debug)]
 pub struct BootReport {
     /// Each node, by its node-ID.
@@ -16,7 +16,7 @@ pub struct BootReport {
     pub notes: Vec<String>,
 }
 
-/// What came of the boot-up of one node.
+/// The result of the boot-up of one node.
 #[derive(Clone, Debug)]
 pub struct NodeReport {
     /// Which.

@@ -46,7 +46,7 @@ pub struct ProcessImage {
 
 const NONE: u16 = u16::MAX;
 
-/// A PDO keeps its position for ever; one that is no longer used has no identifier.
+/// A PDO keeps its position; one that is no longer used has no identifier.
 #[derive(Clone, Debug)]
 struct Tpdo {
     node: NodeId,

@@ -113,15 +113,15 @@ impl fmt::Display for Refusal {
                 f.write_str("its TPDO does not come: check that it is operational and sends with each SYNC")
             }
             Self::Remapped => f.write_str("one of its PDOs got another mapping: open it again. It was stopped"),
-            Self::Stopped(loss) => write!(f, "it was stopped, since {loss}. Switch it off to begin anew"),
+            Self::Stopped(loss) => write!(f, "it was stopped, since {loss}. Switch it off to start again"),
             Self::Fault(statusword) => {
                 write!(f, "it is at fault (statusword {:04X}h): remove the cause, then reset the fault", statusword.0)
             }
             Self::LostOperation(Some(state)) => {
-                write!(f, "it left Operation enabled and is in {}. Switch it off to begin anew", state.name())
+                write!(f, "it left Operation enabled and is in {}. Switch it off to start again", state.name())
             }
             Self::LostOperation(None) => {
-                f.write_str("its statusword shows no state any more. Switch it off to begin anew")
+                f.write_str("its statusword shows no state any more. Switch it off to start again")
             }
             Self::WrongKind => f.write_str("its mode takes set-points of another kind. The drive is held instead"),
             Self::NoNumber => {

@@ -212,7 +212,7 @@ impl fmt::Display for Sdo {
             SdoStep::BadChecksum { mux, said, found } => {
                 f.write_str("block transfer of ")?;
                 named(f, *mux)?;
-                write!(f, ": its checksum is {found:04X}h, and {said:04X}h was said")
+                write!(f, ": its checksum is {found:04X}h, and {said:04X}h was sent")
             }
             SdoStep::Abort(mux, code) => {
                 let who = if self.from == Side::Server { "the drive" } else { "the master" };

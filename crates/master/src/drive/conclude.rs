@@ -96,7 +96,8 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
 fn without_ramp((conclusion, advice): (String, String), facts: &[Fact]) -> (String, String) {
     let zero = facts.iter().find_map(|fact| if let Fact::RateOfZero(object) = fact { Some(object) } else { None });
     let Some(object) = zero else { return (conclusion, advice) };
-    let first = format!("Write how fast its speed may change to {object}: many drives do not move while it is 0");
+    let first =
+        format!("Write the permitted rate of change of its speed to {object}: many drives do not move while it is 0");
     (conclusion, format!("{first}. {advice}"))
 }
 
@@ -104,7 +105,7 @@ fn without_ramp((conclusion, advice): (String, String), facts: &[Fact]) -> (Stri
 fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
     match trigger {
         Trigger::Waiting => text(
-            "The drive is busy with itself and does not get ready",
+            "The drive is busy with its self-test or fault reaction and does not get ready",
             "Wait for its self-test or fault reaction to end; check its supply; switch it off and on if it persists",
         ),
         Trigger::Ignored(command) => (
@@ -166,7 +167,7 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
         Trigger::Elsewhere { at, target, unit, by } => elsewhere(*at, *target, unit, by),
         Trigger::Fault | Trigger::LostOperation | Trigger::HeldUp(_) | Trigger::Silent(_) => text(
             "The drive is no longer where it was a moment ago",
-            "Read its state again: it changes while being looked at",
+            "Read its state again: it changes while it is read",
         ),
     }
 }
@@ -178,13 +179,13 @@ fn held_up(time: Duration) -> (String, String) {
              allows: the drive has stopped by itself, and is not set going again",
             time.as_secs_f64()
         ),
-        "Look where it stands, then begin the motion anew".to_owned(),
+        "Check where it stands, then start the motion again".to_owned(),
     )
 }
 
 fn elsewhere(at: f64, target: f64, unit: &str, by: &Interference) -> (String, String) {
     let place = format!("It is at {} {unit} where {} {unit} was asked for", Shown(at), Shown(target));
-    let find = "Find out who else commands it: another master, a PLC, a pendant, an RPDO. When it is safe, begin the motion anew";
+    let find = "Find out who else commands it: another master, a PLC, a pendant, an RPDO. When it is safe, start the motion again";
     match by {
         Interference::Halted => (format!("{place}: another master has halted it (bit 8 of 6040h)"), find.to_owned()),
         Interference::Retargeted { object, now, sent } => {

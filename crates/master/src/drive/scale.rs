@@ -327,7 +327,7 @@ impl Drive {
     }
 }
 
-/// A change of the shaft's speed below this is none: half a count of the speed objects.
+/// A change of the shaft's speed below this does not count: half a count of the speed objects.
 const LEAST_CHANGE_RPM: f64 = 0.5;
 
 /// A ramp as an acceleration in counts that are `worth` (r/min)/s each; a change without a ramp is `none_from`. A time that is

@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::units::{Amperes, Celsius, Counts, Degrees, Rpm, Volts};
 use canopen::Mux;
 
-/// Everything that a drive says of itself at one time. What the model does not have is `None`.
+/// Everything that a drive shows at one time. What the model does not have is `None`.
 #[derive(Clone, Debug)]
 pub struct DriveState {
     /// 6041h.

@@ -135,7 +135,7 @@ pub enum Error {
     },
     /// The node lacks an object that the model has, though both say the same identity.
     #[error(
-        "node {node} is not a {model}, though it says the same of itself: it has no {object}. Name the right model; \
+        "node {node} is not a {model}, though it has the same identity: it has no {object}. Name the right model; \
          what stores parameters on one may set something else on the other"
     )]
     OtherModel {
@@ -147,7 +147,7 @@ pub enum Error {
         object: Mux,
     },
     /// The drive has no axis of this number.
-    #[error("node {node}: the {model} has {axes} axes, and none of number {}", axis.0)]
+    #[error("node {node}: the {model} has {axes} axes, and no axis {}", axis.0)]
     NoSuchAxis {
         /// The node.
         node: NodeId,

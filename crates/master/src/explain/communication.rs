@@ -32,14 +32,14 @@ fn silent(seen: &Observed) -> Option<Finding> {
             format!("Start it: ferrodrive nmt {node} start"),
         ),
         (_, 1..) => (
-            format!("The node lives ({heartbeats} heartbeats heard) and its SDO server does not answer"),
-            "Look whether another program has an SDO transfer open with it; reset the node's communication \
+            format!("The node is alive ({heartbeats} heartbeats heard), but its SDO server does not answer"),
+            "Check whether another program has an SDO transfer open with it; reset the node's communication \
              (ferrodrive nmt reset-communication), or switch it off and on"
                 .to_owned(),
         ),
         _ => (
             "No node is there, or its bit rate, node-ID or cable is wrong".to_owned(),
-            "Look at its supply and cable, at the termination (120 ohm at both ends), and who is there: ferrodrive scan"
+            "Check its supply and cable, the termination (120 ohm at both ends), and who is there: ferrodrive scan"
                 .to_owned(),
         ),
     };
@@ -134,7 +134,7 @@ fn nmt_by_other(seen: &Observed) -> Option<Finding> {
             TOPIC,
             "nmt_by_other",
             [
-                "The NMT state changes when the one master wants it".to_owned(),
+                "NMT commands come from one master only".to_owned(),
                 format!("{} NMT commands of another program; the last one was {name} to {}", last.count, all_or(to)),
                 "PDOs end, or the node starts anew, in the middle of a motion".to_owned(),
                 "Find the other NMT master (ferrodrive dump --service nmt) and let one of the two do it".to_owned(),

@@ -114,7 +114,7 @@ fn position(seen: &Observed) -> Option<Finding> {
             [
                 "Controlword bit 4 rises for each new target (CiA 402-2, 10.1)".to_owned(),
                 found,
-                "Bit 4 still stands from the target before: the one in 607Ah was never taken".to_owned(),
+                "Bit 4 is still set from the target before: the one in 607Ah was never taken".to_owned(),
                 "Clear bit 4, wait until statusword bit 12 is 0, then set it again".to_owned(),
             ],
         ));
@@ -206,7 +206,7 @@ fn limits(seen: &Observed, mode: ModeOfOperation, findings: &mut Vec<Finding>) {
                     format!("A limit above 0 in {}", seen.named(object)),
                     "It is 0".to_owned(),
                     "The limit holds every set-point at 0".to_owned(),
-                    format!("Write {object}: what the motor and the machine bear"),
+                    format!("Write {object}: what the motor and the machine can take"),
                 ],
             ));
         }
@@ -228,7 +228,7 @@ fn ramps(seen: &Observed, mode: ModeOfOperation, findings: &mut Vec<Finding>) {
                 format!("A rate above 0 in {}", seen.named(object)),
                 "It is 0".to_owned(),
                 "The speed may not change: many drives do not move so".to_owned(),
-                format!("Write how fast its speed may change to {object}"),
+                format!("Write the permitted rate of change of its speed to {object}"),
             ],
         ));
     }

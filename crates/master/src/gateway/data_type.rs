@@ -58,7 +58,7 @@ impl GatewayType {
         }
     }
 
-    /// The bytes of a value; `None` if the text is none of this type, or too large for it.
+    /// The bytes of a value; `None` if the text is not of this type, or too large for it.
     pub fn bytes(self, text: &str) -> Option<Vec<u8>> {
         match self {
             Self::Boolean => match text {

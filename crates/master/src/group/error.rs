@@ -52,7 +52,7 @@ pub enum GroupError {
     /// The limit is more than the drive does.
     #[error(
         "axis {axis}, node {node}: a velocity of {} r/min was stated as its limit, and the drive does {} r/min at most, by \
-         {bound}. State less", Shown(*stated_rpm), Shown(*most_rpm)
+         {bound}. Lower the limit", Shown(*stated_rpm), Shown(*most_rpm)
     )]
     BeyondDrive {
         /// Which axis, from 1.

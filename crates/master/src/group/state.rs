@@ -72,7 +72,7 @@ pub enum StopCause {
     },
     /// No path to rest was found from where the axes were: each drive was stopped by its own quick stop.
     NoPathToRest,
-    /// Somebody asked for it.
+    /// It was asked for.
     Asked,
 }
 
@@ -96,12 +96,12 @@ impl fmt::Display for StopCause {
             ),
             Self::OutOfReach { cycles } => write!(
                 f,
-                "the group was stopped: the points of its path came {cycles} cycles late, and to join it again would pass the \
+                "the group was stopped: the points of its path came {cycles} cycles late, and joining it again would exceed the \
                  limits of speed or acceleration. Give points earlier, or more of them before the start (prefill)"
             ),
             Self::NoPathToRest => f.write_str(
                 "the group was stopped by the quick stop (605Ah) of each of its drives, not along a path, since none to rest was \
-                 found within its limits. Switch it off, look where its axes are, and enable it again",
+                 found within its limits. Switch it off, check where its axes are, and enable it again",
             ),
             Self::Asked => f.write_str("the group was stopped by command"),
         }

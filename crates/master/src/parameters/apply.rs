@@ -99,7 +99,7 @@ impl Drive {
         }
     }
 
-    /// Puts back what `done` has written, in reverse, and looks whether it is so.
+    /// Puts back what `done` has written, in reverse, and reads it back.
     async fn go_back(&self, plan: &Plan, done: &[Step]) -> Undone {
         let undo: Vec<(Mux, Vec<u8>)> =
             done.iter().rev().filter_map(|step| Some((step.object, step.before.clone()?))).collect();

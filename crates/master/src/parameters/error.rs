@@ -17,7 +17,7 @@ use crate::limits::Limits;
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum PlanError {
     /// The node is another device.
-    #[error("node {node} is another device than these parameters are of: they are of {wanted}; it says {found}")]
+    #[error("node {node} is not the device of these parameters: they are for {wanted}; its identity is {found}")]
     OtherDevice {
         /// The node.
         node: NodeId,

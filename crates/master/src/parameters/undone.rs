@@ -32,7 +32,7 @@ impl fmt::Display for Undone {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.not_put_back.is_empty() {
             return match self.put_back {
-                0 => f.write_str("Nothing had been written: everything stands as before"),
+                0 => f.write_str("Nothing had been written: nothing has changed"),
                 1 => f.write_str("What had been written was put back: 1 object reads as before"),
                 many => write!(f, "What had been written was put back: {many} objects read as before"),
             };
@@ -46,8 +46,8 @@ impl fmt::Display for Undone {
     }
 }
 
-/// Writes what leads back, in this order, and looks whether every object has again what it had: `had`, or else what its
-/// last write here was. Ends at the first silence: what is left then is reported.
+/// Writes what leads back, in this order, and checks whether every object has again what it had: `had`, or else what
+/// its last write here was. Ends at the first silence: what is left then is reported.
 pub async fn roll_back(node: &Node, undo: &[(Mux, Vec<u8>)], had: impl Fn(Mux) -> Option<Vec<u8>>) -> Undone {
     let mut silent = None;
     for (object, value) in undo {

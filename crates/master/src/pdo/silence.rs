@@ -51,9 +51,9 @@ pub enum Silence {
 /// A PDO that is held back for longer than this seems silent to a person.
 const LONG: Duration = Duration::from_secs(1);
 
-/// What keeps a PDO away, the first thing to mend first; empty if nothing is known that does.
+/// What keeps a PDO away, the first thing to fix first; empty if nothing is known that does.
 pub fn why_silent(config: &PdoConfig, cob_id: CobId, situation: &Situation) -> Vec<Silence> {
-    // Whatever else there is acts only once this has been mended.
+    // Whatever else there is acts only once this has been fixed.
     if !cob_id.is_valid() {
         return vec![Silence::Off];
     }

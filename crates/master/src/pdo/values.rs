@@ -41,7 +41,7 @@ pub enum PdoUnfit {
         objects: String,
     },
     /// A mapping record of the model is shorter.
-    #[error("{pdo} would have {objects} objects; of a {model} it has at most {most}")]
+    #[error("{pdo} would have {objects} objects; on a {model} it has at most {most}")]
     TooMany {
         /// The model.
         model: &'static str,

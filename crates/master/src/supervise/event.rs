@@ -21,10 +21,10 @@ pub enum SupervisorEvent {
     Held(NodeSet),
     /// All that was lost is back and stands: the heartbeat is sent again.
     Released,
-    /// A node came back, and this came of its boot-up. It stands, and is not started until
+    /// A node came back, with the result of its boot-up. It stands, and is not started until
     /// [`Supervisor::resume`](super::Supervisor::resume).
     Recovered(NodeReport),
-    /// A node came back, and could not be made to stand: why.
+    /// A node came back, and could not be stopped: why.
     NotStopped(NodeId, String),
     /// Another master is on the bus.
     Foreign(Foreign),
@@ -81,7 +81,9 @@ impl fmt::Display for SupervisorEvent {
             Self::Event(event) => event.fmt(f),
             Self::Emcy(record) => record.fmt(f),
             Self::Held(nodes) => {
-                f.write_str("this master holds its heartbeat back until all is back and stands; for want of it stops")?;
+                f.write_str(
+                    "this master withholds its heartbeat until all nodes are back and at rest; without it stops",
+                )?;
                 let mut before = ": node ";
                 for node in nodes.iter() {
                     write!(f, "{before}{node}")?;
@@ -89,14 +91,14 @@ impl fmt::Display for SupervisorEvent {
                 }
                 Ok(())
             }
-            Self::Released => f.write_str("all is back and stands: this master sends its heartbeat again"),
+            Self::Released => f.write_str("all nodes are back and at rest: this master sends its heartbeat again"),
             Self::Recovered(report) if report.has_failed() => report.fmt(f),
             Self::Recovered(report) => {
-                write!(f, "{report}\n  it stands; `resume {}` lets it take part again", report.node)
+                write!(f, "{report}\n  it is at rest; `resume {}` lets it take part again", report.node)
             }
             Self::NotStopped(node, why) => write!(
                 f,
-                "node {node} is back, and could not be made to stand: {why}. Go near it only without its supply; `resume {node}` \
+                "node {node} is back, but could not be stopped: {why}. Switch off its supply before going near it; `resume {node}` \
                  tries again"
             ),
             Self::Foreign(foreign) => foreign.fmt(f),

@@ -72,7 +72,7 @@ const LENGTHS: [(&str, f64); 5] = [("um", 1e-6), ("µm", 1e-6), ("mm", 1e-3), ("
 /// A length such as `10mm` or `0.5m`, in metres.
 ///
 /// # Errors
-/// [`ParseUnitError`] when it is none.
+/// [`ParseUnitError`] when it is not one.
 pub fn parse_length(text: &str) -> Result<f64, ParseUnitError> {
     const LENGTH: &str = "a length such as 10mm or 0.5m";
     let (number, unit) = split(text, LENGTH)?;

@@ -237,7 +237,7 @@ impl FromStr for Ramp {
 /// A duration such as `500ms` or `2s`.
 ///
 /// # Errors
-/// [`ParseUnitError`] when it is none, negative, or longer than a year.
+/// [`ParseUnitError`] when it is not a time, negative, or longer than a year.
 pub fn parse_duration(text: &str) -> Result<Duration, ParseUnitError> {
     let (number, unit) = split(text, TIME)?;
     let seconds = match unit {

@@ -219,7 +219,7 @@ fn a_manager_s_dictionary_is_a_plan() {
     let refused = plan(&objects).unwrap_err().to_string();
     assert!(refused.starts_with("1F80h is 2h: without its bit 0 the device is not the NMT master"), "{refused}");
     objects.insert((0x1F80, 0), 0x03_u32.to_le_bytes().to_vec());
-    // Half a configuration is none.
+    // Half a configuration does not count.
     objects.get_mut(&(0x1F22, SERVO)).unwrap().pop();
     let refused = plan(&objects).unwrap_err().to_string();
     assert!(refused.starts_with("1F22h:04, the concise DCF of node 4, is not whole: "), "{refused}");

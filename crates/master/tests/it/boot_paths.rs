@@ -58,7 +58,7 @@ fn another_program_version_ends_with_g_or_h_and_the_right_one_goes_on() {
         (0x1235, UPDATE, Some('G')),
         (0x1235, UPDATE | Assignment::KEEP_ALIVE, Some('H')),
         (0x1234, UPDATE | Assignment::KEEP_ALIVE, None),
-        // Nobody asks.
+        // No request is sent.
         (0x1235, 0, None),
     ] {
         let mut bus = bus_of(device().u32(0x1F56, 1, there));

@@ -298,7 +298,7 @@ fn a_block_transfer_that_goes_wrong_is_reported_and_forgotten() {
     let mut decoder = Decoder::new();
     lines(&mut decoder, &corrupt);
     let shown = lines(&mut decoder, &["584#A2027F0000000000", "604#D5C3310000000000", "584#8008100004000405"]);
-    assert!(shown[1].contains("and 31C3h was said"), "{}", shown[1]);
+    assert!(shown[1].contains("and 31C3h was sent"), "{}", shown[1]);
     assert!(shown[2].contains("the drive aborts 1008h:00 manufacturer_device_name"), "{}", shown[2]);
     // Segments without a beginning, an abort in the middle, a client that begins anew.
     let shown = lines(&mut decoder, &["604#0131323334353637", "584#A2027F0000000000"]);

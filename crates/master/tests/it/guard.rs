@@ -92,9 +92,9 @@ impl Bench {
 
     fn guard(&mut self, id: u8) -> HostLoss {
         let drive = self.drive(id);
-        let foretold = self.run(drive.host_loss_if_guarded()).unwrap();
+        let predicted = self.run(drive.host_loss_if_guarded()).unwrap();
         let loss = self.run(drive.guard(SwitchedOff::Leave)).unwrap();
-        assert_eq!(foretold, loss, "what a guard would report is what it reports");
+        assert_eq!(predicted, loss, "what a guard would report is what it reports");
         loss
     }
 
@@ -134,7 +134,7 @@ fn a_guarded_joint_stops_two_seconds_after_the_last_heartbeat() {
     let time = Duration::from_secs(2);
     assert_eq!(loss, HostLoss::StopsWithoutHeartbeat { object: mux(0x1016, 1), host: node(127), time });
     bench.turn(JOINT);
-    // Nobody asks it anything: the core's heartbeats are enough.
+    // No request is sent to it: the core's heartbeats are enough.
     bench.wait(10_000);
     assert!(bench.turns(JOINT));
     bench.kill();
@@ -247,7 +247,8 @@ fn with_servo() -> (Bench, Drive) {
     (bench, drive)
 }
 
-/// Nobody has decided against a watch that is delivered switched off (CiA 301, 7.5.2.19: 0 is the default of 1016h).
+/// A watch that is delivered switched off was not switched off on purpose (CiA 301, 7.5.2.19: 0 is the default of
+/// 1016h).
 #[test]
 fn a_servo_with_a_heartbeat_consumer_is_guarded_without_being_asked() {
     let (mut bench, drive) = with_servo();

@@ -401,10 +401,10 @@ fn no_frame_of_moved_drives_is_later_than_planned() -> Result<(), Failed> {
     Ok(())
 }
 
-/// What is foretold of a drive in cycles is what it sends once it has been set up for them: every model, every mode that takes a
-/// set-point.
+/// What is predicted of a drive in cycles is what it sends once it has been set up for them: every model, every mode
+/// that takes a set-point.
 #[test]
-fn what_a_drive_sends_in_cycles_is_foretold_without_writing() {
+fn what_a_drive_sends_in_cycles_is_predicted_without_writing() {
     let modes = [1, 3, 4, 7, 8, 9, 10].map(ModeOfOperation);
     for model in sim::machine::models() {
         for (mode, position) in modes.into_iter().flat_map(|mode| [(mode, false), (mode, true)]) {
@@ -417,28 +417,28 @@ fn what_a_drive_sends_in_cycles_is_foretold_without_writing() {
             world.run_for(Duration::from_secs(2));
             let both = sim::block_on(&mut world, async {
                 let drive = Drive::new(network.node(id), model);
-                let foretold = NodeTraffic::of(&drive).await.expect("it answers").in_cycles(&drive, mode, position);
+                let predicted = NodeTraffic::of(&drive).await.expect("it answers").in_cycles(&drive, mode, position);
                 let set_up = match position {
                     true => drive.configure_cyclic_with_position(mode).await,
                     false => drive.configure_cyclic(mode).await,
                 };
-                let Ok(foretold) = foretold else {
-                    assert!(set_up.is_err(), "{} {mode}: {foretold:?}", model.name);
+                let Ok(predicted) = predicted else {
+                    assert!(set_up.is_err(), "{} {mode}: {predicted:?}", model.name);
                     return None;
                 };
                 set_up.expect("it takes the mapping");
                 let cyclic =
                     drive.cyclic(mode, CyclicOptions { guard: None, ..CyclicOptions::default() }).await.ok()?;
                 let read = NodeTraffic::of(&drive).await.expect("it answers");
-                Some((foretold, NodeTraffic { in_cycle: Some(cyclic.rpdo()), ..read }))
+                Some((predicted, NodeTraffic { in_cycle: Some(cyclic.rpdo()), ..read }))
             });
-            let Some((foretold, read)) = both.expect("it goes on") else { continue };
-            assert_eq!(foretold.in_cycle, read.in_cycle, "{} {mode}", model.name);
+            let Some((predicted, read)) = both.expect("it goes on") else { continue };
+            assert_eq!(predicted.in_cycle, read.in_cycle, "{} {mode}", model.name);
             let sent = |traffic: &NodeTraffic| -> Vec<_> {
                 let on = traffic.pdos.iter().filter(|(config, id)| id.is_valid() && !config.map.0.is_empty());
                 on.map(|(config, id)| (config.pdo, config.map.clone(), config.transmission, id.can_id())).collect()
             };
-            assert_eq!(sent(&foretold), sent(&read), "{} {mode} {position}", model.name);
+            assert_eq!(sent(&predicted), sent(&read), "{} {mode} {position}", model.name);
         }
     }
 }

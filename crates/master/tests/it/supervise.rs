@@ -113,7 +113,7 @@ fn a_joint_whose_cable_is_joined_again_stands_until_it_is_moved() {
     bench.watch(Duration::from_secs(6));
     assert_eq!(bench.kinds()[..2], [("heartbeat_lost", Some(JOINT)), ("heartbeat_held", None)]);
     let held = bench.reported[1].to_string();
-    assert!(held.contains("for want of it stops: node 1, 5"), "{held}");
+    assert!(held.contains("without it stops: node 1, 5"), "{held}");
     assert!(bench.speed(JOINT) < 1.0 && bench.speed(DESCRIBED) < 1.0);
 
     bench.apply(JOINT, "cable join");

@@ -238,7 +238,7 @@ fn place_turns((turns, hz): (f64, f64), time_s: f64) -> f64 {
     turns / 2.0 * (1.0 - (TAU * hz * time_s).cos())
 }
 
-/// When the last TPDO4 of this cycle came, ms after its begin; infinite if one is missing.
+/// When the last TPDO4 of this cycle came, ms after its start; infinite if one is missing.
 fn answered_after_ms(bench: &Bench, begin: Instant) -> f64 {
     let times = NODES.map(|node| bench.heard_after(begin, 0x480 + u16::from(node)));
     times.into_iter().fold(0.0, |most, at| at.map_or(f64::INFINITY, |at| most.max((at - begin).as_secs_f64() * 1e3)))

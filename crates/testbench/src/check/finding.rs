@@ -56,7 +56,7 @@ pub struct Finding {
 #[derive(Clone, Debug, Default)]
 pub struct Findings(Vec<Finding>);
 
-/// So many are kept: a file of a megabyte of nonsense has more than anybody reads.
+/// So many are kept: a file of a megabyte of nonsense has more than can be read.
 const MOST: usize = 500;
 
 impl Findings {

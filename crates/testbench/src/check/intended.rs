@@ -79,7 +79,7 @@ const BOOT_TIMEOUT: Duration = Duration::from_millis(2000);
 /// The bus of a `bus.yml` as `dcfgen` and Lely's master take it.
 ///
 /// # Errors
-/// Why there is none, in a sentence.
+/// Why it has none, in a sentence.
 pub(super) fn of_bus_yml(bus: &Bus, devices: &[Option<Device>]) -> Result<Intended, String> {
     let own = bus.master.node_id.as_ref().and_then(|id| NodeId::new(u8::try_from(id.value).ok()?));
     let own = own.ok_or("the master has no node-ID")?;

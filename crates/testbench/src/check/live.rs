@@ -147,7 +147,7 @@ fn strangers(intended: &Intended, network: &Network, report: &mut Reporter<'_>) 
     }
 }
 
-/// A number; `None` for an object that is refused or no number.
+/// A number; `None` for an object that is refused or not a number.
 async fn number(node: &Node, object: Mux) -> Result<Option<u32>, Error> {
     Ok(answered(node.upload(object).await)?
         .filter(|payload| payload.as_bytes().len() <= 4)

@@ -126,7 +126,7 @@ fn intended(machine: &Machine, places: &BTreeMap<u8, Places>, periods: &[Place])
     let top = Place { line: 1, column: 1 };
     let places = periods.iter().copied().chain(std::iter::repeat(top));
     let mut moved: Vec<_> = machine.cycles().zip(places).map(|(cycle, at)| MovedAt { cycle, at }).collect();
-    // The one that fills the bus most is what is foretold.
+    // The one that fills the bus most is what is predicted.
     let fullest = machine.fullest_cycle();
     moved.sort_by_key(|moved| Some(&moved.cycle) != fullest.as_ref());
     let first = moved.first();

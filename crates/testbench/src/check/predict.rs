@@ -1,5 +1,5 @@
-//! The boot-up of a described bus, foretold: virtual drives of its models in virtual time, the master's own boot process on them,
-//! and the plan of what is sent afterwards.
+//! The boot-up of a described bus, predicted: virtual drives of its models in virtual time, the master's own boot
+//! process on them, and the plan of what is sent afterwards.
 
 use std::time::Duration;
 

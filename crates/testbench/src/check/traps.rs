@@ -273,8 +273,8 @@ fn fixed_mapping(case: &Case<'_>, report: &mut Reporter<'_>) {
 /// Targets that a drive follows while it is enabled (CiA 402-2: 607Ah, 60C1h, 60FFh, 6071h).
 const SET_POINTS: [u16; 4] = [0x607A, 0x60C1, 0x60FF, 0x6071];
 
-/// A generated master sends each RPDO that is valid in the sheet, with zeros until it is given other values. Whoever
-/// names an RPDO in the file means to use it, or switches it off.
+/// A generated master sends each RPDO that is valid in the sheet, with zeros until it is given other values. A file
+/// that names an RPDO uses it, or switches it off.
 fn set_point_by_sync(case: &Case<'_>, report: &mut Reporter<'_>) {
     let syncs = case.bus.master.sync_period_us.as_ref().is_some_and(|period| period.value > 0);
     for number in (1..=512).take_while(|_| syncs) {

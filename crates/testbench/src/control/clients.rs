@@ -239,7 +239,7 @@ impl<S: Sink> Control<S> {
         self.clients.len()
     }
 
-    /// Nobody is there.
+    /// Without clients.
     pub fn is_empty(&self) -> bool {
         self.clients.is_empty()
     }

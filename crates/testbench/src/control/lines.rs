@@ -7,7 +7,7 @@ pub const MAX_LINE_LENGTH: usize = 64 * 1024;
 #[derive(Clone, Debug, Default)]
 pub struct LineBuffer {
     bytes: Vec<u8>,
-    /// The rest of a line that is too long is thrown away.
+    /// The rest of a line that is too long is discarded.
     skipping: bool,
 }
 

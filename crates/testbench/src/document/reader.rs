@@ -123,7 +123,7 @@ impl<'a> Field<'a> {
     /// A number, whole or not.
     ///
     /// # Errors
-    /// That it is none, as all that follow.
+    /// It is not one; so in all that follow.
     pub fn number(&self, expected: &str) -> Result<f64, Problem> {
         let number = match self.value.get_ref() {
             DeValue::Float(number) => number.as_str().parse().ok(),

@@ -35,7 +35,7 @@ pub use motion::{AxisPlan, BasePlan, GroupPlan, WATCHDOG};
 const EXAMPLE: &str =
     "[[drive]]\n           model = \"zlac8030l\"\n           node = 4\n           load = { torque_nm = 0.5 }";
 
-/// Decides everything random where no seed is given: runs are repeatable.
+/// The seed where none is given: runs are repeatable.
 pub const SEED: u64 = 1;
 
 /// Node-IDs that there are.

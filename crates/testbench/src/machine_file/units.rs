@@ -72,9 +72,9 @@ mod tests {
         };
         says("units = 50", "expected a table of gear_ratio and feed_constant");
         says("units = { ratio = 50 }", "has no 'ratio'");
-        says("units = { gear_ratio = 0 }", "a gear ratio of 0 is none");
+        says("units = { gear_ratio = 0 }", "a gear ratio of 0 is out of range");
         says("units = { gear_ratio = -3 }", "polarity (607Eh)");
-        says("units = { gear_ratio = [1, 0] }", "a gear ratio of inf is none");
+        says("units = { gear_ratio = [1, 0] }", "a gear ratio of inf is out of range");
         says("units = { gear_ratio = [1, 2, 3] }", "both as [shaft, output]");
         says("units = { gear_ratio = '50' }", "turns of the drive's shaft");
         says("units = { feed_constant = 10 }", "as text, e.g. \"10mm\"");

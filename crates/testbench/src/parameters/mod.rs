@@ -35,7 +35,7 @@ impl Form {
     /// By the name of a file.
     ///
     /// # Errors
-    /// That it says none.
+    /// It has no known extension.
     pub fn of(path: &Path) -> Result<Self, String> {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         Ok(match extension.as_str() {

@@ -138,7 +138,7 @@ fn resolve(field: &Field<'_>, model: Option<&'static Description>) -> Result<(Mu
 /// The value of a field for an object of a model, as delivered in what decides about its unit.
 ///
 /// # Errors
-/// That it is none.
+/// It is not one.
 pub fn value_of(field: &Field<'_>, row: &'static Entry, model: &'static Description) -> Result<Vec<u8>, Problem> {
     let resolution = row.resolution.and_then(|place| match model.row(place)?.default {
         DefaultValue::Value(value) => Some(value),

@@ -65,8 +65,8 @@ impl Mcap {
     /// The subjects of which there is a value.
     pub(super) fn sparse_row(&mut self, at: Instant, values: &[f64]) -> io::Result<()> {
         for place in 0..self.topics.len() {
-            let is_told = |(column, _): &(usize, String)| values.get(*column).is_some_and(|value| value.is_finite());
-            if self.topics[place].fields.iter().any(is_told) {
+            let has_value = |(column, _): &(usize, String)| values.get(*column).is_some_and(|value| value.is_finite());
+            if self.topics[place].fields.iter().any(has_value) {
                 self.row_of(place, at, values)?;
             }
         }
@@ -80,7 +80,7 @@ impl Mcap {
         for (column, name) in &topic.fields {
             let value = values.get(*column).copied().unwrap_or(f64::NAN);
             let comma = if self.text.len() > 1 { "," } else { "" };
-            // JSON has no number for what is none.
+            // JSON has no form for what is not a number.
             let _ = if value.is_finite() {
                 write!(self.text, "{comma}{name}:{value}")
             } else {

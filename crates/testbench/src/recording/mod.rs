@@ -9,7 +9,7 @@
 //! - CSV: `t_s`, a column for each signal (`4.velocity_rpm`), and `mark`, what happened since the line before. It has no
 //!   frames.
 //!
-//! Times are seconds, in MCAP nanoseconds, from the begin of the world or of the connection.
+//! Times are seconds, in MCAP nanoseconds, from the start of the world or of the connection.
 
 mod column;
 mod convert;

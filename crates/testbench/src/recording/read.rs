@@ -62,7 +62,7 @@ pub(super) struct CsvLines<'a> {
 impl<'a> CsvLines<'a> {
     /// Reads the first line.
     pub(super) fn of(bytes: &'a [u8]) -> Result<Self, String> {
-        // The line in which a writer was killed is none; no field holds the end of a line.
+        // The line in which a writer was killed does not count; no field holds the end of a line.
         let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
         let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..whole]);
         let header = reader.headers().map_err(|error| format!("not a CSV file: {error}"))?.clone();

@@ -361,7 +361,7 @@ fn short_name(signal: Signal) -> &'static str {
 /// The signal that is meant: `velocity`, `velocity_rpm`.
 ///
 /// # Errors
-/// That there is none, and which there are.
+/// It is unknown, with the known ones.
 pub fn signal(word: &str) -> Result<Signal, String> {
     let found = Signal::ALL.into_iter().find(|signal| signal.name() == word || short_name(*signal) == word);
     found.ok_or_else(|| {

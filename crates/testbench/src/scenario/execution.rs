@@ -26,7 +26,7 @@ use crate::machine_file::{Machine, SEED};
 use crate::models::with_files;
 
 /// Frames that the outcome of a failed run lists.
-const FRAMES_TOLD: usize = 24;
+const FRAMES_SHOWN: usize = 24;
 
 /// A scenario that goes along with a world which the caller moves.
 ///
@@ -95,7 +95,7 @@ impl Execution {
             shared,
             script: Script::new(scenario),
             next_sample: Instant::ZERO,
-            frames: VecDeque::with_capacity(FRAMES_TOLD),
+            frames: VecDeque::with_capacity(FRAMES_SHOWN),
             finished: false,
         };
         Ok((world, execution))
@@ -156,7 +156,7 @@ impl Execution {
             return;
         }
         if let Occurrence::Wire(WireEvent::Frame { end, frame, .. }) = occurrence {
-            if self.frames.len() == FRAMES_TOLD {
+            if self.frames.len() == FRAMES_SHOWN {
                 self.frames.pop_front();
             }
             self.frames.push_back((*end, *frame));

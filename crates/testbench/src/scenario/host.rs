@@ -96,7 +96,7 @@ pub(super) async fn run(task: HostTask, start: Option<Duration>, lines: Vec<Host
     }
 }
 
-/// What came of a line: what was seen, with a number if it is one; or why it did not go.
+/// The result of a line: what was seen, with a number if it is one; or why it did not go.
 type Done = Result<(String, Option<f64>), String>;
 
 impl Wanted {

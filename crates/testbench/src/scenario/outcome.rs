@@ -4,7 +4,7 @@
 use can::Instant;
 use serde::Serialize;
 
-/// What came of one run.
+/// The result of one run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// The scenario's title.

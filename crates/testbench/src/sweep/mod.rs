@@ -66,7 +66,7 @@ impl Sweep {
     /// All seeds with all values of the scenario's `[sweep]`, each with each.
     ///
     /// # Errors
-    /// That there are none, or too many.
+    /// There are none, or too many.
     pub fn new(scenario: Scenario, seeds: RangeInclusive<u64>) -> Result<Self, String> {
         let axes = scenario.sweep.clone();
         let count = seeds.end().checked_sub(*seeds.start()).and_then(|span| span.checked_add(1));

@@ -1,4 +1,4 @@
-//! What came of a sweep, as `ferrodrive run --seeds --json` prints it and Python hands it out.
+//! The result of a sweep, as `ferrodrive run --seeds --json` prints it and Python hands it out.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{Distribution, Failed, OfValue, Summary, Sweep};
 
-/// What came of a sweep.
+/// The result of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SweepReport {
     /// No run failed.
@@ -23,7 +23,7 @@ pub struct SweepReport {
     pub failed: u64,
     /// All runs were made.
     pub complete: bool,
-    /// What came of the runs with each value of each parameter that is swept.
+    /// The results of the runs with each value of each parameter that is swept.
     pub values: Vec<OfValue>,
     /// How each named figure is distributed.
     pub figures: Vec<Distribution>,

@@ -1,4 +1,4 @@
-//! What came of many runs, in a size that does not grow with them.
+//! The results of many runs, in a size that does not grow with them.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::document::BadFile;
 use crate::scenario::Outcome;
 
 /// Failed runs that are listed: those with the lowest numbers.
-const MOST_TOLD: usize = 10;
+const MOST_LISTED: usize = 10;
 
 /// Values of a figure that are kept for its median; of more runs every second, every fourth and so on.
 const MOST_KEPT: usize = 1 << 16;
@@ -17,7 +17,7 @@ const MOST_KEPT: usize = 1 << 16;
 /// Settings of the parameters whose runs are compared with each other: those with the lowest numbers.
 const MOST_COMPARED: u64 = 1024;
 
-/// What came of the runs so far.
+/// The results of the runs so far.
 #[derive(Clone, Debug, Default)]
 pub struct Summary {
     /// By the setting of the parameters: the digest of a run, and whether another one had another.
@@ -51,7 +51,7 @@ pub struct Failed {
     pub seen: String,
 }
 
-/// What came of the runs with one value of a parameter that is swept.
+/// The results of the runs with one value of a parameter that is swept.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct OfValue {
     /// The parameter.
@@ -96,7 +96,7 @@ struct Figure {
 }
 
 impl Summary {
-    /// Adds what came of the run of this number.
+    /// Adds the result of the run of this number.
     pub fn add(&mut self, sweep: &Sweep, number: u64, outcome: &Result<Outcome, BadFile>) {
         match outcome {
             Ok(outcome) => {
@@ -133,10 +133,10 @@ impl Summary {
         self.failures += 1;
         let of_setting = self.failed.entry(sweep.setting(number)).or_default();
         of_setting.insert(number, Failed { point: sweep.point(number), asked, seen });
-        if of_setting.len() > MOST_TOLD {
+        if of_setting.len() > MOST_LISTED {
             of_setting.pop_last();
         }
-        if self.failed.len() > MOST_TOLD {
+        if self.failed.len() > MOST_LISTED {
             self.failed.pop_last();
         }
     }
@@ -193,12 +193,12 @@ impl Summary {
         let ranked = self.failed.values().flat_map(|of_setting| (0usize..).zip(of_setting));
         let mut first: Vec<_> = ranked.collect();
         first.sort_by_key(|(rank, (number, _))| (*rank, **number));
-        first.truncate(MOST_TOLD);
+        first.truncate(MOST_LISTED);
         first.sort_by_key(|(_, (number, _))| **number);
         first.into_iter().map(|(_, (_, failed))| failed)
     }
 
-    /// What came of the runs with each value of each parameter that is swept.
+    /// The results of the runs with each value of each parameter that is swept.
     pub fn of_values(&self, sweep: &Sweep) -> Vec<OfValue> {
         let rows = sweep.axes.iter().zip(&self.values).flat_map(|(axis, counts)| {
             axis.values.iter().zip(counts).map(|(value, (passed, failed))| OfValue {

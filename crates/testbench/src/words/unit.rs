@@ -71,7 +71,7 @@ const UNITS: &[(Dimension, f64, &[&str])] = &[
 ];
 
 impl Unit {
-    /// The unit spelt `text`; exact spelling first (`mA` is no `MA`), then without regard to case.
+    /// The unit spelt `text`; exact spelling first (`mA` is not `MA`), then without regard to case.
     pub fn named(text: &str) -> Option<Self> {
         let find = |same: &dyn Fn(&str) -> bool| {
             let row = UNITS.iter().find(|(_, _, names)| names.iter().any(|name| same(name)))?;

@@ -202,7 +202,7 @@ fn the_bus_of_the_handbook_boots_in_virtual_time() {
 
 /// What `dcfgen` of Lely core 2.3 writes for such a node: its manual's order, off, parameters, mapping, on; 1016h before all.
 #[test]
-fn what_the_generator_writes_is_foretold_in_its_order() {
+fn what_the_generator_writes_is_predicted_in_its_order() {
     let lines = [
         BEATS,
         CONSUMES,
@@ -411,7 +411,7 @@ fn drives_that_differ_from_the_file_are_reported() {
 const DRIVE: &str = "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n";
 
 #[test]
-fn a_machine_file_is_foretold_with_its_own_writes() {
+fn a_machine_file_is_predicted_with_its_own_writes() {
     let text =
         format!("{DRIVE}heartbeat = \"200ms\"\npdos = {{ tpdo1 = {{ objects = [\"statusword\"], type = 1 }} }}\n");
     let mut checked = of_machine(&text, &PathBuf::new()).unwrap();

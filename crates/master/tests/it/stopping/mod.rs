@@ -558,7 +558,7 @@ fn a_drive_that_was_not_seen_to_stand_keeps_its_watch_and_is_reported_as_moving(
         // The dead one costs the other no time: its own ramp of 300 ms, and some looks.
         assert!(bench.world.now() - began < Duration::from_secs(2), "{name}");
         assert!(bench.network.moved().contains(node(NODES[0])) && !bench.network.moved().contains(node(NODES[1])));
-        // Its cable is mended. What keeps it content has ended, and it has stopped by itself where it has a watch.
+        // Its cable is fixed. What keeps it content has ended, and it has stopped by itself where it has a watch.
         bench.world.run_for(Duration::from_secs(3));
         bench.world.apply(Place::node(NODES[0]), &Stimulus::CableCut(false)).unwrap().unwrap();
         bench.world.run_for(Duration::from_secs(3));
