@@ -14,6 +14,7 @@ mod manifests;
 mod sizes;
 mod source;
 mod text;
+mod wording;
 
 use std::process::{Command, ExitCode};
 
@@ -44,7 +45,7 @@ const SOURCE_RULES: &[SourceRule] = &[
     sizes::functions,
 ];
 
-const TEXT_RULES: &[TextRule] = &[text::typography, text::machine_paths, text::line_ends];
+const TEXT_RULES: &[TextRule] = &[text::typography, text::machine_paths, text::line_ends, wording::habits];
 
 /// Runs `cargo xtask tidy`.
 pub(crate) fn command() -> ExitCode {

@@ -6,7 +6,7 @@ use super::finding::Finding;
 const WRITTEN: &[&str] = &[".rs", ".md", ".toml", ".py", ".csv", ".can", ".yml", ".sh"];
 
 /// The rules spell what they forbid.
-const THE_RULES: &str = "xtask/src/tidy/";
+pub(super) const THE_RULES: &str = "xtask/src/tidy/";
 
 /// Characters that look like a keyboard's but are not, and what to type.
 const LOOKALIKES: &[(char, &str, &str)] = &[
