@@ -112,7 +112,11 @@ const MOST: u64 = 1 << 20;
 const LONG: usize = 1024;
 
 fn content(path: &Path) -> Result<Vec<u8>, Failure> {
-    let unreadable = |error| Failure::new(format!("cannot read {}", path.display())).because(error);
+    let unreadable = |error| {
+        Failure::bad_file(format!("cannot read {}", path.display()))
+            .because(error)
+            .next("give the path of a file of its bytes")
+    };
     let file = File::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
     file.take(MOST + 1).read_to_end(&mut bytes).map_err(unreadable)?;
