@@ -13,7 +13,7 @@ use testbench::network::supervise::WatchedEvent;
 use testbench::words::node::node;
 use tokio::sync::mpsc::{Receiver, channel};
 
-use super::boot::{Planned, global_of, plan_of, planned_by};
+use super::boot::{Planned, announce, global_of, plan_of, planned_by};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -67,7 +67,7 @@ impl Supervise {
     async fn supervise(&self, context: &Context, planned: &Planned, format: Format) -> Result<(), Failure> {
         let mut plan = plan_of(planned, context, &self.nodes).await?;
         plan.own = self.own_node;
-        context.progress.show(format!("booting {} nodes", plan.nodes.len()));
+        announce(context, &plan);
         let mut others = context.traffic.of_others();
         let report = context.network.boot(&plan).await;
         let unconfigured = context.network.unconfigured(&plan, &report).await;

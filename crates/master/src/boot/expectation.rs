@@ -21,7 +21,7 @@ const TRIES: u32 = 3;
 
 /// How long a node may take from a reset to its boot-up message, and to its first answer. The slowest known here takes about one
 /// second.
-const BOOT_TIME: Duration = Duration::from_secs(3);
+pub(super) const BOOT_TIME: Duration = Duration::from_secs(3);
 
 /// What a node is given as heartbeat producer time that has none.
 const HEARTBEAT: Duration = Duration::from_millis(500);
@@ -33,9 +33,9 @@ pub struct BootPlan {
     pub startup: Startup,
     /// The nodes, and what is expected of each.
     pub nodes: BTreeMap<NodeId, Expectation>,
-    /// How long a node may take until it answers (1F89h, CiA 302-2). The standard has a manager wait for ever where that is 0; this
-    /// boot-up ends with a report, and then keeps to its own time.
-    pub boot_time: Duration,
+    /// How long a node may take until it answers (1F89h, CiA 302-2). `None` waits for mandatory nodes without limit, as 1F89h = 0 has
+    /// it, and for others as long as a plan without 1F89h does.
+    pub boot_time: Option<Duration>,
     /// How long each SDO answer is waited for.
     pub timeout: Duration,
     /// How often a request is sent until a node counts as silent; 0 is as 1.
@@ -102,12 +102,18 @@ impl Expectation {
 }
 
 impl BootPlan {
+    /// How long this node may take until it answers; `None` without limit.
+    pub(super) fn boot_time_of(&self, expectation: &Expectation) -> Option<Duration> {
+        let mandatory = expectation.assignment.has(Assignment::MANDATORY);
+        self.boot_time.or((!mandatory).then_some(BOOT_TIME))
+    }
+
     /// A plan for these nodes.
     pub fn new(nodes: impl IntoIterator<Item = (NodeId, Expectation)>) -> Self {
         Self {
             startup: Startup::default(),
             nodes: nodes.into_iter().collect(),
-            boot_time: BOOT_TIME,
+            boot_time: Some(BOOT_TIME),
             timeout: ANSWER,
             tries: TRIES,
             heartbeat: Some(HEARTBEAT),
@@ -135,8 +141,9 @@ impl BootPlan {
         if object(Mux::new(0x1F80, 0)).is_some() && !plan.startup.has(Startup::MASTER) {
             return Err(BadPlan::NoMaster(plan.startup));
         }
-        if let Some(time) = Some(number(0x1F89, 0)).filter(|ms| *ms != 0) {
-            plan.boot_time = Duration::from_millis(time.into());
+        if object(Mux::new(0x1F89, 0)).is_some() {
+            let ms = number(0x1F89, 0);
+            plan.boot_time = (ms != 0).then(|| Duration::from_millis(ms.into()));
         }
         for node in NodeId::all() {
             let of_node = |index| number(index, node.raw());

@@ -12,7 +12,7 @@ use devices::HostWatch;
 
 use super::assignment::{Assignment, Startup};
 use super::error_status::ErrorStatus;
-use super::expectation::{BootPlan, Expectation};
+use super::expectation::{BOOT_TIME, BootPlan, Expectation};
 use super::report::NodeReport;
 use super::step::{Expected, Found, Heard, Step, StepKind, Verdict};
 use crate::Drive;
@@ -42,8 +42,8 @@ pub(super) struct NodeBoot<'a> {
     plan: &'a BootPlan,
     expectation: &'a Expectation,
     steps: Vec<Step>,
-    /// Until then silence may be that it has not booted yet.
-    patience_ends: Instant,
+    /// Until then silence may be that it has not booted yet; `None` for ever.
+    patience_ends: Option<Instant>,
     /// It was operational before, and is left so.
     left_operational: bool,
     /// The longest time between its heartbeats, once it sends any.
@@ -64,7 +64,7 @@ impl<'a> NodeBoot<'a> {
             plan,
             expectation,
             steps: Vec::new(),
-            patience_ends: network.now() + plan.boot_time,
+            patience_ends: plan.boot_time_of(expectation).map(|time| network.now() + time),
             left_operational: false,
             heartbeat: None,
         }
@@ -139,11 +139,12 @@ impl<'a> NodeBoot<'a> {
 
     /// Resets it and waits for its boot-up message. The next request shows whether it is there at all.
     async fn reset(&mut self, command: NmtCommand) {
-        let booted = self.node.wait_boot_up(self.plan.boot_time);
+        let time = self.plan.boot_time.unwrap_or(BOOT_TIME);
+        let booted = self.node.wait_boot_up(time);
         self.node.nmt(command);
         let (found, verdict) = match booted.await {
             Ok(()) => (Found::Came, Verdict::Passed),
-            Err(_) => (self.nothing(self.plan.boot_time), Verdict::Noted),
+            Err(_) => (self.nothing(time), Verdict::Noted),
         };
         self.note(StepKind::Reset, None, Expected::BootUp, found, verdict);
     }
@@ -365,32 +366,32 @@ impl<'a> NodeBoot<'a> {
     }
 
     async fn read(&self, object: Mux) -> Found {
-        self.read_until(object, Instant::ZERO).await
+        self.read_until(object, Some(Instant::ZERO)).await
     }
 
     /// Asks as often as the plan says, and until then.
-    async fn read_until(&self, object: Mux, until: Instant) -> Found {
+    async fn read_until(&self, object: Mux, until: Option<Instant>) -> Found {
         self.ask(until, || self.node.upload(object), |payload| Found::Value(payload.raw())).await
     }
 
     async fn write(&self, object: Mux, bytes: &[u8]) -> Found {
-        self.ask(Instant::ZERO, || self.node.download(object, bytes), |()| Found::Done).await
+        self.ask(Some(Instant::ZERO), || self.node.download(object, bytes), |()| Found::Done).await
     }
 
     async fn ask<T, F: Future<Output = Result<T, Error>>>(
         &self,
-        until: Instant,
+        until: Option<Instant>,
         request: impl Fn() -> F,
         answered: impl Fn(T) -> Found,
     ) -> Found {
-        let mut tries = 0;
+        let mut tries: u32 = 0;
         loop {
-            tries += 1;
+            tries = tries.saturating_add(1);
             match request().await {
                 Ok(answer) => return answered(answer),
                 Err(Error::Aborted { code, .. }) => return Found::Refused(code),
                 Err(Error::NoAnswer { hints, .. }) => {
-                    if tries >= self.plan.tries && self.node.network().now() >= until {
+                    if tries >= self.plan.tries && until.is_some_and(|until| self.node.network().now() >= until) {
                         return Found::Silent { waited: self.node.timeout(), tries, last: self.last_heard(), hints };
                     }
                 }

@@ -18,7 +18,7 @@ use master::boot::{
     Assignment, BootPlan, BootReport, ErrorStatus, Expectation, NodeReport, StepKind, Unconfigured, Verdict,
 };
 use sim::machine::{mjoint, zlac8030l, zlim42c};
-use sim::{Place, World, block_on};
+use sim::{Place, World, block_on, block_on_for};
 
 const JOINT: u8 = 1;
 const STEPPER: u8 = 2;
@@ -204,7 +204,7 @@ fn a_manager_s_dictionary_is_a_plan() {
     };
     let made = plan(&objects).unwrap();
     assert_eq!(made.nodes.keys().map(|node| node.raw()).collect::<Vec<_>>(), [SERVO]);
-    assert_eq!(made.boot_time, Duration::from_secs(4));
+    assert_eq!(made.boot_time, Some(Duration::from_secs(4)));
     assert_eq!(made.nodes[&node(SERVO)].heartbeat, Some(Duration::from_millis(400)));
     let mut bench = Bench::new();
     let report = bench.boot(&made);
@@ -273,7 +273,36 @@ fn an_empty_bus_is_reported_within_the_time_of_the_plan() {
     let report = bus.block_on(network.boot(&plan)).nodes.remove(0);
     assert_eq!(letter(&report), Some('B'));
     assert!(last(&report).contains("check supply, cable, termination and bit rate"), "{}", last(&report));
-    assert!(bus.now - began <= plan.boot_time + plan.timeout * 2);
+    assert!(bus.now - began <= plan.boot_time.unwrap() + plan.timeout * 2);
+}
+
+/// CiA 302-2, 1F89h: 0 is no limit, for the slaves that 1F81h (bit 3) makes mandatory.
+#[test]
+fn a_mandatory_node_is_waited_for_without_limit_where_1f89h_is_0() {
+    let assignment = |mandatory: u32| (Assignment::SLAVE | Assignment::BOOT | mandatory).to_le_bytes().to_vec();
+    let plan = |boot_time: Option<u32>, mandatory: u32| {
+        let time = boot_time.map(|ms| ((0x1F89, 0), ms.to_le_bytes().to_vec()));
+        let slave = [((0x1F80, 0), 1_u32.to_le_bytes().to_vec()), ((0x1F81, SERVO), assignment(mandatory))];
+        let objects: BTreeMap<_, _> = slave.into_iter().chain(time).collect();
+        BootPlan::from_objects(|mux: Mux| objects.get(&(mux.index, mux.sub_index)).cloned()).unwrap()
+    };
+    // Its supply is switched on a minute later.
+    let booted = |plan: BootPlan| {
+        let mut bench = Bench::new();
+        bench.apply(SERVO, "power off");
+        bench.world.run_for(Duration::from_secs(3));
+        let (network, minute) = (bench.network.clone(), Duration::from_secs(60));
+        let mut boot = std::pin::pin!(network.boot(&plan));
+        let gave_up = block_on_for(&mut bench.world, minute, boot.as_mut()).ok();
+        bench.apply(SERVO, "power on");
+        let report = gave_up.unwrap_or_else(|| block_on(&mut bench.world, boot).unwrap());
+        letter(&report.nodes[0])
+    };
+    assert_eq!(booted(plan(None, Assignment::MANDATORY)), Some('B'));
+    assert_eq!(booted(plan(Some(5000), Assignment::MANDATORY)), Some('B'));
+    assert_eq!(booted(plan(Some(0), Assignment::MANDATORY)), None);
+    // Nobody waits for ever for one that may be missing.
+    assert_eq!(booted(plan(Some(0), 0)), Some('B'));
 }
 
 /// A joint starts operational by itself (M joint manual, 4.2), and is left so (CiA 302-2, 1F81h bit 4): its configuration is not

@@ -113,7 +113,7 @@ pub(super) fn of_bus_yml(bus: &Bus, devices: &[Option<Device>]) -> Result<Intend
     let ms = |ms: i64| u32::try_from(ms).ok().filter(|ms| *ms > 0).map(|ms| Duration::from_millis(ms.into()));
     let said = bus.nodes.iter().filter_map(|slave| slave.boot_timeout_ms.as_ref()).chain(&bus.master.boot_timeout_ms);
     let longest = said.filter_map(|time| ms(time.value)).max().unwrap_or(BOOT_TIMEOUT);
-    plan.boot_time = ms(bus.master.boot_time_ms).unwrap_or(longest).min(LONGEST_BOOT);
+    plan.boot_time = Some(ms(bus.master.boot_time_ms).unwrap_or(longest).min(LONGEST_BOOT));
     let cycle = bus.master.sync_period_us.as_ref().and_then(|period| u32::try_from(period.value).ok());
     let beat = bus.master.heartbeat_producer_ms.as_ref().and_then(|time| ms(time.value.min(i64::from(u16::MAX))));
     Ok(Intended {

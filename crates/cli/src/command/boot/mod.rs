@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Format;
 use crate::session;
-pub(crate) use planned::{Planned, global_of, plan_of, planned_by};
+pub(crate) use planned::{Planned, announce, global_of, plan_of, planned_by};
 use testbench::network::boot::BootReport;
 
 /// Boot the nodes of a network: check who they are, configure and start them
@@ -59,7 +59,7 @@ impl Boot {
         // The heartbeat that a drive would watch ends with this command.
         plan.guard = false;
         self.apply(&mut plan);
-        context.progress.show(format!("booting {} nodes", plan.nodes.len()));
+        announce(context, &plan);
         let report = context.network.boot(&plan).await;
         context.settle().await;
         let unconfigured = context.network.unconfigured(&plan, &report).await;

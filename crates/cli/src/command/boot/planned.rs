@@ -25,6 +25,14 @@ pub(crate) fn global_of(planned: &Planned, global: &Global) -> Result<Global, Fa
     }
 }
 
+/// Shows that the nodes of a plan are booted, with a note where that may not end by itself.
+pub(crate) fn announce(context: &Context, plan: &BootPlan) {
+    if plan.boot_time.is_none() {
+        context.progress.note("1F89h is 0: mandatory nodes are waited for without limit; Ctrl-C ends that");
+    }
+    context.progress.show(format!("booting {} nodes", plan.nodes.len()));
+}
+
 /// The plan, for these nodes alone if there are any. A machine whose cycles its bus cannot carry is refused before.
 pub(crate) async fn plan_of(planned: &Planned, context: &Context, only: &[NodeId]) -> Result<BootPlan, Failure> {
     if let Planned::Machine(_, machine) = planned
