@@ -1,7 +1,8 @@
 //! What is going on, on a terminal only.
 
 use std::io::{self, IsTerminal, Write};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -17,7 +18,24 @@ const PIPED_INTERVAL: Duration = Duration::from_secs(5);
 pub(crate) struct Progress {
     bar: ProgressBar,
     /// No terminal, and yet somebody may read it.
-    piped: bool,
+    piped: Option<Arc<Mutex<Lines>>>,
+}
+
+/// Lines about a long count, for somebody who reads standard error from a file or a pipe.
+#[derive(Debug)]
+struct Lines {
+    last: Instant,
+}
+
+impl Lines {
+    /// True if there is one now; the next comes [`PIPED_INTERVAL`] later.
+    fn is_due(&mut self, now: Instant) -> bool {
+        let due = now.saturating_duration_since(self.last) >= PIPED_INTERVAL;
+        if due {
+            self.last = now;
+        }
+        due
+    }
 }
 
 impl Progress {
@@ -25,13 +43,14 @@ impl Progress {
     pub(crate) fn new(quiet: bool) -> Self {
         let piped = !io::stderr().is_terminal();
         if quiet || piped {
-            return Self { bar: ProgressBar::hidden(), piped: piped && !quiet };
+            let lines = || Arc::new(Mutex::new(Lines { last: Instant::now() }));
+            return Self { bar: ProgressBar::hidden(), piped: (piped && !quiet).then(lines) };
         }
         let bar = ProgressBar::new_spinner();
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
             bar.set_style(style);
         }
-        Self { bar, piped }
+        Self { bar, piped: None }
     }
 
     /// True if somebody sees it.
@@ -47,11 +66,13 @@ impl Progress {
 
     /// Shows how far something is that may take long: no terminal gets a line now and then.
     pub(crate) fn count(&self, text: impl Into<String>) {
-        if !self.piped {
-            self.show(text);
-        } else if self.bar.elapsed() >= PIPED_INTERVAL {
-            self.bar.reset_elapsed();
-            self.note(&text.into());
+        match &self.piped {
+            None => self.show(text),
+            Some(lines) => {
+                if lines.lock().unwrap_or_else(PoisonError::into_inner).is_due(Instant::now()) {
+                    self.note(&text.into());
+                }
+            }
         }
     }
 
@@ -124,5 +145,25 @@ impl Screen {
 impl Drop for Screen {
     fn drop(&mut self) {
         self.bar.abandon();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_count_has_a_line_every_five_seconds_on_a_pipe_and_a_short_one_none() {
+        let begin = Instant::now();
+        let told_after = |answer: Duration, count: u32| -> Vec<u64> {
+            let mut lines = Lines { last: begin };
+            let times = (1..=count).map(|number| answer * number);
+            times.filter(|time| lines.is_due(begin + *time)).map(|time| time.as_millis() as u64).collect()
+        };
+        // A scan whose nodes answer at once, a slow one of 127 nodes, and a drive that takes 450 ms for each of 133 objects.
+        assert!(told_after(Duration::from_millis(5), 127).is_empty());
+        assert_eq!(told_after(Duration::from_millis(200), 127), [5000, 10_000, 15_000, 20_000, 25_000]);
+        let slow = told_after(Duration::from_millis(450), 133);
+        assert_eq!(slow, [5400, 10_800, 16_200, 21_600, 27_000, 32_400, 37_800, 43_200, 48_600, 54_000, 59_400]);
     }
 }

@@ -14,11 +14,14 @@ use super::studio::bitrate;
 use crate::context::Context;
 use crate::failure::Failure;
 
+/// The most cycles that `--tolerance` takes.
+const MOST_TOLERANCE: u32 = 100;
+
 /// How late a host may be.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(super) struct CycleArgs {
     /// Cycles in a row that this command may be late for, or a drive's TPDO, before all are stopped
-    #[arg(long, value_name = "CYCLES", default_value_t = TOLERANCE, value_parser = clap::value_parser!(u32).range(0..=100))]
+    #[arg(long, value_name = "CYCLES", default_value_t = TOLERANCE, value_parser = clap::value_parser!(u32).range(0..=i64::from(MOST_TOLERANCE)))]
     tolerance: u32,
 }
 
@@ -31,10 +34,14 @@ impl CycleArgs {
     /// A failure by what a drive says, with what helps where this command was late.
     pub(super) fn advised(self, failure: Failure, refusal: Refusal) -> Failure {
         let Refusal::Stopped(CycleLoss::ProgramLate(_)) = refusal else { return failure };
-        let more = self.tolerance.max(1) * 5;
+        let more = (self.tolerance.max(1) * 5).min(MOST_TOLERANCE);
+        let allow = match more > self.tolerance {
+            true => format!("--tolerance {more} to allow more of them without a set-point, "),
+            false => String::new(),
+        };
         failure.next(format!(
-            "other programs kept this one from its cycles: give --tolerance {more} to allow more of them without a set-point, --realtime \
-             (Linux) to run before other programs, or a longer period; `ferrodrive latency` measures how late this host is"
+            "other programs kept this one from its cycles: give {allow}--realtime (Linux) to run before other programs, or a longer \
+             period; `ferrodrive latency` measures how late this host is"
         ))
     }
 }
@@ -90,4 +97,33 @@ fn refusal(cycle: &CyclePlan, what: String, next: String) -> Failure {
 /// How a drive that did not become enabled is asked why.
 pub(super) fn ask_why(node: NodeId) -> String {
     format!("ferrodrive explain {node} says what keeps it; `ferrodrive plan` whether the bus carries such a cycle")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_busy_host_is_told_which_options_help_and_a_silent_drive_is_not() {
+        let advised = |tolerance, loss| {
+            CycleArgs { tolerance }.advised(Failure::new("axis 1 stopped"), Refusal::Stopped(loss)).next.join("; ")
+        };
+        for (tolerance, more) in [(2, "--tolerance 10 "), (0, "--tolerance 5 "), (20, "--tolerance 100 ")] {
+            let next = advised(tolerance, CycleLoss::ProgramLate(6));
+            for part in [more, "--realtime", "a longer period", "`ferrodrive latency`"] {
+                assert!(next.contains(part), "{tolerance}: {part:?} in {next:?}");
+            }
+        }
+        assert_eq!(advised(2, CycleLoss::Silent(6)), "");
+        assert_eq!(advised(2, CycleLoss::NoSync(Duration::from_millis(20))), "");
+    }
+
+    /// What is advised is taken: the option ends at 100 cycles.
+    #[test]
+    fn the_tolerance_that_is_advised_is_one_that_the_option_takes() {
+        let next =
+            CycleArgs { tolerance: 100 }.advised(Failure::new("late"), Refusal::Stopped(CycleLoss::ProgramLate(101)));
+        let advice = next.next.join("; ");
+        assert!(!advice.contains("--tolerance 500"), "{advice}");
+    }
 }

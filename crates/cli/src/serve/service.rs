@@ -310,39 +310,50 @@ pub(crate) fn listen_to_signals(requests: mpsc::Sender<Request>) {
 
 #[cfg(test)]
 mod tests {
+    use std::io::BufWriter;
+
     use can::{Bitrate, Instant};
+    use canopen::NodeId;
     use devices::AxisId;
     use sim::World;
-    use sim::machine::zlac8030l;
+    use sim::machine::{Order, order, zlac8030l};
     use sim::recorder::{Channel, Recorder, Signal};
     use sim::stimulus::Place;
     use testbench::recording::{Column, Kind};
     use transport::RealTimeWorld;
+    use transport::log::{Format, LogWriter};
 
+    use super::super::files::{create_log, create_record};
     use super::super::pacer::{Clock, Pacer, Speed};
     use super::super::scratch;
     use super::*;
     use crate::recording::Pace;
 
-    /// The record of some lines; before line `keep_before` the clock comes to where records are looked for.
-    fn record(kind: Kind, keep_before: usize) -> Vec<u8> {
+    /// The record and the log of some lines; before line `keep_before` the clock comes to where they are looked for.
+    fn written(kind: Kind, keep_before: usize) -> [Vec<u8>; 2] {
         let folder = scratch(&format!("by-hand-{kind:?}-{keep_before}"));
         std::fs::create_dir_all(&folder).unwrap();
-        let path = folder.join("record");
+        let (path, log) = (folder.join("record"), folder.join("log"));
         let mut world = World::new(Bitrate::K500, 1);
         world.add_drive(4, Box::new(zlac8030l(4, 1))).unwrap();
+        // It sends a heartbeat each second (M joint manual, 5.11.1).
+        let joint = devices::model("m4230e17b50").unwrap();
+        let ordered = Order::new(joint, NodeId::new(1).unwrap(), Bitrate::K500);
+        world.add_drive(1, order(joint, &ordered).unwrap()).unwrap();
         let channel = Channel { place: Place { node: 4, axis: AxisId(0) }, signal: Signal::Velocity };
         world.start_recording(Recorder::new(Duration::from_millis(1), vec![channel]));
         world.watch(true);
-        let file = std::fs::File::create(&path).unwrap();
+        let file = create_record(&path, kind).unwrap();
         let columns = [Column::of_axis(channel)];
         let file = RecordFile::start(kind, file, &columns, Pace::Free, Messages::silent()).unwrap();
         let mut served =
             ServedWorld::new(world, Pacer::new(Clock::Manual, Speed::Times(1.0)), true, Messages::silent());
+        let frames = BufWriter::new(create_log(&log, Format::Candump).unwrap());
+        let frames = LogWriter::new(frames, Format::Candump).unwrap();
         let mut service = Service {
             answers: Messages::silent(),
             warnings: Messages::silent(),
-            log: None,
+            log: Some(FrameLog::start(frames, Duration::ZERO, Pace::Free, Messages::silent())),
             record: Some(file),
             waiting: VecDeque::new(),
             quit_in: None,
@@ -363,18 +374,22 @@ mod tests {
             }
         }
         assert!(service.part(&mut served, Ok(())).is_ok());
-        let bytes = std::fs::read(&path).unwrap();
+        let bytes = [path, log].map(|path| std::fs::read(path).unwrap());
         std::fs::remove_dir_all(folder).unwrap();
         bytes
     }
 
     #[test]
-    fn moved_by_hand_a_record_is_the_same_whenever_the_clock_looks_for_it() {
+    fn moved_by_hand_record_and_log_are_the_same_whenever_the_clock_looks_for_them() {
         for kind in [Kind::Csv, Kind::Mcap] {
-            let never = record(kind, usize::MAX);
-            assert!(String::from_utf8_lossy(&never).contains("load torque 0.5"));
+            let never = written(kind, usize::MAX);
+            let recorded = testbench::recording::read(kind, &never[0]).unwrap();
+            assert!(recorded.marks.iter().any(|mark| mark.text.contains("load torque 0.5")), "{:?}", recorded.marks);
+            // Boot-up and heartbeats of the joint, by the bus's own time.
+            let log = String::from_utf8_lossy(&never[1]);
+            assert!(log.matches(" 701#").count() >= 2 && log.starts_with("(0000000000."), "{log}");
             for place in 0..6 {
-                assert!(record(kind, place) == never, "{kind:?}, looked for before line {place}");
+                assert!(written(kind, place) == never, "{kind:?}, looked for before line {place}");
             }
         }
     }
