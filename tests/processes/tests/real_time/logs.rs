@@ -203,3 +203,29 @@ fn what_a_base_cannot_do_is_said_with_what_it_does_instead() {
     assert!(ended.status.success(), "{err}");
     assert_eq!(err.matches("are beyond the limits of the base: it is driven at").count(), 1, "{err}");
 }
+
+/// What the same lines on standard input write where time is moved by hand, in bytes.
+fn by_hand(folder: &std::path::Path, number: usize, record: &str) -> [Vec<u8>; 2] {
+    let [log, record] = ["run.log", record].map(|name| folder.join(format!("{number}-{name}")));
+    let drives = ["--drive", "zlac8030l@4", "--drive", "m4230e17b50@1", "--clock", "manual"];
+    let files = ["--log", log.to_str().unwrap(), "--record", record.to_str().unwrap()];
+    let mut command = command(&[&["sim"], &drives[..], &files].concat());
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let lines = b"run 2s\n4 load torque 0.5\n1 load torque 1\nrun 1s\n4 fault hall on\nrun 1500us\n4 fault hall off\nrun 1s\nquit\n";
+    child.stdin.take().unwrap().write_all(lines).unwrap();
+    assert!(child.wait().unwrap().success());
+    [log, record].map(|path| std::fs::read(path).unwrap())
+}
+
+#[test]
+fn moved_by_hand_a_simulator_writes_the_same_log_and_record_to_the_byte() {
+    let folder = scratch("by-hand");
+    for record in ["run.csv", "run.mcap"] {
+        let first = by_hand(&folder, 0, record);
+        let log = String::from_utf8_lossy(&first[0]);
+        assert!(log.starts_with("(0000000000.") && log.lines().count() > 3, "{log}");
+        for number in 1..4 {
+            assert!(by_hand(&folder, number, record) == first, "{record}, run {number}");
+        }
+    }
+}
