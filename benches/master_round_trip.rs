@@ -59,7 +59,7 @@ fn tpdo(criterion: &mut Criterion) {
         });
     });
     let other: Frame = "3F1#370200010000".parse().expect("a frame");
-    criterion.bench_function("a frame that is nobody's", |bencher| {
+    criterion.bench_function("a frame for no station", |bencher| {
         bencher.iter(|| core.handle_frame(black_box(&other), now));
     });
     criterion.bench_function("idle call", |bencher| {

@@ -1,4 +1,4 @@
-//! First light: a drive boots, is enabled, turns, faults when its supply rises, and is explained; as a picture that moves.
+//! First light: a drive boots, is enabled, turns, faults when its supply rises, and is explained; as an animated SVG.
 //!
 //! ```sh
 //! # prints what happened; with a file, draws it as an SVG that moves by itself (`docs/first-light.svg` is one)
@@ -33,7 +33,7 @@ const BAUD_RATE_500K: u16 = 1;
 /// Between two samples; a browser draws what lies between.
 const SAMPLING_PERIOD: Duration = Duration::from_millis(50);
 
-/// How long the last picture stays before it begins again, s.
+/// How long the last frame stays before the animation restarts, in s.
 const REST_S: f64 = 4.0;
 
 /// Characters of a row of text in the picture.

@@ -64,8 +64,8 @@ async fn on_a_real_bus(spec: &BusSpec) -> Result<(), Box<dyn Error>> {
     let mut bus = spec.open(&clock).await?;
     let network = Network::new();
     let done = hello(node(&network));
-    let tell = |_, note: &Note| eprintln!("{note}");
-    run_station(&mut bus, &mut network.clone(), &clock, &tokio::sync::Notify::new(), done, tell).await??;
+    let report = |_, note: &Note| eprintln!("{note}");
+    run_station(&mut bus, &mut network.clone(), &clock, &tokio::sync::Notify::new(), done, report).await??;
     Ok(())
 }
 

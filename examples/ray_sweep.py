@@ -39,7 +39,7 @@ def came_of(sweep: ferrodrive.Sweep, number: int) -> Union[ferrodrive.Outcome, V
 
 
 def with_processes(tasks: Iterable[range], sweep: ferrodrive.Sweep, workers: int) -> Iterator[Outcomes]:
-    """Yields what comes of the tasks, made by processes of this machine."""
+    """Yields the results of the tasks, run by processes of this machine."""
     # A process that is forked would have the threads' locks of this one.
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(workers, mp_context=context) as pool:
@@ -55,7 +55,7 @@ def with_processes(tasks: Iterable[range], sweep: ferrodrive.Sweep, workers: int
 def with_ray(
     tasks: Iterable[range], sweep: ferrodrive.Sweep, workers: int, address: Optional[str] = None
 ) -> Iterator[Outcomes]:
-    """Yields what comes of the tasks, made by Ray's workers: of a cluster, or as many as wanted on this machine."""
+    """Yields the results of the tasks, run by Ray's workers: of a cluster, or as many as wanted on this machine."""
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     import ray
 

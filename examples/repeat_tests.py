@@ -28,7 +28,7 @@ def main():
     digests = {test: {digests.get(test) for _, _, digests in runs} for test in sorted(runs[0][2])}
     differ = [test for test, seen in digests.items() if len(seen) != 1 or None in seen]
     green = sum(ok for ok, _, _ in runs)
-    print(f"{green} of {len(runs)} runs green; {len(digests)} tests tell a digest, {len(differ)} of them not always the same")
+    print(f"{green} of {len(runs)} runs green; {len(digests)} tests report a digest, {len(differ)} of them not always the same")
     print(f"a run took {min(took):.1f} to {max(took):.1f} s, in the middle {statistics.median(took):.1f} s")
     for test in differ:
         print(f"  {test}: {digests[test]}")

@@ -3,7 +3,7 @@
 //! Three servos of CiA 402 on a bus of 1 Mbit/s, cyclic synchronous positions each millisecond: first alike, then one alone, one
 //! with a torque and one with an inertia on its shaft. They go by one turn; when each shaft passes the same shares of its way is
 //! measured in the simulated world, between samples 50 µs apart. The second three then go to and fro for as long as is asked for
-//! (seconds; without an argument 10), and what was missed and how far they lagged is told:
+//! (seconds; without an argument 10), and reports what was missed and how far they lagged:
 //!
 //! ```text
 //! cargo run --profile dist -p ferrodrive-benches --example group_figures -- 3600

@@ -1,5 +1,5 @@
 //! Runs a world of the benchmark `drives` for so many virtual milliseconds, for a profiler, an instruction counter or a
-//! training run to look at. The digest on the last line tells whether two builds did the same.
+//! training run to look at. The digest on the last line shows whether two builds did the same.
 //!
 //! Arguments: the number of a world (from 0; without arguments they are listed) and milliseconds. The difference between
 //! two runs, divided by the difference of their lengths, is what a virtual millisecond takes:

@@ -75,7 +75,7 @@ pub(crate) fn firmware() -> Zlac8030l {
     drive
 }
 
-/// A frame to the node and everything that comes of it.
+/// A frame to the node and all its consequences.
 pub(crate) fn exchange_with_node(node: &mut Node<Room>, frame: &Frame) -> u64 {
     node.handle_frame(black_box(frame), NOW);
     let sum = drain(node);
@@ -85,7 +85,7 @@ pub(crate) fn exchange_with_node(node: &mut Node<Room>, frame: &Frame) -> u64 {
     sum
 }
 
-/// A frame to the drive and everything that comes of it.
+/// A frame to the drive and all its consequences.
 pub(crate) fn exchange_with_firmware(drive: &mut Zlac8030l, frame: &Frame) -> u64 {
     drive.handle_frame(black_box(frame), NOW);
     drain(drive)

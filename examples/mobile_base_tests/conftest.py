@@ -11,7 +11,7 @@ import pytest
 from base import Base
 
 PACE = os.environ.get("FERRODRIVE_PACE", "virtual")
-#: Each test's name and the digest of its run, for whoever compares runs.
+#: The name of each test and the digest of its run, to compare runs.
 DIGESTS = os.environ.get("FERRODRIVE_DIGESTS")
 
 
