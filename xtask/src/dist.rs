@@ -43,7 +43,7 @@ pub(crate) fn command() -> ExitCode {
     }
 }
 
-/// The dist step of `cargo xtask test`: the release as the tests' profile makes it, used by somebody who has nothing else.
+/// The dist step of `cargo xtask test`: the release as the tests' profile makes it, used on a machine without anything else.
 pub(crate) fn step() -> Tally {
     let folder = workspace::target().join("dist-test");
     let made = program::built().and_then(|program| make(&program, "dev", &folder.join("dist")));
@@ -211,7 +211,7 @@ fn files_in(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// What somebody does with a release: looks at its sums, runs the program where nothing else is, and installs the wheel.
+/// The steps of a user of a release: check the sums, run the program on its own, and install the wheel.
 fn try_it(folder: &Path) -> Vec<(&'static str, Result<(), String>)> {
     let (dist, empty) = (folder.join("dist"), folder.join("empty"));
     let _ = fs::remove_dir_all(&empty);

@@ -1,6 +1,6 @@
-//! Runs every example of the workspace: an example that nobody runs is wrong before long.
+//! Runs every example of the workspace: an example that is never run is wrong before long.
 //!
-//! An example either runs to its end, or serves until it is stopped and says so with a line that begins with `ready`.
+//! An example either runs to its end, or serves until it is stopped and reports it with a line that begins with `ready`.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `cargo xtask idle [SECONDS]`: what a simulator costs that waits. One drive of each kind, and six, on a served bus that nobody
+//! `cargo xtask idle [SECONDS]`: the cost of an idle simulator. One drive of each kind, and six, on a served bus that no client
 //! uses; the processor time that each takes, in per cent of a core, from `/proc/PID/stat`.
 
 use std::io::{BufRead, BufReader};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use crate::{process, program};
 
-/// How long each is watched if nobody says otherwise.
+/// Default time for which each is watched.
 const SECONDS: u64 = 60;
 
 /// What a drive does at its start, and its thermometers' first way, is not counted.
@@ -27,7 +27,11 @@ const BUSES: [(&str, &[&str]); 5] = [
 pub(crate) fn command(arguments: &[&str]) -> ExitCode {
     let seconds = match arguments {
         [] => Ok(SECONDS),
-        [seconds] => seconds.parse().ok().filter(|seconds| *seconds > 0).ok_or(format!("{seconds:?} is no time in s")),
+        [seconds] => seconds
+            .parse()
+            .ok()
+            .filter(|seconds| *seconds > 0)
+            .ok_or(format!("expected whole seconds above 0, got {seconds:?}")),
         _ => Err("expected: cargo xtask idle [SECONDS]".to_owned()),
     };
     match seconds.and_then(measure) {
@@ -68,7 +72,7 @@ impl Simulator {
         let mut command = Command::new(program);
         command.args(["sim", "--serve", "socketcand://127.0.0.1:0"]);
         drives.iter().for_each(|drive| _ = command.args(["--drive", drive]));
-        // Its standard input stays open: at its end nobody could quit it.
+        // Its standard input stays open: after its end it could not be quit.
         let started = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
         let mut child = started.map_err(|error| format!("cannot run ferrodrive: {error}"))?;
         let output = child.stdout.take().ok_or("no standard output")?;

@@ -7,7 +7,7 @@ use crate::process;
 use crate::say::say;
 use crate::tally::Tally;
 
-/// Whether tests tell how long they take (`--timings`).
+/// Whether tests report how long they take (`--timings`).
 static TIMED: AtomicBool = AtomicBool::new(false);
 
 /// How many of the slowest are shown.
@@ -16,7 +16,7 @@ const SLOWEST: usize = 20;
 /// A test, and how long it took in s.
 pub(crate) type Timed = (f64, String);
 
-/// From here on tests tell how long they take.
+/// From here on tests report how long they take.
 pub(crate) fn time_all() {
     TIMED.store(true, Ordering::Relaxed);
 }
@@ -102,7 +102,7 @@ pub(crate) fn failed_test(line: &str) -> Option<String> {
     outcome.starts_with("FAILED").then(|| name.to_owned())
 }
 
-/// The time of a test, where it is told: `test frame::a_law ... ok <0.123s>`.
+/// The time of a test, if reported: `test frame::a_law ... ok <0.123s>`.
 fn time_of(line: &str) -> Option<Timed> {
     let (name, outcome) = line.strip_prefix("test ")?.split_once(" ... ")?;
     let (_, time) = outcome.strip_suffix("s>")?.split_once('<')?;

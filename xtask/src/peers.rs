@@ -3,7 +3,7 @@
 //!
 //! They start it with `ferrodrive.Simulator` of our own Python package. The packages of others go into a private environment
 //! under `target/`, in pinned versions, and stay there for the next run. A machine without Python or without a network skips
-//! this step and says so; it never fails for that.
+//! this step and reports it; it never fails for that.
 
 use std::process::Command;
 

@@ -35,7 +35,7 @@ pub(crate) fn output(command: &mut Command) -> Result<String, String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// Runs a program whose output nobody needs; its name and last words when it fails.
+/// Runs a program and discards its output; its name and the end of its output when it fails.
 pub(crate) fn quietly(command: &mut Command) -> Result<(), String> {
     output(command).map(|_| ())
 }

@@ -1,7 +1,7 @@
 //! The Python package: environments with pinned packages, the wheel, and the tests against the installed wheel.
 //!
 //! Environments stand under `target/` and stay for the next run. A machine without Python or without a network skips what
-//! needs them and says so; it never fails for that.
+//! needs them and reports it; it never fails for that.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -108,7 +108,7 @@ pub(crate) fn environment_of(name: &str, wanted: &str) -> Result<PathBuf, String
     Ok(python)
 }
 
-/// `python -m pip`, which gives up soon where there is no network.
+/// `python -m pip`, which gives up soon without a network.
 pub(crate) fn pip(python: &Path) -> Command {
     let mut pip = Command::new(python);
     pip.current_dir(workspace::root()).args(["-m", "pip", "--disable-pip-version-check", "--retries", "1"]);

@@ -58,7 +58,7 @@ pub(crate) fn build(words: &[&str]) -> Result<Vec<Program>, String> {
     build_with(workspace::cargo(), words)
 }
 
-/// The same by a cargo that was told where.
+/// The same with a cargo that was given the folder.
 ///
 /// # Errors
 /// A sentence; what the compiler says goes to standard error.

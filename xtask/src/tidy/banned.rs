@@ -14,7 +14,7 @@ struct Banned {
 
 const CLOCK: &str = "time is an argument, so that a run repeats to the last bit; only transport reads a clock";
 const TAKE_NOW: &str = "take `now: Instant` as an argument, or move this to transport";
-const PRINTING: &str = "a library that prints cannot be used where nobody reads";
+const PRINTING: &str = "a library that prints cannot be used without a terminal";
 const RETURN_IT: &str = "return the fact, and let the caller show it";
 
 const BANNED: &[Banned] = &[
@@ -58,7 +58,7 @@ pub(super) fn in_code(source: &Source) -> Vec<Finding> {
     let mut found = Vec::new();
     for banned in BANNED.iter().filter(|banned| !banned.allowed_in.contains(&library)) {
         let occurrences = occurrences(&source.shipped, banned.word).into_iter();
-        // `&'static mut` is no `static mut`.
+        // `&'static mut` is not a `static mut`.
         for at in occurrences.filter(|at| !source.shipped[..*at].ends_with('\'')) {
             found.push(finding(source, at, "banned", banned.word, banned.why, banned.remedy));
         }
@@ -116,7 +116,7 @@ pub(super) fn clocks_of_tests(source: &Source) -> Vec<Finding> {
 /// Work left undone: in code by macro, in comments by word.
 pub(super) fn left_undone(source: &Source) -> Vec<Finding> {
     const WHY: &str = "the project ships whole things, not places where a thing will be";
-    const REMEDY: &str = "write it, or leave it out and say so in the documentation";
+    const REMEDY: &str = "write it, or omit it and document that";
     let in_code = ["todo!", "unimplemented!"].iter().flat_map(|word| found_in(&source.code, word));
     let in_comments = ["TODO", "FIXME", "XXX", "HACK"].iter().flat_map(|word| found_in(&source.comments, word));
     in_code.chain(in_comments).map(|(at, word)| finding(source, at, "undone", word, WHY, REMEDY)).collect()

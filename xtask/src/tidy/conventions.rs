@@ -3,7 +3,7 @@
 use super::finding::Finding;
 use super::source::{Source, occurrences};
 
-/// Every file says at its top what it is, or is one thing whose own documentation says so.
+/// Every file begins with its documentation, or has one item with its own.
 pub(super) fn module_docs(source: &Source) -> Vec<Finding> {
     if source.text.lines().any(|line| line.starts_with("//!")) || first_item(&source.text).starts_with("///") {
         return Vec::new();

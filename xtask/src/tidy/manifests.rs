@@ -6,7 +6,7 @@ use super::source::Source;
 /// What a manifest says, and why.
 const SAID: &[(&str, &str, &str)] = &[
     ("description = ", "a registry shows it first", "say in a line what the crate is"),
-    ("license.workspace = true", "nobody may use it without", "take the workspace's"),
+    ("license.workspace = true", "without it nothing may be used", "take the workspace's"),
     ("repository.workspace = true", "it leads back here", "take the workspace's"),
     ("keywords = ", "others find it by them", "name up to five"),
     ("categories = ", "others find it by them", "name up to five of crates.io's"),
@@ -36,7 +36,7 @@ pub(super) fn of_crates(path: &str, text: &str, exists: impl Fn(&str) -> bool) -
     for section in text.split("\n[").filter(|section| section.starts_with("lib]") || section.starts_with("[bin]")) {
         if !section.lines().any(|line| line == "bench = false") {
             let name = section.lines().next().unwrap_or_default();
-            let why = "the harness of unit tests refuses what criterion is told: cargo bench -- --noplot";
+            let why = "the harness of unit tests refuses the options of criterion: cargo bench -- --noplot";
             found.push(finding(format!("[{name} without bench = false"), why, "add it; benches are in benches/"));
         }
     }

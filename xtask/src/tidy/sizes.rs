@@ -1,4 +1,4 @@
-//! How long a file and a function may be. Every feared giant was a small state machine once that nobody split.
+//! How long a file and a function may be. Every feared giant was once a small state machine that was not split in time.
 
 use super::finding::Finding;
 use super::source::{Source, closing_brace, occurrences};

@@ -2,7 +2,7 @@
 //! which lie inside `#[cfg(test)]`.
 //!
 //! This is a lexer for comments and literals, not a parser. It knows line and nested block comments, strings with
-//! escapes, raw strings, byte and C strings, and tells a character from a lifetime.
+//! escapes, raw strings, byte and C strings, and distinguishes a character from a lifetime.
 
 /// A Rust file and its views. Each view has the file's length and line breaks, with everything else blanked.
 pub(crate) struct Source {
@@ -42,7 +42,7 @@ impl Source {
     }
 }
 
-/// The offsets where `word` stands in `code` as a whole: not as a part of a longer name.
+/// The offsets of `word` in `code`, not as a part of a longer name.
 pub(crate) fn occurrences(code: &str, word: &str) -> Vec<usize> {
     let is_name = |byte: Option<&u8>| byte.is_some_and(|byte| byte.is_ascii_alphanumeric() || *byte == b'_');
     let bytes = code.as_bytes();

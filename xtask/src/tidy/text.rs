@@ -2,7 +2,7 @@
 
 use super::finding::Finding;
 
-/// Files that people write by hand. Others (licences, lock files, pictures) come as they are.
+/// Files written by hand. Others (licences, lock files, pictures) are not checked.
 const WRITTEN: &[&str] = &[".rs", ".md", ".toml", ".py", ".csv", ".can", ".yml", ".sh"];
 
 /// The rules spell what they forbid.
@@ -32,7 +32,7 @@ pub(super) fn typography(path: &str, text: &str) -> Vec<Finding> {
 /// Folders that exist on one machine only.
 const MACHINE_FOLDERS: &[&str] = &["/work/", "/home/", "/root/", "/Users/", "C:\\Users"];
 
-/// A path that exists on nobody else's machine.
+/// A path that exists on one machine only.
 pub(super) fn machine_paths(path: &str, text: &str) -> Vec<Finding> {
     let why = "it exists on one machine only";
     each_line(path, text, |line| {
@@ -43,7 +43,7 @@ pub(super) fn machine_paths(path: &str, text: &str) -> Vec<Finding> {
 
 /// Spaces at line ends, tabs, and a missing line break at the end.
 pub(super) fn line_ends(path: &str, text: &str) -> Vec<Finding> {
-    let why = "it shows up as a change that nobody made";
+    let why = "it shows up as a change that was not intended";
     let mut found = each_line(path, text, |line| {
         if line.ends_with([' ', '\t', '\r']) {
             return Some(("line_ends", "space at the end of the line".to_owned(), why, "remove it"));

@@ -37,12 +37,12 @@ pub(super) fn run(image: &Image, checks: &str) -> Result<Output, String> {
     write("checks.sh", checks)?;
     let console = folder.0.join("console");
     let mut guest = Guest(start(image, &control, &console)?);
-    let told = |name: &str| fs::read_to_string(control.join(name)).ok().filter(|text| !text.trim().is_empty());
+    let reported = |name: &str| fs::read_to_string(control.join(name)).ok().filter(|text| !text.trim().is_empty());
     let began = Instant::now();
     let mut limit = began + BOOT_LIMIT;
     let mut started = false;
     while guest.0.try_wait().map_err(|error| error.to_string())?.is_none() {
-        if !started && let Some(uptime) = told("started") {
+        if !started && let Some(uptime) = reported("started") {
             say(format_args!(
                 "the guest has started ({} s by its clock, {:.0} s by ours)",
                 uptime.trim(),
@@ -51,7 +51,7 @@ pub(super) fn run(image: &Image, checks: &str) -> Result<Output, String> {
             (started, limit) = (true, Instant::now() + CHECKS_LIMIT);
         }
         if Instant::now() > limit {
-            let text = told("output").unwrap_or_default();
+            let text = reported("output").unwrap_or_default();
             return Err(format!(
                 "the guest took too long; it said last: {}{}",
                 last_words(&text),
@@ -60,12 +60,12 @@ pub(super) fn run(image: &Image, checks: &str) -> Result<Output, String> {
         }
         sleep(POLL);
     }
-    match told("status") {
+    match reported("status") {
         Some(status) => {
             let ended_well = status.trim() == "0";
             // What programs said beside their results is of interest when something failed.
-            let said = if ended_well { String::new() } else { told("errors").unwrap_or_default() };
-            Ok(Output { text: told("output").unwrap_or_default() + &said, ended_well })
+            let said = if ended_well { String::new() } else { reported("errors").unwrap_or_default() };
+            Ok(Output { text: reported("output").unwrap_or_default() + &said, ended_well })
         }
         None => Err(format!("the guest ended without a result; it said last: {}", last_words(&read(&console)))),
     }
@@ -143,7 +143,7 @@ fn start(image: &Image, control: &Path, console: &Path) -> Result<Child, String>
     qemu.stdin(Stdio::null()).stdout(Stdio::null()).spawn().map_err(|error| format!("cannot run QEMU: {error}"))
 }
 
-/// Whether this machine lets its processor run a guest. A device file alone does not tell: some clouds show one that cannot.
+/// Whether this machine lets its processor run a guest. A device file alone is not enough: some clouds have one that cannot.
 fn has_kvm() -> bool {
     let may = fs::OpenOptions::new().read(true).write(true).open("/dev/kvm").is_ok();
     let flags = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();

@@ -145,7 +145,7 @@ fn unpack_kernel_package(package: &Path, files: &Path) -> Result<(), String> {
 fn unpack_kernel(packed: &Path, kernel: &Path) -> Result<(), String> {
     let failed = |error: std::io::Error| format!("{}: {error}", packed.display());
     let bytes = fs::read(packed).map_err(failed)?;
-    let payload = payload(&bytes).ok_or_else(|| format!("{} is no kernel", packed.display()))?;
+    let payload = payload(&bytes).ok_or_else(|| format!("{} is not a kernel", packed.display()))?;
     let program = match payload {
         [0xFD, b'7', b'z', ..] => Some("xz"),
         [0x1F, 0x8B, ..] => Some("gzip"),

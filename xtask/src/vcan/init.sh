@@ -1,6 +1,6 @@
 #!/bin/busybox sh
 # The first program of the guest: it takes over the host's files, read-only, sets the CAN interfaces up, runs the checks and
-# ends the machine. What fails before the checks run is told on the console.
+# ends the machine. Failures before the checks run are reported on the console.
 bb=/bin/busybox
 fail() { $bb echo "GUEST-FAILED: $*"; $bb poweroff -f; $bb sleep 60; }
 
@@ -10,7 +10,7 @@ for module in $($bb cat /modules/order); do
   $bb insmod /modules/$module || $bb echo "no module $module"
 done
 
-# The host's root under an overlay in memory, so that programs may write what nobody keeps.
+# The host's root under an overlay in memory: what programs write is discarded.
 share=trans=virtio,version=9p2000.L,msize=512000
 $bb mount -t 9p -o ro,$share,cache=loose root /lower || fail "the host's files are not shared"
 $bb mount -t tmpfs -o size=80%,mode=755 upper /upper

@@ -2,7 +2,7 @@
 //!
 //! Few machines that build this have CAN in their kernel. So a Debian kernel is booted under QEMU ([`image`], [`guest`]) with
 //! `vcan0`, `vcan1` and two emulated Kvaser cards on one bus, `can0` and `can1`. The guest's files are the host's, read-only,
-//! so that what was built here runs there. A machine without QEMU, or where it cannot be installed, skips this and says so.
+//! so that what was built here runs there. A machine without QEMU, or where it cannot be installed, skips this and reports it.
 
 mod guest;
 mod image;

@@ -83,7 +83,7 @@ impl Tree {
     }
 }
 
-/// A `mod name;` line: the module that it stands in, the name, and the modules with bodies around it.
+/// A `mod name;` line: its module, the name, and the modules with bodies around it.
 type Below = (usize, String, Vec<String>);
 
 struct Reader<'a> {

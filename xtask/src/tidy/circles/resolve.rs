@@ -31,7 +31,7 @@ impl Tree {
         while let (Found::Module(at), Some((next, after))) = (&here, rest.split_first()) {
             here = match next.as_str() {
                 "super" => Found::Module(self.modules[*at].parent?),
-                // What nobody is seen to define, a macro may: it is the module's.
+                // A name without a definition may come from a macro: it belongs to the module.
                 name => self.name_in(*at, name, patience).unwrap_or_else(|| Found::Item(*at, name.to_owned())),
             };
             rest = after;
