@@ -99,7 +99,7 @@ class Remote:
         self.write(0x6040, ready | 0x10)
         self.status_becomes(acknowledged, acknowledged, "bit 12 acknowledges the set-point")
         self.write(0x6040, ready)
-        self.status_becomes(acknowledged | 1 << 10, 1 << 10, "bit 10 tells that the target is reached")
+        self.status_becomes(acknowledged | 1 << 10, 1 << 10, "bit 10 reports that the target is reached")
 
     def save(self):
         """The drive's command to store, and the time that a real EEPROM takes."""
@@ -140,7 +140,7 @@ class Bench(Remote):
     """The folder's drive behind a simulator, and the network to it. Use it with `with`.
 
     `drives` are other `--drive` arguments than the folder's own, `extra` more of the command line. With `state` the
-    parameter stores are kept in a folder, so that `restart` finds them again. With `absent` nobody waits for the drive.
+    parameter stores are kept in a folder, so that `restart` finds them again. With `absent` the drive is not waited for.
     """
 
     def __init__(self, program, drive, drives=(), extra=(), state=False, absent=False):

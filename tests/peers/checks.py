@@ -31,9 +31,9 @@ def check(name, *drives, rows=None, **setup):
     def add(function):
         for drive in drives:
             for row in (rows(drive) if callable(rows) else rows) or [None]:
-                told = name if row is None else name.format_map(row)
+                title = name if row is None else name.format_map(row)
                 made_with = setup | {"drives": row["drives"]} if row and "drives" in row else setup
-                CHECKS.append(Check(drive, told, function, () if row is None else (row,), made_with))
+                CHECKS.append(Check(drive, title, function, () if row is None else (row,), made_with))
         return function
 
     return add

@@ -68,7 +68,7 @@ def ferrodrive(bench, *words):
 
 
 def decoded(bench, path):
-    """The frames of a log as `ferrodrive decode` tells of them, as messages of python-can."""
+    """The frames of a log as `ferrodrive decode` prints them, as messages of python-can."""
     read = []
     for line in ferrodrive(bench, "decode", path):
         identifier, data = line["frame"].split("#")
@@ -134,7 +134,7 @@ def trc(bench, path):
     return read
 
 
-@check("An error frame and a CAN FD frame of python-can's {form} are told, and are not the end of the log", ALL[0],
+@check("An error frame and a CAN FD frame of python-can's {form} are reported, and do not end the log", ALL[0],
        rows=[{"form": "asc"}, {"form": "blf"}, {"form": "log"}])
 def passed_over(bench, row):
     error = can.Message(timestamp=BEGIN + 0.1, is_error_frame=True, arbitration_id=0x80, dlc=8, data=bytes(8), channel=0)
@@ -209,7 +209,7 @@ def can_utils(bench):
         equal([int(text[0], 16) for text in texts], [frame[0] for frame in FRAMES], "identifiers that asc2log reads")
         equal([text[1] for text in texts if not text[1].startswith("R")], [frame[3] for frame in FRAMES if not frame[2]], "data")
         subprocess.run([log2asc, "-I", source, "-O", theirs, "can0"], check=True, capture_output=True, timeout=60)
-        # Its head tells the begin in whole seconds, and its times count from the first frame.
+        # Its head has the start in whole seconds, and its times count from the first frame.
         read = decoded(bench, theirs)
         for message in read:
             message.timestamp += BEGIN - int(BEGIN)

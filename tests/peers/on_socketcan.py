@@ -46,7 +46,7 @@ def value_is_written_and_read_back(node):
 
 
 def reset_is_followed_by_boot_up(node):
-    """CiA 301, 7.3.2.3: a node that has restarted says so."""
+    """CiA 301, 7.3.2.3: a node that has restarted reports it."""
     assert ears.boot_up_after_reset(node, PATIENCE_S), "no boot-up"
 
 

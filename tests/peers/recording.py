@@ -24,7 +24,7 @@ def records(bench):
             while simulator.world("now")["t"] < 2.0:
                 time.sleep(0.05)
             simulator.world(f"{node_id} load torque 0.1")
-            told = simulator.world(f"{node_id} get")
+            answer = simulator.world(f"{node_id} get")
             simulator.quit()
         with open(path, "rb") as file:
             reader = make_reader(file, validate_crcs=True)
@@ -48,7 +48,7 @@ def records(bench):
         samples = [(message.log_time, json.loads(message.data)) for topic, message in messages if topic.startswith("/node")]
         equal(len(samples), counts[f"/node/{node_id}"], "messages, as the summary counts them")
         equal({later[0] - earlier[0] for earlier, later in zip(samples, samples[1:])}, {2_000_000}, "period, in ns")
-        true(abs(samples[-1][1]["supply_v"] - told["supply_v"]) < 0.5, "the supply of the last sample is that of `get`")
+        true(abs(samples[-1][1]["supply_v"] - answer["supply_v"]) < 0.5, "the supply of the last sample is that of `get`")
         frames = [json.loads(message.data) for topic, message in messages if topic == "/can"]
         true(any(frame["text"] == f"{0x700 + node_id:03X}#00" for frame in frames), "the boot-up is among the frames")
         said = [json.loads(message.data) for topic, message in messages if topic == "/events"]

@@ -44,7 +44,7 @@ def measure(arguments, log):
         bus = can.Bus(
             interface="socketcand", host="127.0.0.1", port=port, channel="can0", tcp_tune=arguments.tcp_tune
         )
-        # Until the drive has booted nobody acknowledges a frame on the wire, and it is repeated.
+        # Until the drive has booted no node acknowledges a frame on the wire, and it is repeated.
         time.sleep(BOOT_TIME_S)
         task = bus.send_periodic(SYNC, arguments.period)
         end = time.monotonic() + arguments.duration

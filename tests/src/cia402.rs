@@ -1,7 +1,7 @@
 //! The figures of CiA 301 and CiA 402 for the standard's own servo, as data.
 //!
 //! `objects.csv` has the profile, `communication.csv` the objects of CiA 301 with the mappings of CiA 402-3. A default is
-//! told where the standard gives one. The node is 6.
+//! given where the standard has one. The node is 6.
 
 use crate::csv::Row;
 use crate::manual::{ObjectRow, PowerCell, flag, hex, integer, power_cell, rows};

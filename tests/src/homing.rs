@@ -1,4 +1,4 @@
-//! Homing as the drives' tables tell it: the moves of one run, and the edge that becomes the origin.
+//! Homing as in the drives' tables: the moves of one run, and the edge that becomes the origin.
 //!
 //! A move is a direction, a speed and what ends it. Speeds are names (`6099:01`, `origin`), since the tables say which
 //! of the drive's speeds is used, not how fast that is. That each run is possible is asked of the running drives.
@@ -60,7 +60,7 @@ fn one_move(text: &str) -> Move {
 
 fn latch(text: &str) -> Latch {
     let [switch, edge, way] = words(text);
-    assert!(edge == "rising" || edge == "falling", "{edge:?} is no edge");
+    assert!(edge == "rising" || edge == "falling", "{edge:?} is not an edge");
     Latch { switch: switch.to_owned(), rising: edge == "rising", direction: direction(way) }
 }
 
@@ -73,6 +73,6 @@ fn direction(text: &str) -> i32 {
     match text {
         "positive" => 1,
         "negative" => -1,
-        _ => panic!("{text:?} is no direction"),
+        _ => panic!("{text:?} is not a direction"),
     }
 }

@@ -1,7 +1,7 @@
 //! The figures of the "M Robot Joint Motor CanOpen Manual" as data.
 //!
 //! Every value is the manual's, with its contradictions settled as `docs/drives/mjoint.md` says; the `note` of a row
-//! tells what the manual prints instead, and `assumed` where it prints nothing. The node is 1, the manual's default.
+//! has what the manual prints instead, and `assumed` where it prints nothing. The node is 1, the manual's default.
 
 use crate::csv::Row;
 use crate::homing::{HomingRow, homing};
@@ -57,7 +57,7 @@ pub struct HomingStatus {
 pub struct Figure {
     /// The group of the table: `motor`, `reducer`.
     pub group: String,
-    /// What is told.
+    /// What is reported.
     pub parameter: String,
     /// Its unit; `1` for a plain number.
     pub unit: String,

@@ -1,7 +1,7 @@
 //! What is asked of every row of a manual's object table on a running drive: width, default, access, range and store.
 //!
 //! Each function is a scenario; it asks all rows that it is about, each at a fresh [`Bench`], and fails with the
-//! list of those that answer otherwise. What a drive's manual says of single objects stands in its `refused.csv` and `at_rest.csv`.
+//! list of those that answer otherwise. What a drive's manual says of single objects is in its `refused.csv` and `at_rest.csv`.
 
 use std::time::Duration;
 
@@ -101,7 +101,7 @@ fn refused<S: Subject>(row: &ObjectRow, value: i64, code: Abort) -> Result<(), S
     expect("value after it", bench.get((row.index, row.sub)), before)
 }
 
-/// `refused.csv`: objects and sub-indexes that the manual does not have are told apart, and so are values that lie between
+/// `refused.csv`: objects and sub-indexes that the manual does not have are distinguished, and so are values that lie between
 /// the listed ones. An empty value is a read.
 pub fn refuse_what_the_manual_does_not_have<S: Subject>() {
     for (index, sub, value, abort) in rows(S::REFUSED, |row| {
@@ -152,8 +152,8 @@ pub fn read_at_rest_what_a_resting_drive_has<S: Subject>() {
         let value = bench.get((*index, *sub));
         assert!(range.contains(&value), "{index:04X}h:{sub:02X} reads {value}, expected {range:?}");
     }
-    let told = |row: &&ObjectRow| row.live && !expected.iter().any(|(key, _)| *key == row.key());
-    let untold: Vec<_> = S::rows().all().iter().filter(told).collect();
+    let unexpected = |row: &&ObjectRow| row.live && !expected.iter().any(|(key, _)| *key == row.key());
+    let untold: Vec<_> = S::rows().all().iter().filter(unexpected).collect();
     assert!(untold.is_empty(), "{untold:?}");
 }
 
@@ -247,7 +247,7 @@ pub fn are_saved_together_or_not_at_all<S: KeepingSubject>() {
             assert_eq!(bench.get(0x603F), 0, "{command}, off after {delay_us} us");
             (olds, news) = if kept == *old { (olds + 1, news) } else { (olds, news + 1) };
         }
-        // A host sends an order that nobody took again, so that a restore comes late rather than never.
+        // A host repeats a command that was not accepted, so that a restore comes late rather than never.
         assert!((olds > 0 || command == 1) && news > 0, "both happen: {olds} and {news}");
     }
 }

@@ -22,7 +22,7 @@ pub trait PowerSubject: Subject {
     /// Its `power_state.csv`; with each cell the bits of the statusword above the low byte, of those in [`ABOVE`](Self::ABOVE).
     fn power_states() -> Vec<(PowerCell, u16)>;
 
-    /// Bits above the low byte that the cells tell.
+    /// Bits above the low byte in the cells.
     const ABOVE: u16;
 
     /// Its `statusword_at_rest.csv`.
@@ -34,7 +34,7 @@ pub trait PowerSubject: Subject {
     /// The low byte of the statusword in the state Fault, with the bus voltage present. CiA 402-2 has 18h; bit 7 is a warning.
     const FAULT: u16 = 0x98;
 
-    /// The bit of the statusword that tells that the motor turns; none where the maker has not added one.
+    /// The bit of the statusword that reports that the motor turns; none where the manufacturer has not added one.
     const RUNNING: u16 = 1 << 14;
 
     /// Modes in which it moves, but for torque.
@@ -151,11 +151,15 @@ impl<S: PowerSubject> Bench<S> {
         self.enable_in(3).set(0x60FF, rpm).run_ms(800)
     }
 
-    /// Asserts that the motor turns steadily at this speed, and that 606Ch says so.
+    /// Asserts that the motor turns steadily at this speed, and that 606Ch reports it.
     #[track_caller]
     pub fn goes_at(&mut self, rpm: i64) -> &mut Self {
-        let (told, asked) = (self.get(0x606C), rpm * S::COUNTS_PER_RPM);
-        assert!((told - asked).abs() <= S::COUNTS_PER_RPM, "606Ch is {told} for {rpm} r/min, at {} s", self.seconds());
+        let (reported, asked) = (self.get(0x606C), rpm * S::COUNTS_PER_RPM);
+        assert!(
+            (reported - asked).abs() <= S::COUNTS_PER_RPM,
+            "606Ch is {reported} for {rpm} r/min, at {} s",
+            self.seconds()
+        );
         self.turns_at(rpm as f64 - S::RIPPLE_RPM, rpm as f64 + S::RIPPLE_RPM)
     }
 

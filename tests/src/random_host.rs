@@ -1,4 +1,4 @@
-//! A host that writes anything anywhere, while somebody plays with the machine.
+//! A host that writes anything anywhere, while the world of the machine changes at random.
 
 use crate::bench::{Bench, Subject};
 use crate::manual::ObjectRow;
@@ -20,7 +20,7 @@ pub struct Play<S> {
     /// What hands do to the machine now and then, and what undoes it, as world commands without their node; nothing undoes
     /// what is over by itself, and `> ` begins a frame.
     pub hands: &'static [(&'static str, &'static str)],
-    /// The bits that tell the state, and what they are in each; none where any will do.
+    /// The bits of the state, and their values in each; none where any will do.
     pub states: (u16, &'static [u16]),
     /// Asserts that the drive, mended and restarted, is as delivered; with the seed, for the message.
     pub recovers: fn(&mut Bench<S>, u64),
@@ -63,7 +63,7 @@ fn act<S: Subject>(bench: &mut Bench<S>, line: &str) {
     match line.strip_prefix("> ") {
         Some(frame) => bench.send(frame),
         None if line.is_empty() => bench,
-        None => bench.tell(&format!("{} {line}", S::NODE)),
+        None => bench.world(&format!("{} {line}", S::NODE)),
     };
 }
 

@@ -31,7 +31,7 @@ pub fn columns_are_the_manuals<const N: usize>(table: &'static Table, rows: &[Ob
     assert!(differences.is_empty(), "{} differences:\n{}", differences.len(), differences.join("\n"));
 }
 
-/// Each object is said to stand in the section of the manual that has it.
+/// Each object names the section of the manual that has it.
 pub fn sections_are_the_manuals(model: &Description, rows: &[ObjectRow]) {
     let found =
         |row: &ObjectRow| model.section(row.index).map(|section| section.trim_start_matches("chapter ").to_owned());

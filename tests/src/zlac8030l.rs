@@ -1,7 +1,7 @@
 //! The figures of the "ZLAC8030L V2.0 servo driver CANopen communication quick start guide" (V1.00) as data.
 //!
 //! Every value is the manual's, with its contradictions settled as `docs/drives/zlac8030l.md` says; the `note` of a
-//! row tells what the manual prints instead. The node is 4, the manual's default.
+//! row has what the manual prints instead. The node is 4, the manual's default.
 
 use crate::manual::{datagram, object, power_cell, rows};
 

@@ -7,7 +7,7 @@ use crate::csv::Row;
 use crate::homing::{HomingRow, homing};
 use crate::manual::{Datagram, ObjectRow, PowerCell, datagram, flag, hex, object, power_cell, rows};
 
-/// A cell of the power state table, with the statusword bit that tells whether the motor is energised.
+/// A cell of the power state table, with the statusword bit that reports whether the motor is energised.
 #[derive(Debug, Clone)]
 pub struct EnergisedCell {
     /// The cell.
@@ -36,7 +36,7 @@ pub struct Figure {
     pub table: String,
     /// The row within that: a model, a setting.
     pub row: String,
-    /// What is told.
+    /// What is reported.
     pub quantity: String,
     /// Its unit; `1` for a plain number.
     pub unit: String,
@@ -102,7 +102,7 @@ pub fn figures() -> Vec<Figure> {
 ///
 /// # Panics
 ///
-/// When there is no such figure: the test that asks is wrong.
+/// If there is no such figure: the test is wrong.
 #[must_use]
 pub fn figure(table: &str, row: &str, quantity: &str) -> f64 {
     let all = figures();

@@ -35,7 +35,7 @@ def fast_scan(bench):
     mark = bench.trace.mark()
     lss.send_identify_non_configured_remote_slave()
     # The library does not wait for this answer, and would take it for the next one.
-    bench.trace.wait(0x7E4, mark, "somebody has no node-ID", lambda frame: frame.data[0] == 0x50)
+    bench.trace.wait(0x7E4, mark, "a device has no node-ID", lambda frame: frame.data[0] == 0x50)
     bench.sleep(0.3)
     equal(lss.fast_scan(), (True, list(ADDRESS)), "fastscan")
     equal(lss.inquire_node_id(), UNCONFIGURED, "node-ID")
@@ -45,7 +45,7 @@ def fast_scan(bench):
     lss.send_switch_state_global(WAITING)
     bench.trace.wait(0x709, mark, "boot-up as node 9", lambda frame: frame.data == b"\0")
     equal(bench.other(9).sdo.upload(0x1018, 2), (402).to_bytes(4, "little"), "1018h:02 of node 9")
-    equal(lss.fast_scan(), (False, None), "fastscan once nobody is without a node-ID")
+    equal(lss.fast_scan(), (False, None), "fastscan once every device has a node-ID")
     equal(node_id(lss), 9, "node-ID")
 
 

@@ -1,4 +1,4 @@
-"""Servos that are made from makers' files, where somebody has some: FERRODRIVE_EDS_FILES names the folder."""
+"""Servos made from makers' files, if there are any: FERRODRIVE_EDS_FILES names the folder."""
 
 import configparser
 import contextlib

@@ -52,7 +52,7 @@ def answer_to(bench, row):
 def replay(bench, section, patience_s=0):
     """Sends a section's requests in order and compares the drive's answers; NMT and SYNC have none.
 
-    A printed answer may tell that a move is over. With patience, its request is sent again until that is so.
+    A printed answer may report that a move is over. With patience, its request is sent again until that is so.
     """
     for row in bench.drive.rows("datagrams.csv"):
         if row["section"] != section or not row["request_cob"]:
@@ -76,7 +76,7 @@ def section(bench, row):
     replay(bench, row["section"], row["patience"])
     bench.becomes(row["index"], row["value"], row["tolerance"])
     if row["section"] == "5.3.6":
-        bench.status_becomes(1 << 8, 1 << 8, "bit 8 tells that homing is done")
+        bench.status_becomes(1 << 8, 1 << 8, "bit 8 reports that homing is done")
 
 
 @check("manual 5.10.3: the datagrams of RPDO4 wait for SYNC on three joints", MJOINT, drives=THREE)

@@ -1,4 +1,4 @@
-"""Faults and alarms: how each is told and cleared, and a drive without supply or without its cable."""
+"""Faults and alarms: how each is reported and cleared, and a drive without supply or without its cable."""
 
 from checks import check, equal, eventually, table, true
 from drive import ALL, MJOINT, ZL, ZLAC8030L, ZLIM42C
@@ -47,12 +47,12 @@ def fault(bench, row):
     bench.world(row["end"])
     bench.sleep(3.0)
     bench.write(0x6040, 0x80)
-    true(bench.statusword() & 0xFF == 0x98 or is_unseen_at_rest(row), "80h again is no edge")
+    true(bench.statusword() & 0xFF == 0x98 or is_unseen_at_rest(row), "80h again is not an edge")
     bench.write(0x6040, 0x00)
     bench.write(0x6040, 0x80)
     bench.status_becomes(0xFF, 0x70, "the statusword after the reset")
     cleared = bench.trace.since(mark, emcy)[-1]
-    equal(bytes(cleared.data), bytes(8), "the EMCY that tells the reset")
+    equal(bytes(cleared.data), bytes(8), "the EMCY of the reset")
     equal([bench.read(0x603F), bench.read(0x1001)], [0, 0], "603Fh and 1001h after the reset")
 
 
@@ -91,7 +91,7 @@ ALARMS = table(
 )
 
 
-@check("{alarm} is told by 260Eh, bit 3 and heartbeat 04, and is cleared in each of three ways once it has gone", MJOINT, rows=ALARMS)
+@check("{alarm} is reported by 260Eh, bit 3 and heartbeat 04, and is cleared in each of three ways once it has gone", MJOINT, rows=ALARMS)
 def alarm(bench, row):
     bench.write(0x1017, 100)
     bench.write_all(row["settings"])
@@ -120,5 +120,5 @@ def silence(bench):
         true(not bench.answers(), f"no answer after {away}")
         bench.world(back)
         eventually(bench.answers, bool, f"an answer after {back}")
-        bench.sleep(0.5)  # what nobody took from the wire meanwhile is answered now
+        bench.sleep(0.5)  # frames that were not read meanwhile are answered now
         bench.turn(60)

@@ -11,7 +11,7 @@ ENABLED = {"zlac8030l": (0x6F, 0x27), "zlim42c": (0x6F, 0x27), "mjoint": (0xFF, 
 QUICK_STOP = {"zlac8030l": (0x6F, 0x07), "zlim42c": (0x6F, 0x07), "mjoint": (0xFF, 0x17)}
 
 
-@check("profile velocity runs both ways at the speeds asked for, 6064h and the shaft with it, and bit 10 tells", *ALL)
+@check("profile velocity runs both ways at the speeds asked for, 6064h and the shaft with it, and bit 10 reports it", *ALL)
 def velocity(bench):
     for r_min in (60, -60, 200):
         bench.turn(r_min)

@@ -61,7 +61,7 @@ def no_such_services(bench):
     equal(answers + bench.trace.since(mark, 0x7E4), [], "answers")
 
 
-@check("a line that is no world command is answered by one refusal and changes nothing", ZLAC8030L)
+@check("a line that is not a world command is answered by one refusal and changes nothing", ZLAC8030L)
 def no_command(bench):
     node = bench.node_id
     lines = ["get", "nonsense", "99 get", f"{node}"]

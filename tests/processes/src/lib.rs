@@ -45,7 +45,7 @@ pub fn program() -> &'static str {
     })
 }
 
-/// Commands that ask nobody, or each node-ID whether somebody is there.
+/// Commands that need no node, or scan all node-IDs.
 const NOT_PATIENT: [&str; 3] = ["sim", "dump", "scan"];
 
 /// The program with these arguments, and nothing of this environment that it would listen to. Who asks on a served bus waits longer

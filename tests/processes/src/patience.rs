@@ -8,7 +8,7 @@ pub const PATIENCE: Duration = Duration::from_secs(600);
 /// Between two looks.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Looks again and again until there is something, and gives it. `Err` is what is there instead, for whoever reads why nothing came.
+/// Polls until there is a value, and returns it. `Err` is what is there instead, for the message of a timeout.
 #[track_caller]
 pub fn wait_for<T>(what: &str, mut look: impl FnMut() -> Result<T, String>) -> T {
     // The watchdog's.

@@ -34,8 +34,8 @@ impl<S: Subject> Bench<S> {
     #[track_caller]
     pub fn shows(&mut self, mask: u16, bits: u16) -> &mut Self {
         let (statusword, at) = (self.statusword(), self.seconds());
-        let told = format!("6041h is {statusword:04X}h, expected {bits:04X}h of {mask:04X}h, at {at} s");
-        assert_eq!(statusword & mask, bits, "{told}");
+        let text = format!("6041h is {statusword:04X}h, expected {bits:04X}h of {mask:04X}h, at {at} s");
+        assert_eq!(statusword & mask, bits, "{text}");
         self
     }
 
@@ -61,7 +61,7 @@ impl<S: Subject> Bench<S> {
         self
     }
 
-    /// Asserts that nobody answers an SDO request.
+    /// Asserts that no node answers an SDO request.
     #[track_caller]
     pub fn is_silent(&mut self) -> &mut Self {
         assert_eq!(self.sdo(&head(0x40, 0x6041, 0)), None, "at {} s", self.seconds());

@@ -69,16 +69,16 @@ impl<S: Subject> Bench<S> {
         self
     }
 
-    /// A line for the world, as a person at the machine types it; it must be taken.
+    /// A world command, as typed by a person at the machine; it must be accepted.
     #[track_caller]
-    pub fn tell(&mut self, line: &str) -> &mut Self {
-        self.told(line);
+    pub fn world(&mut self, line: &str) -> &mut Self {
+        self.world_answer(line);
         self
     }
 
-    /// The answer to a line for the world, which must be taken.
+    /// The answer to a world command, which must be accepted.
     #[track_caller]
-    pub fn told(&mut self, line: &str) -> String {
+    pub fn world_answer(&mut self, line: &str) -> String {
         let answer = sim::command::answer(&mut self.world, line).expect("a line is answered").json;
         assert!(answer.starts_with("{\"ok\":true"), "{line}: {answer}");
         answer

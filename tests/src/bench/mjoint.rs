@@ -24,7 +24,7 @@ pub const MODELS: [&Model; 4] = [&Model::M4230E17B50, &Model::M4230E17B80, &Mode
 ///
 /// # Panics
 ///
-/// When there is no such figure: the test that asks is wrong.
+/// If there is no such figure: the test is wrong.
 #[must_use]
 pub fn figure(parameter: &str) -> [f64; 4] {
     figures().into_iter().find(|figure| figure.parameter == parameter).expect("a figure of the table").values

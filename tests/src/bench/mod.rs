@@ -210,7 +210,7 @@ impl<S: Subject> Bench<S> {
         self.heard().into_iter().filter(|frame| frame.starts_with(&beginning)).collect()
     }
 
-    /// What was heard since the last call is of no interest.
+    /// Discards what was heard since the last call.
     pub fn forget(&mut self) -> &mut Self {
         self.heard_at();
         self

@@ -1,4 +1,4 @@
-//! The firmwares under frames, sensors and gaps in time that nobody sane would give them.
+//! The firmwares under absurd frames, sensors and gaps in time.
 
 use can::{CanId, Frame, Instant};
 use canopen::AbortCode;
@@ -62,7 +62,7 @@ pub(super) fn mjoint(data: &[u8]) {
 }
 
 /// Every SDO request gets at most one well-formed answer, every writable object lies within its limits, read-only
-/// communication objects do not change, what the drive tells of itself is finite, and the duty cycles are shares.
+/// communication objects do not change, what the drive reports is finite, and the duty cycles are shares.
 fn drive<F: Subject>(data: &[u8], mut firmware: F, hardware: &F::Hardware) {
     let mut now = Instant::ZERO;
     firmware.power_on(hardware, now);
@@ -106,7 +106,7 @@ fn drain<F: Subject>(firmware: &mut F, after: &Frame) -> usize {
             let raw = sent.data().first_chunk::<8>().expect("an SDO answer has eight bytes");
             let reply = Reply::parse(raw);
             assert!(!matches!(reply, Reply::Unknown { .. }), "{sent} after {after}");
-            // A server that gives a transfer up tells of it without being asked.
+            // A server that aborts a transfer reports it without a request.
             answers += usize::from(!matches!(reply, Reply::Abort(_, AbortCode::TIMED_OUT)));
         }
         if sent.id() == CanId::standard(0x700 + u16::from(NODE)) {

@@ -62,7 +62,7 @@ fn rewriting_changes_one_line(document: &Document) {
     };
     assert!(others(&changed) == others(document), "line {} was rewritten, and others changed", first.line);
     let read = Document::parse(&changed.to_bytes()).expect("the file is no larger than before");
-    // Without the one letter that was no UTF-8 the same bytes are other letters.
+    // Without the one letter that was not UTF-8 the same bytes are other letters.
     let same_letters = read.encoding() == changed.encoding();
     assert!(!same_letters || others(&read) == others(&changed), "the places of the lines are those of the text");
 }

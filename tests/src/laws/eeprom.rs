@@ -98,7 +98,7 @@ fn boots<F: Subject>(mut firmware: F, hardware: &F::Hardware) {
     firmware.power_on(hardware, now);
     for _ in 0..PERIODS {
         let actuation = firmware.tick(&F::Sensors::default(), now);
-        assert!(F::is_off(&actuation), "nobody has enabled it");
+        assert!(F::is_off(&actuation), "it was not enabled");
         now = now.plus_nanos(F::CONTROL_PERIOD_NS);
         firmware.handle_timeout(now);
         while firmware.poll_transmit().is_some() {}

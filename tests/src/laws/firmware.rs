@@ -16,7 +16,7 @@ pub(super) trait Subject: Firmware<Sensors: Default> {
     fn sensors(place: u8, bits: u8) -> Self::Sensors;
     /// The power stage does nothing that hardware cannot do.
     fn is_possible(actuation: &Self::Actuation) -> bool;
-    /// The power stage does nothing that nobody has asked for.
+    /// The power stage does nothing without a command.
     fn is_off(_actuation: &Self::Actuation) -> bool {
         true
     }
@@ -109,7 +109,7 @@ impl Subject for zlim42c::Zlim42c {
 impl Subject for mjoint::MJoint {
     /// SDO, the four RPDOs, SYNC, the host's heartbeat, NMT.
     const IDS: [u16; 8] = [0x601, 0x201, 0x301, 0x401, 0x501, 0x080, 0x77F, 0x000];
-    /// The save flag reads 2 when all is stored, which nobody can write.
+    /// The save flag reads 2 when all is stored, which cannot be written.
     const OWN_RULE: &'static [u16] = &[0x2614];
 
     fn table() -> &'static Table {

@@ -1,4 +1,4 @@
-//! The master's core under answers that nobody gave, in any order and at any time.
+//! The master's core under arbitrary answers, in any order and at any time.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -104,7 +104,7 @@ fn settle(core: &mut Core, open: &mut BTreeSet<Ticket>, after: &[u8]) {
         let ticket = finished.ticket;
         assert!(open.remove(&ticket), "{ticket:?} ended twice, or was not asked, after {after:02X?}");
     }
-    // Half of the time nobody reads events: then the oldest go.
+    // Half of the time events are not read: then the oldest are dropped.
     if after.last().is_some_and(|last| last & 1 == 0) {
         let events = std::iter::from_fn(|| core.poll_event()).take(2 * MOST_EVENTS).count();
         assert!(events <= MOST_EVENTS, "{events} events after {after:02X?}");
@@ -122,7 +122,7 @@ fn end(core: &mut Core, open: &mut BTreeSet<Ticket>, mut now: Instant) {
         settle(core, open, &[]);
     }
     assert!(open.is_empty(), "{} requests never end", open.len());
-    // What was asked of nobody in time is a frame that still finds its way: an answer to nothing is nothing.
+    // A request that timed out may still be answered: an answer without a request is ignored.
     core.handle_frame(&Frame::new(CanId::standard(0x581), &[0x60, 0, 0, 0, 0, 0, 0, 0]), now);
     settle(core, open, &[]);
 }

@@ -57,7 +57,7 @@ fn on_a_line(bytes: &[u8], cut: usize) {
     assert!(answer.len() == 7 && answer[..3] == [UNIT, 3, 2], "{answer:02X?} after {bytes:02X?}");
 }
 
-/// The bytes as what stands in a sound frame.
+/// The bytes as the contents of a valid frame.
 fn as_a_request(pdu: &[u8]) {
     if !(1..=253).contains(&pdu.len()) {
         return;

@@ -1,4 +1,4 @@
-//! The SDO protocol and a whole node over the ZLAC8030L's object table, under frames that nobody sane would send.
+//! The SDO protocol and a whole node over the ZLAC8030L's object table, under absurd frames.
 
 use std::collections::HashMap;
 

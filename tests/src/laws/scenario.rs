@@ -53,5 +53,5 @@ fn assert_placed(bad: &BadFile, text: &str) {
         let length = line.unwrap_or_else(|| panic!("no line {} in {text:?}", problem.line)).chars().count();
         assert!(problem.column <= length + 1, "{problem:?}");
     }
-    assert!(bad.to_string().len() < 200_000, "a message that nobody reads");
+    assert!(bad.to_string().len() < 200_000, "a message too long to read");
 }

@@ -51,7 +51,7 @@ pub(super) fn world_command(data: &[u8]) {
     all_finite(&mut world, "the end");
 }
 
-/// The three drives, each told to turn.
+/// The three drives, each commanded to turn.
 fn world() -> (World, StationId) {
     let mut world = World::new(Bitrate::K500, 1);
     let host = world.add_probe();

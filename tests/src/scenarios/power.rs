@@ -22,8 +22,8 @@ pub fn a_fault_is_told_and_goes_with_a_rising_bit_7_once_its_cause_is_gone<S: Po
     // Bit 7 did not rise.
     bench.set(0x6040, 0x80).shows(0xFF, S::FAULT);
     bench.set(0x6040, 0x00).set(0x6040, 0x80).shows(0xFF, S::BOOTED & 0xFF).reads(0x603F, 0).reads(0x1001, 0);
-    let told = format!("08n#{:04X}{register:02X}0000000000", code.swap_bytes());
-    bench.hears_of("08n#", &[&told, "08n#0000000000000000"]);
+    let emcy = format!("08n#{:04X}{register:02X}0000000000", code.swap_bytes());
+    bench.hears_of("08n#", &[&emcy, "08n#0000000000000000"]);
 }
 
 /// `statusword_at_rest.csv`.

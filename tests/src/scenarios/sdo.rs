@@ -53,7 +53,7 @@ pub fn a_segmented_download_carries_a_small_object_too<S: Subject>() {
     bench.reads(0x6083, 1000);
 }
 
-/// Bit 0 of the command is 0: no size is told.
+/// Bit 0 of the command is 0: no size is indicated.
 pub fn an_expedited_download_without_a_size_takes_what_the_object_needs<S: Subject>() {
     let mut bench = Bench::<S>::new();
     bench.answers([0x22, 0x83, 0x60, 0, 0xE8, 3, 0, 0], head(0x60, 0x6083, 0)).reads(0x6083, 1000);
@@ -71,7 +71,7 @@ pub fn an_upload_ignores_its_low_five_bits_and_three_bytes_are_too_few<S: Subjec
     assert_eq!((answer[0], &answer[4..]), (0x80, &[0x13, 0x00, 0x07, 0x06][..]));
 }
 
-/// An answer repeats the multiplexor of its request; nobody waits for the answer before the next request here.
+/// An answer repeats the multiplexor of its request; the next request is sent without waiting for it here.
 pub fn requests_sent_without_waiting_for_answers_are_all_answered_in_order<S: Subject>() {
     let mut bench = Bench::<S>::new();
     let requests = ["60n#4000100000000000", "60n#4041600000000000", "60n#4064600000000000", "60n#4060600000000000"];

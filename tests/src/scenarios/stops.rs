@@ -120,7 +120,7 @@ pub fn disable_voltage_frees_the_motor_at_once_in_every_mode<S: PowerSubject>() 
     }
 }
 
-/// A halt is no end.
+/// A halt is not an end.
 pub fn a_halted_move_goes_on_to_its_target<S: PowerSubject>() {
     for option in [1, 2, 3] {
         let mut bench = Bench::<S>::new();

@@ -11,42 +11,42 @@ const IN_POSITION: i64 = 4;
 /// What the drive says of Y0 and Y1 (2004h), which is what a meter at them shows.
 #[track_caller]
 fn outputs<S: ZltechSubject>(bench: &mut Bench<S>) -> i64 {
-    let told = bench.run_ms(5).get(0x2004) & 3;
-    assert_eq!((bench.report().outputs.bits & 3) as i64, told);
-    told
+    let levels = bench.run_ms(5).get(0x2004) & 3;
+    assert_eq!((bench.report().outputs.bits & 3) as i64, levels);
+    levels
 }
 
-/// 0 is no function, and 3 is not connected or tells of a homing that has not been.
+/// 0 is not a function, and 3 is not connected or reports a homing that has not been done.
 pub fn an_output_tells_what_its_function_names_in_either_polarity<S: ZltechSubject>() {
     for (sub, mask) in S::OUTPUT_FUNCTIONS.iter().zip([1, 2]) {
         for reversed in [false, true] {
             let mut bench = Bench::<S>::new();
             bench.set((0x2030, 0x0C), if reversed { mask } else { 0 });
-            let tells = |bench: &mut Bench<S>, function, active: bool| {
+            let reports = |bench: &mut Bench<S>, function, active: bool| {
                 let now = outputs(bench.set((0x2030, *sub), function));
                 assert_eq!(now & mask != 0, active != reversed, "{function} at 2030h:{sub:02X}, reversed {reversed}");
                 assert_eq!(now & !mask, 0, "the other output");
             };
             for function in [0, ALARM, DRIVE_STATUS, 3] {
-                tells(&mut bench, function, false);
+                reports(&mut bench, function, false);
             }
-            tells(&mut bench, IN_POSITION, S::BOOTED & 1 << 10 != 0);
+            reports(&mut bench, IN_POSITION, S::BOOTED & 1 << 10 != 0);
             bench.enable_in(1);
-            tells(&mut bench, DRIVE_STATUS, true);
-            tells(&mut bench, IN_POSITION, true);
+            reports(&mut bench, DRIVE_STATUS, true);
+            reports(&mut bench, IN_POSITION, true);
             bench.move_by(4_000).run_ms(100);
-            tells(&mut bench, IN_POSITION, false);
-            tells(&mut bench, DRIVE_STATUS, true);
+            reports(&mut bench, IN_POSITION, false);
+            reports(&mut bench, DRIVE_STATUS, true);
             bench.run_ms(2500);
-            tells(&mut bench, IN_POSITION, true);
+            reports(&mut bench, IN_POSITION, true);
             bench.set(0x6040, 0);
-            tells(&mut bench, DRIVE_STATUS, false);
+            reports(&mut bench, DRIVE_STATUS, false);
             bench.enable().set((0x2030, S::OUTPUT_FUNCTIONS[0]), 0).break_down(true);
             for (function, active) in [(0, false), (ALARM, true), (DRIVE_STATUS, false), (3, false)] {
-                tells(&mut bench, function, active);
+                reports(&mut bench, function, active);
             }
             bench.break_down(false).set(0x6040, 0).set(0x6040, 0x80);
-            tells(&mut bench, ALARM, false);
+            reports(&mut bench, ALARM, false);
         }
     }
 }

@@ -53,8 +53,8 @@ fn silence_and_surplus_are_differences_too() {
     let header = "drive zlac8030l 4\n";
     let told = |lines: &str| hold("x.can", &format!("{header}{lines}")).expect_err("a difference");
     assert!(told("< 704#00\n").starts_with("x.can:2: heard nothing"));
-    assert!(told("> 604#4000100000000000\n+ 5 ms\n+ 5 ms\n").starts_with("x.can:4: nobody expected 584#"));
-    assert!(told("> 604#4000100000000000\n+ 5 ms\n").starts_with("x.can:3: nobody expected 584#"));
+    assert!(told("> 604#4000100000000000\n+ 5 ms\n+ 5 ms\n").starts_with("x.can:4: unexpected 584#"));
+    assert!(told("> 604#4000100000000000\n+ 5 ms\n").starts_with("x.can:3: unexpected 584#"));
     assert!(told("> 604#4000100000000000\n< 584#43001000........  1..2\n").starts_with("x.can:3: heard 262546"));
     assert!(told("hello\n").starts_with("x.can:2: "));
 }
@@ -65,13 +65,13 @@ fn hold(name: &str, text: &str) -> Result<(), String> {
     let lines: Vec<_> = text.lines().collect();
     let last = lines.len();
     for (n, line) in lines.iter().enumerate() {
-        play(&mut stage, line).map_err(|what| told(name, &lines, n, &what))?;
+        play(&mut stage, line).map_err(|what| located(name, &lines, n, &what))?;
     }
     let surplus = stage.as_mut().map_or(Ok(()), Stage::expect_silence);
-    surplus.map_err(|what| told(name, &lines, last.saturating_sub(1), &what))
+    surplus.map_err(|what| located(name, &lines, last.saturating_sub(1), &what))
 }
 
-fn told(name: &str, lines: &[&str], n: usize, what: &str) -> String {
+fn located(name: &str, lines: &[&str], n: usize, what: &str) -> String {
     let mut text = format!("{name}:{}: {what}\n", n + 1);
     let around = n.saturating_sub(3)..(n + 3).min(lines.len());
     for shown in around.filter(|shown| n.abs_diff(*shown) <= 2) {
@@ -122,11 +122,11 @@ impl Stage {
     }
 
     fn expect_silence(&mut self) -> Result<(), String> {
-        self.heard.pop_front().map_or(Ok(()), |frame| Err(format!("nobody expected {frame}")))
+        self.heard.pop_front().map_or(Ok(()), |frame| Err(format!("unexpected {frame}")))
     }
 
     fn send(&mut self, text: &str) -> Result<(), String> {
-        let frame = first_word(text).parse().map_err(|_| format!("{text:?} is no frame"))?;
+        let frame = first_word(text).parse().map_err(|_| format!("{text:?} is not a frame"))?;
         self.bench.world.send(self.bench.host, frame).map_err(|error| error.to_string())?;
         // As long as a frame takes, and a little for the drive.
         self.run(Duration::from_micros(300));

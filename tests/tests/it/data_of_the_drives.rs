@@ -1,4 +1,4 @@
-//! What holds for the data files of every drive, before they judge it. What one drive's files have of their own stands in
+//! What holds for the data files of every drive, before they judge it. What only one drive's files have is in
 //! `data_of_the_DRIVE`.
 
 use std::collections::HashSet;

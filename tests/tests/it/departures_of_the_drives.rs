@@ -10,7 +10,7 @@ use ferrodrive_tests::csv::Table;
 
 const NO_SUCH_OBJECT: Abort = 0x0602_0000;
 
-/// What a drive answers to questions that tell departures.
+/// The answers of a drive to requests that distinguish departures.
 fn asked<S: Subject>(bench: &mut Bench<S>) -> Vec<(&'static str, bool)> {
     let node = bench.node;
     let mut lacks = |index| bench.read(index) == Err(NO_SUCH_OBJECT);
@@ -48,7 +48,7 @@ fn asked<S: Subject>(bench: &mut Bench<S>) -> Vec<(&'static str, bool)> {
 
     // Too much for each of them: a fault, or an alarm.
     bench.heard();
-    bench.tell(&format!("{node} supply 90")).run_ms(500);
+    bench.world(&format!("{node} supply 90")).run_ms(500);
     seen.push(("no_emcy", bench.heard_of(&format!("{:03X}#", 0x080 + u16::from(node))).is_empty()));
     seen.push(("heartbeat_tells_alarm", beat(bench).ends_with("#04")));
     seen

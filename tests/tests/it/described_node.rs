@@ -1,4 +1,4 @@
-//! A device that is no drive, from a data sheet of our own: what a host on the bus sees of it, and the outer world's hand.
+//! A device that is not a drive, from our own data sheet: what a host on the bus sees of it, and changes from outside.
 
 use std::time::Duration;
 
@@ -77,7 +77,7 @@ impl Bench {
     }
 
     /// A world command; what is heard within 20 ms of it.
-    fn tell(&mut self, line: &str) -> Vec<String> {
+    fn world_command(&mut self, line: &str) -> Vec<String> {
         let answer = sim::command::answer(&mut self.world, line).unwrap().json;
         assert!(answer.starts_with("{\"ok\":true"), "{line}: {answer}");
         self.world.run_for(Duration::from_millis(20));
@@ -88,11 +88,11 @@ impl Bench {
 #[test]
 fn what_the_world_sets_is_sent_by_event_and_with_sync() {
     let mut bench = Bench::new();
-    assert_eq!(bench.tell("9 set 6000:01 5Ah"), ["189#5A"]);
-    assert!(bench.tell("9 set 6000:01 5Ah").is_empty(), "no change, no event");
+    assert_eq!(bench.world_command("9 set 6000:01 5Ah"), ["189#5A"]);
+    assert!(bench.world_command("9 set 6000:01 5Ah").is_empty(), "no change, no event");
     assert_eq!(bench.send("080#"), ["289#5A"]);
     bench.send("000#8009");
-    assert!(bench.tell("9 set 6000:01 1").is_empty(), "pre-operational: no PDO");
+    assert!(bench.world_command("9 set 6000:01 1").is_empty(), "pre-operational: no PDO");
 }
 
 #[test]
@@ -115,16 +115,16 @@ fn a_default_beyond_ascii_goes_over_the_bus_byte_for_byte() {
 #[test]
 fn texts_and_64_bits_are_set_from_outside_and_stored_over_power_cycles() {
     let mut bench = Bench::new();
-    bench.tell("9 set 2001 \"new\"");
+    bench.world_command("9 set 2001 \"new\"");
     assert_eq!(bench.send("609#4001200000000000"), ["589#470120006E657700"]);
-    bench.tell("9 set 2002 18446744073709551615");
+    bench.world_command("9 set 2002 18446744073709551615");
     assert_eq!(bench.send("609#4002200000000000"), ["589#4102200008000000"]);
     assert_eq!(bench.send("609#6000000000000000"), ["589#00FFFFFFFFFFFFFF"]);
     assert_eq!(bench.send("609#7000000000000000"), ["589#1DFF000000000000"]);
     bench.send("609#2300200000000040");
     assert_eq!(bench.send("609#2310100173617665"), ["589#6010100100000000"], "save");
-    bench.tell("9 power off");
-    bench.tell("9 power on");
+    bench.world_command("9 power off");
+    bench.world_command("9 power on");
     assert_eq!(bench.send("609#4001200000000000"), ["589#470120006E657700"], "the label");
     assert_eq!(bench.send("609#4000200000000000"), ["589#4300200000000040"], "the gain");
     let answer = sim::command::answer(&mut bench.world, "9 set 2001 5").unwrap().json;
@@ -137,9 +137,9 @@ fn texts_and_64_bits_are_set_from_outside_and_stored_over_power_cycles() {
 fn a_new_error_register_is_told_by_emcy_and_kept_in_the_history() {
     let mut bench = Bench::new();
     // Generic and temperature.
-    assert_eq!(bench.tell("9 set 1001 9"), ["089#0010090000000000"]);
+    assert_eq!(bench.world_command("9 set 1001 9"), ["089#0010090000000000"]);
     assert_eq!(bench.send("609#4003100100000000"), ["589#4303100100100000"]);
-    assert_eq!(bench.tell("9 set 1001 0"), ["089#0000000000000000"]);
+    assert_eq!(bench.world_command("9 set 1001 0"), ["089#0000000000000000"]);
     assert_eq!(bench.send("609#4001100000000000"), ["589#4F01100000000000"]);
 }
 
@@ -175,14 +175,14 @@ fn what_nothing_acts_on_and_what_contradicts_is_refused_with_the_standards_codes
 [1019]\nParameterName=Counter\nDataType=5\nAccessType=rw\nDefaultValue=0\n";
     let mut bench = Bench::of(&[SHEET, services].concat());
     let mut refused = |index, sub_index, bytes, value| write(&mut bench, index, sub_index, bytes, value);
-    // CiA 301, 7.5.2.19: no two times for one node; a time of 0 watches nobody.
+    // CiA 301, 7.5.2.19: no two times for one node; a time of 0 watches no node.
     assert_eq!(refused(0x1016, 1, 4, 0x0005_03E8), None);
     assert_eq!(refused(0x1016, 2, 4, 0x0005_01F4), Some(0x0604_0043));
     assert_eq!(refused(0x1016, 2, 4, 0x0005_0000), None);
     assert_eq!(refused(0x1016, 1, 4, 0x0005_07D0), None, "its own entry may change");
     assert_eq!(refused(0x1016, 3, 4, 0x0006_01F4), None);
     assert_eq!(refused(0x1016, 1, 4, 0), None);
-    assert_eq!(refused(0x1016, 2, 4, 0x0005_01F4), None, "it is watched by nobody else any more");
+    assert_eq!(refused(0x1016, 2, 4, 0x0005_01F4), None, "no other entry watches it any more");
     // There is no window of synchronous PDOs and no clock.
     assert_eq!(refused(0x1007, 0, 4, 500), Some(0x0609_0030));
     assert_eq!(refused(0x1007, 0, 4, 0), None);

@@ -15,7 +15,7 @@ use sim::machine::{Order, order, without_effect};
 
 const NODE: u8 = 5;
 
-/// One line on standard error, for whoever reads the table.
+/// One line on standard error, for the table.
 fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -125,7 +125,7 @@ impl Bench {
     }
 }
 
-/// CiA 305, 6.5.3: the smallest address first; whoever has been found lets itself be configured and takes no further part.
+/// CiA 305, 6.5.3: the smallest address first; a device that has been found can be configured and takes no further part.
 #[test]
 fn two_of_one_make_are_found_one_after_the_other_and_become_nodes() {
     let mut bench = Bench::of(&[(0xFFFF_FFFF, 0), (7, 0), (9, 5)]);
@@ -173,7 +173,7 @@ fn a_new_bit_rate_begins_after_the_first_delay_and_speech_after_the_second() {
     bench.send(frame);
     bench.world.run_for(Duration::from_millis(1));
     bench.heard();
-    // What it sends at 250 kbit/s nobody here acknowledges, which its controller counts (ISO 11898-1, 12.1.4.2).
+    // No node acknowledges what it sends at 250 kbit/s, which its controller counts (ISO 11898-1, 12.1.4.2).
     bench.world.run_for(delay - Duration::from_millis(10));
     assert_eq!((bench.heard(), bench.rate(), bench.refused_frames()), (Vec::new(), Some(Bitrate::K500), 0));
     bench.world.run_for(Duration::from_millis(20));

@@ -8,7 +8,7 @@ use ferrodrive_tests::csv::Table;
 const OBJECTS: &str = include_str!("../../data/cia402/objects.csv");
 
 /// Type, access and mapping of an object as one line, in the words of the data.
-fn told(mux: Mux) -> Option<String> {
+fn heard(mux: Mux) -> Option<String> {
     let row = CIA402.row(mux)?;
     let kind = format!("{:?}", row.data_type).replace("Unsigned", "U").replace("Integer", "I");
     let mapped = if row.pdo == PdoMapping::No { "no" } else { "yes" };
@@ -24,7 +24,7 @@ fn every_object_of_the_profile_is_as_the_standard_has_it() {
         // What the note says is otherwise here, and why.
         let access = line.get("note").get(..2).unwrap_or(line.get("access"));
         let expected = format!("{},{access},{}", line.get("type"), line.get("pdo_mappable"));
-        assert_eq!(told(mux), Some(expected), "{line:?}");
+        assert_eq!(heard(mux), Some(expected), "{line:?}");
         objects.push(mux);
     }
     let rows = CIA402.dictionary.rows().iter().filter(|row| row.index >= 0x6000).map(|row| row.mux());

@@ -1,4 +1,4 @@
-//! What a live bus says beside frames: seen through a server of socketcand that tells of the errors on its bus.
+//! What a live bus says beside frames: seen through a server of socketcand that reports the errors on its bus.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpListener;

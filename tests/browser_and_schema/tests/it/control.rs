@@ -109,7 +109,7 @@ fn a_unix_socket_serves_the_same_is_private_and_goes_with_the_simulator() {
     simulator.ask("quit");
     simulator.wait();
     assert!(!path.exists());
-    // What a killed one leaves behind is in nobody's way; what is no socket is left alone.
+    // A socket left by a killed one is replaced; another kind of file is left alone.
     let mut killed = Simulator::start(&arguments);
     killed.kill();
     assert!(path.exists());

@@ -1,7 +1,7 @@
 //! The page of the studio in a real browser: Chromium, moved by its WebDriver.
 //!
 //! `cargo xtask test --only studio` installs both where it can, and runs this. A screenshot of each view is left in
-//! `target/studio` for somebody to look at.
+//! `target/studio` to be looked at.
 
 mod figures;
 mod group;
@@ -67,7 +67,7 @@ impl Stage {
             let line = line.expect("text");
             Some(line.split_once("successfully on port ")?.1.trim_end_matches('.').to_owned())
         });
-        // It goes on talking, and nobody has to listen.
+        // It keeps printing, and its output need not be read.
         std::thread::spawn(move || said.for_each(drop));
         let profile = processes::scratch(&format!("studio_{name}"));
         let arguments = [
@@ -133,7 +133,7 @@ impl Stage {
         }
     }
 
-    /// Clicks until something comes of it: what the page moves between looking and clicking is missed, as a person may miss it.
+    /// Clicks until it has an effect: an element that the page moves between finding and clicking is missed, as by a person.
     async fn click_for(&self, css: &str, wanted: &str) {
         // The watchdog's.
         let until = std::time::Instant::now() + PATIENCE;
@@ -312,7 +312,7 @@ async fn a_jog_ends_with_the_button_the_key_and_the_tab() {
     stage.client.close_window().await.expect("it closes");
     stage.rests();
     stage.wheel("a quick stop", |wheel| wheel["drive"]["state"] != "Operation enabled");
-    stage.studio.wait("nobody in control", |state| state["controller"].is_null());
+    stage.studio.wait("no session in control", |state| state["controller"].is_null());
     stage.close().await;
 }
 
@@ -357,7 +357,7 @@ async fn the_trace_says_what_passes_and_a_filter_hides_the_rest() {
 async fn the_trace_draws_what_is_in_view_and_fetches_what_is_older() {
     let stage = Stage::open("trace_scrolled").await;
     let kept = |script: &'static str| async {
-        // A list that is not full is as tall as its view, which is no whole number of lines.
+        // A list that is not full is as tall as its view, which is not a whole number of lines.
         stage.client.execute(script, vec![]).await.expect("it runs").as_f64().expect("a number") as u64
     };
     const FIRST: &str = "return Number(document.querySelector('.trace-list .trace-row').dataset.number)";

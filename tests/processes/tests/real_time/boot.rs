@@ -49,7 +49,7 @@ fn the_dcf_of_a_manager_says_who_is_booted_and_as_what() {
     std::fs::write(&path, manager(vendor, "wheel.bin")).expect("a DCF");
     let ended = ferrodrive(&["boot", file, "--json"]);
     assert_eq!((ended.status, letter(&ended.json(), 4)), (Some(0), None), "{}{}", ended.out, ended.err);
-    assert_eq!(ended.json()["nodes"].as_array().map(Vec::len), Some(1), "nobody else is a slave: {}", ended.out);
+    assert_eq!(ended.json()["nodes"].as_array().map(Vec::len), Some(1), "no other node is a slave: {}", ended.out);
 
     // CiA 302-2, 8.2: another vendor is D, and a mandatory slave that fails is a failure of the whole.
     std::fs::write(&path, manager(vendor + 1, "wheel.bin")).expect("a DCF");

@@ -70,7 +70,7 @@ fn who_says_nothing_is_sent_away_in_time_and_a_crowd_of_them_keeps_nobody_out() 
     let mut silent: Vec<Line> = (0..40).map(|_| Line::connect(&simulator)).collect();
     let mut late = Line::connect(&simulator);
     assert_eq!(late.ask(r#"{"request":"hello","token":"secret"}"#)["ok"], true);
-    // Those who came first made room, the others had their time; each is told why.
+    // The first ones made room, the others had their time; each gets the reason.
     for stranger in &mut silent {
         let told = stranger.next().expect("a reason");
         assert_eq!(told["error"]["kind"], "token", "{told}");

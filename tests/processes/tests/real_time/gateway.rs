@@ -196,7 +196,7 @@ fn boot_ups_emergencies_and_pdos_are_told_to_every_client() {
     // CiA 301, 7.2.8: NMT reset node, then the boot-up message.
     assert_eq!(one.ask("[2] 2 reset node"), "[2] OK");
     assert_eq!(one.hear("BOOT_UP"), "1 2 BOOT_UP");
-    // "ZLIM42C stepper CANopen" and CiA 402: a Hall or encoder fault is an EMCY; the code stands in 603Fh.
+    // "ZLIM42C stepper CANopen" and CiA 402: a Hall or encoder fault is an EMCY; the code is in 603Fh.
     simulator.send("4 fault hall on");
     let told = one.hear("EMCY");
     assert!(told.starts_with("1 4 EMCY ") && told.split(' ').count() == 10, "{told}");

@@ -39,7 +39,7 @@ fn refused(arguments: &[&str], status: i32, part: &str) {
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn a_base_goes_the_way_of_its_twist() {
 #[test]
 fn lines_of_twists_are_driven_one_after_the_other_and_bad_ones_are_told() {
     let file = example("base.toml");
-    // Ten lines of 100 ms each; what is no twist takes no time.
+    // Ten lines of 100 ms each; a line that is not a twist takes no time.
     let lines = format!("{}\nnan 0\nfast\n0.2\n1 2 3\n", "0.3 0\n".repeat(10));
     let driven = with_input(&["--json", "drive-base", &file], &lines);
     assert_eq!(driven.status, Some(0), "{}", driven.err);
@@ -187,7 +187,7 @@ fn a_group_is_stopped_when_its_command_is_asked_to_end_or_killed() {
                 );
             }
         }
-        // Killed, it asked nobody: the drives' own watch over their host ends the motion (2000h).
+        // Killed, it stopped nothing: the drives' own watch over their host ends the motion (2000h).
         bench.wait(false);
     }
 }

@@ -1,5 +1,5 @@
 //! The commands of `docs/handbook`, as a reader would type them: each ends well, and each line for a simulator's terminal
-//! is answered. They stand in the project's folder, not in the package.
+//! is answered. They are in the project's folder, not in the package.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ const PRINTED_PORT: &str = "29536";
 const PRINTED_LSS: &str = "can0 lss ";
 const PATIENT_LSS: &str = "can0 lss --within 500ms ";
 
-/// What is no command of ours: checked elsewhere, or another program's.
+/// Lines that are not our commands: checked elsewhere, or of another program.
 const OTHERS: &[&str] = &["cargo ", "git ", "pip ", "#"];
 
 fn root() -> PathBuf {

@@ -169,7 +169,7 @@ fn simulator_ends(signal: &str, status: i32) {
     assert_eq!(String::from_utf8(ended.stderr).unwrap(), "", "{signal}");
 }
 
-/// Its drives leave somebody else's bus as if their cable was cut; the bus and what drives it stay.
+/// Its drives leave another program's bus as if their cable was cut; the bus and its master stay.
 #[test]
 fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
     let owner = Simulator::start(&["--drive", "cia402@5", "--serve", "socketcand://127.0.0.1:0"]);
@@ -192,7 +192,7 @@ fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
         send(signal, &child);
         let ended = child.wait_with_output().unwrap();
         assert_eq!(ended.status.code(), Some(status), "{signal}: {}", String::from_utf8_lossy(&ended.stderr));
-        // Whoever drove it is told that it is gone; the owner's drive still answers.
+        // The program that moved it reports the loss; the owner's drive still answers.
         let told = moving.wait_with_output().unwrap();
         assert_eq!(told.status.code(), Some(1), "{}", String::from_utf8_lossy(&told.stderr));
         let told = String::from_utf8(told.stderr).unwrap();
@@ -211,7 +211,7 @@ fn a_bus_lost_in_a_move_is_told_with_what_was_moving_and_what_to_do() {
     let ended = moving.wait_with_output().unwrap();
     assert_eq!(ended.status.code(), Some(1));
     let said = String::from_utf8(ended.stderr).unwrap();
-    // What is told of the connection depends on the moment: that it was reset, or that it is refused when it is tried again.
+    // The report of the connection depends on the moment: reset, or refused when it is tried again.
     for part in [
         "node 4 may still be moving",
         "the connection to the bus is lost: ",

@@ -16,7 +16,7 @@ const STEPPER: (&str, &str) = ("2", "2=zlim42c");
 const SERVO: (&str, &str) = ("4", "4=zlac8030l");
 
 /// Stopping from 60 r/min with the ramps as delivered, and what was on its way. Times are of the drives; that they do not stop
-/// sooner is held in virtual time, since nobody here can say when a command that a busy machine kept waiting was last heard.
+/// sooner is tested in virtual time, since on a busy machine it is not known when a delayed command was last received.
 const SLACK: Duration = Duration::from_millis(1500);
 
 /// Far longer than any of them takes to boot.
@@ -124,7 +124,7 @@ fn a_drive_with_a_watch_ends_every_kind_of_motion_by_itself() {
 }
 
 /// A servo of CiA 402 is delivered without a watch (1016h is 0, as CiA 301, 7.5.2.19 has it); a command gives it one of 2000 ms
-/// while it moves it, and what 6007h makes of its loss ends the motion. With `--no-guard` it has none, which is said.
+/// while it moves it, and what 6007h makes of its loss ends the motion. With `--no-guard` it has none, which is reported.
 #[test]
 fn a_described_servo_stops_by_itself_where_it_was_given_a_watch_and_else_it_was_said() {
     const DESCRIBED: (&str, &str) = ("5", "5=cia402");
@@ -278,7 +278,7 @@ fn a_watch_that_is_switched_off_is_told_and_switched_on_if_asked_for() {
     bench.stops("4", Duration::from_millis(1000) + SLACK);
 }
 
-/// Whoever moves the drives: `supervise` keeps them content, and they stop when it dies. The ZLIM42-C has nothing for that, which it
+/// Whatever program moves the drives: `supervise` feeds their watches, and they stop when it dies. The ZLIM42-C has none, which it
 /// says.
 #[test]
 fn drives_that_another_program_moves_stop_when_their_supervisor_is_killed() {
@@ -309,7 +309,7 @@ fn drives_that_another_program_moves_stop_when_their_supervisor_is_killed() {
     for drive in [JOINT, SERVO, DESCRIBED] {
         bench.json(drive, &["velocity", drive.0, "60rpm", "--no-wait", "--no-guard"]);
     }
-    // Beyond every watch: somebody keeps them content, and it is not who moves them.
+    // Longer than every watch: another program than the moving one feeds them.
     bench.simulator.pass(Duration::from_secs(4));
     for (node, _) in [JOINT, SERVO, DESCRIBED] {
         assert!(bench.turns(node), "node {node}");

@@ -57,7 +57,7 @@ fn a_tpdo_that_follows_sync_is_measured_and_is_no_faster_than_its_wire() {
     for (object, value) in [("1A00:01", "0x60410010"), ("1A00:00", "1"), ("1800:02", "1")] {
         on_bus(&["--model", "4=zlac8030l", "write", "4", object, value]);
     }
-    // Without NMT start nothing comes, and that is said.
+    // Without NMT start nothing comes, and that is reported.
     let measured =
         |count: &str| done(&["--bus", &bus, "--timeout", "500ms", "--json", "latency", "4", "--count", count]).json();
     let silent = measured("3");
@@ -65,7 +65,7 @@ fn a_tpdo_that_follows_sync_is_measured_and_is_no_faster_than_its_wire() {
     on_bus(&["nmt", "4", "start"]);
     let report = measured("30");
     assert!(figure(&report, "pdo", "count") >= 10.0, "{report}");
-    // 44 bits and two bytes, without stuff bits, at 500 kbit/s: 120 us. A simulator that got no processor time for a while makes good
+    // 44 bits and two bytes, without stuff bits, at 500 kbit/s: 120 us. A simulator that got no processor time for a while catches up
     // what it is behind, and then one answer may come sooner by the computer's clock; not half of them.
     assert!(figure(&report, "pdo", "median_us") >= 120.0, "{report}");
 }
@@ -133,7 +133,7 @@ fn a_user_who_may_not_run_in_real_time_is_told_how_to_allow_it() {
         let ended =
             without(limits, capabilities, program, &["--bus", &bus, "--realtime", "read", "4", "1000"]).unwrap();
         let text = String::from_utf8_lossy(&ended.stderr);
-        // Where nobody may have SCHED_FIFO, that is said first.
+        // Where SCHED_FIFO is not permitted, that is reported first.
         assert_eq!(ended.status.code(), Some(1), "{limits}: {text}");
         assert!(text.contains(said) || text.contains("SCHED_FIFO"), "{limits}: {text}");
         assert!(text.contains("may not") && text.contains("setcap cap_sys_nice") && text.contains("rtprio"), "{text}");

@@ -1,4 +1,4 @@
-//! Values that are rounded, refused or held back: what is said of them, and that the limits named are those in force.
+//! Values that are rounded, refused or limited: the report, and that the named limits are those in force.
 
 use processes::{Simulator, done, ferrodrive};
 use serde_json::json;

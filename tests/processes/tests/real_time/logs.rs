@@ -10,7 +10,7 @@ use serde_json::Value;
 /// The extensions of what can be written.
 const WRITTEN: [&str; 4] = ["log", "asc", "blf", "pcapng"];
 
-/// The frames of a log as `decode` tells of them, with their direction.
+/// The frames of a log as `decode` prints them, with their direction.
 fn frames(log: &Path) -> Vec<(String, Option<bool>)> {
     let ended = done(&["--json", "decode", log.to_str().unwrap()]);
     let lines = ended.out.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));

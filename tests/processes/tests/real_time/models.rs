@@ -1,4 +1,4 @@
-//! Which model a node is: what a scan says of drives that answer the same, and what is refused until somebody says it.
+//! Identification of models: a scan of drives that answer the same, and what is refused until the model is given.
 
 use processes::{Ended, Simulator, done, ferrodrive, scratch};
 use serde_json::{Value, json};
@@ -174,7 +174,7 @@ fn signed_values_are_signed_whether_the_model_is_said_or_not() {
     }
 }
 
-/// A data sheet of the servo by somebody who calls its bus voltage otherwise.
+/// A data sheet of the servo with another name for its bus voltage.
 const SHEET: &str = "[FileInfo]\nFileName=wheel.eds\n[DeviceInfo]\nVendorName=Somebody\nProductName=Wheel\n\
     VendorNumber=0x100\nProductNumber=1\nRevisionNumber=0\n\
     [MandatoryObjects]\nSupportedObjects=1\n1=0x1000\n\

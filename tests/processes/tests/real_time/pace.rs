@@ -105,7 +105,7 @@ fn ten_times_as_fast_the_bus_is_ten_times_as_far() {
     let inner_s = inner.elapsed().as_secs_f64();
     let second = simulator.ask("now");
     let outer_s = outer.elapsed().as_secs_f64();
-    // Where the bus is and how far it is behind make where it should be. Both are told in whole milliseconds.
+    // Where the bus is and how far it is behind make where it should be. Both are given in whole milliseconds.
     let (reached, behind) = (number(&second, "t") - number(&first, "t"), number(&second, "behind_ms") * 1e-3);
     let behind_at_first = number(&first, "behind_ms") * 1e-3;
     assert!(

@@ -94,7 +94,7 @@ fn what_cannot_be_written_is_told_with_its_place_and_nothing_is_written() {
     let ended = ferrodrive(&["params", "apply", "4", &joint]);
     assert!(ended.status == Some(1) && ended.err.contains("another device"), "{}", ended.err);
     assert_eq!(ended.err.matches("vendor").count(), 2, "{}", ended.err);
-    // Of one that says the same of itself the file's model tells.
+    // Drives with the same identity are distinguished by the model in the file.
     let stepper = folder.path("stepper.toml");
     done(&["params", "backup", "2", "-o", &stepper]);
     let said = refused(&stepper);
@@ -226,7 +226,7 @@ fn a_power_cycle_proves_what_was_stored() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the binary runs");
-    // Power fails again and again until somebody has waited for it: when that is, only the command knows.
+    // Power fails repeatedly until the command has waited for it: only the command knows when that is.
     let mut child = child;
     wait_until("it has waited for a boot-up", || {
         // Between two failures of the supply: longer than a boot.
@@ -236,7 +236,7 @@ fn a_power_cycle_proves_what_was_stored() {
     });
     let output = child.wait_with_output().expect("it has ended");
     let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    // A cut in the middle of the writes is told as such, and is no proof.
+    // A cut during the writes is reported as such, and is not a proof.
     assert!(
         said.contains("after a power cycle everything that is kept reads as written") || !output.status.success(),
         "{said}"

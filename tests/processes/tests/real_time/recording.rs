@@ -106,7 +106,7 @@ fn a_long_record_takes_no_more_memory_than_a_short_one() {
 }
 
 #[test]
-fn a_picture_is_written_over_a_picture_and_nothing_else() {
+fn a_picture_overwrites_only_a_picture() {
     let place = scratch("plots");
     let csv = place.join("run.csv");
     let text = "t_s,4.velocity_rpm,4.velocity_demand_rpm,5.current_a,mark\n0,0,0,1,\n1,60,60,1.5,node 4: started\n";

@@ -20,7 +20,7 @@ fn start(file: &Path, options: &[&str]) -> Simulator {
     Simulator::start_scenario(&[&[file.to_str().expect("UTF-8")], options].concat())
 }
 
-/// The exit status, and the line of JSON that tells what came of it.
+/// The exit status, and the line of JSON with the outcome.
 fn end(mut served: Simulator) -> (Option<i32>, Value) {
     let lines = served.lines_left();
     let report = lines.last().unwrap_or_else(|| panic!("nothing but {:?}", served.ready));
@@ -67,7 +67,7 @@ fn time_begins_with_the_first_client_and_what_is_open_at_the_limit_has_failed() 
     let mut served = start(&file, &[&SERVE[..], &["--json"]].concat());
     // Time in which nothing may happen: no client has come.
     std::thread::sleep(std::time::Duration::from_millis(500));
-    assert!(served.is_running(), "time stands until somebody is there");
+    assert!(served.is_running(), "time stands still until a client is connected");
     let client = RawBus::connect(&served.address("socketcand"));
     let (status, report) = end(served);
     drop(client);

@@ -1,5 +1,5 @@
-//! What is said of nodes that were not heard in time, of objects of nodes whose model is not known, and of logs with lines
-//! that are no frames.
+//! Reports on nodes that were not heard in time, on objects of nodes with an unknown model, and on logs with lines
+//! that are not frames.
 
 use std::path::Path;
 

@@ -154,7 +154,7 @@ fn a_lost_connection_is_told_and_made_again() {
     let mut until = |part: &str| lines.by_ref().find(|line| line.contains(part)).unwrap_or_default();
     assert!(until("704#").contains("heartbeat"));
     first.kill();
-    // What is told of it depends on the moment: that it was reset, or that it is refused when it is tried again.
+    // The report depends on the moment: reset, or refused when it is tried again.
     let lost = until("is lost");
     assert!(lost.contains("the connection to the bus is lost: ") && lost.contains("127.0.0.1:"), "{lost}");
     let second = beating("zlac8030l@5,1017=100", &place);
@@ -265,7 +265,7 @@ fn every_model_can_be_simulated_and_a_scan_from_outside_says_what_it_cannot_tell
     assert_eq!((&node(4)["model"], &node(4)["remark"]), (&"zlac8030l".into(), &serde_json::Value::Null));
     assert!(node(2)["model"].is_null() && node(12)["model"].is_null());
     assert!(node(2)["remark"].as_str().unwrap().contains("--model 2=zlim42c"), "{found}");
-    // The 82 mm stepper is told apart from the ZLAC8030L and not from the one of 70 mm.
+    // The 82 mm stepper is distinguished from the ZLAC8030L and not from the one of 70 mm.
     assert!(node(3)["remark"].as_str().unwrap().contains("--model 3=zlim42c (or zlim42c-82)"), "{found}");
     simulator.ask("quit");
     assert_eq!(simulator.wait(), Some(0));

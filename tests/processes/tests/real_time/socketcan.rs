@@ -107,7 +107,7 @@ fn on_somebodys_bus_time_is_not_ours_to_change() {
     }
 }
 
-/// Also where the kernel has no CAN, which is said then.
+/// Also where the kernel has no CAN, which is reported then.
 #[test]
 fn an_interface_that_no_machine_has_is_refused_by_name() {
     for arguments in [&["scan"][..], &["sim", "--drive", "zlac8030l@4"]] {
@@ -279,7 +279,7 @@ fn a_dump_of_one_node_has_the_kernel_keep_back_the_others() {
         run("cansend", &["vcan0", "605#4041600000000000"]);
         run("cansend", &["vcan0", frame]);
     }
-    // Its new identifier is no node's by the predefined connection set.
+    // Its new identifier belongs to no node in the predefined connection set.
     let shown = loop {
         run("cansend", &["vcan0", "2BB#3706"]);
         // Then it is sent again.
@@ -298,7 +298,7 @@ fn a_dump_of_one_node_has_the_kernel_keep_back_the_others() {
     assert!(!said.contains("5: ") && !said.contains("of them shown"), "a frame of node 5 came through: {said}");
 }
 
-/// A queueing discipline that holds each frame for a minute and has room for two stands in for a controller that gets no
+/// A queueing discipline that holds each frame for a minute and has room for two takes the place of a controller that gets no
 /// frame out: the emulated one has no bus that could be stuck.
 #[test]
 #[ignore = "needs the interfaces of cargo xtask vcan-test"]
@@ -329,7 +329,7 @@ fn every_command_of_the_page_ends_well() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/handbook/socketcan.md");
     let page = std::fs::read_to_string(&page).unwrap_or_else(|error| panic!("{}: {error}", page.display()));
     let blocks = page.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next());
-    // The page makes vcan0, and somebody has to be there whom a scan of can0 finds.
+    // The page makes vcan0, and a scan of can0 needs a node to find.
     run("ip", &["link", "del", "vcan0"]);
     let _other = Simulator::start(&["--drive", "zlac8030l@5", "--bus", "can1"]);
     let mut simulators = Vec::new();

@@ -1,4 +1,4 @@
-//! Stores that a client was told of are on the disk, however the simulator ends.
+//! Stores that were confirmed to a client are on the disk, however the simulator ends.
 //!
 //! `FERRODRIVE_KILLS=200 cargo test --test stores` kills more often than a test run does.
 #![cfg(unix)]
@@ -78,7 +78,7 @@ fn a_store_is_there_after_every_end_that_came_with_its_acknowledgement() {
     }
 }
 
-/// A disk that takes longer than clients wait is not waited for, and that is said: then nothing was promised by one that has ended.
+/// A disk that takes longer than clients wait is not waited for, which is reported: then an ended one has promised nothing.
 fn was_promised(simulator: &Simulator) -> bool {
     !simulator.errors_left().iter().any(|line| line.contains("the disk of --state is slow"))
 }

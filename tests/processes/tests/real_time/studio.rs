@@ -1,4 +1,4 @@
-//! `ferrodrive studio` as a process: its first line, who is let in, how it ends.
+//! `ferrodrive studio` as a process: its first line, access, and its end.
 
 use processes::ferrodrive;
 use processes::studio::Studio;
@@ -74,7 +74,7 @@ fn the_page_is_opened_by_the_desktop_and_without_one_that_is_said() {
 
     opened_with(&directory, "no xdg-open", || is_said("cannot open a browser (xdg-open: No such file"));
 
-    // What xdg-open does where it knows of no browser: it fails.
+    // As xdg-open without a browser: it fails.
     let program = directory.join("xdg-open");
     symlink("/bin/false", &program).unwrap();
     opened_with(&directory, "a failing xdg-open", || is_said("(xdg-open: exit status: 1): open the address yourself"));

@@ -1,4 +1,4 @@
-//! `ferrodrive top` in a terminal that `script` (util-linux) makes: what is held moves a drive, and what is let go, or loses its
+//! `ferrodrive top` in a terminal that `script` (util-linux) makes: a held key moves a drive, and one that is released, or loses its
 //! terminal, stops.
 #![cfg(unix)]
 #![allow(clippy::print_stderr, reason = "a test that is skipped says why")]
@@ -86,7 +86,7 @@ impl Terminal {
     }
 
     /// Holds a key as a keyboard does until this is true. A machine that is busy may hold repeats up, which ends the hold: then
-    /// it is let go, and held again.
+    /// it is released, and held again.
     fn hold_until(&mut self, key: &str, mut done: impl FnMut() -> bool) {
         wait_until(&format!("what holding {key:?} does"), || {
             self.press(key);

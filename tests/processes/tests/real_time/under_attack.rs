@@ -201,7 +201,7 @@ fn each_line_is_answered_once_but_for_blank_ones_and_comments() {
     );
     let refused = simulator.line();
     assert!(refused.starts_with("{\"ok\":false") && !refused.contains('\u{1b}'), "{refused}");
-    assert_eq!(simulator.ask("4 get")["powered"], true, "a comment is no command");
+    assert_eq!(simulator.ask("4 get")["powered"], true, "a comment is not a command");
 }
 
 #[test]

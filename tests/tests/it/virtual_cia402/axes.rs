@@ -200,7 +200,7 @@ fn what_both_axes_need_stops_both() {
     for (status, error) in [(0x6041, 0x603F), (0x6841, 0x683F)] {
         assert_eq!((bench.read(status, 0) & 0x4F, bench.read(error, 0)), (0x08, 0x4210));
     }
-    assert_eq!(bench.emcy(), [0x4210], "told once");
+    assert_eq!(bench.emcy(), [0x4210], "reported once");
 }
 
 /// A world with a two-axis servo as node 5.
@@ -214,7 +214,7 @@ fn world() -> World {
     world
 }
 
-fn tell(world: &mut World, line: &str) -> String {
+fn world_command(world: &mut World, line: &str) -> String {
     sim::command::answer(world, line).unwrap().json
 }
 
@@ -232,17 +232,17 @@ fn the_outer_world_reaches_each_axis_by_its_number() {
     let channel = |axis| Channel { place: Place { node: 5, axis: AxisId(axis) }, signal: Signal::Velocity };
     world.start_recording(Recorder::new(Duration::from_millis(10), [channel(0), channel(1)]));
     // Nothing is enabled: the load alone turns the second shaft.
-    assert!(tell(&mut world, "5.2 load torque -0.3").starts_with("{\"ok\":true"));
+    assert!(world_command(&mut world, "5.2 load torque -0.3").starts_with("{\"ok\":true"));
     world.run_for(Duration::from_millis(200));
     let (first, second) = (report(&mut world, 0), report(&mut world, 1));
     assert!(first.velocity_rpm.abs() < 1e-6 && second.velocity_rpm > 100.0, "{first:?} {second:?}");
     assert!(second.position > first.position);
-    assert!(tell(&mut world, "5.2 get").contains(&format!("\"position\":{}", second.position)));
-    tell(&mut world, "5.2 rotor lock");
+    assert!(world_command(&mut world, "5.2 get").contains(&format!("\"position\":{}", second.position)));
+    world_command(&mut world, "5.2 rotor lock");
     world.run_for(Duration::from_millis(10));
     assert_eq!(report(&mut world, 1).velocity_rpm, 0.0);
     assert_eq!(
-        tell(&mut world, "5.3 get"),
+        world_command(&mut world, "5.3 get"),
         r#"{"ok":false,"error":{"kind":"refused","message":"a two-axes-by-offset has no axis 3; it has 2","node":null,"object":null,"abort":null,"next":null}}"#
     );
     let recorder = world.stop_recording().unwrap();
@@ -266,7 +266,7 @@ fn the_objects_of_a_node_that_is_no_drive_are_the_outer_worlds() {
     world.add_drive(9, order_machine(model, &order).unwrap()).unwrap();
     world.run_for(Duration::from_millis(300));
     for line in ["9 set 6000:01 FFh", "9 set 6401:01 -2"] {
-        assert!(tell(&mut world, line).starts_with("{\"ok\":true"), "{line}");
+        assert!(world_command(&mut world, line).starts_with("{\"ok\":true"), "{line}");
     }
     while world.poll_received(host).is_some() {}
     for (request, answer) in [("40006001", "4F006001FF000000"), ("40016401", "4B016401FEFF0000")] {
@@ -282,7 +282,7 @@ fn the_objects_of_a_node_that_is_no_drive_are_the_outer_worlds() {
         ("9 load torque 1", "a inputs has no motor"),
         ("9 input X0 1", "a inputs has no input \\\"X0\\\"; it has none"),
     ] {
-        let answer = tell(&mut world, &line.replace("\\\"", "\""));
+        let answer = world_command(&mut world, &line.replace("\\\"", "\""));
         assert_eq!(answer, format!("{{\"ok\":false,\"error\":\"{error}\",\"kind\":\"refused\"}}"), "{line}");
     }
 }

@@ -122,7 +122,7 @@ fn feed_velocity(bench: &mut Bench, every_ms: u64, for_ms: u64) {
 
 #[test]
 fn velocities_that_stay_away_bring_the_axis_to_rest_and_the_next_one_moves_it_again() {
-    // In the rhythm of 60C2h; in another; in one of SYNC that 1006h tells of.
+    // In the rhythm of 60C2h; in another; in one of SYNC that is in 1006h.
     for (every_ms, sync_us, rests_within_ms) in [(2, 0, 4), (10, 0, 100), (10, 10_000, 30)] {
         let mut bench = cyclic(9, 0x60FF_0020, 2);
         bench.set(&[(0x1006, 0, sync_us)]);

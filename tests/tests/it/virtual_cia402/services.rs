@@ -115,15 +115,15 @@ fn pdos_are_mapped_as_the_standard_has_them() {
     bench.sent.clear();
     bench.frame("205#0600");
     bench.run_ms(2);
-    let told: Vec<_> = bench.sent.iter().map(ToString::to_string).collect();
+    let heard: Vec<_> = bench.sent.iter().map(ToString::to_string).collect();
     // TPDO1: statusword; TPDO2: statusword and mode.
-    assert!(told.contains(&"185#3106".to_string()) && told.contains(&"285#310600".to_string()), "{told:?}");
+    assert!(heard.contains(&"185#3106".to_string()) && heard.contains(&"285#310600".to_string()), "{heard:?}");
     bench.sent.clear();
     bench.sync();
     bench.run_ms(2);
-    let told: Vec<_> = bench.sent.iter().map(ToString::to_string).collect();
-    assert!(told.iter().any(|frame| frame.starts_with("385#3106") && frame.len() == 4 + 12), "{told:?}");
-    assert!(told.iter().any(|frame| frame.starts_with("485#3106") && frame.len() == 4 + 12), "{told:?}");
+    let heard: Vec<_> = bench.sent.iter().map(ToString::to_string).collect();
+    assert!(heard.iter().any(|frame| frame.starts_with("385#3106") && frame.len() == 4 + 12), "{heard:?}");
+    assert!(heard.iter().any(|frame| frame.starts_with("485#3106") && frame.len() == 4 + 12), "{heard:?}");
     bench.frame("305#060003");
     bench.run_ms(2);
     assert_eq!(bench.read(0x6061, 0), 3, "RPDO2 carries the mode");

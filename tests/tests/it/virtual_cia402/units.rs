@@ -1,5 +1,5 @@
 //! Units that are coarser or finer than the increments of the encoder: whatever 607Dh, 608Fh, 6091h and 6092h say, the shaft
-//! turns the way that it was told, and stands with "target reached" only where it was told to be.
+//! turns in the commanded direction, and stands with "target reached" only at its target.
 
 use canopen::od::{Entry, FREE_PLACES, RowFacts, Table};
 use devices::Description;
@@ -52,7 +52,7 @@ impl Units {
         i128::from(user.signum()) * (twice / (2 * self.units))
     }
 
-    /// What says so many increments, held to 31 bits.
+    /// The units for so many increments, limited to 31 bits.
     fn user(&self, increments: f64) -> i64 {
         let user = increments * self.units as f64 / self.increments as f64;
         user.round().clamp(-2_147_483_647.0, 2_147_483_647.0) as i64

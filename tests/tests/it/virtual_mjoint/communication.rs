@@ -117,7 +117,7 @@ fn no_reset_clears_the_loss_of_the_host_and_a_time_of_0_watches_nothing() {
     bench.set((0x1016, 1), 0x007F_0064).send("77F#05").run_ms(150).reads(0x260E, 0x20);
     bench.set(0x6040, 0x80).set(0x2601, 0).set(0x2601, 1).set(0x260E, 0).reads(0x260E, 0x20);
     bench.set((0x1016, 1), 0x007F_0000);
-    assert_eq!(bench.get(0x260E), 0, "nobody is watched any more");
+    assert_eq!(bench.get(0x260E), 0, "no node is watched any more");
     bench.send("77F#05").run_ms(5000).reads(0x260E, 0);
     // Bits 24 to 31 are "invalid": node 7Fh is watched all the same.
     bench.set((0x1016, 1), 0xAB7F_0064).send("77F#05").run_ms(150).reads(0x260E, 0x20);
@@ -191,10 +191,10 @@ fn a_device_address_is_in_the_identifiers_of_pdos_at_once_and_the_node_id_after_
     bench.set((0x1402, 1), 0x444);
     for address in [7, 5] {
         bench.set(0x2615, address).reads((0x1400, 1), 0x200 + address).reads((0x1800, 1), 0x180 + address);
-        assert_eq!(bench.get((0x1402, 1)), 0x444, "one that somebody chose stays");
+        assert_eq!(bench.get((0x1402, 1)), 0x444, "one that was chosen stays");
     }
     bench.forget().send("201#0F0001E8030000").run_ms(5);
-    assert!(bench.heard().iter().all(|frame| !frame.starts_with("181#")), "nobody listens to 201h");
+    assert!(bench.heard().iter().all(|frame| !frame.starts_with("181#")), "no node listens to 201h");
     bench.send("205#0F0001E8030000").run_ms(5);
     assert!(bench.heard().iter().any(|frame| frame.starts_with("185#")));
     bench.set(0x6040, 0).save().send("000#8101").run_ms(5).reads(0x2615, 5).forget().power_cycle();

@@ -42,7 +42,7 @@ fn begin(section: &str) -> Bench {
     let mut bench = Bench::of(3, &Model::M4230E17B50);
     match section {
         // A switch that is reached between the third and the fourth datagram: 100 r/min are 54613 counts/s.
-        "5.09" => drop(bench.told("1 switch DIR min -80000")),
+        "5.09" => drop(bench.world_answer("1 switch DIR min -80000")),
         "5.10.3" => {
             for node in 1..=3 {
                 bench.write_to(node, 0x6040, 0x0F).expect("enabled");
@@ -76,7 +76,7 @@ fn sync(bench: &mut Bench, at: &str) {
 
 fn heartbeat(bench: &mut Bench, state: u8, at: &str) {
     if state == 0x04 {
-        bench.tell("1 battery off");
+        bench.world("1 battery off");
     }
     bench.run_ms(10);
     bench.forget().run_ms(1010);

@@ -21,7 +21,7 @@ fn every_run_ends_as_the_table_says() {
             "beyond_switch" => goes_on(run),
             "stalls_on_the_way" => fails_at_the_stop(run),
             "mode_1_on_the_way" => is_left(run),
-            other => panic!("nobody knows what to do with {other}"),
+            other => panic!("unknown step {other}"),
         }
     }
 }
@@ -37,7 +37,7 @@ fn switch_of(method: i64) -> (&'static str, bool) {
 
 fn started(run: &HomingStatus, line: &str) -> Bench {
     let mut bench = Bench::new();
-    bench.tell(line).run_ms(5);
+    bench.world(line).run_ms(5);
     bench.set(0x6098, i64::from(run.row.method)).set(0x6060, 6);
     assert_eq!(bench.statusword(), run.running, "{run:?}");
     bench
@@ -82,7 +82,7 @@ fn fails_at_the_stop(run: &HomingStatus) {
     // 30 % of the output at rest for 1 s, and a current limit that is not reached.
     bench.set(0x2618, 101).set(0x261D, 10_000).set(0x6098, i64::from(run.row.method)).set(0x6060, 6).run_ms(500);
     assert_eq!(bench.statusword(), run.running);
-    bench.tell("1 rotor lock");
+    bench.world("1 rotor lock");
     bench.until(6000, |bench| bench.get(0x260E) == 0x14);
     assert_eq!(bench.statusword(), run.after);
     bench.forget().run_ms(1010);
@@ -105,14 +105,14 @@ fn after_homing_the_position_is_about_zero_whatever_the_ramp_unless_the_edge_is_
     for acceleration in [20_000, 20_005, 20_009, 5_009, 1_000, 60_000] {
         for (choice, at_edge) in [("stand", false), ("edge", true)] {
             let mut bench = Bench::choosing("J113", choice);
-            bench.tell("1 switch DIR min -20000").run_ms(5);
+            bench.world("1 switch DIR min -20000").run_ms(5);
             bench.set(0x6083, acceleration).set(0x6060, 6);
             bench.until(20_000, |bench| bench.statusword() == 0x1414);
             bench.run_ms(1500);
             let rpm = (acceleration % 10 + 1) as f64 * 100.0;
             let way =
                 if acceleration < 60_000 { 0.5 * rpm * rpm / acceleration as f64 * TURN as f64 / 60.0 } else { 0.0 };
-            // It is no faster at the edge than 20000 counts of ramp make it.
+            // At the edge it is not faster than a ramp of 20000 counts allows.
             let way = way.min(20_000.0);
             let (position, expected) = (bench.position(), if at_edge { way } else { 0.0 });
             let tolerance = 60.0 + 0.05 * expected + if at_edge { 2.0 * rpm } else { 0.0 };
@@ -142,7 +142,7 @@ fn a_halt_holds_homing_and_its_end_lets_it_go_on() {
 #[test]
 fn homing_under_power_shows_the_mirrored_bits_and_position_mode_goes_on_from_the_origin() {
     let mut bench = Bench::new();
-    bench.tell("1 switch DIR min -5000").set(0x6040, 0x0F).set(0x6060, 6).shows(0xFFFF, 0x0037);
+    bench.world("1 switch DIR min -5000").set(0x6040, 0x0F).set(0x6060, 6).shows(0xFFFF, 0x0037);
     bench.until(3000, |bench| bench.statusword() == 0x1437);
     bench.run_ms(50);
     bench.set(0x6060, 1).shows(0xFFFF, 0x0437);
@@ -162,7 +162,7 @@ fn homing_that_cannot_begin_fails_at_once() {
     bench.set(0x6060, 6);
     assert_eq!(bench.statusword(), 0x0014, "the next write does");
     let mut bench = Bench::new();
-    bench.tell("1 supply 60").run_ms(300);
+    bench.world("1 supply 60").run_ms(300);
     bench.set(0x6060, 6).reads(0x260E, 0x15).shows(0xFFFF, 0x200C);
 }
 
@@ -176,7 +176,7 @@ fn the_origin_lies_within_three_control_periods_of_the_edge_at_every_speed_and_f
             bench.set(0x6083, 20_000 + digit).set(0x6098, method);
             let edge = if positive { distance } else { -distance };
             let range = if positive { format!("{edge} max") } else { format!("min {edge}") };
-            bench.tell(&format!("1 switch {pin} {range}")).run_ms(5);
+            bench.world(&format!("1 switch {pin} {range}")).run_ms(5);
             bench.set(0x6060, 6);
             bench.until(6000, |bench| bench.statusword() == 0x1414);
             bench.run_ms(300);
@@ -193,7 +193,7 @@ fn the_origin_lies_within_three_control_periods_of_the_edge_at_every_speed_and_f
 #[test]
 fn a_host_that_sends_mode_6_each_cycle_homes_once() {
     let mut bench = Bench::new();
-    bench.tell("1 switch DIR min -5000");
+    bench.world("1 switch DIR min -5000");
     for _ in 0..600 {
         bench.send("201#0F000600000000").run_ms(2);
     }

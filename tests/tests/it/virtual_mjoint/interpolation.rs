@@ -22,8 +22,8 @@ fn three(synchronised: i64, apart_us: u64) -> Bench {
     led(&mut bench, 1, synchronised);
     // The joints' own rhythms are apart from each other, as those of real ones are.
     for node in 2..=3_u8 {
-        bench.tell(&format!("{node} power cut")).run(Duration::from_micros(1_730 * u64::from(node) + apart_us));
-        bench.tell(&format!("{node} power on")).run_ms(20);
+        bench.world(&format!("{node} power cut")).run(Duration::from_micros(1_730 * u64::from(node) + apart_us));
+        bench.world(&format!("{node} power on")).run_ms(20);
         led(&mut bench, node, synchronised);
     }
     bench.run_ms(20);
@@ -121,7 +121,7 @@ fn a_line_of_points_is_followed_with_a_steady_speed_and_little_lag() {
 fn with_255_dir_is_the_clock_of_the_stretch_and_axes_start_together() {
     let mut bench = three(255, 0);
     for node in 1..=3 {
-        bench.tell(&format!("{node} clock 10000"));
+        bench.world(&format!("{node} clock 10000"));
     }
     assert!(spread_us(&mut bench) <= 50.0);
 }
@@ -134,7 +134,7 @@ fn with_255_a_host_that_goes_by_a_slow_dir_clock_is_followed_without_a_pause_bet
         for (index, value) in [(0x261C, time_base), (0x6060, 7), (0x6040, 0x0F)] {
             bench.set(index, value);
         }
-        bench.tell("1 clock 4000");
+        bench.world("1 clock 4000");
         let (mut least, mut most) = (f64::MAX, f64::MIN);
         let mut position = 0.0;
         for cycle in 0..300 {
@@ -164,11 +164,11 @@ fn with_255_a_point_waits_while_dir_stands_still() {
     bench.send("080#").run_ms(100).is_at(0, 3).shows(0xFFFF, 0x0037);
     // Half of the stretch: 10 changes of the level.
     for n in 1..=10 {
-        bench.tell(&format!("1 input DIR {}", n % 2)).run_ms(1);
+        bench.world(&format!("1 input DIR {}", n % 2)).run_ms(1);
     }
     bench.run_ms(300).is_at(500, 12);
     for n in 1..=11 {
-        bench.tell(&format!("1 input DIR {}", n % 2)).run_ms(1);
+        bench.world(&format!("1 input DIR {}", n % 2)).run_ms(1);
     }
     bench.run_ms(300).is_at(1000, 12).shows(0xFFFF, 0x0437);
 }

@@ -1,6 +1,6 @@
 //! The virtual M joint, firmware and physics together, judged from the bus in virtual time.
 //!
-//! What is expected stands in the "M Robot Joint Motor CanOpen Manual" (as `docs/drives/mjoint.md` reads it and
+//! The expected values are in the "M Robot Joint Motor CanOpen Manual" (as `docs/drives/mjoint.md` reads it and
 //! `tests/data/mjoint` lists it), in CiA 301, or follows from the motor's published constants by a closed form. One file
 //! for each subject; [`bench`] is the table they all work at.
 

@@ -81,10 +81,10 @@ fn halt_stops_within_milliseconds_and_holds_and_the_move_goes_on_afterwards() {
     assert!(bench.report().velocity_rpm.abs() < 10.0, "{}", bench.report().velocity_rpm);
     bench.run_ms(200);
     let held = bench.position();
-    bench.tell("1 load torque 10").run_ms(500);
+    bench.world("1 load torque 10").run_ms(500);
     assert!((bench.position() - held).abs() < 200, "self-locked: {}", bench.position() - held);
     bench.shows(0xFFFF, 0x0437);
-    bench.tell("1 load torque 0").set(0x6040, 0x2F).shows(0xFFFF, 0x0037);
+    bench.world("1 load torque 0").set(0x6040, 0x2F).shows(0xFFFF, 0x0037);
     bench.reaches(4000).is_at(30 * TURN, 30);
 }
 
@@ -97,10 +97,10 @@ fn quick_stop_ends_a_move_and_no_voltage_frees_the_shaft() {
     bench.set(0x6040, 0x0F).run_ms(300);
     assert!((bench.position() - held).abs() <= 5, "the move is over");
     bench.set(0x6040, 0).shows(0xFFFF, 0x0404);
-    bench.tell("1 load torque -10").run_ms(100);
+    bench.world("1 load torque -10").run_ms(100);
     assert!(bench.position() > held + 1000, "free: the load turns it");
     bench.set(0x2601, 0).set(0x6040, 0x0F).shows(0xFFFF, 0x0423);
-    bench.tell("1 load torque 0").set(0x2601, 1);
+    bench.world("1 load torque 0").set(0x2601, 1);
     assert_eq!(bench.statusword() & !0x0400, 0x0037);
 }
 
@@ -110,7 +110,7 @@ fn the_load_is_felt_through_the_gear() {
     let mut bench = Bench::new();
     bench.turn(500).run_ms(500);
     let free = bench.report().current_a;
-    bench.tell("1 load torque 20").run_ms(500);
+    bench.world("1 load torque 20").run_ms(500);
     let more = bench.report().current_a - free;
     // The motor gives 1 N m at 3.5 A.
     let least = 20.0 / 50.0 * 3.5;
@@ -123,7 +123,11 @@ fn a_speed_step_is_well_damped_on_every_model_bare_and_loaded() {
     for model in MODELS {
         for inertia_kg_m2 in [0.0, 0.2] {
             let mut bench = Bench::of(1, model);
-            bench.tell(&format!("1 load inertia {inertia_kg_m2}")).set(0x6083, 60_000).set(0x6060, 3).set(0x6040, 0x0F);
+            bench
+                .world(&format!("1 load inertia {inertia_kg_m2}"))
+                .set(0x6083, 60_000)
+                .set(0x6060, 3)
+                .set(0x6040, 0x0F);
             bench.set(0x60FF, 300);
             let mut most: f64 = 0.0;
             for _ in 0..600 {
@@ -143,7 +147,7 @@ fn the_gains_of_60f9h_and_60fbh_are_the_loops_own() {
     let yields = |velocity_kp: i64, position_kp: i64| {
         let mut bench = Bench::new();
         bench.set((0x60F9, 1), velocity_kp).set((0x60FB, 1), position_kp).set(0x6040, 0x0F).run_ms(50);
-        bench.tell("1 load torque 15");
+        bench.world("1 load torque 15");
         let mut most = 0;
         for _ in 0..300 {
             bench.run_ms(1);
@@ -157,7 +161,7 @@ fn the_gains_of_60f9h_and_60fbh_are_the_loops_own() {
     let integral = |time_ms: i64| {
         let mut bench = Bench::new();
         bench.set((0x60F9, 2), time_ms).set(0x6040, 0x0F).run_ms(50);
-        bench.tell("1 load torque 15").run_ms(2000);
+        bench.world("1 load torque 15").run_ms(2000);
         bench.position().abs()
     };
     assert!(integral(30) <= 10 && integral(2000) > 50, "2000 cancels integration");
@@ -166,14 +170,20 @@ fn the_gains_of_60f9h_and_60fbh_are_the_loops_own() {
 #[test]
 fn targets_faster_than_the_motor_are_held_to_its_highest_speed() {
     let mut bench = Bench::of(1, &Model::M8025E25B50);
-    bench.tell("1 supply 48").set(0x6060, 3).set(0x6040, 0x0F).set(0x60FF, 3000).run_ms(1000).turns_about(1500.0, 15.0);
+    bench
+        .world("1 supply 48")
+        .set(0x6060, 3)
+        .set(0x6040, 0x0F)
+        .set(0x60FF, 3000)
+        .run_ms(1000)
+        .turns_about(1500.0, 15.0);
     bench.shows(0xFFFF, 0x0437);
 }
 
 #[test]
 fn actual_values_are_in_the_manuals_units() {
     let mut bench = Bench::new();
-    bench.turn(-600).tell("1 load torque -10").run_ms(500);
+    bench.turn(-600).world("1 load torque -10").run_ms(500);
     let report = bench.report();
     assert!((bench.get(0x606C) + 6000).abs() < 60);
     assert!((bench.get(0x6079) as f64 / 327.0 - report.supply_v).abs() < 0.1);

@@ -17,11 +17,11 @@ fn turn_to(bench: &mut Bench, counts: i64) {
 fn turns_are_kept_by_the_battery_also_when_the_shaft_is_turned_without_power() {
     let mut bench = Bench::choosing("J005", "free");
     turn_to(&mut bench, 7 * TURN + 5000);
-    bench.tell("1 power cut").tell("1 load torque -20").run_ms(3000);
-    bench.tell("1 load torque 0").run_ms(500);
+    bench.world("1 power cut").world("1 load torque -20").run_ms(3000);
+    bench.world("1 load torque 0").run_ms(500);
     let turned = bench.report().shaft_angle_rad / core::f64::consts::TAU * TURN as f64;
     assert!(turned > (8 * TURN) as f64, "the load turned it on: {turned}");
-    bench.tell("1 power on").run_ms(10);
+    bench.world("1 power on").run_ms(10);
     assert!((bench.position() as f64 - turned).abs() < 2.0, "{} {turned}", bench.position());
     bench.reads(0x260E, 0);
 }
@@ -30,7 +30,7 @@ fn turns_are_kept_by_the_battery_also_when_the_shaft_is_turned_without_power() {
 fn without_battery_and_power_the_turns_are_lost_and_the_place_in_the_turn_is_known() {
     let mut bench = Bench::new();
     turn_to(&mut bench, 7 * TURN + 5000);
-    bench.tell("1 battery off").power_cycle();
+    bench.world("1 battery off").power_cycle();
     let position = bench.position();
     assert!((position - 5000).abs() <= 30, "{position}");
     bench.reads(0x260E, 0x10);
@@ -64,7 +64,7 @@ fn function_6_goes_back_to_the_origin_at_the_speed_of_the_ones_digit() {
 fn turns_that_are_lost_are_no_place_to_go_back_to() {
     let mut bench = saved(6);
     turn_to(&mut bench, 8 * TURN + 9000);
-    bench.tell("1 battery off").power_cycle().run_ms(1000);
+    bench.world("1 battery off").power_cycle().run_ms(1000);
     assert!((bench.position() - 9000).abs() <= 30 && bench.statusword() & 0x10 == 0);
 }
 
@@ -82,12 +82,12 @@ fn functions_7_and_8_move_a_brake() {
     bench.power_cycle();
     assert_eq!(bench.report().brake, Some(sim::Brake::Engaged));
     let before = bench.position();
-    bench.tell("1 load torque 20").run_ms(500);
+    bench.world("1 load torque 20").run_ms(500);
     assert!((bench.position() - before).abs() < 200, "the brake holds");
     bench.set(0x6040, 0x0F).run_ms(5);
     assert_eq!(bench.report().brake, Some(sim::Brake::Released));
     bench.set(0x6040, 0).run_ms(5);
-    bench.tell("1 power off").run_ms(300);
+    bench.world("1 power off").run_ms(300);
     assert_eq!(bench.report().brake, Some(sim::Brake::Engaged), "without power it holds");
 }
 
@@ -98,7 +98,7 @@ fn function_9_and_a_gear_of_0_put_the_host_in_control() {
         bench.set(index, value).save().reads(0x2600, 0);
         bench.power_cycle();
         assert_eq!(bench.get(0x2600), 1, "{index:04X}h");
-        bench.tell("1 pulses 1000 10000").run_ms(300);
+        bench.world("1 pulses 1000 10000").run_ms(300);
         assert!(bench.position().abs() < 2, "pulses are ignored");
     }
 }
@@ -106,11 +106,11 @@ fn function_9_and_a_gear_of_0_put_the_host_in_control() {
 #[test]
 fn with_a_brake_the_turns_outlive_a_power_off_without_a_battery() {
     let mut bench = saved(7);
-    bench.tell("1 battery off").power_cycle();
+    bench.world("1 battery off").power_cycle();
     assert_eq!(bench.get(0x260E), 0, "a brake in place of a battery: nothing is missing");
     turn_to(&mut bench, 7 * TURN + 5000);
-    bench.tell("1 load torque 20").run_ms(10).tell("1 power off").run_ms(500);
-    bench.tell("1 power on").run_ms(10).reads(0x260E, 0).is_at(7 * TURN + 5000, 300);
+    bench.world("1 load torque 20").run_ms(10).world("1 power off").run_ms(500);
+    bench.world("1 power on").run_ms(10).reads(0x260E, 0).is_at(7 * TURN + 5000, 300);
     let position = bench.position();
     bench.send("000#8101").run_ms(10);
     assert_eq!((bench.position(), bench.get(0x260E)), (position, 0), "and an NMT reset");
@@ -119,7 +119,7 @@ fn with_a_brake_the_turns_outlive_a_power_off_without_a_battery() {
 #[test]
 fn function_8_goes_back_to_the_origin_without_a_battery() {
     let mut bench = saved(8);
-    bench.tell("1 battery off").power_cycle().reaches(2000);
+    bench.world("1 battery off").power_cycle().reaches(2000);
     bench.set(0x6040, 0x0F).set(0x260A, 60_006).set(0x260A, 60_016).run_ms(1);
     turn_to(&mut bench, -3 * TURN);
     bench.power_cycle();
@@ -133,7 +133,7 @@ fn function_8_goes_back_to_the_origin_without_a_battery() {
 fn a_brake_without_a_readable_record_does_not_guess_the_turns() {
     let mut bench = saved(7);
     turn_to(&mut bench, 2 * TURN);
-    bench.tell("1 battery off").tell("1 fault eeprom on").power_cycle().reads(0x260E, 0x10);
+    bench.world("1 battery off").world("1 fault eeprom on").power_cycle().reads(0x260E, 0x10);
 }
 
 #[test]
@@ -178,16 +178,16 @@ fn a_joint_that_takes_pulses_goes_back_to_where_it_was_at_power_off_and_holds() 
     // "Characteristic": "reenergize automatically back to the power off position".
     let pushed_away = |bench: &mut Bench| {
         turn_to(bench, 2 * TURN + 5000);
-        bench.tell("1 power cut").tell("1 load torque -20").run_ms(2000);
-        bench.tell("1 load torque 0").run_ms(500);
-        bench.tell("1 power on").run_ms(10);
+        bench.world("1 power cut").world("1 load torque -20").run_ms(2000);
+        bench.world("1 load torque 0").run_ms(500);
+        bench.world("1 power on").run_ms(10);
         assert!(bench.position() > 3 * TURN, "{}", bench.position());
     };
     let mut bench = Bench::new();
     pushed_away(&mut bench);
-    assert_eq!(bench.statusword() & !0x0400, 0x0004, "as printed for a joint that nobody has enabled");
+    assert_eq!(bench.statusword() & !0x0400, 0x0004, "as printed for a joint that was not enabled");
     bench.run_ms(10_000).is_at(2 * TURN + 5000, 40).shows(0xFFFF, 0x0404);
-    bench.tell("1 load torque 20").run_ms(500);
+    bench.world("1 load torque 20").run_ms(500);
     assert!((bench.position() - 2 * TURN - 5000).abs() <= 200, "it holds: {}", bench.position());
     // Bit 0 of the controlword makes it the host's, and bit 1 is 0: free.
     bench.set(0x6040, 1).run_ms(500);
@@ -204,12 +204,12 @@ fn a_joint_that_takes_pulses_goes_back_to_where_it_was_at_power_off_and_holds() 
 fn at_the_first_power_on_after_an_nmt_reset_and_without_its_turns_a_joint_holds_where_it_is() {
     let mut bench = Bench::new();
     turn_to(&mut bench, TURN);
-    bench.tell("1 power cycle").run_ms(500);
+    bench.world("1 power cycle").run_ms(500);
     turn_to(&mut bench, 3 * TURN + 9000);
     bench.send("000#8101").run_ms(2000);
     assert!((bench.position() - 3 * TURN - 9000).abs() <= 60, "not to the last power-off: {}", bench.position());
-    bench.tell("1 battery off").power_cycle().run_ms(2000);
+    bench.world("1 battery off").power_cycle().run_ms(2000);
     assert!((bench.position() - 9000).abs() <= 60, "the place in the turn: {}", bench.position());
-    bench.tell("1 load torque 20").run_ms(500);
+    bench.world("1 load torque 20").run_ms(500);
     assert!((bench.position() - 9000).abs() <= 260, "it holds: {}", bench.position());
 }

@@ -36,7 +36,7 @@ fn at_24_v_and_without_an_advance_in_2604h_the_voltage_ends_the_speed() {
     for (n, model) in MODELS.into_iter().enumerate() {
         for (supply_v, advance) in [(36.0, 0), (24.0, 0), (24.0, 200)] {
             let mut bench = turning(model, 3000.0);
-            bench.set(0x2604, advance).tell(&format!("1 supply {supply_v}")).run_ms(2500);
+            bench.set(0x2604, advance).world(&format!("1 supply {supply_v}")).run_ms(2500);
             // Back-emf less what the d current takes of it, against the bus: v = speed * (Kt / 1.5 - p L i_d).
             let constant = torque[n] / (2.0_f64.sqrt() * current[n]) / 1.5;
             let direct_a = 10.0 * 2.0_f64.sqrt() * (0.1 * advance as f64).to_radians().sin();

@@ -11,7 +11,7 @@ fn a_load_that_takes_more_than_the_peak_start_stop_torque_is_told_and_a_lighter_
     // 44 N·m: 20000 (r/min)/s are 42 rad/s² behind a ratio of 50, and 3 kg·m² would take 126 N·m for them.
     for (inertia_kg_m2, overloaded) in [(0.3, false), (3.0, true)] {
         let mut bench = Bench::new();
-        bench.tell(&format!("1 load inertia {inertia_kg_m2}")).set(0x6040, 0x2F).set(0x607A, 300_000).run_ms(1500);
+        bench.world(&format!("1 load inertia {inertia_kg_m2}")).set(0x6040, 0x2F).set(0x607A, 300_000).run_ms(1500);
         let shaft = output(&mut bench);
         assert_eq!(shaft.overloads > 0, overloaded, "{inertia_kg_m2} kg·m²: {shaft:?}");
         assert_eq!(shaft.most_nm > 44.0, overloaded, "{inertia_kg_m2} kg·m²: {shaft:?}");
@@ -25,15 +25,15 @@ fn from_the_ratcheting_torque_on_the_output_stands_elsewhere_until_there_is_a_ne
     let mut bench = Bench::new();
     bench.set(0x6040, 0x0F);
     // A blow of 400 N·m on a reducer whose teeth jump from 190 on.
-    bench.tell("1 load torque 400").run_ms(20);
-    bench.tell("1 load torque 0").run_ms(500);
+    bench.world("1 load torque 400").run_ms(20);
+    bench.world("1 load torque 0").run_ms(500);
     let shaft = output(&mut bench);
     assert!(shaft.jumps > 0 && shaft.slip_rad.abs() > 190.0 / 1.1e4, "{shaft:?}");
     let motor_rad = bench.report().shaft_angle_rad / 50.0;
     assert!((shaft.angle_rad - motor_rad + shaft.slip_rad).abs() < 1e-3, "{shaft:?}, motor {motor_rad}");
-    let got = bench.told("1 get");
+    let got = bench.world_answer("1 get");
     assert!(got.contains("\"output_shaft\":{\"angle_deg\":") && got.contains("teeth of the reducer jumped"), "{got}");
-    bench.tell("1 rotor free");
+    bench.world("1 rotor free");
     assert_eq!((output(&mut bench).jumps, bench.report().damage), (0, None));
 }
 
@@ -57,9 +57,9 @@ fn the_output_follows_the_motor_but_for_the_reducers_error_and_twist() {
 fn a_free_joint_stands_under_a_small_load_and_a_large_one_does_not_run_away() {
     for (model, rated_nm) in MODELS.into_iter().zip(figure("Output torque after deceleration")) {
         let mut bench = Bench::of(1, model);
-        bench.set(0x6040, 1).tell("1 load torque 2.5").run_ms(2000);
+        bench.set(0x6040, 1).world("1 load torque 2.5").run_ms(2000);
         assert!(bench.report().velocity_rpm.abs() < 1e-9, "{}: {}", model.name, bench.report().velocity_rpm);
-        bench.tell(&format!("1 load torque {rated_nm}")).run_ms(3000);
+        bench.world(&format!("1 load torque {rated_nm}")).run_ms(3000);
         let report = bench.report();
         // The motor feeds the bus through the idle bridge, and the suppressors hold that: 94 V at 16 A.
         assert!(report.supply_v < 94.0, "{}: {} V", model.name, report.supply_v);

@@ -76,26 +76,26 @@ fn after_any_lawful_mess_a_host_that_begins_anew_reaches_its_target() {
     for seed in 0..30 {
         let mut seeded = Seeded::new(seed);
         let mut bench = Bench::new();
-        let mut told = Vec::new();
+        let mut heard = Vec::new();
         for _ in 0..60 {
             if seeded.below(4) == 0 {
                 let (done, undone) = HANDS[seeded.below(HANDS.len())];
                 let line = if undone.is_empty() || seeded.below(4) > 0 { done } else { undone };
-                bench.tell(&format!("1 {line}"));
-                told.push(line.to_owned());
+                bench.world(&format!("1 {line}"));
+                heard.push(line.to_owned());
             } else if let Some((index, value)) = writes.get(seeded.below(writes.len() + frames.len())) {
                 // Taken or refused.
                 let _ = bench.write(*index, *value);
-                told.push(format!("{index:04X}h = {value}"));
+                heard.push(format!("{index:04X}h = {value}"));
             } else {
                 let frame = frames[seeded.below(frames.len())];
                 bench.send(frame);
-                told.push(frame.to_owned());
+                heard.push(frame.to_owned());
             }
             bench.run_ms(seeded.below(60) as u64);
         }
         for (_, undone) in HANDS.iter().filter(|(_, undone)| !undone.is_empty()) {
-            bench.tell(&format!("1 {undone}"));
+            bench.world(&format!("1 {undone}"));
         }
         bench.send("000#0101");
         // A bus that the load has charged empties slowly.
@@ -107,7 +107,7 @@ fn after_any_lawful_mess_a_host_that_begins_anew_reaches_its_target() {
         bench.set(0x607A, target).run_ms(3000);
         let (position, statusword) = (bench.position(), bench.statusword());
         let away = position - target;
-        assert!(away.abs() <= 30, "seed {seed}: {away} away, {statusword:04X}h: {told:?}");
-        assert_eq!(statusword & !0x0008, 0x0437, "seed {seed}: {told:?}");
+        assert!(away.abs() <= 30, "seed {seed}: {away} away, {statusword:04X}h: {heard:?}");
+        assert_eq!(statusword & !0x0008, 0x0437, "seed {seed}: {heard:?}");
     }
 }

@@ -30,7 +30,7 @@ impl Conversation {
             (Some((0x304, data)), None) => self.write_target_velocity_by_rpdo(data),
             (None, Some((0x704, state))) => self.hear_state(state[0]),
             (None, Some((0x184, shape))) => self.hear_velocity_by_tpdo(shape.len()),
-            other => Err(format!("nobody knows what to do with {other:X?}")),
+            other => Err(format!("unknown step {other:X?}")),
         }
     }
 

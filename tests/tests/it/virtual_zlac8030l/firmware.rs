@@ -19,8 +19,8 @@ fn firmware_2_01_takes_a_target_above_the_maximum_speed_for_a_fault_and_1_00_lim
             bench.set(0x60FF, 100).run_ms(800).turns_at(99.0, 101.0);
             bench.forget().set(0x60FF, target).run_ms(5);
             assert_eq!(bench.get(0x603F), code, "{firmware}: {target}");
-            let told = bench.heard_of("084#");
-            assert_eq!(told, if code == 0 { vec![] } else { vec!["084#0020210000000000"] }, "generic and profile");
+            let heard = bench.heard_of("084#");
+            assert_eq!(heard, if code == 0 { vec![] } else { vec!["084#0020210000000000"] }, "generic and profile");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The virtual ZLAC8030L, firmware and physics together, judged from the bus in virtual time.
 //!
-//! What is expected stands in the "ZLAC8030L quick start guide V1.00" (as `docs/drives/zlac8030l.md` reads it and
+//! The expected values are in the "ZLAC8030L quick start guide V1.00" (as `docs/drives/zlac8030l.md` reads it and
 //! `tests/data/zlac8030l` lists it), in CiA 301 and CiA 402-2, or follows from the motor's published constants by a closed
 //! form. One file for each subject; [`bench`] is the table they all work at.
 

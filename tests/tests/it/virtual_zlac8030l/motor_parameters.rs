@@ -1,4 +1,4 @@
-//! What the drive is told about its motor: encoder lines (200Bh), pole pairs (200Ch), Hall offset (2011h).
+//! The motor parameters of the drive: encoder lines (200Bh), pole pairs (200Ch), Hall offset (2011h).
 
 use crate::virtual_zlac8030l::bench::{Bench, assert_within};
 

@@ -19,7 +19,7 @@ fn drain_s(from_v: f64, to_v: f64) -> f64 {
     own_f * (from_v * from_v - to_v * to_v) / (2.0 * CONSUMPTION_W)
 }
 
-/// Seconds from now until the drive has died; it has been told to turn off, or will be.
+/// Seconds from now until the drive has died; its supply has been switched off, or will be.
 fn seconds_to_live(bench: &mut Bench) -> f64 {
     bench.seconds_until(30.0, Duration::from_micros(500), |report| !report.powered)
 }
@@ -27,7 +27,7 @@ fn seconds_to_live(bench: &mut Bench) -> f64 {
 #[test]
 fn switched_off_the_drive_lives_on_its_capacitor_and_tells_of_under_voltage() {
     let mut bench = Bench::new();
-    bench.forget().tell("4 power off").run(Duration::from_secs_f64(drain_s(48.0, UNDER_VOLTAGE_V) - 0.002));
+    bench.forget().world("4 power off").run(Duration::from_secs_f64(drain_s(48.0, UNDER_VOLTAGE_V) - 0.002));
     bench.hears_of(EMCY_UNDER_VOLTAGE, &[]);
     assert_within("bus", bench.report().supply_v, UNDER_VOLTAGE_V, UNDER_VOLTAGE_V + 0.2);
     // Some periods of supervision for the fault.
@@ -40,7 +40,7 @@ fn switched_off_the_drive_lives_on_its_capacitor_and_tells_of_under_voltage() {
     // 81 V^2 / 3 W = 27 ohm discharge the rest.
     bench.run_ms(1000);
     assert_eq!(bench.report().supply_v, 0.0);
-    bench.tell("4 power on").run_ms(2500).reads(0x603F, 0);
+    bench.world("4 power on").run_ms(2500).reads(0x603F, 0);
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn a_power_cycle_and_a_supply_that_comes_back_early_end_in_a_restart_once_the_bu
         let mut bench = Bench::new();
         bench.set(0x60FF, 50).forget();
         for command in commands {
-            bench.tell(command);
+            bench.world(command);
         }
         let drained_s = drain_s(48.0, CONVERTER_STOPS_V);
         bench.run(Duration::from_secs_f64(drained_s - 0.002));
@@ -64,20 +64,20 @@ fn a_power_cycle_and_a_supply_that_comes_back_early_end_in_a_restart_once_the_bu
 #[test]
 fn cut_off_it_is_dead_at_once_and_says_nothing() {
     let mut bench = Bench::new();
-    bench.forget().tell("4 power cut");
+    bench.forget().world("4 power cut");
     let report = bench.report();
     assert_eq!((report.powered, report.supply_v), (false, 0.0));
     bench.run_ms(1000).hears(&[]);
-    bench.tell("4 power cycle").run_ms(2500);
+    bench.world("4 power cycle").run_ms(2500);
     assert_eq!(bench.heard_of("704#00").len(), 1);
 }
 
 #[test]
 fn a_wheel_that_turns_feeds_the_drive_until_it_is_slow() {
     let mut bench = Bench::new();
-    bench.tell("4 load inertia 0.5").tell("4 load torque -4");
+    bench.world("4 load inertia 0.5").world("4 load torque -4");
     bench.seconds_until(30.0, Duration::from_millis(1), |report| report.velocity_rpm > 300.0);
-    bench.tell("4 load torque 0").tell("4 power off");
+    bench.world("4 load torque 0").world("4 power off");
     // The rectified back-emf of 300 r/min (0.875 V s/rad between two wires) is above 18 V down to 206 r/min.
     let slow_s = bench.seconds_until(30.0, Duration::from_millis(1), |report| report.velocity_rpm < 215.0);
     assert!(slow_s > 2.0 * drain_s(48.0, CONVERTER_STOPS_V), "{slow_s} s");
@@ -90,7 +90,7 @@ fn a_wheel_that_turns_feeds_the_drive_until_it_is_slow() {
 #[test]
 fn a_supply_at_its_limit_sags_until_the_drive_gives_up() {
     let mut bench = Bench::new();
-    bench.tell("4 load inertia 0.3").enable_in(3).set(0x6083, 10).tell("4 supply 48 limit 0.3");
+    bench.world("4 load inertia 0.3").enable_in(3).set(0x6083, 10).world("4 supply 48 limit 0.3");
     // 14 W at 48 V, 5 W at 18 V: no way to 400 r/min within 10 ms, nor to stay there.
     bench.set(0x60FF, 400);
     let fell_s = bench.seconds_until(5.0, Duration::from_millis(1), |report| report.error_code == 0x0002);
@@ -99,7 +99,13 @@ fn a_supply_at_its_limit_sags_until_the_drive_gives_up() {
     bench.run(Duration::from_secs_f64(wheel::bus_capacitance_f() * 48.0 / (0.3 - 3.0 / 18.0) + 0.1));
     assert_within("bus", bench.report().supply_v, 47.8, 49.0);
     // As an ideal one it has no trouble.
-    bench.tell("4 supply 48 limit 1000").set(0x6083, 2000).set(0x6040, 0x80).enable_in(3).set(0x60FF, 400).run_ms(3000);
+    bench
+        .world("4 supply 48 limit 1000")
+        .set(0x6083, 2000)
+        .set(0x6040, 0x80)
+        .enable_in(3)
+        .set(0x60FF, 400)
+        .run_ms(3000);
     bench.reads(0x603F, 0);
     assert_within("r/min", bench.report().velocity_rpm, 395.0, 405.0);
 }
@@ -123,7 +129,7 @@ fn what_makes_no_sense_of_a_supply_is_refused_with_its_range_and_changes_nothing
 #[test]
 fn the_bus_sags_by_the_inner_resistance_that_is_set() {
     let mut bench = Bench::new();
-    bench.tell("4 supply 48 resistance 10").run_ms(3000);
+    bench.world("4 supply 48 resistance 10").run_ms(3000);
     let expected_v = 24.0 + (24.0_f64.powi(2) - 10.0 * CONSUMPTION_W).sqrt();
     assert_within("bus", bench.report().supply_v, expected_v - 0.01, expected_v + 0.01);
 }

@@ -59,8 +59,8 @@ fn two_faults_show_together_and_the_last_one_to_go_ends_the_fault() {
     bench.set(0x6040, 0x80).reads(0x603F, 0x0080).shows(0xFF, 0x98);
     bench.set_fault(Component::Reference, false).run_ms(50);
     bench.set(0x6040, 0x00).set(0x6040, 0x80).reads(0x603F, 0).shows(0xFF, 0x70);
-    let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("084#")).collect();
-    assert_eq!(told, ["084#0002810000000000", "084#8000810000000000", "084#0000000000000000"]);
+    let heard: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("084#")).collect();
+    assert_eq!(heard, ["084#0002810000000000", "084#8000810000000000", "084#0000000000000000"]);
 }
 
 #[test]

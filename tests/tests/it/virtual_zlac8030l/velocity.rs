@@ -26,8 +26,8 @@ fn the_example_of_4_1_runs_at_the_speeds_that_it_sets() {
         // Down to zero and up again: two ramps of 500 ms.
         bench.run_ms(1300);
         assert_within("speed in r/min", rpm(&mut bench), target as f64 - 1.0, target as f64 + 1.0);
-        let told = bench.get(0x606C) as f64 * 0.1;
-        assert_within("606Ch", told, target as f64 - 1.0, target as f64 + 1.0);
+        let heard = bench.get(0x606C) as f64 * 0.1;
+        assert_within("606Ch", heard, target as f64 - 1.0, target as f64 + 1.0);
     }
 }
 

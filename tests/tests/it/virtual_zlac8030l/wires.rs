@@ -1,5 +1,5 @@
 //! The motor's cable (chapter 8: a loose power cable is a cause of 0004h): a wire that comes off while the motor turns, wires that
-//! touch, and the sound motor, of which neither is said.
+//! touch, and the sound motor, which reports neither.
 
 use sim::Component;
 use sim::machine::Realism;

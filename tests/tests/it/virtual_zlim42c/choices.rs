@@ -7,8 +7,8 @@ fn a_fault_goes_with_a_reset_or_by_3_4_with_the_supply_only() {
     for (choice, resets) in [("reset", true), ("power-cycle", false)] {
         for (index, value) in [(0x6040, 0x80), (0x2011, 1)] {
             let mut bench = Bench::choosing("Z010", choice);
-            bench.tell("1 supply 45").run_ms(50).reads(0x603F, 0xFF01);
-            bench.tell("1 supply 24").run_ms(500);
+            bench.world("1 supply 45").run_ms(50).reads(0x603F, 0xFF01);
+            bench.world("1 supply 24").run_ms(500);
             bench.set(index, value).run_ms(5);
             let expected = if resets { (0, 0x40) } else { (0xFF01, 0x08) };
             assert_eq!((bench.get(0x603F), bench.statusword() & 0x4F), expected, "{choice}, {index:04X}h");

@@ -21,7 +21,7 @@ fn every_datagram_of_the_manual_is_answered_as_the_manual_prints_it() {
                 let expected: Vec<u8> = datagram.answer.iter().map(|byte| byte.expect("no byte is open")).collect();
                 assert_eq!(answer[..], expected[..], "{at}");
             }
-            other => panic!("{at}: nobody knows what to do with {other:X?}"),
+            other => panic!("{at}: unknown step {other:X?}"),
         }
         bench.run_ms(2);
     }

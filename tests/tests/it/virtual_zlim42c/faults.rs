@@ -47,8 +47,8 @@ fn each_fault_frees_the_motor_and_is_told_by_603fh_1001h_and_emcy() {
         assert_eq!(bench.statusword() & 0x20FF, 0x0098, "{cause:?}: bit 13 off");
         assert_eq!((bench.get(0x603F), bench.get(0x1001)), (i64::from(code), i64::from(register)), "{cause:?}");
         let [low, high] = code.to_le_bytes();
-        let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("081#")).collect();
-        assert_eq!(told, [format!("081#{low:02X}{high:02X}{register:02X}0000000000")]);
+        let heard: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("081#")).collect();
+        assert_eq!(heard, [format!("081#{low:02X}{high:02X}{register:02X}0000000000")]);
         assert_eq!(bench.report().current_a, 0.0);
         bench.set(0x2011, 0).shows(0xFF, 0x98);
     }
@@ -67,7 +67,7 @@ fn a_rising_bit_7_or_2011h_resets_a_fault_whose_cause_is_gone() {
                 }
                 bench.statusword() & 0xFF
             };
-            // A free motor cannot tell how its wires are: such a fault comes again with the current only.
+            // The wires of a free motor cannot be checked: such a fault comes again only with the current.
             let unseen = matches!(cause, Cause::Broken(Component::Phase | Component::Short));
             assert_eq!(reset(&mut bench), if unseen { 0x70 } else { 0x98 }, "{cause:?} is still there");
             set(&mut bench, cause, false);
@@ -261,8 +261,8 @@ fn over_voltage_begins_above_40_v() {
 fn two_faults_are_told_one_by_one_and_go_one_by_one() {
     let mut bench = faulty(Cause::Broken(Component::Reference));
     set(&mut bench, Cause::OverVoltage, true);
-    let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("081#")).collect();
-    assert_eq!(told, ["081#08FF810000000000", "081#01FF850000000000"], "the register gathers both");
+    let heard: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("081#")).collect();
+    assert_eq!(heard, ["081#08FF810000000000", "081#01FF850000000000"], "the register gathers both");
     assert_eq!(bench.get(0x603F), 0xFF01, "the last");
     set(&mut bench, Cause::OverVoltage, false);
     bench.set(0x2011, 1).reads(0x603F, 0xFF08).reads(0x1001, 0x81).shows(0x4F, 0x08);

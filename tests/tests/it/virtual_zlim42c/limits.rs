@@ -52,8 +52,8 @@ fn a_velocity_goes_on_when_the_limit_goes_off_and_a_move_does_not() {
     bench.input(0, true).run_ms(400).reads(0x606C, 0);
     assert_eq!(bench.statusword() & 1 << 14, 0, "it stands");
     bench.input(0, false).run_ms(300).reads(0x606C, 60);
-    bench.tell("1 switch X0 9000 max").run_ms(3000).reads(0x606C, 0);
-    bench.tell("1 switch X0 1000000 max").run_ms(500).reads(0x606C, 60);
+    bench.world("1 switch X0 9000 max").run_ms(3000).reads(0x606C, 0);
+    bench.world("1 switch X0 1000000 max").run_ms(500).reads(0x606C, 60);
 
     let mut bench = with_switches(0);
     bench.enable_in(1).move_by(40_000).run_ms(300);

@@ -1,6 +1,6 @@
 //! The virtual ZLIM42-C, firmware and physics together, judged from the bus in virtual time.
 //!
-//! What is expected stands in the "ZLIM42-C user manual V1.03" (as `docs/drives/zlim42c.md` reads it and
+//! The expected values are in the "ZLIM42-C user manual V1.03" (as `docs/drives/zlim42c.md` reads it and
 //! `tests/data/zlim42c` lists it), in CiA 301 and CiA 402-2, or follows from the motor's published constants by a closed
 //! form. One file for each subject; [`bench`] is the table they all work at.
 

@@ -29,7 +29,7 @@ fn below_20_v_the_drive_is_off_and_it_starts_anew_when_the_voltage_comes_back() 
         supply(&mut bench, supply_v);
         let report = bench.report();
         assert_eq!((report.powered, report.current_a, report.statusword), (false, 0.0, None), "{supply_v} V");
-        assert_eq!(bench.sdo(&[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), None, "{supply_v} V: nobody answers");
+        assert_eq!(bench.sdo(&[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), None, "{supply_v} V: no answer");
         supply(&mut bench, 24.0);
         assert_eq!(bench.heard_of("701#"), ["701#00"], "{supply_v} V");
         assert_eq!((bench.statusword(), bench.get(0x60FF)), (0x0270, 0), "{supply_v} V");

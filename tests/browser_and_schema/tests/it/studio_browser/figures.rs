@@ -63,7 +63,7 @@ fn busy_bus() -> Bus {
         let turn = ["--bus", &address, "velocity", &node, "60rpm", "--for", "7200s"];
         let turn = command(&turn).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
         turning.push(turn.expect("it starts"));
-        // Whoever asks the drives next, asks them alone: a channel for SDO has one client (CiA 301, 7.2.4.3).
+        // The next client has to be the only one: an SDO channel has one client (CiA 301, 7.2.4.3).
         let is_turning = |simulator: &mut Simulator| {
             simulator.ask(&format!("{node} get"))["velocity_rpm"].as_f64().is_some_and(|rpm| rpm > 50.0)
         };

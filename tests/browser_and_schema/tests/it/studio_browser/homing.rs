@@ -6,7 +6,7 @@ use super::{Stage, press, speed};
 
 #[tokio::test]
 #[ignore = "needs a browser: cargo xtask test --only studio"]
-async fn homing_is_chosen_by_its_picture_and_ends_with_a_stop() {
+async fn homing_is_chosen_by_its_drawing_and_ends_with_a_stop() {
     let stage = Stage::open("homed").await;
     stage.take_the_wheel().await;
     stage.click(".motion .chooser button:nth-child(2)").await;
@@ -27,7 +27,7 @@ async fn homing_is_chosen_by_its_picture_and_ends_with_a_stop() {
     field.send_keys("60rpm").await.expect("typed");
     stage.click("#home-write").await;
     stage.says("#home-told", "Written and read back").await;
-    // Nothing stops this model when the studio dies: whoever moves it is asked.
+    // Nothing stops this model when the studio dies: the page asks before it moves it.
     stage.click("#home-start").await;
     stage.click("#guarding button:focus").await;
     stage.find("#guarding:not(:has(button))").await;

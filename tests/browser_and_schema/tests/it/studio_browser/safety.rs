@@ -18,7 +18,7 @@ const STEPPER: usize = 1;
 const VIEWS: [&str; 9] = ["bus", "drive", "motion", "scope", "parameters", "pdo", "trace", "faults", "world"];
 
 impl Stage {
-    /// A window of this size; narrow ones as those of a device that is touched, whose layout is as wide as what stands in it. By a
+    /// A window of this size; narrow ones as those of a device that is touched, whose layout is as wide as its contents. By a
     /// command of Chromium's own (Chrome DevTools Protocol), which its driver passes on.
     async fn device(&self, width: u32, height: u32) {
         let session = self.client.session_id().await.expect("it answers").expect("it has begun");
@@ -84,7 +84,7 @@ async fn a_studio_that_freezes_or_dies_is_said_to_and_so_is_a_stop_that_nobody_c
     stage.click("#go-turn").await;
     stage.stepper("a stepper that turns", |node| speed(node) > 50.0);
     stage.says(".motion .status", "in motion by this studio").await;
-    // A stop is confirmed by whoever moves the drives, and nothing is said.
+    // The host confirms a stop, and no notice is shown.
     stage.key(Key::Escape).await;
     stage.stepper("a stepper that rests", |node| speed(node) < 2.0);
     stage.find("#stop-notice[hidden]").await;
@@ -108,7 +108,7 @@ async fn a_studio_that_freezes_or_dies_is_said_to_and_so_is_a_stop_that_nobody_c
     stage.device(375, 667).await;
     stage.shoot("frozen_375").await;
     stage.device(1280, 900).await;
-    // It goes on: whoever had it in hand is long gone, and the page sees again.
+    // It continues: the hold ended long ago, and the page sees again.
     stage.signal("-CONT");
     stage.find("body:not(.unseen)").await;
     stage.stepper("a stepper that rests", |node| speed(node) < 2.0);
@@ -223,7 +223,7 @@ async fn by_the_keyboard_everything_is_chosen_and_nothing_moves_by_enter_or_a_le
     for letter in ('a'..='z').filter(|letter| *letter != 'p') {
         stage.key(letter).await;
     }
-    // A thing that is told meanwhile would be seen: pictures come every 50 ms.
+    // A notice meanwhile would be seen: states come every 50 ms.
     tokio::time::sleep(Duration::from_millis(500)).await;
     rests(&stage);
     let answered = stage.studio.state();

@@ -126,7 +126,7 @@ async fn the_edge_of_the_scope_moves_evenly_and_stands_where_the_bus_does() {
     );
     let moved = moved.await.expect("it computes");
     let bounds = |what: &str| (moved[what][0].as_f64().expect("a number"), moved[what][1].as_f64().expect("a number"));
-    // A tenth of what the delays differ by is the most that a step differs from 1/60 s; the pictures themselves tell times in 1/60 s.
+    // A step differs from 1/60 s by at most a tenth of the difference of the delays; the pictures themselves have times in 1/60 s.
     let (least, most) = bounds("steps");
     let jitter_s = 0.1 * (0.04 + 1.0 / 60.0);
     assert!(least > 1.0 / 60.0 - jitter_s && most < 1.0 / 60.0 + jitter_s, "{moved}");
@@ -155,7 +155,7 @@ async fn the_scope_waits_for_its_trigger_and_measures_the_step() {
     // The part after it, 80 % of 10 s: while the wheel goes on turning.
     stage.find("#scope-pause[aria-pressed=true]").await;
     stage.click("#scope-step").await;
-    // A ramp of less than a second, read nine times a second: that is said, and nothing made up.
+    // A ramp of less than a second, read nine times a second: reported as too few readings.
     let told = stage.says(".readout", "Step of Speed").await;
     assert!(told.contains("Step of Speed: too few readings: ") && told.contains("event timer of 1 ms"), "{told}");
     assert!(!told.contains("rise time") && !told.contains("Step of Current"), "{told}");

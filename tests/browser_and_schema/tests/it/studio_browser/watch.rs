@@ -17,7 +17,7 @@ async fn who_only_looks_can_stop() {
     stage.find(".motion fieldset[disabled]").await;
     stage.click("#stop").await;
     stage.rests();
-    // That is told where it is seen, whatever is scrolled to, and once, though a press takes two ways.
+    // That is shown in view, at any scroll position, and once, though a press takes two channels.
     stage.says("#news li:first-child", "node 4: stopped by a press of stop").await;
     let seen = "const line = document.querySelector('#news li').getBoundingClientRect(); \
                 const told = [...document.querySelectorAll('#news li')].filter((one) => one.textContent.includes('node 4: stopped by a press')); \

@@ -72,6 +72,6 @@ async fn what_happens_to_the_world_is_drawn_and_the_drives_say_so() {
     stage.click("#tabs [data-name=bus]").await;
     stage.says("#wire", "error-active, transmit error counter ").await;
     stage.click("#tabs [data-name=faults]").await;
-    stage.client.wait().for_element(Locator::XPath("//*[contains(., 'silent')]")).await.expect("it is told");
+    stage.client.wait().for_element(Locator::XPath("//*[contains(., 'silent')]")).await.expect("it is reported");
     stage.close().await;
 }

@@ -318,7 +318,7 @@ async fn closing_an_slcan_bus_closes_its_channel() {
     assert_eq!(told, "\r\rC\rV\rS5\rO\rF\rC\r");
 }
 
-/// What another bus says, and what it was given, in the hands of a test.
+/// The frames from another bus, and to it, for a test.
 struct Other {
     heard: tokio::sync::mpsc::Receiver<Result<Received, BusError>>,
     sent: tokio::sync::mpsc::UnboundedSender<Frame>,

@@ -201,7 +201,7 @@ const CONTRADICTIONS: [(&[u8], u8); 10] = [
     // 03h too short and too long.
     (&[0x03, 0, 0, 0], 3),
     (&[0x03, 0, 0, 0, 1, 0], 3),
-    // 10h: two registers in two bytes, one in three, 8000h in none, 8001h in two, one in more bytes than are told.
+    // 10h: two registers in two bytes, one in three, 8000h in none, 8001h in two, one in more bytes than its count.
     (&[0x10, 0, 0, 0, 2, 2, 0, 1], 3),
     (&[0x10, 0, 0, 0, 1, 3, 0, 1, 0], 3),
     (&[0x10, 0, 0, 0x80, 0, 0], 3),
@@ -265,7 +265,7 @@ async fn of_many_clients_the_longest_idle_one_makes_room_for_the_next() {
     let mut idle = Vec::new();
     for number in 0..64 {
         idle.push(raw(&server, if number % 2 == 0 { &[] } else { &[0, 1, 0] }).await);
-        // Whoever asks is not idle, however long ago it came.
+        // A client that sends requests is not idle, however long it is connected.
         assert!(soon(&clock, first.read_holding_registers(0, 1)).await.unwrap().is_ok(), "{number}");
     }
     let mut last = client(&server, UNIT).await;
@@ -336,7 +336,7 @@ async fn a_client_that_leaves_in_the_middle_of_a_request_disturbs_nobody() {
     let clock = WallClock::start();
     let server = serve("127.0.0.1:0", &clock).await;
     let request = [0, 1, 0, 0, 0, 6, UNIT, 3, 0, 0, 0, 1];
-    // More clients than are served at a time, so that each has to be let go of.
+    // More clients than are served at a time, so that each has to be released.
     for length in (1..=request.len()).cycle().take(200) {
         drop(raw(&server, &request[..length]).await);
     }

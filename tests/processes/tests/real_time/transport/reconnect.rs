@@ -11,7 +11,7 @@ async fn open(place: &str, clock: &WallClock) -> Result<AnyBus, BusError> {
     place.parse::<BusSpec>().unwrap().open(clock).await
 }
 
-/// The next note of a bus on which nobody sends a frame.
+/// The next note of a bus on which no frame is sent.
 async fn note(bus: &mut AnyBus, clock: &WallClock) -> Note {
     match soon(clock, bus.recv()).await.unwrap().1 {
         Received::Note(note) => note,
@@ -45,7 +45,7 @@ async fn a_socketcand_server_that_is_started_again_is_found_again() {
     drop(server);
     let reason = lost(&mut bus, &clock).await;
     assert!(reason.contains(&address.to_string()), "{reason}");
-    // Frames are lost in the meantime, and nobody waits.
+    // Frames are lost in the meantime, without blocking.
     soon(&clock, bus.send(&frame("601#40"))).await.unwrap();
     let place = format!("socketcand://{address}");
     let (mut server, back) = tokio::join!(soon(&clock, hub_at(&place, &clock)), note(&mut bus, &clock));
@@ -70,7 +70,7 @@ async fn what_is_not_there_at_the_start_is_an_error_at_once() {
     assert!(error.contains("is it a serial device"), "{error}");
 }
 
-/// An adapter as far as hosts ask it: answers each line, and keeps those that are no frame. Ends when `frames` frames have come,
+/// An adapter as far as hosts ask it: answers each line, and keeps those that are not frames. Ends when `frames` frames have come,
 /// or with the connection.
 async fn adapter<S: AsyncReadExt + AsyncWriteExt + Unpin>(line: &mut S, frames: usize) -> (String, Vec<String>) {
     let (mut told, mut sent, mut command) = (String::new(), Vec::new(), Vec::new());
@@ -242,7 +242,7 @@ mod on_a_tty {
         path
     }
 
-    /// As [`adapter`], one that waits for its host: until somebody opens the other end, reading a line fails.
+    /// As [`adapter`], one that waits for its host: until the other end is open, reading a line fails.
     async fn patient_adapter(line: &mut SerialStream, clock: &WallClock) -> (String, Vec<String>) {
         loop {
             let (told, sent) = adapter(line, 1).await;

@@ -330,7 +330,7 @@ async fn a_late_world_catches_up_in_steps_and_then_wakes_once_a_deadline() {
     // One for each deadline and one that finds it is not yet due, and some for the end.
     let deadlines = (stopped_at - Instant::ZERO).as_millis() / period.as_millis();
     assert!((12..2 * deadlines + 10).contains(&(world.steps as u128)), "{} steps", world.steps);
-    // It is told how late it is, and (or it would run still) when it is no more.
+    // It gets how late it is, and (or it would still run) when it is on time again.
     assert!(world.worst_lag >= Duration::from_millis(150), "{:?}", world.worst_lag);
 }
 
@@ -370,7 +370,7 @@ async fn a_world_goes_on_when_nobody_commands_it_any_more() {
         heard(&mut listener, &clock).await
     };
     tokio::select! {
-        _ = run_world(&mut world, &mut hub, &clock, &mut commands, obey) => unreachable!("nobody ends it"),
+        _ = run_world(&mut world, &mut hub, &clock, &mut commands, obey) => unreachable!("it is not ended"),
         received = clients => assert_eq!(received, frame("123#01")),
     }
 }
