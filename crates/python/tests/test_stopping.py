@@ -1,7 +1,13 @@
 """Whatever a program forgets, or however it ends: what it has set in motion stops, and the bus is silent after it."""
 
+import asyncio
+import subprocess
+import sys
+
 import ferrodrive
 import pytest
+
+pytest_plugins = ["pytester"]
 
 #: The tests of the master have them all; these are a servo that holds an RPDO back, and a joint that does not.
 MODELS = ["zlac8030l", "m4230e17b50"]
@@ -117,3 +123,95 @@ def test_a_network_that_nobody_holds_any_more_stops_what_it_moved(world, model, 
     opened = begin(motion, network, world, model)
     del opened, network
     assert_stands(world)
+
+
+@pytest.mark.parametrize("error", [None, KeyboardInterrupt, asyncio.CancelledError])
+def test_a_drive_of_coroutines_stops_with_its_network(world, model, error):
+    async def main():
+        await network.async_drive(1, model).velocity(60, wait=False)
+        await network.async_sleep(0.5)
+        assert abs(world[1].velocity_rpm) > 20.0
+        if error is not None:
+            raise error("the program has a fault")
+
+    try:
+        with ferrodrive.virtual_time(world), ferrodrive.Network(world) as network:
+            asyncio.run(main())
+    except (KeyboardInterrupt, asyncio.CancelledError):
+        pass
+    assert fastest(world) < 2.0
+    assert_stands(world)
+
+
+def test_a_coroutine_that_is_cancelled_on_the_way_leaves_nothing_turning_behind_its_network(world, model):
+    async def main():
+        drive = network.async_drive(1, model)
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(drive.move(360_000, relative=True, speed_rpm=60), 0.5)
+
+    with ferrodrive.virtual_time(world), ferrodrive.Network(world) as network:
+        asyncio.run(main())
+    assert fastest(world) < 2.0
+    assert_stands(world)
+
+
+#: Ends with a drive that turns, and that no watch of its own stops; nobody closes the network.
+PROGRAM = """
+import sys, ferrodrive
+network = ferrodrive.Network(sys.argv[1])
+drive = network.drive(5, "cia402")
+drive.velocity(300)
+print(drive.state()["velocity_rpm"], flush=True)
+"""
+
+
+@pytest.mark.parametrize("end", ["", "sys.exit(3)", "raise RuntimeError('a fault')", "raise KeyboardInterrupt"])
+def test_the_end_of_the_interpreter_stops_what_it_moved(end):
+    try:
+        path = ferrodrive.simulator.program()
+    except ferrodrive.SimulatorError as error:
+        pytest.skip(str(error))
+    with ferrodrive.Simulator(["cia402@5"], extra=["--timing", "ideal"], path=path) as simulator:
+        bus = f"socketcand://127.0.0.1:{simulator.port()}/can0"
+        ended = subprocess.run([sys.executable, "-c", PROGRAM + end, bus], capture_output=True, text=True)
+        assert float(ended.stdout) == pytest.approx(300, rel=0.1), ended.stderr
+        # It was seen to stand before the program ended.
+        assert abs(simulator.world("5 get")["velocity_rpm"]) < 2.0
+
+
+SUITE = """
+    import sys, ferrodrive, pytest
+
+    @pytest.fixture
+    def network(ferrodrive_world):
+        sys.kept = ferrodrive_world
+        with ferrodrive.Network(ferrodrive_world) as network:
+            yield network
+
+    @pytest.mark.ferrodrive(drives=["zlac8030l@1", "m4230e17b50@2"])
+    def test_it(network):
+        network.wait_for(1)
+        for node, model in ((1, "zlac8030l"), (2, "m4230e17b50")):
+            network.drive(node, model).velocity(60, wait=False)
+        network.sleep(0.5)
+        print([sys.kept[node].velocity_rpm for node in (1, 2)])
+        assert all(abs(sys.kept[node].velocity_rpm) > 20 for node in (1, 2))
+        raise KeyboardInterrupt
+"""
+
+#: What the suite's world does once the run was interrupted.
+AFTER = """
+import sys, pytest
+status = pytest.main(["-p", "no:cacheprovider", *sys.argv[1:]])
+sys.kept.run_for(1.0)
+print("after", int(status), *(round(sys.kept[node].velocity_rpm, 1) for node in (1, 2)))
+"""
+
+
+def test_an_interrupted_run_of_pytest_stops_what_its_fixtures_moved(pytester):
+    path = pytester.makepyfile(SUITE)
+    result = pytester.run(sys.executable, "-c", AFTER, path)
+    # 2: the run was interrupted, by the test and not by an assertion.
+    (after,) = (line.split() for line in result.outlines if line.startswith("after"))
+    assert after[1] == "2"
+    assert all(abs(float(speed)) < 1.0 for speed in after[2:])
