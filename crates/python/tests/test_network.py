@@ -327,4 +327,15 @@ def test_a_watch_goes_on_while_the_program_sleeps_in_virtual_time(world):
         time.sleep(3)
         # Nothing asked for it meanwhile.
         assert [(event["kind"], event["node"]) for event in supervisor.events(within=0.01)][:1] == [("heartbeat_lost", 1)]
+        # A drive that is away cannot be released from its watch over this program.
+        with pytest.raises(ferrodrive.NoAnswer, match="node 1 .* 1016h:01"):
+            supervisor.close()
         supervisor.close()
+
+
+def test_what_fails_under_a_watch_is_raised_before_what_its_end_says(world, network):
+    with pytest.warns(ferrodrive.BusWarning, match="1016h:01"), pytest.raises(KeyError, match="mine"):
+        with network.supervise():
+            world[1].power_cut()
+            network.sleep(1)
+            raise KeyError("mine")

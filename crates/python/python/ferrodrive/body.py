@@ -28,6 +28,8 @@ class Body:
     def apply(self, words: str) -> dict[str, Any]:
         """Does what a world command says about it: ``apply("slope 5 90")``.
 
+        :raises Refused: there is no such body, or it does not take the command; nothing has changed
+
         >>> body.apply("slope 5 90")["ok"]
         True
         """

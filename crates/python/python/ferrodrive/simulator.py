@@ -101,10 +101,11 @@ class Simulator:
         self.quit()
 
     def wait_until_booted(self, within: float = BOOT_TIMEOUT_S) -> None:
-        """Waits until the drives that it was started with, by words or by a machine file, have booted. They begin to when the program is ready and take about a
-        second, in which they are deaf, as real ones are.
+        """Waits until the drives that it was started with, by words or by a machine file, have booted. They begin to when the program is
+        ready and take about a second, in which they are deaf, as real ones are.
 
-        :param within: longest time in s; after that :class:`~ferrodrive.SimulatorError` is raised
+        :param within: longest time in s
+        :raises SimulatorError: one has not by then
 
         >>> sim.wait_until_booted()
         """

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Optional, Union, cast
 
 from ._native import Supervisor as NativeSupervisor
+from .errors import BusWarning, MasterError
 from .reports import BootReport, WatchedEvent
 
 if TYPE_CHECKING:
@@ -41,7 +43,13 @@ class Supervisor:
     def __exit__(
         self, kind: Optional[type[BaseException]], error: Optional[BaseException], traceback: Optional[TracebackType]
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        except MasterError as kept:
+            if error is None:
+                raise
+            # What went wrong first is what is raised; that a drive still waits for a heartbeat is a warning beside it.
+            warnings.warn(str(kept), BusWarning, stacklevel=2)
 
     def next(self, within: float = 1.0) -> Optional[WatchedEvent]:
         """The next thing that happened, or None if nothing did.
@@ -95,7 +103,7 @@ class Supervisor:
     def close(self) -> None:
         """Ends the watch; no drive waits for the heartbeat of this program then. Does nothing the second time.
 
-        :raises MasterError: a drive did not let go
+        :raises MasterError: a drive that is out of reach could not be released; it stops for want of the heartbeat
 
         >>> supervisor.close()
         """

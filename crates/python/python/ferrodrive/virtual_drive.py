@@ -60,6 +60,8 @@ class VirtualDrive:
     def axis(self, number: int) -> VirtualDrive:
         """Another axis of the same drive, counted from 1.
 
+        :raises ValueError: the drive has no such axis
+
         >>> world[5].axis(1)
         <cia402 at 5>
         """
@@ -182,6 +184,8 @@ class VirtualDrive:
 
     def apply(self, words: str) -> None:
         """Does what a world command says, without the node: ``apply("load torque 2.5")``.
+
+        :raises Refused: the command is not one, or the drive does not take it; nothing has changed
 
         >>> world[5].apply("load torque 2.5")
         """

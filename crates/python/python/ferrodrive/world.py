@@ -93,6 +93,8 @@ class World(_native.World):
         :param node: node-ID at the first start, 1 to 127; the drive keeps this number in the world
         :param options: what is special about this one, in the words of ``ferrodrive sim --drive``: ``motor="fast"``,
             ``firmware="2.01"``, ``max_current=100``; an object by its index as ``**{"6060": 3}``
+        :raises ValueError: the model, the file or an option is not one
+        :raises Refused: the number is in use, or the drive does not take an option
 
         >>> world.add("zlac8030l", node=4, motor="fast")
         <zlac8030l at 4>
@@ -118,8 +120,9 @@ class World(_native.World):
         return f"<World at {self.now} s with {len(self.nodes)} drives>"
 
     def apply(self, line: str) -> dict[str, Any]:
-        """Does what a world command says (``4 load torque 2.5``, ``bus corrupt 0.01``) and returns its answer; what is refused raises
-        :class:`~ferrodrive.Refused`.
+        """Does what a world command says (``4 load torque 2.5``, ``bus corrupt 0.01``) and returns its answer.
+
+        :raises Refused: the command is not one, or the drive does not take it; nothing has changed
 
         >>> world.apply("5 load torque 2.5")["ok"]
         True
@@ -131,7 +134,9 @@ class World(_native.World):
         return answer
 
     def body(self, name: str) -> Body:
-        """A machine that several drives move, by its name.
+        """A machine that several drives move, by its name. That there is none of this name shows with its first use.
+
+        :raises ValueError: the name is not one word
 
         >>> ferrodrive.World.machine("base.toml").body("base")
         <Body base>
@@ -145,6 +150,8 @@ class World(_native.World):
 
     def run_for(self, seconds: float) -> None:
         """Lets time pass, in s. Threads that take part in the virtual time of this world go on meanwhile.
+
+        :raises ValueError: the time is less than 0
 
         >>> world.run_for(0.5)
         """
@@ -196,6 +203,8 @@ class World(_native.World):
         """A copy of everything: drives, physics, frames under way. It goes its own way from here, or is come back to with
         :meth:`restore`.
 
+        :raises RuntimeError: a master is in the world: it would be in two
+
         >>> copy = world.snapshot()
         >>> world.run_for(1)
         >>> copy.now < world.now
@@ -242,6 +251,8 @@ class World(_native.World):
         frames) or ``.csv``.
 
         :param every: time between two samples in s of virtual time
+        :raises OSError: the file cannot be written
+        :raises RuntimeError: the world is being recorded already
 
         >>> with world.record("run.csv", every=0.01):
         ...     world.run_for(0.1)
@@ -257,6 +268,7 @@ class World(_native.World):
 
         :param last: how far back it goes, in s of virtual time
         :param every: time between two samples in s of virtual time
+        :raises ValueError: more samples than memory is kept for
 
         >>> world.keep_trail(last=5)
         """
@@ -272,6 +284,8 @@ class World(_native.World):
         """What :meth:`keep_trail` has kept, as the text of an SVG: position, velocity, current, supply and faults of each drive, and
         where bodies were, over time.
 
+        :raises RuntimeError: nothing was kept, or nothing has moved
+
         >>> world.keep_trail()
         >>> world.run_for(1)
         >>> world.picture("a second")[:4]
@@ -282,12 +296,16 @@ class World(_native.World):
     def corrupt(self, probability: float) -> None:
         """From now on each frame is destroyed on the wire with this probability, 0 to 1, and sent again (``bus corrupt 0.01``).
 
+        :raises Refused: it is not a probability
+
         >>> world.corrupt(0.01)
         """
         self.apply(f"bus corrupt {number(probability)}")
 
     def destroy(self, nth_frame: int, bit: int) -> None:
         """The n-th frame from here on is destroyed at this bit of it, counted from 1 at start of frame (``bus destroy 3 20``).
+
+        :raises Refused: the frame or the bit is less than 1
 
         >>> world.destroy(3, bit=20)
         """
