@@ -32,7 +32,7 @@ def of_drive():
     """A round in virtual time, on the clock of the wall."""
     clock = time.perf_counter
     network = canopen.Network()
-    world = ferrodrive.World()
+    world = ferrodrive.World(timing="ideal")
     world.add("cia402", node=5)
     network.connect(interface="ferrodrive", channel=world)
     node = network.add_node(5, sheet())
