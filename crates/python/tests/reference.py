@@ -8,9 +8,10 @@ import pathlib
 import re
 import textwrap
 from collections.abc import Iterator
-from typing import NamedTuple, Optional
+from typing import ForwardRef, NamedTuple, Optional
 
 import ferrodrive
+import ferrodrive.reports
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PAGE = ROOT / "docs" / "python.md"
@@ -167,7 +168,21 @@ def page() -> str:
         for name in names:
             for entry in of_name(name):
                 text.append(block(entry))
+    text += reports()
     return re.sub(r"\n{3,}", "\n\n", "\n".join(text)).rstrip() + "\n"
+
+
+def reports() -> Iterator[str]:
+    """The dicts that a network reports, each with its fields."""
+    yield "\n## What is reported\n\nDicts, typed in `ferrodrive.reports`; their fields are those of [`--json`](json.md).\n"
+    for name, thing in vars(ferrodrive.reports).items():
+        if not name.startswith("_") and isinstance(thing, type) and thing.__module__ == "ferrodrive.reports":
+            fields = ", ".join(f"`{field}: {plain(kind)}`" for field, kind in thing.__annotations__.items())
+            yield f"\n### {name}\n\n{markdown(own_words(thing))}\n\n{fields}\n"
+
+
+def plain(kind) -> str:
+    return kind.__forward_arg__ if isinstance(kind, ForwardRef) else str(kind)
 
 
 def block(entry: Entry) -> str:

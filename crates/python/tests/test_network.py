@@ -5,8 +5,10 @@ import math
 import pathlib
 import subprocess
 import time
+import typing
 
 import ferrodrive
+import ferrodrive.reports
 import pytest
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[3] / "examples"
@@ -339,3 +341,48 @@ def test_what_fails_under_a_watch_is_raised_before_what_its_end_says(world, netw
             world[1].power_cut()
             network.sleep(1)
             raise KeyError("mine")
+
+
+def test_the_types_of_reports_have_the_fields_that_there_are(network, tmp_path):
+    network.boot()
+    parameters, kept, wanted = network.params(1), tmp_path / "kept.toml", tmp_path / "wanted.toml"
+    parameters.backup(kept)
+    wanted.write_text('[values]\n"6081h:00" = 1234\n', encoding="utf-8")
+    reported = {
+        "ScanReport": network.scan(),
+        "BootReport": network.boot(),
+        "PlanReport": network.plan(),
+        "ExplainReport": network.explain(1),
+        "CheckReport": network.check(EXAMPLES / "base.toml"),
+        "BackupReport": parameters.backup(),
+        "ParametersPlan": parameters.plan(wanted),
+        "DiffReport": parameters.diff(wanted),
+        "VerifyReport": parameters.verify(wanted),
+        "ApplyReport": parameters.apply(wanted),
+        "DriveState": network.drive(1).state(),
+        "MotionReport": network.drive(1).velocity(10),
+    }
+    for name, report in reported.items():
+        holds(getattr(ferrodrive.reports, name), report, name)
+
+
+def holds(kind, value, at):
+    """That a value has what its type has: each field, and no other."""
+    if isinstance(kind, type) and hasattr(kind, "__total__"):
+        hints = typing.get_type_hints(kind)
+        missing = set(hints) - set(value) if kind.__total__ else set()
+        assert not missing and set(value) <= set(hints), f"{at}: {set(value) ^ set(hints)}"
+        for field in value:
+            holds(hints[field], value[field], f"{at}.{field}")
+    elif typing.get_origin(kind) is list:
+        for item in value:
+            holds(typing.get_args(kind)[0], item, f"{at}[]")
+    elif typing.get_origin(kind) is typing.Union:
+        kinds = [other for other in typing.get_args(kind) if other is not type(None)]
+        assert value is None and len(kinds) < len(typing.get_args(kind)) or value is not None and len(kinds) == 1, at
+        if value is not None:
+            holds(kinds[0], value, at)
+    elif kind is float:
+        assert isinstance(value, (int, float)), f"{at}: {value!r}"
+    elif isinstance(kind, type):
+        assert isinstance(value, kind), f"{at}: {value!r} is not of {kind}"

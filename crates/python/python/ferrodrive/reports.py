@@ -183,10 +183,7 @@ class ExplainReport(TypedDict):
     pdos: list[ExplainedPdo]
 
 
-class CheckReport(TypedDict):
-    """Of :func:`check` and :meth:`Network.check`. ``findings`` have ``severity``, ``rule``, ``at``, ``node``, ``what`` and ``next``;
-    ``predicted`` is how the bus boots and what is sent then, ``live`` what the drives of a bus answered."""
-
+class _CheckReport(TypedDict):
     ok: bool
     file: str
     nodes: list[dict[str, Any]]
@@ -196,6 +193,13 @@ class CheckReport(TypedDict):
     findings: list[dict[str, Any]]
     predicted: Optional[dict[str, Any]]
     live: Optional[list[dict[str, Any]]]
+
+
+class CheckReport(_CheckReport, total=False):
+    """Of :func:`check` and :meth:`Network.check`. ``findings`` have ``severity``, ``rule``, ``at``, ``node``, ``what`` and ``next``;
+    ``predicted`` is how the bus boots and what is sent then, ``live`` what the drives of a bus answered, ``error`` why ``ok`` is False."""
+
+    error: dict[str, Any]
 
 
 class PlannedFrame(TypedDict):
@@ -213,10 +217,7 @@ class PlannedFrame(TypedDict):
     in_time: bool
 
 
-class PlanReport(TypedDict):
-    """Of :meth:`Network.plan`; loads are from 0 to 1, ``bitrate`` in bit/s. ``moved`` is there where a group or the base of the machine
-    file is planned."""
-
+class _PlanReport(TypedDict):
     ok: bool
     fits: bool
     bitrate: int
@@ -228,6 +229,13 @@ class PlanReport(TypedDict):
     most_drives_in_cycle: int
     drives: int
     notes: list[str]
+
+
+class PlanReport(_PlanReport, total=False):
+    """Of :meth:`Network.plan`; loads are from 0 to 1, ``bitrate`` in bit/s. ``moved`` is there where a group or the base of the machine
+    file is planned."""
+
+    moved: str
 
 
 class Shown(TypedDict):
@@ -315,13 +323,17 @@ class ApplyReport(TypedDict):
     notes: list[str]
 
 
-class Deviation(TypedDict):
-    """An object that has another value than it should; ``found`` is None where the node refused to show it."""
-
+class _Deviation(TypedDict):
     object: str
     name: Optional[str]
     wanted: Shown
     found: Optional[Shown]
+
+
+class Deviation(_Deviation, total=False):
+    """An object that has another value than it should; ``found`` is None where the node refused to show it, and ``refused`` says why."""
+
+    refused: str
 
 
 class VerifyReport(TypedDict):
