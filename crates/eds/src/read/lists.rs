@@ -32,7 +32,7 @@ impl Reader {
                 continue;
             }
             if entry.key.is_empty() || !entry.key.bytes().all(|digit| digit.is_ascii_digit()) {
-                self.warn(section, entry, "no number of a list's line", Some("nothing".into()));
+                self.warn(section, entry, "not the number of a line of the list", Some("nothing".into()));
                 continue;
             }
             count += 1;

@@ -138,7 +138,12 @@ impl Reader {
             return inferred;
         };
         let Some(kind) = self.count::<u16>(section, entry).and_then(ObjectType::of) else {
-            self.error(section, entry, format!("no type of an object: {:?}", shortened(entry.value)), inferred.name());
+            self.error(
+                section,
+                entry,
+                format!("expected a type of object, got {:?}", shortened(entry.value)),
+                inferred.name(),
+            );
             return inferred;
         };
         if has_subs && !kind.has_sub_objects() && kind != ObjectType::DefType {

@@ -95,7 +95,7 @@ impl Reader {
             () if data_type == TypeCode::BOOLEAN && word("false") => Some(0),
             () => whole(entry.value).map(|real| real as i128),
         };
-        let what = format!("no number of {data_type}: {:?}", shortened(entry.value));
+        let what = format!("expected a number of {data_type}, got {:?}", shortened(entry.value));
         let Some(value) =
             value.filter(|value| data_type.range().is_some_and(|(low, high)| (low..=high).contains(value)))
         else {
