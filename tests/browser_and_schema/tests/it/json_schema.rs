@@ -220,7 +220,14 @@ fn kinds_in(text: &str) -> Vec<String> {
         (!word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c == '_')).then(|| word.to_owned())
     };
     let behind = |mark: &str| text.split(mark).skip(1).filter_map(word).collect::<Vec<_>>();
-    let mut kinds = [behind("of_kind(\""), behind(" kind: \""), behind("\"kind\":\""), behind("Self::new(\"")].concat();
+    let mut kinds = [
+        behind("of_kind(\""),
+        behind(" kind: \""),
+        behind("\"kind\":\""),
+        behind("Self::new(\""),
+        behind("ControlError::new(\""),
+    ]
+    .concat();
     for body in text.split("fn kind(&self) -> &'static str {").skip(1) {
         let body = body.split("\n    }\n").next().unwrap_or_default();
         kinds.extend(body.split("=> \"").skip(1).filter_map(word));
