@@ -4,14 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
-use clap::ArgMatches;
-use clap::parser::ValueSource;
 use transport::BusSpec;
 
 use crate::failure::Failure;
 use crate::recording::{LogPath, log_path};
-use crate::scope::heeds_machine;
-use crate::session::read_machine;
 use testbench::machine_file::Machine;
 use testbench::models::Description;
 use testbench::words::drive::node_model;
@@ -81,35 +77,6 @@ pub(crate) struct MachineFile {
 }
 
 impl Global {
-    /// The command line with the machine file where the command looks for it: on the virtual bus of a command's own its drives are
-    /// there.
-    ///
-    /// # Errors
-    /// Where the file cannot be used, or `--bus` names another one than `--machine`.
-    pub(crate) fn with_machine_file(mut self, matches: &ArgMatches) -> Result<Self, Failure> {
-        let command = matches.subcommand_name().unwrap_or_default();
-        let Some(path) = self.machine_path.clone().filter(|_| heeds_machine(command)) else { return Ok(self) };
-        let is_typed = matches.value_source("machine") == Some(ValueSource::CommandLine);
-        // A check reads its file, and asks only a bus that is named; a simulator makes its drives itself.
-        let makes_its_own = matches!(command, "check" | "sim");
-        match &self.bus {
-            BusSpec::Sim { file: None } if !makes_its_own => self.bus = BusSpec::Sim { file: Some(path.clone()) },
-            BusSpec::Sim { file: Some(other) } if *other != path => {
-                if is_typed {
-                    return Err(two_files(other, &path));
-                }
-                return Ok(self);
-            }
-            _ => {}
-        }
-        // A check says of a bad file all that it finds.
-        if command != "check" {
-            self.machine = Some(read_machine(&path)?);
-        }
-        self.machine_file = Some(MachineFile { path, is_typed });
-        Ok(self)
-    }
-
     /// The command line with a machine file that a command names itself, as if it stood behind `--machine`.
     ///
     /// # Errors
@@ -137,7 +104,7 @@ impl Global {
     }
 }
 
-fn two_files(one: &Path, other: &Path) -> Failure {
+pub(crate) fn two_files(one: &Path, other: &Path) -> Failure {
     Failure::usage(format!("two machine files: {} and {}", one.display(), other.display()))
         .because("a bus is described by one")
         .next("give one of them, with --machine FILE or as the command takes it")

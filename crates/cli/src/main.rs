@@ -15,6 +15,7 @@ mod frames;
 mod global;
 mod guard;
 mod help;
+mod machine_option;
 mod output;
 mod plain;
 mod progress;
@@ -43,6 +44,7 @@ use clap_complete::env::CompleteEnv;
 use crate::args::{Cli, Command};
 use crate::command::completions::ASKED_BY;
 use crate::command::departures::DepartureList;
+use crate::command::drive::StopOutcome;
 use crate::command::objects::{Objects, Whose};
 use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
@@ -226,17 +228,10 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Disable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Estop(command) => {
-            let report = session::run(global, async |context| command.run(context).await)?;
-            judged(format, &report, report.failure())
+            stops(global, format, async |context| command.run(context).await.map(StopOutcome::All))
         }
-        Command::Stop(command) => {
-            let outcome = session::run(global, async |context| command.run(context).await)?;
-            judged(format, &outcome, outcome.failure())
-        }
-        Command::QuickStop(command) => {
-            let outcome = session::run(global, async |context| command.run(context).await)?;
-            judged(format, &outcome, outcome.failure())
-        }
+        Command::Stop(command) => stops(global, format, async |context| command.run(context).await),
+        Command::QuickStop(command) => stops(global, format, async |context| command.run(context).await),
         Command::Reset(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Velocity(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Move(command) => on_bus(global, format, async |context| command.run(context).await),
@@ -285,6 +280,15 @@ fn list_objects(global: &Global, format: Format, objects: &Objects) -> Result<()
         Whose::Model(model) => print(format, &objects.list(model)?),
         Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
     }
+}
+
+fn stops(
+    global: &Global,
+    format: Format,
+    command: impl AsyncFnOnce(&Context) -> Result<StopOutcome, Failure>,
+) -> Result<(), Failure> {
+    let outcome = session::run(global, command)?;
+    judged(format, &outcome, outcome.failure())
 }
 
 fn on_bus<R: Report>(

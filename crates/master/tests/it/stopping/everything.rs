@@ -2,6 +2,9 @@
 //! not there any more.
 
 use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::future::poll_fn;
+use std::pin::pin;
 use std::time::Duration;
 
 use can::{CanId, Frame};
@@ -9,11 +12,12 @@ use canopen::NmtCommand;
 use cia402::{Controlword, PowerCommand};
 use devices::model;
 use master::Network;
+use master::base::Twist;
 use master::drive::{MotionOptions, StopWay, StoppedAxis};
 use master::units::Rpm;
 use sim::{Place, Stimulus, block_on};
 
-use super::{Bench, NODES, models, options, while_going_on};
+use super::{Bench, Moving, NODES, PERIOD, models, options};
 use crate::support::{mux, node};
 
 impl Bench {
@@ -23,6 +27,34 @@ impl Bench {
             self.run(drive.velocity(Rpm(60.0), MotionOptions { wait: true, ..options() })).unwrap();
         }
         self.moving = NODES.to_vec();
+    }
+
+    /// Another program stops everything while this one goes on with its cycles. The time after which the last drive was seen to
+    /// stand.
+    pub(super) fn stop_everything(&mut self, mut moving: Moving, what: &str) -> (Option<Duration>, Option<Moving>) {
+        let other = Network::new();
+        self.world.add_station(other.clone());
+        let network = self.network.clone();
+        let go_on = async {
+            loop {
+                match &mut moving {
+                    Moving::Alone => {}
+                    Moving::Group(group) => drop(group.cycle().await),
+                    Moving::Base(base) => {
+                        let _ = base.command(Twist { linear_m_s: 0.6, angular_rad_s: 0.0 });
+                        let _ = base.cycle().await;
+                    }
+                }
+                // What has ended does not wait for its next cycle.
+                network.sleep(PERIOD / 10).await;
+            }
+        };
+        let models = BTreeMap::new();
+        let stopped = block_on(&mut self.world, while_going_on(other.stop_everything(&models), go_on)).unwrap();
+        assert_eq!(stopped.len(), NODES.len(), "{what}: {stopped:?}");
+        assert!(self.fastest() < 2.0, "{what}: said to stand at {} r/min", self.fastest());
+        let times = stopped.iter().map(|axis| axis.outcome.as_ref().unwrap_or_else(|e| panic!("{what}: {e}")).0);
+        (times.max(), Some(moving))
     }
 
     /// Another program on the same bus.
@@ -35,6 +67,19 @@ impl Bench {
     fn stop_everything_by(&mut self, other: &Network) -> Vec<StoppedAxis> {
         self.run(other.stop_everything(&BTreeMap::new()))
     }
+}
+
+/// What comes of `work`, while `other` goes on without end.
+async fn while_going_on<T>(work: impl Future<Output = T>, other: impl Future<Output = Infallible>) -> T {
+    let (mut work, mut other) = (pin!(work), pin!(other));
+    poll_fn(|context| {
+        let done = work.as_mut().poll(context);
+        if done.is_pending() {
+            let _ = other.as_mut().poll(context);
+        }
+        done
+    })
+    .await
 }
 
 #[test]

@@ -7,10 +7,6 @@
 mod another_master;
 mod everything;
 
-use std::collections::BTreeMap;
-use std::convert::Infallible;
-use std::future::poll_fn;
-use std::pin::pin;
 use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant, Station};
@@ -324,19 +320,6 @@ fn whatever_moves_stops_within_its_ramp_however_its_program_ends() {
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/safety.md");
 const TABLE_BEGINS: &str = "| motion | drive |";
 
-/// What comes of `work`, while `other` goes on without end.
-async fn while_going_on<T>(work: impl Future<Output = T>, other: impl Future<Output = Infallible>) -> T {
-    let (mut work, mut other) = (pin!(work), pin!(other));
-    poll_fn(|context| {
-        let done = work.as_mut().poll(context);
-        if done.is_pending() {
-            let _ = other.as_mut().poll(context);
-        }
-        done
-    })
-    .await
-}
-
 /// What the page has: how long after each end the shaft stands.
 fn table(times: &[((&'static str, Motion), End, Stood)]) -> String {
     let columns =
@@ -418,34 +401,6 @@ impl Bench {
         }
     }
 
-    /// Another program stops everything while this one goes on with its cycles. The time after which the last drive was seen to
-    /// stand.
-    fn stop_everything(&mut self, moving: &mut Moving, what: &str) -> Duration {
-        let other = Network::new();
-        self.world.add_station(other.clone());
-        let network = self.network.clone();
-        let go_on = async {
-            loop {
-                match moving {
-                    Moving::Alone => {}
-                    Moving::Group(group) => drop(group.cycle().await),
-                    Moving::Base(base) => {
-                        let _ = base.command(Twist { linear_m_s: 0.6, angular_rad_s: 0.0 });
-                        let _ = base.cycle().await;
-                    }
-                }
-                // What has ended does not wait for its next cycle.
-                network.sleep(PERIOD / 10).await;
-            }
-        };
-        let models = BTreeMap::new();
-        let stopped = block_on(&mut self.world, while_going_on(other.stop_everything(&models), go_on)).unwrap();
-        assert_eq!(stopped.len(), NODES.len(), "{what}: {stopped:?}");
-        assert!(self.fastest() < 2.0, "{what}: said to stand at {} r/min", self.fastest());
-        let times = stopped.iter().map(|axis| axis.outcome.as_ref().unwrap_or_else(|e| panic!("{what}: {e}")).0);
-        times.max().unwrap()
-    }
-
     fn end(&mut self, (name, motion, end): (&str, Motion, End), moving: Moving, speed: f64) -> Stood {
         let what = format!("{name} {motion:?} {end:?}");
         let network = self.network.clone();
@@ -475,11 +430,7 @@ impl Bench {
                 self.world.refresh();
                 kept = Some(moving);
             }
-            End::Everything => {
-                let mut moving = moving;
-                said = Some(self.stop_everything(&mut moving, &what));
-                kept = Some(moving);
-            }
+            End::Everything => (said, kept) = self.stop_everything(moving, &what),
             // A motion that goes on alone is what its program asked for.
             End::Forgotten if matches!(moving, Moving::Alone) => return Stood::AsAsked,
             End::Forgotten => drop(moving),
