@@ -3,8 +3,6 @@
 
 use clap::{Arg, Command};
 
-use crate::scope::command_line;
-
 /// The commands of a group, as one looks for them.
 struct CommandGroup {
     title: &'static str,
@@ -66,8 +64,7 @@ pub(crate) fn dressed(command: Command) -> Command {
 }
 
 /// The options of all commands, as `ferrodrive help options` shows them.
-pub(crate) fn of_options() -> String {
-    let mut command = command_line();
+pub(crate) fn of_options(mut command: Command) -> String {
     command.build();
     command.find_subcommand_mut(OPTIONS).map(|its| its.render_long_help().to_string()).unwrap_or_default()
 }
@@ -141,6 +138,7 @@ fn about(command: &Command, name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scope::command_line;
 
     /// A terminal of the usual size shows 40 lines or so without scrolling.
     const SCREEN: usize = 40;

@@ -267,7 +267,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Replay(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Completions(completions) => completions.run(),
         Command::ManPages(pages) => pages.run(scope::heeded()),
-        Command::Options => print_line(&help::of_options()).map_err(Failure::of_stdout),
+        Command::Options => print_line(&help::of_options(command_line())).map_err(Failure::of_stdout),
     }
 }
 
