@@ -85,11 +85,11 @@ pub fn print(nodes: &[DbcNode]) -> String {
     }
     out.push_str("\n\n");
     let mut tail = Tail::default();
-    let everybody: Vec<String> = nodes.iter().map(DbcNode::name).collect();
-    let everybody = everybody.join(",");
+    let all_nodes: Vec<String> = nodes.iter().map(DbcNode::name).collect();
+    let all_nodes = all_nodes.join(",");
     let nmt = [Signal::plain("command", 0, 8).valued(&NMT_COMMANDS), Signal::plain("node", 8, 8)];
-    message(&mut out, &mut tail, Head { id: 0, name: "NMT", length: 2, sender: MASTER, receiver: &everybody }, &nmt);
-    message(&mut out, &mut tail, Head { id: 0x80, name: "SYNC", length: 0, sender: MASTER, receiver: &everybody }, &[]);
+    message(&mut out, &mut tail, Head { id: 0, name: "NMT", length: 2, sender: MASTER, receiver: &all_nodes }, &nmt);
+    message(&mut out, &mut tail, Head { id: 0x80, name: "SYNC", length: 0, sender: MASTER, receiver: &all_nodes }, &[]);
     for node in nodes {
         node.messages(&mut out, &mut tail);
     }

@@ -117,6 +117,6 @@ fn a_boot_up_that_leaves_the_configuration_of_the_file_unwritten_does_not_end_wi
     assert_eq!((reset.status, &reset.json()["ok"]), (Some(0), &true.into()), "{}", reset.out);
     let check = ferrodrive(&["--json", "check", &file]).json();
     let findings = check["findings"].as_array().unwrap().iter();
-    let warned = findings.filter(|finding| finding["what"].as_str().unwrap().contains("is not written"));
+    let warned = findings.filter(|finding| finding["what"].as_str().unwrap().contains("are not written"));
     assert_eq!(warned.count(), 6, "{check}");
 }

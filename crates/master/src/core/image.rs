@@ -124,7 +124,7 @@ impl ProcessImage {
         self.index();
     }
 
-    /// Prepares a node's RPDO for sending under `id`, all bits zero. What it carries stays where it is so already.
+    /// Prepares a node's RPDO for sending under `id`, all bits zero. What it carries stays where that is so already.
     pub fn set_rpdo(&mut self, node: NodeId, number: PdoNumber, id: u16, map: PdoMap, trigger: RpdoTrigger) {
         let id = Some(CanId::standard(id));
         let same = |pdo: &&mut Rpdo| (pdo.node, pdo.number, pdo.id, &pdo.map) == (node, number, id, &map);

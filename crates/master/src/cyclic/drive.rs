@@ -155,7 +155,7 @@ impl CyclicDrive {
         } else {
             Ok(self.target.rest(self.actual(io)))
         };
-        // The last speed or current, sent again, would be followed for ever.
+        // The last speed or current, sent again, would be followed without end.
         let raw = wish.unwrap_or_else(|_| self.target.hold());
         if io.write(self.target.set_point, raw) {
             self.target.last_sent = raw;

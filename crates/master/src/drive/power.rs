@@ -137,7 +137,7 @@ impl Drive {
         let rest = match self.power_state(statusword) {
             // A fault has taken the power off: what was commanded before must not come back unasked.
             Some(PowerState::Fault) | None => Controlword(0),
-            // An alarm that has stopped nothing: who follows or holds goes on so.
+            // An alarm that has stopped nothing: a drive that follows or holds goes on.
             Some(_) => Controlword(self.node.read::<u16>(self.place(CONTROLWORD)).await? & !Controlword::FAULT_RESET),
         };
         self.write_controlword(rest).await?;

@@ -43,7 +43,7 @@ const UNKNOWN_RAMP: Duration = Duration::from_secs(5);
 const REST_COUNTS: i64 = 11;
 const REST_LOOK: Duration = Duration::from_millis(20);
 
-/// What became of an axis that was to stop.
+/// The result for an axis that was to stop.
 #[derive(Clone, Debug)]
 pub struct Stopped {
     /// Its node.
@@ -87,7 +87,7 @@ impl Network {
     }
 
     /// Queues the same quick stops without waiting; the runner has to be kept going until the frames are out. Whether they stop
-    /// is not looked at: the nodes stay among [`moved`](Self::moved).
+    /// is not checked: the nodes stay among [`moved`](Self::moved).
     pub fn quick_stop_moved(&self) -> NodeSet {
         let axes = self.moved_axes();
         self.overrule(&axes);

@@ -202,7 +202,7 @@ impl Drive {
             Ramps::Rates { acceleration: up, deceleration: down, scale, none_from, .. } => {
                 let worth = self.worth(scale).await?;
                 let rates = wishes.clone().map(|(_, ramp)| ramp_counts(ramp, change_rpm, worth, none_from));
-                // One object for both: the gentler of two wishes.
+                // One object for both: the gentler of the two.
                 let gentler = if up == down { rates.clone().min() } else { None };
                 for ((what, ramp), own) in wishes.zip(rates) {
                     let object = if what == "acceleration" { up } else { down };

@@ -1,4 +1,4 @@
-//! Does it answer, does it live, who else speaks to it, and whom does it watch?
+//! Does it answer, is it alive, which other masters access it, and what does it watch?
 
 use std::time::Duration;
 

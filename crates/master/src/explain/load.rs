@@ -7,7 +7,7 @@ use super::observed::Observed;
 
 const TOPIC: Topic = Topic::Load;
 
-/// A speed of less than this part of what was asked for, after its ramp, is none.
+/// A speed of less than this part of what was asked for, after its ramp, does not count.
 const HELD_SHARE: f64 = 0.05;
 
 /// A speed of more than this part of what was asked for is near it.

@@ -29,7 +29,7 @@ pub use observed::Observed;
 pub use overheard::{HeardFrames, Overheard};
 pub use pdos::PdoSeen;
 
-/// What became of looking at a drive.
+/// The result of looking at a drive.
 #[derive(Clone, Debug)]
 pub struct Explained {
     /// The node.

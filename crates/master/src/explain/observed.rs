@@ -102,7 +102,7 @@ pub struct Observed {
     pub rates_of_zero: Vec<Mux>,
     /// How its PDOs are set up.
     pub pdos: Vec<(PdoConfig, CobId)>,
-    /// This master said something to it within this time before it was looked at.
+    /// This master sent it something within this time before it was looked at.
     pub talked_to: Option<Duration>,
     /// What speaks for two devices with its node-ID.
     pub twins: Option<Twins>,

@@ -1,7 +1,7 @@
 //! A gateway from text to CANopen: the ASCII mapping of CiA 309-3, without sockets.
 //!
 //! A [`Session`] is one client's connection: lines go in, lines come out, and what a drive on the bus sends unasked
-//! becomes lines too. Who has the connection hands lines over, and asks at its end which nodes the client may have set
+//! becomes lines too. The owner of the connection hands lines over, and asks at its end which nodes the client may have set
 //! in motion ([`Session::moved`]).
 //!
 //! The text of CiA 309-3 was not at hand. Commands, order of words and error codes are those that gateways and clients in the

@@ -46,7 +46,7 @@ struct PdoData {
 }
 
 impl Session {
-    /// A client of `network`, which has set nothing yet. The one net is the default, a default node there is not.
+    /// A client of `network`, which has set nothing yet. The one net is the default, there is no default node.
     pub fn new(network: Network) -> Self {
         Self {
             network,
@@ -112,7 +112,7 @@ impl Session {
         })
     }
 
-    /// The answer to a line that is longer than [`super::MAX_LINE`] or no text.
+    /// The answer to a line that is longer than [`super::MAX_LINE`] or not text.
     pub fn unreadable() -> String {
         format!("[0] ERROR: {}\r\n", Refusal::SYNTAX)
     }

@@ -58,7 +58,7 @@ pub enum PathError {
         /// How many are expected.
         axes: usize,
     },
-    /// A set-point is infinite or no number.
+    /// A set-point is infinite or not a number.
     #[error("the set-point of axis {axis} is {value}: expected a finite number. Nothing was moved")]
     NoNumber {
         /// Which axis.
@@ -189,7 +189,7 @@ impl AxisLimits {
             (Quantity::Jerk, self.jerk_turns_s3),
             (Quantity::FollowingError, self.following_error_turns),
         ];
-        // Not `value <= 0.0`: no number is above nothing.
+        // Not `value <= 0.0`: NaN is not above 0 either.
         if let Some((quantity, value)) = values.into_iter().find(|(_, value)| !(*value > 0.0 && *value < MOST)) {
             return Err(PathError::BadLimit { axis, quantity, value });
         }

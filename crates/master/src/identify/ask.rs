@@ -163,7 +163,7 @@ pub(crate) async fn has(node: &Node, mux: Mux) -> Result<bool, Error> {
 }
 
 impl Network {
-    /// Asks all 127 node-IDs who they are. `progress` hears how many have been asked.
+    /// Asks all 127 node-IDs who they are. `progress` is given how many have been asked.
     ///
     /// Nodes that answer no SDO are found by their boot-up or heartbeat messages, if any came before or meanwhile.
     pub async fn scan(&self, timeout: Duration, mut progress: impl FnMut(usize)) -> Vec<Found> {

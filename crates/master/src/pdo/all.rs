@@ -15,7 +15,7 @@ impl Drive {
     /// How every PDO of the node is set up, TPDOs first: those of its model's table, else those that it has. Changes nothing.
     ///
     /// # Errors
-    /// Those of the SDO reads; a PDO that is not there is none.
+    /// Those of the SDO reads; a PDO that is not there is not an error.
     pub async fn pdos(&self) -> Result<Vec<(PdoConfig, CobId)>, Error> {
         let units = self.description().map_or(TimerUnits::STANDARD, TimerUnits::of);
         let mut pdos = Vec::new();

@@ -85,7 +85,7 @@ impl<'a> InStep<'a> {
                 break;
             }
             if round >= ROUNDS {
-                // What grows for ever takes what depends on it along.
+                // What grows without end takes along what depends on it.
                 next.iter_mut()
                     .zip(&times)
                     .filter(|(next, before)| *next != *before)

@@ -143,7 +143,7 @@ pub struct PlannedFrame {
 }
 
 impl PlannedFrame {
-    /// It is there in time, whatever happens that was planned for.
+    /// It is there in time, in every case that was planned for.
     pub fn is_in_time(&self) -> bool {
         self.bound.worst.is_some_and(|worst| worst <= self.deadline)
     }
@@ -458,7 +458,7 @@ mod tests {
     const MS: Duration = Duration::from_millis(1);
     const TPDO1: PdoId = PdoId { direction: Direction::Tpdo, number: PdoNumber::FIRST };
 
-    /// Load of a bus at 500 kbit/s with SYNC each 10 ms and one TPDO of 8 bytes, and whether something was said of it.
+    /// Load of a bus at 500 kbit/s with SYNC each 10 ms and one TPDO of 8 bytes, and whether there was a remark.
     fn with_tpdo(event_trigger: EventTrigger, set: impl Fn(PdoConfig) -> PdoConfig) -> (f64, bool) {
         let map = [0x6064, 0x606C].map(|index| MappingRecord { mux: Mux::new(index, 0), bits: 32 });
         let config = set(PdoConfig::new(TPDO1, PdoMap(map.to_vec())));

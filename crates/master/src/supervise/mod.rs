@@ -5,7 +5,7 @@
 //! resumes it ([`Supervisor::resume`]).
 //!
 //! A drive that stops for want of this master's heartbeat may go on with its old motion at the next one (M joint manual, 5.11.2),
-//! before anybody could stop it. So the heartbeat is held back as soon as such a drive is out of reach, which stops all that watch
+//! before it could be stopped. So the heartbeat is held back as soon as such a drive is out of reach, which stops all that watch
 //! it, and sent again when all of them are back and have been stopped. For that the loss of a drive has to be noticed
 //! before the drive notices the loss of its master: by a shorter heartbeat of its own (1017h) than the watch that it has (1016h).
 

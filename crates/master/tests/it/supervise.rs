@@ -73,7 +73,7 @@ impl Bench {
         self.world.apply(Place::node(id), &words.parse().unwrap()).unwrap().unwrap();
     }
 
-    /// For 3 s: long enough that everybody notices.
+    /// For 3 s: long enough for every watch to notice.
     fn supply_away(&mut self, id: u8) {
         self.apply(id, "power off");
         self.watch(Duration::from_secs(3));

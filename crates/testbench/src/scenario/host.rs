@@ -124,7 +124,7 @@ impl Wanted {
 }
 
 impl HostTask {
-    /// Waits until each drive has booted and looked about; not for ever for one that does not.
+    /// Waits until each drive has booted and checked its surroundings; a bounded time for one that does not.
     async fn wait_until_booted(&self) {
         let boots = self
             .machine

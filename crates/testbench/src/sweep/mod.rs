@@ -23,7 +23,7 @@ pub use alike::Alike;
 pub use report::{SweepReport, Worst};
 pub use summary::{Distribution, Failed, OfValue, Summary};
 
-/// Runs that a sweep may have: more would take longer than anybody waits.
+/// Runs that a sweep may have: more would take too long.
 pub const MOST_RUNS: u64 = 1_000_000_000;
 
 /// A scenario, the seeds and the values that it is run with.
