@@ -228,7 +228,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Disable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Estop(command) => {
-            stops(global, format, async |context| command.run(context).await.map(StopOutcome::All))
+            stops(global, format, async |context| command.run(context).await.map(StopOutcome::all))
         }
         Command::Stop(command) => stops(global, format, async |context| command.run(context).await),
         Command::QuickStop(command) => stops(global, format, async |context| command.run(context).await),

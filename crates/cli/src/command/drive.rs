@@ -83,10 +83,14 @@ pub(crate) enum StopOutcome {
     /// Of one drive.
     One(Box<StateReport>),
     /// Of every drive on the bus.
-    All(StopReport),
+    All(Box<StopReport>),
 }
 
 impl StopOutcome {
+    pub(crate) fn all(report: StopReport) -> Self {
+        Self::All(Box::new(report))
+    }
+
     /// Why not every drive was seen to stand.
     pub(crate) fn failure(&self) -> Option<Failure> {
         match self {
@@ -205,7 +209,7 @@ impl Disable {
 impl Stop {
     /// Stops and shows the state.
     pub(crate) async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
-        let Nodes::One(node) = self.nodes else { return stop_all(context).await.map(StopOutcome::All) };
+        let Nodes::One(node) = self.nodes else { return stop_all(context).await.map(StopOutcome::all) };
         let drive = context.drive_to_stop(node).await?;
         drive.stop().await?;
         Ok(StopOutcome::One(Box::new(StateReport::read(&drive).await?)))
@@ -215,7 +219,7 @@ impl Stop {
 impl QuickStop {
     /// Stops at once and shows the state. The stop goes out before the model is asked for.
     pub(crate) async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
-        let Nodes::One(node) = self.nodes else { return Estop {}.run(context).await.map(StopOutcome::All) };
+        let Nodes::One(node) = self.nodes else { return Estop {}.run(context).await.map(StopOutcome::all) };
         context.quick_stop(node).await?;
         let drive = context.drive_to_stop(node).await?;
         drive.quick_stop().await?;

@@ -127,7 +127,9 @@ impl AxisReport {
     }
 
     fn unseen(node: NodeId, axis: AxisId, model: Option<&'static str>, failure: &Failure) -> Self {
-        let why = [&[failure.what.clone()], &failure.because[..]].concat().join("; ");
+        let why = [&[failure.what.as_str()], &failure.because.iter().map(String::as_str).collect::<Vec<_>>()[..]]
+            .concat()
+            .join("; ");
         Self { node: node.raw(), axis: axis.0 + 1, model, stands: false, way: None, after_ms: None, why: Some(why) }
     }
 
