@@ -21,7 +21,7 @@ pub enum ErrorStatus {
     NoGuarding,
     /// G: the program that it has cannot be compared with the one that it is to have, or is another and there is none to load.
     NoProgram,
-    /// H: a program is to be loaded, which is not allowed.
+    /// H: a program would have to be loaded, which is not allowed.
     ProgramNotAllowed,
     /// I: the program could not be loaded.
     ProgramFailed,

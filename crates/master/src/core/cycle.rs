@@ -42,7 +42,7 @@ const LOST_AFTER_PERIODS: u64 = 3;
 pub(super) struct SyncClock {
     source: Source,
     period_ns: u64,
-    /// When the next SYNC is to be produced, or counts as lost.
+    /// When the next SYNC is due, or counts as lost.
     due: Option<Instant>,
     pending: bool,
     cycle: Option<Cycle>,

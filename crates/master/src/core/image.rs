@@ -26,7 +26,7 @@ pub enum RpdoTrigger {
     Sync,
 }
 
-/// Process image: the newest data of every mapped PDO, with the time it came, and what is to be sent.
+/// Process image: the newest data of every mapped PDO, with the time it came, and the data to send.
 ///
 /// RPDO and TPDO are from the device's side. A frame that is shorter
 /// than its mapping is not taken over (CiA 301, 7.2.2.5). An unsent RPDO is overwritten by its newer value.
@@ -332,7 +332,7 @@ impl ProcessImage {
         self.cycle = number;
     }
 
-    /// Everything that was written and waited is to be sent.
+    /// Marks everything that was written and waited for sending.
     pub(super) fn release_waiting(&mut self) {
         for position in self.waiting.drain(..) {
             if let Some(pdo) = self.rpdos.get_mut(usize::from(position)) {

@@ -153,7 +153,7 @@ fn a_record_is_asked_for_in_words_that_make_sense() {
     refused(&["--record-period", "1ms"], "--record <FILE>");
     let place = scratch("refused-record");
     let csv = place.join("run.csv");
-    refused(&["--record", csv.to_str().unwrap(), "--record-signals", "5.*"], "no signal '5.*'");
+    refused(&["--record", csv.to_str().unwrap(), "--record-signals", "5.*"], "unknown signal '5.*'");
     assert!(!csv.exists());
 }
 
