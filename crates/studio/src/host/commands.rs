@@ -73,13 +73,7 @@ impl Host {
                 self.note_stop(node, "stopped by a quick stop");
                 self.quick_stop_one(node, "stopped by a quick stop", Some(asked));
             }
-            Command::JogHold { node } => {
-                let now = self.network.now();
-                match self.jogs.get_mut(&node).is_some_and(|held| held.renew(now)) {
-                    true => done(asked),
-                    false => not_held(asked, node),
-                }
-            }
+            Command::JogHold { node } => self.hold_jog(node, asked),
             Command::JogEnd { node } => self.end_jog(node, asked),
             Command::AcceptUnguarded { node } => self.accept_unguarded(node, asked),
             Command::Objects { .. }
@@ -178,6 +172,14 @@ impl Host {
         self.work.push(future);
         for other in others {
             self.quick_stop_one(other, "another drive of its group got another command", None);
+        }
+    }
+
+    fn hold_jog(&mut self, node: NodeId, asked: Asked) {
+        let now = self.network.now();
+        match self.jogs.get_mut(&node).is_some_and(|held| held.renew(now)) {
+            true => done(asked),
+            false => not_held(asked, node),
         }
     }
 
