@@ -283,6 +283,7 @@ fn the_objects_of_a_node_that_is_no_drive_are_the_outer_worlds() {
         ("9 input X0 1", "a inputs has no input \\\"X0\\\"; it has none"),
     ] {
         let answer = world_command(&mut world, &line.replace("\\\"", "\""));
-        assert_eq!(answer, format!("{{\"ok\":false,\"error\":\"{error}\",\"kind\":\"refused\"}}"), "{line}");
+        let start = format!("{{\"ok\":false,\"error\":{{\"kind\":\"refused\",\"message\":\"{error}\"");
+        assert!(answer.starts_with(&start), "{line}: {answer}");
     }
 }
