@@ -101,7 +101,7 @@ def test_a_scan_names_who_is_there_and_an_empty_bus_is_an_exception(network):
     assert [(node["node"], node["model"]) for node in nodes] == [(1, "cia402"), (2, "cia402")]
     with ferrodrive.Network(ferrodrive.World()) as alone, pytest.raises(ferrodrive.MasterError) as raised:
         alone.scan()
-    assert raised.value.kind == "nobody" and "termination" in raised.value.do[0]
+    assert raised.value.kind == "no_node" and "termination" in raised.value.do[0]
 
 
 def test_what_others_send_during_a_scan_is_in_its_report(world, network):
@@ -110,7 +110,7 @@ def test_what_others_send_during_a_scan_is_in_its_report(world, network):
         network.wait_for(2)
         other.sync(0.01)
         heard = network.scan()["heard"]
-    assert [row["text"] for row in heard if row["service"] == "sync"] == ["somebody else produces SYNC"]
+    assert [row["text"] for row in heard if row["service"] == "sync"] == ["another node produces SYNC"]
 
 
 def test_a_node_that_comes_back_is_booted_again_and_started_when_it_is_resumed(world, network):

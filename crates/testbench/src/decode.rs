@@ -29,7 +29,7 @@ pub struct Decoded {
     /// That unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<&'static str>,
-    /// What the number means, where the object says so.
+    /// What the number means, where the object states it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub meaning: Option<String>,
     #[serde(skip)]

@@ -155,7 +155,7 @@ impl StopReport {
         let bus = context.bus();
         if nodes.is_empty() {
             return Err(Failure::new(format!("no drive answers on {bus}: what is there may still be moving"))
-                .of_kind("nobody")
+                .of_kind("no_node")
                 .because("no node has a statusword (6041h), and none was heard")
                 .next(format!("if something moves and must not: {surer}"))
                 .next("check supply, cable and bit rate; then: ferrodrive scan"));

@@ -289,7 +289,7 @@ impl LssMaster<'_> {
         }
         if devices.is_empty() {
             return Err(Failure::new("no device without a node-ID answers")
-                .of_kind("nobody")
+                .of_kind("no_node")
                 .because(format!(
                     "a fastscan finds devices without a node-ID alone (CiA 305, 6.5.3), and not every device has LSS: {}",
                     without_lss()

@@ -144,7 +144,7 @@ impl Plan {
             nodes.push(traffic(&drive, file, asked.map(|(_, mode)| *mode), moved).await?);
         }
         if nodes.is_empty() {
-            return Err(Failure::new("nobody is on the bus").of_kind("nobody").next("ferrodrive scan says more"));
+            return Err(Failure::new("no node is on the bus").of_kind("no_node").next("ferrodrive scan says more"));
         }
         Ok(nodes)
     }

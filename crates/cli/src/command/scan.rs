@@ -10,7 +10,7 @@ use plot::Paint;
 use plot::Table;
 use testbench::models::how_to_say;
 use testbench::network::heard::Counted;
-use testbench::network::scan::{ScanReport, ScannedNode, nobody};
+use testbench::network::scan::{ScanReport, ScannedNode, no_node};
 
 /// Show who is on the bus
 ///
@@ -44,9 +44,9 @@ impl Scan {
         while let Ok((_, frame)) = others.try_recv() {
             counted.note(&mut decoder, &frame);
         }
-        let heard = counted.told(|node| found.iter().any(|found| found.node == node));
+        let heard = counted.reported(|node| found.iter().any(|found| found.node == node));
         if found.is_empty() {
-            return Err(nobody(&heard).into());
+            return Err(no_node(&heard).into());
         }
         let node = |found: &Found| ScannedNode::new(context.told_model(found.node), found, how_to_say);
         Ok(ScanReport { nodes: found.iter().map(node).collect(), heard })

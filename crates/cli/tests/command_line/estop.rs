@@ -65,5 +65,5 @@ fn a_bus_where_nobody_answers_is_not_said_to_stand() {
     simulator.send("5 cable cut");
     simulator.line();
     let ended = ferrodrive(&["--bus", &bus, "--json", "estop"]);
-    assert_eq!((ended.status, &ended.json()["error"]["kind"]), (Some(1), &json!("nobody")), "{}", ended.out);
+    assert_eq!((ended.status, &ended.json()["error"]["kind"]), (Some(1), &json!("no_node")), "{}", ended.out);
 }

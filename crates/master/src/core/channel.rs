@@ -146,7 +146,7 @@ impl Channel {
         self.ended.take()
     }
 
-    /// Lets the buffer grow to what the answer declares, or by a segment where it has declared nothing. What nobody asked for takes no
+    /// Lets the buffer grow to what the answer declares, or by a segment where it has declared nothing. What was not asked for takes no
     /// room.
     fn make_room(&mut self, frame: &Frame) {
         let asked = self.active.as_ref().map(|active| active.mux);

@@ -13,14 +13,14 @@ const KEPT: usize = 8;
 /// Heartbeats that speak of a rhythm: five times between them.
 const RHYTHM: usize = 6;
 
-/// Changes of the state, back and forth between two of them, that nobody has commanded.
+/// Changes of the state, back and forth between two of them, that no master has commanded.
 const FLIPS: usize = 4;
 
 /// By how much two times of a rhythm have to differ at least. An adapter or a program that hands frames over in bundles makes a rhythm
 /// of its own, of some tens of milliseconds.
 const DISTINCT: Duration = Duration::from_millis(100);
 
-/// No device starts twice within this time, unless it is told to.
+/// No device starts twice within this time, unless it is commanded to.
 const START: Duration = Duration::from_millis(100);
 
 /// What speaks for two devices with one node-ID.
@@ -55,7 +55,7 @@ pub(super) struct Heartbeats {
     /// Oldest first; the first `count` of them.
     kept: [(Instant, Option<NmtState>); KEPT],
     count: usize,
-    /// When the last boot-up message came, unless the node was told since to start anew.
+    /// When the last boot-up message came, unless the node was since commanded to start anew.
     booted_at: Option<Instant>,
 }
 
@@ -67,7 +67,7 @@ impl Heartbeats {
         before.filter(|before| now - *before < START).map(|_| Twins::BootUps)
     }
 
-    /// The node was told to change its state, by this master or another.
+    /// The node was commanded to change its state, by this master or another.
     pub(super) fn commanded(&mut self) {
         (self.count, self.booted_at) = (0, None);
     }

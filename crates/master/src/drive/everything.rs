@@ -1,4 +1,4 @@
-//! Stopping every drive on the bus, whoever moves it.
+//! Stopping every drive on the bus, whatever moves it.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -60,7 +60,7 @@ pub struct StoppedAxis {
 }
 
 impl Network {
-    /// Stops every drive on the bus, all at the same time, whoever has set it in motion, and says how each came to rest.
+    /// Stops every drive on the bus, all at the same time, whatever has set it in motion, and returns how each came to rest.
     ///
     /// First one NMT command takes all nodes to pre-operational: no PDO of another master sets a drive going again after
     /// its quick stop, and a node that was stopped by NMT answers SDO (CiA 301, 7.3.2.2). Stopped would not do, since nothing
@@ -70,7 +70,7 @@ impl Network {
     /// Then each node-ID has a quick stop by SDO, those first that were heard or are in `models`. A node without a controlword
     /// (6040h) is not a drive and is left out. One that was heard, or is in `models`, and does not answer is among the
     /// results with that error. A node-ID that neither answers nor sends anything meanwhile is not: nothing shows it. Of an
-    /// unknown model the second and further axes are told to stop and cannot be seen to stand.
+    /// unknown model the second and further axes are commanded to stop and cannot be seen to stand.
     ///
     /// Takes a third of a second, and the time of the drives' own ramps. What else this program asks of these drives has to have
     /// ended.
@@ -101,20 +101,20 @@ impl Network {
     }
 }
 
-/// Stops what is at a node-ID. Nothing where nobody is, or what is no drive.
-async fn stop_node(node: &Node, told: Option<&'static Description>, is_expected: bool) -> Vec<StoppedAxis> {
-    if told.is_some_and(|model| model.axes.is_empty()) {
+/// Stops what is at a node-ID. Nothing where there is no node, or one that is not a drive.
+async fn stop_node(node: &Node, named: Option<&'static Description>, is_expected: bool) -> Vec<StoppedAxis> {
+    if named.is_some_and(|model| model.axes.is_empty()) {
         return Vec::new();
     }
-    let first = Drive { node: node.clone(), axis: AxisId::FIRST, description: told, guess: None, gear: Gear::DIRECT };
-    // The model is asked for only once it has been told to stop.
+    let first = Drive { node: node.clone(), axis: AxisId::FIRST, description: named, guess: None, gear: Gear::DIRECT };
+    // The model is asked for only once the stop is sent.
     let told_to_stop = first.tell_to_stop().await;
     match told_to_stop {
         Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT, .. }) => return Vec::new(),
         Err(Error::NoAnswer { .. }) if !is_expected && node.facts().seen_at.is_none() => return Vec::new(),
         _ => {}
     }
-    let model = match told {
+    let model = match named {
         Some(model) => Some(model),
         None => identify::knowledge(node).await.ok().and_then(|knowledge| knowledge.description()),
     };

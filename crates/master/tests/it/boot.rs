@@ -276,7 +276,7 @@ fn an_empty_bus_is_reported_within_the_time_of_the_plan() {
     assert!(bus.now - began <= plan.boot_time.unwrap() + plan.timeout * 2);
 }
 
-/// CiA 302-2, 1F89h: 0 is no limit, for the slaves that 1F81h (bit 3) makes mandatory.
+/// CiA 302-2, 1F89h: 0 means without limit, for the slaves that 1F81h (bit 3) makes mandatory.
 #[test]
 fn a_mandatory_node_is_waited_for_without_limit_where_1f89h_is_0() {
     let assignment = |mandatory: u32| (Assignment::SLAVE | Assignment::BOOT | mandatory).to_le_bytes().to_vec();
@@ -301,7 +301,7 @@ fn a_mandatory_node_is_waited_for_without_limit_where_1f89h_is_0() {
     assert_eq!(booted(plan(None, Assignment::MANDATORY)), Some('B'));
     assert_eq!(booted(plan(Some(5000), Assignment::MANDATORY)), Some('B'));
     assert_eq!(booted(plan(Some(0), Assignment::MANDATORY)), None);
-    // Nobody waits for ever for one that may be missing.
+    // One that may be missing is not waited for without end.
     assert_eq!(booted(plan(Some(0), 0)), Some('B'));
 }
 

@@ -191,7 +191,7 @@ fn hold_shaft(bench: &mut Bench, target: i64) {
     bench.write(mux(0x60FF, 0), target);
 }
 
-/// Turns at this target velocity for longer than the ramp takes, though nobody talks to the drive.
+/// Turns at this target velocity for longer than the ramp takes, though no master talks to the drive.
 fn turn_at(bench: &mut Bench, target: i64) {
     bench.write(mux(0x2000, 0), 0);
     bench.enable(3);
@@ -418,12 +418,16 @@ fn a_speed_beyond_the_supply_is_told_with_the_voltage_and_what_is_reached() {
     let mut bench = Bench::new("zlac8030l");
     turn_at(&mut bench, 900);
     let explained = bench.explain();
-    let told = explained.findings.iter().find(|finding| finding.rule == "supply_limit").expect("a finding");
+    let finding_of_supply =
+        explained.findings.iter().find(|finding| finding.rule == "supply_limit").expect("a finding");
     let reached = explained.speed_rpm.expect("a speed");
     let closed_form = 48.0 / 3.0_f64.sqrt() * 1.5 / 0.7613 * 60.0 / core::f64::consts::TAU;
     assert!((0.95..1.0).contains(&(reached / closed_form)), "{reached} of {closed_form} r/min");
-    assert!(told.found.contains(" V, ") && told.found.contains(" A of 30.0 A"), "{told:?}");
-    assert!(told.remedy.contains(&format!("at most {reached:.0} r/min")), "{told:?}");
+    assert!(
+        finding_of_supply.found.contains(" V, ") && finding_of_supply.found.contains(" A of 30.0 A"),
+        "{finding_of_supply:?}"
+    );
+    assert!(finding_of_supply.remedy.contains(&format!("at most {reached:.0} r/min")), "{finding_of_supply:?}");
     // A load that takes all the current there is, a speed that is reached, one on its way, and one that 200Ah holds are not.
     type Prepare = fn(&mut Bench);
     let others: [(&str, Prepare); 4] = [

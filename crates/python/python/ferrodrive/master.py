@@ -280,7 +280,7 @@ class Network:
     def scan(self) -> ScanReport:
         """Asks all 127 node-IDs who they are; reads only. What others sent meanwhile is in ``heard``.
 
-        :raises MasterError: no node is on the bus (kind ``nobody``)
+        :raises MasterError: no node is on the bus (kind ``no_node``)
 
         >>> [(node["node"], node["model"]) for node in network.scan()["nodes"]]
         [(5, 'cia402')]

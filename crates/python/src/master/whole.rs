@@ -23,7 +23,7 @@ use testbench::network::check::CheckReport;
 use testbench::network::explain::ExplainReport;
 use testbench::network::heard::Counted;
 use testbench::network::plan::{CYCLE, PlanReport, SHORTEST_CYCLE, traffic};
-use testbench::network::scan::{ScanReport, ScannedNode, nobody};
+use testbench::network::scan::{ScanReport, ScannedNode, no_node};
 use testbench::words::mode::mode;
 
 use super::job::Trouble;
@@ -104,9 +104,9 @@ pub(crate) fn scan(py: Python<'_>, network: &Bound<'_, Network>) -> PyResult<Job
         while let Some((_, frame)) = listener.take() {
             counted.note(&mut decoder, &frame);
         }
-        let heard = counted.told(|node| found.iter().any(|found| found.node == node));
+        let heard = counted.reported(|node| found.iter().any(|found| found.node == node));
         if found.is_empty() {
-            return Err(nobody(&heard).into());
+            return Err(no_node(&heard).into());
         }
         let nodes = found.iter().map(|found| ScannedNode::new(known.get(&found.node).copied(), found, how_to_say));
         Ok(Value::report(&ScanReport { nodes: nodes.collect(), heard }))
@@ -270,7 +270,7 @@ pub(crate) fn plan(py: Python<'_>, network: &Bound<'_, Network>, order: PlanOrde
             nodes.push(traffic(&drive, file.as_deref(), asked, moved.as_ref()).await?);
         }
         if nodes.is_empty() {
-            return Err(nobody(&[]).into());
+            return Err(no_node(&[]).into());
         }
         Ok(Value::report(&PlanReport::new(&nodes, &settings, bitrate, moved)))
     })

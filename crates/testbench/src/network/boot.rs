@@ -212,7 +212,7 @@ impl Planned {
             return Err(match self {
                 Self::Manager(_) => Failure::bad_file("the file has no slave: 1F81h says of no node that it is one")
                     .next("give the DCF of the CANopen manager, not that of a device"),
-                _ => Failure::new("nobody is on the bus").of_kind("nobody").next("ferrodrive scan says more"),
+                _ => Failure::new("no node is on the bus").of_kind("no_node").next("ferrodrive scan says more"),
             });
         }
         Ok(plan)
@@ -263,7 +263,7 @@ fn values(path: &Path) -> Result<BTreeMap<Mux, Vec<u8>>, Failure> {
     Ok(values)
 }
 
-/// A device's file in place of the manager's is a mistake that would boot nobody.
+/// A device's file in place of the manager's is a mistake that would boot nothing.
 fn check(path: &Path, eds: &Eds) -> Result<(), Failure> {
     if eds.object(0x1F81).is_some() {
         return Ok(());

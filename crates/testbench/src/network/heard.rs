@@ -8,7 +8,7 @@ use canopen::connection_set::Service;
 use master::decode::{Decoded, Decoder};
 use serde::Serialize;
 
-/// Kinds of frames that are told apart; further ones are counted as one.
+/// Kinds of frames that are distinguished; further ones are counted as one.
 const MOST: usize = 200;
 
 /// Frames of one kind.
@@ -31,10 +31,10 @@ pub struct Counted {
     others: u64,
 }
 
-/// In the order in which they are told: other masters first.
+/// In the order in which they are reported: other masters first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
-    /// An NMT command, an SDO request, an RPDO, an LSS request: nobody but a master sends these.
+    /// An NMT command, an SDO request, an RPDO, an LSS request: only a master sends these.
     Nmt,
     SdoRequest(NodeId),
     Rpdo(NodeId),
@@ -103,13 +103,13 @@ impl Kind {
             Self::SdoRequest(node) => format!("another master asks node {node} by SDO: answers may be mixed up"),
             Self::Rpdo(node) => format!("another master sends PDOs to node {node}"),
             Self::LssMaster => format!("another master sends LSS requests, the latest: {latest}"),
-            Self::Sync => "somebody else produces SYNC".to_owned(),
-            Self::Time => "somebody else produces TIME".to_owned(),
+            Self::Sync => "another node produces SYNC".to_owned(),
+            Self::Time => "another node produces TIME".to_owned(),
             Self::Emcy(_) => latest.to_owned(),
             Self::BootUp(node) => format!("node {node} has booted during the scan"),
             Self::Heartbeat(node) => format!("heartbeat of node {node}"),
             Self::Tpdo(node) => format!("node {node} sends PDOs"),
-            Self::LssSlave => "an LSS slave answers somebody".to_owned(),
+            Self::LssSlave => "an LSS slave answers another master".to_owned(),
             Self::Id(id) => {
                 format!("frames with the identifier {id:X}h, which has no meaning as delivered (CiA 301, 7.3.3)")
             }
@@ -139,12 +139,12 @@ impl Counted {
     }
 
     /// What was heard, but for the heartbeats of nodes that are listed anyway.
-    pub fn told(self, is_listed: impl Fn(NodeId) -> bool) -> Vec<Heard> {
+    pub fn reported(self, is_listed: impl Fn(NodeId) -> bool) -> Vec<Heard> {
         let kinds = self.kinds.into_iter().filter(|(kind, _)| match kind {
             Kind::Heartbeat(node) => !is_listed(*node),
             _ => true,
         });
-        let mut told: Vec<Heard> = kinds
+        let mut reported: Vec<Heard> = kinds
             .map(|(kind, (count, latest))| Heard {
                 service: kind.service(),
                 node: kind.node().map(NodeId::raw),
@@ -153,14 +153,14 @@ impl Counted {
             })
             .collect();
         if self.others > 0 {
-            told.push(Heard {
+            reported.push(Heard {
                 service: "other",
                 node: None,
                 count: self.others,
                 text: "frames of further kinds; ferrodrive dump shows them".to_owned(),
             });
         }
-        told
+        reported
     }
 }
 
@@ -180,7 +180,7 @@ mod tests {
         let mut decoder = Decoder::new();
         let mut counted = Counted::default();
         frames.iter().for_each(|frame| counted.note(&mut decoder, &frame.parse().unwrap()));
-        counted.told(|node| node.raw() == 4).iter().map(Heard::line).collect()
+        counted.reported(|node| node.raw() == 4).iter().map(Heard::line).collect()
     }
 
     #[test]
@@ -200,7 +200,7 @@ mod tests {
         assert!(lines[0].contains("another master sends NMT commands") && lines[0].contains("node 7"), "{lines:?}");
         assert!(lines[1].contains("asks node 6 by SDO"), "{lines:?}");
         assert!(lines[2].contains("PDOs to node 5"), "{lines:?}");
-        assert_eq!(lines[3], "heard: somebody else produces SYNC (2 frames)");
+        assert_eq!(lines[3], "heard: another node produces SYNC (2 frames)");
         assert_eq!(lines[4], "heard: node 7 sends PDOs");
     }
 

@@ -1,7 +1,7 @@
 //! What the command line and the Python package do with a network, and what comes of it: the same rows for both, as `docs/json.md` has
 //! them.
 //!
-//! In: a network of crate `master`, which somebody runs. Out: reports that serialise, or a [`Failure`]. How a person reads them is the
+//! In: a network of crate `master`, which the caller runs. Out: reports that serialise, or a [`Failure`]. How a person reads them is the
 //! command line's.
 
 pub mod boot;
@@ -43,7 +43,7 @@ pub trait Progress {
     fn note(&self, text: &str);
 }
 
-/// Nobody is.
+/// Shows nothing.
 impl Progress for () {
     fn show(&self, _: String) {}
     fn count(&self, _: String) {}

@@ -123,9 +123,9 @@ fn remark(found: &Found, doubt: String, say: impl Fn(NodeId, &[&str]) -> String)
 }
 
 /// That no node is on the bus, with what was heard all the same.
-pub fn nobody(heard: &[Heard]) -> Failure {
-    let failure = Failure::new("nobody is on the bus")
-        .of_kind("nobody")
+pub fn no_node(heard: &[Heard]) -> Failure {
+    let failure = Failure::new("no node is on the bus")
+        .of_kind("no_node")
         .because("no node answered SDO and no boot-up or heartbeat message was heard");
     let failure = heard.iter().fold(failure, |failure, heard| failure.because(heard.line()));
     failure.next("check supply, cable, termination (60 ohm between CAN_H and CAN_L) and the bit rate")

@@ -10,7 +10,7 @@ use lz4_flex::frame::{BlockSize, FrameEncoder, FrameInfo};
 
 use super::piece::Target;
 
-/// Bytes of a chunk, uncompressed, before it is written though nobody has asked for it.
+/// Bytes of a chunk, uncompressed, before it is written without a flush.
 const CHUNK: usize = 256 << 10;
 /// Bytes of the index that are made before they are written.
 const INDEX_PIECE: usize = 64 << 10;
@@ -56,7 +56,7 @@ pub(super) struct McapWriter {
     span: Option<(u64, u64)>,
     /// What is put together before it is written.
     out: Vec<u8>,
-    /// The target refused a write: nobody knows how much of it stands in the file.
+    /// The target refused a write: how much of it is in the file is unknown.
     failed: bool,
     /// Written to its end.
     ended: bool,
@@ -298,7 +298,7 @@ impl McapWriter {
 }
 
 impl Drop for McapWriter {
-    /// A file that nobody has ended is ended, as far as that goes.
+    /// A file that was not finished is finished, as far as possible.
     fn drop(&mut self) {
         let _ = self.finish();
     }

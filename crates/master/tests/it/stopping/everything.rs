@@ -1,4 +1,4 @@
-//! Everything on the bus stops, whoever moves it: kept going by another master's process data, stopped by NMT, without power, or
+//! Everything on the bus stops, whatever moves it: kept going by another master's process data, stopped by NMT, without power, or
 //! not there any more.
 
 use std::collections::BTreeMap;
