@@ -77,9 +77,9 @@ pub(crate) enum Command {
     Completions(completions::Completions),
     #[command(hide = true)]
     ManPages(man_pages::ManPages),
-    /// Options that every command takes, before or behind it
+    /// Options that every command takes, before or after it
     ///
-    /// A command refuses those that mean nothing to it; its help names the others.
+    /// A command refuses those that have no effect on it; its help names the others.
     #[command(hide = true)]
     Options,
 }

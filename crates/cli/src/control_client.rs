@@ -19,10 +19,10 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Where the simulator is.
 #[derive(Debug, clap::Args)]
 pub(crate) struct ControlArgs {
-    /// The control connection of a running simulator: what its `ready` line names, HOST:PORT or the path of a socket
+    /// Control connection of a running simulator, as its `ready` line names it: HOST:PORT or the path of a socket
     #[arg(long, value_name = "PLACE", env = "FERRODRIVE_CONTROL")]
     control: Option<ControlAddress>,
-    /// The token of a simulator on another machine
+    /// Token of a simulator on another machine
     #[arg(long, value_name = "TOKEN", env = "FERRODRIVE_CONTROL_TOKEN", hide_env_values = true)]
     control_token: Option<String>,
 }
@@ -32,7 +32,7 @@ pub(crate) struct ControlClient {
     reader: BufReader<Socket>,
     place: ControlAddress,
     asked: u64,
-    /// The drives that are there, as they were told at the start.
+    /// The drives of the simulator, as reported at the start.
     nodes: Value,
 }
 

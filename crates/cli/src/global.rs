@@ -19,7 +19,7 @@ pub(crate) struct Global {
     /// The bus: sim, sim:FILE.toml, can0, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k,
     /// slcan://HOST:PORT, cannelloni://HOST:PORT?local=PORT, udp_multicast://239.74.163.2, log:FILE
     ///
-    /// `sim` is a virtual bus of this command alone, with factory-fresh drives, as fast as the machine goes.
+    /// `sim` is a virtual bus of this command alone, with factory-fresh drives, and runs as fast as the machine can.
     #[arg(long, value_name = "BUS", env = "FERRODRIVE_BUS", default_value = "sim", global = true)]
     pub(crate) bus: BusSpec,
 
@@ -27,19 +27,19 @@ pub(crate) struct Global {
     #[arg(long, global = true)]
     pub(crate) json: bool,
 
-    /// Which model a node is, where its identity cannot tell (e.g. 4=zlac8030l, 5=FILE.eds); may be repeated
+    /// Model of a node whose identity fits several (e.g. 4=zlac8030l, 5=FILE.eds); may be repeated
     #[arg(long = "model", value_name = "NODE=MODEL", value_parser = node_model, global = true)]
     pub(crate) models: Vec<(NodeId, &'static Description)>,
 
-    /// Machine file: which models are where, behind which gears; on a virtual bus its drives are there
+    /// Machine file: the models of the nodes and their gears; on a virtual bus also its drives
     ///
-    /// On a real bus the `model`, `node` and `units` of each [[drive]] count, and what is moved as one. On the virtual bus of a command's
-    /// own it is the short form of --bus sim:FILE.toml, and `sim` serves the drives that it describes. A command that takes a machine
-    /// file as an argument takes it here too.
+    /// On a real bus the `model`, `node` and `units` of each [[drive]] are used, and the groups and bases. On the
+    /// virtual bus of a command's own it is the short form of --bus sim:FILE.toml, and `sim` serves the drives that it
+    /// describes. A command that takes a machine file as an argument takes it here too.
     #[arg(id = "machine", long = "machine", value_name = "FILE.toml", env = "FERRODRIVE_MACHINE", global = true)]
     pub(crate) machine_path: Option<PathBuf>,
 
-    /// Show every frame that the command sends and hears, in words, on standard error
+    /// Show every frame that the command sends and receives, decoded, on standard error
     #[arg(long, short = 'v', global = true)]
     pub(crate) verbose: bool,
 
@@ -47,10 +47,10 @@ pub(crate) struct Global {
     #[arg(long, global = true)]
     pub(crate) realtime: bool,
 
-    /// Write every frame that the command sends and hears to this file, with its time
+    /// Write every frame that the command sends and receives to this file, with its time
     ///
-    /// The extension tells the form: .log (candump), .asc (Vector), .blf (Vector), .pcapng (Wireshark). It is a new file, or an
-    /// empty one, or a log of that form, which is replaced. Any other file, a symbolic link, a device and a FIFO are
+    /// The extension selects the format: .log (candump), .asc (Vector), .blf (Vector), .pcapng (Wireshark). The file is
+    /// new, empty, or a log of that format, which is replaced. Any other file, a symbolic link, a device and a FIFO are
     /// refused. A command that is killed loses less than a second of it.
     #[arg(long, value_name = "FILE", value_parser = log_path, global = true)]
     pub(crate) log: Option<LogPath>,

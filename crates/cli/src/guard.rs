@@ -15,15 +15,16 @@ use crate::failure::Failure;
 /// Whether a motion is guarded.
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct GuardArgs {
-    /// Have the drive stop by itself if this command dies, where it has a watch over its host (on, unless off is given)
+    /// Have the drive stop by itself if this command dies, where it can monitor its host (on, unless off is given)
     ///
-    /// What a drive has is its model's: it stops when no frame for it comes for a time, or when the heartbeat of this command
-    /// (node 127, as a drive's 1016h has it) stays away, or it has nothing and goes on, which is said before it moves. A watch
-    /// that is set to 0 on the drive stays so, unless --guard is given: then it has its factory value until this command ends.
-    /// A 1016h that is delivered as 0 is set to node 127 within 2000 ms for this command without being asked.
+    /// The model decides how: it stops when it receives no frame for a time, or when the heartbeat of this command
+    /// (node 127, as a drive's 1016h has it) is missing; or it has no such function and goes on, which is reported
+    /// before it moves. A monitoring time that is set to 0 on the drive stays 0, unless --guard is given: then it has
+    /// its factory value until this command ends. A 1016h that is delivered as 0 is set to node 127 within 2000 ms for
+    /// this command in any case.
     #[arg(long, value_name = "on|off", num_args = 0..=1, default_missing_value = "on")]
     guard: Option<OnOff>,
-    /// The same as --guard off: a heartbeat is not sent, and a drive that needs one goes on
+    /// Same as --guard off: no heartbeat is sent, and a drive that needs one goes on
     #[arg(long, conflicts_with = "guard")]
     no_guard: bool,
 }
@@ -55,7 +56,7 @@ pub(crate) struct GuardReport {
 }
 
 impl GuardArgs {
-    /// Guards the drive before it moves. What nothing would stop is told on standard error.
+    /// Guards the drive before it moves. What nothing would stop is reported on standard error.
     pub(crate) async fn begin(&self, context: &Context, drive: &Drive) -> Result<Guard, Failure> {
         let armed = !self.no_guard && self.guard != Some(OnOff::Off);
         let switched_off = if self.guard.is_some() { SwitchedOff::SwitchOn } else { SwitchedOff::Leave };

@@ -48,7 +48,7 @@ const TEMPLATE: &str = "{about-with-newline}\n{usage-heading} {usage}{after-help
 /// The command whose help describes the options that every command takes.
 pub(crate) const OPTIONS: &str = "options";
 
-const EXAMPLES: &str = "Without --bus everything happens on a virtual bus of its own, in virtual time:
+const EXAMPLES: &str = "Without --bus everything happens on a private virtual bus, in virtual time:
   ferrodrive demo
   ferrodrive move 4 90deg
   ferrodrive --bus can0 state 4";

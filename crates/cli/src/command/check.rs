@@ -16,22 +16,23 @@ use transport::BusSpec;
 
 /// Check the description of a bus: a bus.yml of ros2_canopen with its data sheets, or a machine file
 ///
-/// A bus.yml (also what Lely's dcfgen reads) is held against its EDS files and against what is known of the drives that
-/// they describe: node-IDs, heartbeats, boot times, PDOs, drivers. A machine file is read and its machine built. Then the bus that the
-/// file means is booted in virtual time: each node with the letter of CiA 302-2 with which its boot-up ends, and the frames that are sent
-/// afterwards with the load of the bus. Nothing is sent, unless a bus is named: with --bus the drives that are there are asked who they
-/// are and what they have, by reads alone. Ends with status 1 if there is an error, with --strict also for a warning.
+/// A bus.yml (also read by Lely's dcfgen) is compared with its EDS files and with what is known of the drives that they
+/// describe: node-IDs, heartbeats, boot times, PDOs, drivers. A machine file is read and its machine built. Then the
+/// bus that the file describes is booted in virtual time, which gives for each node the letter of CiA 302-2 with which
+/// its boot-up ends, and the frames that are sent afterwards with the load of the bus. Nothing is sent on a real bus
+/// unless one is named: with --bus the drives there are asked for their identities and contents, by reads alone. Ends
+/// with status 1 if there is an error, with --strict also for a warning.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive check config/bus.yml\n  \
     ferrodrive check machine.toml\n  \
-    ferrodrive --bus can0 check config/bus.yml          # and the drives that are there\n  \
+    ferrodrive --bus can0 check config/bus.yml          # and the drives on it\n  \
     ferrodrive --json check bus.yml")]
 pub(crate) struct Check {
     /// NAME.yml, NAME.yaml or NAME.toml (default: the file of --machine)
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
-    /// Fail for warnings too
+    /// Fail on warnings too
     #[arg(long)]
     strict: bool,
 }

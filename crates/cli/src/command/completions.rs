@@ -8,8 +8,9 @@ use crate::output::print;
 
 /// Print a completion script for a shell
 ///
-/// The shell then asks this program what a line may go on with: commands and options, and the nodes that were heard on the bus, the
-/// objects of their models, models, modes and buses. What was heard is kept in $XDG_CACHE_HOME/ferrodrive by commands at a terminal.
+/// The shell then asks this program how a command line may continue: commands and options, the nodes heard on the bus,
+/// the objects of their models, models, modes and buses. Commands at a terminal remember what was heard in
+/// $XDG_CACHE_HOME/ferrodrive.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive completions bash > ~/.local/share/bash-completion/completions/ferrodrive\n  \

@@ -13,19 +13,20 @@ use crate::plain::plain;
 use crate::recording::{LogPath, log_path};
 use plot::Paint;
 
-/// Write a log file in another form
+/// Convert a log file to another format
 ///
-/// Read are candump, ASC, BLF, TRC, pcap and pcapng, told apart by their first bytes, then by their extension; - is standard
-/// input. Written is what OUT's extension says: .log (candump), .asc (Vector), .blf (Vector), .pcapng (Wireshark). Time,
-/// direction, bus, remote frames and error frames are kept as far as the form has them; CAN FD frames are counted and left out.
+/// Reads candump, ASC, BLF, TRC, pcap and pcapng, recognised by their first bytes, then by their extension; - is
+/// standard input. Writes the format of OUT's extension: .log (candump), .asc (Vector), .blf (Vector), .pcapng
+/// (Wireshark). Time, direction, bus, remote frames and error frames are kept as far as the format allows; CAN FD
+/// frames are counted and left out.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive convert trace.blf trace.pcapng     # for Wireshark\n  \
     ferrodrive convert trace.trc trace.log        # for can-utils")]
 pub(crate) struct Convert {
-    /// The log to read, or - for standard input
+    /// Log to read, or - for standard input
     #[arg(value_name = "IN")]
     from: PathBuf,
-    /// The log to write: a new file, or an empty one, or a log of that form, which is replaced
+    /// Log to write: new, empty, or a log of that format, which is replaced
     #[arg(value_name = "OUT", value_parser = log_path)]
     to: LogPath,
 }

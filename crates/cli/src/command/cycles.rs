@@ -20,7 +20,7 @@ const MOST_TOLERANCE: u32 = 100;
 /// How late a host may be.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(super) struct CycleArgs {
-    /// Cycles in a row that this command may be late for, or a drive's TPDO, before all are stopped
+    /// Consecutive cycles that this command, or a TPDO of a drive, may miss before all drives are stopped
     #[arg(long, value_name = "CYCLES", default_value_t = TOLERANCE, value_parser = clap::value_parser!(u32).range(0..=i64::from(MOST_TOLERANCE)))]
     tolerance: u32,
 }

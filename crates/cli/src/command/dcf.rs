@@ -23,8 +23,9 @@ use testbench::words::node::node;
 
 /// Read a device's parameters into a device configuration file (DCF)
 ///
-/// The file is the data sheet with the values of the device's parameters, the same that `params backup` writes; with --eds with those
-/// that differ from that sheet. What is read-only is left out, and so are commands and set-points, which are not configuration.
+/// The file is the data sheet with the values of the device's parameters, as `params backup` writes it; with --eds it
+/// has only the values that differ from that sheet. Read-only objects are left out, and so are commands and set-points,
+/// which are not configuration.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive dcf 4 --output left-wheel.dcf\n  \
     ferrodrive --bus socketcand://HOST:29536/can0 dcf 5 --eds vendor.eds --output axis.dcf\n  ferrodrive dcf 4 --model 4=zlac8030l > left-wheel.dcf")]
@@ -32,19 +33,19 @@ pub(crate) struct Dcf {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
-    /// The device's data sheet; without it that of its model
+    /// Data sheet of the device (default: that of its model)
     #[arg(long, value_name = "FILE")]
     eds: Option<PathBuf>,
-    /// Write the file here, and say what was read; without it, and as -, the file goes to standard output
+    /// Write to this file and report what was read (default, and -: write to standard output)
     #[arg(long, short, value_name = "FILE.dcf", value_parser = dcf_path)]
     output: Option<PathBuf>,
-    /// Every object that can be written, not only parameters or what differs from the data sheet
+    /// Include every writable object, not only parameters or what differs from the data sheet
     #[arg(long)]
     all: bool,
-    /// Write over a file that is there
+    /// Overwrite an existing file
     #[arg(long, requires = "output")]
     force: bool,
-    /// The device's name in the plan
+    /// Name of the node in the file
     #[arg(long, value_name = "NAME", default_value = "")]
     name: String,
 }

@@ -9,16 +9,16 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Format;
 
-/// Show a log file decoded, as dump shows a bus
+/// Decode a log file, as dump decodes a bus
 ///
-/// Reads candump, ASC, BLF, TRC, pcap and pcapng, told apart by their first bytes, then by their extension; - is standard input. What is
-/// torn or no frame is told and passed over. With --log FILE the frames that are read are written again, in the form that
-/// FILE's extension says; `ferrodrive convert` does that alone.
+/// Reads candump, ASC, BLF, TRC, pcap and pcapng, recognised by their first bytes, then by their extension; - is
+/// standard input. Parts that are torn or not a frame are reported and skipped. With --log FILE the frames are also
+/// written again, in the format of FILE's extension; `ferrodrive convert` does only that.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive decode trace.blf --model 4=zlac8030l\n  \
     ferrodrive decode trace.pcapng --machine base.toml\n  candump -L can0 | ferrodrive decode -")]
 pub(crate) struct Decode {
-    /// The log, or - for standard input
+    /// Log file, or - for standard input
     #[arg(value_name = "FILE")]
     file: PathBuf,
     #[command(flatten)]

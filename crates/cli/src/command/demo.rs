@@ -18,17 +18,17 @@ use crate::serve::files::create_picture;
 use crate::session::exit_on_signal;
 use testbench::models::resolve;
 
-/// Show the whole thing on an embedded virtual bus: every procedure of the three manuals against the three drives
+/// Run every procedure of the manuals against virtual drives
 ///
-/// Prints what was asked, what answered and what moved, beside what the manuals let expect, and draws the motion.
-/// Exit status 1 if anything differs.
+/// Runs on embedded virtual buses. Prints each request, its answer and the motion beside what the three manuals let
+/// expect, and draws the motion. Ends with status 1 if anything differs.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive demo\n  ferrodrive demo --drive zlim42c -o stepper.svg")]
 pub(crate) struct Demo {
-    /// Where to draw the motion
+    /// Draw the motion to this file
     #[arg(long = "output", short = 'o', alias = "svg", value_name = "FILE.svg", default_value = "demo.svg", value_parser = svg_path)]
     svg: PathBuf,
-    /// Only the part of one drive, which may be any model that its manual is about
+    /// Run only the part of one drive, which may be any model that its manual covers
     #[arg(long, value_name = "MODEL", value_parser = PossibleValuesParser::new(models().map(|known| known.name)))]
     drive: Option<String>,
 }

@@ -15,9 +15,10 @@ use crate::output::Report;
 use plot::Paint;
 use testbench::words::node::{Nodes, node, nodes};
 
-/// Show what a drive says of itself: power state, fault with remedy, position, speed, current, temperatures, supply
+/// Show the state of a drive: power state, fault with remedy, position, speed, current, temperatures, supply
 ///
-/// Reads only. What a drive has no object for is left out. `explain` says why it does not move, `watch` shows objects as they change.
+/// Reads only. What a drive has no object for is omitted. `explain` shows why it does not move, `watch` shows objects
+/// as they change.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive state 4\n  ferrodrive --bus can0 --machine machine.toml state 4 --json"
@@ -28,10 +29,10 @@ pub(crate) struct State {
     node: NodeId,
 }
 
-/// Enable a drive: power on the motor, holding still
+/// Enable a drive: power its motor, which holds still
 ///
-/// Goes the way of CiA 402 to operation enabled, whatever state the drive is in; a fault is not reset. The drive stays enabled when the
-/// command has ended.
+/// Takes the transitions of CiA 402 to operation enabled, whatever state the drive is in; a fault is not reset. The
+/// drive stays enabled when the command has ended.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive --bus can0 enable 4\n  ferrodrive --bus can0 enable 4 -v      # each frame of it"
@@ -42,7 +43,7 @@ pub(crate) struct Enable {
     node: NodeId,
 }
 
-/// Disable a drive: stop, then take the power off the motor
+/// Disable a drive: stop it, then remove power from its motor
 ///
 /// A load that pulls (an arm, a slope) moves a motor without power, unless a brake holds it.
 #[derive(Debug, clap::Args)]
@@ -53,10 +54,10 @@ pub(crate) struct Disable {
     node: NodeId,
 }
 
-/// Stop a drive, or all, by the deceleration ramp; it stays enabled
+/// Stop a drive, or all, with the deceleration ramp; it stays enabled
 ///
-/// Returns when it stands. For all: each drive that answers on the bus is stopped, at the same time, and the command ends with status 0
-/// only when every one was seen to stand.
+/// Returns when it stands. With all, every drive that answers on the bus is stopped at the same time, and the status is
+/// 0 only when each one was seen to stand.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 stop 4\n  ferrodrive --bus can0 stop all")]
 pub(crate) struct Stop {
@@ -65,9 +66,10 @@ pub(crate) struct Stop {
     nodes: Nodes,
 }
 
-/// Stop a drive, or all, as fast as it is set to (605Ah)
+/// Stop a drive, or all, with the quick stop as configured (605Ah)
 ///
-/// By the quick stop of its model, whatever it does; what the drive is in then is said. `quick-stop all` is `estop`.
+/// Uses the quick stop of the model in every mode, and reports the state of the drive afterwards. `quick-stop all` is
+/// `estop`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 quick-stop 4\n  ferrodrive --bus can0 quick-stop all")]
 pub(crate) struct QuickStop {
@@ -111,7 +113,7 @@ impl Report for StopOutcome {
 
 /// Reset a drive's fault, once its cause is gone
 ///
-/// A fault that stays is told with its cause and remedy. The drive is not enabled.
+/// A fault that persists is reported with its cause and remedy. The drive is not enabled.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive --bus can0 reset 4\n  ferrodrive --bus can0 state 4          # the fault, and what to do about it"

@@ -33,12 +33,12 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
 /// Lines that are kept while the base is busy; of more than one the newest counts.
 const MOST_LINES: usize = 16;
 
-/// Drive a base on two wheels: by a twist for a time, or by lines that say one twist after the other
+/// Drive a base on two wheels: by a twist for a time, or by a stream of twists on standard input
 ///
-/// Wheels, geometry and limits are in the [base] of a machine file. Without --for, each line of standard input is a twist, `LINEAR
-/// ANGULAR` in m/s and rad/s: it counts until the next one comes, and for 300 ms at most, so that a program that hangs stops the base.
-/// On the virtual bus of the command alone each line counts for 100 ms of virtual time. At the end of the input the base comes to
-/// rest; then its drives have no power.
+/// Wheels, geometry and limits come from the [base] of a machine file. Without --for, each line of standard input is a
+/// twist, `LINEAR ANGULAR` in m/s and rad/s: it is valid until the next one arrives, and for 300 ms at most, so that a
+/// program that hangs stops the base. On the command's own virtual bus each line lasts for 100 ms of virtual time. At
+/// the end of the input the base comes to rest; then power is removed from its drives.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive drive-base examples/base.toml --linear 0.3 --angular 0.2 --for 3s\n  \
@@ -48,16 +48,16 @@ pub(crate) struct DriveBase {
     /// Machine file with a [base] (default: that of --machine or --bus sim:FILE.toml)
     #[arg(value_name = "FILE.toml")]
     file: Option<PathBuf>,
-    /// Speed along the heading in m/s; below 0 backwards
+    /// Speed along the heading in m/s; negative is backwards
     #[arg(long, value_name = "M/S", value_parser = finite, allow_negative_numbers = true, requires = "duration")]
     linear: Option<f64>,
-    /// Rate of the heading in rad/s; above 0 to the left
+    /// Rate of turn in rad/s; positive is to the left
     #[arg(long, value_name = "RAD/S", value_parser = finite, allow_negative_numbers = true, requires = "duration")]
     angular: Option<f64>,
-    /// How long to drive so; without it the twists come by standard input
+    /// How long to drive (default: twists are read from standard input)
     #[arg(long = "for", id = "duration", value_name = "TIME", value_parser = parse_duration)]
     duration: Option<Duration>,
-    /// How long a line counts (default: the file's watchdog, or 300ms)
+    /// How long a line is valid (default: the file's watchdog, or 300ms)
     #[arg(long, value_name = "TIME", value_parser = parse_duration, conflicts_with = "duration")]
     dead_man: Option<Duration>,
     #[command(flatten)]

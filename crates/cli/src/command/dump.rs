@@ -26,10 +26,10 @@ use crate::signals::asked_to_end;
 use plot::Paint;
 use testbench::machine_file::Machine;
 
-/// Show the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
+/// Show the traffic of the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
 ///
-/// Only listens. On a real bus it runs until Ctrl-C; on a log until its end; on an embedded virtual bus it shows how the
-/// drives boot. Names of a model's own objects need the model: --model NODE=MODEL, or --machine FILE.toml.
+/// Only listens. On a real bus it runs until Ctrl-C; on a log until its end; on an embedded virtual bus it shows how
+/// the drives boot. The names of a model's own objects need the model: --model NODE=MODEL, or --machine FILE.toml.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 --model 4=zlac8030l dump\n  \
     ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k dump --log trace.log\n  \
@@ -37,10 +37,10 @@ use testbench::machine_file::Machine;
     ferrodrive --bus slcan://HOST:3000 dump --node 4 --service sdo,emcy --time delta\n  \
     ferrodrive --bus slcan://HOST:3000 dump --object 6041,target_velocity --time absolute")]
 pub(crate) struct Dump {
-    /// End after this time, of a log after this time of the log (default on an embedded virtual bus: 2s)
+    /// End after this time; with a log, after this time of the log (default on an embedded virtual bus: 2s)
     #[arg(long = "for", value_name = "TIME", value_parser = master::units::parse_duration)]
     duration: Option<Duration>,
-    /// The time before each line (`t` of --json stays as it is)
+    /// Form of the time before each line (`t` of --json does not change)
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]
     time: TimeForm,
     #[command(flatten)]

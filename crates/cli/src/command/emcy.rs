@@ -18,7 +18,7 @@ use crate::output::{Format, Report};
 use plot::Paint;
 use testbench::words::node::{Nodes, node, nodes};
 
-/// Show emergency messages: as they come, or those that a node remembers
+/// Show emergency messages as they arrive, or the errors that a node remembers
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 emcy watch\n  \
     ferrodrive emcy watch 4 --for 10s\n  ferrodrive emcy show 4")]
@@ -29,9 +29,9 @@ pub(crate) struct Emcy {
 
 #[derive(Debug, clap::Subcommand)]
 enum What {
-    /// Show emergency messages as they come, with fault and remedy
+    /// Show emergency messages as they arrive, with fault and remedy
     Watch(Watch),
-    /// Show the errors that a node remembers (1003h), the newest first
+    /// Show the errors that a node remembers (1003h), newest first
     Show(Show),
 }
 
@@ -43,7 +43,7 @@ struct Watch {
     /// End after this time (default on an embedded virtual bus: 1s)
     #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
     duration: Option<Duration>,
-    /// The time before each line
+    /// Form of the time before each line
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]
     time: TimeForm,
 }

@@ -15,12 +15,13 @@ use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
 
-/// Stop every drive on the bus at once, whoever moves it
+/// Stop every drive on the bus at once, whichever master moves it
 ///
-/// First one NMT command takes all nodes to pre-operational, so that no PDO of another master sets a drive going again; then each
-/// drive is quick-stopped. The nodes are left so: `ferrodrive boot` or `ferrodrive nmt all start` goes on. Ends with status 0 only
-/// when every drive was seen to stand, by its statusword and its speed. A node that was heard, or is in the machine file, and does not
-/// answer may still be moving; --timeout has no effect on how long that is waited for. This is software on a bus: it does not replace an emergency stop that takes the power away.
+/// First one NMT command takes all nodes to pre-operational, so that no PDO of another master starts a drive again;
+/// then each drive is quick-stopped. The nodes stay pre-operational: `ferrodrive boot` or `ferrodrive nmt all start`
+/// continues. Ends with status 0 only when every drive was seen to stand, by its statusword and its speed. A node that
+/// was heard, or is in the machine file, and does not answer may still be moving; --timeout has no effect on how long
+/// the command waits for it. This is software on a bus: it does not replace an emergency stop that removes the power.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive --bus can0 estop\n  ferrodrive --bus can0 --machine machine.toml estop --json\n  \

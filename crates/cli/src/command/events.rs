@@ -9,7 +9,8 @@ use crate::output::{Format, print_line};
 use crate::plain::plain;
 use crate::session::exit_on_signal;
 
-/// Show what happens in a running simulator: boots, changes of state, faults with what to do, arrivals, bus errors
+/// Show the events of a running simulator: boot-ups, changes of state, faults with remedies, targets reached, bus
+/// errors
 ///
 /// Runs until the simulator ends, or Ctrl-C. Times are those of the bus.
 #[derive(Debug, clap::Args)]
@@ -22,13 +23,13 @@ use crate::session::exit_on_signal;
 pub(crate) struct Events {
     #[command(flatten)]
     control: ControlArgs,
-    /// Only of this node; may be repeated
+    /// Show only events of this node; may be repeated
     #[arg(long = "node", value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
     nodes: Vec<u8>,
-    /// Only of this kind; may be repeated
+    /// Show only events of this kind; may be repeated
     #[arg(long = "kind", value_name = "KIND")]
     kinds: Vec<String>,
-    /// End after so many events
+    /// End after this many events
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
 }

@@ -17,9 +17,9 @@ use testbench::words::node::node;
 
 /// Explain why a drive does not move, and why its PDOs are silent
 ///
-/// Listens to the bus first, then reads what the drive says of itself; writes nothing, so that it may be asked of a running
-/// machine. Each finding says what a moving drive has, what this one has, what follows, and what to do. A cause keeps the
-/// drive from moving; a warning does not, or not yet.
+/// Listens to the bus first, then reads objects of the drive; writes nothing, so that it can be used on a running
+/// machine. Each finding states what a moving drive has, what this one has, what follows, and what to do. A cause keeps
+/// the drive from moving; a warning does not, or not yet.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive explain 4\n  \
     ferrodrive --bus can0 explain 4 --watch 5s\n  ferrodrive --bus can0 explain 4 --json")]
@@ -27,7 +27,7 @@ pub(crate) struct Explain {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
-    /// How long to listen before: longer than the longest period of what is looked for
+    /// How long to listen first: longer than the longest period on the bus
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "1500ms")]
     watch: Duration,
 }

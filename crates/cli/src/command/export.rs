@@ -11,7 +11,7 @@ use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
 
-/// Write what is on the bus in another program's form
+/// Export the description of the bus for other programs
 #[derive(Debug, clap::Args)]
 pub(crate) struct Export {
     #[command(subcommand)]
@@ -23,16 +23,17 @@ enum Form {
     Dbc(Dbc),
 }
 
-/// The messages of the bus as a DBC file: PDOs as they are mapped now, NMT, SYNC, EMCY and heartbeats
+/// Write the messages of the bus as a DBC file: PDOs as they are mapped now, NMT, SYNC, EMCY and heartbeats
 ///
-/// Reads the PDO parameters and mappings of each node by SDO (CiA 301, 1400h to 1BFFh) and writes nothing. Signals have place,
-/// sign, factor and unit by the model's table; of a node whose model is not known, as far as the standard tells.
+/// Reads the PDO parameters and mappings of each node by SDO (CiA 301, 1400h to 1BFFh) and writes nothing to it. Place,
+/// sign, factor and unit of the signals come from the model's table; for a node of unknown model, from the standard as
+/// far as it defines them.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 export dbc > bus.dbc\n  \
     ferrodrive --bus can0 --model 4=zlac8030l export dbc 4 > wheel.dbc\n  \
-    ferrodrive --bus sim:base.toml export dbc     # the drives of a machine file, as they come")]
+    ferrodrive --bus sim:base.toml export dbc     # the drives of a machine file, as delivered")]
 struct Dbc {
-    /// Which nodes (default: everybody who answers)
+    /// Nodes (default: every node that answers)
     #[arg(value_name = "NODE", value_parser = node)]
     nodes: Vec<NodeId>,
 }

@@ -26,16 +26,17 @@ use crate::failure::Failure;
 use crate::output::{Format, Report};
 use plot::Paint;
 
-/// Let other programs reach the bus as text over TCP (CiA 309-3)
+/// Serve the bus to other programs as text over TCP (CiA 309-3)
 ///
-/// Several clients may be connected. A client whose connection ends has the drives that it may have set in motion
-/// quick-stopped; a drive with a watch over its host is guarded before it is moved, so that it stops when the gateway dies. There is
-/// no password: whoever reaches the port can move the drives. docs/handbook/gateway.md has the commands.
+/// Several clients may be connected. When the connection of a client ends, the drives that it may have set in motion
+/// are quick-stopped; a drive that monitors its host is guarded before it is moved, so that it stops when the gateway
+/// dies. There is no password: anyone who reaches the port can move the drives. docs/handbook/gateway.md describes the
+/// commands.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 gateway --listen 127.0.0.1:7000\n  \
     printf '[1] 4 r 0x1018 1 x32\\n' | nc 127.0.0.1 7000")]
 pub(crate) struct Gateway {
-    /// Where to listen; port 0 takes a free one, which the first line of output names
+    /// Address to listen at; port 0 takes a free one, which the first line of output names
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7000")]
     listen: String,
 }

@@ -32,11 +32,11 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
 
 /// Move several axes as one
 ///
-/// All begin with one SYNC and end together, on paths that are limited in speed, acceleration and jerk. When one drive faults, is lost
-/// or lags, all come to rest. Afterwards the drives have no power.
+/// All start with one SYNC and end together, on paths limited in speed, acceleration and jerk. When one drive faults,
+/// is lost or lags, all come to rest. Afterwards the drives have no power.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    ferrodrive group move 1=90deg 4=0.5turn --within 3s            # what it may do: see group move --help\n  \
+    ferrodrive group move 1=90deg 4=0.5turn --within 3s            # default limits: group move --help\n  \
     ferrodrive group move examples/machine.toml 1=90deg 2=-45deg   # limits, modes and period by its [[group]]\n  \
     ferrodrive --bus can0 group move machine.toml --relative 1=10deg 2=10deg")]
 pub(crate) struct GroupCommand {
@@ -51,8 +51,9 @@ enum What {
 
 /// Move axes to positions, together
 ///
-/// With a machine file that has a [[group]], the axes that are not named stay where they are. Where nothing is said an axis may do 30 r/min
-/// and 60 (r/min)/s, within 100 ms of it, and lag by 0.2 turns. A drive that takes no positions in cycles is moved by speeds.
+/// With a machine file that has a [[group]], the axes that are not named stay where they are. The default limits of an
+/// axis are 30 r/min and 60 (r/min)/s, reached within 100 ms, and a lag of 0.2 turns. A drive that takes no positions
+/// in cycles is moved by speeds.
 #[derive(Debug, clap::Args)]
 struct Move {
     /// Machine file, and the positions of the nodes: 1=90deg 4=0.5turn 2=-3000counts
@@ -61,10 +62,10 @@ struct Move {
     /// Which [[group]] of the file (default: the one that has the nodes)
     #[arg(long, value_name = "NAME")]
     group: Option<String>,
-    /// Turn by this much from where each axis is, instead of to it
+    /// Turn by this much from the present position of each axis, instead of to a position
     #[arg(long)]
     relative: bool,
-    /// Take this long, instead of the shortest time within the limits
+    /// Duration of the move (default: the shortest within the limits)
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     within: Option<Duration>,
     /// Highest speed of each axis
@@ -73,13 +74,13 @@ struct Move {
     /// Highest acceleration of each axis: 120rpm/s, 12.6rad/s2
     #[arg(long, value_name = "RATE", value_parser = rate)]
     acceleration: Option<f64>,
-    /// How long the acceleration takes to reach its highest value, which limits the jerk
+    /// Time in which the acceleration reaches its highest value, which limits the jerk
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     rounding: Option<Duration>,
-    /// How far a shaft may be from its set-point before all are stopped
+    /// Largest distance of a shaft from its set-point, beyond which all axes are stopped
     #[arg(long, value_name = "ANGLE", value_parser = angle)]
     following_error: Option<Angle>,
-    /// From one SYNC to the next (default: the file's, or 5ms)
+    /// Period of SYNC (default: the file's, or 5ms)
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     period: Option<Duration>,
     /// Mode of operation of each axis (default: the file's, or the first of csp, ip, csv, pv that its model has)

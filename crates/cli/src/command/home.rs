@@ -17,8 +17,8 @@ use testbench::words::node::node;
 
 /// Find a drive's reference position
 ///
-/// Enables the drive and waits until it has found the edge of its switch, which is position zero from then on. The inputs
-/// have to be set up as switches before; a drive that finds nothing in time is stopped.
+/// Enables the drive and waits until it has found the edge of its switch, which is position zero from then on. The
+/// inputs have to be configured as switches first; a drive that does not find the edge in time is stopped.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive home 2 --method 17\n  ferrodrive home 1 --method 18 --within 5s")]
 pub(crate) struct Home {
@@ -31,10 +31,10 @@ pub(crate) struct Home {
     /// Speed of the search, where the drive has an object for it
     #[arg(long, value_name = "SPEED", value_parser = speed)]
     profile_velocity: Option<Along<Rpm>>,
-    /// Longest time that it may take
+    /// Longest time to wait for the reference
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "60s")]
     within: Duration,
-    /// Do not wait until it is found
+    /// Return at once, without waiting for the reference
     #[arg(long)]
     no_wait: bool,
     #[command(flatten)]

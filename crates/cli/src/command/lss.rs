@@ -36,9 +36,11 @@ pub(crate) struct Lss {
 enum What {
     /// Find every device that has no node-ID (fastscan): some seconds for each
     Scan,
-    /// Find every device of a make, with a node-ID or without (identify remote slave): some seconds for each
+    /// Find every device of a vendor and product, with or without a node-ID (identify remote slave): some seconds for
+    /// each
     ///
-    /// Revision and serial numbers are asked for in ranges, which are halved where somebody answers. It asks alone: nothing is changed.
+    /// Revision and serial numbers are requested in ranges, which are halved where a device answers. It only asks:
+    /// nothing is changed.
     Identify {
         /// VENDOR:PRODUCT[:REVISION] (1018h:01 to 03) in hexadecimal; with the revision it takes half the time
         #[arg(value_name = "VENDOR:PRODUCT", value_parser = make)]
@@ -64,19 +66,19 @@ struct DeviceArg {
 struct Set {
     #[command(flatten)]
     device: DeviceArg,
-    /// Its node-ID from the next NMT reset communication on; none takes it away
+    /// New node-ID, in effect from the next NMT reset communication on; none removes it
     #[arg(long, value_name = "NODE|none", value_parser = node_or_none, required_unless_present_any = ["bitrate", "store"])]
     node_id: Option<Wanted>,
-    /// Its bit rate: 10k, 20k, 50k, 125k, 250k, 500k, 800k, 1M
+    /// New bit rate: 10k, 20k, 50k, 125k, 250k, 500k, 800k, 1M
     #[arg(long, value_name = "RATE", value_parser = bit_rate)]
     bitrate: Option<u8>,
-    /// Have it keep both
+    /// Store both in the device
     #[arg(long)]
     store: bool,
-    /// Then NMT reset communication, with which a node that has a node-ID takes the new one
+    /// Send NMT reset communication afterwards, with which a node that has a node-ID takes the new one
     #[arg(long, requires = "node_id")]
     reset: bool,
-    /// Change to the new bit rate now, silent for this long before and after; this bus has to change too
+    /// Switch to the new bit rate now, with this much silence before and after; this bus has to be switched too
     #[arg(long, value_name = "TIME", value_parser = silence, requires = "bitrate")]
     activate: Option<Duration>,
 }

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use crate::failure::Failure;
 
-/// Write the manual pages of every command into a folder, for packages
+/// Write the manual pages of all commands to a folder, for packages
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  ferrodrive man-pages ~/.local/share/man/man1")]
 pub(crate) struct ManPages {
-    /// The folder; it is made if it is not there
+    /// Folder, which is created if it does not exist
     folder: PathBuf,
 }
 

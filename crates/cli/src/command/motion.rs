@@ -19,9 +19,10 @@ use plot::Paint;
 use testbench::models::is_from_file;
 use testbench::words::node::node;
 
-/// Turn at a speed
+/// Turn the motor at a speed
 ///
-/// Enables the drive and returns when the speed is reached; the motor goes on turning. With --for it is stopped again.
+/// Enables the drive and returns when the speed is reached; the motor keeps turning. With --for it is stopped
+/// afterwards.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive velocity 4 60rpm --for 2s\n  ferrodrive velocity 4 -360deg/s --acceleration 120rpm/s"
@@ -35,12 +36,12 @@ pub(crate) struct Velocity {
     speed: Along<Rpm>,
     #[command(flatten)]
     ramps: RampArgs,
-    /// Go on turning for this long, then stop
+    /// Keep turning for this long, then stop
     #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
     duration: Option<Duration>,
 }
 
-/// Turn to a position, or by an angle
+/// Move to a position, or by an angle
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive move 4 90deg\n  ferrodrive move 4 32000 --profile-velocity 60rpm\n  \
     ferrodrive move 4 --relative -0.5turn --acceleration 300ms")]
@@ -51,19 +52,19 @@ pub(crate) struct Move {
     /// Position: 32000 (counts), 90deg, 0.5turn, 1.57rad; 40mm where the machine file has a feed constant
     #[arg(allow_hyphen_values = true)]
     position: Along<Angle>,
-    /// Turn by this much from the last target, instead of to it
+    /// Move by this much from the last target, instead of to a position
     #[arg(long)]
     relative: bool,
-    /// Largest speed on the way
+    /// Highest speed of the move
     #[arg(long, value_name = "SPEED", value_parser = speed)]
     profile_velocity: Option<Along<Rpm>>,
     #[command(flatten)]
     ramps: RampArgs,
 }
 
-/// Let the motor push with a current
+/// Apply a motor current (profile torque)
 ///
-/// Returns at once: what comes of it is up to the load. With --for the torque is taken away again.
+/// Returns at once: what the motor does depends on the load. With --for the torque is removed afterwards.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  ferrodrive torque 4 1.5A --for 2s")]
 pub(crate) struct Torque {
@@ -73,7 +74,7 @@ pub(crate) struct Torque {
     /// Motor current: 1.5A, -800mA
     #[arg(allow_hyphen_values = true)]
     current: Amperes,
-    /// Push for this long, then stop
+    /// Apply it for this long, then stop
     #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
     duration: Option<Duration>,
     /// Accepted for symmetry with the other moving commands: this one never waits
@@ -86,18 +87,18 @@ pub(crate) struct Torque {
 /// How a motion is to be made, where the drive's own settings are not wanted.
 #[derive(Debug, clap::Args)]
 struct RampArgs {
-    /// How fast the speed may rise: 500ms, 120rpm/s, 12.6rad/s2; 500mm/s2 with a feed constant
+    /// Acceleration, or the time to speed up: 500ms, 120rpm/s, 12.6rad/s2; 500mm/s2 with a feed constant
     #[arg(long, value_name = "RAMP")]
     acceleration: Option<Along<Ramp>>,
-    /// How fast the speed may fall
+    /// Deceleration, in the same forms
     #[arg(long, value_name = "RAMP")]
     deceleration: Option<Along<Ramp>>,
-    /// Do not wait until the target is reached
+    /// Return at once, without waiting for the target
     #[arg(long)]
     no_wait: bool,
-    /// Longest time that it may take until the target is reached; beyond it the drive is quick-stopped
+    /// Longest time to reach the target; beyond it the drive is quick-stopped
     ///
-    /// Without it half as long again as the ramps and the way are reckoned to take, and 2 s.
+    /// Without it: 1.5 times the calculated duration of the ramps and the travel, and 2 s.
     #[arg(long, value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
     within: Option<Duration>,
     #[command(flatten)]

@@ -24,11 +24,11 @@ pub(crate) struct Nmt {
     /// Node-ID, or all
     #[arg(value_name = "NODE|all", value_parser = nodes)]
     nodes: Nodes,
-    /// What to do
+    /// Command to send
     command: NmtWord,
-    /// Wait until the node says that it has done so: by its heartbeat, after a reset by its boot-up message
+    /// Wait until the node confirms it: by its heartbeat, after a reset by its boot-up message
     ///
-    /// For all nodes this lists what each of them says within the time.
+    /// With all, this lists what each node reports within the time.
     #[arg(long, value_name = "TIME", value_parser = parse_duration, num_args = 0..=1, default_missing_value = "5s")]
     wait: Option<Duration>,
 }

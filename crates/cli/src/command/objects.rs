@@ -26,9 +26,9 @@ pub(crate) struct Objects {
     /// Model (e.g. zlac8030l), data sheet (FILE.eds) or node-ID
     #[arg(value_name = "MODEL|FILE.eds|NODE", value_parser = whose)]
     pub(crate) whose: Whose,
-    /// Only objects with this index, or with this word in name, title or meaning
+    /// Show only objects with this index, or with this word in name, title or meaning
     search: Vec<String>,
-    /// Show where the model departs from CiA 301 and CiA 402, and what a program written to them has to do
+    /// Show where the model departs from CiA 301 and CiA 402, and what a program written for them has to do
     #[arg(long, conflicts_with = "search")]
     pub(crate) departures: bool,
 }

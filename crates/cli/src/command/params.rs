@@ -20,10 +20,11 @@ use crate::output::Format;
 
 pub(super) use plan::{PlanReport, plan_of};
 
-/// Keep a node's parameters in a file, compare them, write them all or not at all, go back
+/// Back up a node's parameters, compare them, write them all or not at all, roll back
 ///
-/// Files: .dcf (CiA 306), .toml (objects by number or name, values with units), .bin (concise DCF, CiA 302-3). Commands and
-/// set-points are never among the parameters, nothing here moves a drive, and a drive in operation enabled is refused.
+/// Files: .dcf (CiA 306), .toml (objects by number or name, values with units), .bin (concise DCF, CiA 302-3). Commands
+/// and set-points are never among the parameters, nothing here moves a drive, and a drive in operation enabled is
+/// refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive params backup 4 -o wheel.toml\n  \
     ferrodrive --bus can0 params plan 4 wheel.toml\n  ferrodrive --bus can0 params apply 4 wheel.toml --save --prove\n  \
@@ -50,15 +51,15 @@ struct Backup {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
-    /// Write the file here, .toml, .dcf or .bin; without it, and as -, TOML goes to standard output
+    /// Write to this file, .toml, .dcf or .bin (default, and -: TOML to standard output)
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Write over a file that is there
+    /// Overwrite an existing file
     #[arg(long, requires = "output")]
     force: bool,
 }
 
-/// Show in what a node and a file, or two files, differ
+/// Show the differences between a node and a file, or between two files
 #[derive(Debug, clap::Args)]
 struct Diff {
     /// Node-ID or file
@@ -69,25 +70,26 @@ struct Diff {
     second: PathBuf,
 }
 
-/// Show what `apply` would write, in its order; nothing is written
+/// Show what `apply` would write, in order; nothing is written
 #[derive(Debug, clap::Args)]
 struct PlanArguments {
     #[command(flatten)]
     wanted: Wanted,
-    /// Node-ID and bit rate too, as the last
+    /// Include node-ID and bit rate, which are written last
     #[arg(long)]
     address: bool,
 }
 
 /// Write a file's parameters to a node, all or none
 ///
-/// Everything that can be checked is checked before the first write; each value is read back; on the first refusal what was
-/// written is put back in reverse order. A journal is kept meanwhile: after a kill or a power failure `rollback` goes back.
+/// Everything that can be checked is checked before the first write; each value is read back; on the first refusal what
+/// was written is put back in reverse order. A journal is kept meanwhile, with which `rollback` restores the node after
+/// a kill or a power failure.
 #[derive(Debug, clap::Args)]
 struct Apply {
     #[command(flatten)]
     wanted: Wanted,
-    /// Node-ID and bit rate too, as the last
+    /// Include node-ID and bit rate, which are written last
     #[arg(long, conflicts_with = "prove")]
     address: bool,
     #[command(flatten)]
@@ -101,7 +103,7 @@ struct Verify {
     wanted: Wanted,
 }
 
-/// Go back to how a node was before an `apply` that was broken off
+/// Restore a node to how it was before an interrupted `apply`
 #[derive(Debug, clap::Args)]
 struct Rollback {
     /// Node-ID
@@ -118,16 +120,17 @@ pub(super) struct Transaction {
     /// Store the parameters in the drive's memory afterwards
     #[arg(long)]
     save: bool,
-    /// Start the drive anew afterwards, and read everything once more
+    /// Restart the drive afterwards, and read everything again
     ///
-    /// `power-cycle` waits until somebody has switched the drive off and on; `reset` sends NMT reset node, with which a device
-    /// takes its stored values up (CiA 301, 7.3.2.2.1). Without HOW: a reset on a virtual bus of this command, else a power cycle.
+    /// `power-cycle` waits until the drive has been switched off and on by hand; `reset` sends NMT reset node, with
+    /// which a device loads its stored values (CiA 301, 7.3.2.2.1). Without HOW: a reset on a virtual bus of this
+    /// command, else a power cycle.
     #[arg(long, value_name = "HOW", num_args = 0..=1, require_equals = true, default_missing_value = "auto", requires = "save")]
     prove: Option<Prove>,
     /// Longest wait for the drive to come back
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "2min", requires = "prove")]
     within: Duration,
-    /// Where the journal is kept meanwhile
+    /// File for the journal
     #[arg(long, value_name = "FILE")]
     journal: Option<PathBuf>,
 }
@@ -143,13 +146,13 @@ struct Wanted {
     file: Option<PathBuf>,
 }
 
-/// How a drive starts anew.
+/// How a drive is restarted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Prove {
-    /// As fits the bus.
+    /// Whichever fits the bus.
     #[value(hide = true)]
     Auto,
-    /// Somebody switches its supply off and on.
+    /// Its supply is switched off and on by hand.
     PowerCycle,
     /// NMT reset node.
     Reset,

@@ -23,7 +23,7 @@ use plot::Table;
 use testbench::decode::{self, decode};
 use testbench::words::node::node;
 
-/// Show how a node's PDOs are set up and why one stays away, what they carry as they come, or set them up
+/// Show how the PDOs of a node are configured and why one is silent, watch their values, or configure them
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive pdo show 4\n  \
     ferrodrive --bus socketcand://HOST:29536/can0 pdo watch 4 --time delta\n  \
@@ -39,7 +39,7 @@ pub(crate) struct Pdo {
 enum What {
     /// Show identifier, transmission type, timers and mapping of each PDO
     Show(Show),
-    /// Show the values in a node's PDOs as they come, by its own mapping
+    /// Show the values in the PDOs of a node as they arrive, by its own mapping
     Watch(Watch),
     Plan(setup::PlanPdos),
     Apply(setup::ApplyPdos),
@@ -47,7 +47,7 @@ enum What {
 
 #[derive(Debug, clap::Args)]
 struct Show {
-    /// Node-IDs; without any, every node on the bus is asked
+    /// Node-IDs (default: every node on the bus)
     #[arg(value_parser = node)]
     nodes: Vec<NodeId>,
 }
@@ -60,7 +60,7 @@ struct Watch {
     /// End after this time (default on an embedded virtual bus: 1s)
     #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
     duration: Option<Duration>,
-    /// The time before each line
+    /// Form of the time before each line
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]
     time: TimeForm,
 }
@@ -68,7 +68,7 @@ struct Watch {
 /// Nothing happens on an embedded bus by itself.
 const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
 
-/// How the PDOs of nodes are set up.
+/// How the PDOs of nodes are configured.
 #[derive(Debug, Serialize)]
 struct PdoList {
     nodes: Vec<OfNode>,
@@ -80,7 +80,7 @@ struct OfNode {
     pdos: Vec<Row>,
 }
 
-/// How one PDO is set up.
+/// How one PDO is configured.
 #[derive(Debug, Serialize)]
 struct Row {
     /// `TPDO1`, counted from 1 as by CiA 301.
@@ -95,7 +95,7 @@ struct Row {
     inhibit_ms: Option<f64>,
     event_ms: Option<f64>,
     objects: Vec<Mapped>,
-    /// What keeps it away, as far as that is known.
+    /// Why it is silent, as far as that is known.
     silent: Vec<String>,
 }
 

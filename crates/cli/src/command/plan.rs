@@ -24,25 +24,27 @@ use plot::Table;
 
 /// Plan a bus: its load, the longest time of every frame, and how many such drives it carries
 ///
-/// Takes the frames from how the PDOs of the nodes are set up, of virtual drives of a machine file or of those on a real bus, which
-/// is only read. The [[group]] or the [base] of the file is planned as it will run: its period, its modes, its PDOs; of several the one that
-/// fills the bus most. The times are bounds: whatever comes together with whatever, no frame of a bus without errors is later (CAN
-/// schedulability analysis of Davis, Burns, Bril and Lukkien, 2007). Each RPDO is sent once in a cycle; a frame has to be there
-/// before the next of its kind is due, and a PDO before the next SYNC. Ends with status 1 if something is late; of a group and a base,
-/// which tolerate two cycles without a PDO, if something is late in a cycle alone, without SDO and EMCY.
+/// Takes the frames from the PDO configuration of the nodes: of virtual drives of a machine file, or of those on a real
+/// bus, which is only read. The [[group]] or the [base] of the file is planned as it will run, with its period, its
+/// modes and its PDOs; of several, the one that fills the bus most. The times are upper bounds: whatever coincides, no
+/// frame of a bus without errors is later (CAN schedulability analysis of Davis, Burns, Bril and Lukkien, 2007). Each
+/// RPDO is sent once in a cycle; a frame has to arrive before the next of its kind is due, and a PDO before the next
+/// SYNC. Ends with status 1 if a frame is late; with a group or base, which tolerates two cycles without a PDO, if one
+/// is late in a cycle alone, without SDO and EMCY.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive plan machine.toml                             # the [[group]] or [base] of the file\n  \
     ferrodrive plan machine.toml --cycle 5ms --mode pv       # as `Drive::configure_cyclic` maps the PDOs for that mode\n  \
     ferrodrive --bus can0 plan --cycle 10ms --bitrate 500k   # as they are mapped now")]
 pub(crate) struct Plan {
-    /// Machine file whose drives are looked at (default: those on --bus)
+    /// Machine file whose drives are planned (default: those on --bus)
     #[arg(value_name = "FILE.toml")]
     file: Option<PathBuf>,
     /// Period of SYNC (default: that of the file's group or base, or 10ms)
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     cycle: Option<Duration>,
-    /// Plan with the PDOs that this mode of operation needs for a set-point with each SYNC, in place of those that are mapped
+    /// Plan with the PDOs that this mode of operation needs for a set-point with each SYNC, instead of those that are
+    /// mapped
     ///
     /// By its number (6060h), abbreviation or name. For one node: NODE=MODE; may be repeated.
     #[arg(long = "mode", value_name = "[NODE=]MODE", value_parser = node_mode)]
@@ -62,10 +64,10 @@ pub(crate) struct Plan {
     /// Heartbeat of the host, with node-ID 127; 0 for none
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "0s")]
     heartbeat: Duration,
-    /// The bus destroys a frame at most once in this time; 0 for never
+    /// Shortest time between two frames that the bus destroys; 0 for never
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "0s")]
     errors: Duration,
-    /// The host's controller sends the most urgent frame first, not in the order given
+    /// Assume that the host's controller sends the most urgent frame first, not in the order given
     #[arg(long)]
     by_priority: bool,
 }

@@ -12,25 +12,25 @@ use plot::Paint;
 
 /// Draw a record of --record: a figure for each node, a panel for each quantity
 ///
-/// The picture is SVG (.svg), or a web page (.html) of its own that tells the values under the pointer and the differences
-/// between two places. A record whose writer was killed, or is still at work, is drawn as far as it goes.
+/// The picture is SVG (.svg), or a self-contained web page (.html) that shows the values under the pointer and the
+/// differences between two points. A record whose writer was killed, or is still at work, is drawn as far as it goes.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive plot run.mcap -o run.svg\n  \
     ferrodrive plot run.csv --signals velocity,4.current_a --from 1.5 --to 3 -o run.html")]
 pub(crate) struct Plot {
-    /// The record: NAME.mcap or NAME.csv
+    /// Record, NAME.mcap or NAME.csv
     file: PathBuf,
-    /// Which signals, e.g. velocity,4.current_a,5.*; without it positions, velocities, currents and supplies
+    /// Signals, e.g. velocity,4.current_a,5.* (default: positions, velocities, currents and supplies)
     #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',')]
     signals: Vec<String>,
-    /// Begin, in s
+    /// Start, in s
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
     from: f64,
-    /// End, in s; without it that of the record
+    /// End, in s (default: that of the record)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     to: Option<f64>,
-    /// Write the picture to this file, NAME.svg or NAME.html; without it, it goes beside the record, as NAME.svg
+    /// Write the picture to this file, NAME.svg or NAME.html (default: NAME.svg beside the record)
     #[arg(long, short, alias = "svg", alias = "html", value_name = "FILE", value_parser = picture_path)]
     output: Vec<PathBuf>,
 }

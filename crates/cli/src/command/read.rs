@@ -30,10 +30,10 @@ pub(crate) struct Read {
     /// Indices, index:sub-index, names or ranges
     #[arg(value_name = "OBJECT", required = true, value_parser = selection)]
     objects: Vec<Selection>,
-    /// Write the bytes of the one object, as they come, into a new file
+    /// Write the bytes of the one object, as they are, to a new file
     #[arg(long = "output", short = 'o', alias = "to", value_name = "FILE")]
     to: Option<PathBuf>,
-    /// Write over the file
+    /// Overwrite an existing file
     #[arg(long, requires = "to")]
     force: bool,
 }

@@ -9,10 +9,11 @@ use crate::readings::{self, Reading};
 use plot::Paint;
 use testbench::models::{Description, resolve};
 
-/// List where a model's manual is silent or contradicts itself, what is done there, and what can be chosen
+/// List where a model's manual is silent or contradicts itself, what the virtual drive does there, and what can be
+/// chosen
 ///
-/// Each place has what the manual prints, what the virtual drive does, why, and how sure that is: traffic of real drives,
-/// another document of the maker, a sibling's manual, the standard, or a guess.
+/// Each entry has what the manual prints, what the virtual drive does, why, and how certain that is: traffic of real
+/// drives, another document of the maker, a sibling's manual, the standard, or a guess.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive readings zlim42c homing\n  ferrodrive readings zlac8030l L123\n  \
     ferrodrive readings zlac8030l --choices")]
@@ -20,12 +21,12 @@ pub(crate) struct Readings {
     /// Model, e.g. zlac8030l
     #[arg(value_parser = resolve)]
     model: &'static Description,
-    /// Only places with this number or with these words
+    /// Show only entries with this number or with these words
     search: Vec<String>,
-    /// Only what can be chosen for a virtual drive (sim --drive MODEL@NODE,...)
+    /// Show only what can be chosen for a virtual drive (sim --drive MODEL@NODE,...)
     #[arg(long)]
     choices: bool,
-    /// Only guesses
+    /// Show only guesses
     #[arg(long)]
     guesses: bool,
 }

@@ -29,10 +29,11 @@ use plot::Paint;
 
 /// Record objects of a node over time
 ///
-/// Reads each object again and again, by the TPDOs that carry it where the node sends some, else by SDO, and writes the values in
-/// their units to a file that ferrodrive plot draws: .mcap (for Foxglove, PlotJuggler, Rerun; with the frames of others) or
-/// .csv. Nothing is written to the node. By SDO no other program may ask the same node meanwhile: CiA 301 gives each node one channel,
-/// and each would take the other's answers. Ends after --for, or with Ctrl-C; what is older than a second is on the disk by then.
+/// Reads each object repeatedly, from the TPDOs that carry it where the node sends some, otherwise by SDO, and writes
+/// the values in their units to a file that ferrodrive plot draws: .mcap (for Foxglove, PlotJuggler, Rerun; with the
+/// frames of other nodes) or .csv. Nothing is written to the node. With SDO no other program may ask the same node
+/// meanwhile: CiA 301 gives each node one channel, and each program would take the other's answers. Ends after --for,
+/// or with Ctrl-C; everything older than a second is on the disk by then.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive --bus can0 --model 4=zlac8030l record 4 velocity_actual_value position_actual_value -o run.mcap --for 10s\n  \
@@ -41,10 +42,10 @@ pub(crate) struct Record {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
-    /// Which objects: index, index:sub-index or name
+    /// Objects: index, index:sub-index or name
     #[arg(value_name = "OBJECT", required = true, value_parser = object)]
     objects: Vec<ObjectArg>,
-    /// The file: NAME.mcap or NAME.csv; a new one, or an empty one, or an earlier record, which is replaced
+    /// Output file, NAME.mcap or NAME.csv: new, empty, or an earlier record, which is replaced
     #[arg(long = "output", short = 'o', alias = "out", value_name = "FILE", value_parser = record_file)]
     out: (PathBuf, Kind),
     /// Time between two samples

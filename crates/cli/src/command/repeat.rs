@@ -12,10 +12,10 @@ use crate::failure::Failure;
 /// How often, and how many times.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub(crate) struct Repeat {
-    /// Again and again, with this period
+    /// Repeat with this period
     #[arg(long, value_name = "TIME", value_parser = period)]
     pub(crate) every: Option<Duration>,
-    /// How many times; without it until Ctrl-C
+    /// Number of times (default: until Ctrl-C)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) count: Option<u64>,
 }

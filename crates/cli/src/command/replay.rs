@@ -19,28 +19,29 @@ use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
 
-/// Send the frames of a log again, at the distance in time that they had
+/// Replay a log with its original timing
 ///
-/// Reads every form that decode reads. A log has the frames of everybody who was on the bus: --only chooses whose part is
-/// played, else all of them are sent. Frames that may set a drive in motion (NMT start, RPDOs, writes to controlword,
-/// mode, targets and makers' objects) are sent only with --allow-motion; without it a log that has some is refused, and with
-/// --skip-motion they are left out. When this command ends early, it quick-stops the nodes that it has sent such frames to.
+/// Reads every format that decode reads. A log has the frames of all nodes on the bus: --only chooses which of them are
+/// sent; by default all are. Frames that may set a drive in motion (NMT start, RPDOs, writes to controlword, mode,
+/// targets and makers' objects) are sent only with --allow-motion; without it a log that has some is refused, and with
+/// --skip-motion they are left out. When this command ends early, it quick-stops the nodes to which it has sent such
+/// frames.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 replay trace.blf --only master --skip-motion\n  \
     ferrodrive --bus can0 replay trace.log --only 604,704 --speed 2\n  \
     ferrodrive replay trace.log --only sent --allow-motion    # on a virtual bus")]
 pub(crate) struct Replay {
-    /// The log
+    /// Log file
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Which frames: master (what a master sends), nodes (what they send), sent and received (by whoever wrote the log), identifiers (604, 180-1FF); any
-    /// of them counts
+    /// Frames to send: master (what a master sends), nodes (what they send), sent and received (by the program that
+    /// wrote the log), identifiers (604, 180-1FF); any match counts
     #[arg(long, value_name = "WHICH,..", value_delimiter = ',')]
     only: Vec<Which>,
-    /// How much faster than it was, or max for as fast as the bus takes them
+    /// Speed as a multiple of the original, or max for as fast as the bus takes the frames
     #[arg(long, value_name = "N|max", default_value = "1")]
     speed: ReplaySpeed,
-    /// Send frames that may set a drive in motion too
+    /// Also send frames that may set a drive in motion
     #[arg(long, conflicts_with = "skip_motion")]
     allow_motion: bool,
     /// Leave out frames that may set a drive in motion

@@ -12,11 +12,12 @@ use testbench::models::how_to_say;
 use testbench::network::heard::Counted;
 use testbench::network::scan::{ScanReport, ScannedNode, no_node};
 
-/// Show who is on the bus
+/// Show the nodes on the bus
 ///
-/// Asks all 127 node-IDs for their device type and identity. Several models may answer the same: say which a node is with
-/// --model NODE=MODEL, or in a machine file (--machine FILE.toml). A node in the state stopped answers no SDO; it is listed
-/// if it sends a heartbeat. What others sent meanwhile is told too: boot-ups, errors, PDOs, SYNC, another master's requests.
+/// Asks all 127 node-IDs for their device type and identity. Several models may answer the same: name the model of a
+/// node with --model NODE=MODEL, or in a machine file (--machine FILE.toml). A node in the state stopped answers no
+/// SDO; it is listed if it sends a heartbeat. Other traffic heard meanwhile is reported too: boot-ups, errors, PDOs,
+/// SYNC, another master's requests.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive --bus can0 scan\n  ferrodrive --bus can0 scan --model 4=zlac8030l --json"

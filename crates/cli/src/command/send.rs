@@ -11,7 +11,7 @@ use plot::Paint;
 
 /// Send frames as they are
 ///
-/// Nothing looks at what they do: a frame may start a motor. With --verbose what the bus answers is shown.
+/// Their effect is not checked: a frame may start a motor. With --verbose the answers on the bus are shown.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Frames are written as by candump and cansend, in hexadecimal:\n  \
     ferrodrive send 604#4041600000000000 -v      # an SDO upload of 6041h, and its answer\n  \

@@ -48,8 +48,8 @@ const WORLD_COMMANDS: &str = "World commands (4 is the node of --drive):\n  \
     4 bus babble 080# 1       4 bus overrun 2 0.5       bus corrupt 0.01\n  \
     run 20ms, run until 2.5s                (with --clock manual: time passes)\n  \
     4 supply 48 limit 10 resistance 0.2     (what the supply gives at most, in A, and its resistance in ohm)\n\
-    Switched off a drive lives on the charge of its bus, and its under-voltage, until it dies; a supply that comes back\n\
-    before that, and a cycle, wait for it, which `power` in `get` tells. Cut, it is dead at once.\n\
+    Switched off, a drive runs on the charge of its DC bus, with under-voltage, until it dies; a supply that returns before\n\
+    that, and a cycle, wait for it, as `power` in `get` shows. Cut, it is dead at once.\n\
     Of the joints, here node 1:\n  \
     1 battery off|on          1 pulses 8192 10000       1 quadrature -400 1000\n  \
     1 duty 40                 1 clock 10000";
@@ -60,88 +60,92 @@ const EXAMPLES: &str = "\
 
 /// Run virtual drives in real time, for other programs
 ///
-/// Prints one line that begins with `ready` and names every listener once all of them listen. Then reads world commands
-/// from standard input, one a line, and answers each with one line of JSON; `quit` ends, the end of input does not. Blank
-/// lines and `# comments` have no answer; `help` lists the commands.
+/// Prints one line that begins with `ready` and names every listener, once all of them listen. Then reads world
+/// commands from standard input, one per line, and answers each with one line of JSON; `quit` ends the simulator, the
+/// end of input does not. Blank lines and `# comments` have no answer; `help` lists the commands.
 ///
-/// With --bus BUS before or behind `sim` the drives join somebody's live bus: can0, vcan0, socketcand://HOST:29536/can0 or
-/// slcan. They hear what is said there and answer, as real ones would; --serve may be given beside it. When that bus goes away,
-/// the drives go on and wait for it.
+/// With --bus BUS before or after `sim` the drives join a live bus: can0, vcan0, socketcand://HOST:29536/can0 or slcan.
+/// They hear its frames and answer as real drives would; --serve may be given beside it. When that bus goes away, the
+/// drives go on and wait for it.
 ///
-/// The drives start when the simulator does, and take about a second to boot (--timing): until its boot-up message a drive is
-/// deaf, and `get` says "power":"booting".
+/// The drives start with the simulator, and take about a second to boot (--timing): until its boot-up message a drive
+/// is deaf, and `get` reports "power":"booting".
 ///
-/// Time on the bus is that of the clock, unless --speed or --clock says otherwise. Nobody holds it up: answers that nobody reads are dropped when 4 MiB wait, and
-/// counted; clients have the wire in turn, at most 256 at a time, of which idle ones make room. `now` and `get` tell
-/// `behind_ms`, how far the bus is behind the clock; falling behind and catching up are also said on standard error.
+/// Time on the bus follows the clock, unless --speed or --clock is given. No client holds it up: answers that are not
+/// read are dropped when 4 MiB wait, and counted; clients take turns on the wire, at most 256 at a time, of which idle
+/// ones make room. `now` and `get` report `behind_ms`, how far the bus is behind the clock; falling behind and catching
+/// up are also reported on standard error.
 #[derive(clap::Args)]
 #[command(after_help = format!("{EXAMPLES}\n\nWorld commands and more options: ferrodrive sim --help"), after_long_help = format!("{WORLD_COMMANDS}\n\n{EXAMPLES}"))]
 pub(crate) struct Sim {
     /// A drive and its node-ID, e.g. zlac8030l@4; may be repeated, beside --machine FILE
     ///
-    /// cia402@5 is a servo as the standard has it. An EDS or DCF file in place of the model, e.g. vendor.eds@5, is a servo with
-    /// the objects of that file, or, if it describes no drive, a node with its objects.
+    /// cia402@5 is a servo as the standard has it. An EDS or DCF file in place of the model, e.g. vendor.eds@5, is a
+    /// servo with the objects of that file, or, if it does not describe a drive, a node with its objects.
     ///
-    /// After a comma: what is special about this one (`ferrodrive readings MODEL` lists it), e.g. zlim42c@2,reading=Z050:prose;
-    /// or the value that an object has at power-on, as if stored, e.g. zlac8030l@4,2014=100.
+    /// After a comma: variations of this drive (`ferrodrive readings MODEL` lists them), e.g.
+    /// zlim42c@2,reading=Z050:prose; or the value of an object at power-on, as if stored, e.g. zlac8030l@4,2014=100.
     #[arg(long = "drive", value_name = "MODEL@NODE[,KEY=VALUE..]", value_parser = drive_spec)]
     drives: Vec<DriveSpec>,
-    /// Bit rate of the bus; without it the machine file's, or 500k
+    /// Bit rate of the bus (default: the machine file's, or 500k)
     #[arg(long, value_name = "RATE")]
     bitrate: Option<Bitrate>,
-    /// Where to serve the bus: socketcand://HOST:PORT or slcan://HOST:PORT; may be repeated
+    /// Serve the bus at this address: socketcand://HOST:PORT or slcan://HOST:PORT; may be repeated
     ///
     /// Port 0 takes a free one, which the `ready` line names.
     #[arg(long = "serve", value_name = "URL")]
     places: Vec<ServeSpec>,
-    /// Where to serve the joints' registers: HOST:PORT for Modbus TCP, or rtu:///dev/ttyUSB0?baud=115200; the unit
-    /// identifier is the joint's address (2615h)
+    /// Serve the joints' registers at this address: HOST:PORT for Modbus TCP, or rtu:///dev/ttyUSB0?baud=115200; the
+    /// unit identifier is the joint's address (2615h)
     #[arg(long, value_name = "PLACE", hide_short_help = true)]
     modbus: Option<ModbusSpec>,
     #[command(flatten)]
     control: ControlOptions,
-    /// Keep EEPROM contents in this directory; without it every start is factory-fresh
+    /// Keep EEPROM contents in this directory (default: every start is factory-fresh)
     ///
-    /// A store is on the disk before the drive acknowledges it: before the SDO answer to a write that is stored, before the
-    /// answer that reads 2 from a joint's 2614h, over Modbus too. So no end of the simulator loses one, be it a signal or
-    /// kill -9. A disk that takes more than 250 ms, or cannot be written, is not waited for; that is said on standard error.
-    /// What nobody acknowledges (stored values that come by PDO, the position that a joint notes when its supply falls)
-    /// follows within 100 ms and what the disk takes. Symbolic links and files of others are refused, and never changed.
+    /// A store is on the disk before the drive acknowledges it: before the SDO answer to a write that is stored, before
+    /// the answer that reads 2 from a joint's 2614h, over Modbus too. So no store is lost when the simulator ends, be
+    /// it by a signal or kill -9. A disk that takes more than 250 ms, or cannot be written, is not waited for; that is
+    /// reported on standard error. Stores without an acknowledgement (values written by PDO, the position that a joint
+    /// notes when its supply falls) follow within 100 ms and the time that the disk takes. Symbolic links and files of
+    /// others are refused, and never changed.
     #[arg(long, value_name = "DIR")]
     state: Option<PathBuf>,
-    /// Decides everything random; without it the machine file's, or 1
+    /// Random seed (default: the machine file's, or 1)
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Whether the drives are as calculated (ideal) or have what real ones have (full): noise of encoder, current, voltage
-    /// and temperature, dead time, cogging; without it the machine file's, or ideal
+    /// Simulate drives as calculated (ideal), or with the imperfections of real ones (full): noise of encoder, current,
+    /// voltage and temperature, dead time, cogging (default: the machine file's, or ideal)
     #[arg(long, value_name = "ideal|full", hide_short_help = true)]
     realism: Option<Realism>,
-    /// Whether the drives take the time that such drives take (device), or none (ideal); without it the machine file's, or
-    /// device
+    /// Simulate drives that take the time of real ones (device), or none (ideal) (default: the machine file's, or
+    /// device)
     ///
-    /// A drive boots in about a second, is deaf until its boot-up message, acts on an SDO request after about a millisecond, on
-    /// an RPDO or SYNC after some hundred microseconds, takes some milliseconds for a store and half a second for NMT reset
-    /// node. `ferrodrive readings MODEL times` lists the bounds and where they are from; --seed decides each time between them.
-    /// A drive may have it otherwise: --drive zlac8030l@4,timing=ideal.
+    /// A drive boots in about a second, is deaf until its boot-up message, acts on an SDO request after about a
+    /// millisecond, on an RPDO or SYNC after some hundred microseconds, takes some milliseconds for a store and half a
+    /// second for NMT reset node. `ferrodrive readings MODEL times` lists the bounds and their sources; --seed decides
+    /// each time between them. One drive may differ: --drive zlac8030l@4,timing=ideal.
     #[arg(long, value_name = "device|ideal", hide_short_help = true)]
     timing: Option<TimingMode>,
-    /// How many times as fast as the clock the bus runs, e.g. 10 or 0.1, or max
+    /// Speed of the bus as a multiple of the clock, e.g. 10 or 0.1, or max
     ///
-    /// With max it runs as fast as the machine can while a client is connected, which takes a whole core: 1 ms of the bus's
-    /// time is computed, then clients have their turn; their frames are taken between two such steps. While no client is
-    /// connected it runs with the clock.
+    /// With max it runs as fast as the machine can while a client is connected, which takes a whole core: 1 ms of the
+    /// bus's time is computed, then clients have their turn; their frames are taken between two such steps. While no
+    /// client is connected it follows the clock.
     #[arg(long, value_name = "N|max", conflicts_with = "clock")]
     speed: Option<Speed>,
-    /// What moves time: the clock, or `run 20ms` and `run until 2.5s` on standard input (manual)
+    /// What advances time: the clock, or `run 20ms` and `run until 2.5s` on standard input (manual)
     ///
-    /// Moved by hand, time stands between two runs: a frame of a client is taken at the time that the bus has, and goes out
-    /// with the next run. Records and logs are the same each time, then; a log counts from the start of the bus. Each run is answered, when it is over, with the time reached, how many frames the bus has carried,
-    /// and the drives whose power, statusword or error code has changed. Lines that come before that wait for it; a second `quit` does not.
+    /// With manual, time stands still between two runs: a frame of a client is taken at the present time of the bus,
+    /// and goes out with the next run. Records and logs are then the same each time; a log counts from the start of the
+    /// bus. Each run is answered, when it is over, with the time reached, how many frames the bus has carried, and the
+    /// drives whose power, statusword or error code has changed. Lines that arrive before that wait for it; a second
+    /// `quit` does not.
     #[arg(long, value_name = "real|manual", value_enum, default_value = "real", hide_possible_values = true)]
     clock: Clock,
     #[command(flatten)]
     recording: RecordOptions,
-    /// Name what is else only counted at the start: the objects of a file that have no effect
+    /// Name the objects of a file that have no effect, which are otherwise only counted at the start
     #[arg(short, long, hide_short_help = true)]
     verbose: bool,
 }

@@ -13,8 +13,8 @@ use testbench::words::node::node;
 
 /// Store a drive's parameters in its own memory
 ///
-/// Says which object the model has for it, and which values count only after the next start. What a model stores without being asked is on
-/// its page of the handbook.
+/// Shows which object the model has for it, and which values take effect only after the next start. What a model stores
+/// without being asked is on its page of the handbook.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive --bus can0 save 4\n  ferrodrive --bus can0 params backup 4 -o wheel.toml    # a copy in a file"
@@ -25,7 +25,7 @@ pub(crate) struct Save {
     node: NodeId,
 }
 
-/// Put a drive's parameters back to their factory values
+/// Restore a drive's parameters to their factory values
 ///
 /// Everything that was set is lost, perhaps node-ID and bit rate too: keep a copy first.
 #[derive(Debug, clap::Args)]

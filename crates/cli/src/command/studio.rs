@@ -27,33 +27,34 @@ use plot::Paint;
 
 /// Show and move drives in the browser
 ///
-/// Serves a page at the address that the first line of output names. Any number of pages may look; one has control, and hands
-/// it over. What a page moves stops when the page goes, or says nothing: a jog within 200 ms. Stop is open to all. Without
-/// --bus it is a virtual machine whose time passes with the clock.
+/// Serves a page at the address in the first line of output. Any number of pages may watch; one has control, and hands
+/// it over. What a page moves stops when the page closes or falls silent: a jog within 200 ms. Every page can stop
+/// drives. Without --bus it serves a virtual machine whose time follows the clock.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive studio --open\n  ferrodrive --bus can0 studio\n  \
     ferrodrive --bus socketcand://127.0.0.1:29536/can0 studio --control 127.0.0.1:7001\n  \
     ferrodrive --bus can0 studio --listen 0.0.0.0:8402 --password-file studio.password")]
 pub(crate) struct Studio {
-    /// Where to listen; port 0 takes a free one. Elsewhere than on this machine (127.0.0.1, [::1]) takes a password
+    /// Address to listen at; port 0 takes a free one. One that other machines reach (not 127.0.0.1, [::1]) needs a
+    /// password
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8402")]
     listen: String,
     /// File whose first line is the password for other machines, 12 characters or more
     ///
-    /// Neither it nor anything else is encrypted on its way: whoever can listen on the network between can read the password,
-    /// and whoever has it can move the drives.
+    /// Nothing is encrypted on its way, the password included: anyone who can listen on the network in between can read
+    /// it, and anyone who has it can move the drives.
     #[arg(long, value_name = "FILE")]
     password_file: Option<PathBuf>,
-    /// File with the token that lets in; it is made if it is not there, and holds over launches
+    /// File with the access token, which is created if it does not exist, and is valid across launches
     ///
-    /// Without it each launch has a token of its own, and pages that were open before have to be opened anew by the address that
-    /// is printed. Whoever can read the file can move the drives: it is made for its owner alone.
+    /// Without it each launch has a token of its own, and pages that were open before have to be opened again by the
+    /// address that is printed. Anyone who can read the file can move the drives: it is created for its owner alone.
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
-    /// A name that browsers may call this server by, e.g. drives.local; may be repeated
+    /// Name by which browsers may call this server, e.g. drives.local; may be repeated
     ///
-    /// Without it that is an address of this machine, or localhost: under a name of another site, which leads here, it could be
-    /// asked from any browser of this network.
+    /// Without it only addresses of this machine and localhost are accepted: under the name of another site that leads
+    /// here, the server could be used from any browser of this network.
     #[arg(long = "host", value_name = "NAME")]
     hosts: Vec<String>,
     /// Open the page in the browser of this machine

@@ -21,28 +21,28 @@ use crate::output::{Format, Report};
 use crate::session;
 use plot::Paint;
 
-/// Boot the nodes of a network, then watch them: heartbeats, errors, and who comes back
+/// Boot the nodes of a network, then watch them: heartbeats, errors, and nodes that come back
 ///
-/// Boots as `ferrodrive boot` does, and has each drive stop by itself when this command dies, where its model has something for
-/// that; where not, it says so. Then it tells what happens: lost heartbeats, states, emergency messages with fault and remedy,
-/// another master. A node whose supply or cable was away is stopped, identified and configured again; the word `resume NODE` on
-/// standard input starts it (NMT). While a drive that watches this command's heartbeat is out of reach, the heartbeat is held
-/// back, so that nothing goes on by itself: that stops every drive that watches it. A node that was operational is left as it is; if it
-/// does not have what the file says, the command ends with status 1. It never moves a motor. Ctrl-C ends it, and the
-/// drives no longer watch it then.
+/// Boots as `ferrodrive boot` does, and has each drive stop by itself when this command dies, where its model can do
+/// that; where it cannot, this is reported. Then it reports what happens: lost heartbeats, states, emergency messages
+/// with fault and remedy, another master. A node whose supply or cable was away is stopped, identified and configured
+/// again; the line `resume NODE` on standard input starts it (NMT). While a drive that monitors this command's
+/// heartbeat is out of reach, the heartbeat is held back, so that nothing resumes by itself: that stops every drive
+/// that monitors it. A node that was operational is left as it is; if it does not have the values of the file, the
+/// command ends with status 1. It never moves a motor. Ctrl-C ends it, and the drives then no longer monitor it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive supervise examples/machine.toml --for 2s\n  \
     ferrodrive --bus can0 supervise machine.toml\n  \
     ferrodrive --bus can0 supervise master.dcf --own-node 1")]
 pub(crate) struct Supervise {
-    /// Machine file, or DCF of a CANopen manager (default: --machine, --model, or who is on the bus)
+    /// Machine file, or DCF of a CANopen manager (default: --machine, --model, or the nodes on the bus)
     #[arg(value_name = "FILE.toml|MASTER.dcf")]
     file: Option<PathBuf>,
-    /// Only this node; may be repeated
+    /// Boot and watch only this node; may be repeated
     #[arg(long = "node", value_name = "NODE", value_parser = node)]
     nodes: Vec<NodeId>,
-    /// The node-ID of this master, for drives whose watch over a heartbeat (1016h) is off as yet
+    /// Node-ID of this master, for drives that do not monitor a heartbeat yet (1016h)
     #[arg(long, value_name = "NODE", value_parser = node, default_value = "127")]
     own_node: NodeId,
     /// End after this time (default on an embedded virtual bus: 1s)

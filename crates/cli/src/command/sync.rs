@@ -11,9 +11,9 @@ use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
 
-/// Send SYNC, once or at a rate
+/// Send SYNC, once or periodically
 ///
-/// Devices with synchronous PDOs then take over what they were sent, and send what they have.
+/// Devices with synchronous PDOs then apply those that they have received, and send their own.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 sync\n  \
     ferrodrive --bus slcan:///dev/ttyACM0 sync --every 10ms --count 1000\n  \
@@ -21,10 +21,10 @@ use plot::Paint;
 pub(crate) struct SyncCommand {
     #[command(flatten)]
     repeat: Repeat,
-    /// With a counter from 1 up to this, as 1019h of the devices has it
+    /// Add a counter from 1 up to this, equal to 1019h of the devices
     #[arg(long, value_name = "OVERFLOW", value_parser = clap::value_parser!(u8).range(2..=240))]
     counter: Option<u8>,
-    /// Its identifier, where 1005h of the devices is not 80h
+    /// Identifier, if 1005h of the devices is not 80h
     #[arg(long, value_name = "ID", value_parser = identifier)]
     id: Option<CanId>,
 }

@@ -20,10 +20,10 @@ use plot::Paint;
     after_help = "Examples:\n  ferrodrive --bus slcan:///dev/ttyACM0 time\n  ferrodrive time --unix 1000000000 -v"
 )]
 pub(crate) struct Time {
-    /// This time instead of now, in seconds since 1 January 1970, UTC
+    /// Time to send instead of now, in seconds since 1 January 1970, UTC
     #[arg(long, value_name = "SECONDS")]
     unix: Option<u64>,
-    /// Its identifier, where 1012h of the devices is not 100h
+    /// Identifier, if 1012h of the devices is not 100h
     #[arg(long, value_name = "ID", value_parser = identifier)]
     id: Option<CanId>,
 }

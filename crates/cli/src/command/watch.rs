@@ -22,8 +22,8 @@ use testbench::words::object::{ObjectArg, object};
 
 /// Show objects of a node as they change: a live table on a terminal, lines elsewhere
 ///
-/// Its questions are life signs too: a drive that stops when its host falls silent (2000h of a ZLAC8030L) does not as long as
-/// it is watched.
+/// Its requests are signs of life too: a drive that stops when its host falls silent (2000h of a ZLAC8030L) does not
+/// stop while it is watched.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 watch 4 6064 606C statusword\n  \
     ferrodrive --bus slcan:///dev/ttyACM0 watch 4 2026:01 --every 1s --count 60 --json > motor.jsonl")]
@@ -34,10 +34,10 @@ pub(crate) struct Watch {
     /// Indices, index:sub-index or names
     #[arg(value_name = "OBJECT", required = true, value_parser = object)]
     objects: Vec<ObjectArg>,
-    /// Time between two looks
+    /// Time between two readings
     #[arg(long, value_name = "TIME", value_parser = period, default_value = "100ms")]
     every: Duration,
-    /// How many looks; without it until Ctrl-C
+    /// Number of readings (default: until Ctrl-C)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
     /// End after this time

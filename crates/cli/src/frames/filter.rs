@@ -11,17 +11,17 @@ use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
 use testbench::words::suggest::{did_you_mean, near};
 
-/// What is wanted. Of each kind any that is named will do; all kinds that are given have to fit.
+/// Frames to show. A frame has to match one value of each option that is given.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Which frames")]
 pub(crate) struct Filter {
-    /// Only what is about these nodes, NMT commands for all nodes included
+    /// Show only frames of these nodes, including NMT commands for all nodes
     #[arg(long = "node", value_name = "NODE", value_parser = node, value_delimiter = ',')]
     nodes: Vec<NodeId>,
-    /// Only these services: nmt, sync, time, emcy, pdo, sdo, heartbeat, lss, other
+    /// Show only these services: nmt, sync, time, emcy, pdo, sdo, heartbeat, lss, other
     #[arg(long = "service", value_name = "SERVICE", value_parser = service, value_delimiter = ',')]
     services: Vec<ServiceKind>,
-    /// Only SDO and PDO with these objects: 6041, 6041:00 or a name
+    /// Show only SDO and PDO with these objects: 6041, 6041:00 or a name
     #[arg(long = "object", value_name = "OBJECT", value_parser = wanted, value_delimiter = ',')]
     objects: Vec<Wanted>,
 }

@@ -9,12 +9,12 @@ use clap::ValueEnum;
 /// How times are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TimeForm {
-    /// Seconds since the command began; of a log as it was recorded
+    /// Seconds since the command began; with a log, as recorded
     #[default]
     Stamp,
     /// Seconds since the first line shown
     Relative,
-    /// Seconds since the line before
+    /// Seconds since the previous line
     Delta,
     /// Date and time of day, UTC
     Absolute,

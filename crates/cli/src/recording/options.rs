@@ -19,16 +19,16 @@ use master::units::parse_duration;
 /// Sample rate and choice of signals of a record.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct RecordOptions {
-    /// Record what moves, is measured and happens to this file: .mcap (for Foxglove, PlotJuggler, Rerun) or .csv
+    /// Record motion, measured values and events to this file: .mcap (for Foxglove, PlotJuggler, Rerun) or .csv
     ///
-    /// It is a new file, or an empty one, or an earlier record, which is replaced. What is older than a second is on the
-    /// disk, whatever happens to this program. `ferrodrive plot FILE` draws it.
+    /// The file is new, empty, or an earlier record, which is replaced. What is older than a second is on the disk,
+    /// whatever happens to this program. `ferrodrive plot FILE` draws it.
     #[arg(long, value_name = "FILE", value_parser = record_path)]
     record: Option<PathBuf>,
-    /// Time between two samples, from 50us on
+    /// Time between two samples, at least 50us
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = record_period, hide_short_help = true, requires = "record")]
     record_period: Option<Duration>,
-    /// Which signals, e.g. velocity,4.current_a,5.*; without it all of them
+    /// Signals, e.g. velocity,4.current_a,5.* (default: all)
     #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',', hide_short_help = true, requires = "record")]
     record_signals: Vec<String>,
 }

@@ -17,26 +17,28 @@ use crate::session;
 pub(crate) use planned::{Planned, announce, global_of, plan_of, planned_by};
 use testbench::network::boot::BootReport;
 
-/// Boot the nodes of a network: check who they are, configure and start them
+/// Boot the nodes of a network: check their identities, configure and start them
 ///
-/// Each node is reset, asked for its identity, configured, watched by its heartbeat and started, in the order of CiA 302-2; each step
-/// says what it expected and found, and a node that fails has the standard's letter. What is expected is said by the file: a
-/// machine file, or the DCF of a CANopen manager (1F80h to 1F8Ah, 1F22h). Without one, whoever is on the bus is booted as what it says that
-/// it is. A node that is operational is left as it is, unless --reset is given. No motor is moved. A machine file
-/// whose group or base has a cycle that the bus cannot carry is refused before. Ends with status 1 if a mandatory node has failed, or if one that was left as it is does not have what the file says.
+/// Each node is reset, asked for its identity, configured, watched by its heartbeat and started, in the order of CiA
+/// 302-2. Each step reports what was expected and what was found; a node that fails is reported with the standard's
+/// letter. The expectations come from the file: a machine file, or the DCF of a CANopen manager (1F80h to 1F8Ah,
+/// 1F22h). Without a file, each node found on the bus is booted with the identity that it reports. A node that is
+/// already operational is left as it is, unless --reset is given. No motor is moved. A machine file whose group or base
+/// has a cycle that the bus cannot carry is refused first. Ends with status 1 if a mandatory node has failed, or if a
+/// node that was left as it is does not have the values of the file.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive boot examples/machine.toml\n  \
-    ferrodrive --bus can0 boot machine.toml --node 4     # that node of it alone\n  \
-    ferrodrive --bus can0 boot master.dcf --no-start     # up to, and without, NMT start")]
+    ferrodrive --bus can0 boot machine.toml --node 4     # only this node of it\n  \
+    ferrodrive --bus can0 boot master.dcf --no-start     # up to NMT start, without it")]
 pub(crate) struct Boot {
-    /// Machine file, or DCF of a CANopen manager (default: --machine, --model, or who is on the bus)
+    /// Machine file, or DCF of a CANopen manager (default: --machine, --model, or the nodes on the bus)
     #[arg(value_name = "FILE.toml|MASTER.dcf")]
     file: Option<PathBuf>,
-    /// Only this node; may be repeated
+    /// Boot only this node; may be repeated
     #[arg(long = "node", value_name = "NODE", value_parser = node)]
     nodes: Vec<NodeId>,
-    /// Reset nodes that are operational too: a motor that turns may stop at once, or go on
+    /// Also reset nodes that are operational: a turning motor may stop at once, or keep turning
     #[arg(long)]
     reset: bool,
     /// Leave the nodes pre-operational

@@ -11,7 +11,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
 
-/// The file of the command, else that of `--machine`.
+/// The file of the command, otherwise that of `--machine`.
 pub(crate) fn planned_by(file: Option<&Path>, global: &Global) -> Result<Planned, Failure> {
     let by_option = || global.machine_file.as_ref().map(|file| file.path.as_path());
     Ok(Planned::read(file.or_else(by_option))?)

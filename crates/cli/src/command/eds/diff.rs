@@ -13,7 +13,7 @@ use plot::Table;
 
 /// Compare two EDS or DCF files, or one with a model: objects, types, access, defaults, limits, PDOs
 ///
-/// Of a DCF the values count, where it has some. Names are not compared.
+/// A DCF is compared by its values where it has any. Names are not compared.
 #[derive(clap::Args)]
 pub(crate) struct Diff {
     /// EDS or DCF file, or a model

@@ -12,15 +12,15 @@ use crate::plain::plain;
 use plot::Paint;
 use plot::Table;
 
-/// Say what is wrong with EDS and DCF files, with lines, and what is taken instead
+/// Check EDS and DCF files: report errors with their lines, and what is used instead
 ///
-/// Errors are what had to be guessed or left out, and what strict tools refuse; warnings are what is readable all the same.
+/// Errors are what had to be guessed or left out, and what strict tools refuse; warnings can still be read.
 #[derive(clap::Args)]
 pub(crate) struct Lint {
     /// EDS or DCF files
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Fail for warnings too
+    /// Fail on warnings too
     #[arg(long)]
     pub(super) strict: bool,
 }

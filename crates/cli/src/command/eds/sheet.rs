@@ -16,23 +16,23 @@ use testbench::words::node::node;
 /// Which model's, and what is special about it.
 #[derive(clap::Args)]
 pub(super) struct SheetArgs {
-    /// Model, e.g. zlac8030l: write its EDS on standard output
+    /// Model whose EDS is written to standard output, e.g. zlac8030l
     #[arg(value_parser = resolve)]
     model: Option<&'static Description>,
-    /// What is special about the device, as `sim --drive` takes it: defaults=eds, firmware=2.01, 6060=3
+    /// Variations of the device, as in `sim --drive`: defaults=eds, firmware=2.01, 6060=3
     #[arg(value_name = "KEY=VALUE")]
     choices: Vec<String>,
-    /// For this node alone: identifiers as numbers, without $NODEID
+    /// Write the EDS for this node: identifiers as numbers, without $NODEID
     #[arg(long, value_name = "NODE", value_parser = node)]
     node: Option<NodeId>,
-    /// For a program that asks for more than the device has
+    /// Adapt the EDS to a program that needs more than the device has
     #[arg(long)]
     variant: Option<Variant>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Variant {
-    /// With 6502h and 6061h, and types as they are mapped
+    /// Add 6502h and 6061h, and give objects the types with which they are mapped
     #[value(name = "ros2_canopen")]
     Ros2Canopen,
 }

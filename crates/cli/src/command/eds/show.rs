@@ -18,7 +18,7 @@ pub(crate) struct Show {
     /// EDS or DCF file, or a model
     #[arg(value_name = "FILE|MODEL")]
     file: String,
-    /// Only objects with this index, or with this word in the name
+    /// Show only objects with this index, or with this word in the name
     #[arg(value_name = "OBJECT")]
     search: Vec<String>,
 }

@@ -21,25 +21,25 @@ use plot::Paint;
 use plot::Table;
 use spread::{Bin, Spread};
 
-/// Measure how long answers take on this bus, and how evenly SYNC comes
+/// Measure response times on this bus, and the regularity of SYNC
 ///
-/// Times from an SDO request (1000h, read only) to its answer, from a SYNC to each synchronous TPDO of the node, and from one SYNC
-/// to the next; as a table, a histogram and a picture. Where another node produces SYNC, that one is measured. Else this
-/// command produces it, unless the motor of a node on the bus is switched on: SYNC would hand it what its synchronous RPDOs hold.
-/// Nothing is written to any node.
+/// Times from an SDO request (1000h, read only) to its answer, from a SYNC to each synchronous TPDO of the node, and
+/// from one SYNC to the next are shown as a table, a histogram and a picture. If another node produces SYNC, that one
+/// is measured. Otherwise this command produces it, unless the motor of a node on the bus is switched on: SYNC would
+/// activate what its synchronous RPDOs hold. Nothing is written to any node.
 ///
-/// On a real bus a frame's time is that of handing it to the connection, or of getting it from there. On a virtual bus it is the
-/// end of its last bit: what the wire and the device take.
+/// On a real bus the time of a frame is when it is handed to the connection, or received from it. On a virtual bus it
+/// is the end of its last bit: what the wire and the device take.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive --bus socketcand://HOST:29536/can0 latency 4\n  \
     ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k latency 4 --count 10000 -o latency.svg\n  \
     ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k latency --sync 5ms --for 1min")]
 pub(crate) struct Latency {
-    /// The node to ask; without it only SYNC is measured
+    /// Node to measure (default: only SYNC is measured)
     #[arg(value_parser = node)]
     node: Option<NodeId>,
-    /// How many requests and how many SYNCs
+    /// Number of requests, and of SYNCs
     #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     count: u32,
     /// End each of the two measurements after this time, if it has not reached its count
@@ -48,7 +48,7 @@ pub(crate) struct Latency {
     /// Period of the SYNC that this command produces
     #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "10ms")]
     sync: Duration,
-    /// Draw the histograms into this file
+    /// Draw the histograms to this file
     #[arg(long = "output", short = 'o', alias = "svg", value_name = "FILE.svg", value_parser = svg_path)]
     svg: Option<PathBuf>,
 }

@@ -24,7 +24,7 @@ use crate::output::Report;
 use plot::Paint;
 use plot::Table;
 
-/// What is to be set up.
+/// What is to be configured.
 #[derive(Debug, clap::Args)]
 pub(super) struct Wanted {
     /// Node-ID
@@ -33,16 +33,16 @@ pub(super) struct Wanted {
     /// A PDO and its objects by name or number, or `off`: tpdo1=statusword,6064 (default: those of the machine file)
     #[arg(value_name = "PDO=OBJECTS", value_parser = asked)]
     pdos: Vec<Asked>,
-    /// Transmission type of those that are named: 1 with every SYNC, 255 on events (CiA 301, tables 66 and 71)
+    /// Transmission type of the named PDOs: 1 with every SYNC, 255 on events (CiA 301, tables 66 and 71)
     #[arg(long = "type", value_name = "0..255", requires = "pdos")]
     transmission: Option<u8>,
-    /// Shortest time between two
+    /// Shortest time between two PDOs (inhibit time)
     #[arg(long, value_name = "TIME", value_parser = parse_duration, requires = "pdos")]
     inhibit: Option<Duration>,
-    /// Longest time between two
+    /// Longest time between two PDOs (event timer)
     #[arg(long, value_name = "TIME", value_parser = parse_duration, requires = "pdos")]
     event: Option<Duration>,
-    /// Identifier, of a single PDO: 0x185
+    /// Identifier, if one PDO is named: 0x185
     #[arg(long, value_name = "ID", value_parser = identifier, requires = "pdos")]
     id: Option<u16>,
 }
@@ -52,18 +52,18 @@ pub(super) struct Wanted {
 pub(super) struct PlanPdos {
     #[command(flatten)]
     wanted: Wanted,
-    /// Period of SYNC that the load is told for
+    /// Period of SYNC for which the bus load is calculated
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "10ms")]
     cycle: Duration,
-    /// Bit rate that the load is told for
+    /// Bit rate for which the bus load is calculated
     #[arg(long, value_name = "RATE", default_value = "500k")]
     bitrate: Bitrate,
 }
 
-/// Set PDOs of a node up, all or none, in the order of CiA 301
+/// Configure PDOs of a node, all or none, in the order of CiA 301
 ///
-/// As `params apply`: each value is read back, on the first refusal everything is put back, and a journal leads back after a
-/// kill (`ferrodrive params rollback`).
+/// As with `params apply`, each value is read back, everything is put back on the first refusal, and a journal restores
+/// the node after a kill (`ferrodrive params rollback`).
 #[derive(Debug, clap::Args)]
 pub(super) struct ApplyPdos {
     #[command(flatten)]
@@ -106,7 +106,7 @@ struct Budget {
     objects: Vec<String>,
 }
 
-/// What would be written, and what comes of it.
+/// What would be written, and what results from it.
 #[derive(Debug, Serialize)]
 pub(super) struct PdoPlanReport {
     pdos: Vec<Budget>,

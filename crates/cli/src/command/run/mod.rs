@@ -23,13 +23,13 @@ use loaded::{Loaded, unbuildable, write};
 use report::RunReport;
 use serving::ServeOptions;
 
-/// Run scenarios in virtual time, and see whether everything is as they expect
+/// Run scenarios in virtual time, and check what they expect
 ///
-/// A scenario is a TOML file: a machine, what happens to it, what a host does with it, what is expected (docs/scenarios.md). The
-/// exit status is 0 if everything is as expected, 1 if not, 2 if a file cannot be used. Of several files each is a row, and all are
-/// run whatever comes of the others.
+/// A scenario is a TOML file: a machine, what happens to it, what a host does with it, what is expected
+/// (docs/scenarios.md). The exit status is 0 if everything is as expected, 1 if not, 2 if a file cannot be used.
+/// Several files are shown in a row each, and all are run, whatever the results of the others.
 ///
-/// With --serve the host is a program outside, and the scenario goes with the clock.
+/// With --serve the host is a program outside, and the scenario follows the clock.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive run examples/scenarios/brown_out.toml\n  \
     ferrodrive run examples/scenarios/*.toml --junit result.xml\n  \
@@ -37,22 +37,22 @@ use serving::ServeOptions;
     ferrodrive run scenario.toml --seed 7 --set torque=1.5 --junit result.xml\n  \
     ferrodrive run scenario.toml --seeds 1..1000 --jobs 4")]
 pub(crate) struct Run {
-    /// The scenario, or several
+    /// Scenario files
     #[arg(value_name = "FILE.toml", required = true)]
     files: Vec<PathBuf>,
-    /// Decides everything random; without it the scenario's, its machine's, or 1
+    /// Random seed (default: the scenario's, its machine's, or 1)
     #[arg(long, value_name = "N", conflicts_with = "seeds")]
     seed: Option<u64>,
-    /// The value of a parameter of the scenario; may be repeated. Of several scenarios, of those that have it
+    /// Set a parameter of the scenario; may be repeated. With several scenarios, in those that have it
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = parameter)]
     set: Vec<(String, String)>,
     /// Run with each of these seeds, and with each value of the scenario's [sweep]
     #[arg(long, value_name = "FIRST..LAST", value_parser = seeds)]
     seeds: Option<RangeInclusive<u64>>,
-    /// How many runs at once, of a sweep or of several files; without it one for each core
+    /// Number of runs at once, of a sweep or of several files (default: one for each core)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Write the result in JUnit's XML too, as build servers read it
+    /// Also write the result as JUnit XML, as build servers read it
     #[arg(long, value_name = "FILE", conflicts_with = "seeds")]
     junit: Option<PathBuf>,
     #[command(flatten)]

@@ -22,17 +22,17 @@ use crate::session::failure_of;
 /// Where and how fast a scenario is served.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct ServeOptions {
-    /// Serve the scenario's bus to a host outside: socketcand://HOST:PORT or slcan://HOST:PORT; port 0 takes a free one; may be
-    /// repeated
+    /// Serve the scenario's bus to an outside host: socketcand://HOST:PORT or slcan://HOST:PORT; port 0 takes a free
+    /// one; may be repeated
     ///
-    /// One line that begins with `ready` names every listener. Time begins when the first client has come, and goes with the clock;
-    /// the command ends when the scenario does, with its result and exit status.
+    /// One line that begins with `ready` names every listener. Time begins when the first client has connected, and
+    /// follows the clock; the command ends when the scenario does, with its result and exit status.
     #[arg(long = "serve", value_name = "URL")]
     places: Vec<ServeSpec>,
-    /// How many times as fast as the clock a served scenario goes, e.g. 10 or 0.1, or max
+    /// Speed of a served scenario as a multiple of the clock, e.g. 10 or 0.1, or max
     #[arg(long, value_name = "N|max", conflicts_with = "clock", requires = "places")]
     speed: Option<Speed>,
-    /// What moves the time of a served scenario: the clock, or `run` on the control connection (manual)
+    /// What advances the time of a served scenario: the clock, or `run` on the control connection (manual)
     #[arg(long, value_name = "real|manual", value_enum, default_value = "real")]
     clock: Clock,
     #[command(flatten)]

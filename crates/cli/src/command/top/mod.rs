@@ -36,9 +36,9 @@ use screen::Look;
 
 /// Show and move drives in this terminal: states, plots, faults, and keys to enable, jog and stop
 ///
-/// Works over SSH in 80 columns and 24 lines. A drive is jogged only while its key is held, which the terminal tells by the key's
-/// repeats: a press alone moves nothing. What was moved from here stops when this ends, however it ends. Without --bus it is a virtual
-/// machine whose time passes with the clock.
+/// Works over SSH in 80 columns and 24 lines. A drive is jogged only while its key is held, which is detected by the
+/// key's repeats: a press alone moves nothing. What was moved from here stops when this command ends, however it ends.
+/// Without --bus it shows a virtual machine whose time follows the clock.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive top\n  ferrodrive --bus can0 --machine machine.toml top\n\n\
     Keys: ? shows them. SPACE and Esc stop every drive.")]

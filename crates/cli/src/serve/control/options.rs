@@ -11,14 +11,15 @@ use crate::serve::world::ServedWorld;
 /// Where the world can be commanded from, and by whom.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct ControlOptions {
-    /// Where other programs give world commands and hear what happens: HOST:PORT, or the path of a Unix socket
+    /// Control connection for other programs, to give world commands and receive events: HOST:PORT, or the path of a
+    /// Unix socket
     ///
-    /// Lines of JSON, for `ferrodrive world`, `ferrodrive events` and programs; docs/control.md describes them. On an address
-    /// that other machines can reach a token is asked for.
+    /// Lines of JSON, for `ferrodrive world`, `ferrodrive events` and programs; docs/control.md describes them. On an
+    /// address that other machines can reach a token is required.
     #[arg(long, value_name = "PLACE")]
     control: Option<ControlAddress>,
-    /// What clients of --control have to say first; without it, on an address that other machines can reach, a random one is
-    /// made and said on standard error
+    /// Token that clients of --control have to give first (default, on an address that other machines can reach: a
+    /// random one, printed on standard error)
     #[arg(
         long,
         value_name = "TOKEN",
