@@ -89,17 +89,17 @@ impl Line {
     /// What is known of the nodes: as it was told, of the machine, of an own bus, or from earlier calls.
     fn nodes(&self) -> Vec<(u8, Option<&'static Description>)> {
         let bus = self.bus();
-        let told = self.values("--model").filter_map(|text| node_model(text).ok());
+        let stated = self.values("--model").filter_map(|text| node_model(text).ok());
         let machine =
             self.values("--machine").last().map(str::to_owned).or_else(|| std::env::var("FERRODRIVE_MACHINE").ok());
         let machine = bus.strip_prefix("sim:").map(str::to_owned).or(machine.filter(|_| bus != "sim"));
         let of_machine = machine.and_then(|path| machine_file::machine(&path).ok());
         let of_machine = of_machine.iter().flat_map(machine_file::Machine::models);
         let own = models::embedded().into_iter().filter(|_| bus == "sim");
-        let told = told.chain(of_machine).chain(own).map(|(node, model)| (node.raw(), Some(model)));
+        let stated = stated.chain(of_machine).chain(own).map(|(node, model)| (node.raw(), Some(model)));
         let remembered = Remembered::for_completion();
         let earlier = remembered.nodes(&bus).map(|(node, model)| (node, model.and_then(named)));
-        let mut all: Vec<_> = told.chain(earlier).collect();
+        let mut all: Vec<_> = stated.chain(earlier).collect();
         all.sort_by_key(|(node, model)| (*node, model.is_none()));
         all.dedup_by_key(|(node, _)| *node);
         all

@@ -46,7 +46,7 @@ pub(crate) struct Context {
     /// What the bus says beside frames.
     pub(crate) wire: Wire,
     timeout: Duration,
-    models: BTreeMap<NodeId, Told>,
+    models: BTreeMap<NodeId, Stated>,
     json: bool,
     embedded: bool,
     remembered: RefCell<Remembered>,
@@ -54,14 +54,14 @@ pub(crate) struct Context {
 
 /// A model that need not be found out.
 #[derive(Clone, Copy)]
-enum Told {
+enum Stated {
     /// By the embedded bus, whose drive it is.
     ByBus(&'static Description),
     /// By the user, who may be wrong.
     ByUser(&'static Description),
 }
 
-impl Told {
+impl Stated {
     const fn description(self) -> &'static Description {
         match self {
             Self::ByBus(profile) | Self::ByUser(profile) => profile,
@@ -80,10 +80,11 @@ impl Context {
         traffic: Traffic,
     ) -> Self {
         let of_machine = global.machine.iter().filter(|_| embedded.is_none()).flat_map(Machine::models);
-        let by_user = of_machine.chain(global.models.iter().copied()).map(|(node, model)| (node, Told::ByUser(model)));
-        let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Told::ByBus(model)));
+        let by_user =
+            of_machine.chain(global.models.iter().copied()).map(|(node, model)| (node, Stated::ByUser(model)));
+        let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Stated::ByBus(model)));
         let models: BTreeMap<_, _> = by_bus.chain(by_user).collect();
-        network.set_models(models::with_files(models.values().map(|told| told.description())));
+        network.set_models(models::with_files(models.values().map(|stated| stated.description())));
         // The file of an embedded bus has been read once, to make the bus.
         let of_bus = match &global.bus {
             BusSpec::Sim { file: Some(path) } => machine_file::read(path).ok(),
@@ -122,16 +123,16 @@ impl Context {
     }
 
     /// Which model a node is as the user or the embedded bus says.
-    pub(crate) fn told_model(&self, id: NodeId) -> Option<&'static Description> {
-        self.models.get(&id).map(|told| told.description())
+    pub(crate) fn stated_model(&self, id: NodeId) -> Option<&'static Description> {
+        self.models.get(&id).map(|stated| stated.description())
     }
 
     /// What is known of a node's model: as it was told, if the node does not contradict, else as its identity and objects
     /// say.
     async fn knowledge_of(&self, id: NodeId) -> Result<Knowledge, Failure> {
         match self.models.get(&id) {
-            Some(Told::ByBus(model)) => return Ok((*model).into()),
-            Some(Told::ByUser(model)) => {
+            Some(Stated::ByBus(model)) => return Ok((*model).into()),
+            Some(Stated::ByUser(model)) => {
                 Drive::new(self.node(id), model).check_identity().await?;
                 return Ok((*model).into());
             }
@@ -141,15 +142,15 @@ impl Context {
     }
 
     /// All models that need not be found out.
-    pub(crate) fn told_models(&self) -> BTreeMap<NodeId, &'static Description> {
-        self.models.iter().map(|(node, told)| (*node, told.description())).collect()
+    pub(crate) fn stated_models(&self) -> BTreeMap<NodeId, &'static Description> {
+        self.models.iter().map(|(node, stated)| (*node, stated.description())).collect()
     }
 
     /// A decoder that knows the models that this command was told.
     pub(crate) fn decoder(&self) -> Decoder {
         let mut decoder = Decoder::knowing(self.network.models());
-        for (node, told) in &self.models {
-            decoder.set_model(*node, told.description());
+        for (node, stated) in &self.models {
+            decoder.set_model(*node, stated.description());
         }
         decoder
     }
@@ -202,30 +203,30 @@ impl Context {
 
     /// A drive, of a known model or not. A guess is told to the user.
     pub(crate) async fn drive(&self, id: NodeId) -> Result<Drive, Failure> {
-        let drive = self.drive_untold(id).await?;
-        self.tell_guess(&drive);
+        let drive = self.drive_without_note(id).await?;
+        self.note_guess(&drive);
         Ok(drive)
     }
 
     /// A drive, for commands that may refuse to work with a guess, which is then told with the refusal.
-    pub(crate) async fn drive_untold(&self, id: NodeId) -> Result<Drive, Failure> {
+    pub(crate) async fn drive_without_note(&self, id: NodeId) -> Result<Drive, Failure> {
         Ok(Drive::known_as(self.node(id), self.knowledge_of(id).await?).behind(self.gear(id)))
     }
 
     /// Tells the user if what follows rests on a guess. Where all models that answer so have the same objects, it does not.
-    pub(crate) fn tell_guess(&self, drive: &Drive) {
+    pub(crate) fn note_guess(&self, drive: &Drive) {
         let Some(guess) = drive.guess().filter(|guess| guess.evidence().is_some() && !self.json) else { return };
         let id = drive.node().id();
         let fitting: Vec<_> = guess.fitting().map(|model| model.name).collect();
         let key = format!("{} node {id} taken for {}", self.bus, guess.description().name);
         let how = models::how_to_say(id, &fitting);
-        self.tell_once(&key, &format!("node {id}: cannot tell its model: {guess}. Taken for that; to be sure: {how}"));
+        self.note_once(&key, &format!("node {id}: cannot tell its model: {guess}. Taken for that; to be sure: {how}"));
     }
 
     /// Keeps for completion which nodes were heard, and which models they are as far as that was said.
     pub(crate) fn remember_nodes(&self) {
         let heard = self.network.seen();
-        let nodes = heard.iter().map(|node| (node, self.told_model(node).map(|model| model.name)));
+        let nodes = heard.iter().map(|node| (node, self.stated_model(node).map(|model| model.name)));
         self.remembered.borrow_mut().heard(&self.bus.to_string(), nodes);
     }
 
@@ -237,14 +238,14 @@ impl Context {
     }
 
     /// Tells people what would be the same with every call: a person at a terminal once, whoever collects the text each time.
-    pub(crate) fn tell_once(&self, key: &str, text: &str) {
+    pub(crate) fn note_once(&self, key: &str, text: &str) {
         if !self.json && self.remembered.borrow_mut().is_new(key) {
-            self.tell(text);
+            self.note(text);
         }
     }
 
     /// Tells people something beside what the command prints; programs read the report.
-    pub(crate) fn tell(&self, text: &str) {
+    pub(crate) fn note(&self, text: &str) {
         if !self.json {
             self.progress.note(text);
         }
@@ -252,7 +253,7 @@ impl Context {
 
     /// A drive that is to be stopped: as what the user takes it for, be that right or wrong.
     pub(crate) async fn drive_to_stop(&self, id: NodeId) -> Result<Drive, Failure> {
-        match self.told_model(id) {
+        match self.stated_model(id) {
             Some(model) => Ok(Drive::new(self.node(id), model).behind(self.gear(id))),
             None => self.drive(id).await,
         }
@@ -270,10 +271,10 @@ impl Context {
     }
 
     /// Says of which nodes there are two.
-    pub(crate) fn tell_of_twins(&self) {
+    pub(crate) fn note_twins(&self) {
         let seen = self.network.seen();
         for (node, twins) in seen.iter().filter_map(|node| Some((node, self.network.node(node).facts().twins?))) {
-            self.tell(&master::core::two_devices(node, twins));
+            self.note(&master::core::two_devices(node, twins));
         }
     }
 

@@ -70,8 +70,8 @@ impl ControlArgs {
         let mut client = ControlClient { reader: BufReader::new(socket), place, asked: 0, nodes: Value::Null };
         client.wait_at_most(Some(PATIENCE))?;
         let name = format!("ferrodrive {}", std::process::id());
-        let mut told = client.ask(json!({ "request": "hello", "token": self.control_token, "name": name }))?;
-        client.nodes = told["nodes"].take();
+        let mut answer = client.ask(json!({ "request": "hello", "token": self.control_token, "name": name }))?;
+        client.nodes = answer["nodes"].take();
         Ok(client)
     }
 }

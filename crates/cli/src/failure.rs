@@ -29,7 +29,7 @@ pub(crate) struct Failure {
     /// The node, object and abort code that it is about.
     pub(crate) subject: Subject,
     /// It has been told already, as part of what the command printed.
-    pub(crate) told: bool,
+    pub(crate) reported: bool,
 }
 
 impl Failure {
@@ -42,7 +42,7 @@ impl Failure {
             because: Vec::new(),
             next: Vec::new(),
             subject: Subject::default(),
-            told: false,
+            reported: false,
         }
     }
 
@@ -163,7 +163,7 @@ impl From<testbench::failure::Failure> for Failure {
     fn from(failure: testbench::failure::Failure) -> Self {
         let testbench::failure::Failure { kind, what, because, next, subject, is_usage } = failure;
         let status = if is_usage { Status::Usage } else { Status::Failed };
-        Self { status, kind, what, because, next, subject, told: false }
+        Self { status, kind, what, because, next, subject, reported: false }
     }
 }
 

@@ -52,8 +52,8 @@ impl Around for FarWorld {
 
     fn change(&mut self, line: &str) -> Result<Changed, (&'static str, String)> {
         let (_, around::Changed { node, line, back, .. }) = around::understand(line)?;
-        let told = self.ask(json!({ "request": "world", "line": line }))?;
-        Ok(Changed { node, line, back, note: told["note"].as_str().map(str::to_owned) })
+        let answer = self.ask(json!({ "request": "world", "line": line }))?;
+        Ok(Changed { node, line, back, note: answer["note"].as_str().map(str::to_owned) })
     }
 }
 

@@ -166,7 +166,7 @@ fn show_usage(error: &clap::Error) -> ExitCode {
 /// Says why: to people on standard error, to programs as a line of JSON on standard output. Who sent a signal knows,
 /// unless there is more to tell.
 fn complain(format: Format, failure: &Failure) {
-    if failure.told {
+    if failure.reported {
         return;
     }
     if format.json {
@@ -200,7 +200,7 @@ impl Typed {
 /// Prints a report, and fails as it says; for programs that stands in the report.
 fn judged(format: Format, report: &impl Report, failure: Option<Failure>) -> Result<(), Failure> {
     print(format, report)?;
-    failure.map_or(Ok(()), |failure| Err(Failure { told: format.json || failure.told, ..failure }))
+    failure.map_or(Ok(()), |failure| Err(Failure { reported: format.json || failure.reported, ..failure }))
 }
 
 fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Result<(), Failure> {

@@ -153,15 +153,15 @@ impl Runner {
         mut station: impl Station + Send + 'static,
         clock: &WallClock,
         until: U,
-        tell: impl FnMut(Instant, &Note),
+        report: impl FnMut(Instant, &Note),
     ) -> Result<U::Output, BusError> {
         let wakeup = Arc::new(Notify::new());
         match self {
-            Self::Here(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, tell).await,
-            Self::World(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, tell).await,
+            Self::Here(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, report).await,
+            Self::World(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, report).await,
             Self::Thread(thread) => {
                 network.on_activity(Waker::from(Arc::new(Wakes(Arc::clone(&wakeup)))));
-                thread.run(station, wakeup, until, tell).await
+                thread.run(station, wakeup, until, report).await
             }
         }
     }
@@ -195,7 +195,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         let text = format!(
             "of the machine file a command on a real bus does not use: {unused}; `ferrodrive sim --machine FILE` and `ferrodrive run` do"
         );
-        context.tell_once(&format!("{} {text}", global.bus), &text);
+        context.note_once(&format!("{} {text}", global.bus), &text);
     }
     let notes = RefCell::new(BusNotes::of(&global.bus));
     let until = async {
@@ -216,18 +216,18 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         Err(notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost))))
     };
     let station = Logged::new(Tap::new(network.clone(), traffic), log);
-    let tell = |_, note: &Note| {
+    let report = |_, note: &Note| {
         wire::put_down(&context.wire, note);
         let news = notes.borrow_mut().news(note);
         if let Some(text) = news {
-            context.tell(&text);
+            context.note(&text);
             context.wire.tell(&text);
         }
     };
-    let ended = runner.run(&network, station, &clock, until, tell).await;
+    let ended = runner.run(&network, station, &clock, until, report).await;
     progress.clear();
     context.remember_nodes();
-    context.tell_of_twins();
+    context.note_twins();
     if let (Some(missing), Some(log)) = (writing.finish(), &global.log) {
         log.lacks(missing);
     }

@@ -108,7 +108,7 @@ impl Dcf {
             None => {
                 report.dcf = Some(document.text().to_owned());
                 context.progress.clear();
-                context.tell(&report.summary(Paint::OFF));
+                context.note(&report.summary(Paint::OFF));
             }
         }
         Ok(report)

@@ -220,7 +220,7 @@ impl Dump {
             result = follow(&mut bus, sink) => result?.map_or(Ok(()), |error| Err(bus_failure(global, &error))),
             result = over => {
                 if result.is_err() {
-                    sink.tell_counts();
+                    sink.report_counts();
                 }
                 result
             }
@@ -250,12 +250,12 @@ async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, F
 
 impl Sink {
     fn new(dump: &Dump, global: &Global, format: Format, log: CommandLog) -> Result<Self, Failure> {
-        let told = global
+        let stated = global
             .models
             .iter()
             .map(|(_, model)| *model)
             .chain(global.machine.iter().flat_map(Machine::models).map(|(_, model)| model));
-        dump.filter.check(&devices::all().iter().chain(told).collect::<Vec<_>>())?;
+        dump.filter.check(&devices::all().iter().chain(stated).collect::<Vec<_>>())?;
         Ok(Self {
             decoder: decoder(global, &[]),
             filter: dump.filter.clone(),
@@ -361,7 +361,7 @@ impl Sink {
     /// Tells how much was passed over, if anything was. A log without a single frame is none.
     fn summarise(&self) -> Result<(), Failure> {
         let (frames, lines_skipped, fd_frames) = (self.counts.frames(), self.lines_skipped, self.fd_frames);
-        self.tell_counts();
+        self.report_counts();
         if lines_skipped == 0 && fd_frames == 0 {
             return Ok(());
         }
@@ -384,7 +384,7 @@ impl Sink {
     }
 
     /// How many frames of what there were, for people. Programs count the lines.
-    fn tell_counts(&self) {
+    fn report_counts(&self) {
         if !self.format.json {
             // Nobody may be listening any more.
             let whose =

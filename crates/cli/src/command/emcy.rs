@@ -63,7 +63,7 @@ const ERROR_FIELD: u16 = 0x1003;
 
 /// An error, as it was told or is remembered.
 #[derive(Debug, Serialize)]
-struct Told {
+struct ErrorEntry {
     /// When it came, in s since the command began; `null` of one that is remembered.
     t: Option<f64>,
     node: u8,
@@ -84,7 +84,7 @@ struct Told {
 #[derive(Debug, Serialize)]
 struct Remembered {
     node: u8,
-    errors: Vec<Told>,
+    errors: Vec<ErrorEntry>,
 }
 
 impl Emcy {
@@ -106,8 +106,8 @@ impl Watch {
                 let (at, frame) = context.traffic.next().await;
                 let Decoded::Emcy(node, message, fault) = decoder.decode(&frame) else { continue };
                 if self.nodes == Nodes::All || self.nodes == Nodes::One(node) {
-                    let told = Told::message(at.as_secs_f64(), node, &message, fault, stamps.text(at));
-                    format.print(&told).map_err(Failure::not_printed)?;
+                    let entry = ErrorEntry::message(at.as_secs_f64(), node, &message, fault, stamps.text(at));
+                    format.print(&entry).map_err(Failure::not_printed)?;
                 }
             }
         };
@@ -124,7 +124,7 @@ impl Show {
         let mut errors = Vec::new();
         for sub_index in 1..=count.raw().min(254) as u8 {
             match drive.node().upload(Mux::new(ERROR_FIELD, sub_index)).await {
-                Ok(value) => errors.push(Told::remembered(self.node, value.raw(), drive.description())),
+                Ok(value) => errors.push(ErrorEntry::remembered(self.node, value.raw(), drive.description())),
                 // Devices that count their places, and not the errors in them, refuse the empty ones.
                 Err(Error::Aborted { .. }) => break,
                 Err(error) => return Err(error.into()),
@@ -162,7 +162,7 @@ fn meaning(code: EmcyErrorCode, fault: Option<&FaultRow>) -> String {
     }
 }
 
-impl Told {
+impl ErrorEntry {
     fn message(t: f64, node: NodeId, message: &Message, fault: Option<&'static FaultRow>, stamp: String) -> Self {
         Self {
             t: Some(t),
@@ -193,7 +193,7 @@ impl Told {
     }
 }
 
-impl Report for Told {
+impl Report for ErrorEntry {
     fn text(&self, paint: Paint) -> String {
         let Self { node, code, name, manufacturer, .. } = self;
         let time = if self.stamp.is_empty() { String::new() } else { format!("{} ", paint.dim(&self.stamp)) };

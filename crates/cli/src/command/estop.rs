@@ -64,7 +64,7 @@ const STATUSWORD: Mux = Mux::new(0x6041, 0);
 impl Estop {
     /// Stops everything.
     pub(crate) async fn run(&self, context: &Context) -> Result<StopReport, Failure> {
-        let models: BTreeMap<_, _> = context.told_models();
+        let models: BTreeMap<_, _> = context.stated_models();
         let stopped = context.network.stop_everything(&models).await;
         StopReport::new(
             context,
@@ -78,7 +78,7 @@ impl Estop {
 pub(crate) async fn stop_all(context: &Context) -> Result<StopReport, Failure> {
     let asked = NodeId::all().map(|id| async move {
         let answer = context.network.node(id).with_timeout(PATIENCE).read::<u16>(STATUSWORD).await;
-        let expected = context.told_model(id).is_some() || context.network.facts(id).seen_at.is_some();
+        let expected = context.stated_model(id).is_some() || context.network.facts(id).seen_at.is_some();
         match answer {
             Ok(_) => Some((id, None)),
             Err(Error::NoAnswer { .. }) if !expected => None,

@@ -48,8 +48,8 @@ impl Events {
         while self.count.is_none_or(|count| shown < count)
             && let Some(line) = client.next()?
         {
-            let Some(told) = line.get("event").or_else(|| line.get("dropped")) else { continue };
-            let printed = if format.json { format.print_json(told) } else { print_line(&plain(&words(told))) };
+            let Some(event) = line.get("event").or_else(|| line.get("dropped")) else { continue };
+            let printed = if format.json { format.print_json(event) } else { print_line(&plain(&words(event))) };
             printed.map_err(Failure::of_stdout)?;
             shown += 1;
         }
@@ -58,17 +58,17 @@ impl Events {
 }
 
 /// `(  1.234567)  node 4: fault 0001h, over-voltage`, and what to do below.
-fn words(told: &Value) -> String {
-    let Some(t) = told["t"].as_f64() else {
-        return format!("{} events are missing here: they were not read in time", told["events"]);
+fn words(event: &Value) -> String {
+    let Some(t) = event["t"].as_f64() else {
+        return format!("{} events are missing here: they were not read in time", event["events"]);
     };
-    let place = match (&told["node"], &told["axis"]) {
+    let place = match (&event["node"], &event["axis"]) {
         (Value::Null, _) => String::new(),
         (node, Value::Null) => format!("node {node}: "),
         (node, axis) => format!("node {node}.{axis}: "),
     };
-    let text = told["text"].as_str().unwrap_or_default();
-    let by = told["by"].as_str().filter(|by| !text.contains(by)).map(|by| format!(" (by {by})")).unwrap_or_default();
-    let remedy = told["remedy"].as_str().map(|remedy| format!("\n{:14}what to do: {remedy}", "")).unwrap_or_default();
+    let text = event["text"].as_str().unwrap_or_default();
+    let by = event["by"].as_str().filter(|by| !text.contains(by)).map(|by| format!(" (by {by})")).unwrap_or_default();
+    let remedy = event["remedy"].as_str().map(|remedy| format!("\n{:14}what to do: {remedy}", "")).unwrap_or_default();
     format!("({t:11.6}) {place}{text}{by}{remedy}")
 }

@@ -81,7 +81,7 @@ impl Gateway {
         let listener = TcpListener::bind(&self.listen).await.map_err(cannot)?;
         let address = listener.local_addr().map_err(cannot)?;
         if !address.ip().is_loopback() {
-            context.tell(&format!("everybody who reaches {address} can move the drives: there is no password"));
+            context.note(&format!("everybody who reaches {address} can move the drives: there is no password"));
         }
         format.print(&Ready { listen: address }).map_err(|error| Failure::new("cannot write").because(error))?;
         let (guard, guards) = mpsc::channel(REQUESTS);
@@ -107,7 +107,7 @@ async fn let_in(
 ) {
     let (events, _) = broadcast::channel::<Event>(EVENTS);
     let mut places = Places::default();
-    let told = Cell::new(false);
+    let is_noted = Cell::new(false);
     loop {
         tokio::select! {
             accepted = listener.accept() => {
@@ -116,8 +116,8 @@ async fn let_in(
                     continue;
                 };
                 let (place, displaced) = places.take(peer, context.network.now());
-                if let Some(displaced) = displaced.filter(|_| !told.replace(true)) {
-                    context.tell(&format!(
+                if let Some(displaced) = displaced.filter(|_| !is_noted.replace(true)) {
+                    context.note(&format!(
                         "{MAX_CLIENTS} clients are connected: {displaced}, silent for the longest, has made room for {peer}; \
                          whoever comes further is let in in the same way"
                     ));
@@ -152,7 +152,7 @@ async fn see_guarded(context: &Context, mut asked: mpsc::Receiver<Guard>, mut le
                 for node in guards.take(nodes).iter() {
                     match guard(context, node).await {
                         Ok(()) => guards.note(node),
-                        Err(why) => context.tell(&format!("node {node}: nothing stops it when this gateway dies: {why}")),
+                        Err(why) => context.note(&format!("node {node}: nothing stops it when this gateway dies: {why}")),
                     }
                 }
                 // The client may have gone.
@@ -175,7 +175,7 @@ async fn see_off(context: &Context, mut parted: mpsc::UnboundedReceiver<Gone>, l
                 Ok(_) => format!("node {node}: its client has gone; it has been quick-stopped and stands"),
                 Err(error) => format!("node {node}: its client has gone, and it may still be moving: {error}"),
             };
-            context.tell(&text);
+            context.note(&text);
         }
         // It ends with this.
         let _ = left.send(guarded);

@@ -123,12 +123,12 @@ impl Nmt {
             _ => NmtState::PreOperational,
         };
         let id = handle.id();
-        let model = context.told_model(id);
+        let model = context.stated_model(id);
         // A heartbeat that was on its way when the command went out tells of the time before it.
         let said = |node: &NodeView<'_>| {
             let heard = node.facts.heartbeat_at.filter(|at| *at > before)?;
-            let told = node.facts.nmt_state?;
-            let state = model.map_or(told, |model| model.nmt_state(told));
+            let reported = node.facts.nmt_state?;
+            let state = model.map_or(reported, |model| model.nmt_state(reported));
             Some((heard, state)).filter(|(_, state)| *state == wanted)
         };
         context.progress.show(format!("node {id}: until it says that it is {wanted}"));
@@ -183,7 +183,7 @@ async fn said_by_all(context: &Context, patience: Duration) -> Vec<Said> {
         let facts = context.network.facts(node);
         facts.heartbeat_at.filter(|at| *at >= before)?;
         // The state of an alarm heartbeat is its model's to read.
-        let state = facts.probable_state(context.told_model(node))?;
+        let state = facts.probable_state(context.stated_model(node))?;
         let booted = facts.boot_up.is_some_and(|(at, _)| at >= before);
         Some(Said { node: node.raw(), state: state.to_string(), booted })
     });

@@ -173,7 +173,7 @@ impl Params {
                 if let Some(failure) = report.failure().filter(|_| printed.is_ok()) {
                     // For programs the report has it.
                     let failure = Failure::from(failure);
-                    return Err(if format.json { Failure { told: true, ..failure } } else { failure });
+                    return Err(if format.json { Failure { reported: true, ..failure } } else { failure });
                 }
                 printed
             }

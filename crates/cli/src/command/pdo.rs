@@ -181,7 +181,7 @@ impl Watch {
                 decoder.set_pdo(self.node, config.pdo, id, &config.map);
             }
         }
-        self.tell_why_silent(context, &drive, sends);
+        self.note_why_silent(context, &drive, sends);
         context.traffic.listen();
         context.progress.show("listening; Ctrl-C ends it");
         let mut stamps = Stamps::new(self.time, context.traffic.unix_zero());
@@ -199,13 +199,13 @@ impl Watch {
     }
 
     /// What keeps its PDOs away, as far as it is known.
-    fn tell_why_silent(&self, context: &Context, drive: &Drive, sends: usize) {
+    fn note_why_silent(&self, context: &Context, drive: &Drive, sends: usize) {
         let (node, state) = (self.node, context.network.facts(self.node).probable_state(drive.description()));
         if sends == 0 {
-            context.tell(&format!("node {node} has no valid TPDO with something mapped: ferrodrive pdo show {node}"));
+            context.note(&format!("node {node} has no valid TPDO with something mapped: ferrodrive pdo show {node}"));
         }
         if let Some(state @ (NmtState::PreOperational | NmtState::Stopped)) = state {
-            context.tell(&format!("node {node} is {state} and sends no PDOs: ferrodrive nmt {node} start"));
+            context.note(&format!("node {node} is {state} and sends no PDOs: ferrodrive nmt {node} start"));
         }
     }
 }

@@ -96,7 +96,7 @@ impl Plan {
         if report.ok {
             return Ok(());
         }
-        Err(Failure { told: true, ..Failure::new("not everything is there in time") })
+        Err(Failure { reported: true, ..Failure::new("not everything is there in time") })
     }
 
     fn bitrate_of(&self, bus: &BusSpec) -> Result<Bitrate, Failure> {

@@ -229,7 +229,7 @@ impl Replay {
         }
         let mut decoder = Decoder::knowing(with_files(std::iter::empty()));
         for node in (1..=127).filter_map(NodeId::new) {
-            if let Some(model) = context.told_model(node) {
+            if let Some(model) = context.stated_model(node) {
                 decoder.set_model(node, model);
             }
         }

@@ -49,7 +49,7 @@ impl Scan {
         if found.is_empty() {
             return Err(no_node(&heard).into());
         }
-        let node = |found: &Found| ScannedNode::new(context.told_model(found.node), found, how_to_say);
+        let node = |found: &Found| ScannedNode::new(context.stated_model(found.node), found, how_to_say);
         Ok(ScanReport { nodes: found.iter().map(node).collect(), heard })
     }
 }

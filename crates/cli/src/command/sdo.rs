@@ -70,7 +70,7 @@ impl Write {
     /// Reads what was typed, and writes it.
     pub(crate) async fn run(&self, context: &Context) -> Result<ObjectReport, Failure> {
         let content = self.from.as_deref().map(content).transpose()?;
-        let drive = context.drive_untold(self.node).await?;
+        let drive = context.drive_without_note(self.node).await?;
         let (mux, row) = resolve(&drive, &self.object)?;
         let limits = moving_limits(&drive, row).await?;
         let wrong = |reason| Failure::usage(reason).at_node(self.node).at_object(mux);
@@ -82,7 +82,7 @@ impl Write {
         };
         // Bytes may be a number that means something else on another model.
         drive.check_write(mux, value.number().unwrap_or_else(|| low_bytes(&value.bytes())))?;
-        context.tell_guess(&drive);
+        context.note_guess(&drive);
         let bytes = value.bytes();
         if bytes.len() > LONG {
             context.progress.show(format!("node {}: writing {} bytes to {mux}", self.node, bytes.len()));

@@ -57,7 +57,7 @@ struct Named {
 impl Save {
     /// Stores.
     pub(crate) async fn run(&self, context: &Context) -> Result<StoreReport, Failure> {
-        let drive = context.drive_untold(self.node).await?;
+        let drive = context.drive_without_note(self.node).await?;
         drive.save().await?;
         StoreReport::new(&drive, "stored", |storage| storage.save)
     }
@@ -66,7 +66,7 @@ impl Save {
 impl Restore {
     /// Restores.
     pub(crate) async fn run(&self, context: &Context) -> Result<StoreReport, Failure> {
-        let drive = context.drive_untold(self.node).await?;
+        let drive = context.drive_without_note(self.node).await?;
         drive.restore().await?;
         StoreReport::new(&drive, "restored to factory values", |storage| storage.restore)
     }

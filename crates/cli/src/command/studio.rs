@@ -95,7 +95,7 @@ impl Studio {
         };
         if !address.ip().is_loopback() {
             let place = elsewhere(address);
-            context.tell(&format!(
+            context.note(&format!(
                 "from other machines: http://{place}/ with the password. Everybody who reaches it and has the password can move the drives, and nothing is encrypted on its way: \
                  keep it to a network of the machine's own"
             ));
@@ -145,7 +145,7 @@ pub(super) fn setting(context: &Context) -> Setting {
         bus: context.bus().to_string(),
         bitrate: bitrate(context),
         timeout: context.timeout(),
-        models: context.told_models(),
+        models: context.stated_models(),
         gears: context.gears(),
         interface: interface_of(context.bus()).name().to_owned(),
         journals: journals(context),
@@ -263,7 +263,7 @@ async fn open(context: &Context, url: &str) {
         Ok(Err(error)) => error.to_string(),
         Err(_) => return,
     };
-    context.tell(&format!("cannot open a browser ({program}: {why}): open the address yourself"));
+    context.note(&format!("cannot open a browser ({program}: {why}): open the address yourself"));
 }
 
 #[cfg(test)]

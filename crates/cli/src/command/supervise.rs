@@ -75,7 +75,7 @@ impl Supervise {
         format.print(&booted).map_err(Failure::not_printed)?;
         if let Some(failure) = booted.failure().filter(|_| !unconfigured.is_empty()) {
             // What is watched had better be what was planned.
-            return Err(Failure { told: true, ..failure.into() });
+            return Err(Failure { reported: true, ..failure.into() });
         }
         while let Some((at, event)) = context.network.poll_event() {
             // What the report of the boot-up does not have.
@@ -101,7 +101,7 @@ impl Supervise {
             }
         }
         let open = supervisor.emcys().records().filter(|record| record.gone.is_none());
-        open.for_each(|record: &EmcyRecord| context.tell(&format!("not gone: {record}")));
+        open.for_each(|record: &EmcyRecord| context.note(&format!("not gone: {record}")));
         Ok(context.network.release_guards(NodeSet::ALL).await?)
     }
 }
@@ -125,13 +125,13 @@ async fn obey(supervisor: &mut Supervisor, context: &Context, line: &str) {
     let wanted = line.trim().strip_prefix("resume ").map(|rest| node(rest.trim()));
     match wanted {
         Some(Ok(node)) => match supervisor.resume(node).await {
-            Ok(()) => context.tell(&format!("node {node}: told to take part again (NMT start)")),
-            Err(error) => context.tell(&format!("node {node} is not resumed: {error}")),
+            Ok(()) => context.note(&format!("node {node}: told to take part again (NMT start)")),
+            Err(error) => context.note(&format!("node {node} is not resumed: {error}")),
         },
-        Some(Err(reason)) => context.tell(&reason),
+        Some(Err(reason)) => context.note(&reason),
         None => {
             let how = if io::stdin().is_terminal() { "; Ctrl-C ends it" } else { "" };
-            context.tell(&format!("'{}' is no word here; expected resume NODE{how}", line.trim()));
+            context.note(&format!("'{}' is no word here; expected resume NODE{how}", line.trim()));
         }
     }
 }

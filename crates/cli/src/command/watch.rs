@@ -168,12 +168,12 @@ impl Watched {
             return;
         };
         let Some(number) = value.value else { return };
-        let told = || (number, value.text(Paint::OFF));
+        let shown = || (number, value.text(Paint::OFF));
         if self.lowest.as_ref().is_none_or(|(lowest, _)| number < *lowest) {
-            self.lowest = Some(told());
+            self.lowest = Some(shown());
         }
         if self.highest.as_ref().is_none_or(|(highest, _)| number > *highest) {
-            self.highest = Some(told());
+            self.highest = Some(shown());
         }
     }
 }

@@ -61,14 +61,14 @@ impl<B: Send + 'static> Background<B> {
     ) -> Self {
         let (batches, incoming) = sync_channel(pace.room());
         let (done, written) = channel();
-        let told = messages.clone();
+        let reporter = messages.clone();
         std::thread::spawn(move || {
             let mut writer = writer;
             let all = incoming.iter().try_for_each(|batch| write(&mut writer, batch));
             let ended = all.and_then(|()| end(writer)).map_err(|error| error.to_string());
             if let Err(error) = &ended {
                 // The drives are worth more than what is written about them.
-                told.say(&format!("warning: cannot write {}: {error}; it ends here", words.file));
+                reporter.say(&format!("warning: cannot write {}: {error}; it ends here", words.file));
             }
             // Nobody may wait for the end any more.
             let _ = done.send(ended);

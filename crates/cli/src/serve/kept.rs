@@ -13,13 +13,13 @@ pub(crate) struct Kept {
     since: Instant,
     /// Asks for the piece; false if that could not be taken, and is to be told again.
     is_full: Box<dyn Fn() -> bool>,
-    told: bool,
+    asked: bool,
 }
 
 impl Kept {
     /// Nothing yet, from the start of the bus on.
     pub(crate) fn new() -> Self {
-        Self { frames: Vec::new(), since: Instant::ZERO, is_full: Box::new(|| true), told: false }
+        Self { frames: Vec::new(), since: Instant::ZERO, is_full: Box::new(|| true), asked: false }
     }
 
     /// Calls `is_full` when the piece has to be [taken](Self::take) before time goes on, until it returns true.
@@ -40,13 +40,13 @@ impl Kept {
     /// Asks for the piece if time has come to its end.
     pub(crate) fn reached(&mut self, now: Instant) {
         if self.full_at() <= now {
-            self.told = self.told || (self.is_full)();
+            self.asked = self.asked || (self.is_full)();
         }
     }
 
     /// The piece; the next begins `now`.
     pub(crate) fn take(&mut self, now: Instant) -> Vec<(Instant, Frame)> {
-        (self.since, self.told) = (now, false);
+        (self.since, self.asked) = (now, false);
         std::mem::take(&mut self.frames)
     }
 }

@@ -226,7 +226,7 @@ impl Service {
         let read = self.answers.finish(PARTING_PATIENCE) & self.warnings.finish(PARTING_PATIENCE);
         if let Err(failure) = &mut ended {
             // Where nobody reads, the reason cannot be told either, and telling it would wait for ever.
-            failure.told |= !read;
+            failure.reported |= !read;
         }
         ended
     }

@@ -71,7 +71,7 @@ pub(crate) struct ServedWorld {
 struct UnderWay {
     before: Before,
     end: Instant,
-    told: bool,
+    reported: bool,
     /// Whose it is, if a client of the control connection asked.
     client: Option<Pending>,
 }
@@ -81,7 +81,7 @@ struct FollowedCourse {
     execution: Execution,
     /// Tells that it is over; false if that could not be taken, and is to be told again.
     is_over: Box<dyn Fn() -> bool>,
-    told: bool,
+    reported: bool,
 }
 
 /// What becomes of a world command.
@@ -134,7 +134,7 @@ impl ServedWorld {
             self.control.keep_events();
         }
         execution.go_on(&mut self.world);
-        self.execution = Some(FollowedCourse { execution, is_over: Box::new(is_over), told: false });
+        self.execution = Some(FollowedCourse { execution, is_over: Box::new(is_over), reported: false });
     }
 
     /// The world and its scenario, as they stand.
@@ -209,7 +209,7 @@ impl ServedWorld {
             Some(run) => Err(CommandError::Running { until_s: run.end.as_nanos() as f64 / 1e9 }),
             None => {
                 let end = run.end(self.world.now());
-                self.run = Some(UnderWay { before: Before::of(&mut self.world), end, told: false, client: None });
+                self.run = Some(UnderWay { before: Before::of(&mut self.world), end, reported: false, client: None });
                 self.pacer.run_to(end);
                 Ok(())
             }
@@ -516,15 +516,15 @@ impl RealTimeWorld for ServedWorld {
         if let Some(followed) = self.execution.as_mut().filter(|followed| followed.execution.is_over()) {
             // A run of longer ends with it: time goes no further.
             self.run.iter_mut().for_each(|run| run.end = run.end.min(self.world.now()));
-            followed.told = followed.told || (followed.is_over)();
+            followed.reported = followed.reported || (followed.is_over)();
         }
         if let Some(stores) = &mut self.stores {
             stores.settle(&mut self.world, self.clock);
         }
         let reached = self.world.now();
         self.kept.iter_mut().for_each(|kept| kept.reached(reached));
-        if let Some(run) = self.run.as_mut().filter(|run| !run.told && run.end <= reached) {
-            run.told = (self.run_is_over)();
+        if let Some(run) = self.run.as_mut().filter(|run| !run.reported && run.end <= reached) {
+            run.reported = (self.run_is_over)();
         }
     }
 

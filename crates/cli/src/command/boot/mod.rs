@@ -53,7 +53,7 @@ impl Boot {
         let global = global_of(&planned, global)?;
         let report = session::run(&global, async |context| self.boot(context, &planned).await)?;
         format.print(&report).map_err(Failure::of_stdout)?;
-        report.failure().map_or(Ok(()), |failure| Err(Failure { told: true, ..failure.into() }))
+        report.failure().map_or(Ok(()), |failure| Err(Failure { reported: true, ..failure.into() }))
     }
 
     async fn boot(&self, context: &Context, planned: &Planned) -> Result<BootReport, Failure> {

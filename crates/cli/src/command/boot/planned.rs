@@ -41,5 +41,5 @@ pub(crate) async fn plan_of(planned: &Planned, context: &Context, only: &[NodeId
         refuse_too_full_cycles(context, machine).await?;
     }
     let asked = |count| context.progress.count(format!("asked {count} of 127"));
-    Ok(planned.plan(&context.network, &context.told_models(), context.timeout(), only, asked).await?)
+    Ok(planned.plan(&context.network, &context.stated_models(), context.timeout(), only, asked).await?)
 }

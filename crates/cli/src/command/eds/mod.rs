@@ -43,7 +43,7 @@ impl Eds {
                 let report = lint.run();
                 print(format, &report)?;
                 // For programs the report has it.
-                report.failure(lint.strict).map_or(Ok(()), |failure| Err(Failure { told: format.json, ..failure }))
+                report.failure(lint.strict).map_or(Ok(()), |failure| Err(Failure { reported: format.json, ..failure }))
             }
             Some(What::Show(show)) => print(format, &show.run()?),
             Some(What::Diff(diff)) => print(format, &diff.run()?),

@@ -15,9 +15,9 @@ use plot::Paint;
 
 impl super::Apply {
     pub(super) async fn run(&self, context: &Context) -> Result<ApplyReport, Failure> {
-        let drive = context.drive_untold(self.wanted.node).await?;
+        let drive = context.drive_without_note(self.wanted.node).await?;
         self.how.check(context, &drive).await?;
-        context.tell_guess(&drive);
+        context.note_guess(&drive);
         let (wanted, file) = source::wanted(context, &self.wanted, drive.description())?;
         let transaction = self.how.transaction(context, drive.node().id(), self.address)?;
         Ok(transaction.apply(&context.progress, &drive, &wanted, file).await?)

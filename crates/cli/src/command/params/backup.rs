@@ -24,7 +24,7 @@ impl super::Backup {
             report.parameters = Some(sheet::print(&parameters, Some(model)));
             context.progress.clear();
             for refused in &report.refused {
-                context.tell(&format!("{} is not in it: {}", refused.object, refused.why));
+                context.note(&format!("{} is not in it: {}", refused.object, refused.why));
             }
             return Ok(report);
         };

@@ -127,7 +127,7 @@ impl Run {
         ended?;
         match report.failure() {
             // It stands in the report.
-            Some(failure) if format.json => Err(Failure { told: true, ..failure }),
+            Some(failure) if format.json => Err(Failure { reported: true, ..failure }),
             Some(failure) => Err(failure),
             None => Ok(()),
         }

@@ -37,8 +37,8 @@ pub(super) fn sweep(
     let report = SweepReport::new(file, &sweep, &summary);
     format.print(&report).map_err(Failure::of_stdout)?;
     match (crew.signal(), failure(&report)) {
-        (Some(signal), _) => Err(Failure { told: true, ..Failure::ended_by(signal) }),
-        (None, Some(failure)) if format.json => Err(Failure { told: true, ..failure }),
+        (Some(signal), _) => Err(Failure { reported: true, ..Failure::ended_by(signal) }),
+        (None, Some(failure)) if format.json => Err(Failure { reported: true, ..failure }),
         (None, Some(failure)) => Err(failure),
         (None, None) => Ok(()),
     }

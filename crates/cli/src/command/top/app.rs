@@ -92,7 +92,7 @@ impl App {
     }
 
     /// Something to tell that the bus has not said.
-    pub(super) fn tell(&mut self, node: Option<u8>, text: impl Into<String>) {
+    pub(super) fn report(&mut self, node: Option<u8>, text: impl Into<String>) {
         self.note(News { time_s: self.state.time_s, node, text: text.into() });
     }
 
@@ -108,20 +108,20 @@ impl App {
             }
             // The bus has told it already, or the key was let go.
             if !matches!(kind, "stopped" | "replaced" | "not_held") {
-                self.tell(node, error.get("message").and_then(Value::as_str).unwrap_or("it was refused"));
+                self.report(node, error.get("message").and_then(Value::as_str).unwrap_or("it was refused"));
             }
         }
         for note in answer["notes"].as_array().into_iter().flatten().filter_map(Value::as_str) {
-            self.tell(node, note);
+            self.report(node, note);
         }
         if let Some(findings) = answer["result"]["findings"].as_array() {
             let text = |finding: &Value, part: &str| finding[part].as_str().unwrap_or_default().to_owned();
             let causes: Vec<_> = findings.iter().filter(|finding| finding["cause"] == true).collect();
             for finding in &causes {
-                self.tell(node, format!("{}. {}", text(finding, "follows"), text(finding, "remedy")));
+                self.report(node, format!("{}. {}", text(finding, "follows"), text(finding, "remedy")));
             }
             if causes.is_empty() {
-                self.tell(node, "nothing is found that keeps it from moving");
+                self.report(node, "nothing is found that keeps it from moving");
             }
         }
         self.news.len() != before || self.news.len() == MOST_NEWS
@@ -230,7 +230,7 @@ impl App {
             KeyCode::Char('n') => vec![Action::Say(json!({ "do": "scan" }))],
             KeyCode::Char('t') => vec![Action::Say(json!({ "do": "take_control" }))],
             _ => {
-                self.tell(None, "this key does nothing here; ? shows those that do");
+                self.report(None, "this key does nothing here; ? shows those that do");
                 Vec::new()
             }
         }
@@ -272,7 +272,7 @@ impl App {
 
     fn say(&mut self, deed: &str) -> Vec<Action> {
         let Some(node) = self.chosen else {
-            self.tell(None, "no node has been heard: n scans the bus");
+            self.report(None, "no node has been heard: n scans the bus");
             return Vec::new();
         };
         vec![Action::Say(json!({ "do": deed, "node": node }))]

@@ -180,13 +180,13 @@ async fn show(context: &Context, host: studio::HostHandle, format: Format) -> Re
                 match shown {
                     Shown::State(state) => match serde_json::from_str(&state) {
                         Ok(state) => app.take(state),
-                        Err(error) => app.tell(None, format!("the host says what cannot be read: {error}")),
+                        Err(error) => app.report(None, format!("the host says what cannot be read: {error}")),
                     },
                     Shown::News(news) => match serde_json::from_str(&news) {
                         Ok(news) => app.note(news),
-                        Err(error) => app.tell(None, format!("the host says what cannot be read: {error}")),
+                        Err(error) => app.report(None, format!("the host says what cannot be read: {error}")),
                     },
-                    Shown::Missed(missed) => app.tell(None, format!("{missed} news came too fast to be shown")),
+                    Shown::Missed(missed) => app.report(None, format!("{missed} news came too fast to be shown")),
                     Shown::Over => return Err(gone()),
                 }
                 Vec::new()

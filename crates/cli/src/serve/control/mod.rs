@@ -228,7 +228,7 @@ struct Client<T> {
 
 impl<T: From<ControlMessage>> Client<T> {
     async fn serve(&self, stream: Box<dyn Socket>, entry: Entry) {
-        if !self.tell(ControlMessage::Joined(self.number, Arc::clone(&self.shared_outbox))).await {
+        if !self.send(ControlMessage::Joined(self.number, Arc::clone(&self.shared_outbox))).await {
             return;
         }
         let (reader, writer) = tokio::io::split(stream);
@@ -236,15 +236,15 @@ impl<T: From<ControlMessage>> Client<T> {
         tokio::select! {
             _ = self.read_lines(reader) => {
                 // What it has asked for is answered before this is heard.
-                self.tell(ControlMessage::Left(self.number)).await;
+                self.send(ControlMessage::Left(self.number)).await;
                 let _ = tokio::time::timeout(LINGER, writing).await;
             }
             _ = &mut writing => {
-                self.tell(ControlMessage::Left(self.number)).await;
+                self.send(ControlMessage::Left(self.number)).await;
             }
             () = self.turned_away(), if entry == Entry::ByToken => {
                 self.shared_outbox.put(Class::Answer, SENT_AWAY.to_owned());
-                self.tell(ControlMessage::Left(self.number)).await;
+                self.send(ControlMessage::Left(self.number)).await;
                 let _ = tokio::time::timeout(LINGER, writing).await;
             }
         }
@@ -259,7 +259,7 @@ impl<T: From<ControlMessage>> Client<T> {
     }
 
     /// False when the world's loop is over.
-    async fn tell(&self, message: ControlMessage) -> bool {
+    async fn send(&self, message: ControlMessage) -> bool {
         self.requests.send(message.into()).await.is_ok()
     }
 
@@ -276,7 +276,7 @@ impl<T: From<ControlMessage>> Client<T> {
             buffer.take(&bytes[..count], |line| lines.push(line));
             for line in lines {
                 self.shared_outbox.wait_for_room().await;
-                if !self.tell(ControlMessage::Line(self.number, line)).await {
+                if !self.send(ControlMessage::Line(self.number, line)).await {
                     return Ok(());
                 }
             }
