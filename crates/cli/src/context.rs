@@ -198,7 +198,7 @@ impl Context {
             .of_kind("unknown_model")
             .at_node(id)
             .because("its identity (1018h) and objects fit no model, or more than one")
-            .next(format!("say which it is with --model {id}=MODEL, where MODEL is one of: {}", models::names())))
+            .next(format!("name it with --model {id}=MODEL, where MODEL is one of: {}", models::names())))
     }
 
     /// A drive, of a known model or not. A guess is told to the user.
@@ -220,7 +220,10 @@ impl Context {
         let fitting: Vec<_> = guess.fitting().map(|model| model.name).collect();
         let key = format!("{} node {id} taken for {}", self.bus, guess.description().name);
         let how = models::how_to_say(id, &fitting);
-        self.note_once(&key, &format!("node {id}: cannot tell its model: {guess}. Taken for that; to be sure: {how}"));
+        self.note_once(
+            &key,
+            &format!("node {id}: its model is not certain: {guess}. That is assumed; to be sure: {how}"),
+        );
     }
 
     /// Keeps for completion which nodes were heard, and which models they are as far as that was said.

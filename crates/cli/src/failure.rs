@@ -66,13 +66,13 @@ impl Failure {
     pub(crate) fn of_stdout(error: std::io::Error) -> Self {
         Self::new("cannot write to standard output")
             .because(error)
-            .next("is the disk full that it goes to, or the program gone that reads it?")
+            .next("check whether the disk is full, or the reading program has ended")
     }
 
     /// A file that was asked for cannot be written.
     pub(crate) fn of_writing(what: &str, path: &std::path::Path, error: &std::io::Error) -> Self {
         Self::new(format!("cannot write {what} {}", path.display())).of_kind("file").because(error).next(
-            "see that its folder is there, can be written and has room; what is at that path and is no earlier one of its kind is left alone",
+            "make sure that its folder exists, can be written and has room; an existing file of another kind is not overwritten",
         )
     }
 
@@ -95,7 +95,7 @@ impl Failure {
             }
             _ => match error.get(ContextKind::Usage) {
                 Some(usage) => failure.next(usage.to_string().trim().replace("Usage:", "usage:")),
-                None if failure.next.is_empty() => failure.next("ferrodrive --help, or --help behind the command"),
+                None if failure.next.is_empty() => failure.next("ferrodrive --help, or --help after the command"),
                 None => failure,
             },
         }
@@ -174,12 +174,12 @@ impl From<master::Error> for Failure {
         let advice = match &error {
             Error::GuessedModel { node, guess, .. } => {
                 let fitting: Vec<_> = guess.fitting().map(|model| model.name).collect();
-                Some(format!("say which it is: {}", how_to_say(*node, &fitting)))
+                Some(format!("name its model: {}", how_to_say(*node, &fitting)))
             }
             Error::WrongModel { node, .. } | Error::OtherModel { node, .. } => Some(format!(
-                "omit --model {node}=.., see what `ferrodrive scan` says of it, or correct the machine file"
+                "omit --model {node}=.., see what `ferrodrive scan` shows for it, or correct the machine file"
             )),
-            Error::UnknownModel { node, .. } => Some(format!("say which it is: {}", how_to_say(*node, &["MODEL"]))),
+            Error::UnknownModel { node, .. } => Some(format!("name its model: {}", how_to_say(*node, &["MODEL"]))),
             _ => None,
         };
         advice.into_iter().fold(testbench::failure::Failure::from(error).into(), Self::next)

@@ -65,7 +65,7 @@ impl GuardArgs {
             let more = match loss {
                 HostLoss::SwitchedOff { .. } if armed => "; --guard gives it its factory value for this command",
                 HostLoss::NotArmed { .. } => "; without --no-guard they are",
-                _ => "; have an emergency stop at hand",
+                _ => "; keep an emergency stop within reach",
             };
             context.warn(&format!("node {}: if this command dies, {loss}{more}", drive.node().id()));
         }
@@ -97,12 +97,12 @@ impl Guard {
         let node = drive.node().id();
         match self.loss {
             HostLoss::StopsInSilence { object, .. } => format!(
-                "this command ends here, and {}: hold it with --for TIME; to let it go on alone, write 0 to {object} before \
-                 the motion",
+                "this command ends here, and {}: keep this command running with --for TIME; to let the drive go on alone, write 0 to {object} \
+                 before the motion",
                 self.loss
             ),
             _ => format!(
-                "this command ends here, and nobody watches it: it goes on until it is told to stop (ferrodrive stop {node})"
+                "this command ends here, and nothing monitors the drive: it keeps moving until it is stopped (ferrodrive stop {node})"
             ),
         }
     }

@@ -101,7 +101,7 @@ fn matches() -> Result<ArgMatches, clap::Error> {
         Some(mended) if mended.is_harmless() => {
             if !words.iter().any(|word| word == "--json") {
                 // Nobody may be listening any more.
-                let _ = writeln!(io::stderr(), "note: taken for: {}", plain(&mended.text()));
+                let _ = writeln!(io::stderr(), "note: interpreted as: {}", plain(&mended.text()));
             }
             return Ok(mended.matches);
         }

@@ -36,86 +36,76 @@ const UNHEEDED: [Unheeded; 15] = [
         command: "run",
         options: ALL,
         why: "a scenario has a machine and a bus of its own",
-        next: "leave it away; the scenario's machine may be the path of a machine file",
+        next: "omit it; the scenario's machine may be the path of a machine file",
     },
     Unheeded {
         command: "world",
         options: ALL,
-        why: "it speaks to a running simulator, not to a bus",
-        next: "leave it away; --control says where the simulator is",
+        why: "it talks to a running simulator, not to a bus",
+        next: "omit it; --control names the simulator",
     },
     Unheeded {
         command: "events",
         options: ALL,
         why: "it listens to a running simulator, not to a bus",
-        next: "leave it away; --control says where the simulator is",
+        next: "omit it; --control names the simulator",
     },
     Unheeded {
         command: "sim",
         options: &[MODEL],
-        why: "it makes its drives itself, each of the model that its --drive names",
+        why: "it creates its drives itself, each of the model that --drive names",
         next: "give --drive MODEL@NODE, e.g. --drive zlac8030l@4",
     },
     Unheeded {
         command: "sim",
         options: &[TIMEOUT],
-        why: "it asks nobody anything, and waits for no answer",
-        next: "leave it away",
+        why: "it sends no requests, and waits for no answer",
+        next: "omit it",
     },
     Unheeded {
         command: "demo",
         options: ALL,
         why: "it shows virtual drives on buses of their own",
-        next: "leave it away; --drive MODEL chooses the drive",
+        next: "omit it; --drive MODEL chooses the drive",
     },
     Unheeded {
         command: "dump",
         options: &[TIMEOUT, VERBOSE],
         why: "it only listens, waits for no answer, and shows every frame that it hears",
-        next: "leave it away; --for TIME says how long it listens",
+        next: "omit it; --for TIME says how long it listens",
     },
     Unheeded {
         command: "decode",
         options: &[BUS, TIMEOUT, VERBOSE, REALTIME],
-        why: "it reads a log, and asks nobody anything",
-        next: "leave it away",
+        why: "it reads a log, and sends no requests",
+        next: "omit it",
     },
     Unheeded {
         command: "convert",
         options: ALL,
         why: "it reads a log and writes another, and looks at no frame",
-        next: "leave it away; the second file is the log that is written",
+        next: "omit it; the second file is the log that is written",
     },
-    Unheeded { command: "plot", options: ALL, why: "it draws what a file has", next: "leave it away" },
-    Unheeded {
-        command: "man-pages",
-        options: ALL,
-        why: "a manual page depends on none of them",
-        next: "leave it away",
-    },
+    Unheeded { command: "plot", options: ALL, why: "it draws a file", next: "omit it" },
+    Unheeded { command: "man-pages", options: ALL, why: "a manual page depends on none of them", next: "omit it" },
     Unheeded {
         command: "completions",
         options: ALL,
         why: "a script for a shell depends on none of them",
-        next: "leave it away",
+        next: "omit it",
     },
-    Unheeded {
-        command: "eds",
-        options: ALL,
-        why: "it is about files, not about a node of a bus",
-        next: "leave it away",
-    },
+    Unheeded { command: "eds", options: ALL, why: "it is about files, not about a node of a bus", next: "omit it" },
     Unheeded {
         command: "check",
         options: &[MODEL],
         why: "the file that is checked says which models are where",
-        next: "leave it away",
+        next: "omit it",
     },
     Unheeded {
         command: "readings",
         options: ALL,
         why: "it is about a model, not about a node of a bus",
-        next: "leave it away",
+        next: "omit it",
     },
 ];
 
@@ -123,14 +113,14 @@ const OBJECTS_OF_A_MODEL: Unheeded = Unheeded {
     command: "objects",
     options: ALL,
     why: "the objects of a model are the same on every bus",
-    next: "leave it away, or give a node-ID in place of the model",
+    next: "omit it, or give a node-ID in place of the model",
 };
 
 const CHECK_OF_A_FILE: Unheeded = Unheeded {
     command: "check",
     options: &[TIMEOUT, VERBOSE, REALTIME, LOG],
     why: "without a bus it reads files, and sends nothing",
-    next: "leave it away, or give --bus to have the drives asked that are there",
+    next: "omit it, or give --bus to ask the drives on it",
 };
 
 /// The command line as it is parsed and shown.
@@ -170,7 +160,7 @@ pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgM
     let rows = UNHEEDED.iter().filter(|row| row.command == name).chain(special);
     for row in rows {
         if let Some(option) = row.options.iter().find(given) {
-            return Err(Failure::usage(format!("--{} means nothing to {name}", spelled(option)))
+            return Err(Failure::usage(format!("--{} has no effect on {name}", spelled(option)))
                 .because(row.why)
                 .next(row.next));
         }
@@ -179,8 +169,8 @@ pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgM
     let own_bus =
         own_bus && name != "sim" && !UNHEEDED.iter().any(|row| row.command == name && row.options.contains(&BUS));
     if typed(REALTIME) && own_bus {
-        return Err(Failure::usage("--realtime means nothing on a virtual bus of this command alone")
-            .because("its time is that of the simulation, not of the clock")
+        return Err(Failure::usage("--realtime has no effect on a virtual bus of this command alone")
+            .because("its time is simulated, and does not follow the clock")
             .next("give --bus with a real bus, or use it with sim"));
     }
     refuse_two_models(global)
@@ -211,7 +201,7 @@ mod tests {
 
     const REAL_BUS: &str = "socketcand://127.0.0.1:1/can0";
 
-    /// A line of each command that the parser takes, on a bus where every option may mean something.
+    /// A line of each command that the parser takes, on a bus where every option may have an effect.
     const LINES: &[&str] = &[
         "boot m.toml",
         "check m.toml",
@@ -291,7 +281,7 @@ mod tests {
         let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| panic!("{all:?}: {e}"));
         let refused = refuse_unheeded(&cli.global, &cli.command, &matches).err();
         let said = refused.as_ref().map(|failure| failure.what.as_str());
-        let of_option = format!("--{} means nothing to", spelled(option));
+        let of_option = format!("--{} has no effect on", spelled(option));
         assert!(said.is_none_or(|said| said.starts_with(&of_option)), "{all:?}: {said:?}");
         said.is_none()
     }

@@ -38,7 +38,7 @@ const VIRTUAL_LIMIT: Duration = Duration::from_secs(24 * 3600);
 pub(crate) fn run<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
     match &global.bus {
         BusSpec::Sim { file } => virtual_bus(global, file.as_deref(), command),
-        BusSpec::Log { path } => Err(Failure::usage(format!("{} is a log: nobody there can answer", path.display()))
+        BusSpec::Log { path } => Err(Failure::usage(format!("{} is a log: no node can answer", path.display()))
             .next(format!("ferrodrive --bus log:{} dump", path.display()))),
         _ => runtime()?.block_on(real_bus(global, command)),
     }
@@ -238,7 +238,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
             let failure = failure.because(format!("node {node} was moving, and cannot be reached any more"));
             without_this_command(network.guarded(node), failure).next(make_sure(node))
         });
-        failure.next(format!("find out why {} went away, and start it again", global.bus))
+        failure.next(format!("find out why {} was lost, and restart it", global.bus))
     })?
 }
 
@@ -316,7 +316,7 @@ pub(crate) fn bus_failure(global: &Global, error: &dyn Error) -> Failure {
     let failure = Failure { what: format!("bus {}: {}", global.bus, failure.what), kind: "bus", ..failure };
     if failure.next.is_empty() {
         return failure
-            .next("see that it is there and spelt rightly; `ferrodrive help options` lists the forms of --bus");
+            .next("check that it exists and is spelled correctly; `ferrodrive help options` lists the forms of --bus");
     }
     failure
 }

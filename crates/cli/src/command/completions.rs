@@ -52,7 +52,8 @@ impl Completions {
             script.extend_from_slice(BASH.as_bytes());
         } else {
             let known = Shells::builtins();
-            let shell = known.completer(name).ok_or_else(|| Failure::new(format!("there is no script for {name}")))?;
+            let shell =
+                known.completer(name).ok_or_else(|| Failure::new(format!("cannot print a script for {name}")))?;
             let written = shell.write_registration(ASKED_BY, "ferrodrive", "ferrodrive", "ferrodrive", &mut script);
             written.map_err(|error| Failure::new("cannot make the script").because(error))?;
         }

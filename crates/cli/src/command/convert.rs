@@ -55,7 +55,7 @@ impl Convert {
     pub(crate) fn run(&self, quiet: bool) -> Result<ConvertReport, Failure> {
         let mut reader = open_log(&self.from)?;
         if same_file(&self.from, self.to.path()) {
-            return Err(Failure::usage(format!("{} would be written while it is read", self.from.display()))
+            return Err(Failure::usage(format!("cannot convert {} to itself", self.from.display()))
                 .next("give the new log another name"));
         }
         let mut writer = self.to.create()?;
@@ -84,7 +84,7 @@ impl Convert {
         writer.finish().map_err(not_written)?;
         if report.frames + report.error_frames + report.fd_frames == 0 && report.passed_over > 0 {
             return Err(
-                Failure::new(format!("no frame in {}: this is no {} log", report.from, report.form)).of_kind("no_log")
+                Failure::new(format!("no frame in {}: it is not a {} log", report.from, report.form)).of_kind("no_log")
             );
         }
         Ok(report)
@@ -101,7 +101,7 @@ impl Report for ConvertReport {
         let Self { from, to, frames, error_frames, fd_frames, passed_over, form } = self;
         let mut text = format!("{} ({form}) written as {}: {frames} frames", from, paint.strong(to));
         for (count, what) in
-            [(error_frames, "error frames"), (fd_frames, "CAN FD frames left out"), (passed_over, "places passed over")]
+            [(error_frames, "error frames"), (fd_frames, "CAN FD frames left out"), (passed_over, "places skipped")]
         {
             if *count > 0 {
                 text.push_str(&format!(", {count} {what}"));

@@ -40,7 +40,7 @@ impl CycleArgs {
             false => String::new(),
         };
         failure.next(format!(
-            "other programs kept this one from its cycles: give {allow}--realtime (Linux) to run before other programs, or a longer \
+            "other programs delayed the cycles of this one: give {allow}--realtime (Linux) to run before other programs, or a longer \
              period; `ferrodrive latency` measures how late this host is"
         ))
     }

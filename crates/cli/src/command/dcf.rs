@@ -247,9 +247,9 @@ async fn bit_rate(node: &Node, model: &Description) -> Option<u16> {
 }
 
 pub(super) fn exists(path: &Path) -> Failure {
-    Failure::new(format!("{} is there already", path.display()))
+    Failure::new(format!("{} already exists", path.display()))
         .of_kind("file_exists")
-        .next("--force writes over it, or give another --output")
+        .next("--force overwrites it, or give another --output")
 }
 
 /// Writes the file at once or not at all: beside its place, then to it.

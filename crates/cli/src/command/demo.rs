@@ -83,6 +83,6 @@ impl Report for DemoReport {
 }
 
 fn differs() -> Failure {
-    let failure = Failure::new("the drives did not do everything as their manuals say");
+    let failure = Failure::new("not every result matches the manuals");
     Failure { kind: "differs", ..failure.next("look for DIFFERS in the table, or for \"ok\":false in the rows") }
 }

@@ -164,8 +164,8 @@ impl DriveBase {
 
     async fn drive(&self, context: &Context) -> Result<BaseDriven, Failure> {
         let Some(plan) = context.machine.as_ref().and_then(|machine| machine.base) else {
-            return Err(Failure::usage("no machine file with a [base] is given")
-                .next("give one: ferrodrive drive-base --machine FILE.toml (docs/machine-file.md says what it has)"));
+            return Err(Failure::usage("expected a machine file with a [base]")
+                .next("give one: ferrodrive drive-base --machine FILE.toml (docs/machine-file.md describes it)"));
         };
         let watchdog = self.dead_man.unwrap_or(plan.limits.watchdog);
         let limits = BaseLimits { watchdog, ..plan.limits };
@@ -262,11 +262,11 @@ fn within_limits(asked: Twist, plan: &BasePlan, limits: &BaseLimits) -> Result<(
     let shown = |twist: Twist| format!("{} m/s and {} rad/s", Shown(twist.linear_m_s), Shown(twist.angular_rad_s));
     let [linear, angular, wheel] = [limits.linear_m_s, limits.angular_rad_s, limits.wheel_m_s].map(Shown);
     Err(Failure::new(format!(
-        "{} is more than this base is to do: [base] allows {linear} m/s, {angular} rad/s and {wheel} m/s at a wheel",
+        "{} is beyond the limits of [base]: {linear} m/s, {angular} rad/s and {wheel} m/s at a wheel",
         shown(asked)
     ))
     .of_kind("out_of_limits")
-    .next(format!("ask for {}, the most on the same way, or raise the limits in [base]", shown(driven))))
+    .next(format!("give {}, the most in the same direction, or raise the limits in [base]", shown(driven))))
 }
 
 async fn wheel(context: &Context, plan: &BasePlan, node: NodeId, turns: f64) -> Result<WheelSetup, Failure> {
@@ -341,7 +341,7 @@ async fn follow_lines(
         let is_late = matches!(state.cause, Some(StopCause::Watchdog { .. }));
         if let Some(cause) = state.cause.filter(|_| is_late && !was_late) {
             seen.dead_man_stops += 1;
-            context.progress.note(&format!("{cause}; the next line drives on"));
+            context.progress.note(&format!("{cause}; the next line continues"));
         }
         was_late = is_late;
         if ended {
@@ -398,7 +398,7 @@ fn twist_of(context: &Context, line: &str, seen: &mut Seen) -> Option<Twist> {
     if twist.is_none() {
         seen.bad_lines += 1;
         let shown: String = line.chars().take(60).collect();
-        context.progress.note(&format!("'{shown}' is no twist: expected two numbers, m/s and rad/s, e.g. 0.3 -0.1"));
+        context.progress.note(&format!("expected a twist of two numbers, m/s and rad/s, e.g. 0.3 -0.1, got '{shown}'"));
     }
     twist
 }
@@ -451,7 +451,7 @@ impl BaseDriven {
 impl Report for BaseDriven {
     fn text(&self, paint: Paint) -> String {
         let PoseReport { x_m, y_m, heading_deg } = self.pose;
-        let head = format!("the base stands after {:.2} s; its drives have no power now", self.time_s);
+        let head = format!("the base stands after {:.2} s; its drives are without power", self.time_s);
         let Limits { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, dead_man_ms, lag_m } = self.limits;
         let [linear, angular, wheel, ramp] = [linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2].map(Shown);
         let mut lines = vec![
@@ -465,10 +465,10 @@ impl Report for BaseDriven {
         ];
         lines.extend(self.wheels.iter().map(|wheel| format!("  guard   node {}: {}", wheel.node, wheel.guard.text)));
         if self.dead_man_stops > 0 {
-            lines.push(format!("  note    stopped {} times, since no line came", self.dead_man_stops));
+            lines.push(format!("  note    stopped {} times because no line arrived", self.dead_man_stops));
         }
         if self.bad_lines > 0 {
-            lines.push(format!("  note    {} lines were no twist", self.bad_lines));
+            lines.push(format!("  note    {} lines were not a twist", self.bad_lines));
         }
         lines.join("\n")
     }

@@ -367,9 +367,9 @@ impl Sink {
         }
         if frames == 0 && fd_frames == 0 {
             let form = self.of.map_or("candump", LogFormat::name);
-            return Err(Failure::new(format!("no frame, and {lines_skipped} passed over: this is no {form} log"))
+            return Err(Failure::new(format!("no frame, and {lines_skipped} places skipped: this is not a {form} log"))
                 .of_kind("no_log")
-                .next("logs are told apart by their first bytes, then by their extension: .log (candump), .asc, .blf, .trc, .pcap, .pcapng")
+                .next("a log is recognised by its first bytes, then by their extension: .log (candump), .asc, .blf, .trc, .pcap, .pcapng")
                 .next("candump -L can0 writes one"));
         }
         if self.format.json {
@@ -378,7 +378,7 @@ impl Sink {
         }
         let _ = writeln!(
             io::stderr(),
-            "warning: {frames} frames read; {lines_skipped} places were passed over, and {fd_frames} CAN FD frames seen"
+            "warning: {frames} frames read; {lines_skipped} places were skipped, and {fd_frames} CAN FD frames seen"
         );
         Ok(())
     }
@@ -388,7 +388,7 @@ impl Sink {
         if !self.format.json {
             // Nobody may be listening any more.
             let whose =
-                if self.is_filtered { "; the kernel kept back all but the identifiers of these nodes" } else { "" };
+                if self.is_filtered { "; the kernel filtered out all but the identifiers of these nodes" } else { "" };
             let _ = writeln!(io::stderr(), "{}{whose}", self.counts);
         }
     }
@@ -405,7 +405,7 @@ pub(crate) fn open_log(path: &Path) -> Result<AnyLogReader, Failure> {
 
 /// A log that cannot be read on.
 pub(crate) fn unreadable(path: &Path, error: &io::Error) -> Failure {
-    Failure::new(format!("cannot read the log {} on", path.display())).of_kind("bus").because(error)
+    Failure::new(format!("cannot read the log {} to its end", path.display())).of_kind("bus").because(error)
 }
 
 fn not_printed(error: &io::Error) -> Failure {

@@ -142,8 +142,8 @@ impl Show {
             return failure;
         }
         failure
-            .because("the node remembers no errors (it has no 1003h)")
-            .next(format!("ferrodrive state {} shows the fault that there is now", self.node))
+            .because("the node has no 1003h, so that it remembers no errors")
+            .next(format!("ferrodrive state {} shows the present fault", self.node))
     }
 }
 

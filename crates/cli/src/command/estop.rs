@@ -155,11 +155,11 @@ impl StopReport {
     fn new(context: &Context, nodes: Vec<AxisReport>, surer: &str) -> Result<Self, Failure> {
         let bus = context.bus();
         if nodes.is_empty() {
-            return Err(Failure::new(format!("no drive answers on {bus}: what is there may still be moving"))
+            return Err(Failure::new(format!("no drive answers on {bus}: drives may still be moving"))
                 .of_kind("no_node")
                 .because("no node has a statusword (6041h), and none was heard")
-                .next(format!("if something moves and must not: {surer}"))
-                .next("check supply, cable and bit rate; then: ferrodrive scan"));
+                .next(format!("if something moves that must not: {surer}"))
+                .next("check supply, cable and bit rate, then: ferrodrive scan"));
         }
         let moving: Vec<_> = nodes.iter().filter(|axis| !axis.stands).collect();
         let failure = moving.first().map(|_| {
@@ -205,8 +205,8 @@ fn in_words(way: &'static str) -> String {
     } else if way == StopWay::NoPower.words() {
         "its motor has no power; a load may move it".to_owned()
     } else if way == StopWay::Fault.words() {
-        "a fault has taken the power off its motor; a load may move it".to_owned()
+        "a fault has removed power from its motor; a load may move it".to_owned()
     } else {
-        "by its ramp; it was left as enabled as it was".to_owned()
+        "by its ramp; it stays enabled if it was".to_owned()
     }
 }

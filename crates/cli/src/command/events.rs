@@ -38,7 +38,7 @@ impl Events {
     /// Shows events until there are no more.
     pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
         Filter::new(self.nodes.iter().copied(), &self.kinds)
-            .map_err(|error| Failure::usage(error.to_string()).next("leave --kind away to hear of all"))?;
+            .map_err(|error| Failure::usage(error.to_string()).next("omit --kind to show all events"))?;
         exit_on_signal();
         let mut client = self.control.connect()?;
         let events = json!({ "nodes": self.nodes, "kinds": self.kinds });

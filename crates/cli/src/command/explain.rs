@@ -36,7 +36,7 @@ impl Explain {
     /// Listens, reads, concludes.
     pub(crate) async fn run(&self, context: &Context) -> Result<ExplainReport, Failure> {
         let heard = self.listen(context).await;
-        context.progress.show(format!("node {}: reading what it says of itself", self.node));
+        context.progress.show(format!("node {}: reading its objects", self.node));
         let drive = match context.drive(self.node).await {
             Ok(drive) => drive,
             // Silence is what is to be explained; the frames still tell something.
@@ -71,7 +71,7 @@ impl Report for ExplainReport {
     fn text(&self, paint: Paint) -> String {
         let mut lines = vec![self.headline()];
         if self.causes == 0 {
-            lines.push("Nothing was found that keeps it from moving.".to_owned());
+            lines.push("Nothing found that keeps it from moving.".to_owned());
         }
         for row in &self.findings {
             lines.push(String::new());

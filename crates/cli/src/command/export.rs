@@ -63,7 +63,9 @@ impl Export {
             ids = context.network.scan(context.timeout(), asked).await.iter().map(|found| found.node).collect();
         }
         if ids.is_empty() {
-            return Err(Failure::new("no node is on the bus").of_kind("no_node").next("ferrodrive scan says more"));
+            return Err(Failure::new("no node answers on the bus")
+                .of_kind("no_node")
+                .next("ferrodrive scan shows more"));
         }
         ids.sort_unstable();
         ids.dedup();

@@ -69,8 +69,8 @@ impl Gateway {
     /// Serves until a signal ends it.
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         if context.is_embedded() {
-            return Err(Failure::usage("a gateway to a virtual bus of this command alone serves nobody")
-                .because("such a bus has virtual time")
+            return Err(Failure::usage("a gateway cannot serve a virtual bus of this command alone")
+                .because("such a bus has virtual time, in which no client can connect")
                 .next("ferrodrive sim --drive MODEL@NODE --serve socketcand://127.0.0.1:29536, then --bus socketcand://127.0.0.1:29536/can0"));
         }
         let cannot = |error: std::io::Error| {
@@ -81,7 +81,7 @@ impl Gateway {
         let listener = TcpListener::bind(&self.listen).await.map_err(cannot)?;
         let address = listener.local_addr().map_err(cannot)?;
         if !address.ip().is_loopback() {
-            context.note(&format!("everybody who reaches {address} can move the drives: there is no password"));
+            context.note(&format!("there is no password: anyone who can reach {address} can move the drives"));
         }
         format.print(&Ready { listen: address }).map_err(|error| Failure::new("cannot write").because(error))?;
         let (guard, guards) = mpsc::channel(REQUESTS);
@@ -119,7 +119,7 @@ async fn let_in(
                 if let Some(displaced) = displaced.filter(|_| !is_noted.replace(true)) {
                     context.note(&format!(
                         "{MAX_CLIENTS} clients are connected: {displaced}, silent for the longest, has made room for {peer}; \
-                         whoever comes further is let in in the same way"
+                         further clients get a place in the same way"
                     ));
                 }
                 let handle = Handle {

@@ -134,7 +134,7 @@ fn turning(text: &str) -> Result<Rpm, String> {
 fn rate(text: &str) -> Result<f64, String> {
     match text.parse::<Ramp>() {
         Ok(Ramp::RpmPerSecond(rate)) if rate > 0.0 => Ok(rate / 60.0),
-        Ok(_) => Err("expected a rate above 0, e.g. 120rpm/s: the way to a speed that changes has no one time".into()),
+        Ok(_) => Err("expected a rate above 0, e.g. 120rpm/s: a change of speed does not take a fixed time".into()),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -265,7 +265,9 @@ impl Move {
     async fn plan(&self, context: &Context) -> Result<Planned, Failure> {
         let targets: Vec<_> = self.targets().collect();
         if targets.is_empty() {
-            return Err(Failure::usage("no axis is named").next("say where each is to go: 1=90deg 4=0.5turn"));
+            return Err(
+                Failure::usage("expected the axes to move").next("name each with its position: 1=90deg 4=0.5turn")
+            );
         }
         for (position, (node, _)) in targets.iter().enumerate() {
             if targets[..position].iter().any(|(other, _)| other == node) {
@@ -319,7 +321,7 @@ impl Move {
         };
         match targets.iter().find(|(node, _)| !has(&group, *node)) {
             Some((node, _)) => {
-                Err(Failure::usage(format!("node {node} is no axis of the group '{name}'")).at_node(*node))
+                Err(Failure::usage(format!("node {node} is not an axis of the group '{name}'")).at_node(*node))
             }
             None => Ok(Some(group)),
         }
@@ -475,7 +477,7 @@ impl Report for GroupMoved {
             0 => String::new(),
             missed => format!(", later by {missed} missed cycles"),
         };
-        let head = format!("{}{missed}; no power now", paint.good(&moved));
+        let head = format!("{}{missed}; the drives are without power", paint.good(&moved));
         let mut table = Table::new(&["node", "mode", "from", "to", "at", "largest lag", "limits"]);
         for axis in &self.axes {
             let deg = |value: f64| format!("{} deg", Shown(value));

@@ -50,7 +50,7 @@ impl Home {
         {
             return Err(self.refusal(model, axis));
         }
-        let doing = format!("node {}: looking for its reference", self.node);
+        let doing = format!("node {}: searching its reference", self.node);
         context.progress.show(&doing);
         let speed = self.profile_velocity.map(|speed| drive.turning(speed)).transpose()?;
         let options = HomingOptions { speed, limit: self.within, wait: !self.no_wait };
@@ -63,7 +63,7 @@ impl Home {
     fn refusal(&self, model: &Description, axis: &AxisDescription) -> Failure {
         let modes = axis.modes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let mode = ModeOfOperation::HOMING;
-        Failure::new(format!("node {}: no homing with method {}", self.node, self.method))
+        Failure::new(format!("node {}: cannot home with method {}", self.node, self.method))
             .of_kind("no_such_mode")
             .at_node(self.node)
             .because(format!("the {} has no homing: 6060h takes {modes} only, not {}", model.title, mode.0))

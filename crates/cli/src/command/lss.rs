@@ -115,8 +115,8 @@ fn device(text: &str) -> Result<Device, String> {
     let numbers: Option<[u32; 4]> = hexadecimals(text);
     numbers.map(|numbers| Device::At(Address { numbers })).ok_or_else(|| {
         format!(
-            "'{text}' is no LSS address; expected vendor, product code, revision and serial number in hexadecimal, e.g. \
-             100:1:0:2A, or the word only"
+            "expected an LSS address (vendor, product code, revision and serial number in hexadecimal, e.g. 100:1:0:2A), or \
+             the word only, got '{text}'"
         )
     })
 }
@@ -129,7 +129,9 @@ fn make(text: &str) -> Result<Make, String> {
         revision: Some(revision),
     });
     short.or(long).ok_or_else(|| {
-        format!("'{text}' is no make; expected vendor-ID and product code, and the revision if known, in hexadecimal, e.g. 100:1")
+        format!(
+            "expected vendor-ID and product code, and the revision if known, in hexadecimal, e.g. 100:1, got '{text}'"
+        )
     })
 }
 
@@ -155,13 +157,13 @@ fn bit_rate(text: &str) -> Result<u8, String> {
     let wanted = text.parse::<Bitrate>().ok().map(|rate| rate.bits_per_second() / 1000);
     let index = BIT_RATES_KBIT.iter().position(|rate| rate.is_some() && rate.map(u32::from) == wanted);
     index.map(|index| index as u8).ok_or_else(|| {
-        format!("'{text}' is no bit rate of CiA 305; expected 10k, 20k, 50k, 125k, 250k, 500k, 800k or 1M")
+        format!("expected a bit rate of CiA 305 (10k, 20k, 50k, 125k, 250k, 500k, 800k or 1M), got '{text}'")
     })
 }
 
 fn silence(text: &str) -> Result<Duration, String> {
     let time = parse_duration(text).map_err(|error| error.to_string())?;
-    if time.as_millis() <= u128::from(u16::MAX) { Ok(time) } else { Err("at most 65535ms can be said".into()) }
+    if time.as_millis() <= u128::from(u16::MAX) { Ok(time) } else { Err("expected at most 65535ms".into()) }
 }
 
 /// What was found or done.
@@ -321,7 +323,7 @@ impl LssMaster<'_> {
         if addresses.is_empty() {
             let only_first = asked == 1;
             return Err(if only_first {
-                no_answer(&format!("a device of make {vendor_id:X}:{product_code:X}"))
+                no_answer(&format!("a device {vendor_id:X}:{product_code:X}"))
             } else {
                 went_away()
             });
@@ -391,7 +393,7 @@ impl LssMaster<'_> {
         if let Some(Wanted(node)) = set.node_id {
             let what = if node == UNCONFIGURED { "no node-ID".to_owned() } else { format!("node-ID {node}") };
             let answer = self.ask(Request::ConfigureNodeId(node)).await;
-            done.push(checked(&what, answer, "the device does not take it")?);
+            done.push(checked(&what, answer, "the device does not accept it")?);
         }
         if let Some(index) = set.bitrate {
             let rate = BIT_RATES_KBIT[usize::from(index)].unwrap_or_default();
@@ -400,7 +402,7 @@ impl LssMaster<'_> {
         }
         if set.store {
             let answer = self.ask(Request::Store).await;
-            done.push(checked("stored", answer, "the device has no store for it, or cannot reach it")?);
+            done.push(checked("stored", answer, "the device cannot store it")?);
         }
         if let Some(silence) = set.activate {
             self.ask(Request::ActivateBitRate(silence.as_millis() as u16)).await;
@@ -420,7 +422,7 @@ fn no_answer(who: &str) -> Failure {
     Failure::new(format!("{who} does not answer LSS"))
         .of_kind("no_answer")
         .because(format!("it is not there, has another address, or has no LSS (CiA 305): {}", without_lss()))
-        .next("ferrodrive scan shows who has a node-ID, `ferrodrive read NODE 1018:*` its address; give it more time: --within 200ms")
+        .next("ferrodrive scan shows the nodes with a node-ID, `ferrodrive read NODE 1018:*` its address; give it more time: --within 200ms")
 }
 
 /// The models that have no LSS, in words.

@@ -108,7 +108,7 @@ struct RampArgs {
 pub(super) fn speed(text: &str) -> Result<Along<Rpm>, String> {
     match text.parse() {
         Ok(speed @ (Along::Turning(Rpm(value)) | Along::Metres(value))) if value > 0.0 => Ok(speed),
-        Ok(_) => Err("a profile velocity is more than zero, e.g. 60rpm; the target gives the direction".into()),
+        Ok(_) => Err("expected a profile velocity above 0, e.g. 60rpm; the target decides the direction".into()),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -211,7 +211,7 @@ impl Torque {
         let guard = self.guard.begin(context, &drive).await?;
         let motion = drive.torque(self.current).await?;
         let then = self.duration.map_or(Then::goes_on_if(self.current.0 != 0.0), Then::StopAfter);
-        outcome(context, &drive, ("push with", &self.current), motion, then, guard).await
+        outcome(context, &drive, ("apply", &self.current), motion, then, guard).await
     }
 }
 
@@ -303,8 +303,7 @@ pub(super) async fn outcome(
     }
     let state = StateReport::read(drive).await?;
     let from_file = drive.description().is_some_and(is_from_file);
-    let units =
-        from_file.then(|| "the data sheet does not say what a count is worth: CiA 402's units are assumed".to_owned());
+    let units = from_file.then(|| "the data sheet does not define the units: CiA 402's units are assumed".to_owned());
     let (guard, farewell) = guard.end(context, drive, then == Then::GoesOn).await?;
     // What the drive does without its host is the guard's to tell.
     let notes = motion.notes.iter().filter(|note| !matches!(note, Note::HostLoss(_))).map(ToString::to_string);

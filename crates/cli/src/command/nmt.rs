@@ -131,7 +131,7 @@ impl Nmt {
             let state = model.map_or(reported, |model| model.nmt_state(reported));
             Some((heard, state)).filter(|(_, state)| *state == wanted)
         };
-        context.progress.show(format!("node {id}: until it says that it is {wanted}"));
+        context.progress.show(format!("node {id}: waiting until it reports that it is {wanted}"));
         match handle.wait(said, patience).await {
             Ok((_, state)) => Ok(state),
             Err(Elapsed) => Err(self.not_reached(context, handle, wanted, before, patience).await),
@@ -148,14 +148,14 @@ impl Nmt {
     ) -> Failure {
         let id = handle.id();
         let failure =
-            Failure::new(format!("node {id} has not said within {} s that it is {wanted}", patience.as_secs_f64()))
+            Failure::new(format!("node {id} has not reported within {} s that it is {wanted}", patience.as_secs_f64()))
                 .of_kind("not_reached")
                 .at_node(id);
         let facts = handle.facts();
         let said = facts.nmt_state.filter(|_| facts.heartbeat_at.is_some_and(|at| at > before));
         if let Some(state) = said {
             return failure
-                .because(format!("its heartbeat says that it is {state}"))
+                .because(format!("its heartbeat reports that it is {state}"))
                 .next(format!("ferrodrive state {id}"));
         }
         // Who is stopped answers no SDO.
@@ -163,13 +163,13 @@ impl Nmt {
         match period {
             Ok(0) => failure
                 .because("it sends no heartbeat (1017h is 0), so that its state cannot be seen")
-                .next(format!("ferrodrive write {id} 1017 100, then once more; or leave --wait away")),
+                .next(format!("ferrodrive write {id} 1017 100, then once more; or omit --wait")),
             Ok(ms) => failure
-                .because(format!("no heartbeat came, though 1017h says {ms} ms"))
+                .because(format!("no heartbeat came, though 1017h is {ms} ms"))
                 .next(format!("ferrodrive --bus {} dump --node {id}, or a longer --wait", context.bus())),
             Err(error) => failure
                 .because(format!("no heartbeat came, and {error}"))
-                .next("ferrodrive scan shows who is on the bus"),
+                .next("ferrodrive scan shows the nodes on the bus"),
         }
     }
 }
@@ -177,7 +177,7 @@ impl Nmt {
 /// What every node says within a time.
 async fn said_by_all(context: &Context, patience: Duration) -> Vec<Said> {
     let before = context.network.now();
-    context.progress.show("listening to what the nodes say");
+    context.progress.show("listening to the nodes");
     context.network.sleep(patience).await;
     let said = context.network.seen().iter().filter_map(|node| {
         let facts = context.network.facts(node);
@@ -213,7 +213,7 @@ impl Report for NmtReport {
             text.push_str(&format!("\n  node {node}: {booted}{state}"));
         }
         if self.nodes.as_ref().is_some_and(Vec::is_empty) {
-            text.push_str("\n  no node has said anything since");
+            text.push_str("\n  no node has sent anything since");
         }
         text
     }

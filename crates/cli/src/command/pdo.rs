@@ -161,7 +161,7 @@ impl Show {
             list.push(OfNode { node: node.raw(), pdos: pdos.iter().map(row).collect() });
         }
         if list.is_empty() {
-            return Err(Failure::new("no node is on the bus").of_kind("no_node").next("ferrodrive scan"));
+            return Err(Failure::new("no node answers on the bus").of_kind("no_node").next("ferrodrive scan"));
         }
         Ok(PdoList { nodes: list })
     }

@@ -96,14 +96,16 @@ impl Plan {
         if report.ok {
             return Ok(());
         }
-        Err(Failure { reported: true, ..Failure::new("not everything is there in time") })
+        Err(Failure { reported: true, ..Failure::new("some frames are late") })
     }
 
     fn bitrate_of(&self, bus: &BusSpec) -> Result<Bitrate, Failure> {
         match (self.bitrate, bus) {
             (Some(bitrate), _) => Ok(bitrate),
             (None, BusSpec::Sim { file }) => Ok(session::virtual_world(file.as_deref())?.0.bitrate()),
-            (None, _) => Err(Failure::usage("which bit rate has the bus?").next("add --bitrate, as in --bitrate 500k")),
+            (None, _) => {
+                Err(Failure::usage("the bit rate of the bus is not known").next("give --bitrate, e.g. --bitrate 500k"))
+            }
         }
     }
 
@@ -133,7 +135,7 @@ impl Plan {
         found.sort_unstable();
         let modes = self.modes.iter().filter_map(|(node, _)| *node);
         if let Some(missing) = modes.clone().find(|node| !found.contains(node)) {
-            return Err(Failure::usage(format!("--mode names node {missing}, and nobody is there")).at_node(missing));
+            return Err(Failure::usage(format!("--mode names node {missing}, which does not answer")).at_node(missing));
         }
         let mut nodes = Vec::new();
         for id in found {
@@ -146,7 +148,9 @@ impl Plan {
             nodes.push(traffic(&drive, file, asked.map(|(_, mode)| *mode), moved).await?);
         }
         if nodes.is_empty() {
-            return Err(Failure::new("no node is on the bus").of_kind("no_node").next("ferrodrive scan says more"));
+            return Err(Failure::new("no node answers on the bus")
+                .of_kind("no_node")
+                .next("ferrodrive scan shows more"));
         }
         Ok(nodes)
     }
@@ -195,12 +199,12 @@ impl Report for PlanReport {
         ));
         let cycle = time(self.cycle_us);
         let verdict = match (self.fits, self.ok) {
-            (true, _) => paint.good("everything is there in time"),
+            (true, _) => paint.good("no frame is late"),
             (false, true) => format!(
-                "{}, and beside SDO and EMCY what is marked is late",
-                paint.good("in a cycle alone everything is there in time")
+                "{}, and beside SDO and EMCY the marked frames are late",
+                paint.good("in a cycle alone no frame is late")
             ),
-            (false, false) => paint.bad("not everything is there in time"),
+            (false, false) => paint.bad("some frames are late"),
         };
         let moved = self.moved.iter().map(|moved| format!(", {moved} of the machine file")).collect::<String>();
         lines.push(format!("{} {verdict} at a cycle of {cycle}{moved}", paint.strong("verdict")));

@@ -49,7 +49,7 @@ pub(super) fn svg_path(text: &str) -> Result<PathBuf, String> {
 const LARGEST: u64 = 4 << 30;
 
 fn seconds(text: &str) -> Result<f64, String> {
-    let wrong = || format!("'{text}' is no time in s, e.g. 1.5");
+    let wrong = || format!("expected seconds such as 1.5, got '{text}'");
     let number: f64 = text.trim_end_matches('s').parse().map_err(|_| wrong())?;
     if number.is_finite() && number >= 0.0 { Ok(number) } else { Err(wrong()) }
 }
@@ -72,13 +72,13 @@ impl Plot {
         let title = self.file.file_name().unwrap_or_default().to_string_lossy();
         let span = self.from..=self.to.unwrap_or(f64::INFINITY);
         if span.is_empty() {
-            return Err(Failure::usage("--to is before --from").next("give --to a later time, or leave it away"));
+            return Err(Failure::usage("--to is before --from").next("give a later --to, or omit it"));
         }
         let poster = picture(&title, &recorded, &self.signals, span).map_err(|reason| {
             Failure::new(format!("cannot draw {}", self.file.display()))
                 .of_kind("record")
                 .because(reason)
-                .next("without --signals, --from and --to all of it is drawn that has a picture")
+                .next("omit --signals, --from and --to to draw everything that can be plotted")
         })?;
         let mut files = self.output.clone();
         if files.is_empty() {
@@ -103,13 +103,13 @@ impl Plot {
                 .next("give a file that --record of this program has written")
         };
         let kind = Kind::of_name(&self.file.to_string_lossy()).ok_or_else(|| {
-            Failure::usage(format!("{} is no record", self.file.display()))
+            Failure::usage(format!("{} is not a record", self.file.display()))
                 .because("a record is called NAME.mcap or NAME.csv")
                 .next("make one, e.g. ferrodrive sim --drive zlac8030l@4 --record run.mcap")
         })?;
         let length = std::fs::metadata(&self.file).map_err(|error| unreadable().because(error))?;
         if !length.is_file() || length.len() > LARGEST {
-            return Err(unreadable().because("it is no file, or has more than 4 GiB"));
+            return Err(unreadable().because("it is not a regular file, or larger than 4 GiB"));
         }
         let bytes = std::fs::read(&self.file).map_err(|error| unreadable().because(error))?;
         read(kind, &bytes).map_err(|reason| unreadable().because(reason))
@@ -126,7 +126,7 @@ impl Report for Drawn {
     fn text(&self, _: Paint) -> String {
         let files: Vec<String> = self.files.iter().map(|path| path.display().to_string()).collect();
         let drawn = format!("{} signals and {} marks are drawn in {}", self.signals, self.marks, files.join(" and "));
-        let torn = "the end of the record is missing: its writer was killed, or is still at work";
+        let torn = "the end of the record is missing: its writer was killed, or is still running";
         if self.torn { format!("{drawn}\n{torn}") } else { drawn }
     }
 }

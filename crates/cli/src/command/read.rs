@@ -169,12 +169,13 @@ impl Read {
 
     fn check_file(&self, path: &Path, is_one: bool) -> Result<(), Failure> {
         if !is_one {
-            return Err(Failure::usage("--output takes one object").next("read them one by one, or use --json > FILE"));
+            return Err(Failure::usage("--output accepts one object only")
+                .next("read the objects one by one, or use --json > FILE"));
         }
         if !self.force && path.exists() {
-            return Err(Failure::new(format!("{} is there already", path.display()))
+            return Err(Failure::new(format!("{} already exists", path.display()))
                 .of_kind("file_exists")
-                .next("--force writes over it, or give another --output"));
+                .next("--force overwrites it, or give another --output"));
         }
         Ok(())
     }

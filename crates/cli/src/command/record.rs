@@ -201,7 +201,7 @@ impl Source {
             .map_err(|reason| Failure::usage(reason).at_node(id))?;
         let row = if drive.description().is_some() { row } else { common_row(mux) };
         if row.is_some_and(|row| !row.data_type.fits_cell()) {
-            return Err(Failure::usage(format!("{mux} is no number of at most 32 bits, which a record is made of"))
+            return Err(Failure::usage(format!("{mux} is not a number of at most 32 bits, which a record requires"))
                 .at_node(id)
                 .at_object(mux));
         }

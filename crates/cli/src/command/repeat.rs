@@ -29,7 +29,7 @@ const SHORTEST: Duration = Duration::from_micros(50);
 /// A period: a time that is not zero.
 pub(crate) fn period(text: &str) -> Result<Duration, String> {
     let period = parse_duration(text).map_err(|error| error.to_string())?;
-    if period < SHORTEST { Err("a period is 50us or more, e.g. 10ms".into()) } else { Ok(period) }
+    if period < SHORTEST { Err("expected a period of 50us or more, e.g. 10ms".into()) } else { Ok(period) }
 }
 
 impl Repeat {

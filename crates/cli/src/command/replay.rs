@@ -216,16 +216,18 @@ impl Replay {
         report.took_s = (context.network.now() - begin).as_secs_f64();
         (report.not_chosen, report.passed_over) = (frames.not_chosen, frames.passed_over);
         if report.motion_sent > 0 {
-            context.warn("frames that move drives were sent: what they have set in motion goes on; ferrodrive quick-stop NODE stops one");
+            context.warn(
+                "frames that move drives were sent: drives in motion keep moving; ferrodrive quick-stop NODE stops one",
+            );
         }
         Ok(report)
     }
 
     fn frames(&self, context: &Context) -> Result<Frames<'_>, Failure> {
         if self.file.as_os_str() == "-" {
-            return Err(Failure::usage("a replay reads its log twice, so that it cannot come from standard input")
-                .because("what may move a drive is told before anything is sent")
-                .next("write it to a file first"));
+            return Err(Failure::usage("a replay reads its log twice, and cannot read it from standard input")
+                .because("frames that may move a drive are reported before anything is sent")
+                .next("write the log to a file first"));
         }
         let mut decoder = Decoder::knowing(with_files(std::iter::empty()));
         for node in (1..=127).filter_map(NodeId::new) {
@@ -279,7 +281,7 @@ impl Replay {
         let failure = examples.into_iter().fold(failure, Failure::because);
         Err(failure
             .next("--skip-motion leaves them out")
-            .next("--allow-motion sends them; see first that nobody is near, and that an emergency stop is at hand"))
+            .next("--allow-motion sends them; first make sure that no person is near, and that an emergency stop is within reach"))
     }
 }
 
@@ -291,7 +293,7 @@ impl Report for ReplayReport {
             (motion_sent, "of them may move a drive"),
             (motion_skipped, "that may move a drive left out"),
             (not_chosen, "not chosen"),
-            (passed_over, "places passed over"),
+            (passed_over, "places skipped"),
         ] {
             if *count > 0 {
                 text.push_str(&format!("; {count} {what}"));

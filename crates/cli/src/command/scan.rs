@@ -62,7 +62,7 @@ impl Report for ScanReport {
             let identity = [node.vendor_id, node.product_code, node.revision_number].map(hex).join(":");
             table.row([
                 node.node.to_string(),
-                node.model.unwrap_or(if node.models.is_empty() { "unknown" } else { "cannot tell" }).into(),
+                node.model.unwrap_or(if node.models.is_empty() { "unknown" } else { "ambiguous" }).into(),
                 node.nmt_text(),
                 hex(node.device_type),
                 identity,

@@ -115,18 +115,18 @@ fn content(path: &Path) -> Result<Vec<u8>, Failure> {
     let unreadable = |error| {
         Failure::bad_file(format!("cannot read {}", path.display()))
             .because(error)
-            .next("give the path of a file of its bytes")
+            .next("give the path of a file with the bytes to write")
     };
     let file = File::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
     file.take(MOST + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MOST {
         return Err(Failure::new(format!("{} is longer than {MOST} bytes", path.display()))
-            .because("an object of more than a megabyte is not written")
-            .next("look whether this is the right file"));
+            .because("objects of more than a megabyte cannot be written")
+            .next("check whether this is the right file"));
     }
     if bytes.is_empty() {
-        return Err(Failure::new(format!("{} is empty", path.display())).next("look whether this is the right file"));
+        return Err(Failure::new(format!("{} is empty", path.display())).next("check whether this is the right file"));
     }
     Ok(bytes)
 }
@@ -157,7 +157,7 @@ fn note(drive: &Drive, mux: Mux, number: Option<i64>, limits: Option<&Limits>) -
     }
     let (limits, setting) = limits.and_then(|limits| Some((limits, limits.holding_back(number?)?)))?;
     let most = limits.held_to.map_or(0, |(most, _)| most);
-    Some(format!("the drive holds it to {most}, by {setting}"))
+    Some(format!("the drive limits it to {most}, by {setting}"))
 }
 
 /// A refusal of a value, with what the object takes now and where that comes from.
@@ -240,7 +240,8 @@ impl Report for ObjectReport {
             return format!("node {} {}{name}: {bytes} bytes {to} {file}", self.node, self.object);
         }
         let verb = if self.written { " written:" } else { " =" };
-        let cut = (self.value.is_cut() && !self.written).then(|| "--to FILE writes all of them into a file".to_owned());
+        let cut =
+            (self.value.is_cut() && !self.written).then(|| "--output FILE writes all of them to a file".to_owned());
         let note = self.note.as_ref().or(cut.as_ref()).map(|note| format!("\n  note    {note}")).unwrap_or_default();
         format!("node {} {}{name}{verb} {}{note}", self.node, self.object, self.value.text(paint))
     }

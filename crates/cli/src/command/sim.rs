@@ -152,7 +152,7 @@ pub(crate) struct Sim {
 
 /// What a simulator says that nobody can reach.
 const NOBODY: &str = "note: no program can reach these drives: give --serve socketcand://127.0.0.1:29536, or --modbus, or \
-                      --bus to join a bus. World commands on standard input are answered all the same";
+                      --bus to join a bus. World commands on standard input are still answered";
 
 impl Sim {
     /// Runs until `quit`, Ctrl-C or a lost `bridge` (the bus given with `--bus` beside `sim`). The drives of the machine file come
@@ -163,19 +163,19 @@ impl Sim {
         let machine = self.machine(file)?;
         if global.realtime && (self.clock != Clock::Real || self.speed.is_some()) {
             return Err(Failure::usage("--realtime has no meaning where the bus does not run with the clock")
-                .next("leave --realtime away, or --speed and --clock"));
+                .next("omit --realtime, or --speed and --clock"));
         }
         if let Some(BusSpec::Sim { .. } | BusSpec::Log { .. }) = bridge {
             return Err(Failure::usage(format!("sim cannot join its drives to {}", global.bus))
-                .because("it makes a virtual bus itself, and joins it to a live one only")
-                .next("leave --bus away, or give e.g. --bus socketcand://HOST:29536/can0"));
+                .because("it creates a virtual bus, and joins it to a live bus only")
+                .next("omit --bus, or give e.g. --bus socketcand://HOST:29536/can0"));
         }
         if bridge.is_some()
             && (self.clock == Clock::Manual || self.speed.is_some_and(|speed| speed != Speed::Times(1.0)))
         {
             return Err(Failure::usage(format!("on {} time passes by itself", global.bus))
-                .because("--speed and --clock manual are for a bus of its own")
-                .next("leave them away, or --bus"));
+                .because("--speed and --clock manual need a bus of its own")
+                .next("omit them, or --bus"));
         }
         // All that its drives do not take is told at once, before any of them is made.
         file.map(Machine::build).transpose().map_err(unusable)?;
@@ -373,7 +373,7 @@ impl From<EepromError> for Failure {
         match error {
             EepromError::Corrupt(..) => failure.next("move the file away to start this drive factory-fresh"),
             EepromError::File(..) => {
-                failure.next("put a regular file of ours there, or none, and see that it can be written")
+                failure.next("put an EEPROM file of this program there, or none, and make sure that it can be written")
             }
             EepromError::InUse(_) => failure.next("end the other simulator, or give another --state directory"),
             _ => failure,

@@ -78,12 +78,12 @@ impl StoreReport {
         done: &'static str,
         write: impl Fn(&ParameterStorage) -> Option<Write>,
     ) -> Result<Self, Failure> {
-        let (node, intent) = (drive.node().id(), "say what was stored");
+        let (node, intent) = (drive.node().id(), "show what was stored");
         let model = drive.description().ok_or(Error::UnknownModel { node, intent })?;
         let after_restart = model.storage.effective_after_restart.iter();
         let after_restart =
             after_restart.map(|mux| Named { object: mux.to_string(), name: model.row(*mux).map(|row| row.name) });
-        let intent = "say through which object";
+        let intent = "name the object";
         let object = write(&model.storage).or(model.storage.save).ok_or(Error::UnknownModel { node, intent })?.object;
         Ok(Self {
             node: node.raw(),

@@ -96,7 +96,7 @@ impl Studio {
         if !address.ip().is_loopback() {
             let place = elsewhere(address);
             context.note(&format!(
-                "from other machines: http://{place}/ with the password. Everybody who reaches it and has the password can move the drives, and nothing is encrypted on its way: \
+                "from other machines: http://{place}/ with the password. Anyone who can reach it and has the password can move the drives, and nothing is encrypted on its way: \
                  keep it to a network of the machine's own"
             ));
         }
@@ -221,7 +221,7 @@ fn kept_token(path: &Path) -> Result<Token, Failure> {
             let text = std::fs::read_to_string(path).map_err(|error| {
                 Failure::new(format!("cannot read the token from {}", path.display()))
                     .because(error)
-                    .next("give --token-file a file that you can read, or one that is not there: it is made")
+                    .next("give --token-file a file that you can read, or a path where no file is: it is created")
             })?;
             Token::new(text.lines().next().unwrap_or_default()).map_err(|error| refused(&error).because(path.display()))
         }
@@ -233,10 +233,10 @@ fn refused(error: &AccessError) -> Failure {
     let failure = Failure::usage(error.to_string());
     match error {
         AccessError::NoPassword(_) => failure
-            .because("whoever reaches a studio from elsewhere can move the drives, and sees all that passes")
+            .because("anyone who reaches a studio from another machine can move the drives and see all traffic")
             .next("give --password-file FILE too, or --listen 127.0.0.1:8402 and reach it through `ssh -L 8402:127.0.0.1:8402`"),
         AccessError::ShortPassword(_) => failure.next("choose a longer one, e.g. four words that do not belong together"),
-        AccessError::BadToken => failure.next("delete the file: a new token is put there"),
+        AccessError::BadToken => failure.next("delete the file: it is created with a new token"),
         AccessError::NoRandom(_) => Failure::new(error.to_string()),
     }
 }

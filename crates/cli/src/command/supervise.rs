@@ -101,7 +101,7 @@ impl Supervise {
             }
         }
         let open = supervisor.emcys().records().filter(|record| record.gone.is_none());
-        open.for_each(|record: &EmcyRecord| context.note(&format!("not gone: {record}")));
+        open.for_each(|record: &EmcyRecord| context.note(&format!("still present: {record}")));
         Ok(context.network.release_guards(NodeSet::ALL).await?)
     }
 }
@@ -125,13 +125,13 @@ async fn obey(supervisor: &mut Supervisor, context: &Context, line: &str) {
     let wanted = line.trim().strip_prefix("resume ").map(|rest| node(rest.trim()));
     match wanted {
         Some(Ok(node)) => match supervisor.resume(node).await {
-            Ok(()) => context.note(&format!("node {node}: told to take part again (NMT start)")),
+            Ok(()) => context.note(&format!("node {node}: started again (NMT start)")),
             Err(error) => context.note(&format!("node {node} is not resumed: {error}")),
         },
         Some(Err(reason)) => context.note(&reason),
         None => {
             let how = if io::stdin().is_terminal() { "; Ctrl-C ends it" } else { "" };
-            context.note(&format!("'{}' is no word here; expected resume NODE{how}", line.trim()));
+            context.note(&format!("expected resume NODE{how}, got '{}'", line.trim()));
         }
     }
 }

@@ -35,7 +35,7 @@ pub(super) fn identifier(text: &str) -> Result<CanId, String> {
     let raw = u16::from_str_radix(digits.trim_end_matches(['h', 'H']), 16).ok();
     raw.filter(|raw| *raw <= CanId::MAX_STANDARD)
         .map(CanId::standard)
-        .ok_or_else(|| format!("'{text}' is no identifier of 11 bits; expected hexadecimal 0 to 7FF, e.g. 080"))
+        .ok_or_else(|| format!("expected an identifier of 11 bits, hexadecimal 0 to 7FF, e.g. 080, got '{text}'"))
 }
 
 /// What was sent.

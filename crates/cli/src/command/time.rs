@@ -45,7 +45,7 @@ impl Time {
         // A clock that starts now has its zero now.
         let unix = self.unix.map_or_else(|| WallClock::start().unix_zero(), Duration::from_secs);
         let time = TimeOfDay::from_unix(unix).ok_or_else(|| {
-            Failure::usage("this time cannot be said in a TIME frame")
+            Failure::usage("this time cannot be sent in a TIME frame")
                 .because("it counts days from 1 January 1984 in 16 bits, up to 2163")
                 .next("set the clock of this machine, or give another --unix SECONDS")
         })?;

@@ -38,7 +38,7 @@ fn service(text: &str) -> Result<ServiceKind, String> {
     let known = ServiceKind::ALL.map(ServiceKind::word);
     let typed = text.to_ascii_lowercase();
     ServiceKind::ALL.into_iter().find(|kind| kind.word() == typed).ok_or_else(|| {
-        format!("'{text}' is no service{}; expected one of {}", did_you_mean(&near(&typed, known)), known.join(", "))
+        format!("expected a service, one of {}, got '{text}'{}", known.join(", "), did_you_mean(&near(&typed, known)))
     })
 }
 
@@ -60,7 +60,7 @@ impl Filter {
                 let mut close = near(name, names());
                 close.dedup();
                 return Err(Failure::usage(format!("no model has an object named '{name}'{}", did_you_mean(&close)))
-                    .next("give its index, e.g. --object 6041, or say which model a node is: --model NODE=MODEL"));
+                    .next("give its index, e.g. --object 6041, or name the model of a node: --model NODE=MODEL"));
             }
         }
         Ok(())

@@ -89,14 +89,15 @@ impl<B: Send + 'static> Background<B> {
             Ok(()) if self.missing > 0 => {
                 let missing = std::mem::take(&mut self.missing);
                 self.lost += missing;
-                self.messages.say(&format!("warning: {file} is written again; {missing} {what} are missing in it"));
+                self.messages
+                    .say(&format!("warning: {file} is being written again; {missing} {what} are missing in it"));
             }
             // When the file has ended for good, that has been said.
             Ok(()) | Err(TrySendError::Disconnected(_)) => {}
             Err(TrySendError::Full(_)) => {
                 if self.missing == 0 {
                     self.messages.say(&format!(
-                        "warning: {file} cannot be written as fast as the bus goes; {what} are left out"
+                        "warning: {file} cannot be written as fast as the bus runs; {what} are left out"
                     ));
                 }
                 self.missing += pieces;

@@ -138,7 +138,7 @@ impl Writing {
             Ok(Ok(0)) => None,
             Ok(Ok(missing)) => Some(format!("{missing} frames are missing in the log: the disk was too slow")),
             Ok(Err(error)) => Some(format!("cannot write the log: {error}; its end is missing")),
-            Err(_) => Some("the log was not written to its end".to_owned()),
+            Err(_) => Some("the end of the log was not written".to_owned()),
         }
     }
 }

@@ -56,8 +56,8 @@ impl LogPath {
     /// Why the log is not what was asked for, if it is not.
     pub(crate) fn failure(&self) -> Option<Failure> {
         let missing = self.missing.get()?;
-        let failure = Failure::new(format!("the log {} is not whole", self.path.display())).of_kind("file");
-        Some(failure.because(missing).next("see that the disk has room, and is fast enough"))
+        let failure = Failure::new(format!("the log {} is not complete", self.path.display())).of_kind("file");
+        Some(failure.because(missing).next("make sure that the disk has room and is fast enough"))
     }
 
     /// Begins the file: a new one, or one that is empty or a log of the same form already.

@@ -38,7 +38,11 @@ const SHORTEST: Duration = Duration::from_micros(50);
 
 fn record_period(text: &str) -> Result<Duration, String> {
     let period = parse_duration(text).map_err(|error| error.to_string())?;
-    if period < SHORTEST { Err("a control period is 50us; nothing changes within it".into()) } else { Ok(period) }
+    if period < SHORTEST {
+        Err("expected 50us or more: a control period, within which nothing changes".into())
+    } else {
+        Ok(period)
+    }
 }
 
 fn record_path(text: &str) -> Result<PathBuf, String> {
@@ -79,7 +83,7 @@ impl RecordOptions {
             let chosen = select(&names, &self.record_signals).map_err(|reason| {
                 Failure::usage("cannot record what --record-signals asks for")
                     .because(reason)
-                    .next("name signals as velocity, 4.current_a or 5.*, or leave it away and record all")
+                    .next("name signals as velocity, 4.current_a or 5.*, or omit it to record all")
             })?;
             let is_chosen = |name: &str| chosen.iter().any(|i| names[*i] == name);
             channels.retain(|channel| is_chosen(&Column::of_axis(*channel).name()));

@@ -144,7 +144,7 @@ fn fresh(path: &Path) -> io::Result<File> {
     let left = read_bounded(path, MAX_LENGTH)?.unwrap_or_default();
     let common = left.len().min(MAGIC.len());
     if left[..common] != MAGIC.as_bytes()[..common] {
-        return Err(io::Error::new(io::ErrorKind::AlreadyExists, "it is in the way, and no EEPROM file; move it away"));
+        return Err(io::Error::new(io::ErrorKind::AlreadyExists, "it exists and is not an EEPROM file; move it away"));
     }
     fs::remove_file(path)?;
     create_new(path)

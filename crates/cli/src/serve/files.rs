@@ -25,7 +25,7 @@ fn regular(path: &Path) -> io::Result<Metadata> {
     } else if kind.is_dir() {
         "a directory"
     } else {
-        "no regular file but a device, a FIFO or a socket"
+        "a device, a FIFO or a socket, not a regular file"
     };
     Err(io::Error::new(io::ErrorKind::InvalidInput, format!("it is {what}")))
 }
@@ -35,7 +35,7 @@ fn open_regular(path: &Path, options: &OpenOptions) -> io::Result<File> {
     let seen = regular(path)?;
     let file = options.open(path)?;
     if identity(&seen) != identity(&file.metadata()?) {
-        return Err(io::Error::other("it was exchanged while it was opened"));
+        return Err(io::Error::other("it was replaced while it was being opened"));
     }
     Ok(file)
 }
@@ -88,7 +88,7 @@ fn create_or_replace(path: &Path, begin: &[u8], what: &str) -> io::Result<File> 
     let mut first = Vec::new();
     (&mut file).take(begin.len() as u64).read_to_end(&mut first)?;
     if !first.is_empty() && first != begin {
-        let reason = format!("it exists and is no {what}; remove it or choose another name");
+        let reason = format!("it exists and is not a {what}; remove it or choose another name");
         return Err(io::Error::new(io::ErrorKind::AlreadyExists, reason));
     }
     file.set_len(0)?;

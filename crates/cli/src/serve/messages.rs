@@ -52,7 +52,7 @@ impl Messages {
     /// Standard output, of lines that answer world commands.
     pub(crate) fn of_answers(warned: Messages) -> Self {
         let gap = |dropped| {
-            let failure = Failure::new(format!("{dropped} answers are missing here: nobody read them in time"))
+            let failure = Failure::new(format!("{dropped} answers are missing here: they were not read in time"))
                 .of_kind("dropped")
                 .next("read the answers as they come");
             sim::json::line(&Gap { ok: false, error: (&failure).into(), dropped })
@@ -85,7 +85,7 @@ impl Messages {
         if queue.bytes + line.len() > MAX_BYTES {
             queue.dropped += 1;
             if let (1, Some(warned)) = (queue.dropped, &self.0.warned) {
-                warned.say("warning: nobody reads standard output; answers are being dropped");
+                warned.say("warning: standard output is not being read; answers are being dropped");
             }
             return;
         }
@@ -209,7 +209,7 @@ mod tests {
         assert_eq!(lines.iter().map(String::len).collect::<Vec<_>>(), [1 << 20, 1 << 20, 1 << 20, 5, 9]);
         messages.say("after");
         assert_eq!(read_until(&reader, "after"), ["after"]);
-        assert!(read_until(&warned, "being dropped")[0].contains("nobody reads standard output"));
+        assert!(read_until(&warned, "being dropped")[0].contains("standard output is not being read"));
         assert!(read_until(&warned, "were dropped")[0].contains("7 answers were dropped"));
         assert!(messages.finish(SOON));
     }

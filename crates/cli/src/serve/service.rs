@@ -236,9 +236,9 @@ impl Service {
         self.write_records(world);
         match world.finish_stores(DISK_PATIENCE) {
             Some(kept) => kept.map_err(Failure::from),
-            None => Err(Failure::new("the last stores are not in --state")
+            None => Err(Failure::new("the last stores have not reached --state")
                 .because(format!("the disk has not taken them within {} s", DISK_PATIENCE.as_secs()))
-                .next("what was acknowledged is there; see what else keeps the disk busy")),
+                .next("acknowledged stores are there; check what else keeps the disk busy")),
         }
     }
 

@@ -67,7 +67,7 @@ fn what_makes_no_sheet_is_a_usage_error() {
         (&["eds", "zlac8030l", "colour=red"], "takes no 'colour'"),
         (&["eds", "zlac8030l", "fast"], "KEY=VALUE"),
         (&["eds", "zlac8030l", "2014=99999"], "2014h:00 of a zlac8030l cannot be 99999"),
-        (&["eds", "--bus", "can0", "zlac8030l"], "--bus means nothing to eds"),
+        (&["eds", "--bus", "can0", "zlac8030l"], "--bus has no effect on eds"),
         (&["eds", "diff", "zlac8030l", "nothing"], "there is no file nothing"),
     ] {
         let ended = ferrodrive(words);
@@ -168,7 +168,7 @@ fn a_devices_values_make_a_dcf_that_is_not_written_over_unasked() {
 
     let ended = ferrodrive(&["dcf", "4", "--output", &path]);
     assert_eq!(ended.status, Some(1));
-    assert!(ended.err.contains("is there already") && ended.err.contains("--force"), "{}", ended.err);
+    assert!(ended.err.contains("already exists") && ended.err.contains("--force"), "{}", ended.err);
     let forced = done(&["dcf", "4", "--output", &path, "--force", "--all"]).out;
     assert!(forced.contains("152 objects read, 152 values in the file"), "{forced}");
     assert!(std::fs::read_to_string(&path).expect("the file").contains("ParameterValue="));

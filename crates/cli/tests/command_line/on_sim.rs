@@ -88,7 +88,7 @@ fn a_move_ends_where_it_should_and_when_it_should() {
 fn a_torque_is_a_motor_current() {
     let pushed = done(&["--json", "torque", "4", "500mA"]).json();
     assert_eq!(pushed["reached"], false);
-    assert_eq!(pushed["asked"], "push with 0.5 A");
+    assert_eq!(pushed["asked"], "apply 0.5 A");
 }
 
 #[test]

@@ -181,5 +181,5 @@ fn what_cannot_be_run_is_refused_with_its_place() {
     ended_with(1, &["run", &scenario("step_loss.toml"), "--set", "held=long"], "does not begin with a number");
     ended_with(1, &["run", "/nowhere.toml"], "cannot use the scenario /nowhere.toml");
     refused(&["run", path, "--seeds", "9..1"], "FIRST..LAST");
-    refused(&["--timeout", "1s", "run", path], "--timeout means nothing to run");
+    refused(&["--timeout", "1s", "run", path], "--timeout has no effect on run");
 }

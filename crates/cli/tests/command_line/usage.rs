@@ -89,7 +89,7 @@ fn buses_are_checked() {
     refused(&["--bus", "http://x", "scan"], &["socketcand://HOST:PORT/can0", "slcan://HOST:PORT"]);
     refused(&["--bus", "socketcand://localhost:99999/can0", "scan"], &["'99999' is not a port"]);
     not_taken(&["--bus", "sim:/nowhere/machine.toml", "scan"], &["/nowhere/machine.toml", "[[drive]]"]);
-    refused(&["--bus", "log:trace.log", "scan"], &["nobody there can answer", "dump"]);
+    refused(&["--bus", "log:trace.log", "scan"], &["no node can answer", "dump"]);
 }
 
 #[test]
@@ -113,11 +113,11 @@ fn simulator_arguments_are_checked_before_anything_listens() {
 fn options_that_mean_nothing_are_refused_with_the_reason() {
     let sim = ["sim", "--drive", "zlac8030l@4"];
     let with = |more: &[&'static str]| [&sim[..], more].concat();
-    refused(&with(&["--model", "4=zlac8030l"]), &["--model means nothing to sim", "--drive MODEL@NODE"]);
-    refused(&with(&["--timeout", "1s"]), &["--timeout means nothing to sim", "waits for no answer"]);
-    refused(&["demo", "--bus", "slcan://127.0.0.1:1"], &["--bus means nothing to demo", "buses of their own"]);
-    refused(&["dump", "--timeout", "1s"], &["--timeout means nothing to dump", "--for TIME"]);
-    refused(&["completions", "bash", "--timeout", "1s"], &["--timeout means nothing to completions"]);
+    refused(&with(&["--model", "4=zlac8030l"]), &["--model has no effect on sim", "--drive MODEL@NODE"]);
+    refused(&with(&["--timeout", "1s"]), &["--timeout has no effect on sim", "waits for no answer"]);
+    refused(&["demo", "--bus", "slcan://127.0.0.1:1"], &["--bus has no effect on demo", "buses of their own"]);
+    refused(&["dump", "--timeout", "1s"], &["--timeout has no effect on dump", "--for TIME"]);
+    refused(&["completions", "bash", "--timeout", "1s"], &["--timeout has no effect on completions"]);
     refused(&["objects", "zlac8030l", "--model", "4=zlac8030l"], &["the same on every bus"]);
     refused(&["readings", "zlim42c", "--timeout", "1s"], &["about a model"]);
     let two = ["--model", "4=zlac8030l", "--model", "4=zlim42c", "scan"];

@@ -212,7 +212,7 @@ impl Planned {
             return Err(match self {
                 Self::Manager(_) => Failure::bad_file("the file has no slave: 1F81h says of no node that it is one")
                     .next("give the DCF of the CANopen manager, not that of a device"),
-                _ => Failure::new("no node is on the bus").of_kind("no_node").next("ferrodrive scan says more"),
+                _ => Failure::new("no node answers on the bus").of_kind("no_node").next("ferrodrive scan shows more"),
             });
         }
         Ok(plan)

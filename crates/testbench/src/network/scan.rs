@@ -124,7 +124,7 @@ fn remark(found: &Found, doubt: String, say: impl Fn(NodeId, &[&str]) -> String)
 
 /// That no node is on the bus, with what was heard all the same.
 pub fn no_node(heard: &[Heard]) -> Failure {
-    let failure = Failure::new("no node is on the bus")
+    let failure = Failure::new("no node answers on the bus")
         .of_kind("no_node")
         .because("no node answered SDO and no boot-up or heartbeat message was heard");
     let failure = heard.iter().fold(failure, |failure, heard| failure.because(heard.line()));

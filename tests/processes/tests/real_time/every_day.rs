@@ -209,7 +209,7 @@ fn a_motion_that_takes_longer_than_it_may_is_given_up_and_stopped() {
 fn words_in_another_order_are_understood_where_that_does_no_harm() {
     let read = done(&["4", "read", "6060"]);
     assert_eq!(read.out, done(&["read", "4", "6060"]).out);
-    assert_eq!(read.err.trim(), "note: taken for: ferrodrive read 4 6060");
+    assert_eq!(read.err.trim(), "note: interpreted as: ferrodrive read 4 6060");
     assert_eq!(done(&["--json", "4", "read", "6060"]).err, "");
     for (typed, meant) in [
         (&["4", "velocity", "60rpm"][..], "ferrodrive velocity 4 60rpm"),

@@ -321,7 +321,7 @@ fn a_gateway_that_is_asked_to_end_stops_what_its_clients_moved() {
 #[test]
 fn a_gateway_that_cannot_serve_says_why() {
     let embedded = ferrodrive(&["gateway"]);
-    assert!(embedded.status == Some(2) && embedded.err.contains("serves nobody"), "{}", embedded.err);
+    assert!(embedded.status == Some(2) && embedded.err.contains("cannot serve a virtual bus"), "{}", embedded.err);
     let simulator = simulator();
     let bus = simulator.bus("socketcand");
     let first = Gateway::start(&bus, &[]);

@@ -109,7 +109,11 @@ fn lines_of_twists_are_driven_one_after_the_other_and_bad_ones_are_told() {
     let report = driven.json();
     assert!((number(&report["pose"]["x_m"]) - 0.3).abs() < 0.02, "{report}");
     assert_eq!(report["bad_lines"], 4);
-    assert!(driven.err.contains("'fast' is no twist: expected two numbers, m/s and rad/s"), "{}", driven.err);
+    assert!(
+        driven.err.contains("expected a twist of two numbers, m/s and rad/s, e.g. 0.3 -0.1, got 'fast'"),
+        "{}",
+        driven.err
+    );
 }
 
 #[test]

@@ -232,8 +232,8 @@ fn a_command_that_leaves_a_motor_turning_says_what_happens_then() {
     let mut bench = Bench::new();
     for (drive, armed, after_ms, object, then) in [
         (SERVO, true, json!(1000), json!("2000h:00"), "it stops by itself 1000 ms after"),
-        (JOINT, true, json!(2000), json!("1016h:01"), "it goes on until it is told to stop"),
-        (STEPPER, false, Value::Null, Value::Null, "it goes on until it is told to stop"),
+        (JOINT, true, json!(2000), json!("1016h:01"), "it keeps moving until it is stopped"),
+        (STEPPER, false, Value::Null, Value::Null, "it keeps moving until it is stopped"),
     ] {
         let (node, _) = drive;
         let said = bench.json(drive, &["velocity", node, "60rpm"]);
@@ -256,7 +256,7 @@ fn a_command_that_leaves_a_motor_turning_says_what_happens_then() {
 fn a_motion_that_is_not_waited_for_goes_on_alone() {
     let mut bench = Bench::new();
     let said = bench.json(JOINT, &["velocity", "1", "60rpm", "--no-wait"]);
-    assert!(said["notes"][0].as_str().unwrap().contains("nobody watches it"), "{said}");
+    assert!(said["notes"][0].as_str().unwrap().contains("nothing monitors the drive"), "{said}");
     bench.simulator.pass(Duration::from_secs(4));
     assert!(bench.turns("1"));
     assert_eq!(bench.json(JOINT, &["state", "1"])["fault_code"], 0);

@@ -57,7 +57,7 @@ fn a_log_goes_through_every_form_and_comes_out_as_it_was() {
     assert!(trc.status == Some(2) && trc.err.contains("TRC file is only read"), "{}", trc.err);
     std::fs::write(path("letter.blf"), "Dear Sir").unwrap();
     let letter = ferrodrive(&["convert", &from, &path("letter.blf")]);
-    assert!(letter.status == Some(1) && letter.err.contains("it exists and is no BLF log"), "{}", letter.err);
+    assert!(letter.status == Some(1) && letter.err.contains("it exists and is not a BLF log"), "{}", letter.err);
 }
 
 #[test]

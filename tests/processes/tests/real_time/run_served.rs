@@ -129,12 +129,12 @@ fn what_makes_no_sense_together_is_refused() {
     let file = file.to_str().unwrap();
     for (options, said) in [
         (&["--serve", "socketcand://127.0.0.1:0", "--seeds", "1..3"][..], "a sweep is many runs"),
-        (&["--serve", "socketcand://127.0.0.1:0", "--clock", "manual"], "nobody can move the time"),
+        (&["--serve", "socketcand://127.0.0.1:0", "--clock", "manual"], "the time cannot be advanced"),
         (&["--speed", "10"], "--serve"),
         (&["--serve", "nowhere"], "nowhere"),
         (&["--jobs", "2"], "--jobs is about many runs"),
-        (&[file, "--serve", "socketcand://127.0.0.1:0"], "is about one scenario, and here are 2"),
-        (&[file, "--record", "a.csv"], "is about one scenario, and here are 2"),
+        (&[file, "--serve", "socketcand://127.0.0.1:0"], "takes one scenario, and there are 2"),
+        (&[file, "--record", "a.csv"], "takes one scenario, and there are 2"),
     ] {
         let ended = ferrodrive(&[&["run", file], options].concat());
         assert_eq!(ended.status, Some(2), "{options:?}: {}", ended.err);

@@ -52,7 +52,7 @@ fn answers_that_nobody_reads_stop_no_drive_and_their_number_is_told() {
     for _ in 0..ASKED {
         writeln!(input, "4 get").unwrap();
     }
-    simulator.error("nobody reads standard output");
+    simulator.error("standard output is not being read");
     let bus = simulator.bus("socketcand");
     assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200B"]).json()["value"], 1024);
     let (mut answered, mut dropped, mut last) = (0, 0, 0.0);

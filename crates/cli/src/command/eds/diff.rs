@@ -68,7 +68,7 @@ impl Report for DiffReport {
     fn text(&self, paint: Paint) -> String {
         let (first, second) = (plain(&self.first), plain(&self.second));
         if self.differences.is_empty() {
-            return format!("{first} and {second} say the same");
+            return format!("{first} and {second} do not differ");
         }
         let mut table = Table::new(&["object", "name", "what", "first", "second"]);
         for row in &self.differences {

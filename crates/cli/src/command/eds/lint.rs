@@ -86,7 +86,7 @@ impl LintReport {
         let count = self.files.iter().filter(bad).count();
         let of = self.files.len();
         let what = if strict { "errors or warnings" } else { "errors" };
-        let next = "the lines above say where; CiA 306 says how it has to be";
+        let next = "the table above has the lines; CiA 306 defines the format";
         (count > 0).then(|| Failure::new(format!("{count} of {of} files with {what}")).of_kind("lint").next(next))
     }
 }
@@ -126,7 +126,7 @@ impl OfFile {
         }
         let counts = format!("{}, {}", counted(self.errors, "error"), counted(self.warnings, "warning"));
         let counts = match (self.errors, self.warnings) {
-            (0, 0) => paint.good("nothing wrong"),
+            (0, 0) => paint.good("no findings"),
             (0, _) => counts,
             _ => paint.bad(&counts),
         };

@@ -53,7 +53,7 @@ impl SheetArgs {
         let mut spec = DriveSpec::new(model, self.node.unwrap_or(NodeId::MIN));
         for choice in &self.choices {
             let (key, value) = choice.split_once('=').ok_or_else(|| {
-                Failure::usage(format!("'{choice}' is no option of a drive; expected KEY=VALUE, e.g. defaults=eds"))
+                Failure::usage(format!("expected an option of a drive, KEY=VALUE, e.g. defaults=eds, got '{choice}'"))
             })?;
             spec.set(key.trim(), value.trim()).map_err(Failure::usage)?;
         }

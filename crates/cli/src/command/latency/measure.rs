@@ -79,7 +79,7 @@ impl<'a> Measurement<'a> {
             self.measured.producer = Some("another");
         } else if let Some(energised) = self.energised().await {
             self.measured.notes.push(format!(
-                "no SYNC was sent: the motor of node {energised} is switched on, and SYNC would hand it what its synchronous \
+                "no SYNC was sent: the motor of node {energised} is switched on, and SYNC would activate what its synchronous \
                  RPDOs hold"
             ));
             return Ok(self.measured);
@@ -191,7 +191,7 @@ impl<'a> Measurement<'a> {
             if count > last.0 {
                 last = (count, now);
             } else if now - last.1 > LISTEN_TIME + 4 * period {
-                self.measured.notes.push("SYNC stayed away, and the measurement ended".into());
+                self.measured.notes.push("SYNC stopped, and the measurement ended".into());
                 break;
             }
         }
@@ -199,7 +199,7 @@ impl<'a> Measurement<'a> {
             self.context.network.sync(None);
         }
         if self.watches && self.measured.pdo.count() == 0 {
-            self.measured.notes.push("none of the TPDOs that come with SYNC came: is the node operational?".into());
+            self.measured.notes.push("no TPDO followed SYNC: is the node operational?".into());
         }
     }
 

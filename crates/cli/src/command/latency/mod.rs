@@ -89,7 +89,7 @@ impl Latency {
         };
         if report.sdo.is_none() && report.pdo.is_none() && report.sync.is_none() {
             let failure = report.notes.iter().fold(Failure::new("nothing could be measured"), Failure::because);
-            return Err(failure.next("ferrodrive scan shows who is on the bus"));
+            return Err(failure.next("ferrodrive scan shows the nodes on the bus"));
         }
         if let Some(path) = &self.svg {
             draw(&report, path)?;
@@ -118,7 +118,7 @@ impl Report for LatencyReport {
         let mut lines = vec![table.plain(paint)];
         for (name, spread) in self.spreads() {
             lines.push(String::new());
-            lines.push(format!("{} {}", paint.strong(name), paint.dim("us, how many")));
+            lines.push(format!("{} {}", paint.strong(name), paint.dim("us, count")));
             lines.extend(spread.histogram.iter().map(|bin| bar(bin, spread.count)));
         }
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
@@ -142,13 +142,8 @@ fn draw(report: &LatencyReport, path: &Path) -> Result<(), Failure> {
             [(bin.from_us, count), (bin.to_us, count)]
         });
         let trace = Trace { label: "".into(), style: Style::Actual(colour), points: points.collect() };
-        let panel = Panel {
-            title: "how many".into(),
-            unit: "1".into(),
-            height: 140.0,
-            traces: vec![trace],
-            ..Panel::default()
-        };
+        let panel =
+            Panel { title: "count".into(), unit: "1".into(), height: 140.0, traces: vec![trace], ..Panel::default() };
         let subtitle = format!(
             "{} measured, {} lost; median {:.0} µs, 99.9 % {:.0} µs, most {:.0} µs",
             spread.count, spread.lost, spread.median_us, spread.p999_us, spread.max_us

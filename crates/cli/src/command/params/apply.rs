@@ -68,7 +68,7 @@ fn how(prove: Prove, context: &Context) -> Result<Proof, Failure> {
         (Prove::Auto, true) => Ok(Proof::Reset),
         (Prove::Auto | Prove::PowerCycle, false) => Ok(Proof::PowerCycle),
         (Prove::PowerCycle, true) => {
-            Err(Failure::usage("nobody can switch a drive off that is on a virtual bus of this command alone")
+            Err(Failure::usage("a drive on a virtual bus of this command alone cannot be switched off by hand")
                 .next("--prove=reset, or serve the drive: ferrodrive sim, and ferrodrive world NODE power cycle"))
         }
         (Prove::Reset, _) => Ok(Proof::Reset),
@@ -79,12 +79,12 @@ impl Report for ApplyReport {
     fn text(&self, paint: Paint) -> String {
         let file = plain(&self.file);
         let mut lines = vec![match self.writes {
-            0 => format!("node {} has what {file} says: nothing was written", self.node),
-            writes => format!("node {}: {writes} writes done and read back; it has what {file} says", self.node),
+            0 => format!("node {} already has the values of {file}: nothing was written", self.node),
+            writes => format!("node {}: {writes} writes done and read back; it has the values of {file}", self.node),
         }];
         for rounded in &self.rounded {
             lines.push(format!(
-                "{} {}: {} was written, the drive made {} of it",
+                "{} {}: {} was written, the drive holds {}",
                 rounded.object,
                 rounded.name.unwrap_or_default(),
                 plain(&rounded.asked.text),
@@ -99,7 +99,7 @@ impl Report for ApplyReport {
             lines.push(format!("not stored by a command: ferrodrive save {}", self.node));
         }
         if let Some(how) = self.proved {
-            lines.push(format!("after {how} everything that is kept reads as written"));
+            lines.push(format!("after {how} all stored values read as written"));
         }
         lines.join("\n")
     }

@@ -24,7 +24,7 @@ impl super::Backup {
             report.parameters = Some(sheet::print(&parameters, Some(model)));
             context.progress.clear();
             for refused in &report.refused {
-                context.note(&format!("{} is not in it: {}", refused.object, refused.why));
+                context.note(&format!("{} is not in the file: {}", refused.object, refused.why));
             }
             return Ok(report);
         };
@@ -49,8 +49,12 @@ impl Report for BackupReport {
         let file = self.file.as_deref().map(plain).unwrap_or_default();
         let mut text = format!("{file}: {} values of node {}", self.values, self.node);
         for refused in &self.refused {
-            text +=
-                &format!("\n  {} {} is not in it: {}", refused.object, refused.name.unwrap_or_default(), refused.why);
+            text += &format!(
+                "\n  {} {} is not in the file: {}",
+                refused.object,
+                refused.name.unwrap_or_default(),
+                refused.why
+            );
         }
         text
     }

@@ -38,7 +38,7 @@ impl Report for DiffReport {
     fn text(&self, paint: Paint) -> String {
         let (first, second) = (plain(&self.first), plain(&self.second));
         if self.differences.is_empty() {
-            return format!("{first} has what {second} says");
+            return format!("{first} has the values of {second}");
         }
         let mut table = Table::new(&["object", "name", "first", "second"]);
         for row in &self.differences {
@@ -52,7 +52,7 @@ impl Report for DiffReport {
 impl Report for VerifyReport {
     fn text(&self, paint: Paint) -> String {
         if self.ok {
-            return format!("node {} has what {} says: {} objects", self.node, plain(&self.file), self.compared);
+            return format!("node {} has the values of {}: {} objects", self.node, plain(&self.file), self.compared);
         }
         let mut table = Table::new(&["object", "name", "should be", "is"]);
         for row in &self.deviations {

@@ -23,7 +23,7 @@ impl Report for PlanReport {
     fn text(&self, paint: Paint) -> String {
         let mut lines = Vec::new();
         if self.steps.is_empty() {
-            lines.push(format!("node {} has what {} says: nothing is to be written", self.node, plain(&self.file)));
+            lines.push(format!("node {} has the values of {}: nothing to write", self.node, plain(&self.file)));
         } else {
             let mut table = Table::new(&["", "object", "name", "has", "gets", "what for"]);
             for (position, step) in self.steps.iter().enumerate() {
@@ -37,7 +37,7 @@ impl Report for PlanReport {
                 ]);
             }
             lines.push(table.plain(paint));
-            lines.push(format!("\n{} values are there already", self.same));
+            lines.push(format!("\n{} values are already set", self.same));
         }
         lines.extend(self.left.iter().map(LeftOut::text));
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));

@@ -18,7 +18,7 @@ pub(super) fn wanted(
     }
     let Some(machine) = &context.machine else {
         return Err(
-            Failure::usage("which parameters?").next("name their file, or a machine file with --machine FILE.toml")
+            Failure::usage("expected a file of parameters").next("name it, or a machine file with --machine FILE.toml")
         );
     };
     Ok(of_machine(machine, wanted.node)?)

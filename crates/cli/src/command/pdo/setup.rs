@@ -90,11 +90,11 @@ fn asked(text: &str) -> Result<Asked, String> {
 fn identifier(text: &str) -> Result<u16, String> {
     let digits = text.strip_prefix("0x").unwrap_or(text);
     let id = u16::from_str_radix(digits, 16).ok().filter(|id| *id <= 0x7FF);
-    let id = id.ok_or_else(|| format!("'{text}' is no identifier of 11 bits; expected 0x181 to 0x77F"))?;
+    let id = id.ok_or_else(|| format!("expected an identifier of 11 bits, 0x181 to 0x77F, got '{text}'"))?;
     CobId::standard(id)
         .check_identifier()
         .map(|()| id)
-        .map_err(|_| format!("{id:03X}h is kept for another service (CiA 301, table 41)"))
+        .map_err(|_| format!("{id:03X}h is reserved for another service (CiA 301, table 41)"))
 }
 
 /// Bits of a PDO as it would be.
@@ -137,7 +137,7 @@ impl Wanted {
             return Ok((parameters, "the machine file".to_owned()));
         }
         if self.id.is_some() && self.pdos.len() > 1 {
-            return Err(Failure::usage("--id is of one PDO: two with one identifier would disturb each other"));
+            return Err(Failure::usage("--id takes one PDO: two with the same identifier would disturb each other"));
         }
         let mut values: BTreeMap<Mux, Vec<u8>> = BTreeMap::new();
         for asked in &self.pdos {

@@ -80,18 +80,18 @@ impl Run {
         let scenario = Loaded::read(file, &self.set).and_then(Loaded::with_all)?;
         let Some(seeds) = &self.seeds else {
             if self.jobs.is_some() {
-                return Err(Failure::usage("--jobs is about many runs, and this is one")
-                    .next("leave it away, or give --seeds 1..100 or several files"));
+                return Err(Failure::usage("--jobs needs several runs, and this is one")
+                    .next("omit it, or give --seeds 1..100 or several files"));
             }
             return self.once(&scenario, file, format);
         };
         if self.recording.path().is_some() {
-            return Err(Failure::usage("a sweep is many runs, and --record writes one")
-                .next("the summary says how to repeat a run: give --record with that"));
+            return Err(Failure::usage("--record writes one run, and a sweep has many")
+                .next("the summary shows how to repeat one run: add --record to that"));
         }
         if self.serving.is_asked_for() {
-            return Err(Failure::usage("a sweep is many runs, and --serve and --control are about one")
-                .next("give --seed in place of --seeds, or leave --serve away"));
+            return Err(Failure::usage("--serve and --control serve one run, and a sweep has many")
+                .next("give --seed in place of --seeds, or omit --serve"));
         }
         sweeping::sweep(scenario, seeds.clone(), self.jobs, file, format)
     }
@@ -106,7 +106,7 @@ impl Run {
         match given.iter().find(|(is_given, _)| *is_given) {
             None => Ok(()),
             Some((_, what)) => {
-                Err(Failure::usage(format!("{what} is about one scenario, and here are {}", self.files.len()))
+                Err(Failure::usage(format!("{what} takes one scenario, and there are {}", self.files.len()))
                     .next("give one file with it"))
             }
         }
@@ -173,13 +173,13 @@ fn batch(runner: &mut Runner) -> Batch {
 /// `torque=1.5`.
 fn parameter(text: &str) -> Result<(String, String), String> {
     let (name, value) =
-        text.split_once('=').ok_or_else(|| format!("'{text}' is incomplete; expected NAME=VALUE, e.g. torque=1.5"))?;
+        text.split_once('=').ok_or_else(|| format!("expected NAME=VALUE, e.g. torque=1.5, got '{text}'"))?;
     Ok((name.to_owned(), value.to_owned()))
 }
 
 /// `1..1000`, both ends included.
 fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
-    let expected = || format!("'{text}' is no range of seeds; expected FIRST..LAST, e.g. 1..1000");
+    let expected = || format!("expected a range of seeds FIRST..LAST, e.g. 1..1000, got '{text}'");
     let (first, last) = text.split_once("..").ok_or_else(expected)?;
     let number = |text: &str| text.trim_start_matches('=').parse::<u64>().map_err(|_| expected());
     let (first, last) = (number(first)?, number(last)?);

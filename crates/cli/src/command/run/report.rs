@@ -43,7 +43,7 @@ impl<'a> RunReport<'a> {
         ));
         let parameters = self.outcome.parameters.iter().map(|(name, value)| format!(" --set {name}={value}"));
         let again = format!("ferrodrive run {file} --seed {}{}", self.outcome.seed, parameters.collect::<String>());
-        Some(failure.next(format!("the same run again, with everything in it: {again} --json")))
+        Some(failure.next(format!("repeat this run with all details: {again} --json")))
     }
 }
 

@@ -57,8 +57,8 @@ impl ServeOptions {
         file: &Path,
     ) -> Result<(Outcome, Result<(), Failure>), Failure> {
         if self.clock == Clock::Manual && self.control.place().is_none() {
-            return Err(Failure::usage("nobody can move the time of --clock manual")
-                .next("give --control 127.0.0.1:0: its clients move time by `run 20ms`"));
+            return Err(Failure::usage("the time cannot be advanced with --clock manual")
+                .next("give --control 127.0.0.1:0: its clients advance time with `run 20ms`"));
         }
         let (mut world, execution) = Execution::begin(scenario, seed).map_err(|bad| unbuildable(file, bad))?;
         let warnings = Messages::of_warnings();

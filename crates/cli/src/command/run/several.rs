@@ -33,7 +33,7 @@ pub(super) fn run(
     });
     if let Some((name, _)) = nobodys.filter(|_| loaded.iter().any(Result::is_ok)) {
         return Err(Failure::usage(format!("none of the {} scenarios has a parameter '{name}'", files.len()))
-            .next("leave that --set away; [parameters] of a scenario names what it has"));
+            .next("omit that --set; [parameters] of a scenario lists its parameters"));
     }
     let scenarios: Vec<Result<Scenario, Failure>> =
         loaded.into_iter().map(|loaded| loaded.and_then(Loaded::with_its_own)).collect();

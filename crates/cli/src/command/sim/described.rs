@@ -35,7 +35,7 @@ pub(super) fn notes(node: NodeId, model: &'static Description, verbose: bool) ->
 fn run_as(model: &Description) -> String {
     match model.axes.len() {
         0 if model.identity.device_type & 0xFFFF == DRIVES => {
-            "a node with its objects; it says that it is a drive (1000h), and has no 6040h: nothing turns".into()
+            "a node with its objects; it claims to be a drive (1000h), but has no 6040h: nothing turns".into()
         }
         0 => "a node with its objects".into(),
         1 => "a servo".into(),

@@ -60,7 +60,7 @@ impl Top {
     /// Shows until `q`, or until the terminal or the bus is gone.
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         if format.json || !stdin().is_terminal() || !stdout().is_terminal() {
-            let failure = Failure::usage("this is no terminal to draw on");
+            let failure = Failure::usage("not a terminal that can be drawn on");
             let failure =
                 if format.json { failure.because("--json is for programs, and this is for people") } else { failure };
             return Err(failure
@@ -180,13 +180,13 @@ async fn show(context: &Context, host: studio::HostHandle, format: Format) -> Re
                 match shown {
                     Shown::State(state) => match serde_json::from_str(&state) {
                         Ok(state) => app.take(state),
-                        Err(error) => app.report(None, format!("the host says what cannot be read: {error}")),
+                        Err(error) => app.report(None, format!("cannot read a message of the host: {error}")),
                     },
                     Shown::News(news) => match serde_json::from_str(&news) {
                         Ok(news) => app.note(news),
-                        Err(error) => app.report(None, format!("the host says what cannot be read: {error}")),
+                        Err(error) => app.report(None, format!("cannot read a message of the host: {error}")),
                     },
-                    Shown::Missed(missed) => app.report(None, format!("{missed} news came too fast to be shown")),
+                    Shown::Missed(missed) => app.report(None, format!("{missed} messages came too fast to be shown")),
                     Shown::Over => return Err(gone()),
                 }
                 Vec::new()

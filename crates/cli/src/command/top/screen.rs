@@ -22,7 +22,7 @@ const KEYS: &str = "e enable  d disable  left/right jog  s stop  r reset  SPACE 
 
 const HELP: [&str; 17] = [
     "SPACE, Esc       quick stop of every drive",
-    "left, right      jog the chosen drive while held (h and l too). It",
+    "left, right      jog the chosen drive while held (also h and l). It",
     "                 begins with the second repeat of the key and ends 0.2 s",
     "                 after the last: a press alone moves nothing",
     "+, -             speed to jog at",
@@ -33,7 +33,7 @@ const HELP: [&str; 17] = [
     "r                reset its fault, once the cause is gone",
     "x                explain why it does not move",
     "n                scan the bus",
-    "t                take control, where nobody has it",
+    "t                take control, if no other session has it",
     "q, Ctrl-C        quit: what was moved from here stops",
     "",
     "What this terminal moves stops too when it closes, when its connection",
@@ -125,7 +125,7 @@ fn draw_nodes(frame: &mut Frame<'_>, area: Rect, app: &App, look: Look) {
         lines.push(node_line(node, Some(node.node) == app.chosen, look));
     }
     if app.state.nodes.is_empty() {
-        lines.push(Line::from("  nobody has been heard: is there power, is the bit rate right? n scans the bus"));
+        lines.push(Line::from("  no node has been heard: is there power, is the bit rate right? n scans the bus"));
     }
     frame.render_widget(Paragraph::new(lines), area);
 }
@@ -257,7 +257,7 @@ fn draw_question(frame: &mut Frame<'_>, area: Rect, node: Option<&Node>, look: L
         Line::from(""),
         Line::from("It was not moved. Keep an emergency stop within reach."),
         Line::from(""),
-        Line::from("y      move it nevertheless: let the key go, then hold it again"),
+        Line::from("y      move it nevertheless: release the key, then hold it again"),
         Line::from("SPACE  quick stop of every drive; any other key goes back"),
     ];
     let text = Paragraph::new(text).wrap(Wrap { trim: false });

@@ -138,7 +138,7 @@ fn a_window_that_is_too_small_says_so_and_an_empty_bus_what_to_do() {
         drawn(&app(), width, height);
     }
     let empty = App::new(NUMBER);
-    assert!(drawn(&empty, 80, 24).iter().any(|line| line.contains("nobody has been heard")));
+    assert!(drawn(&empty, 80, 24).iter().any(|line| line.contains("no node has been heard")));
 }
 
 #[test]

@@ -53,13 +53,15 @@ impl ControlOptions {
         let Some(address) = &self.control else { return Ok(None) };
         let token = match &self.control_token {
             Some(token) if token.is_empty() => {
-                return Err(Failure::usage("the token of --control-token is empty").next("give one, or leave it away"));
+                return Err(
+                    Failure::usage("the token of --control-token is empty").next("give one, or omit the option")
+                );
             }
             Some(token) => Some(token.clone()),
             None if address.is_local() => None,
             None => {
                 let token = random_token()?;
-                warnings.say(&format!("note: whoever can reach {address} has to give this token: {token}"));
+                warnings.say(&format!("note: clients of {address} have to give this token: {token}"));
                 Some(token)
             }
         };
