@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::command::{
     boot, check, completions, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, estop, events, explain,
-    export, gateway, group, home, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read,
+    export, gateway, group, home, init, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read,
     readings, record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time, top, watch, world,
 };
 use crate::global::Global;
@@ -36,6 +36,7 @@ pub(crate) enum Command {
     Plot(plot::Plot),
     Readings(readings::Readings),
     Eds(eds::Eds),
+    Init(init::Init),
     Dcf(dcf::Dcf),
     Watch(watch::Watch),
     Params(params::Params),

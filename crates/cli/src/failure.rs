@@ -12,6 +12,7 @@ use crate::status::Status;
 pub(crate) use testbench::failure::FailureBody;
 use testbench::failure::Subject;
 use testbench::models::how_to_say;
+use testbench::words::unresolved::Unresolved;
 
 /// A reason for people, in up to three parts, and what programs look for in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -99,6 +100,17 @@ impl Failure {
                 None => failure,
             },
         }
+    }
+
+    /// That a file named on the command line is missing or cannot be used, where that is what the parser met: the command line itself
+    /// makes sense.
+    pub(crate) fn of_named_file(error: &clap::Error) -> Option<Self> {
+        let unresolved = std::error::Error::source(error)?.downcast_ref::<Unresolved>()?;
+        let Unresolved::File(reason) = unresolved else { return None };
+        Some(
+            Self::bad_file(short(reason))
+                .next("give the path of an EDS or DCF file; `ferrodrive eds lint FILE` says what is wrong with one"),
+        )
     }
 
     /// Names its kind.

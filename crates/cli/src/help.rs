@@ -33,7 +33,7 @@ const GROUPS: &[CommandGroup] = &[
             "reset",
         ],
     },
-    CommandGroup { title: "Configure", commands: &["write", "params", "dcf", "save", "restore", "lss"] },
+    CommandGroup { title: "Configure", commands: &["init", "write", "params", "dcf", "save", "restore", "lss"] },
     CommandGroup {
         title: "Network",
         commands: &["boot", "supervise", "nmt", "sync", "time", "send", "latency", "gateway", "plan", "check"],

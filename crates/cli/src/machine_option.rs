@@ -19,6 +19,10 @@ impl Global {
         let command = matches.subcommand_name().unwrap_or_default();
         let Some(path) = self.machine_path.clone().filter(|_| heeds_machine(command)) else { return Ok(self) };
         let is_typed = matches.value_source("machine") == Some(ValueSource::CommandLine);
+        // The file of the environment may be the one that is to be written.
+        if command == "init" && !is_typed {
+            return Ok(self);
+        }
         // A check reads its file, and asks only a bus that is named; a simulator makes its drives itself.
         let makes_its_own = matches!(command, "check" | "sim");
         match &self.bus {

@@ -143,6 +143,10 @@ fn suggest_by_sense(error: &mut clap::Error, words: &[String]) {
 fn refuse_command_line(error: &clap::Error) -> ExitCode {
     let before_dashes = std::env::args_os().take_while(|argument| argument != "--");
     let json = before_dashes.into_iter().any(|argument| argument == "--json");
+    if let Some(failure) = Failure::of_named_file(error) {
+        complain(Format { json, paint: Paint::for_stream(&io::stdout()) }, &failure);
+        return ExitCode::from(failure.status as u8);
+    }
     if !json || !error.use_stderr() {
         return show_usage(error);
     }
@@ -249,6 +253,10 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Check(check) => {
             let report = check.run(global)?;
             judged(format, &report, report.failure(check.strict()).map(Into::into))
+        }
+        Command::Init(init) => {
+            let report = init.run(global, typed.bus)?;
+            judged(format, &report, report.failure().map(Into::into))
         }
         Command::Plot(plot) => print(format, &plot.draw()?),
         Command::Readings(readings) => print(format, &readings.list()?),

@@ -123,6 +123,13 @@ const CHECK_OF_A_FILE: Unheeded = Unheeded {
     next: "omit it, or give --bus to ask the drives on it",
 };
 
+const INIT_OF_DRIVES: Unheeded = Unheeded {
+    command: "init",
+    options: ALL,
+    why: "--drive says which drives there are, and nobody is asked",
+    next: "omit it, or give --bus in place of --drive",
+};
+
 /// The command line as it is parsed and shown.
 pub(crate) fn command_line() -> clap::Command {
     help::dressed(heeded())
@@ -156,7 +163,9 @@ pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgM
     let of_model = matches!(command, Command::Objects(objects) if matches!(objects.whose, Whose::Model(_)));
     let name = matches.subcommand_name().unwrap_or_default();
     let of_file = matches!(command, Command::Check(_)) && global.bus == BusSpec::Sim { file: None };
-    let special = of_model.then_some(&OBJECTS_OF_A_MODEL).into_iter().chain(of_file.then_some(&CHECK_OF_A_FILE));
+    let of_drives = matches!(command, Command::Init(init) if init.is_without_bus());
+    let special = [(of_model, &OBJECTS_OF_A_MODEL), (of_file, &CHECK_OF_A_FILE), (of_drives, &INIT_OF_DRIVES)];
+    let special = special.iter().filter_map(|(is_so, row)| is_so.then_some(*row));
     let rows = UNHEEDED.iter().filter(|row| row.command == name).chain(special);
     for row in rows {
         if let Some(option) = row.options.iter().find(given) {
@@ -223,6 +232,7 @@ mod tests {
         "gateway",
         "group move 4=90deg",
         "home 4 --method 17",
+        "init",
         "latency",
         "lss scan",
         "man-pages pages",

@@ -10,6 +10,7 @@ use sim::machine::models;
 
 use crate::data_sheet::{self, Unread};
 use crate::words::suggest::{did_you_mean, near};
+use crate::words::unresolved::Unresolved;
 
 pub use devices::Description;
 
@@ -18,7 +19,7 @@ pub use devices::Description;
 ///
 /// # Errors
 /// What of it is not known, and what is.
-pub fn resolve(text: &str) -> Result<&'static Description, String> {
+pub fn resolve(text: &str) -> Result<&'static Description, Unresolved> {
     let Some((name, choices)) = text.split_once(',').filter(|_| !is_file(text)) else {
         return resolve_in(text, Path::new(""));
     };
@@ -46,9 +47,9 @@ pub fn resolve(text: &str) -> Result<&'static Description, String> {
 ///
 /// # Errors
 /// That it is neither, and what is near.
-pub fn resolve_in(text: &str, folder: &Path) -> Result<&'static Description, String> {
+pub fn resolve_in(text: &str, folder: &Path) -> Result<&'static Description, Unresolved> {
     if is_file(text) {
-        return described(&folder.join(text));
+        return described(&folder.join(text)).map_err(Unresolved::File);
     }
     let known = || models().map(|model| model.name);
     models().find(|model| model.name.eq_ignore_ascii_case(text)).ok_or_else(|| {
@@ -58,6 +59,7 @@ pub fn resolve_in(text: &str, folder: &Path) -> Result<&'static Description, Str
             did_you_mean(&near),
             names()
         )
+        .into()
     })
 }
 
@@ -84,6 +86,12 @@ fn described(path: &Path) -> Result<&'static Description, String> {
 /// True for a device that a data sheet describes: what one count of an object is worth, no data sheet says.
 pub fn is_from_file(model: &Description) -> bool {
     !models().any(|known| model.is_edition_of(known))
+}
+
+/// The path of the file that describes a device, as it was given; `None` for a model that is built in.
+pub fn file_of(model: &'static Description) -> Option<&'static str> {
+    let path = model.manual.strip_prefix("the file ").filter(|_| is_from_file(model))?;
+    Some(path.strip_suffix(", without its modules").unwrap_or(path))
 }
 
 /// The models known, and those of `given` that come from files.
@@ -130,7 +138,7 @@ mod tests {
         assert!(!has("zlac8030l", 0x202F, 6) && has("ZLAC8030L,firmware=2.01", 0x202F, 6));
         assert!(!has("m8025e25b80", 0x1006, 0) && has("m8025e25b80,firmware=1.66", 0x1006, 0));
         assert!(std::ptr::eq(resolve("zlac8030l,motor=fast").unwrap(), resolve("zlac8030l").unwrap()));
-        let refusal = |text: &str| resolve(text).unwrap_err();
+        let refusal = |text: &str| resolve(text).unwrap_err().to_string();
         assert!(refusal("zlac8030l,firmware=3").contains("expected one of: 1.00, 2.01"));
         assert!(refusal("zlac8030l,colour=red").contains("it has: firmware, motor"));
         assert!(refusal("zlac8030l,firmware").contains("KEY=CHOICE"));

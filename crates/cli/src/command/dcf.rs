@@ -27,8 +27,8 @@ use testbench::words::node::node;
 /// has only the values that differ from that sheet. Read-only objects are left out, and so are commands and set-points,
 /// which are not configuration.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  ferrodrive dcf 4 --output left-wheel.dcf\n  \
-    ferrodrive --bus socketcand://HOST:29536/can0 dcf 5 --eds vendor.eds --output axis.dcf\n  ferrodrive dcf 4 --model 4=zlac8030l > left-wheel.dcf")]
+#[command(after_help = "Examples:\n  ferrodrive dcf 4 -o left-wheel.dcf\n  \
+    ferrodrive --bus socketcand://HOST:29536/can0 dcf 5 --eds vendor.eds -o axis.dcf\n  ferrodrive dcf 4 --model 4=zlac8030l > left-wheel.dcf")]
 pub(crate) struct Dcf {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -83,10 +83,7 @@ impl Dcf {
     /// Reads the values and writes the file.
     pub(crate) async fn run(&self, context: &Context) -> Result<DcfReport, Failure> {
         // Before anything is asked for: nobody waits for what cannot be kept.
-        let output = self.output.as_deref().filter(|path| *path != Path::new("-"));
-        if let Some(path) = output.filter(|path| !self.force && path.exists()) {
-            return Err(exists(path));
-        }
+        let output = new_file(self.output.as_deref(), self.force)?;
         let (mut made, model) = self.sheet(context).await?;
         let node = context.node(self.node);
         let (values, read, refused) = match &self.eds {
@@ -246,7 +243,24 @@ async fn bit_rate(node: &Node, model: &Description) -> Option<u16> {
     row.meaning(value.into())?.strip_suffix(" kbit/s")?.parse().ok()
 }
 
-pub(super) fn exists(path: &Path) -> Failure {
+/// The file of `--output`; `None` for standard output, which has no such option or `-`.
+///
+/// # Errors
+/// The file exists, and `force` does not allow replacing it.
+pub(super) fn new_file(output: Option<&Path>, force: bool) -> Result<Option<&Path>, Failure> {
+    let path = output.filter(|path| !is_stdout(path));
+    match path.filter(|path| !force && path.exists()) {
+        Some(path) => Err(exists(path)),
+        None => Ok(path),
+    }
+}
+
+/// True for the `-` that means standard output.
+pub(super) fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+fn exists(path: &Path) -> Failure {
     Failure::new(format!("{} already exists", path.display()))
         .of_kind("file_exists")
         .next("--force overwrites it, or give another --output")
@@ -254,7 +268,7 @@ pub(super) fn exists(path: &Path) -> Failure {
 
 /// Writes the file at once or not at all: beside its place, then to it.
 pub(super) fn keep(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure> {
-    let cannot = |error: std::io::Error| Failure::new(format!("cannot write {}", path.display())).because(error);
+    let cannot = |error: std::io::Error| Failure::of_writing("the file", path, &error);
     if !force {
         // Made only if nobody was faster.
         let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(cannot)?;

@@ -21,6 +21,7 @@ pub(crate) mod export;
 pub(crate) mod gateway;
 pub(crate) mod group;
 pub(crate) mod home;
+pub(crate) mod init;
 pub(crate) mod latency;
 pub(crate) mod lss;
 pub(crate) mod man_pages;

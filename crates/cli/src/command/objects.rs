@@ -15,6 +15,7 @@ use plot::Table;
 use testbench::models::{Description, resolve};
 use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
+use testbench::words::unresolved::Unresolved;
 
 /// List the object dictionary of a model or of a node
 #[derive(clap::Args)]
@@ -42,9 +43,9 @@ pub(crate) enum Whose {
     Node(NodeId),
 }
 
-fn whose(text: &str) -> Result<Whose, String> {
+fn whose(text: &str) -> Result<Whose, Unresolved> {
     if text.starts_with(|first: char| first.is_ascii_digit() || first == '-') {
-        return node(text).map(Whose::Node);
+        return Ok(Whose::Node(node(text)?));
     }
     resolve(text).map(Whose::Model)
 }

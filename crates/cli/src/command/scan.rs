@@ -9,7 +9,7 @@ use master::identify::Found;
 use plot::Paint;
 use plot::Table;
 use testbench::models::how_to_say;
-use testbench::network::heard::Counted;
+use testbench::network::heard::{Counted, Heard};
 use testbench::network::scan::{ScanReport, ScannedNode, no_node};
 
 /// Show the nodes on the bus
@@ -27,31 +27,34 @@ pub(crate) struct Scan {}
 impl Scan {
     /// Asks everybody.
     pub(crate) async fn run(&self, context: &Context) -> Result<ScanReport, Failure> {
-        let asked = |count| context.progress.count(format!("asked {count} of 127"));
-        let (mut counted, mut decoder) = (Counted::default(), context.decoder());
-        let mut others = context.traffic.of_others();
-        let mut scanning = std::pin::pin!(context.network.scan(context.timeout(), asked));
-        let found = loop {
-            tokio::select! {
-                found = &mut scanning => break found,
-                passed = others.recv() => match passed {
-                    Ok((_, frame)) => counted.note(&mut decoder, &frame),
-                    // A busy bus is faster than this: what was missed is of the kinds that come again.
-                    Err(RecvError::Lagged(_)) => {}
-                    Err(RecvError::Closed) => break scanning.await,
-                },
-            }
-        };
-        while let Ok((_, frame)) = others.try_recv() {
-            counted.note(&mut decoder, &frame);
-        }
-        let heard = counted.reported(|node| found.iter().any(|found| found.node == node));
-        if found.is_empty() {
-            return Err(no_node(&heard).into());
-        }
+        let (found, heard) = look(context).await?;
         let node = |found: &Found| ScannedNode::new(context.stated_model(found.node), found, how_to_say);
         Ok(ScanReport { nodes: found.iter().map(node).collect(), heard })
     }
+}
+
+/// Who is on the bus, and what others sent meanwhile; a failure where nobody is.
+pub(super) async fn look(context: &Context) -> Result<(Vec<Found>, Vec<Heard>), Failure> {
+    let asked = |count| context.progress.count(format!("asked {count} of 127"));
+    let (mut counted, mut decoder) = (Counted::default(), context.decoder());
+    let mut others = context.traffic.of_others();
+    let mut scanning = std::pin::pin!(context.network.scan(context.timeout(), asked));
+    let found = loop {
+        tokio::select! {
+            found = &mut scanning => break found,
+            passed = others.recv() => match passed {
+                Ok((_, frame)) => counted.note(&mut decoder, &frame),
+                // A busy bus is faster than this: what was missed is of the kinds that come again.
+                Err(RecvError::Lagged(_)) => {}
+                Err(RecvError::Closed) => break scanning.await,
+            },
+        }
+    };
+    while let Ok((_, frame)) = others.try_recv() {
+        counted.note(&mut decoder, &frame);
+    }
+    let heard = counted.reported(|node| found.iter().any(|found| found.node == node));
+    if found.is_empty() { Err(no_node(&heard).into()) } else { Ok((found, heard)) }
 }
 
 impl Report for ScanReport {

@@ -6,6 +6,7 @@ mod cycles;
 mod eds;
 mod estop;
 mod handbook;
+mod init;
 mod json;
 mod machine;
 mod on_sim;

@@ -44,6 +44,7 @@ const LINES: &[&str] = &[
     "gateway",
     "group move 4=90deg",
     "home 4 --method 17",
+    "init",
     "latency",
     "lss scan",
     "move 4 90deg",

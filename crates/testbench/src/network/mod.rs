@@ -8,6 +8,7 @@ pub mod boot;
 pub mod check;
 pub mod explain;
 pub mod heard;
+pub mod init;
 pub mod params;
 pub mod plan;
 pub mod scan;

@@ -8,6 +8,7 @@ use sim::machine::{Order, TimingMode};
 use super::node::node;
 use super::object;
 use super::suggest::{did_you_mean, near};
+use super::unresolved::Unresolved;
 use crate::models::{Description, resolve};
 
 /// A drive to put on a virtual bus.
@@ -145,7 +146,10 @@ fn number(text: &str) -> Option<i64> {
 }
 
 /// `zlac8030l@4,motor=fast,6060=3`, `vendor.eds@5`.
-pub fn drive_spec(text: &str) -> Result<DriveSpec, String> {
+///
+/// # Errors
+/// What of it makes no sense, or that the file that it names cannot be used.
+pub fn drive_spec(text: &str) -> Result<DriveSpec, Unresolved> {
     let mut words = text.split(',');
     let place = words.next().unwrap_or_default();
     let (name, number) = place
@@ -162,7 +166,10 @@ pub fn drive_spec(text: &str) -> Result<DriveSpec, String> {
 }
 
 /// `4=zlac8030l`.
-pub fn node_model(text: &str) -> Result<(NodeId, &'static Description), String> {
+///
+/// # Errors
+/// The same.
+pub fn node_model(text: &str) -> Result<(NodeId, &'static Description), Unresolved> {
     let (number, name) =
         text.split_once('=').ok_or_else(|| format!("'{text}' is incomplete; expected NODE=MODEL, e.g. 4=zlac8030l"))?;
     Ok((node(number)?, resolve(name)?))
@@ -173,7 +180,7 @@ mod tests {
     use super::*;
 
     fn refusal(text: &str) -> String {
-        drive_spec(text).err().unwrap_or_default()
+        drive_spec(text).err().map(String::from).unwrap_or_default()
     }
 
     #[test]
@@ -228,6 +235,6 @@ mod tests {
         assert!(refusal("zlac8030l").contains("MODEL@NODE"));
         assert!(refusal("zlac8030l@128").contains("1 to 127"));
         assert!(refusal("@4").contains("zlac8030l"));
-        assert!(node_model("zlac8030l").err().unwrap().contains("4=zlac8030l"));
+        assert!(node_model("zlac8030l").err().unwrap().to_string().contains("4=zlac8030l"));
     }
 }

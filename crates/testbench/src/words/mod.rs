@@ -9,6 +9,7 @@ pub mod object;
 pub mod selection;
 pub mod suggest;
 pub mod unit;
+pub mod unresolved;
 pub mod value;
 
 /// `text` with its control characters escaped, but for the ends of lines: file names, machine files and commands may carry

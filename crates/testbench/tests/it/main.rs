@@ -4,5 +4,6 @@ mod check;
 mod control;
 mod documented;
 mod hostile_files;
+mod init;
 mod scenario_words;
 mod worked_scenarios;

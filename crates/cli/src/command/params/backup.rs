@@ -3,7 +3,7 @@
 use testbench::network::params::{BackupReport, back_up, bytes_of};
 use testbench::parameters::{Form, sheet};
 
-use crate::command::dcf::{exists, keep, of_parameters};
+use crate::command::dcf::{is_stdout, keep, new_file, of_parameters};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -13,11 +13,9 @@ use plot::Paint;
 impl super::Backup {
     pub(super) async fn run(&self, context: &Context) -> Result<BackupReport, Failure> {
         // Before anything is asked for: nobody waits for what cannot be kept.
-        let output = self.output.as_deref().filter(|path| *path != std::path::Path::new("-"));
+        let output = self.output.as_deref().filter(|path| !is_stdout(path));
         let form = output.map(Form::of).transpose().map_err(Failure::usage)?;
-        if let Some(path) = output.filter(|path| !self.force && path.exists()) {
-            return Err(exists(path));
-        }
+        let output = new_file(output, self.force)?;
         let drive = context.known_drive(self.node).await?;
         let (mut report, parameters, model) = back_up(&context.progress, &drive).await?;
         let Some((path, form)) = output.zip(form) else {
