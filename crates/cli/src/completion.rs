@@ -86,7 +86,7 @@ impl Line {
         node_of(&command, &command.clone().try_get_matches_from(words).ok()?)
     }
 
-    /// What is known of the nodes: as it was told, of the machine, of an own bus, or from earlier calls.
+    /// What is known of the nodes: from --model, of the machine, of an own bus, or from earlier calls.
     fn nodes(&self) -> Vec<(u8, Option<&'static Description>)> {
         let bus = self.bus();
         let stated = self.values("--model").filter_map(|text| node_model(text).ok());

@@ -127,7 +127,7 @@ impl Context {
         self.models.get(&id).map(|stated| stated.description())
     }
 
-    /// What is known of a node's model: as it was told, if the node does not contradict, else as its identity and objects
+    /// What is known of a node's model: as stated, if the node does not contradict, else as its identity and objects
     /// say.
     async fn knowledge_of(&self, id: NodeId) -> Result<Knowledge, Failure> {
         match self.models.get(&id) {
@@ -146,7 +146,7 @@ impl Context {
         self.models.iter().map(|(node, stated)| (*node, stated.description())).collect()
     }
 
-    /// A decoder that knows the models that this command was told.
+    /// A decoder that knows the stated models.
     pub(crate) fn decoder(&self) -> Decoder {
         let mut decoder = Decoder::knowing(self.network.models());
         for (node, stated) in &self.models {
@@ -155,7 +155,7 @@ impl Context {
         decoder
     }
 
-    /// Listens for this long, or without end, but on an embedded bus for `embedded`: nobody presses Ctrl-C in virtual time.
+    /// Listens for this long, or without end, but on an embedded bus for `embedded`: in virtual time Ctrl-C does not come.
     /// `work` ends by itself only with an error.
     pub(crate) async fn listen_for(
         &self,
@@ -188,7 +188,7 @@ impl Context {
         self.timeout
     }
 
-    /// A drive of a known or guessed model, for commands that cannot do without. A guess is told to the user.
+    /// A drive of a known or guessed model, for commands that need one. A guess is reported.
     pub(crate) async fn known_drive(&self, id: NodeId) -> Result<Drive, Failure> {
         let drive = self.drive(id).await?;
         if drive.description().is_some() {
@@ -201,19 +201,19 @@ impl Context {
             .next(format!("name it with --model {id}=MODEL, where MODEL is one of: {}", models::names())))
     }
 
-    /// A drive, of a known model or not. A guess is told to the user.
+    /// A drive, of a known model or not. A guess is reported.
     pub(crate) async fn drive(&self, id: NodeId) -> Result<Drive, Failure> {
         let drive = self.drive_without_note(id).await?;
         self.note_guess(&drive);
         Ok(drive)
     }
 
-    /// A drive, for commands that may refuse to work with a guess, which is then told with the refusal.
+    /// A drive, for commands that may refuse to work with a guess, which is then reported with the refusal.
     pub(crate) async fn drive_without_note(&self, id: NodeId) -> Result<Drive, Failure> {
         Ok(Drive::known_as(self.node(id), self.knowledge_of(id).await?).behind(self.gear(id)))
     }
 
-    /// Tells the user if what follows rests on a guess. Where all models that answer so have the same objects, it does not.
+    /// Notes if what follows rests on a guess. Where all models that answer so have the same objects, it does not.
     pub(crate) fn note_guess(&self, drive: &Drive) {
         let Some(guess) = drive.guess().filter(|guess| guess.evidence().is_some() && !self.json) else { return };
         let id = drive.node().id();
@@ -222,7 +222,7 @@ impl Context {
         let how = models::how_to_say(id, &fitting);
         self.note_once(
             &key,
-            &format!("node {id}: its model is not certain: {guess}. That is assumed; to be sure: {how}"),
+            &format!("node {id}: its model is not certain: {guess}, which is assumed; to be sure: {how}"),
         );
     }
 
@@ -240,14 +240,14 @@ impl Context {
         }
     }
 
-    /// Tells people what would be the same with every call: a person at a terminal once, whoever collects the text each time.
+    /// Notes what would be the same with every call: at a terminal once, in a file or a pipe each time.
     pub(crate) fn note_once(&self, key: &str, text: &str) {
         if !self.json && self.remembered.borrow_mut().is_new(key) {
             self.note(text);
         }
     }
 
-    /// Tells people something beside what the command prints; programs read the report.
+    /// Prints a note on standard error; programs read the report.
     pub(crate) fn note(&self, text: &str) {
         if !self.json {
             self.progress.note(text);
@@ -281,7 +281,7 @@ impl Context {
         }
     }
 
-    /// Lets frames out that nobody answers.
+    /// Waits until frames are sent that have no answer.
     pub(crate) async fn settle(&self) {
         self.network.sleep(SETTLING_TIME).await;
     }

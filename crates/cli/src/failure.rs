@@ -29,7 +29,7 @@ pub(crate) struct Failure {
     pub(crate) next: Vec<String>,
     /// The node, object and abort code that it is about.
     pub(crate) subject: Subject,
-    /// It has been told already, as part of what the command printed.
+    /// It has been reported already, as part of what the command printed.
     pub(crate) reported: bool,
 }
 

@@ -1,5 +1,5 @@
 //! `--guard`: what a drive does when the command that moves it dies, armed where the drive has something against that, and
-//! told where it has not.
+//! reported where it has not.
 //!
 //! A guard lasts as long as its command. A command that ends and leaves the motor turning releases it, and says what
 //! happens then.

@@ -100,7 +100,7 @@ fn matches() -> Result<ArgMatches, clap::Error> {
     let meant = match word_order::mend(&command, &words, error.kind()) {
         Some(mended) if mended.is_harmless() => {
             if !words.iter().any(|word| word == "--json") {
-                // Nobody may be listening any more.
+                // The reader may have gone.
                 let _ = writeln!(io::stderr(), "note: interpreted as: {}", plain(&mended.text()));
             }
             return Ok(mended.matches);
@@ -168,13 +168,13 @@ fn show_usage(error: &clap::Error) -> ExitCode {
 }
 
 /// Says why: to people on standard error, to programs as a line of JSON on standard output. Who sent a signal knows,
-/// unless there is more to tell.
+/// unless there is more to report.
 fn complain(format: Format, failure: &Failure) {
     if failure.reported {
         return;
     }
     if format.json {
-        // Nobody may be listening any more; the exit status still tells.
+        // The reader may have gone; the exit status remains.
         if let Ok(line) = sim::json::to_string(&FailureReport::from(failure)) {
             let _ = writeln!(io::stdout(), "{}", short(&line));
         }
@@ -184,7 +184,7 @@ fn complain(format: Format, failure: &Failure) {
         return;
     }
     let error = Paint::for_stream(&io::stderr()).bad("error:");
-    // Nobody may be listening any more; the exit status still tells.
+    // The reader may have gone; the exit status remains.
     let _ = writeln!(io::stderr(), "{error} {}", short(&plain(&failure.to_string())));
 }
 
@@ -201,7 +201,7 @@ impl Typed {
     }
 }
 
-/// Prints a report, and fails as it says; for programs that stands in the report.
+/// Prints a report, and fails as it says; for programs the report has the failure.
 fn judged(format: Format, report: &impl Report, failure: Option<Failure>) -> Result<(), Failure> {
     print(format, report)?;
     failure.map_or(Ok(()), |failure| Err(Failure { reported: format.json || failure.reported, ..failure }))

@@ -49,7 +49,7 @@ pub(crate) fn print_line(text: &str) -> io::Result<()> {
     if text.is_empty() { Ok(()) } else { print(format!("{text}\n").as_bytes()) }
 }
 
-/// Bytes on standard output, at once. A reader that has gone away is no error: it has seen what it wanted
+/// Bytes on standard output, at once. A reader that has gone away is not an error: it has seen what it wanted
 /// (`ferrodrive dump | head`).
 pub(crate) fn print(bytes: &[u8]) -> io::Result<()> {
     let mut out = io::stdout().lock();

@@ -38,7 +38,7 @@ mod tests {
         let cut = with_arguments_cut(&text, [long.clone(), "read".to_owned()]);
         assert!(cut.len() < 400 && cut.contains("(10000 characters)' is not a node-ID"), "{cut}");
         let cut = with_arguments_cut(
-            &format!("'{long}' is no number"),
+            &format!("'{long}' is not a number"),
             [format!("--set=a={long}"), format!("--jobs={long}")],
         );
         assert!(cut.len() < 200, "{cut}");

@@ -10,18 +10,18 @@ use terminal_size::Width;
 
 use crate::plain::plain;
 
-/// How often somebody is told of a long count who reads standard error from a file or a pipe.
+/// How often a long count is shown where standard error is a file or a pipe.
 const PIPED_INTERVAL: Duration = Duration::from_secs(5);
 
-/// One line on standard error that says what is being waited for; nothing if that is no terminal.
+/// One line on standard error that says what is being waited for; nothing if that is not a terminal.
 #[derive(Clone, Debug)]
 pub(crate) struct Progress {
     bar: ProgressBar,
-    /// No terminal, and yet somebody may read it.
+    /// Not a terminal, and yet it may be read.
     piped: Option<Arc<Mutex<Lines>>>,
 }
 
-/// Lines about a long count, for somebody who reads standard error from a file or a pipe.
+/// Lines about a long count, where standard error is a file or a pipe.
 #[derive(Debug)]
 struct Lines {
     /// Since the line of progress was begun.
@@ -54,7 +54,7 @@ impl Progress {
         Self { bar, piped: None }
     }
 
-    /// True if somebody sees it.
+    /// True if it is visible.
     pub(crate) fn is_shown(&self) -> bool {
         !self.bar.is_hidden()
     }
@@ -79,13 +79,13 @@ impl Progress {
 
     /// A line on standard error that stays, terminal or not.
     pub(crate) fn note(&self, text: &str) {
-        // Nobody may be listening any more.
+        // The reader may have gone.
         self.bar.suspend(|| drop(writeln!(io::stderr(), "note: {}", plain(text))));
     }
 
     /// A line on standard error as it is, terminal or not.
     pub(crate) fn line(&self, text: &str) {
-        // Nobody may be listening any more.
+        // The reader may have gone.
         self.bar.suspend(|| drop(writeln!(io::stderr(), "{text}")));
     }
 
@@ -120,7 +120,7 @@ pub(crate) struct Screen {
 }
 
 impl Screen {
-    /// None if standard output is no terminal.
+    /// None if standard output is not a terminal.
     pub(crate) fn on_terminal() -> Option<Self> {
         if !io::stdout().is_terminal() {
             return None;

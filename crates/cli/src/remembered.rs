@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Buses that are remembered; the one that was used longest ago goes first.
 const MAX_BUSES: usize = 32;
 
-/// Messages that are remembered as said; the oldest goes first, and is said again.
+/// Messages that are remembered as shown; the oldest is forgotten first, and is shown again.
 const MAX_SAID: usize = 256;
 
 /// A larger file is none of ours.
@@ -103,7 +103,7 @@ impl Remembered {
         self.buses.iter().rev().map(|bus| bus.name.as_str())
     }
 
-    /// Writes it; whoever reads it meanwhile has the old file or the new one. A disk that takes nothing is no matter here.
+    /// Writes it; a reader meanwhile has the old file or the new one. A disk that takes nothing does not matter here.
     fn keep(&self) {
         let Some(path) = &self.path else { return };
         let Some(folder) = path.parent() else { return };

@@ -1,5 +1,5 @@
-//! Options of every command that mean nothing to one of them: its help does not show them, and typed there they are refused, so
-//! that nobody believes that they were heeded. The environment may set them for all commands.
+//! Options of every command that have no effect on one of them: its help does not show them, and typed there they are refused, so
+//! that no option is silently ignored. The environment may set them for all commands.
 
 use std::collections::BTreeMap;
 
@@ -149,7 +149,7 @@ pub(crate) fn heeded() -> clap::Command {
     command
 }
 
-/// Whether a machine file means something to a command.
+/// Whether a machine file has an effect on a command.
 pub(crate) fn heeds_machine(command: &str) -> bool {
     !UNHEEDED.iter().any(|row| row.command == command && row.options.contains(&MACHINE))
 }
@@ -158,7 +158,7 @@ pub(crate) fn heeds_machine(command: &str) -> bool {
 pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgMatches) -> Result<(), Failure> {
     let typed = |option: &str| matches.value_source(option) == Some(ValueSource::CommandLine);
     let own_bus = matches!(global.bus, BusSpec::Sim { .. });
-    // The bus that every command has by itself is no contradiction.
+    // The bus that every command has by itself is not a contradiction.
     let given = |option: &&&str| typed(option) && (**option != BUS || global.bus != BusSpec::Sim { file: None });
     let of_model = matches!(command, Command::Objects(objects) if matches!(objects.whose, Whose::Model(_)));
     let name = matches.subcommand_name().unwrap_or_default();

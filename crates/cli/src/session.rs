@@ -211,7 +211,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         };
         let failure = stop_what_moves(&context, failure).await;
         let notes = notes.borrow();
-        // People have read them when they came; programs have only what is said now.
+        // People have read them when they came; programs have only the final report.
         let failure = notes.troubles().filter(|_| global.json).fold(failure, Failure::because);
         Err(notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost))))
     };

@@ -1,7 +1,7 @@
 //! The signals that ask this process to end: Ctrl-C, `kill`, a closed terminal, Ctrl-\.
 //!
 //! One function waits for all of them, so that no command forgets one. Each ends the process with the status that shells
-//! give it: 128 and its number. SIGKILL asks nobody; what drives do then is theirs (`--guard`).
+//! give it: 128 and its number. SIGKILL cannot be handled; the drives then act by themselves (`--guard`).
 
 #[cfg(unix)]
 use std::future::poll_fn;
@@ -83,8 +83,8 @@ impl Signals {
     }
 }
 
-/// True if whoever started this process wants it to outlive its terminal, as `nohup` does. Where the system does not tell,
-/// nobody does.
+/// True if the parent process wants this one to outlive its terminal, as `nohup` does. False where the system does not
+/// show it.
 #[cfg(unix)]
 fn hang_up_is_ignored() -> bool {
     /// SIGHUP is signal 1, the lowest bit of the mask.

@@ -1,4 +1,4 @@
-//! What a bus says beside frames, put down for whoever shows it.
+//! What a bus says beside frames, kept for display.
 
 use studio::Wire;
 use transport::{ControllerState, Note};
@@ -19,7 +19,7 @@ pub(crate) fn put_down(wire: &Wire, note: &Note) {
         Note::DatagramsLost { count } => health.frames_lost += u64::from(*count),
         Note::SendQueueFull => health.frames_lost += 1,
         Note::ConnectionLost { .. } => health.state = Some("connection lost"),
-        // What the controller is now it has not said yet.
+        // The controller has not reported its state yet.
         Note::ConnectionBack => health.state = None,
         Note::WrongBitRate | Note::NoAcknowledge | Note::FdFrame { .. } | Note::TornRecord(_) => {}
     });
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_controller_tells_is_kept_until_it_tells_something_else() {
+    fn what_a_controller_reports_is_kept_until_it_reports_something_else() {
         let wire = Wire::default();
         let counters = Some(ErrorCounters { transmit: 136, receive: 2 });
         let error = ErrorFrame { counters, ..ErrorFrame::default() };

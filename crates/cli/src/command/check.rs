@@ -43,7 +43,7 @@ impl Check {
         let path = self.path(global)?;
         let mut checked = read(path)?;
         let predicted = checked.predict();
-        // The bus of this command alone has nobody that the file means.
+        // The own bus of this command has none of the nodes that the file describes.
         let live = match global.bus {
             BusSpec::Sim { file: None } => None,
             _ => Some(session::run(global, async |context| {

@@ -31,7 +31,7 @@ pub(crate) struct Convert {
     to: LogPath,
 }
 
-/// Findings told one by one; the rest are counted.
+/// Findings reported one by one; the rest are counted.
 const TOLD: u64 = 20;
 
 /// What was converted.
@@ -75,7 +75,7 @@ impl Convert {
                 Entry::Finding(finding) => {
                     report.passed_over += 1;
                     if !quiet && report.passed_over <= TOLD {
-                        // Nobody may be listening any more.
+                        // The reader may have gone.
                         let _ = writeln!(io::stderr(), "warning: {}", plain(&finding.to_string()));
                     }
                 }

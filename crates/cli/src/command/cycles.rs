@@ -50,13 +50,13 @@ impl CycleArgs {
 const SYNC_BITS: u64 = 55;
 const DRIVE_BITS: u64 = 2 * 135;
 
-/// Refuses a cycle that does not fit the bus, before anything is written. Where nobody says the bit rate nothing is refused.
+/// Refuses a cycle that does not fit the bus, before anything is written. Without a known bit rate nothing is refused.
 pub(super) async fn refuse_too_full(context: &Context, cycle: &CyclePlan, drives: &[&Drive]) -> Result<(), Failure> {
     let full = too_full(context, cycle, drives, |read| read).await?;
     full.map_or(Ok(()), |full| Err(refusal(cycle, full.what, full.next)))
 }
 
-/// The same of what a machine file has moved in cycles, once its drives are set up as it says: whoever boots them hears it before.
+/// The same for the cycles of a machine file, once its drives are configured as it says: a boot-up is refused first.
 /// A drive that cannot be asked is the boot-up's business.
 pub(super) async fn refuse_too_full_cycles(context: &Context, machine: &Machine) -> Result<(), Failure> {
     for cycle in machine.cycles() {
@@ -78,7 +78,7 @@ async fn too_full(
     let Some(bitrate) = bitrate(context) else { return Ok(None) };
     let most_ns = (SYNC_BITS + DRIVE_BITS * drives.len() as u64) * bitrate.bit_nanos();
     if Duration::from_nanos(most_ns) <= cycle.period {
-        // It fits in any case: nobody need be asked.
+        // It fits in any case: no drive need be asked.
         return Ok(None);
     }
     let mut nodes = Vec::new();

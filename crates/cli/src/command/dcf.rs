@@ -126,7 +126,7 @@ impl Dcf {
         Ok((made.map_err(|refusal| Failure::new(refusal.to_string()).of_kind("not_an_eds"))?, model))
     }
 
-    /// Reads all that is wanted. An object that the device refuses is noted; a device that does not answer ends it.
+    /// Reads all requested objects. An object that the device refuses is noted; a device that does not answer ends it.
     async fn read_values(
         &self,
         context: &Context,
@@ -270,7 +270,7 @@ fn exists(path: &Path) -> Failure {
 pub(super) fn keep(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure> {
     let cannot = |error: std::io::Error| Failure::of_writing("the file", path, &error);
     if !force {
-        // Made only if nobody was faster.
+        // Created only if no other program has done so.
         let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(cannot)?;
         return file.write_all(bytes).map_err(cannot);
     }

@@ -44,7 +44,7 @@ impl Demo {
         let showcase =
             showcase::run(only, move |section| shown.show(section)).map_err(|error| Failure::new(error.to_string()))?;
         progress.clear();
-        // A picture of somebody else's stays.
+        // A picture that this program has not drawn is kept.
         create_picture(&self.svg, b"<svg")
             .and_then(|mut file| file.write_all(showcase.poster.to_svg().as_bytes()))
             .map_err(|error| Failure::of_writing("the picture", &self.svg, &error))?;

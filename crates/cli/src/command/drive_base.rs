@@ -24,7 +24,7 @@ use plot::Paint;
 /// How long a line counts on the virtual bus of this command alone, where no time passes between two lines.
 const VIRTUAL_LINE: Duration = Duration::from_millis(100);
 
-/// How long the wheels may take to stand after their last set-point before the pose is told.
+/// How long the wheels may take to stand after their last set-point before the pose is reported.
 const SETTLING: Duration = Duration::from_millis(500);
 
 /// How often a person is shown where the base is.
@@ -80,7 +80,7 @@ pub(crate) struct BaseDriven {
     pose: PoseReport,
     /// How often no line came in time, and the base was stopped.
     dead_man_stops: u32,
-    /// Lines that were no twist.
+    /// Lines that were not a twist.
     bad_lines: u32,
     /// Cycles in which a wheel's position did not come.
     unseen_cycles: u64,
@@ -294,7 +294,7 @@ fn lines_of_input() -> Receiver<String> {
 async fn cycle(context: &Context, base: &mut Base, began: can::Instant) -> Result<BaseState, BaseError> {
     let state = base.cycle().await?;
     if let Some(cause) = state.cause.filter(|cause| cause.wheel().is_some()) {
-        // Both wheels come to rest before it is told.
+        // Both wheels come to rest before it is reported.
         base.stop().await?;
         return Err(BaseError::Stopped(cause));
     }
@@ -369,7 +369,7 @@ async fn follow_virtually(
     Ok(())
 }
 
-/// A twist that is no number is a bad line; whatever else is wrong ends the drive.
+/// A twist that is not a number is a bad line; any other error ends the command.
 fn take(
     context: &Context,
     (base, bounds): (&mut Base, Bounds),
@@ -387,7 +387,7 @@ fn take(
     }
 }
 
-/// The twist of a line. A line that is none is told and left out: if nothing better follows, the dead man stops the base.
+/// The twist of a line. Any other line is reported and ignored: if no valid one follows, the dead man stops the base.
 fn twist_of(context: &Context, line: &str, seen: &mut Seen) -> Option<Twist> {
     let mut words = line.split_whitespace().map(|word| word.parse::<f64>().ok().filter(|number| number.is_finite()));
     let twist = match (words.next(), words.next(), words.next()) {

@@ -62,10 +62,10 @@ struct Line {
     objects: Vec<String>,
     #[serde(skip)]
     stamp: String,
-    /// On which bus, in a log that tells.
+    /// On which bus, in a log that has it.
     #[serde(skip_serializing_if = "Option::is_none")]
     interface: Option<String>,
-    /// Whether whoever wrote the log sent it, in a log that tells.
+    /// Whether the program that wrote the log sent it, in a log that has it.
     #[serde(skip_serializing_if = "Option::is_none")]
     sent: Option<bool>,
 }
@@ -115,7 +115,7 @@ struct Summary {
     fd_frames: u64,
 }
 
-/// What is not read is shown one by one up to this many, then only counted: a file that is no log has thousands.
+/// What is not read is shown one by one up to this many, then only counted: a file that is not a log has thousands.
 const SKIPPED_SHOWN: u64 = 20;
 
 /// Where decoded lines and logged frames go.
@@ -134,7 +134,7 @@ struct Sink {
     of: Option<LogFormat>,
     /// Every frame is kept, shown or not.
     keeps_all: bool,
-    /// An SDO transfer may have told a further identifier of a node that is shown.
+    /// An SDO transfer may have set a further identifier of a node that is shown.
     may_have_learned: bool,
     /// The bus passes on the frames of some identifiers only.
     is_filtered: bool,
@@ -194,7 +194,7 @@ impl Dump {
             sink.decoder.set_model(node, model);
         }
         world.log_mut().set_limit(usize::MAX);
-        // Somebody has to acknowledge what a single drive sends.
+        // The frames of a single drive need a node that acknowledges them.
         world.add_probe();
         world.run_for(self.duration.unwrap_or(EMBEDDED_DURATION));
         while let Some(event) = world.log_mut().pull() {
@@ -278,7 +278,7 @@ impl Sink {
         asks.then(|| self.filter.ids(&self.decoder))
     }
 
-    /// Shows what stands in a log at one moment, and keeps it as it is in the log of `--log`.
+    /// Shows a record of a log, and copies it to the log of `--log`.
     fn record(&mut self, record: Record) -> Result<(), Failure> {
         self.log.record(&record);
         let at = record.at.unwrap_or(Instant::ZERO);
@@ -329,7 +329,7 @@ impl Sink {
         self.print(&line)
     }
 
-    /// Tells among the frames what the bus says beside them.
+    /// Shows the notes of the bus among the frames.
     fn note(&mut self, at: Instant, note: &Note) -> Result<(), Failure> {
         let stamp = self.stamps.text(at);
         self.print(&Noted { t: at.as_secs_f64(), note: note.kind(), text: note.to_string(), stamp })
@@ -339,7 +339,7 @@ impl Sink {
         self.format.print(line).map_err(|error| not_printed(&error))
     }
 
-    /// Tells of what is passed over: among the frames to programs, beside them to people.
+    /// Reports what is skipped: among the frames to programs, on standard error to people.
     fn skip(&mut self, finding: Finding) -> Result<(), Failure> {
         self.lines_skipped += 1;
         if self.lines_skipped > SKIPPED_SHOWN {
@@ -353,12 +353,12 @@ impl Sink {
             let skipped = Skipped { line, byte, skipped: finding.text, reason: finding.reason };
             return self.format.print_json(&skipped).map_err(|error| not_printed(&error));
         }
-        // Nobody may be listening any more.
+        // The reader may have gone.
         let _ = writeln!(io::stderr(), "warning: {}", plain(&finding.to_string()));
         Ok(())
     }
 
-    /// Tells how much was passed over, if anything was. A log without a single frame is none.
+    /// Reports how much was skipped, if anything was. A file without a single frame is not a log.
     fn summarise(&self) -> Result<(), Failure> {
         let (frames, lines_skipped, fd_frames) = (self.counts.frames(), self.lines_skipped, self.fd_frames);
         self.report_counts();
@@ -386,7 +386,7 @@ impl Sink {
     /// How many frames of what there were, for people. Programs count the lines.
     fn report_counts(&self) {
         if !self.format.json {
-            // Nobody may be listening any more.
+            // The reader may have gone.
             let whose =
                 if self.is_filtered { "; the kernel filtered out all but the identifiers of these nodes" } else { "" };
             let _ = writeln!(io::stderr(), "{}{whose}", self.counts);

@@ -61,7 +61,7 @@ const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
 /// The pre-defined error field. Source: CiA 301, 7.5.2.3.
 const ERROR_FIELD: u16 = 0x1003;
 
-/// An error, as it was told or is remembered.
+/// An error, as it arrived or is remembered.
 #[derive(Debug, Serialize)]
 struct ErrorEntry {
     /// When it came, in s since the command began; `null` of one that is remembered.

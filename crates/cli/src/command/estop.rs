@@ -1,4 +1,4 @@
-//! `ferrodrive estop`, `quick-stop all` and `stop all`: every drive on the bus comes to rest, whoever has set it in motion.
+//! `ferrodrive estop`, `quick-stop all` and `stop all`: every drive on the bus comes to rest, whichever master moves it.
 
 use std::collections::BTreeMap;
 use std::time::Duration;

@@ -39,7 +39,7 @@ impl Explain {
         context.progress.show(format!("node {}: reading its objects", self.node));
         let drive = match context.drive(self.node).await {
             Ok(drive) => drive,
-            // Silence is what is to be explained; the frames still tell something.
+            // Silence is what has to be explained; the frames are still evidence.
             Err(failure) if failure.kind == "no_answer" => Drive::of_unknown_model(context.node(self.node)),
             Err(failure) => return Err(failure),
         };

@@ -90,7 +90,7 @@ impl Gateway {
         let (left, unguarded) = mpsc::unbounded_channel();
         // Neither who comes nor who is to be stopped waits for a drive that does not answer.
         tokio::select! {
-            () = let_in(context, &listener, guard, gone) => {}
+            () = accept_clients(context, &listener, guard, gone) => {}
             () = see_off(context, parted, left) => {}
             () = see_guarded(context, guards, unguarded) => {}
         }
@@ -98,8 +98,8 @@ impl Gateway {
     }
 }
 
-/// Serves whoever comes, and tells all of them what the network has noticed.
-async fn let_in(
+/// Accepts clients, and sends all of them the events of the network.
+async fn accept_clients(
     context: &Context,
     listener: &TcpListener,
     guards: mpsc::Sender<Guard>,
@@ -132,7 +132,7 @@ async fn let_in(
             }
             () = context.network.sleep(EVENT_INTERVAL) => {
                 while let Some((_, event)) = context.network.poll_event() {
-                    // Nobody may be connected.
+                    // There may be no client.
                     let _ = events.send(event);
                 }
             }
@@ -167,7 +167,7 @@ async fn see_guarded(context: &Context, mut asked: mpsc::Receiver<Guard>, mut le
     }
 }
 
-/// Stops what was moved by who has gone.
+/// Stops what a client that has gone has moved.
 async fn see_off(context: &Context, mut parted: mpsc::UnboundedReceiver<Gone>, left: mpsc::UnboundedSender<NodeSet>) {
     while let Some(Gone { moved, guarded }) = parted.recv().await {
         for Stopped { node, outcome, .. } in context.network.stop_moved(moved).await {
@@ -182,7 +182,7 @@ async fn see_off(context: &Context, mut parted: mpsc::UnboundedReceiver<Gone>, l
     }
 }
 
-/// Sees to it that the drive stops without this program, or says why nothing does.
+/// Makes the drive stop by itself without this program, or returns why it cannot.
 async fn guard(context: &Context, node: NodeId) -> Result<(), String> {
     let drive = context.drive_to_stop(node).await.map_err(|failure| failure.what)?;
     let loss = drive.guard(SwitchedOff::Leave).await.map_err(|error| error.to_string())?;

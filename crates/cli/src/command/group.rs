@@ -337,7 +337,7 @@ impl Move {
         let (is_said, careful) = (said.is_some(), AxisLimits::careful());
         let said = said.unwrap_or(&careful);
         let acceleration_turns_s2 = self.acceleration.unwrap_or(said.acceleration_turns_s2);
-        // A jerk that nobody states goes with the acceleration.
+        // Without a stated jerk it follows the acceleration.
         let rounding_s = careful.acceleration_turns_s2 / careful.jerk_turns_s3;
         let jerk = self.rounding.map(|time| acceleration_turns_s2 / time.as_secs_f64());
         Ok(AxisLimits {
@@ -353,7 +353,7 @@ impl Move {
         })
     }
 
-    /// Enables, moves and lets the shafts settle. What stops it is told in the words of its drive.
+    /// Enables, moves and lets the shafts settle. What stops it is reported in the words of its drive.
     async fn carry_out(&self, context: &Context, group: &mut Group, planned: &Planned) -> Result<Seen, Failure> {
         match self.follow(context, group, planned).await {
             Ok(seen) => Ok(seen),

@@ -220,7 +220,7 @@ impl Lss {
 }
 
 impl Set {
-    /// NMT reset communication, if it is wanted; else how to do it.
+    /// NMT reset communication, if requested; else how to send it.
     async fn take_effect(
         &self,
         context: &Context,
@@ -385,7 +385,7 @@ impl LssMaster<'_> {
     async fn set(&mut self, set: &Set) -> Result<LssReport, Failure> {
         self.select(set.device.device).await?;
         let mut done = Vec::new();
-        // Optional for a device: without it nothing is said of when the new one takes effect.
+        // Optional for a device: without it the device decides when the new one takes effect.
         let before = match self.ask(Request::InquireNodeId).await {
             Some(Reply::NodeId(node)) => Some(NodeId::new(node)),
             _ => None,

@@ -228,7 +228,7 @@ impl RampArgs {
     }
 }
 
-/// How often a motion that goes on is looked at for somebody who waits at a terminal.
+/// How often a motion that goes on is shown to a person who waits at a terminal.
 const PROGRESS_PERIOD: Duration = Duration::from_millis(500);
 
 /// Shows where the shaft is while `motion` goes on, to people at a terminal: the questions cost the bus some frames.
@@ -253,14 +253,14 @@ pub(super) async fn shown_while<T>(
             done = &mut motion => return done,
             state = StateReport::read(drive) => state,
         };
-        // What keeps it from answering is the motion's to tell.
+        // What keeps it from answering is reported by the motion.
         let Ok(state) = state else { continue };
         let seconds = (context.network.now() - began).as_secs_f64();
         context.progress.show(format!("{doing}: at {} after {seconds:.1} s", state.motion.text()));
     }
 }
 
-/// What becomes of a motion that has been commanded.
+/// What follows a commanded motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Then {
     /// It is watched for this long, then the drive is stopped.
@@ -305,7 +305,7 @@ pub(super) async fn outcome(
     let from_file = drive.description().is_some_and(is_from_file);
     let units = from_file.then(|| "the data sheet does not define the units: CiA 402's units are assumed".to_owned());
     let (guard, farewell) = guard.end(context, drive, then == Then::GoesOn).await?;
-    // What the drive does without its host is the guard's to tell.
+    // What the drive does without its host is reported by the guard.
     let notes = motion.notes.iter().filter(|note| !matches!(note, Note::HostLoss(_))).map(ToString::to_string);
     Ok(MotionOutcome {
         asked,
@@ -322,7 +322,7 @@ pub(super) async fn outcome(
     })
 }
 
-/// What limits a motion, as far as the drive tells.
+/// What limits a motion, as far as the drive has objects for it.
 async fn limits(drive: &Drive) -> Limits {
     let Some(axis) = drive.axis_description() else { return Limits::default() };
     let profile_velocity_rpm = match axis.units.profile_velocity {

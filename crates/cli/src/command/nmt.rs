@@ -60,7 +60,7 @@ pub(crate) struct NmtReport {
     /// The state that it has said, where that was waited for.
     #[serde(skip_serializing_if = "Option::is_none")]
     state: Option<String>,
-    /// What each node has said, where all were told and waited for.
+    /// What each node has reported, where all were commanded and waited for.
     #[serde(skip_serializing_if = "Option::is_none")]
     nodes: Option<Vec<Said>>,
 }
@@ -109,7 +109,7 @@ impl Nmt {
         Ok(NmtReport { node: Some(node.raw()), booted: resets.then_some(true), state, ..done })
     }
 
-    /// Waits until a node's heartbeat tells the state that the command leads to.
+    /// Waits until a node's heartbeat has the state that the command leads to.
     async fn reached(
         &self,
         context: &Context,
@@ -124,7 +124,7 @@ impl Nmt {
         };
         let id = handle.id();
         let model = context.stated_model(id);
-        // A heartbeat that was on its way when the command went out tells of the time before it.
+        // A heartbeat that was on its way when the command went out has the state before it.
         let said = |node: &NodeView<'_>| {
             let heard = node.facts.heartbeat_at.filter(|at| *at > before)?;
             let reported = node.facts.nmt_state?;

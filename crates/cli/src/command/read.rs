@@ -109,7 +109,7 @@ impl Read {
         let rows = drive.description().map(|model| model.dictionary.rows());
         let listed = rows.into_iter().flatten().filter(|row| (first..=last).contains(&row.index));
         let listed: Vec<Mux> = listed.map(|row| row.mux()).collect();
-        // A device may have what its model's table lacks; whoever names one index is told of it.
+        // A device may have what its model's table lacks; for one named index this is reported.
         let named = subs && listed.is_empty();
         Ok(match drive.description() {
             Some(_) if !named => listed,
@@ -126,7 +126,7 @@ impl Read {
         for sub_index in 1..=u8::try_from(count).unwrap_or(0).min(254) {
             match self.look(drive, Mux::new(mux.index, sub_index)).await? {
                 Some(report) => reports.push(report),
-                // A variable's number is no count of sub-indices.
+                // The value of a variable is not a count of sub-indices.
                 None if sub_index == 1 => break,
                 None => {}
             }
@@ -183,7 +183,7 @@ impl Read {
     fn keep(&self, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let mut options = OpenOptions::new();
         options.write(true);
-        // Somebody may have made it since the look at it.
+        // Another program may have created it since it was looked for.
         let options = if self.force { options.create(true).truncate(true) } else { options.create_new(true) };
         options
             .open(path)

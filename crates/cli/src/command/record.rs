@@ -72,7 +72,7 @@ fn sample_time(text: &str) -> Result<Duration, String> {
     }
 }
 
-/// Recorded of an embedded bus, whose time nobody waits for.
+/// Recorded of an embedded bus, whose time is virtual.
 const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
 
 /// How often what was sampled is handed to the disk, and how long that may take at the end.
@@ -122,7 +122,7 @@ impl Record {
             node.upload(source.mux).await?;
         }
         for number in (1..=TPDOS).filter_map(PdoNumber::new) {
-            // A TPDO that there is not, or that says nothing of its mapping, is no matter: then by SDO.
+            // A TPDO that does not exist, or whose mapping cannot be read, does not matter: then by SDO.
             let _ = node.adopt_pdo(PdoId { direction: Direction::Tpdo, number }, TimerUnits::STANDARD).await;
         }
         let columns: Vec<Column> = sources.iter().map(|source| source.column.clone()).collect();
@@ -280,7 +280,7 @@ fn mark(at: Instant, event: &Event) -> Option<Mark> {
         _ => return None,
     };
     let (of, text) = (format!("node {node}"), event.to_string());
-    // A mark says of whom it tells by itself.
+    // The text of a mark names its node.
     let text = text.strip_prefix(&of).map_or(&*text, |rest| rest.trim_start_matches([':', ' '])).to_owned();
     Some(Mark { at, of: of.into(), kind: "".into(), severity, text })
 }

@@ -20,7 +20,7 @@ pub(crate) struct Repeat {
     pub(crate) count: Option<u64>,
 }
 
-/// Nobody presses Ctrl-C in virtual time, which passes as fast as the machine goes.
+/// In virtual time, which passes as fast as the machine can, Ctrl-C does not come.
 const TIMES_ON_AN_EMBEDDED_BUS: u64 = 10;
 
 /// More often than this a bus of 1 Mbit/s cannot carry a frame: the shortest has 47 bits (CAN 2.0, 3.2).

@@ -172,7 +172,7 @@ impl Frames<'_> {
                 self.passed_over += 1;
                 continue;
             };
-            // What is left out is decoded as well: it tells how PDOs are mapped, and what a segment belongs to.
+            // Omitted frames are decoded as well: they show how PDOs are mapped, and what a segment belongs to.
             let decoded = self.decoder.decode(&frame);
             if !self.only.is_empty() && !self.only.iter().any(|which| which.takes(&record, &frame)) {
                 self.not_chosen += 1;

@@ -25,7 +25,7 @@ use testbench::network::scan::{ScanReport, ScannedNode, no_node};
 pub(crate) struct Scan {}
 
 impl Scan {
-    /// Asks everybody.
+    /// Asks every node-ID.
     pub(crate) async fn run(&self, context: &Context) -> Result<ScanReport, Failure> {
         let (found, heard) = look(context).await?;
         let node = |found: &Found| ScannedNode::new(context.stated_model(found.node), found, how_to_say);

@@ -150,8 +150,8 @@ pub(crate) struct Sim {
     verbose: bool,
 }
 
-/// What a simulator says that nobody can reach.
-const NOBODY: &str = "note: no program can reach these drives: give --serve socketcand://127.0.0.1:29536, or --modbus, or \
+/// The note of a simulator that no program can reach.
+const UNREACHABLE: &str = "note: no program can reach these drives: give --serve socketcand://127.0.0.1:29536, or --modbus, or \
                       --bus to join a bus. World commands on standard input are still answered";
 
 impl Sim {
@@ -177,7 +177,7 @@ impl Sim {
                 .because("--speed and --clock manual need a bus of its own")
                 .next("omit them, or --bus"));
         }
-        // All that its drives do not take is told at once, before any of them is made.
+        // Everything that its drives refuse is reported at once, before any of them is created.
         file.map(Machine::build).transpose().map_err(unusable)?;
         let warnings = Messages::of_warnings();
         let eeproms = self.state.as_deref().map(Eeproms::open).transpose()?;
@@ -268,11 +268,11 @@ impl Sim {
         let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
         answers.say(&self.ready(&hub, modbus.as_ref(), control.as_ref(), bridge));
         if self.places.is_empty() && modbus.is_none() && control.is_none() && bridge.is_none() {
-            service.warnings.say(NOBODY);
+            service.warnings.say(UNREACHABLE);
         }
         tokio::spawn(tick(requests.clone(), clock.clone()));
         std::thread::spawn(move || read_lines(&requests, &answers));
-        // Behind all threads that it starts: a disk or a terminal is no matter of real time.
+        // After all threads that it starts: a disk or a terminal does not need real time.
         enter_real_time(global)?;
         let serving =
             run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| service.serve(world, request));
@@ -285,7 +285,7 @@ impl Sim {
         ended
     }
 
-    /// The line that tells where the bus can be reached.
+    /// The line with the addresses at which the bus can be reached.
     fn ready(
         &self,
         hub: &Hub,

@@ -117,7 +117,7 @@ impl Studio {
         }
     }
 
-    /// Opens the page where that is wanted. Serving goes on, whatever comes of it.
+    /// Opens the page if requested. The server continues even if that fails.
     async fn keep_open(&self, context: &Context, url: &str) -> Infallible {
         if self.open {
             open(context, url).await;
@@ -139,7 +139,7 @@ fn elsewhere(mut address: SocketAddr) -> SocketAddr {
     address
 }
 
-/// What the host of a command is told at its start.
+/// What the host of a command gets at its start.
 pub(super) fn setting(context: &Context) -> Setting {
     Setting {
         bus: context.bus().to_string(),
@@ -184,7 +184,7 @@ impl Journals for InFolder {
     }
 }
 
-/// The bit rate, where the bus or the machine tells it: a CAN interface of Linux does not.
+/// The bit rate, where the bus or the machine has it: a CAN interface of Linux does not.
 pub(super) fn bitrate(context: &Context) -> Option<Bitrate> {
     match context.bus() {
         BusSpec::SlcanSerial { bitrate, .. } | BusSpec::SlcanTcp { bitrate, .. } => *bitrate,

@@ -57,7 +57,7 @@ const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
 const WORDS: usize = 16;
 
 impl Supervise {
-    /// Boots and watches, until it is told to end.
+    /// Boots and watches, until it is asked to end.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
         let planned = planned_by(self.file.as_deref(), global)?;
         let global = global_of(&planned, global)?;
@@ -120,7 +120,7 @@ fn words() -> Receiver<String> {
     words
 }
 
-/// `resume 4`. What is wrong with it is said, and nothing is done.
+/// `resume 4`. An invalid line is reported, and nothing is done.
 async fn obey(supervisor: &mut Supervisor, context: &Context, line: &str) {
     let wanted = line.trim().strip_prefix("resume ").map(|rest| node(rest.trim()));
     match wanted {

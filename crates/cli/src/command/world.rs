@@ -59,7 +59,7 @@ impl World {
             client.wait_at_most(None)?;
         }
         let mut answer = client.ask(json!({ "request": "world", "line": line }))?;
-        // That all is well is said of every answer alike.
+        // Every answer has "ok": it is omitted here.
         answer.as_object_mut().and_then(|fields| fields.remove("ok"));
         Ok(Answer(answer))
     }

@@ -66,7 +66,7 @@ impl Filter {
         Ok(())
     }
 
-    /// The identifiers of all frames that may be wanted, each once and in order; none where that is every identifier.
+    /// The identifiers of all frames that may match, each once and in order; none where that is every identifier.
     pub(crate) fn ids(&self, decoder: &Decoder) -> Vec<CanId> {
         let mut ids: Vec<CanId> = self.nodes.iter().flat_map(|node| decoder.ids_of(*node)).collect();
         ids.sort_unstable_by_key(|id| id.raw());
@@ -74,7 +74,7 @@ impl Filter {
         ids
     }
 
-    /// True if the frame is wanted.
+    /// True if the frame matches.
     pub(crate) fn takes(&self, decoder: &Decoder, decoded: &Decoded) -> bool {
         let is_wanted = |mux: Mux| {
             self.objects.iter().any(|wanted| match wanted {

@@ -67,7 +67,7 @@ pub(crate) struct BusFrame {
 }
 
 impl Tap {
-    /// A station that is `network`, and tells `traffic`.
+    /// A station that is `network`, and reports to `traffic`.
     pub(crate) fn new(network: Network, traffic: Traffic) -> Self {
         Self { network, traffic }
     }
@@ -153,7 +153,7 @@ impl Traffic {
     }
 
     fn lock(&self) -> MutexGuard<'_, Passing> {
-        // Nothing is half done between two frames, whoever panicked.
+        // Nothing is half done between two frames, whichever thread panicked.
         self.passing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -162,7 +162,7 @@ impl Station for Tap {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         self.traffic.note(frame, now, false);
         if self.traffic.others.receiver_count() > 0 {
-            // Nobody may listen any more.
+            // The receiver may have gone.
             let _ = self.traffic.others.send((now, *frame));
         }
         self.network.handle_frame(frame, now);

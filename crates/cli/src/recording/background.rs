@@ -7,7 +7,7 @@ use std::time::Duration;
 use crate::failure::Failure;
 use crate::serve::messages::Messages;
 
-/// Whether somebody's time passes while a batch waits.
+/// Whether time passes by the clock while a batch waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pace {
     /// The bus goes with the clock: what the disk has no time for is left out.
@@ -50,7 +50,7 @@ pub(super) struct Background<B> {
 }
 
 impl<B: Send + 'static> Background<B> {
-    /// Hands batches to `write` until it fails or all are written, then calls `end`. What goes wrong is told to `messages`.
+    /// Hands batches to `write` until it fails or all are written, then calls `end`. Errors are reported to `messages`.
     pub(super) fn start<W: Send + 'static>(
         words: Words,
         writer: W,
@@ -70,14 +70,14 @@ impl<B: Send + 'static> Background<B> {
                 // The drives are worth more than what is written about them.
                 reporter.say(&format!("warning: cannot write {}: {error}; it ends here", words.file));
             }
-            // Nobody may wait for the end any more.
+            // The receiver may have gone.
             let _ = done.send(ended);
             drop(incoming);
         });
         Self { batches, written, words, pace, missing: 0, lost: 0, messages }
     }
 
-    /// Takes a batch of so many pieces; one that the disk has no time for is left out, and that is said, or waited for: as the pace is.
+    /// Takes a batch of so many pieces; one that the disk has no time for is left out and reported, or waited for, by the pace.
     pub(super) fn write(&mut self, batch: B, pieces: u64) {
         if self.pace == Pace::Free {
             // Why the file has ended has been said.

@@ -26,9 +26,9 @@ pub(crate) struct CommandLog(Option<Arc<Shared>>);
 
 struct Shared {
     waiting: Mutex<Waiting>,
-    /// Told when there is nothing more to come.
+    /// Notified when there is nothing more to come.
     ended: Condvar,
-    /// Told when there is room again.
+    /// Notified when there is room again.
     taken: Condvar,
     /// Whether frames wait for the disk; else they are left out.
     patient: bool,
@@ -43,7 +43,7 @@ struct Waiting {
     over: bool,
 }
 
-/// The thread that writes; whoever has it waits for the end.
+/// The thread that writes; its owner waits for the end.
 pub(crate) struct Writing(Option<(CommandLog, JoinHandle<io::Result<u64>>)>);
 
 impl CommandLog {
@@ -62,7 +62,7 @@ impl CommandLog {
         let log = Self(Some(Arc::clone(&shared)));
         let thread = std::thread::spawn(move || {
             let written = shared.write(file);
-            // Nobody waits for a writer that has failed.
+            // A writer that has failed is not waited for.
             shared.lock().over = true;
             shared.taken.notify_all();
             written
@@ -121,7 +121,7 @@ impl Shared {
     }
 
     fn lock(&self) -> MutexGuard<'_, Waiting> {
-        // Nothing is half done between two frames, whoever panicked.
+        // Nothing is half done between two frames, whichever thread panicked.
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

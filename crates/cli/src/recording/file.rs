@@ -28,7 +28,7 @@ pub(crate) struct Batch {
 pub(crate) struct RecordFile(Background<Batch>);
 
 impl RecordFile {
-    /// Writes to `file` from now on. What goes wrong later is told to `messages`.
+    /// Writes to `file` from now on. Later errors are reported to `messages`.
     ///
     /// # Errors
     /// That of writing the begin.

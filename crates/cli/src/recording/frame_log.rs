@@ -17,7 +17,7 @@ type Batch = Vec<(Instant, Frame)>;
 pub(crate) struct FrameLog(Background<Batch>);
 
 impl FrameLog {
-    /// Writes to `log` from now on, with times counted from `unix_zero`. What goes wrong is told to `messages`.
+    /// Writes to `log` from now on, with times counted from `unix_zero`. Errors are reported to `messages`.
     pub(crate) fn start<W: Write + Seek + Send + 'static>(
         log: LogWriter<W>,
         unix_zero: Duration,
@@ -103,7 +103,7 @@ mod tests {
         assert!((49..=50).contains(&log.0.missing()), "{}", log.0.missing());
         let missing = log.0.missing() as usize;
         drop(allow);
-        // What is missing is said at the end, too.
+        // Missing frames are reported at the end, too.
         assert!(log.finish(SOON).is_err());
         let text = String::from_utf8(disk.try_iter().flatten().collect()).unwrap();
         let lines: Vec<&str> = text.lines().collect();

@@ -21,7 +21,7 @@ pub(crate) struct LogPath {
 /// A log that has just been begun.
 pub(crate) type NewLog = LogWriter<std::io::BufWriter<std::fs::File>>;
 
-/// Reads the name of a log to be written: its extension tells the form, candump where it has none.
+/// Reads the name of a log to be written: its extension selects the format, candump where it has none.
 pub(crate) fn log_path(text: &str) -> Result<LogPath, String> {
     let path = PathBuf::from(text);
     let format = match (Format::of_name(&path), path.extension()) {

@@ -26,7 +26,7 @@ pub(crate) struct ObjectBatch {
 pub(crate) struct ObjectRecord(Background<ObjectBatch>);
 
 impl ObjectRecord {
-    /// Writes to `file` from now on. What goes wrong later is told to `messages`.
+    /// Writes to `file` from now on. Later errors are reported to `messages`.
     ///
     /// # Errors
     /// That of writing the begin.
@@ -36,7 +36,7 @@ impl ObjectRecord {
         Ok(Self(Background::start(words, record, write, Record::finish, Pace::RealTime, messages)))
     }
 
-    /// Takes a batch; one that the disk has no time for is left out, and that is said.
+    /// Takes a batch; one that the disk has no time for is left out and reported.
     pub(crate) fn write(&mut self, batch: ObjectBatch) {
         let samples = batch.rows.len() as u64;
         self.0.write(batch, samples);

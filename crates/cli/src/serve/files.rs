@@ -1,4 +1,4 @@
-//! Files that outlive this program: read with a bound, and never through what somebody else has put in their place.
+//! Files that outlive this program: read with a bound, and never through what others have put in their place.
 //!
 //! A symbolic link, a device, a FIFO or a directory where a file of ours should be is refused, not followed, not opened.
 //! What was looked at and what was opened are compared, so that a swap in between is noticed.
@@ -13,7 +13,7 @@ use transport::log::Format;
 /// What a path names, without following a last symbolic link.
 ///
 /// # Errors
-/// The system's, or that it is no regular file, in words that fit after the path.
+/// The system's, or that it is not a regular file, in words that fit after the path.
 fn regular(path: &Path) -> io::Result<Metadata> {
     let metadata = fs::symlink_metadata(path)?;
     let kind = metadata.file_type();
@@ -60,7 +60,7 @@ pub(crate) fn create_new(path: &Path) -> io::Result<File> {
 }
 
 /// An empty file to write a log to: a new one, or one that is empty or begins as a log of that format does. Any other
-/// file is somebody's, and stays as it is.
+/// file belongs to others, and is not changed.
 pub(crate) fn create_log(path: &Path, format: Format) -> io::Result<File> {
     create_or_replace(path, format.written_begin().unwrap_or_default(), &format!("{format} log"))
 }
@@ -96,14 +96,14 @@ fn create_or_replace(path: &Path, begin: &[u8], what: &str) -> io::Result<File> 
     Ok(file)
 }
 
-/// What tells two files apart, where the system tells.
+/// What distinguishes two files, where the system has it.
 #[cfg(unix)]
 pub(crate) fn identity(metadata: &Metadata) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt;
     Some((metadata.dev(), metadata.ino()))
 }
 
-/// What tells two files apart, where the system tells.
+/// What distinguishes two files, where the system has it.
 #[cfg(not(unix))]
 pub(crate) fn identity(_: &Metadata) -> Option<(u64, u64)> {
     None
@@ -156,7 +156,7 @@ mod tests {
         assert!(create_log(&link, Format::Candump).unwrap_err().to_string().contains("symbolic link"));
         assert!(read_bounded(&link, 100).unwrap_err().to_string().contains("symbolic link"));
         assert_eq!(fs::read(&target).unwrap(), b"(mine");
-        // One that leads nowhere is no free name either.
+        // One that leads nowhere is not a free name either.
         fs::remove_file(&target).unwrap();
         assert!(create_log(&link, Format::Candump).is_err() && create_new(&link).is_err() && !target.exists());
         fs::remove_dir_all(place).unwrap();

@@ -4,8 +4,8 @@ use std::io::{self, BufRead};
 
 use sim::command::MAX_LINE_LENGTH;
 
-/// The next line without its end; `None` at the end of input. Of a line that is too long only so much is kept that whoever
-/// gets it sees that: the rest is skipped without being stored.
+/// The next line without its end; `None` at the end of input. Of a line that is too long only so much is kept that
+/// the caller sees that it is: the rest is skipped without being stored.
 pub(crate) fn next_line(input: &mut impl BufRead) -> io::Result<Option<String>> {
     let mut line = Vec::new();
     let mut any = false;

@@ -11,7 +11,7 @@ const LONGEST: Duration = Duration::from_secs(1);
 pub(crate) struct Kept {
     frames: Vec<(Instant, Frame)>,
     since: Instant,
-    /// Asks for the piece; false if that could not be taken, and is to be told again.
+    /// Asks for the piece; false if the request was not taken, and has to be repeated.
     is_full: Box<dyn Fn() -> bool>,
     asked: bool,
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-/// From here on the bus is said to be behind: clients wait that long for an answer, and some give up soon after.
+/// From here on the bus is reported to be behind: clients wait that long for an answer, and some time out soon after.
 const BEHIND: Duration = Duration::from_millis(100);
 
 /// Below this it has caught up: one step of the loop.

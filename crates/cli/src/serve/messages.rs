@@ -1,6 +1,6 @@
 //! Lines for a stream whose reader may be slow or absent: written by a thread of its own, so that the caller never waits.
 //!
-//! Lines keep their order. When 4 MiB wait unread, further ones are dropped and counted; the count stands in their place as
+//! Lines keep their order. When 4 MiB wait unread, further ones are dropped and counted; the count takes their place as
 //! soon as there is room, and is written to a second stream if there is one.
 
 use std::collections::VecDeque;
@@ -20,7 +20,7 @@ const MAX_BYTES: usize = 4 << 20;
 #[derive(Clone)]
 pub(crate) struct Messages(Arc<Shared>);
 
-/// What stands for answers that nobody read in time.
+/// What replaces answers that were not read in time.
 #[derive(Serialize)]
 struct Gap {
     ok: bool,
@@ -33,7 +33,7 @@ struct Shared {
     changed: Condvar,
     /// The line that stands for as many dropped ones.
     gap: fn(u64) -> String,
-    /// Who is told of them too.
+    /// Where they are reported too.
     warned: Option<Messages>,
 }
 
@@ -44,7 +44,7 @@ struct Queue {
     dropped: u64,
     /// A line is being written.
     writing: bool,
-    /// Nobody has read for as long as somebody was ready to wait.
+    /// Nothing was read for as long as a caller was ready to wait.
     stalled: bool,
 }
 
@@ -65,7 +65,7 @@ impl Messages {
         Self::start(io::stderr(), |dropped| format!("warning: {dropped} messages are missing here"), None)
     }
 
-    /// To nobody.
+    /// To no reader.
     #[cfg(test)]
     pub(crate) fn silent() -> Self {
         Self::start(io::sink(), |_| String::new(), None)
@@ -105,7 +105,7 @@ impl Messages {
         }
     }
 
-    /// Waits until everything is written, at most for `patience`; false if it is not by then: whoever writes to the stream
+    /// Waits until everything is written, at most for `patience`; false if it is not by then: what writes to the stream
     /// now would wait too.
     pub(crate) fn finish(&self, patience: Duration) -> bool {
         let busy = |queue: &mut Queue| queue.writing || !queue.lines.is_empty() || queue.dropped > 0;
@@ -150,7 +150,7 @@ impl Shared {
             };
             queue.writing = true;
             drop(queue);
-            // The drives run on if nobody listens any more.
+            // The drives run on if the reader has gone.
             let _ = writeln!(stream, "{line}").and_then(|()| stream.flush());
             queue = self.lock();
             queue.writing = false;

@@ -1,4 +1,4 @@
-//! Virtual drives for other programs: a served world, what is said and written about it, EEPROM images on disk.
+//! Virtual drives for other programs: a served world, its messages and files, EEPROM images on disk.
 
 pub(crate) mod control;
 pub(crate) mod eeprom;

@@ -9,7 +9,7 @@ use sim::pace::Pace;
 /// of the bus's time at most.
 const STEP: Duration = Duration::from_millis(1);
 
-/// How long a world waits between two moves while nobody is there to hear it. What happens in it has its own time all the same.
+/// How long a world waits between two moves while no client is connected. What happens in it has its own time all the same.
 const UNHEARD: Duration = Duration::from_millis(20);
 
 /// A world that was not moved for longer does not catch up: the machine slept, or the program was frozen.

@@ -17,7 +17,7 @@ pub(crate) fn answer(world: &mut World, request: &ModbusRequest) -> (RegisterAns
     (Some(access.and_then(|access| carry_out(world, number, access))), Some(number))
 }
 
-/// Each unit takes it or refuses it by itself; a read for all is for nobody.
+/// Each unit takes it or refuses it by itself; a read for all has no answer.
 fn broadcast(world: &mut World, request: &ModbusRequest) -> RegisterAnswer {
     if let Ok(access @ RegisterAccess::Write { .. }) = &request.access {
         let numbers: Vec<u8> = world.drive_numbers().collect();

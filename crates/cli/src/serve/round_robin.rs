@@ -20,12 +20,12 @@ pub(crate) struct RoundRobin<K> {
 }
 
 impl<K: Copy + Ord> RoundRobin<K> {
-    /// With nobody in it.
+    /// Empty.
     pub(crate) fn new() -> Self {
         Self { waiting: BTreeMap::new(), order: VecDeque::new() }
     }
 
-    /// Nobody waits.
+    /// Nothing waits.
     pub(crate) fn is_empty(&self) -> bool {
         self.order.is_empty()
     }

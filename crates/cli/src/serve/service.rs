@@ -1,5 +1,5 @@
 //! What is asked of a running simulation by those who started it: lines of standard input, signals, Modbus clients; and the
-//! records that it keeps. Nothing here waits for whoever reads or writes at the other end.
+//! records that it keeps. Nothing here waits for the program at the other end.
 
 use std::collections::VecDeque;
 use std::io::{self, IsTerminal};
@@ -25,7 +25,7 @@ const KEEPING_INTERVAL: Duration = Duration::from_millis(100);
 /// How long standard input waits for the reader of the answers before answers may be dropped.
 const READER_PATIENCE: Duration = Duration::from_secs(1);
 
-/// How long the end waits for the disk, and then for whoever reads the last answers.
+/// How long the end waits for the disk, and then for the reader of the last answers.
 const DISK_PATIENCE: Duration = Duration::from_secs(5);
 pub(crate) const PARTING_PATIENCE: Duration = Duration::from_millis(500);
 
@@ -186,7 +186,7 @@ impl Service {
         ControlFlow::Continue(())
     }
 
-    /// Ends a run where it stands; whoever asked for it is told why.
+    /// Ends a run where it stands; its client gets the reason.
     fn end_run(&self, world: &mut ServedWorld, why: &'static str) {
         if let Some(answer) = world.end_run(why) {
             self.answers.say(&answer);
@@ -208,7 +208,7 @@ impl Service {
     }
 
     /// Ends with `ended`: stores and log are on the disk, and what was said is read, as far as the disk and the readers
-    /// allow in good time. What ended the simulation is what is told of it, then what kept a store from the disk.
+    /// allow in good time. The reason that ended the simulation is reported first, then what kept a store from the disk.
     pub(crate) fn part(mut self, world: &mut ServedWorld, ended: Result<(), Failure>) -> Result<(), Failure> {
         let kept = self.finish(world);
         let mut ended = match (ended, kept) {
@@ -225,7 +225,7 @@ impl Service {
         }
         let read = self.answers.finish(PARTING_PATIENCE) & self.warnings.finish(PARTING_PATIENCE);
         if let Err(failure) = &mut ended {
-            // Where nobody reads, the reason cannot be told either, and telling it would wait for ever.
+            // Without a reader the reason cannot be printed either: that would wait for ever.
             failure.reported |= !read;
         }
         ended
@@ -304,7 +304,7 @@ pub(crate) fn listen_to_signals(requests: mpsc::Sender<Request>) {
             std::process::exit(signal.status() as i32);
         });
     });
-    // Whoever has read `ready` may ask for the end; the other end is dropped when that is so.
+    // A client that has read `ready` may ask for the end; the other end is dropped when that is so.
     let _: Result<(), _> = listening.recv();
 }
 

@@ -1,8 +1,8 @@
 //! Brings EEPROM contents to the disk while the simulation runs.
 //!
 //! A thread of its own writes what it is handed, so that a slow disk does not hold up the bus; of several contents of one
-//! drive only the newest. What is on the disk is told back, so that the drive's answer may go out. What cannot be written
-//! (disk full) is said and tried again; the answer then goes out all the same.
+//! drive only the newest. What is on the disk is reported back, so that the drive's answer may go out. What cannot be written
+//! (disk full) is reported and tried again; the answer then goes out all the same.
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, channel};
@@ -34,7 +34,7 @@ struct Shared {
 struct State {
     /// To be written, by drive number.
     waiting: BTreeMap<u8, StoredImage>,
-    /// Written, or told to be unwritable: drive number and which store.
+    /// Written, or reported as unwritable: drive number and which store.
     settled: Vec<(u8, u64)>,
     over: bool,
 }
@@ -49,7 +49,7 @@ impl StoreWriter {
         Self { shared, outcome }
     }
 
-    /// One whose disk is whoever holds the other value: it calls that with what is kept, by drive number and store.
+    /// One whose disk is the holder of the other value, which gets what is kept, by drive number and store.
     #[cfg(test)]
     pub(crate) fn by_hand() -> (Self, impl Fn(u8, u64)) {
         let shared = Arc::new(Shared::default());

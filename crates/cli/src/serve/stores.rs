@@ -1,7 +1,7 @@
 //! The order of a store: into the drive's memory, onto the disk, and only then the answer that acknowledges it.
 //!
 //! The world holds SDO answers back until a store is confirmed; Modbus answers are held here. A disk that takes longer than
-//! clients wait for an answer is not waited for: the answer goes out, and that is said. How long that is, the wall clock says,
+//! clients wait for an answer is not waited for: the answer goes out, and that is reported. The time is measured by the wall clock,
 //! however fast the time of the bus passes.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -16,7 +16,7 @@ use super::messages::Messages;
 use super::registers;
 use super::store_writer::StoreWriter;
 
-/// How long an answer waits for the disk. Less than the 300 ms after which canopen-python gives up on an SDO answer.
+/// How long an answer waits for the disk. Less than the 300 ms after which canopen-python stops waiting for an SDO answer.
 const DISK_PATIENCE: Duration = Duration::from_millis(250);
 
 /// See the [module](self).

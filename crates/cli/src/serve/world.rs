@@ -49,7 +49,7 @@ pub(crate) struct ServedWorld {
     stores: Option<Stores>,
     control: Control<OutboxSender>,
     /// The scenario that the world goes through, if it does, and its end.
-    execution: Option<FollowedCourse>,
+    execution: Option<FollowedExecution>,
     /// Events that the execution has seen and the record has not.
     events: Vec<Event>,
     /// Who is behind the lines of standard input, to those who hear of stimuli.
@@ -59,7 +59,7 @@ pub(crate) struct ServedWorld {
     clock: Instant,
     /// The run that is under way where time is moved by hand.
     run: Option<UnderWay>,
-    /// Tells that a run is over; false if that could not be taken, and is to be told again.
+    /// Reports that a run is over; false if that was not taken, and has to be repeated.
     run_is_over: Box<dyn Fn() -> bool>,
     lag: Lag,
     frames_lost: u64,
@@ -67,7 +67,7 @@ pub(crate) struct ServedWorld {
     messages: Messages,
 }
 
-/// A run that somebody has asked for.
+/// A requested run.
 struct UnderWay {
     before: Before,
     end: Instant,
@@ -77,14 +77,14 @@ struct UnderWay {
 }
 
 /// A scenario under way.
-struct FollowedCourse {
+struct FollowedExecution {
     execution: Execution,
-    /// Tells that it is over; false if that could not be taken, and is to be told again.
+    /// Reports that it is over; false if that was not taken, and has to be repeated.
     is_over: Box<dyn Fn() -> bool>,
     reported: bool,
 }
 
-/// What becomes of a world command.
+/// The result of a world command.
 pub(crate) enum Commanded {
     /// Nothing is answered: a blank line or a comment.
     Nothing,
@@ -134,7 +134,7 @@ impl ServedWorld {
             self.control.keep_events();
         }
         execution.go_on(&mut self.world);
-        self.execution = Some(FollowedCourse { execution, is_over: Box::new(is_over), reported: false });
+        self.execution = Some(FollowedExecution { execution, is_over: Box::new(is_over), reported: false });
     }
 
     /// The world and its scenario, as they stand.
@@ -161,7 +161,7 @@ impl ServedWorld {
                 let service = self.service();
                 match self.control.handle(number, &line, &mut self.world, service) {
                     Outcome::Answered => {}
-                    // What it is told is still sent.
+                    // The answer to it is still sent.
                     Outcome::Close => self.see_off(number),
                     Outcome::Run(pending) => self.begin_for_client(pending),
                 }
@@ -169,7 +169,7 @@ impl ServedWorld {
         }
     }
 
-    /// A client of the control connection is gone, and with it the run that it has asked for: nobody waits for that.
+    /// A client of the control connection is gone, and with it the run that it has asked for: no client waits for that.
     fn see_off(&mut self, number: ClientNumber) {
         drop(self.control.leave(number, &mut self.world));
         if self.run.as_ref().and_then(|run| run.client.as_ref()).is_some_and(|pending| pending.client == number) {
@@ -326,7 +326,7 @@ impl ServedWorld {
     /// Sorts out what the wire did, and gives the adapter its next frame.
     fn collect(&mut self) {
         while let Some(event) = self.world.log_mut().pull() {
-            if let Some(FollowedCourse { execution, .. }) = &mut self.execution {
+            if let Some(FollowedExecution { execution, .. }) = &mut self.execution {
                 execution.hear(&mut self.world, Occurrence::Wire(&event));
             }
             if let WireEvent::Error { at, cause, .. } = event
@@ -350,9 +350,9 @@ impl ServedWorld {
         self.follow_course();
     }
 
-    /// Hands on to the scenario what the world tells of itself, and has it do what it can do now.
+    /// Hands the events of the world to the scenario, and has it do what it can do now.
     fn follow_course(&mut self) {
-        let Some(FollowedCourse { execution, .. }) = &mut self.execution else { return };
+        let Some(FollowedExecution { execution, .. }) = &mut self.execution else { return };
         if self.world.is_watched() {
             for event in self.control.take_events(&mut self.world) {
                 execution.hear(&mut self.world, Occurrence::Event(&event));
@@ -374,9 +374,9 @@ impl ServedWorld {
         self.execution.as_ref()?.execution.next_time(self.world.now())
     }
 
-    /// Has the scenario look at values, and at what comes of that.
+    /// Has the scenario look at values, and act on them.
     fn look(&mut self) {
-        if let Some(FollowedCourse { execution, .. }) = &mut self.execution {
+        if let Some(FollowedExecution { execution, .. }) = &mut self.execution {
             execution.look(&mut self.world);
             self.collect();
         }
@@ -394,7 +394,7 @@ impl ServedWorld {
         waits && !self.pacer.follows_the_clock()
     }
 
-    /// Moves the world to `instant`; false if it stopped before: the adapter has become free and somebody waits for it, or an answer
+    /// Moves the world to `instant`; false if it stopped before: the adapter has become free and a client waits for it, or an answer
     /// waits for the disk.
     fn run_to(&mut self, instant: Instant) -> bool {
         while !self.is_over() && self.world.next_event().is_some_and(|at| at <= instant) {
@@ -463,7 +463,7 @@ impl ServedWorld {
     }
 }
 
-/// What a controller would tell of an error that all stations see: of which kind, where the cause is one kind's.
+/// What a controller would report of an error that all stations see: its kind, where the cause has one.
 fn error_frame(cause: ErrorCause) -> ErrorFrame {
     let kinds = match cause {
         ErrorCause::NotAcknowledged => ErrorKinds::NONE.with(ErrorKind::Acknowledge),

@@ -1,5 +1,5 @@
-//! What is asked of a network as a whole: who is there, its boot-up, its description, its load, and why a drive does not move. What
-//! comes of it is that of the command line (`testbench::network`).
+//! What is asked of a network as a whole: who is there, its boot-up, its description, its load, and why a drive does not move. The
+//! results are those of the command line (`testbench::network`).
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -33,7 +33,7 @@ use super::{Job, Network, duration};
 use crate::failure::{bad_value, raised};
 use crate::sheets::{model_of, node_id};
 
-/// Longest wait for an answer, as the command line has it where nothing is said.
+/// Longest wait for an answer, as the default of the command line.
 pub(super) const TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Time for a frame without an answer (NMT) to get onto the bus.
@@ -92,7 +92,7 @@ pub(super) async fn drive_at(
     }
 }
 
-/// Everybody on the bus.
+/// All nodes on the bus.
 #[pyfunction]
 pub(crate) fn scan(py: Python<'_>, network: &Bound<'_, Network>) -> PyResult<Job> {
     let network = network.get();
@@ -296,7 +296,7 @@ pub(crate) fn explain(
         }
         heard.until(core.now());
         let drive = match drive_at(&core, machine.as_deref(), id, model).await {
-            // Silence is what is to be explained; the frames still say something.
+            // Silence is what has to be explained; the frames are still evidence.
             Err(failure) if failure.kind == "no_answer" => Drive::of_unknown_model(core.node(id)),
             drive => drive?,
         };

@@ -210,7 +210,7 @@ impl Planned {
         plan.nodes.retain(|node, _| only.is_empty() || only.contains(node));
         if plan.nodes.is_empty() {
             return Err(match self {
-                Self::Manager(_) => Failure::bad_file("the file has no slave: 1F81h says of no node that it is one")
+                Self::Manager(_) => Failure::bad_file("the file has no slave: 1F81h marks no node as one")
                     .next("give the DCF of the CANopen manager, not that of a device"),
                 _ => Failure::new("no node answers on the bus").of_kind("no_node").next("ferrodrive scan shows more"),
             });

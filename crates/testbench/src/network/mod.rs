@@ -1,4 +1,4 @@
-//! What the command line and the Python package do with a network, and what comes of it: the same rows for both, as `docs/json.md` has
+//! What the command line and the Python package do with a network, and the results: the same rows for both, as `docs/json.md` has
 //! them.
 //!
 //! In: a network of crate `master`, which the caller runs. Out: reports that serialise, or a [`Failure`]. How a person reads them is the

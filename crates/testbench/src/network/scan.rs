@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::heard::Heard;
 use crate::failure::Failure;
 
-/// Everybody found.
+/// All nodes found.
 #[derive(Debug, Serialize)]
 pub struct ScanReport {
     /// A row each.
@@ -48,7 +48,7 @@ pub struct ScannedNode {
 }
 
 impl ScannedNode {
-    /// A node that was found, and which model it is said to be; `say` words how a person says which it is.
+    /// A node that was found, and which model it is stated to be; `say` words how a person says which it is.
     pub fn new(known: Option<&'static Description>, found: &Found, say: impl Fn(NodeId, &[&str]) -> String) -> Self {
         let identity = found.identity.unwrap_or_default();
         let contradiction = known.and_then(|known| contradiction(known, found));
@@ -98,9 +98,9 @@ impl ScannedNode {
     }
 }
 
-/// What speaks against the model that a node is said to be.
+/// What contradicts the model that is stated for a node.
 fn contradiction(known: &'static Description, found: &Found) -> Option<String> {
-    let said = format!("it is said to be a {}", known.name);
+    let said = format!("it is stated to be a {}", known.name);
     if !found.identity?.matches(&known.identity) {
         return Some(format!("{said}, but its identity is another one: say the right model"));
     }

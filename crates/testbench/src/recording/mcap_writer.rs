@@ -247,7 +247,7 @@ impl McapWriter {
         Ok(())
     }
 
-    /// Writes the chunk, and where each message stands in it.
+    /// Writes the chunk, and where each message is in it.
     fn end_chunk(&mut self) -> io::Result<()> {
         let Some((first, last)) = self.chunk_span.take() else { return Ok(()) };
         if self.chunk_count == 0 {
@@ -542,7 +542,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_messages_and_one_that_nobody_ended_are_whole() {
+    fn a_file_without_messages_and_one_that_was_not_finished_are_whole() {
         let (empty, _) = written(0);
         let (dropped, file) = written(2);
         drop(file);

@@ -1,4 +1,4 @@
-//! The last of a run, for a picture of how it came to where it stands: a few signals, as long back as is wanted, in memory.
+//! The last of a run, for a picture of how it came to its state: a few signals, as far back as requested, in memory.
 
 use std::collections::VecDeque;
 use std::time::Duration;

@@ -22,7 +22,7 @@ pub(crate) fn reading(path: &Path) -> Result<Reading, Failure> {
 /// A data sheet from a file, or that of a model where no file has this name.
 pub(super) fn sheet(name: &str) -> Result<Eds, Failure> {
     let path = Path::new(name);
-    // The point of `zlac8030l,firmware=2.01` is no file's.
+    // The dot of `zlac8030l,firmware=2.01` does not begin a file extension.
     if path.exists() || (path.extension().is_some() && !name.contains(',')) {
         return reading(path).map(|reading| reading.eds);
     }

@@ -17,7 +17,7 @@ use transport::Vitals;
 use super::places::Place;
 use super::request::{Gone, Guard};
 
-/// How long a client may take to read what it is sent; one that never reads is let go.
+/// How long a client may take to read what it is sent; one that never reads is disconnected.
 const READER_PATIENCE: Duration = Duration::from_secs(10);
 
 /// What a client has of the gateway.

@@ -26,7 +26,7 @@ impl Guards {
         self.guarded.insert(node);
     }
 
-    /// A client has gone that had asked for these: which of them nobody holds any more. They are given back.
+    /// A client has gone that had asked for these: those that no other client holds are given back.
     pub(super) fn give(&mut self, nodes: NodeSet) -> NodeSet {
         let mut free = NodeSet::EMPTY;
         for node in nodes.iter() {
@@ -61,6 +61,6 @@ mod tests {
         assert_eq!(guards.take(nodes(&[4])), nodes(&[4]), "anew");
         // A guard that could not be had is asked for by the next client, too.
         assert_eq!(guards.take(nodes(&[4])), nodes(&[4]));
-        assert_eq!(guards.give(nodes(&[9])), NodeSet::EMPTY, "nobody had asked");
+        assert_eq!(guards.give(nodes(&[9])), NodeSet::EMPTY, "no client had asked");
     }
 }

@@ -1,4 +1,4 @@
-//! The places of the gateway: a further client is always let in, and if need be another makes room for it.
+//! The places of the gateway: a further client is always accepted, and if need be another makes room for it.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ pub(super) struct Place {
 }
 
 impl Places {
-    /// A place for a client that comes at `now`, and whoever had to make room for it.
+    /// A place for a client that comes at `now`, and the client that had to make room for it.
     pub(super) fn take(&mut self, peer: SocketAddr, now: Instant) -> (Place, Option<SocketAddr>) {
         self.0.retain(|client| !client.stay.is_closed());
         let least = Vitals::least(self.0.iter().map(|client| &*client.vitals));

@@ -69,7 +69,7 @@ impl<'a> Measurement<'a> {
         }
     }
 
-    /// Measures. SYNC is produced each `period` if nobody else does.
+    /// Measures. SYNC is produced each `period` if no other node does.
     pub(super) async fn run(mut self, period: Duration) -> Result<Measured, Failure> {
         let node = self.node.clone();
         if let Some(node) = &node {
@@ -209,7 +209,7 @@ impl<'a> Measurement<'a> {
         }
         while let Some(sample) = self.meter.poll_sample() {
             match sample {
-                // What else is asked is no part of the measurement.
+                // Other requests are not part of the measurement.
                 Sample::Sdo(_) | Sample::SdoLost if !self.asks => {}
                 Sample::Sdo(time) => self.measured.sdo.record(time),
                 Sample::SdoLost => self.measured.sdo.lose(),

@@ -83,7 +83,7 @@ impl Times {
     fn bins(&self) -> Vec<Bin> {
         let (min, max) = (self.counts.min(), self.counts.max());
         let top = self.counts.value_at_quantile(0.999).max(min + 1);
-        // No finer than times are told apart.
+        // No finer than the resolution of the times.
         let width = (top - min).div_ceil(BINS).max(top / 500).max(1);
         let mut bins: Vec<Bin> = (0..BINS)
             .map(|place| min + place * width)

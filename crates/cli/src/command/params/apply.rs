@@ -55,7 +55,7 @@ impl super::Transaction {
     async fn check(&self, context: &Context, drive: &Drive) -> Result<(), Failure> {
         self.prove.map(|prove| how(prove, context)).transpose()?;
         if self.save {
-            // Parameters that nobody can store were not asked for.
+            // Parameters that no command can store were not requested.
             drive.check_save().await?;
         }
         Ok(())

@@ -13,7 +13,7 @@ use plot::Paint;
 
 /// A note that a journal stays. The command may be ending by a signal.
 pub(in crate::command) fn note_kept(text: &str) {
-    // Nobody may be listening any more.
+    // The reader may have gone.
     let _ = writeln!(std::io::stderr(), "note: {text}");
 }
 

@@ -7,7 +7,7 @@ use testbench::network::params::source::{of_machine, read};
 use crate::context::Context;
 use crate::failure::Failure;
 
-/// What a node is to have, and where that is said: in the file that was named, or in the machine file.
+/// The requested parameters of a node, and their source: the named file, or the machine file.
 pub(super) fn wanted(
     context: &Context,
     wanted: &super::Wanted,

@@ -15,7 +15,7 @@ use crate::context::Context;
 /// The identifier of SYNC as delivered (CiA 301, 7.3.5).
 const SYNC: CanId = CanId::standard(0x80);
 
-/// How long others are listened to, at least: slower cycles than this are no cycles of a machine.
+/// Shortest time to listen to others: no machine has slower cycles than this.
 const LISTENED: Duration = Duration::from_millis(300);
 
 /// The identifiers that others send with.

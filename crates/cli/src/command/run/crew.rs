@@ -1,4 +1,4 @@
-//! Work for all cores: threads take the numbers of pieces of work, and one place takes what comes of them.
+//! Work for all cores: threads take the numbers of pieces of work, and one place takes the results.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
@@ -40,7 +40,7 @@ impl Crew {
         *self.heard.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Does the pieces 0 to `count`, and hands what comes of each to `take` with its number, in the order in which they end.
+    /// Does the pieces 0 to `count`, and hands the result of each to `take` with its number, in the order in which they end.
     pub(super) fn work<T: Send>(&self, count: u64, work: impl Fn(u64) -> T + Sync, mut take: impl FnMut(u64, T)) {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let jobs = self.jobs.unwrap_or(cores).min(usize::try_from(count).unwrap_or(usize::MAX));

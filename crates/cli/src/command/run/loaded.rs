@@ -1,4 +1,4 @@
-//! Scenarios from their files, with the values of the command line; and what is said of files that do not do.
+//! Scenarios from their files, with the values of the command line; and the errors of files that cannot be used.
 
 use std::path::Path;
 

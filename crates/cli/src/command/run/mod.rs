@@ -126,7 +126,7 @@ impl Run {
         format.print(&report).map_err(Failure::of_stdout)?;
         ended?;
         match report.failure() {
-            // It stands in the report.
+            // The report has it.
             Some(failure) if format.json => Err(Failure { reported: true, ..failure }),
             Some(failure) => Err(failure),
             None => Ok(()),

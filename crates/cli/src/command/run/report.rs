@@ -67,7 +67,7 @@ impl Report for RunReport<'_> {
             let asked = if row.asked.is_empty() { row.name.clone() } else { row.asked.clone() };
             let seen = row.seen.replace('\n', " ");
             let seen = match seen.char_indices().nth(WIDEST) {
-                // What failed is told whole.
+                // Failures are shown in full.
                 Some((end, _)) if row.verdict == Verdict::Passed => format!("{}..", &seen[..end]),
                 _ => seen,
             };

@@ -62,7 +62,7 @@ pub(super) fn run(
     format.print(&report).map_err(Failure::of_stdout)?;
     match (crew.signal(), report.failure()) {
         (Some(signal), _) => Err(Failure { reported: true, ..Failure::ended_by(signal) }),
-        // It stands in the report.
+        // The report has it.
         (None, Some(failure)) if format.json => Err(Failure { reported: true, ..failure }),
         (None, Some(failure)) => Err(failure),
         (None, None) => Ok(()),

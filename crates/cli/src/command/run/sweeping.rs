@@ -18,7 +18,7 @@ use plot::Table;
 /// Values of a parameter that are shown to people.
 const MOST_VALUES: usize = 40;
 
-/// Runs between two changes of the line that tells the progress.
+/// Runs between two changes of the line of progress.
 const RUNS_A_LOOK: u64 = 16;
 
 /// Makes the runs, `jobs` at once or as many as there are cores, and prints what came of them.
@@ -62,7 +62,7 @@ fn sum_up(sweep: &Sweep, crew: &Crew, progress: &Progress) -> Summary {
     summary
 }
 
-/// What comes of a run; it is not made again where nothing in it is random.
+/// The outcome of a run; it is not repeated where nothing in it is random.
 fn made(sweep: &Sweep, alike: &Alike, number: u64) -> Result<Outcome, BadFile> {
     if let Some(known) = alike.of(sweep, number) {
         return Ok(known);

@@ -1,4 +1,4 @@
-//! What is said at the start of a device that a file describes: what it is run as, what of it has no effect, and what in the
+//! Notes at the start about a device that a file describes: what it is run as, what of it has no effect, and what in the
 //! file makes no sense.
 
 use canopen::od::{DefaultValue, Dictionary, Entry};
@@ -89,7 +89,7 @@ mod tests {
     use eds::{Eds, keep};
 
     /// A drive by 1000h without a controlword, and a PDO that maps an object that is not there.
-    const ODD: &str = "[FileInfo]\nFileName=odd.eds\n[DeviceInfo]\nVendorName=Nobody\nProductName=Odd\n\
+    const ODD: &str = "[FileInfo]\nFileName=odd.eds\n[DeviceInfo]\nVendorName=None\nProductName=Odd\n\
         [MandatoryObjects]\nSupportedObjects=1\n1=0x1000\n\
         [OptionalObjects]\nSupportedObjects=2\n1=0x1A00\n2=0x2000\n\
         [1000]\nParameterName=Device type\nObjectType=7\nDataType=7\nAccessType=ro\nDefaultValue=0x00020192\n\

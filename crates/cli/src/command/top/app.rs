@@ -77,7 +77,7 @@ impl App {
         self.state = state;
         let is_there = self.chosen.is_some_and(|node| self.state.node(node).is_some());
         if !is_there {
-            // The first drive, or whoever is there.
+            // The first drive, else the first node.
             let first = self.state.nodes.iter().find(|node| node.drive.is_some()).or(self.state.nodes.first());
             self.chosen = first.map(|node| node.node);
         }
@@ -91,7 +91,7 @@ impl App {
         self.news.push(news);
     }
 
-    /// Something to tell that the bus has not said.
+    /// Something to show that is not an event of the bus.
     pub(super) fn report(&mut self, node: Option<u8>, text: impl Into<String>) {
         self.note(News { time_s: self.state.time_s, node, text: text.into() });
     }
@@ -106,7 +106,7 @@ impl App {
                 self.question = node;
                 return true;
             }
-            // The bus has told it already, or the key was let go.
+            // The bus has reported it already, or the key was released.
             if !matches!(kind, "stopped" | "replaced" | "not_held") {
                 self.report(node, error.get("message").and_then(Value::as_str).unwrap_or("it was refused"));
             }

@@ -1,7 +1,7 @@
-//! Whether a key is held down, told by its repeats: a dead man's switch for a terminal.
+//! Whether a key is held down, detected by its repeats: a dead man's switch for a terminal.
 //!
-//! Most terminals say that a key was pressed, and say it again while it is held, but never that it was let go. So a press moves
-//! nothing, nor do several: what is held begins with the second repeat, since nobody presses a key as fast as systems repeat it, and
+//! Most terminals say that a key was pressed, and say it again while it is held, but never that it was released. So a press moves
+//! nothing, nor do several: what is held begins with the second repeat, since people do not press a key as fast as systems repeat it, and
 //! ends when no further one comes. Repeats that were held up on their way (a connection that stands still) arrive in a burst: they
 //! come too soon after the press, and once a hold has ended the key has to be silent before it counts again. Terminals that do report releases
 //! end a hold at once.
@@ -28,7 +28,7 @@ pub(super) enum Act {
     Begin,
     /// It is held still.
     Renew,
-    /// It has been let go: end.
+    /// It has been released: end.
     End,
 }
 
@@ -67,7 +67,7 @@ impl Hold {
         act
     }
 
-    /// The terminal says that it was let go.
+    /// The terminal reports its release.
     pub(super) fn release(&mut self) -> Option<Act> {
         let held = matches!(self, Self::Held { .. });
         *self = Self::Free;
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn repeats_that_were_held_up_begin_nothing() {
-        // Held from 0 on; the connection stands still from 1 s to 3 s, and the key is let go meanwhile.
+        // Held from 0 on; the connection stands still from 1 s to 3 s, and the key is released meanwhile.
         let held_up = (3000..3060).step_by(2);
         let presses: Vec<_> = held(0, 500, 33, 1000).into_iter().chain(held_up).collect();
         let acts = run(&presses, 6000);
@@ -195,7 +195,7 @@ mod tests {
         assert_eq!((hold.release(), hold), (Some(Act::End), Hold::Free));
         assert_eq!([600, 1100, 1133].map(|ms| press(&mut hold, ms)), [None, None, Some(Act::Begin)]);
         assert_eq!(hold.give_up(at(1140)), Some(Act::End));
-        assert_eq!([1166, 1200, 1233].map(|ms| press(&mut hold, ms)), [None; 3], "until it has been let go");
+        assert_eq!([1166, 1200, 1233].map(|ms| press(&mut hold, ms)), [None; 3], "until it has been released");
         assert_eq!(hold.release(), None);
     }
 }

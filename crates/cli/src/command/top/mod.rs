@@ -1,7 +1,7 @@
-//! `ferrodrive top`: drives in a terminal, for whoever sits on the robot's SSH session.
+//! `ferrodrive top`: drives in a terminal, for an SSH session on the robot.
 //!
 //! It is a page of the studio without a browser: the same [`Host`] owns the bus and everything that moves, and this terminal is one of
-//! its sessions. [`hold`] tells a key that is held, [`app`] what keys mean, [`screen`] draws; this file joins them to a terminal.
+//! its sessions. [`hold`] detects a held key, [`app`] what keys mean, [`screen`] draws; this file joins them to a terminal.
 
 mod app;
 mod hold;
@@ -47,7 +47,7 @@ pub(crate) struct Top {}
 /// How often time is looked at: what is no longer held ends so much later at most.
 const TICK: Duration = Duration::from_millis(10);
 
-/// How often the host is told that this terminal is there. It waits for 3 s.
+/// How often the host gets a sign of life of this terminal. It waits for 3 s.
 const ALIVE: Duration = Duration::from_millis(500);
 
 /// Keys that may wait. People type no faster; what finds no room was held up on its way.
@@ -116,7 +116,7 @@ impl Drop for Screen {
     }
 }
 
-/// What the terminal says, from a thread that waits for it. It ends when nobody listens; so does the channel with the terminal.
+/// Events of the terminal, from a thread that waits for them. It ends when the receiver is dropped; so does the channel with the terminal.
 fn listen() -> mpsc::Receiver<Event> {
     let (sender, receiver) = mpsc::channel(KEYS);
     std::thread::spawn(move || {

@@ -81,7 +81,7 @@ mod tests {
         assert!((kept[0].0 + 59.95).abs() < 1e-9 && kept[1].0 == 0.0);
         past.note(&state(60.2, 60.2, None));
         past.note(&state(60.3, 60.3, Some(f64::NAN)));
-        assert_eq!(past.of(4, 0, 60.3).len(), 2, "what is not known is no sample");
+        assert_eq!(past.of(4, 0, 60.3).len(), 2, "what is not known is not a sample");
         past.note(&State { time_s: 61.0, ..State::default() });
         assert_eq!(past.of(4, 0, 61.0), []);
     }

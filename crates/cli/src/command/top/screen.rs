@@ -1,5 +1,5 @@
 //! The picture: nodes, plots of the chosen one, what it has to say, what has happened, keys. Made for 80 columns and 24 lines; more
-//! room goes to the plots. Nothing is told by colour alone.
+//! room goes to the plots. Nothing is shown by colour alone.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -86,7 +86,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, app: &App, look: Look) {
     }
 }
 
-/// Which drives were told to stop and have not been seen to stand since.
+/// Which drives were commanded to stop and have not been seen to stand since.
 fn unseen_stop(app: &App, look: Look) -> Option<Line<'static>> {
     let unseen = app.state.nodes.iter().filter(|node| node.stop_unseen).map(|node| node.node.to_string());
     let unseen = unseen.collect::<Vec<_>>().join(", ");
@@ -235,7 +235,7 @@ fn draw_news(frame: &mut Frame<'_>, area: Rect, app: &App) {
     frame.render_widget(Paragraph::new(lines.collect::<Vec<_>>()).block(Block::new().borders(Borders::TOP)), area);
 }
 
-/// Lines of the question: what a drive does without this program is said in full.
+/// Lines of the question: what a drive does without this program is shown in full.
 const QUESTION: u16 = 12;
 
 /// That nothing stops a drive, before it is moved for the first time.

@@ -35,10 +35,10 @@ pub(super) struct Node {
     /// Nothing stops it when this program dies,
     #[serde(default)]
     pub(super) goes_on: bool,
-    /// which whoever has control has accepted.
+    /// which the session in control has accepted.
     #[serde(default)]
     pub(super) accepted: bool,
-    /// It was told to stop and has not been seen to stand since.
+    /// It was commanded to stop and has not been seen to stand since.
     #[serde(default)]
     pub(super) stop_unseen: bool,
     pub(super) drive: Option<Drive>,

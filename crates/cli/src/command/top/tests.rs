@@ -186,7 +186,7 @@ fn a_held_key_jogs_and_every_other_ends_it_first() {
     app.key(key(KeyCode::Char('+')), at(0));
     assert_eq!([0, 500, 533].map(|ms| app.key(key(KeyCode::Left), at(ms))), [vec![], vec![], vec![jog(-20.0)]]);
     assert_eq!(app.key(key(KeyCode::Left), at(566)), [say(json!({ "do": "jog_hold", "node": 1 }))]);
-    // Another node is chosen: what is told is the one that turns.
+    // Another node is chosen: the one that turns gets the command.
     assert_eq!(app.key(key(KeyCode::Down), at(580)), [end()]);
     assert_eq!(app.chosen, Some(4));
     app.key(key(KeyCode::Up), at(590));
@@ -195,10 +195,10 @@ fn a_held_key_jogs_and_every_other_ends_it_first() {
     assert_eq!(app.key(key(KeyCode::Left), at(2540)), [end()]);
     assert_eq!([3000, 3033].map(|ms| app.key(key(KeyCode::Left), at(ms))), [vec![], vec![jog(-20.0)]]);
     assert_eq!(app.key(key(KeyCode::Char(' ')), at(3040)), [end(), say(json!({ "do": "stop_all" }))]);
-    // Let go: told at the next look, within the 190 ms of the host.
+    // Released: sent at the next look, within the 190 ms of the host.
     assert_eq!([6000, 6500, 6533].map(|ms| app.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
     assert_eq!((app.look(at(6682)), app.look(at(6683))), (vec![], vec![end()]));
-    // A terminal that tells releases, and one that loses the keyboard.
+    // A terminal that reports releases, and one that loses the keyboard.
     assert_eq!([8000, 8500, 8533].map(|ms| app.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
     let release = KeyEvent { kind: KeyEventKind::Release, ..key(KeyCode::Right) };
     assert_eq!(app.key(release, at(8540)), [end()]);

@@ -29,7 +29,7 @@ pub(crate) use shared_outbox::{OutboxSender, SharedOutbox};
 /// Clients served at a time.
 const MAX_CLIENTS: usize = 256;
 
-/// What one is told that finds all places taken.
+/// The answer to a client that finds all places taken.
 const NO_PLACE: &str = concat!(
     r#"{"id":null,"ok":false,"error":{"kind":"limit","message":"256 clients are connected, and no more are served","#,
     r#""node":null,"object":null,"abort":null,"next":"close a connection that is not needed"}}"#,
@@ -52,7 +52,7 @@ const WRITE_SIZE: usize = 16 * 1024;
 pub(crate) enum ControlMessage {
     /// One has come. Lines for it go into the shared_outbox.
     Joined(ClientNumber, Arc<SharedOutbox>),
-    /// It says something.
+    /// It has sent a line.
     Line(ClientNumber, ReadLine),
     /// It is gone.
     Left(ClientNumber),
@@ -64,20 +64,20 @@ const MAX_STRANGERS: usize = 32;
 /// How long a client has for giving the token.
 const TOKEN_PATIENCE: Duration = Duration::from_secs(5);
 
-/// What one is told that has not given it.
+/// The answer to a client that has not given it.
 const SENT_AWAY: &str = concat!(
     r#"{"id":null,"ok":false,"error":{"kind":"token","message":"the token was not given in time","#,
     r#""node":null,"object":null,"abort":null,"next":"the first request is hello, with the token"}}"#,
 );
 
-/// Connections a second where a token is asked for, and how many may come at once: who guesses tokens does not get far.
+/// Connections a second where a token is asked for, and how many may come at once: guessing tokens does not get far.
 const STRANGERS_A_SECOND: u32 = 20;
 const STRANGERS_AT_ONCE: u32 = 64;
 
 /// Who may come to a server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Entry {
-    /// Whoever reaches it.
+    /// Everyone who reaches it.
     Free,
     /// Who gives the token in good time.
     ByToken,
@@ -139,8 +139,8 @@ impl ControlServer {
         &self.place
     }
 
-    /// Lets nobody in any more, and waits until those who are there have read what they were told, at most for `patience`. The world
-    /// has let go of them before.
+    /// Accepts no more clients, and waits until the present ones have read what was sent, at most for `patience`. The world
+    /// has released them before.
     pub(crate) async fn part(self, patience: Duration) {
         self.listening.abort();
         // Who does not read by then has no use for it.
@@ -203,7 +203,7 @@ where
             }
         }
         let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
-            // Told as far as its socket takes it at once.
+            // Sent as far as its socket takes it at once.
             let _ = tokio::time::timeout(ACCEPT_PAUSE, stream.write_all(NO_PLACE.as_bytes())).await;
             continue;
         };

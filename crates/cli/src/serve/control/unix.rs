@@ -1,4 +1,4 @@
-//! A Unix socket that nobody but this user ever reaches, and that takes away no path but its own.
+//! A Unix socket that only this user can ever reach, and that removes no path but its own.
 
 use std::io;
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
@@ -17,9 +17,9 @@ pub(super) struct OwnPath {
     identity: (u64, u64),
 }
 
-/// A socket in place of one that nobody listens to any more.
+/// A socket in place of one without a listener.
 ///
-/// Between its binding and its listening nobody can connect to it; in that time it is made this user's alone.
+/// Between its binding and its listening no client can connect to it; in that time it is made this user's alone.
 pub(super) fn bind(path: &Path) -> io::Result<(UnixListener, OwnPath)> {
     if let Ok(metadata) = std::fs::symlink_metadata(path) {
         if !metadata.file_type().is_socket() {
