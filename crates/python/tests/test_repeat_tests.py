@@ -31,7 +31,7 @@ def test_it():
 @pytest.mark.parametrize(
     ("node", "so", "status", "says"),
     [
-        ("4", "True", 0, "2 of 2 runs green; 1 tests tell a digest, 0 of them not always the same"),
+        ("4", "True", 0, "2 of 2 runs green; 1 tests report a digest, 0 of them not always the same"),
         ("4", "False", 1, "0 of 2 runs green"),
         ("runs_so_far()", "True", 1, "1 of them not always the same"),
     ],

@@ -185,6 +185,7 @@ SUITE = """
     @pytest.fixture
     def network(ferrodrive_world):
         sys.kept = ferrodrive_world
+        ferrodrive_world.wait_until_booted()
         with ferrodrive.Network(ferrodrive_world) as network:
             yield network
 

@@ -127,6 +127,7 @@ _CLASSES: dict[str, type[MasterError]] = {
     "aborted": Aborted,
     "not_reached": NotReached,
     "usage": BadRequest,
+    "bad_file": BadRequest,
     "out_of_limits": BadRequest,
     "too_fine": BadRequest,
 }
