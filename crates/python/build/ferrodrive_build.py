@@ -63,7 +63,7 @@ def prepare():
 
 
 def strip(program):
-    """Takes the debug information out, where there is a tool for it: a wheel is no place for it."""
+    """Takes the debug information out, where there is a tool for it: it does not belong in a wheel."""
     if tool := shutil.which("strip"):
         subprocess.run([tool, str(program)], check=False)
 

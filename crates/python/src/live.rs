@@ -69,9 +69,9 @@ impl Live {
         let (jobs, incoming) = mpsc::unbounded_channel();
         let opened = Opened::default();
         let said = Arc::new(Said::of(&spec));
-        let (told, noted) = (Arc::clone(&opened), Arc::clone(&said));
+        let (reported, noted) = (Arc::clone(&opened), Arc::clone(&said));
         let thread = thread::Builder::new().name("ferrodrive master".into());
-        let thread = thread.spawn(move || run(&spec, (network, traffic), incoming, &told, &noted));
+        let thread = thread.spawn(move || run(&spec, (network, traffic), incoming, &reported, &noted));
         let thread = thread.map_err(|error| format!("cannot start a thread: {error}"))?;
         let mut result = opened.0.lock().unwrap_or_else(PoisonError::into_inner);
         let result = loop {
@@ -92,7 +92,7 @@ impl Live {
         self.jobs.as_ref().ok_or_else(refusal)?.send(job).map_err(|_| refusal())
     }
 
-    /// Why there is no bus: it was given up, or its connection is being made again.
+    /// Why there is no bus: it was closed after an error, or its connection is being made again.
     pub(crate) fn lost(&self) -> Option<String> {
         let words = self.said.lock();
         words.ended.clone().or_else(|| words.notes.lost().map(str::to_owned))
@@ -128,22 +128,22 @@ fn run(
     opened: &Opened,
     said: &Said,
 ) {
-    let tell = |result: Result<(), String>| {
+    let report = |result: Result<(), String>| {
         *opened.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
         opened.1.notify_all();
     };
     let runtime = match tokio::runtime::Builder::new_current_thread().enable_all().build() {
         Ok(runtime) => runtime,
-        Err(error) => return tell(Err(format!("cannot start the runtime: {error}"))),
+        Err(error) => return report(Err(format!("cannot start the runtime: {error}"))),
     };
     let local = LocalSet::new();
     runtime.block_on(local.run_until(async {
         let clock = WallClock::start();
         let mut bus = match spec.open(&clock).await {
             Ok(bus) => bus,
-            Err(error) => return tell(Err(with_causes(&error))),
+            Err(error) => return report(Err(with_causes(&error))),
         };
-        tell(Ok(()));
+        report(Ok(()));
         let mut station = Tap::new(network.clone(), traffic);
         let wakeup = Arc::new(Notify::new());
         let work = work_through(network.clone(), incoming, Arc::clone(&wakeup));
@@ -160,7 +160,7 @@ fn run(
     }));
 }
 
-/// Does the jobs that come, side by side, until nobody can send more; then gives them up and stops what moves.
+/// Does the jobs that come, side by side, until no sender is left; then drops them and stops what moves.
 async fn work_through(
     network: Network,
     mut incoming: mpsc::UnboundedReceiver<Job>,

@@ -283,7 +283,7 @@ impl Drop for Network {
         self.core.quick_stop_moved();
         if let Runner::World(shared) = &*self.runner {
             Python::attach(|py| {
-                // Nobody moves a world that is being given up itself.
+                // A world that is being dropped is not moved by itself.
                 if let Ok(mut state) = shared.lock(py) {
                     state.world.refresh();
                 }
@@ -304,7 +304,7 @@ impl Network {
         Self { core, traffic, runner: Arc::new(runner), closed: AtomicBool::new(false), machine }
     }
 
-    /// Tells its jobs from those of other networks in the same world.
+    /// Distinguishes its jobs from those of other networks in the same world.
     fn owner(&self) -> usize {
         Arc::as_ptr(&self.runner) as usize
     }

@@ -1,6 +1,6 @@
 //! Scenarios and sweeps of them: what `ferrodrive run` does, for Python.
 //!
-//! A run is made without the interpreter's lock, so that threads run beside it. What comes of it crosses the border as the
+//! A run is made without the interpreter's lock, so that threads run beside it. The result crosses the border as the
 //! JSON that `ferrodrive run --json` prints; `ferrodrive/scenario.py` makes values of it.
 
 use std::path::{Path, PathBuf};

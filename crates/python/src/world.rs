@@ -124,7 +124,7 @@ impl State {
             .ok_or_else(|| bad_value(format!("expected an adapter of this world, got {number}")))
     }
 
-    /// Moves to the first thing that somebody waits for, at most to `until`.
+    /// Moves to the first event that a caller waits for, at most to `until`.
     fn advance(&mut self, until: Option<Instant>, probes: &[StationId]) -> Came {
         let came = self.advance_unrecorded(until, probes);
         self.keep_record();
@@ -362,7 +362,7 @@ impl World {
         Ok(state.world.poll_received(id).map(|(at, frame)| (at.as_nanos(), plain(&frame))))
     }
 
-    /// True if an adapter has heard a frame that nobody took yet.
+    /// True if an adapter has heard a frame that was not taken yet.
     fn has_heard(&self, py: Python<'_>, probe: usize) -> PyResult<bool> {
         let state = self.shared.lock(py)?;
         let id = state.probe(probe)?;

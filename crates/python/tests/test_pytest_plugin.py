@@ -1,4 +1,4 @@
-"""The fixtures as a suite of somebody else has them."""
+"""The fixtures as the suite of a user has them."""
 
 import html
 import re

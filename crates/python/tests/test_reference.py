@@ -135,7 +135,7 @@ class Names(dict):
     def a_world(model, node, booted=True):
         world = ferrodrive.World()
         world.add(model, node=node)
-        world.add_probe()  # a frame needs somebody who acknowledges it
+        world.add_probe()  # a frame needs a node that acknowledges it
         if booted:
             world.wait_until_booted()
             world.run_for(1)

@@ -1,4 +1,4 @@
-"""`examples/repeat_tests.py` tells runs that are equal from runs that are not."""
+"""`examples/repeat_tests.py` distinguishes runs that are equal from runs that are not."""
 
 import pathlib
 import subprocess
@@ -20,7 +20,7 @@ def runs_so_far():
 def test_it():
     world = ferrodrive.World()
     world.add("zlac8030l", node={node})
-    world.add_probe()  # a frame needs somebody who acknowledges it
+    world.add_probe()  # a frame needs a node that acknowledges it
     world.run_for(2)
     with open(os.environ["FERRODRIVE_DIGESTS"], "a") as file:
         file.write(f"test_it {{world.digest():016x}}\\n")

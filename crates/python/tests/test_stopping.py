@@ -26,7 +26,7 @@ def group(network, model):
     mode = "ip" if model.startswith("m") else "pv"
     axes = [ferrodrive.Axis(node, model, mode=mode, velocity_rpm=60, acceleration_rpm_s=300) for node in (1, 2)]
     opened = network.group(axes, period=0.01)
-    # Nobody waits for this.
+    # Nothing waits for this.
     opened.moving = opened._native.move_to([36000, 36000], None)
     return opened
 
@@ -75,10 +75,10 @@ def begin(motion, network, world, model):
     try:
         opened = motion(network, model)
     except ferrodrive.MasterError as error:
-        # A drive that takes no speeds, or does not show where it is, is no wheel.
+        # A drive that takes no speeds, or does not show where it is, is not a wheel.
         if motion is not base or "cannot be a wheel" not in str(error):
             raise
-        pytest.skip(f"{model} is no wheel: {error}")
+        pytest.skip(f"{model} is not a wheel: {error}")
     network.sleep(0.5)
     assert fastest(world) > 20.0
     return opened
@@ -155,7 +155,7 @@ def test_a_coroutine_that_is_cancelled_on_the_way_leaves_nothing_turning_behind_
     assert_stands(world)
 
 
-#: Ends with a drive that turns, and that no watch of its own stops; nobody closes the network.
+#: Ends with a drive that turns, and that no watch of its own stops; the network is not closed.
 PROGRAM = """
 import sys, ferrodrive
 network = ferrodrive.Network(sys.argv[1])

@@ -57,7 +57,7 @@ def test_a_drive_of_the_file_is_moved_by_what_its_output_does(world, network):
     assert (drive.model, drive.gear_ratio) == ("cia402", None)
     drive.move(3, relative=True)
     assert turned(world, 1, before) == pytest.approx(150, abs=1)
-    # What is said at the call overrules the file.
+    # What is given at the call overrules the file.
     network.drive(1, "cia402", gear_ratio=1).move(30, relative=True)
     assert turned(world, 1, before) == pytest.approx(180, abs=1)
 

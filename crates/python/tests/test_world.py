@@ -29,7 +29,7 @@ def test_time_passes_by_what_it_is_told(world):
 
 def test_a_drive_boots_with_the_message_of_the_standard(world):
     """CiA 301, clause 7.2.8.3.3: one byte 00h under 700h + node-ID."""
-    world.add_probe()  # a frame needs somebody who acknowledges it
+    world.add_probe()  # a frame needs a node that acknowledges it
     world.run_for(3)
     assert world.frames(1)[0].endswith("704#00")
 
@@ -155,7 +155,7 @@ def test_a_process_forked_in_the_middle_of_a_run_is_refused_and_makes_worlds_of_
         going.set()
         world.run_for(0.5)
 
-    # The other thread has the world's lock for as long as it runs, and in the child nobody ever gives it back.
+    # The other thread has the world's lock for as long as it runs, and in the child no thread ever releases it.
     runner = threading.Thread(target=run)
     runner.start()
     going.wait()
@@ -263,7 +263,7 @@ def test_a_record_has_a_row_for_each_sample(world, tmp_path):
             pass
 
 
-class Told(ferrodrive.VirtualDrive):
+class Reporting(ferrodrive.VirtualDrive):
     """Notes the words of each stimulus, and has them understood."""
 
     said: list
@@ -385,7 +385,7 @@ def test_every_stimulus_has_a_method():
     for model, calls in STIMULI.items():
         world = ferrodrive.World(500_000)
         world.add(model, node=1)
-        drive = Told(world, 1)
+        drive = Reporting(world, 1)
         drive.said = said
         for call in calls:
             call(drive)

@@ -12,7 +12,7 @@ from typing import Any, Optional, Union
 from .errors import Refused, SimulatorError
 from .real_time import REAL
 
-#: News that are kept until somebody asks for them; of more, the oldest are forgotten.
+#: Events that are kept until the caller reads them; of more, the oldest are dropped.
 MOST_NEWS = 10_000
 
 ANSWER_TIMEOUT_S = 10

@@ -48,7 +48,7 @@ class MasterError(FerrodriveError, RuntimeError):
 
     The message has what was not done, where, what was expected and found, and what to do next; the same is in the attributes, in the
     words of ``--json`` (docs/json.md). :class:`NoAnswer`, :class:`Aborted`, :class:`NotReached` and :class:`BadRequest` are the kinds that
-    a program is most likely to tell apart.
+    a program is most likely to distinguish.
 
     >>> try:
     ...     network.upload(9, 0x1000)

@@ -148,13 +148,13 @@ class Network:
             if not ended.done():
                 ended.set_result(None)
 
-        def tell() -> None:
+        def report() -> None:
             loop.call_soon_threadsafe(end)
 
         if self._world is None:
-            job.on_end(tell)
+            job.on_end(report)
         elif (time := taking_part(self._world)) is not None:
-            time.on_done(job.number, tell)
+            time.on_done(job.number, report)
         else:
             job.cancel()
             raise RuntimeError("time stands still in this world: run the loop inside `with ferrodrive.virtual_time(world)`")

@@ -118,7 +118,7 @@ class Sweep:
     """A scenario with many seeds, and with each value of its ``[sweep]``; runs are numbered from 0.
 
     It makes one run at a time and has no threads: give the numbers to whatever spreads work (``concurrent.futures``, Ray), and
-    what comes of them to a :class:`SweepSummary`. A sweep can be pickled; the other side reads the same file.
+    their results to a :class:`SweepSummary`. A sweep can be pickled; the other side reads the same file.
 
     :param path: a scenario file
     :param seeds: one seed after the other, as ``range(1, 101)``

@@ -1,4 +1,4 @@
-"""What stands in for the clock and for threads while a virtual time is in use, and how it gets there.
+"""What replaces the clock and for threads while a virtual time is in use, and how it gets there.
 
 Replaced are ``time.time``, ``monotonic``, ``perf_counter`` (with their ``_ns``) and ``sleep``; ``threading.Lock``, ``RLock`` and
 what ``Condition`` makes its locks with, so that all of ``threading`` and ``queue`` waits here; ``queue.SimpleQueue``;
@@ -98,7 +98,7 @@ class Lock:
         while True:
             wait = time.begin("waits for another thread")
             self._waits.append(wait)
-            # A thread that takes no part may have released it just now, and seen nobody wait.
+            # A thread that takes no part may have released it just now, and seen no thread wait.
             if self._lock.acquire(False):
                 self._waits.remove(wait)
                 return True

@@ -3,7 +3,7 @@
 While a virtual time is in use, exactly one of the threads that take part in it runs. It runs until it waits: for a moment
 (``time.sleep``), for another thread (a lock, a condition, a queue, an event, ``join``) or for the bus (``recv``). Then the next
 one that may run does, in the order in which they became able to. When none may, the world is moved, from event to event, up to the
-first frame that somebody waits for or the first moment that somebody waits for. So what happens, and when, is decided by the
+first frame that a thread waits for or the first moment that a thread waits for. So what happens, and when, is decided by the
 program and the world; the load of the machine only decides how long it takes.
 
 The thread that begins it takes part, and every ``threading.Thread`` that is started by one that does. Other threads keep the real
@@ -35,7 +35,7 @@ EPOCH_NS = 1_000_000_000 * 1_000_000_000
 FREE_GLANCES = 1000
 GLANCE_NS = 10_000
 
-#: Longest virtual time that everybody may wait before that counts as a mistake.
+#: Longest virtual time that all threads may wait before that counts as a mistake.
 PATIENCE_NS = 3600 * 1_000_000_000
 
 
@@ -176,7 +176,7 @@ class VirtualTime:
             self._listeners.pop(probe, None)
 
     def watch(self, happened: Callable[[], bool], until_ns: Optional[int]) -> bool:
-        """Waits until `happened()`, which is asked whenever somebody has had a turn."""
+        """Waits until `happened()`, which is asked whenever a thread has had a turn."""
         wait = self.begin("waits for events")
         entry = (happened, wait)
         self._watchers.append(entry)
@@ -256,7 +256,7 @@ class VirtualTime:
     # Whose turn it is.
 
     def _next(self) -> Participant:
-        """Who runs next: moves the world until somebody may."""
+        """Which thread runs next: moves the world until one may."""
         idle_since_ns = self.now_ns()
         while True:
             while self._from_outside:
@@ -268,7 +268,7 @@ class VirtualTime:
                 self._interrupt_owner(Stalled(f"no thread can go on: {self._who_waits()}"))
 
     def _move_world(self, patience_ns: int) -> bool:
-        """Moves the world to the first thing that somebody waits for; False if there will never be any."""
+        """Moves the world to the first event that a thread waits for; False if there will never be any."""
         until_ns = patience_ns
         while self._moments and self._moments[0][2].ended:
             heapq.heappop(self._moments)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 NANOSECONDS = 1_000_000_000
 
-#: Worlds by the channel under which `can.Bus` finds them, while somebody holds them.
+#: Worlds by the channel under which `can.Bus` finds them, while a reference to them exists.
 _by_channel: weakref.WeakValueDictionary[str, World] = weakref.WeakValueDictionary()
 
 

@@ -191,7 +191,7 @@ impl Group {
         self.open_with(py, axes, period, tolerance)
     }
 
-    /// Steps it in each cycle for as long as it is open; nobody waits for this.
+    /// Steps it in each cycle for as long as it is open, in the background.
     fn keep(&self, py: Python<'_>) -> PyResult<Job> {
         self.network.get().begin_said(py, self.slot.clone().keep(self.core.clone()))
     }
@@ -395,7 +395,7 @@ impl Base {
         self.open_with(py, wheels, (plan.geometry, plan.limits), period, tolerance)
     }
 
-    /// Steps it in each cycle for as long as it is open; nobody waits for this.
+    /// Steps it in each cycle for as long as it is open, in the background.
     fn keep(&self, py: Python<'_>) -> PyResult<Job> {
         self.network.get().begin_said(py, self.slot.clone().keep(self.core.clone()))
     }

@@ -92,7 +92,7 @@ impl Outcome {
     }
 }
 
-/// Tells the end of a job however it ends: with a result, or dropped with the thread that ran it.
+/// Reports the end of a job however it ends: with a result, or dropped with the thread that ran it.
 struct Reporter(Arc<Outcome>);
 
 impl Reporter {
@@ -100,7 +100,7 @@ impl Reporter {
         self.0.lock().given_up
     }
 
-    fn tell(&self, result: Option<Result<Value, Trouble>>) {
+    fn report(&self, result: Option<Result<Value, Trouble>>) {
         let callback = {
             let mut state = self.0.lock();
             state.given_up = state.given_up || result.is_none();
@@ -125,7 +125,7 @@ impl Drop for Reporter {
             state.result.is_none() && !state.given_up
         };
         if untold {
-            self.tell(None);
+            self.report(None);
         }
     }
 }
@@ -146,7 +146,7 @@ impl Job {
                 false => work.as_mut().poll(context).map(Some),
             });
             let result = result.await;
-            reporter.tell(result);
+            reporter.report(result);
         };
         (Self { number: AtomicU64::new(0), runner: Arc::clone(runner), outcome }, Box::pin(future))
     }

@@ -1,4 +1,4 @@
-//! A node's configuration as one thing, for Python: kept, compared, written as a transaction, checked. What comes of it is that of
+//! A node's configuration as one thing, for Python: kept, compared, written as a transaction, checked. The results are those of
 //! `ferrodrive params`.
 
 use std::path::PathBuf;
@@ -43,7 +43,7 @@ pub(crate) fn params_backup(
     file: Option<PathBuf>,
 ) -> PyResult<Job> {
     let asked = Asked::of(network.get(), node, model)?;
-    // Before anything is asked for: nobody waits for what cannot be kept.
+    // Before any request: no upload for a file that cannot be written.
     let form = file.as_deref().map(Form::of).transpose().map_err(bad_value)?;
     network.get().begin_said(py, async move {
         let drive = asked.drive().await?;

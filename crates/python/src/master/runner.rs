@@ -7,7 +7,7 @@ use crate::world::Shared;
 
 /// A world or a thread.
 pub(crate) enum Runner {
-    /// A world, while somebody moves it.
+    /// A world, while a caller moves it.
     World(Arc<Shared>),
     /// The thread of a real bus; `None` once it is closed.
     Live(Mutex<Option<Live>>),

@@ -33,7 +33,7 @@ struct Ear {
     frames: Mutex<VecDeque<(Instant, Frame)>>,
 }
 
-/// Somebody who listens, until it is dropped.
+/// A listener, until it is dropped.
 pub(crate) struct Listener {
     traffic: Traffic,
     ear: Arc<Ear>,

@@ -78,7 +78,7 @@ impl Jobs {
     }
 }
 
-/// Remembers that somebody called the waker.
+/// Remembers that the waker was called.
 struct Woken(AtomicBool);
 
 impl Wake for Woken {
