@@ -1,5 +1,5 @@
-//! A reader that goes away before a command has printed all (`ferrodrive objects zlac8030l | head -1`) is no error, and
-//! nothing is said of it.
+//! A reader that goes away before a command has printed all (`ferrodrive objects zlac8030l | head -1`) is not an error, and
+//! nothing is reported.
 
 use std::io::Read;
 use std::process::{Command, Stdio};
@@ -36,7 +36,7 @@ fn a_reader_that_has_seen_enough_is_no_error() {
     }
 }
 
-/// An error text has a reader who may have gone too: the status still tells.
+/// The reader of an error text may have gone too: the status remains.
 #[test]
 fn nobody_to_read_an_error_leaves_its_status() {
     let lost = |arguments: &[&str]| {

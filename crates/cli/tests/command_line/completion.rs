@@ -1,4 +1,4 @@
-//! What a shell is told that a line may go on with, by a real bash where there is one; and what commands at a terminal remember.
+//! What a shell gets as the continuations of a line, by a real bash where there is one; and what commands at a terminal remember.
 #![cfg(unix)]
 #![allow(clippy::print_stderr, reason = "a test that is skipped says why")]
 
@@ -60,12 +60,12 @@ fn bash_completes_nodes_objects_models_and_modes() {
     assert!(of(&["read", "4", "201"]).contains(&"2014".to_owned()));
     assert!(!of(&["read", "1", "201"]).contains(&"2014".to_owned()));
     assert!(of(&["--bus", "can7", "--model", "9=zlac8030l", "watch", "9", "201"]).contains(&"2014".to_owned()));
-    // The number of an option is no node.
+    // The number of an option is not a node.
     assert!(of(&["watch", "--count", "1", "4", "201"]).contains(&"2014".to_owned()));
     assert_eq!(of(&["objects", "zla"]), ["zlac8030l"]);
     assert!(of(&["sim", "--drive", "m42"]).len() >= 2);
     assert_eq!(of(&["plan", "machine.toml", "--mode", "cs"]), ["csp", "csv", "cst"]);
-    // What makes no sense is completed by nothing, and is no error.
+    // What makes no sense is completed by nothing, and is not an error.
     assert!(of(&["read", "4", "no_such_obj"]).is_empty());
 }
 
@@ -186,7 +186,7 @@ fn at_a_terminal_a_guess_is_said_once_and_the_nodes_are_remembered() {
     assert!(!second.contains("its model is not certain") && second.contains("2014h"), "{second}");
     let kept = std::fs::read_to_string(cache.join("ferrodrive/remembered.json")).unwrap();
     assert!(kept.contains(&bus) && kept.contains("\"4\""), "{kept}");
-    // Where nobody looks, each call says it, and nothing is kept.
+    // Without a terminal each call reports it, and nothing is kept.
     let elsewhere = scratch("not-remembered");
     for _ in 0..2 {
         let mut quiet = Command::new(processes::program());

@@ -64,7 +64,7 @@ fn plan_check_and_group_say_the_same_of_a_cycle() {
         assert!(finding["next"].as_str().unwrap().contains("1.5 ms"), "{finding}");
         assert_eq!(moved.json()["error"]["kind"], "bus_load");
         assert!(next_of(&moved).contains("1.5 ms") && !moved.out.contains("::"), "{}", moved.out);
-        // Whoever boots the machine hears the same before.
+        // A boot-up of the machine is refused for the same reason.
         for command in [&["boot", &file][..], &["boot", &file, "--reset"], &["supervise", &file, "--for", "1s"]] {
             let booted = ferrodrive(&[&["--json", "--log", log.to_str().unwrap()], command].concat());
             let error = &booted.json()["error"];
@@ -100,7 +100,7 @@ fn a_group_is_spoken_of_in_degrees() {
     assert!(beyond.err.contains("at 200 deg") && beyond.err.contains("-170 to 170 deg"), "{}", beyond.err);
 }
 
-/// Joints are operational by themselves and left so: their heartbeats are not written, which is no success.
+/// Joints are operational by themselves and left so: their heartbeats are not written, which is not a success.
 #[test]
 fn a_boot_up_that_leaves_the_configuration_of_the_file_unwritten_does_not_end_with_0() {
     let folder = scratch("unconfigured");

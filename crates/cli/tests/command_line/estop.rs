@@ -1,4 +1,4 @@
-//! Everything on a bus is stopped by a program that has not set it in motion, and only what was seen to stand is said to.
+//! Everything on a bus is stopped by a program that has not set it in motion, and only what was seen to stand is reported to stand.
 
 use processes::{Simulator, done, ferrodrive, scratch};
 use serde_json::{Value, json};

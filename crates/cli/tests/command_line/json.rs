@@ -101,7 +101,7 @@ fn a_factory_value_is_a_number_and_what_the_node_id_is_added_to_is_said_apart() 
 
 #[test]
 fn three_tenths_are_three_tenths() {
-    // 6077h, and 606Ch, count tenths: 0.1 is no binary fraction.
+    // 6077h, and 606Ch, count tenths: 0.1 is not a binary fraction.
     let directory = scratch("tenths");
     let file = directory.join("warm.toml");
     std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\ntemperatures_c = { motor = 30.3 }\n").unwrap();

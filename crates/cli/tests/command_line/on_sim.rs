@@ -62,7 +62,7 @@ fn a_speed_is_reached_held_and_stopped() {
     assert_eq!((&moved["reached"], &moved["stopped"]), (&json!(true), &json!(true)));
     let speed = moved["before_stop"]["velocity_rpm"].as_f64().unwrap();
     assert!((speed - 60.0).abs() < 1.0, "{speed}");
-    // What is told of a stopped drive is what it does now: standing is less than 1 r/min.
+    // What is reported of a stopped drive is what it does now: standing is less than 1 r/min.
     let speed = moved["velocity_rpm"].as_f64().unwrap();
     assert!(speed.abs() < 1.0, "{speed}");
     // 6083h: 500 ms from 0 to the target; reached is within 5 %.

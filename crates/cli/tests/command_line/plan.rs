@@ -9,7 +9,7 @@ fn frame<'a>(report: &'a Value, name: &str, node: Option<u8>) -> &'a Value {
     found.unwrap_or_else(|| panic!("{name} of {node:?} in {report}"))
 }
 
-/// Two ZLAC8030L that are moved by RPDO1 (controlword and target velocity, 6 bytes) and tell status, speed and current in TPDO1
+/// Two ZLAC8030L that are moved by RPDO1 (controlword and target velocity, 6 bytes) and send status, speed and current in TPDO1
 /// (8 bytes): frames of 55 + 10 s bits (CiA 301's identifiers, ISO 11898-1).
 #[test]
 fn the_frames_of_a_cycle_have_the_times_that_are_counted_by_hand() {

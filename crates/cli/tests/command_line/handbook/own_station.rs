@@ -54,7 +54,7 @@ fn five_writes_turn_the_wheel() {
     world.run_for(Duration::from_secs(1));
     assert!((world.report(4).unwrap().velocity_rpm - 60.0).abs() < 2.0);
 
-    // Nobody talks to it any more: a second after the last frame it stops by itself (2000h = 1000 ms as delivered).
+    // No program talks to it any more: a second after the last frame it stops by itself (2000h = 1000 ms as delivered).
     world.run_for(Duration::from_secs(2));
     assert!(world.report(4).unwrap().velocity_rpm.abs() < 2.0);
 }

@@ -40,7 +40,7 @@ fn blocks(text: &str, language: &str) -> Vec<(String, Vec<String>)> {
     found
 }
 
-/// What stands in backticks and looks like a path of the project.
+/// What is in backticks and looks like a path of the project.
 fn paths(text: &str) -> Vec<&str> {
     let folders = ["crates/", "docs/", "tests/", "examples/", "fuzz/", "xtask/"];
     let quoted = text.split('`').skip(1).step_by(2);
@@ -49,7 +49,7 @@ fn paths(text: &str) -> Vec<&str> {
         .collect()
 }
 
-/// Whether the lines of a block stand in a file, one after another; `...` stands for lines that are left out.
+/// Whether the lines of a block are in a file, one after another; `...` stands for lines that are left out.
 fn stands_in(file: &str, block: &[String]) -> bool {
     let file: Vec<&str> = file.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
     let mut from = 0;
