@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_asked_for_takes_no_room() {
+    fn what_was_not_requested_takes_no_room() {
         let mut channel = reading();
         for _ in 0..1000 {
             // Segments before the transfer has begun, and the beginning of another object of 64 KiB.

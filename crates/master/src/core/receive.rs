@@ -81,7 +81,7 @@ impl Core {
         }
     }
 
-    /// Another master commands a state: the heartbeats that follow say so.
+    /// Another master commands a state: the heartbeats that follow show it.
     pub(super) fn handle_nmt(&mut self, frame: &Frame) {
         let Ok(NmtRequest { target, .. }) = NmtRequest::parse(frame) else { return };
         for node in NodeId::all().filter(|node| target.includes(*node)) {

@@ -163,7 +163,7 @@ mod tests {
             assert_eq!(judged(steady(1000).filter(|(at, _)| at / 1000 % of >= lost)), None, "{lost} of {of}");
         }
         assert_eq!(judged(steady(1000).chain((0..50).map(|n| (50_300 + n * 300, Operational)))), None);
-        // An alarm that a heartbeat tells by its state, and that comes and goes.
+        // An alarm that a heartbeat shows by its state, and that comes and goes.
         assert_eq!(judged((0..50).map(|n| (n * 1000, if n % 10 < 4 { Stopped } else { Operational }))), None);
     }
 

@@ -132,7 +132,7 @@ async fn stop_node(node: &Node, named: Option<&'static Description>, is_expected
     join_all(axes.collect::<Vec<_>>()).await
 }
 
-/// Tells the further axes of a device of unknown model to stop, where it has them.
+/// Commands the further axes of a device of unknown model to stop, where it has them.
 async fn stop_unseen_axes(node: &Node) -> Vec<StoppedAxis> {
     let mut axes = Vec::new();
     for axis in 1..MOST_AXES {

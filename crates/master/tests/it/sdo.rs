@@ -136,7 +136,7 @@ fn two_devices_with_one_node_id_are_noticed_by_their_answers() {
     assert_eq!(bus.block_on(network.scan(Duration::from_millis(50), |_| {}))[0].twins, None);
 }
 
-/// One of the two is stopped and answers no SDO, or both answer the same at the same time: heartbeats and boot-ups tell.
+/// One of the two is stopped and answers no SDO, or both answer the same at the same time: heartbeats and boot-ups show it.
 #[test]
 fn two_devices_with_one_node_id_are_noticed_by_what_they_send() {
     let toy = Toy::new(4).u32(0x1000, 0, 0x0004_0192).u16(0x1017, 0, 1000);

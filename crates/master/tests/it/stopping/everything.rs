@@ -69,7 +69,7 @@ impl Bench {
     }
 }
 
-/// What comes of `work`, while `other` goes on without end.
+/// The result of `work`, while `other` goes on without end.
 async fn while_going_on<T>(work: impl Future<Output = T>, other: impl Future<Output = Infallible>) -> T {
     let (mut work, mut other) = (pin!(work), pin!(other));
     poll_fn(|context| {
