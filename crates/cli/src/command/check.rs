@@ -14,9 +14,9 @@ use plot::Paint;
 use plot::Table;
 use transport::BusSpec;
 
-/// Check the description of a bus: a bus.yml of ros2_canopen with its data sheets, or a machine file
+/// Check the description of a bus: a bus.yml of ros2_canopen, or a machine file
 ///
-/// A bus.yml (also read by Lely's dcfgen) is compared with its EDS files and with what is known of the drives that they
+/// A bus.yml (also read by Lely's dcfgen) is compared with its data sheets (EDS files) and with what is known of the drives that they
 /// describe: node-IDs, heartbeats, boot times, PDOs, drivers. A machine file is read and its machine built. Then the
 /// bus that the file describes is booted in virtual time, which gives for each node the letter of CiA 302-2 with which
 /// its boot-up ends, and the frames that are sent afterwards with the load of the bus. Nothing is sent on a real bus

@@ -15,10 +15,10 @@ use crate::output::Report;
 use plot::Paint;
 use testbench::words::node::{Nodes, node, nodes};
 
-/// Show the state of a drive: power state, fault with remedy, position, speed, current, temperatures, supply
+/// Show the state of a drive: power state, fault, position, speed, current, supply
 ///
-/// Reads only. What a drive has no object for is omitted. `explain` shows why it does not move, `watch` shows objects
-/// as they change.
+/// Reads only. A fault is shown with its remedy. What a drive has no object for is omitted. `explain` shows why it does
+/// not move, `watch` shows objects as they change.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive state 4\n  ferrodrive --bus can0 --machine machine.toml state 4 --json"

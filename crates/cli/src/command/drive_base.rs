@@ -33,7 +33,7 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
 /// Lines that are kept while the base is busy; of more than one the newest counts.
 const MOST_LINES: usize = 16;
 
-/// Drive a base on two wheels: by a twist for a time, or by a stream of twists on standard input
+/// Drive a base on two wheels by a twist, or by a stream of twists on standard input
 ///
 /// Wheels, geometry and limits come from the [base] of a machine file. Without --for, each line of standard input is a
 /// twist, `LINEAR ANGULAR` in m/s and rad/s: it is valid until the next one arrives, and for 300 ms at most, so that a

@@ -26,10 +26,11 @@ use crate::signals::asked_to_end;
 use plot::Paint;
 use testbench::machine_file::Machine;
 
-/// Show the traffic of the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
+/// Show the traffic of the bus decoded: SDO with object names, PDOs, statuswords in words
 ///
 /// Only listens. On a real bus it runs until Ctrl-C; on a log until its end; on an embedded virtual bus it shows how
-/// the drives boot. The names of a model's own objects need the model: --model NODE=MODEL, or --machine FILE.toml.
+/// the drives boot. PDOs are decoded by their mapping. The names of a model's own objects need the model: --model
+/// NODE=MODEL, or --machine FILE.toml.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 --model 4=zlac8030l dump\n  \
     ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k dump --log trace.log\n  \

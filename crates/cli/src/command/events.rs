@@ -9,10 +9,10 @@ use crate::output::{Format, print_line};
 use crate::plain::plain;
 use crate::session::exit_on_signal;
 
-/// Show the events of a running simulator: boot-ups, changes of state, faults with remedies, targets reached, bus
-/// errors
+/// Show the events of a running simulator
 ///
-/// Runs until the simulator ends, or Ctrl-C. Times are those of the bus.
+/// Boot-ups, changes of state, faults with remedies, targets reached, bus errors. Runs until the simulator ends, or
+/// Ctrl-C. Times are those of the bus.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Kinds: power, boot, nmt, state, mode, fault, fault_reset, emcy, target_reached, internal_limit,\n\

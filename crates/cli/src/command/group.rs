@@ -59,7 +59,7 @@ struct Move {
     /// Machine file, and the positions of the nodes: 1=90deg 4=0.5turn 2=-3000counts
     #[arg(value_name = "FILE.toml|NODE=POSITION", required = true, value_parser = word)]
     words: Vec<Word>,
-    /// Which [[group]] of the file (default: the one that has the nodes)
+    /// Name of the [[group]] of the file (default: the one that has the nodes)
     #[arg(long, value_name = "NAME")]
     group: Option<String>,
     /// Turn by this much from the present position of each axis, instead of to a position

@@ -141,7 +141,7 @@ struct Wanted {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
-    /// The parameters: .toml, .dcf or .bin (default: what the machine file says of the node)
+    /// The parameters: .toml, .dcf or .bin (default: the values in the machine file)
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
 }

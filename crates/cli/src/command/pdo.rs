@@ -23,7 +23,7 @@ use plot::Table;
 use testbench::decode::{self, decode};
 use testbench::words::node::node;
 
-/// Show how the PDOs of a node are configured and why one is silent, watch their values, or configure them
+/// Show, watch and configure the PDOs of a node
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive pdo show 4\n  \
     ferrodrive --bus socketcand://HOST:29536/can0 pdo watch 4 --time delta\n  \
@@ -37,7 +37,7 @@ pub(crate) struct Pdo {
 
 #[derive(Debug, clap::Subcommand)]
 enum What {
-    /// Show identifier, transmission type, timers and mapping of each PDO
+    /// Show identifier, transmission type, timers and mapping of each PDO, and why one is silent
     Show(Show),
     /// Show the values in the PDOs of a node as they arrive, by its own mapping
     Watch(Watch),

@@ -22,7 +22,7 @@ use crate::session;
 use plot::Paint;
 use plot::Table;
 
-/// Plan a bus: its load, the longest time of every frame, and how many such drives it carries
+/// Plan a bus: load, longest time of every frame, number of such drives it carries
 ///
 /// Takes the frames from the PDO configuration of the nodes: of virtual drives of a machine file, or of those on a real
 /// bus, which is only read. The [[group]] or the [base] of the file is planned as it will run, with its period, its

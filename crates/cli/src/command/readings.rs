@@ -9,8 +9,7 @@ use crate::readings::{self, Reading};
 use plot::Paint;
 use testbench::models::{Description, resolve};
 
-/// List where a model's manual is silent or contradicts itself, what the virtual drive does there, and what can be
-/// chosen
+/// List where a model's manual is silent or contradicts itself, and what can be chosen
 ///
 /// Each entry has what the manual prints, what the virtual drive does, why, and how certain that is: traffic of real
 /// drives, another document of the maker, a sibling's manual, the standard, or a guess.

@@ -21,7 +21,7 @@ use crate::output::{Format, Report};
 use crate::session;
 use plot::Paint;
 
-/// Boot the nodes of a network, then watch them: heartbeats, errors, and nodes that come back
+/// Boot the nodes of a network, then watch heartbeats, errors and nodes that come back
 ///
 /// Boots as `ferrodrive boot` does, and has each drive stop by itself when this command dies, where its model can do
 /// that; where it cannot, this is reported. Then it reports what happens: lost heartbeats, states, emergency messages

@@ -10,9 +10,10 @@ use crate::output::Report;
 use crate::session::exit_on_signal;
 use plot::Paint;
 
-/// Change the surroundings of drives in a running simulator: supply, load, switches, faults, cables
+/// Change the surroundings of drives in a running simulator
 ///
-/// The commands are those of the simulator's standard input: NODE COMMAND, or now, help, run TIME.
+/// Supply, load, switches, faults, cables: the commands are those of the simulator's standard input, NODE COMMAND, or
+/// now, help, run TIME.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive sim --drive zlac8030l@4 --control 127.0.0.1:4000\n  \
     ferrodrive world --control 127.0.0.1:4000 4 supply 90\n  \

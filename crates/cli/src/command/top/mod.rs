@@ -34,7 +34,7 @@ use crate::output::Format;
 use app::{Action, App};
 use screen::Look;
 
-/// Show and move drives in this terminal: states, plots, faults, and keys to enable, jog and stop
+/// Show and move drives in this terminal: states, plots, faults, keys to jog and stop
 ///
 /// Works over SSH in 80 columns and 24 lines. A drive is jogged only while its key is held, which is detected by the
 /// key's repeats: a press alone moves nothing. What was moved from here stops when this command ends, however it ends.
