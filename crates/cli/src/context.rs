@@ -117,6 +117,11 @@ impl Context {
         &self.bus
     }
 
+    /// True if programs read what is printed.
+    pub(crate) const fn prints_json(&self) -> bool {
+        self.json
+    }
+
     /// True on a virtual bus of this command alone.
     pub(crate) const fn is_embedded(&self) -> bool {
         self.embedded

@@ -31,6 +31,8 @@ pub(crate) struct Failure {
     pub(crate) subject: Subject,
     /// It has been reported already, as part of what the command printed.
     pub(crate) reported: bool,
+    /// Lines of output were printed before it, which are not all that there would be.
+    pub(crate) partial: bool,
 }
 
 impl Failure {
@@ -44,6 +46,7 @@ impl Failure {
             next: Vec::new(),
             subject: Subject::default(),
             reported: false,
+            partial: false,
         }
     }
 
@@ -156,12 +159,14 @@ impl fmt::Display for Failure {
 #[derive(Serialize)]
 pub(crate) struct FailureReport {
     ok: bool,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    partial: bool,
     error: FailureBody,
 }
 
 impl From<&Failure> for FailureReport {
     fn from(failure: &Failure) -> Self {
-        Self { ok: false, error: failure.into() }
+        Self { ok: false, partial: failure.partial, error: failure.into() }
     }
 }
 
@@ -175,7 +180,7 @@ impl From<testbench::failure::Failure> for Failure {
     fn from(failure: testbench::failure::Failure) -> Self {
         let testbench::failure::Failure { kind, what, because, next, subject, is_usage } = failure;
         let status = if is_usage { Status::Usage } else { Status::Failed };
-        Self { status, kind, what, because, next, subject, reported: false }
+        Self { status, kind, what, because, next, subject, reported: false, partial: false }
     }
 }
 

@@ -232,7 +232,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Disable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Estop(command) => {
-            stops(global, format, async |context| command.run(context).await.map(StopOutcome::all))
+            stops(global, format, async |context| Ok(StopOutcome::all(command.run(context).await?)))
         }
         Command::Stop(command) => stops(global, format, async |context| command.run(context).await),
         Command::QuickStop(command) => stops(global, format, async |context| command.run(context).await),

@@ -1,6 +1,5 @@
 //! `ferrodrive demo`: every procedure of the manuals against the virtual drives.
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
@@ -9,12 +8,11 @@ use serde::Serialize;
 use sim::machine::models;
 use transport::WallClock;
 
-use crate::command::plot::svg_path;
+use crate::command::plot::{svg_path, write_svg};
 use crate::failure::{Failure, FailureBody};
 use crate::global::Global;
 use crate::output::Report;
 use crate::progress::Progress;
-use crate::serve::files::create_picture;
 use crate::session::exit_on_signal;
 use testbench::models::resolve;
 
@@ -44,12 +42,9 @@ impl Demo {
         let showcase =
             showcase::run(only, move |section| shown.show(section)).map_err(|error| Failure::new(error.to_string()))?;
         progress.clear();
-        // A picture that this program has not drawn is kept.
-        create_picture(&self.svg, b"<svg")
-            .and_then(|mut file| file.write_all(showcase.poster.to_svg().as_bytes()))
-            .map_err(|error| Failure::of_writing("the picture", &self.svg, &error))?;
+        let picture = write_svg(&self.svg, showcase.poster.to_svg())?;
         let (svg, took_s) = (self.svg.display().to_string(), clock.now().as_secs_f64());
-        Ok(DemoReport::from(showcase::Report::new(showcase.parts, svg, took_s)))
+        Ok(DemoReport { picture, ..DemoReport::from(showcase::Report::new(showcase.parts, svg, took_s)) })
     }
 }
 
@@ -60,12 +55,15 @@ pub(crate) struct DemoReport {
     found: showcase::Report,
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<FailureBody>,
+    /// The picture, if it goes to standard output.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    picture: Option<String>,
 }
 
 impl From<showcase::Report> for DemoReport {
     fn from(found: showcase::Report) -> Self {
         let error = (!found.ok).then(|| (&differs()).into());
-        Self { found, error }
+        Self { found, error, picture: None }
     }
 }
 
@@ -78,7 +76,10 @@ impl DemoReport {
 
 impl Report for DemoReport {
     fn text(&self, paint: Paint) -> String {
-        self.found.text(paint)
+        match &self.picture {
+            Some(picture) => picture.trim_end().to_owned(),
+            None => self.found.text(paint),
+        }
     }
 }
 

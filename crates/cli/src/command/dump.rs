@@ -1,5 +1,6 @@
 //! `ferrodrive dump` and `ferrodrive decode`: a bus or a log in words, line by line.
 
+use std::cell::Cell;
 use std::io::{self, Write};
 use std::path::Path;
 use std::time::Duration;
@@ -139,6 +140,8 @@ struct Sink {
     may_have_learned: bool,
     /// The bus passes on the frames of some identifiers only.
     is_filtered: bool,
+    /// A line went to standard output.
+    has_printed: Cell<bool>,
 }
 
 impl Dump {
@@ -160,6 +163,9 @@ impl Dump {
             (_, None) => Ok(()),
         };
         let summarised = shown.and_then(|()| sink.summarise());
+        // A bus has no end; of a log there would be more.
+        let partial = matches!(global.bus, BusSpec::Log { .. }) && sink.has_printed.get();
+        let summarised = summarised.map_err(|failure| Failure { partial, ..failure });
         match writing.finish() {
             Some(missing) => summarised.and(Err(Failure::new(missing))),
             None => summarised,
@@ -270,6 +276,7 @@ impl Sink {
             keeps_all: global.log.is_some(),
             may_have_learned: true,
             is_filtered: false,
+            has_printed: Cell::new(false),
         })
     }
 
@@ -337,6 +344,7 @@ impl Sink {
     }
 
     fn print(&self, line: &impl Report) -> Result<(), Failure> {
+        self.has_printed.set(true);
         self.format.print(line).map_err(|error| not_printed(&error))
     }
 
@@ -351,6 +359,7 @@ impl Sink {
                 Place::Line(line) => (Some(line), None),
                 Place::Byte(byte) => (None, Some(byte)),
             };
+            self.has_printed.set(true);
             let skipped = Skipped { line, byte, skipped: finding.text, reason: finding.reason };
             return self.format.print_json(&skipped).map_err(|error| not_printed(&error));
         }

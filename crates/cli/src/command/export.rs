@@ -1,14 +1,18 @@
 //! `ferrodrive export`: what is on a bus, in other programs' forms.
 
+use std::path::PathBuf;
+
 use canopen::NodeId;
 use master::Drive;
 use serde::Serialize;
 use testbench::dbc::{self, DbcNode, DbcPdo};
 use testbench::words::node::node;
 
+use super::dcf::{keep, new_file};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
+use crate::plain::plain;
 use plot::Paint;
 
 /// Export the description of the bus for other programs
@@ -29,19 +33,38 @@ enum Form {
 /// sign, factor and unit of the signals come from the model's table; for a node of unknown model, from the standard as
 /// far as it defines them.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  ferrodrive --bus can0 export dbc > bus.dbc\n  \
-    ferrodrive --bus can0 --model 4=zlac8030l export dbc 4 > wheel.dbc\n  \
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 export dbc -o bus.dbc\n  \
+    ferrodrive --bus can0 --model 4=zlac8030l export dbc 4 -o wheel.dbc\n  \
     ferrodrive --bus sim:base.toml export dbc     # the drives of a machine file, as delivered")]
 struct Dbc {
     /// Nodes (default: every node that answers)
     #[arg(value_name = "NODE", value_parser = node)]
     nodes: Vec<NodeId>,
+    /// Write the file here, and say what it has; without it, and as -, the file goes to standard output
+    #[arg(long, short, value_name = "FILE.dbc", value_parser = dbc_path)]
+    output: Option<PathBuf>,
+    /// Write over a file that is there
+    #[arg(long, requires = "output")]
+    force: bool,
+}
+
+fn dbc_path(text: &str) -> Result<PathBuf, String> {
+    if text == "-" || text.to_ascii_lowercase().ends_with(".dbc") {
+        Ok(text.into())
+    } else {
+        Err("expected FILE.dbc, or - for standard output".into())
+    }
 }
 
 /// A DBC file.
 #[derive(Debug, Serialize)]
 pub(crate) struct ExportReport {
-    dbc: String,
+    /// Where the file is; absent if it is [`dbc`](Self::dbc).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
+    /// The file itself, if it was not written anywhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dbc: Option<String>,
     nodes: Vec<u8>,
     /// PDOs that are switched on.
     pdos: usize,
@@ -49,7 +72,13 @@ pub(crate) struct ExportReport {
 
 impl Report for ExportReport {
     fn text(&self, _: Paint) -> String {
-        self.dbc.trim_end().to_owned()
+        match (&self.dbc, &self.file) {
+            (Some(dbc), _) => dbc.trim_end().to_owned(),
+            (None, file) => {
+                let (file, nodes) = (plain(file.as_deref().unwrap_or_default()), self.nodes.len());
+                format!("{file}: {} PDOs of {nodes} node{}", self.pdos, if nodes == 1 { "" } else { "s" })
+            }
+        }
     }
 }
 
@@ -57,6 +86,7 @@ impl Export {
     /// Reads what there is.
     pub(crate) async fn run(&self, context: &Context) -> Result<ExportReport, Failure> {
         let Form::Dbc(dbc) = &self.form;
+        let output = new_file(dbc.output.as_deref(), dbc.force)?;
         let mut ids = dbc.nodes.clone();
         if ids.is_empty() {
             let asked = |count| context.progress.count(format!("asked {count} of 127"));
@@ -75,7 +105,11 @@ impl Export {
             nodes.push(DbcNode { id, model: drive.description(), pdos: pdos_of(&drive).await? });
         }
         let pdos = nodes.iter().map(|node| node.pdos.len()).sum();
-        Ok(ExportReport { dbc: dbc::print(&nodes), nodes: nodes.iter().map(|node| node.id.raw()).collect(), pdos })
+        let text = dbc::print(&nodes);
+        let nodes = nodes.iter().map(|node| node.id.raw()).collect();
+        let Some(path) = output else { return Ok(ExportReport { file: None, dbc: Some(text), nodes, pdos }) };
+        keep(path, text.as_bytes(), dbc.force)?;
+        Ok(ExportReport { file: Some(path.display().to_string()), dbc: None, nodes, pdos })
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use testbench::recording::{Kind, Recorded, picture, read};
 
+use super::dcf::is_stdout;
 use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
@@ -30,19 +31,27 @@ pub(crate) struct Plot {
     /// End, in s (default: that of the record)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     to: Option<f64>,
-    /// Write the picture to this file, NAME.svg or NAME.html (default: NAME.svg beside the record)
+    /// Write the picture to this file, NAME.svg or NAME.html, or as - to standard output; without it, it goes beside the record, as NAME.svg
     #[arg(long, short, alias = "svg", alias = "html", value_name = "FILE", value_parser = picture_path)]
     output: Vec<PathBuf>,
 }
 
 fn picture_path(text: &str) -> Result<PathBuf, String> {
-    let is_known = [".svg", ".html"].iter().any(|ending| text.to_ascii_lowercase().ends_with(ending));
-    if is_known { Ok(text.into()) } else { Err("expected NAME.svg (a picture) or NAME.html (a web page)".into()) }
+    let is_known = text == "-" || [".svg", ".html"].iter().any(|ending| text.to_ascii_lowercase().ends_with(ending));
+    if is_known {
+        Ok(text.into())
+    } else {
+        Err("expected NAME.svg (a picture), NAME.html (a web page) or - (the picture to standard output)".into())
+    }
 }
 
 /// Where a picture of a command that draws no web page goes.
 pub(super) fn svg_path(text: &str) -> Result<PathBuf, String> {
-    if text.to_ascii_lowercase().ends_with(".svg") { Ok(text.into()) } else { Err("expected NAME.svg".into()) }
+    if text == "-" || text.to_ascii_lowercase().ends_with(".svg") {
+        Ok(text.into())
+    } else {
+        Err("expected NAME.svg, or - for standard output".into())
+    }
 }
 
 /// Largest record that is read: 4 GiB would be a day of three drives at 1 kHz.
@@ -63,6 +72,9 @@ pub(crate) struct Drawn {
     marks: usize,
     torn: bool,
     files: Vec<PathBuf>,
+    /// The picture, if it goes to standard output.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    picture: Option<String>,
 }
 
 impl Plot {
@@ -84,6 +96,9 @@ impl Plot {
         if files.is_empty() {
             files.push(self.file.with_extension("svg"));
         }
+        let with_stdout = files.len();
+        files.retain(|path| !is_stdout(path));
+        let picture = (files.len() < with_stdout).then(|| poster.to_svg());
         for path in &files {
             let is_page = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
             let (text, begin): (_, &[u8]) =
@@ -93,7 +108,7 @@ impl Plot {
         let figures = || poster.rows.iter().flatten();
         let signals = figures().flat_map(|figure| &figure.panels).map(|panel| panel.traces.len()).sum();
         let marks = figures().map(|figure| figure.events.len()).max().unwrap_or(0);
-        Ok(Drawn { record: self.file.clone(), signals, marks, torn: recorded.torn, files })
+        Ok(Drawn { record: self.file.clone(), signals, marks, torn: recorded.torn, files, picture })
     }
 
     fn read(&self) -> Result<Recorded, Failure> {
@@ -116,6 +131,14 @@ impl Plot {
     }
 }
 
+/// Writes a picture where it is asked for; the text of it, if that is standard output.
+pub(super) fn write_svg(path: &Path, svg: String) -> Result<Option<String>, Failure> {
+    if is_stdout(path) {
+        return Ok(Some(svg));
+    }
+    write(path, &svg, b"<svg").map(|()| None)
+}
+
 /// Writes a picture to a new file, or over an earlier picture, and over nothing else.
 fn write(path: &Path, text: &str, begin: &[u8]) -> Result<(), Failure> {
     let written = crate::serve::files::create_picture(path, begin).and_then(|mut file| file.write_all(text.as_bytes()));
@@ -124,6 +147,9 @@ fn write(path: &Path, text: &str, begin: &[u8]) -> Result<(), Failure> {
 
 impl Report for Drawn {
     fn text(&self, _: Paint) -> String {
+        if let Some(picture) = &self.picture {
+            return picture.trim_end().to_owned();
+        }
         let files: Vec<String> = self.files.iter().map(|path| path.display().to_string()).collect();
         let drawn = format!("{} signals and {} marks are drawn in {}", self.signals, self.marks, files.join(" and "));
         let torn = "the end of the record is missing: its writer was killed, or is still running";

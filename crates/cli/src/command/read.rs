@@ -1,17 +1,16 @@
 //! `ferrodrive read`: objects of a node by SDO upload (CiA 301, clause 7.2.4), one, several or a range.
 
-use std::fs::OpenOptions;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use canopen::{AbortCode, Mux, NodeId};
 use master::decode::common_row;
 use master::{Drive, Error};
 
+use super::dcf::{is_stdout, keep, new_file};
 use super::sdo::{ObjectReport, moving_limits, resolve};
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::Format;
+use crate::output::{Format, print};
 use testbench::words::node::node;
 use testbench::words::object::ObjectArg;
 use testbench::words::selection::{Selection, selection};
@@ -30,7 +29,7 @@ pub(crate) struct Read {
     /// Indices, index:sub-index, names or ranges
     #[arg(value_name = "OBJECT", required = true, value_parser = selection)]
     objects: Vec<Selection>,
-    /// Write the bytes of the one object, as they are, to a new file
+    /// Write the bytes of the one object, as they are, to a new file, or as - to standard output
     #[arg(long = "output", short = 'o', alias = "to", value_name = "FILE")]
     to: Option<PathBuf>,
     /// Overwrite an existing file
@@ -46,11 +45,13 @@ impl Read {
             _ => None,
         };
         if let Some(path) = &self.to {
-            self.check_file(path, one.is_some())?;
+            self.check_file(path, one.is_some(), format.json)?;
         }
         let show = |report: &ObjectReport| format.print(report).map_err(Failure::not_printed);
         if let Some(object) = one {
-            return show(&self.one(context, object).await?);
+            let report = self.one(context, object).await?;
+            // The bytes are there already, and nothing else is to be among them.
+            return if self.to.as_deref().is_some_and(is_stdout) { Ok(()) } else { show(&report) };
         }
         let drive = context.drive(self.node).await?;
         for selection in &self.objects {
@@ -90,7 +91,11 @@ impl Read {
         let limits = moving_limits(&drive, row).await?;
         let mut report = ObjectReport::new(&drive, mux, row, payload.as_bytes(), limits.as_ref(), false);
         if let Some(path) = &self.to {
-            self.keep(path, payload.as_bytes())?;
+            if is_stdout(path) {
+                print(payload.as_bytes()).map_err(Failure::of_stdout)?;
+                return Ok(report);
+            }
+            keep(path, payload.as_bytes(), self.force)?;
             report.file = Some(path.display().to_string());
         }
         Ok(report)
@@ -167,27 +172,15 @@ impl Read {
             .next(format!("ferrodrive objects {} lists what it has", self.node))
     }
 
-    fn check_file(&self, path: &Path, is_one: bool) -> Result<(), Failure> {
+    fn check_file(&self, path: &Path, is_one: bool, json: bool) -> Result<(), Failure> {
         if !is_one {
             return Err(Failure::usage("--output accepts one object only")
                 .next("read the objects one by one, or use --json > FILE"));
         }
-        if !self.force && path.exists() {
-            return Err(Failure::new(format!("{} already exists", path.display()))
-                .of_kind("file_exists")
-                .next("--force overwrites it, or give another --output"));
+        if json && is_stdout(path) {
+            return Err(Failure::usage("the bytes of an object and lines of JSON cannot both go to standard output")
+                .next("give --output FILE, or omit --json"));
         }
-        Ok(())
-    }
-
-    fn keep(&self, path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-        let mut options = OpenOptions::new();
-        options.write(true);
-        // Another program may have created it since it was looked for.
-        let options = if self.force { options.create(true).truncate(true) } else { options.create_new(true) };
-        options
-            .open(path)
-            .and_then(|mut file| file.write_all(bytes))
-            .map_err(|error| Failure::new(format!("cannot write {}", path.display())).because(error))
+        new_file(Some(path), self.force).map(drop)
     }
 }

@@ -1,6 +1,7 @@
 //! `ferrodrive record`: objects of nodes over time, on any bus, into a file that `plot` and Foxglove read.
 
-use std::path::PathBuf;
+use std::fs::File;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use can::Instant;
@@ -19,6 +20,7 @@ use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
 use testbench::words::unit::split_factor;
 
+use super::dcf::is_stdout;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -45,7 +47,7 @@ pub(crate) struct Record {
     /// Objects: index, index:sub-index or name
     #[arg(value_name = "OBJECT", required = true, value_parser = object)]
     objects: Vec<ObjectArg>,
-    /// Output file, NAME.mcap or NAME.csv: new, empty, or an earlier record, which is replaced
+    /// The file: NAME.mcap or NAME.csv; a new one, or an empty one, or an earlier record, which is replaced; - is CSV on standard output
     #[arg(long = "output", short = 'o', alias = "out", value_name = "FILE", value_parser = record_file)]
     out: (PathBuf, Kind),
     /// Time between two samples
@@ -57,9 +59,21 @@ pub(crate) struct Record {
 }
 
 fn record_file(text: &str) -> Result<(PathBuf, Kind), String> {
+    if text == "-" {
+        return Ok((text.into(), Kind::Csv));
+    }
     let kind =
         Kind::of_name(text).ok_or("a record is called NAME.mcap or NAME.csv; for frames alone there is --log")?;
     Ok((text.into(), kind))
+}
+
+/// Standard output as a file of its own.
+fn stdout_file() -> std::io::Result<File> {
+    #[cfg(unix)]
+    let own = std::os::fd::AsFd::as_fd(&std::io::stdout()).try_clone_to_owned();
+    #[cfg(windows)]
+    let own = std::os::windows::io::AsHandle::as_handle(&std::io::stdout()).try_clone_to_owned();
+    own.map(File::from)
 }
 
 /// An SDO takes some hundred microseconds.
@@ -114,6 +128,10 @@ pub(crate) struct RecordReport {
 impl Record {
     /// Records until the time is over.
     pub(crate) async fn run(&self, context: &Context) -> Result<RecordReport, Failure> {
+        if context.prints_json() && is_stdout(&self.out.0) {
+            return Err(Failure::usage("a record and lines of JSON cannot both go to standard output")
+                .next("give --output NAME.csv, or omit --json"));
+        }
         let drive = context.drive(self.node).await?;
         let sources = self.objects.iter().map(|object| Source::new(&drive, object)).collect::<Result<Vec<_>, _>>()?;
         let node = context.node(self.node);
@@ -129,7 +147,8 @@ impl Record {
         let (path, kind) = &self.out;
         let cannot =
             |error: std::io::Error| Failure::new(format!("cannot write the record {}", path.display())).because(error);
-        let file = create_record(path, *kind).map_err(cannot)?;
+        let file = if is_stdout(path) { stdout_file() } else { create_record(path, *kind) };
+        let file = file.map_err(cannot)?;
         let mut file = ObjectRecord::start(*kind, file, &columns, Messages::of_warnings()).map_err(cannot)?;
         let mut report = RecordReport {
             file: path.display().to_string(),
@@ -143,6 +162,10 @@ impl Record {
         };
         self.sample(context, &node, &sources, &mut file, &mut report).await;
         file.finish(DISK_PATIENCE)?;
+        if is_stdout(path) {
+            context.progress.clear();
+            context.note(&report.summary(Paint::OFF));
+        }
         Ok(report)
     }
 
@@ -287,6 +310,13 @@ fn mark(at: Instant, event: &Event) -> Option<Mark> {
 
 impl Report for RecordReport {
     fn text(&self, paint: Paint) -> String {
+        // The record is there already, and nothing else is to be in it.
+        if is_stdout(Path::new(&self.file)) { String::new() } else { self.summary(paint) }
+    }
+}
+
+impl RecordReport {
+    fn summary(&self, paint: Paint) -> String {
         let Self { file, node, samples, by_pdo, by_sdo, missing, duration_s, .. } = self;
         let mut text = format!(
             "{}: {samples} samples of node {node} in {duration_s:.3} s, {by_pdo} values by PDO, {by_sdo} by SDO",

@@ -240,8 +240,7 @@ impl Report for ObjectReport {
             return format!("node {} {}{name}: {bytes} bytes {to} {file}", self.node, self.object);
         }
         let verb = if self.written { " written:" } else { " =" };
-        let cut =
-            (self.value.is_cut() && !self.written).then(|| "--output FILE writes all of them to a file".to_owned());
+        let cut = (self.value.is_cut() && !self.written).then(|| "-o FILE writes all of them into a file".to_owned());
         let note = self.note.as_ref().or(cut.as_ref()).map(|note| format!("\n  note    {note}")).unwrap_or_default();
         format!("node {} {}{name}{verb} {}{note}", self.node, self.object, self.value.text(paint))
     }

@@ -82,6 +82,48 @@ fn a_bus_that_is_not_there_and_a_log_that_cannot_be_written_are_failures_of_the_
 }
 
 #[test]
+fn an_error_behind_lines_of_a_log_says_that_they_are_not_all() {
+    let directory = scratch("partial");
+    let log = directory.join("bad.log");
+    std::fs::write(&log, "no frame\nnor this\n").unwrap();
+    let ended = ferrodrive(&["--json", "decode", log.to_str().unwrap()]);
+    assert_eq!(ended.status, Some(1));
+    let lines: Vec<Value> = ended.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let (last, before) = lines.split_last().unwrap();
+    assert_eq!(before.len(), 2, "{}", ended.out);
+    assert_eq!(
+        (&last["ok"], &last["partial"], &last["error"]["kind"]),
+        (&json!(false), &json!(true), &json!("no_log"))
+    );
+    // Where nothing was printed before it, nothing is partial.
+    let missing = ferrodrive(&["--json", "decode", "/no/such/a.log"]);
+    assert!(!missing.out.contains("partial"), "{}", missing.out);
+}
+
+#[test]
+fn a_run_that_fails_has_its_error_where_other_commands_have_it() {
+    const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/homing_stuck_switch.toml");
+    let directory = scratch("run_error");
+    let fails = directory.join("fails.toml");
+    let text = "title = 'fails'\nuntil = '100ms'\n[[machine.drive]]\nmodel = 'zlac8030l'\nnode = 4\n\
+                [[expect]]\nname = 'turns'\nwhen = '4 velocity > 50rpm'\nwithin = '50ms'\n";
+    std::fs::write(&fails, text).unwrap();
+    let fails = fails.to_str().unwrap();
+    let error = |words: &[&str], kind: &str| {
+        let ended = ferrodrive(&[&["--json", "run"], words].concat());
+        assert_eq!((ended.status, ended.out.lines().count()), (Some(1), 1), "{words:?}: {}{}", ended.out, ended.err);
+        let said = ended.json();
+        assert_eq!((&said["ok"], &said["error"]["kind"]), (&json!(false), &json!(kind)), "{words:?}: {said}");
+        assert!(said["error"]["next"].is_string() && said["error"]["message"].is_string(), "{said}");
+    };
+    error(&[fails], "scenario");
+    error(&[fails, SCENARIO], "scenario");
+    error(&[fails, "--seeds", "1..2"], "scenario");
+    error(&[SCENARIO, "/no/such/file.toml"], "bad_file");
+    assert_eq!(done(&["--json", "run", SCENARIO, SCENARIO]).json()["error"], Value::Null);
+}
+
+#[test]
 fn a_mode_is_a_number_with_its_name_beside_it() {
     let state = done(&["--json", "velocity", "4", "60rpm"]).json();
     assert_eq!((&state["mode"], &state["mode_name"]), (&json!(3), &json!("profile velocity")));

@@ -10,6 +10,7 @@ mod init;
 mod json;
 mod machine;
 mod on_sim;
+mod output;
 mod plan;
 mod run;
 mod status;

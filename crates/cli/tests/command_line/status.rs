@@ -128,10 +128,34 @@ fn an_input_file_that_is_missing_is_a_1() {
         "eds show /no/such/a.eds",
         "eds diff /no/such/a.eds zlac8030l",
         "dcf 4 --eds /no/such/a.eds",
+        "--model 4=/no/such/a.eds scan",
+        "sim --drive /no/such/a.eds@4",
+        "init --drive /no/such/a.eds@4",
+        "eds /no/such/a.eds",
+        "objects /no/such/a.eds",
         "write 4 6060 --from /no/such/a.bin",
     ] {
         failed(&line.split(' ').collect::<Vec<_>>(), 1);
     }
+}
+
+#[test]
+fn a_data_sheet_that_is_none_is_a_1_wherever_it_is_named() {
+    let directory = scratch("bad_sheet");
+    let sheet = directory.join("bad.eds");
+    std::fs::write(&sheet, "no data sheet\n").unwrap();
+    let (of_node, of_drive) = (format!("4={}", sheet.display()), format!("{}@4", sheet.display()));
+    for line in
+        [&["--model", &of_node, "state", "4"][..], &["sim", "--drive", &of_drive], &["init", "--drive", &of_drive]]
+    {
+        let error = failed(line, 1);
+        assert_eq!(error["kind"], "bad_file", "{line:?}: {error}");
+        assert!(error["message"].as_str().is_some_and(|text| text.contains("bad.eds")), "{error}");
+        let shown = ferrodrive(line);
+        assert!(shown.status == Some(1) && shown.err.contains("  next:    "), "{line:?}: {}", shown.err);
+    }
+    // Without a file in it the word itself makes no sense.
+    failed(&["--model", "4=zlac8030", "scan"], 2);
 }
 
 #[test]

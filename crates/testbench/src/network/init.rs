@@ -59,7 +59,7 @@ pub struct InitNode {
     pub node: u8,
     /// The model that the file has; `None` where the drive is commented out.
     pub model: Option<String>,
-    /// True if the model is said by the user or by the node's identity, and is no guess.
+    /// True if the model is said by the user or by the node's identity, and not guessed.
     pub certain: bool,
     /// The models that it may be by its identity and objects.
     pub models: Vec<String>,

@@ -17,7 +17,7 @@ use crate::output::{Format, Report};
 #[command(
     arg_required_else_help = true,
     args_conflicts_with_subcommands = true,
-    after_help = "Examples:\n  ferrodrive eds zlac8030l > zlac8030l.eds\n  ferrodrive eds zlac8030l defaults=eds --node 4\n  \
+    after_help = "Examples:\n  ferrodrive eds zlac8030l -o zlac8030l.eds\n  ferrodrive eds zlac8030l defaults=eds --node 4\n  \
                   ferrodrive eds lint vendor.eds\n  ferrodrive eds show vendor.eds 6040\n  \
                   ferrodrive eds diff vendor.eds zlac8030l"
 )]

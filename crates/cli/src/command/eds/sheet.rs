@@ -1,13 +1,17 @@
 //! `ferrodrive eds MODEL`: the data sheet of a model, written from its description.
 
+use std::path::PathBuf;
+
 use canopen::NodeId;
 use clap::ValueEnum;
 use devices::variant::Preset;
 use eds::{Flavour, Sheet, write};
 use serde::Serialize;
 
+use crate::command::dcf::{keep, new_file};
 use crate::failure::Failure;
 use crate::output::Report;
+use crate::plain::plain;
 use plot::Paint;
 use testbench::models::{Description, resolve};
 use testbench::words::drive::DriveSpec;
@@ -16,7 +20,7 @@ use testbench::words::node::node;
 /// Which model's, and what is special about it.
 #[derive(clap::Args)]
 pub(super) struct SheetArgs {
-    /// Model whose EDS is written to standard output, e.g. zlac8030l
+    /// Model, e.g. zlac8030l: write its EDS
     #[arg(value_parser = resolve)]
     model: Option<&'static Description>,
     /// Variations of the device, as in `sim --drive`: defaults=eds, firmware=2.01, 6060=3
@@ -28,6 +32,20 @@ pub(super) struct SheetArgs {
     /// Adapt the EDS to a program that needs more than the device has
     #[arg(long)]
     variant: Option<Variant>,
+    /// Write the file here, and its name on standard output; without it, and as -, the file goes there
+    #[arg(long, short, value_name = "FILE.eds", value_parser = eds_path)]
+    output: Option<PathBuf>,
+    /// Write over a file that is there
+    #[arg(long, requires = "output")]
+    force: bool,
+}
+
+fn eds_path(text: &str) -> Result<PathBuf, String> {
+    if text == "-" || text.to_ascii_lowercase().ends_with(".eds") {
+        Ok(text.into())
+    } else {
+        Err("expected FILE.eds, or - for standard output".into())
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -42,13 +60,19 @@ enum Variant {
 pub(super) struct SheetReport {
     model: &'static str,
     file_name: String,
-    eds: String,
+    /// Where the file is; absent if it is [`eds`](Self::eds).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
+    /// The file itself, if it was not written anywhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    eds: Option<String>,
 }
 
 impl SheetArgs {
     /// Writes it.
     pub(super) fn run(&self) -> Result<SheetReport, Failure> {
         let model = self.model.ok_or_else(|| Failure::usage("no model given"))?;
+        let output = new_file(self.output.as_deref(), self.force)?;
         // Which node it is does not matter to the choices.
         let mut spec = DriveSpec::new(model, self.node.unwrap_or(NodeId::MIN));
         for choice in &self.choices {
@@ -66,7 +90,17 @@ impl SheetArgs {
             flavour: self.variant.map_or(Flavour::Standard, |Variant::Ros2Canopen| Flavour::Ros2Canopen),
         };
         let eds = sheet.eds();
-        Ok(SheetReport { model: model.name, file_name: eds.file.file_name.clone(), eds: write(&eds) })
+        let mut report =
+            SheetReport { model: model.name, file_name: eds.file.file_name.clone(), file: None, eds: None };
+        let text = write(&eds);
+        match output {
+            Some(path) => {
+                keep(path, text.as_bytes(), self.force)?;
+                report.file = Some(path.display().to_string());
+            }
+            None => report.eds = Some(text),
+        }
+        Ok(report)
     }
 }
 
@@ -85,6 +119,9 @@ fn check(model: &Description, presets: &[Preset]) -> Result<(), Failure> {
 
 impl Report for SheetReport {
     fn text(&self, _: Paint) -> String {
-        self.eds.trim_end().to_owned()
+        match (&self.eds, &self.file) {
+            (Some(eds), _) => eds.trim_end().to_owned(),
+            (None, file) => format!("{}: the EDS of a {}", plain(file.as_deref().unwrap_or_default()), self.model),
+        }
     }
 }

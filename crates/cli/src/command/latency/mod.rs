@@ -3,8 +3,7 @@
 mod measure;
 mod spread;
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use canopen::NodeId;
@@ -12,7 +11,7 @@ use plot::{Colour, Figure, Panel, Poster, Style, Trace};
 use serde::Serialize;
 use testbench::words::node::node;
 
-use crate::command::plot::svg_path;
+use crate::command::plot::{svg_path, write_svg};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -68,6 +67,9 @@ pub(crate) struct LatencyReport {
     /// What was not measured, and why.
     notes: Vec<String>,
     svg: Option<PathBuf>,
+    /// The picture, if it goes to standard output.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    picture: Option<String>,
 }
 
 impl Latency {
@@ -86,14 +88,15 @@ impl Latency {
             producer: measured.producer,
             notes: measured.notes,
             svg: None,
+            picture: None,
         };
         if report.sdo.is_none() && report.pdo.is_none() && report.sync.is_none() {
             let failure = report.notes.iter().fold(Failure::new("nothing could be measured"), Failure::because);
             return Err(failure.next("ferrodrive scan shows the nodes on the bus"));
         }
         if let Some(path) = &self.svg {
-            draw(&report, path)?;
-            report.svg = Some(path.clone());
+            report.picture = write_svg(path, drawn(&report))?;
+            report.svg = report.picture.is_none().then(|| path.clone());
         }
         Ok(report)
     }
@@ -108,6 +111,9 @@ impl LatencyReport {
 
 impl Report for LatencyReport {
     fn text(&self, paint: Paint) -> String {
+        if let Some(picture) = &self.picture {
+            return picture.trim_end().to_owned();
+        }
         let mut table = Table::new(&["us", "count", "lost", "min", "median", "99 %", "99.9 %", "max"]);
         for (name, spread) in self.spreads() {
             let times = [spread.min_us, spread.median_us, spread.p99_us, spread.p999_us, spread.max_us];
@@ -135,7 +141,8 @@ fn bar(bin: &Bin, of: u64) -> String {
     format!("{:>8.0} .. {:>8.0}  {:>8} {}", bin.from_us, bin.to_us, bin.count, "#".repeat(length)).trim_end().to_owned()
 }
 
-fn draw(report: &LatencyReport, path: &Path) -> Result<(), Failure> {
+/// The picture.
+fn drawn(report: &LatencyReport) -> String {
     let figures = report.spreads().zip(Colour::ALL).map(|((name, spread), colour)| {
         let points = spread.histogram.iter().flat_map(|bin| {
             let count = bin.count as f64;
@@ -153,8 +160,5 @@ fn draw(report: &LatencyReport, path: &Path) -> Result<(), Failure> {
         }]
     });
     let title = report.node.map_or("SYNC".to_owned(), |node| format!("Node {node}: answers and SYNC"));
-    let poster = Poster { title, subtitle: report.notes.join("; "), rows: figures.collect() };
-    let file = crate::serve::files::create_picture(path, b"<svg");
-    let written = file.and_then(|mut file| file.write_all(poster.to_svg().as_bytes()));
-    written.map_err(|error| Failure::new(format!("cannot write the picture {}", path.display())).because(error))
+    Poster { title, subtitle: report.notes.join("; "), rows: figures.collect() }.to_svg()
 }

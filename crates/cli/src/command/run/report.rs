@@ -6,7 +6,7 @@ use master::units::Shown;
 use serde::Serialize;
 use testbench::scenario::{Outcome, OutcomeReport, Verdict};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureBody};
 use crate::output::Report;
 use plot::Paint;
 use plot::Table;
@@ -49,8 +49,19 @@ impl<'a> RunReport<'a> {
 
 impl Serialize for RunReport<'_> {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        OutcomeReport::serialize(&self.outcome.to_json(), serializer)
+        let error = self.failure().as_ref().map(FailureBody::from);
+        RunBody { outcome: self.outcome.to_json(), error }.serialize(serializer)
     }
+}
+
+/// What came of a run, for programs.
+#[derive(Serialize)]
+struct RunBody<'a> {
+    #[serde(flatten)]
+    outcome: OutcomeReport<'a>,
+    /// Why the command fails, if it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<FailureBody>,
 }
 
 impl Report for RunReport<'_> {

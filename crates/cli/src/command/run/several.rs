@@ -55,24 +55,23 @@ pub(super) fn run(
         },
     );
     progress.clear();
-    let report = SeveralReport { files, results: &results };
+    let mut report = SeveralReport { files, results: &results, error: None };
+    let failure = crew.signal().map(Failure::ended_by).or_else(|| report.failure());
+    report.error = failure.as_ref().map(FailureBody::from);
     if let Some(path) = junit_file {
         write(path, &report.junit())?;
     }
     format.print(&report).map_err(Failure::of_stdout)?;
-    match (crew.signal(), report.failure()) {
-        (Some(signal), _) => Err(Failure { reported: true, ..Failure::ended_by(signal) }),
-        // The report has it.
-        (None, Some(failure)) if format.json => Err(Failure { reported: true, ..failure }),
-        (None, Some(failure)) => Err(failure),
-        (None, None) => Ok(()),
-    }
+    // For programs it is part of the report; a signal needs no words.
+    failure.map_or(Ok(()), |failure| Err(Failure { reported: format.json || failure.status.is_signal(), ..failure }))
 }
 
 /// What came of each file, in the order of the command line.
 struct SeveralReport<'a> {
     files: &'a [PathBuf],
     results: &'a [Ended],
+    /// Why the command fails, if it does.
+    error: Option<FailureBody>,
 }
 
 /// What came of one file, for programs.
@@ -95,6 +94,8 @@ enum FileReport<'a> {
 #[derive(Serialize)]
 struct SeveralBody<'a> {
     ok: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<&'a FailureBody>,
     passed: usize,
     failed: usize,
     unusable: usize,
@@ -161,7 +162,8 @@ impl Serialize for SeveralReport<'_> {
         });
         let (passed, failed, unusable) = (self.passed(), self.failed(), self.unusable());
         let body = SeveralBody {
-            ok: passed == self.files.len(),
+            ok: self.error.is_none(),
+            error: self.error.as_ref(),
             passed,
             failed,
             unusable,

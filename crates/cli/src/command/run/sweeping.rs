@@ -4,12 +4,13 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use master::units::Shown;
+use serde::Serialize;
 use testbench::document::BadFile;
 use testbench::scenario::{Outcome, Scenario};
 use testbench::sweep::{Alike, OfValue, Summary, Sweep, SweepReport, Worst};
 
 use super::crew::Crew;
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureBody};
 use crate::output::{Format, Report};
 use crate::progress::Progress;
 use plot::Paint;
@@ -34,13 +35,28 @@ pub(super) fn sweep(
     })?;
     let crew = Crew::new(jobs);
     let summary = sum_up(&sweep, &crew, &Progress::new(format.json));
-    let report = SweepReport::new(file, &sweep, &summary);
-    format.print(&report).map_err(Failure::of_stdout)?;
-    match (crew.signal(), failure(&report)) {
-        (Some(signal), _) => Err(Failure { reported: true, ..Failure::ended_by(signal) }),
-        (None, Some(failure)) if format.json => Err(Failure { reported: true, ..failure }),
-        (None, Some(failure)) => Err(failure),
-        (None, None) => Ok(()),
+    let mut report = SweepReport::new(file, &sweep, &summary);
+    let failure = crew.signal().map(Failure::ended_by).or_else(|| failure(&report));
+    report.ok = failure.is_none();
+    let error = failure.as_ref().map(FailureBody::from);
+    format.print(&SweepBody { report, error }).map_err(Failure::of_stdout)?;
+    // For programs it is part of the report; a signal needs no words.
+    failure.map_or(Ok(()), |failure| Err(Failure { reported: format.json || failure.status.is_signal(), ..failure }))
+}
+
+/// What came of a sweep, for programs.
+#[derive(Serialize)]
+struct SweepBody {
+    #[serde(flatten)]
+    report: SweepReport,
+    /// Why the command fails, if it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<FailureBody>,
+}
+
+impl Report for SweepBody {
+    fn text(&self, paint: Paint) -> String {
+        text(&self.report, paint)
     }
 }
 
@@ -102,26 +118,24 @@ fn of_values(values: &[OfValue], paint: Paint) -> Option<String> {
     (!values.is_empty()).then(|| [table.text(paint, colour)].into_iter().chain(notes).collect::<Vec<_>>().join("\n"))
 }
 
-impl Report for SweepReport {
-    fn text(&self, paint: Paint) -> String {
-        let mut lines = vec![paint.strong(&self.title)];
-        lines.extend(of_values(&self.values, paint));
-        if !self.figures.is_empty() {
-            let mut table = Table::new(&["figure", "min", "median", "max", "lowest with", "highest with"]);
-            for it in &self.figures {
-                let values = [it.min, it.median, it.max].map(|value| Shown(value).to_string());
-                let row = [it.name.clone()].into_iter().chain(values);
-                table.row(row.chain([it.lowest.options(), it.highest.options()]));
-            }
-            lines.push(table.plain(paint));
+fn text(report: &SweepReport, paint: Paint) -> String {
+    let mut lines = vec![paint.strong(&report.title)];
+    lines.extend(of_values(&report.values, paint));
+    if !report.figures.is_empty() {
+        let mut table = Table::new(&["figure", "min", "median", "max", "lowest with", "highest with"]);
+        for it in &report.figures {
+            let values = [it.min, it.median, it.max].map(|value| Shown(value).to_string());
+            let row = [it.name.clone()].into_iter().chain(values);
+            table.row(row.chain([it.lowest.options(), it.highest.options()]));
         }
-        for Worst { failed, again } in &self.worst {
-            lines.push(format!("{} {}: {}", paint.bad("FAILED"), failed.asked, failed.seen.replace('\n', " ")));
-            lines.push(format!("  again: {again}"));
-        }
-        lines.extend(self.note.as_ref().map(|note| format!("note: {note}")));
-        let ended = if self.complete { "" } else { ", ended before the others" };
-        lines.push(format!("{} of {} runs passed, {} failed{ended}", self.passed, self.runs, self.failed));
-        lines.join("\n")
+        lines.push(table.plain(paint));
     }
+    for Worst { failed, again } in &report.worst {
+        lines.push(format!("{} {}: {}", paint.bad("FAILED"), failed.asked, failed.seen.replace('\n', " ")));
+        lines.push(format!("  again: {again}"));
+    }
+    lines.extend(report.note.as_ref().map(|note| format!("note: {note}")));
+    let ended = if report.complete { "" } else { ", ended before the others" };
+    lines.push(format!("{} of {} runs passed, {} failed{ended}", report.passed, report.runs, report.failed));
+    lines.join("\n")
 }
