@@ -1,6 +1,6 @@
 //! The world of a simulator that runs as another program, for a host that is asked about it: by its control connection.
 //!
-//! A thread of its own asks and waits. When the simulator has gone, it ends, and whoever asks is told that there is no world.
+//! A thread of its own asks and waits. When the simulator has gone, it ends, and requests are answered that there is no world.
 
 use serde_json::{Value, json};
 use studio::{Around, Changed, WorldDoor};

@@ -32,7 +32,7 @@ pub(crate) struct Convert {
 }
 
 /// Findings reported one by one; the rest are counted.
-const TOLD: u64 = 20;
+const SHOWN: u64 = 20;
 
 /// What was converted.
 #[derive(Debug, Default, Serialize)]
@@ -74,7 +74,7 @@ impl Convert {
                 }
                 Entry::Finding(finding) => {
                     report.passed_over += 1;
-                    if !quiet && report.passed_over <= TOLD {
+                    if !quiet && report.passed_over <= SHOWN {
                         // The reader may have gone.
                         let _ = writeln!(io::stderr(), "warning: {}", plain(&finding.to_string()));
                     }

@@ -27,7 +27,7 @@ use crate::signals::asked_to_end;
 use plot::Paint;
 use testbench::machine_file::Machine;
 
-/// Show the traffic of the bus decoded: SDO with object names, PDOs, statuswords in words
+/// Show the traffic of the bus decoded: SDO, PDOs, statuswords in words
 ///
 /// Only listens. On a real bus it runs until Ctrl-C; on a log until its end; on an embedded virtual bus it shows how
 /// the drives boot. PDOs are decoded by their mapping. The names of a model's own objects need the model: --model

@@ -90,7 +90,7 @@ pub(crate) struct Sim {
     /// Bit rate of the bus (default: the machine file's, or 500k)
     #[arg(long, value_name = "RATE")]
     bitrate: Option<Bitrate>,
-    /// Serve the bus at this address: socketcand://HOST:PORT or slcan://HOST:PORT; may be repeated
+    /// Serve the bus here: socketcand://HOST:PORT or slcan://HOST:PORT; may be repeated
     ///
     /// Port 0 takes a free one, which the `ready` line names.
     #[arg(long = "serve", value_name = "URL")]
@@ -134,7 +134,7 @@ pub(crate) struct Sim {
     /// client is connected it follows the clock.
     #[arg(long, value_name = "N|max", conflicts_with = "clock")]
     speed: Option<Speed>,
-    /// What advances time: the clock, or `run 20ms` and `run until 2.5s` on standard input (manual)
+    /// What advances time: the clock, or `run 20ms`, `run until 2.5s` on standard input (manual)
     ///
     /// With manual, time stands still between two runs: a frame of a client is taken at the present time of the bus,
     /// and goes out with the next run. Records and logs are then the same each time; a log counts from the start of the

@@ -62,20 +62,20 @@ pub(crate) fn create_new(path: &Path) -> io::Result<File> {
 /// An empty file to write a log to: a new one, or one that is empty or begins as a log of that format does. Any other
 /// file belongs to others, and is not changed.
 pub(crate) fn create_log(path: &Path, format: Format) -> io::Result<File> {
-    create_or_replace(path, format.written_begin().unwrap_or_default(), &format!("{format} log"))
+    create_or_replace(path, format.written_begin().unwrap_or_default(), &format!("a log of the format {format}"))
 }
 
 /// An empty file to write a record to: a new one, or one that is empty or a record already.
 pub(crate) fn create_record(path: &Path, kind: Kind) -> io::Result<File> {
     match kind {
-        Kind::Mcap => create_or_replace(path, b"\x89MCAP0\r\n", "MCAP file"),
-        Kind::Csv => create_or_replace(path, b"t_s,", "record"),
+        Kind::Mcap => create_or_replace(path, b"\x89MCAP0\r\n", "an MCAP file"),
+        Kind::Csv => create_or_replace(path, b"t_s,", "a record"),
     }
 }
 
 /// An empty file to write a picture to: a new one, or one that is empty or begins as our pictures of its kind do.
 pub(crate) fn create_picture(path: &Path, begin: &[u8]) -> io::Result<File> {
-    create_or_replace(path, begin, "picture of this program")
+    create_or_replace(path, begin, "a picture of this program")
 }
 
 /// An empty file: a new one, or one that is empty or begins with `begin`, as `what` does.
@@ -88,7 +88,7 @@ fn create_or_replace(path: &Path, begin: &[u8], what: &str) -> io::Result<File> 
     let mut first = Vec::new();
     (&mut file).take(begin.len() as u64).read_to_end(&mut first)?;
     if !first.is_empty() && first != begin {
-        let reason = format!("it exists and is not a {what}; remove it or choose another name");
+        let reason = format!("it exists and is not {what}; remove it or choose another name");
         return Err(io::Error::new(io::ErrorKind::AlreadyExists, reason));
     }
     file.set_len(0)?;
@@ -123,7 +123,9 @@ mod tests {
         drop(create_log(&log, Format::Candump).unwrap());
         assert_eq!(fs::read(&log).unwrap(), b"");
         fs::write(&letter, "Dear reader").unwrap();
-        assert!(create_log(&letter, Format::Candump).unwrap_err().to_string().contains("no candump log"));
+        assert!(
+            create_log(&letter, Format::Candump).unwrap_err().to_string().contains("not a log of the format candump")
+        );
         assert_eq!(fs::read(&letter).unwrap(), b"Dear reader");
         assert!(create_log(&place, Format::Candump).unwrap_err().to_string().contains("directory"));
         fs::remove_dir_all(place).unwrap();
@@ -141,7 +143,7 @@ mod tests {
             assert_eq!(fs::read(path).unwrap(), b"");
         }
         fs::write(&csv, "name,price\n").unwrap();
-        assert!(create_record(&csv, Kind::Csv).unwrap_err().to_string().contains("no record"));
+        assert!(create_record(&csv, Kind::Csv).unwrap_err().to_string().contains("not a record"));
         assert_eq!(fs::read(&csv).unwrap(), b"name,price\n");
         fs::remove_dir_all(place).unwrap();
     }

@@ -32,7 +32,7 @@ fn a_models_sheet_is_written_and_has_nothing_wrong_with_it() {
     let path = file(&folder, "zlim42c.eds", &sheet);
     let report = done(&["eds", "lint", "--json", &path]).json();
     assert_eq!(report["files"][0]["errors"], 0);
-    assert_eq!(done(&["eds", "diff", &path, "zlim42c"]).out, format!("{path} and zlim42c say the same\n"));
+    assert_eq!(done(&["eds", "diff", &path, "zlim42c"]).out, format!("{path} and zlim42c do not differ\n"));
 }
 
 #[test]

@@ -96,7 +96,7 @@ fn a_machine_file_that_is_cut_short_is_refused_with_its_line_before_the_bus() {
     let path = folder.join("machine.toml");
     std::fs::write(&path, "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n\n[[drive]]\nmodel = \"zlim")
         .expect("half a file");
-    // Nobody listens there: the bus is not what is complained of.
+    // No program listens there: the error is not about the bus.
     let ended = ferrodrive(&["--bus", "socketcand://127.0.0.1:1/can0", "boot", path.to_str().expect("UTF-8")]);
     assert_eq!(ended.status, Some(2), "{}", ended.err);
     assert!(ended.err.contains("machine.toml:6:") && !ended.err.contains("socketcand"), "{}", ended.err);

@@ -72,8 +72,8 @@ fn who_says_nothing_is_sent_away_in_time_and_a_crowd_of_them_keeps_nobody_out() 
     assert_eq!(late.ask(r#"{"request":"hello","token":"secret"}"#)["ok"], true);
     // The first ones made room, the others had their time; each gets the reason.
     for stranger in &mut silent {
-        let told = stranger.next().expect("a reason");
-        assert_eq!(told["error"]["kind"], "token", "{told}");
+        let reported = stranger.next().expect("a reason");
+        assert_eq!(reported["error"]["kind"], "token", "{reported}");
         assert_eq!(stranger.next(), None);
     }
     // Who has given it stays, for all that it is silent.

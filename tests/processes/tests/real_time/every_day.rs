@@ -144,10 +144,10 @@ fn what_is_on_a_bus_is_shown_as_it_comes() {
         }
         watching.join().unwrap()
     });
-    let told = lines(&watch);
-    assert!(!told.is_empty());
+    let reported = lines(&watch);
+    assert!(!reported.is_empty());
     assert_eq!(
-        (&told[0]["node"], &told[0]["code"], &told[0]["error_register"]),
+        (&reported[0]["node"], &reported[0]["code"], &reported[0]["error_register"]),
         (&json!(9), &json!(0x2310), &json!(2))
     );
 }

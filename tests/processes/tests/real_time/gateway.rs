@@ -33,7 +33,7 @@ impl Gateway {
     }
 
     /// The next line on its standard error that contains `part`.
-    fn told(&mut self, part: &str) -> String {
+    fn reported(&mut self, part: &str) -> String {
         loop {
             let mut line = String::new();
             assert_ne!(self.errors.read_line(&mut line).unwrap(), 0, "no {part:?} on standard error");
@@ -132,7 +132,7 @@ fn objects_of_all_three_drives_are_read_and_written() {
         ("[35] set heartbeat 500", "[35] ERROR: 102"),
         ("[36] w p 1 1 5", "[36] ERROR: 102"),
         ("[37] set tpdo 1 0x204 event 3 u32 u32 u8", "[37] ERROR: 401"),
-        // Nobody there: within the time that was set.
+        // No node there: within the time that was set.
         ("[40] set sdo_timeout 50", "[40] OK"),
         ("[41] 99 r 0x1000 0 u32", "[41] ERROR: 0x05040000"),
         ("[42] info version", "[42] 0 0 0 0 2 1.1"),
@@ -198,9 +198,9 @@ fn boot_ups_emergencies_and_pdos_are_told_to_every_client() {
     assert_eq!(one.hear("BOOT_UP"), "1 2 BOOT_UP");
     // "ZLIM42C stepper CANopen" and CiA 402: a Hall or encoder fault is an EMCY; the code is in 603Fh.
     simulator.send("4 fault hall on");
-    let told = one.hear("EMCY");
-    assert!(told.starts_with("1 4 EMCY ") && told.split(' ').count() == 10, "{told}");
-    assert_eq!(other.hear("EMCY"), told, "every client hears it, and no boot-up where it is switched off");
+    let reported = one.hear("EMCY");
+    assert!(reported.starts_with("1 4 EMCY ") && reported.split(' ').count() == 10, "{reported}");
+    assert_eq!(other.hear("EMCY"), reported, "every client hears it, and no boot-up where it is switched off");
     // A PDO that a client has set up: the gateway sends it, another hears it as data.
     assert_eq!(other.ask("[3] set rpdo 7 0x2FF event 2 u16 i32"), "[3] OK");
     let raw = ferrodrive(&["--bus", &simulator.bus("socketcand"), "replay", &pdo_log(), "--allow-motion"]);
@@ -264,12 +264,12 @@ fn a_client_that_goes_has_what_it_moved_stopped() {
     assert!(client.ask("[50] 4 r 0x606C 0 i32").starts_with("[50] "));
     assert!(speed_of(&simulator) > 50.0);
     drop(client);
-    let told = gateway.told("its client has gone");
-    assert!(told.contains("node 4") && told.contains("quick-stopped"), "{told}");
+    let reported = gateway.reported("its client has gone");
+    assert!(reported.contains("node 4") && reported.contains("quick-stopped"), "{reported}");
     wait_until("the drive stands", || speed_of(&simulator).abs() < 1.0);
 }
 
-/// The joint watches for the heartbeat of its host (M joint manual, 5.11.2), which a guard sends: whoever goes takes it from nobody else.
+/// The joint watches for the heartbeat of its host (M joint manual, 5.11.2), which a guard sends: a client that goes takes it from no other client.
 #[test]
 fn a_client_that_goes_leaves_the_drives_of_another_guarded() {
     let arguments = [&DRIVES[..], &["--serve", "socketcand://127.0.0.1:0", "--control", "127.0.0.1:0"]].concat();
@@ -285,7 +285,7 @@ fn a_client_that_goes_leaves_the_drives_of_another_guarded() {
     turn(&mut first);
     turn(&mut second);
     drop(first);
-    gateway.told("node 1: its client has gone; it has been quick-stopped");
+    gateway.reported("node 1: its client has gone; it has been quick-stopped");
     // A guard is given back after that, if it is.
     assert!(second.ask("[2] 1 r 0x1016 1 u32").starts_with("[2] "));
     turn(&mut second);
@@ -303,7 +303,7 @@ fn a_stop_gets_in_however_many_connections_are_idle() {
     wait_until("the drive stands", || speed_of(&simulator).abs() < 1.0);
     // Who has moved a drive does not make room for who has not.
     assert!(mover.ask("[50] 4 r 0x606C 0 i32").starts_with("[50] "));
-    gateway.told("has made room");
+    gateway.reported("has made room");
     drop(idle);
 }
 

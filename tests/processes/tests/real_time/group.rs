@@ -119,8 +119,8 @@ fn lines_of_twists_are_driven_one_after_the_other_and_bad_ones_are_told() {
 #[test]
 fn what_is_no_drive_of_a_base_is_refused() {
     let file = example("base.toml");
-    refused(&["drive-base"], 2, "no machine file with a [base] is given");
-    refused(&["drive-base", &example("two_axes.toml")], 2, "no machine file with a [base] is given");
+    refused(&["drive-base"], 2, "expected a machine file with a [base]");
+    refused(&["drive-base", &example("two_axes.toml")], 2, "expected a machine file with a [base]");
     refused(&["drive-base", &file, "--linear", "0.3"], 2, "--for");
     refused(&["drive-base", &file, "--linear", "nan", "--for", "1s"], 2, "expected a finite number");
     refused(&["drive-base", &file, "--for", "1s", "--dead-man", "1s"], 2, "cannot be used with");
@@ -217,6 +217,6 @@ fn a_base_stops_when_no_line_comes_and_drives_on_with_the_next() {
     assert_eq!(ended.status.code(), Some(0), "{out}{err}");
     let report: Value = serde_json::from_str(&out).unwrap();
     assert!(report["dead_man_stops"].as_u64().unwrap() >= 1, "{report}");
-    assert!(err.contains("no new twist came for 300 ms; the next line drives on"), "{err}");
+    assert!(err.contains("no new twist came for 300 ms; the next line continues"), "{err}");
     bench.wait(false);
 }

@@ -193,10 +193,10 @@ fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
         let ended = child.wait_with_output().unwrap();
         assert_eq!(ended.status.code(), Some(status), "{signal}: {}", String::from_utf8_lossy(&ended.stderr));
         // The program that moved it reports the loss; the owner's drive still answers.
-        let told = moving.wait_with_output().unwrap();
-        assert_eq!(told.status.code(), Some(1), "{}", String::from_utf8_lossy(&told.stderr));
-        let told = String::from_utf8(told.stderr).unwrap();
-        assert!(told.contains("node 4"), "{told}");
+        let ended = moving.wait_with_output().unwrap();
+        assert_eq!(ended.status.code(), Some(1), "{}", String::from_utf8_lossy(&ended.stderr));
+        let reported = String::from_utf8(ended.stderr).unwrap();
+        assert!(reported.contains("node 4"), "{reported}");
         done(&["--bus", &bus, "--timeout", "10s", "read", "5", "1000"]);
     }
 }

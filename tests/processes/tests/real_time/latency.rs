@@ -87,7 +87,7 @@ fn a_bus_with_a_motor_switched_on_is_sent_no_sync() {
 fn real_time_is_entered_or_refused_with_what_to_do() {
     let ended = ferrodrive(&["--realtime", "read", "4", "6064"]);
     assert_eq!(ended.status, Some(2));
-    assert!(ended.err.contains("--realtime means nothing on a virtual bus"), "{}", ended.err);
+    assert!(ended.err.contains("--realtime has no effect on a virtual bus"), "{}", ended.err);
     let drive = ["--realtime", "sim", "--drive", "zlac8030l@4"];
     let ended = ferrodrive(&[&drive[..], &["--speed", "10"]].concat());
     assert_eq!(ended.status, Some(2), "{}", ended.err);

@@ -82,7 +82,7 @@ fn limits_follow_what_is_written_to_the_objects_that_move_them() {
     let error = on_bus(&["velocity", "4", "800rpm"]).err;
     assert!(error.contains("acts up to 500, by 200Ah:00 max_motor_speed = 500"), "{error}");
     let written = on_bus(&["write", "4", "60FF", "800"]).out;
-    assert!(written.contains("the drive holds it to 500, by 200Ah:00 max_motor_speed = 500"), "{written}");
+    assert!(written.contains("the drive limits it to 500, by 200Ah:00 max_motor_speed = 500"), "{written}");
 
     // A new resolution acts from the next restart on (5.3), and so do the limits.
     let written = on_bus(&["write", "4", "202F:05", "10"]).out;

@@ -57,7 +57,11 @@ fn a_log_goes_through_every_form_and_comes_out_as_it_was() {
     assert!(trc.status == Some(2) && trc.err.contains("TRC file is only read"), "{}", trc.err);
     std::fs::write(path("letter.blf"), "Dear Sir").unwrap();
     let letter = ferrodrive(&["convert", &from, &path("letter.blf")]);
-    assert!(letter.status == Some(1) && letter.err.contains("it exists and is not a BLF log"), "{}", letter.err);
+    assert!(
+        letter.status == Some(1) && letter.err.contains("it exists and is not a log of the format BLF"),
+        "{}",
+        letter.err
+    );
 }
 
 #[test]
@@ -87,7 +91,7 @@ fn a_log_that_is_torn_is_told_and_read_as_far_as_it_goes() {
         let shown = ferrodrive(&["decode", torn.to_str().unwrap()]);
         assert!(shown.err.contains(what), "{extension}: {}{}", shown.out, shown.err);
         let none = directory.join(format!("none.{extension}"));
-        std::fs::write(&none, "this is no log\n").unwrap();
+        std::fs::write(&none, "this is not a log\n").unwrap();
         let shown = ferrodrive(&["decode", none.to_str().unwrap()]);
         assert_eq!(shown.status, Some(1), "{extension}: {}", shown.out);
         assert!(shown.err.contains("no frame"), "{extension}: {}", shown.err);

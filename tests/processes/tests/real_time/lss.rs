@@ -37,7 +37,7 @@ impl Bus {
 #[test]
 fn a_device_without_a_node_id_is_found_and_becomes_a_node() {
     let bus = Bus::of(&["cia402@4,node-id=none", "zlac8030l@5"]);
-    // Nobody is node 4: the device sends nothing and answers no SDO.
+    // No device is node 4: the device sends nothing and answers no SDO.
     assert_eq!(bus.refused(&["nmt", "4", "start", "--wait", "1s"]).status, Some(1));
     let found = &bus.done(&["lss", "--within", "1s", "scan"])["devices"];
     assert_eq!(found.as_array().map(Vec::len), Some(1), "{found}");
@@ -50,10 +50,10 @@ fn a_device_without_a_node_id_is_found_and_becomes_a_node() {
     let inquired = &bus.done(&["lss", "--within", "5s", "inquire", "only"])["devices"];
     assert_eq!((&inquired[0]["address"], &inquired[0]["node_id"]), (&json!(ADDRESS), &json!(9)));
     // It has a node-ID now, and the ZLAC8030L has no LSS.
-    let nobody = bus.refused(&["lss", "scan"]).out;
+    let absent = bus.refused(&["lss", "scan"]).out;
     assert!(
-        nobody.contains("no device without a node-ID") && nobody.contains("by their manuals zlac8030l"),
-        "{nobody}"
+        absent.contains("no device without a node-ID") && absent.contains("by their manuals zlac8030l"),
+        "{absent}"
     );
 }
 
@@ -99,24 +99,24 @@ fn a_device_is_found_by_its_make_and_a_listener_reads_it_in_words() {
     assert_eq!((found.as_array().map(Vec::len), &found[0]["node_id"]), (Some(1), &json!(4)), "{found}");
     assert_eq!(found[0]["address"], json!("0:192:10000:DEADBEEF"));
     assert_eq!(bus.done(&["read", "4", "1018:04"])["value"], json!(0xDEAD_BEEF_u32));
-    let nobody = bus.refused(&["lss", "identify", "0:193"]);
-    assert!(nobody.out.contains("a device of make 0:193 does not answer LSS"), "{}", nobody.out);
-    let told = ferrodrive(&bus.arguments(&["-v", "lss", "--within", "5s", "inquire", "only"])).err;
+    let absent = bus.refused(&["lss", "identify", "0:193"]);
+    assert!(absent.out.contains("a device 0:193 does not answer LSS"), "{}", absent.out);
+    let reported = ferrodrive(&bus.arguments(&["-v", "lss", "--within", "5s", "inquire", "only"])).err;
     for words in
         ["LSS switch state global: configuration", "LSS inquire serial number", "LSS reply: serial number DEADBEEFh"]
     {
-        assert!(told.contains(words), "{words}: {told}");
+        assert!(reported.contains(words), "{words}: {reported}");
     }
 }
 
 #[test]
 fn a_serial_number_is_one_of_a_device_that_has_it() {
-    for (drive, told) in
+    for (drive, reported) in
         [("cia402@4,1018:04=4294967296", "1018h:04 cannot be 4294967296"), ("zlac8030l@4,1018:04=7", "1018h:04")]
     {
         let refused = ferrodrive(&["sim", "--drive", drive]);
         assert_ne!(refused.status, Some(0), "{drive}");
-        assert!(refused.err.contains(told), "{}", refused.err);
+        assert!(refused.err.contains(reported), "{}", refused.err);
     }
 }
 

@@ -97,7 +97,7 @@ async fn a_joint_moves_and_tells_its_values_in_the_scales_of_the_manual() {
     // 1/2000 A, without a sign.
     let mut current = async || f64::from(read(&mut joint, CURRENT).await) / 2000.0;
     let (told_a, true_a) = (current().await, simulator.ask("2 get")["current_a"].as_f64().unwrap().abs());
-    assert!((told_a - true_a).abs() < 0.2 + 0.3 * true_a, "{told_a} A told, {true_a} A true");
+    assert!((told_a - true_a).abs() < 0.2 + 0.3 * true_a, "{told_a} A reported, {true_a} A true");
 
     // CANopen has the same object. (Of a drive that it does not know the command line shows the bits.)
     let over_can = done(&["--bus", &simulator.bus("socketcand"), "--json", "read", "2", "60FF"]).json();
@@ -116,8 +116,8 @@ async fn only_a_joint_with_power_answers_and_only_its_registers() {
     assert_eq!(joint.write_single_register(MODE, 2).await.unwrap(), Err(ExceptionCode::IllegalDataValue));
     // A ZLAC8030L has no RS485 here.
     for unit in [0, 1, 4] {
-        let mut nobody = client(&simulator, unit).await;
-        let answer = nobody.read_holding_registers(0, 1).await.unwrap();
+        let mut absent = client(&simulator, unit).await;
+        let answer = absent.read_holding_registers(0, 1).await.unwrap();
         assert_eq!(answer, Err(ExceptionCode::GatewayTargetDevice), "{unit}");
     }
     assert_eq!(simulator.ask("2 power off")["ok"], true);

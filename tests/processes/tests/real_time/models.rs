@@ -45,14 +45,14 @@ fn a_scan_says_that_it_cannot_tell_and_how_the_user_can() {
     let bench = bench();
     let found = bench.json(&["scan"]);
     let nodes = found["nodes"].as_array().unwrap();
-    let told: Vec<_> =
+    let stated: Vec<_> =
         nodes.iter().map(|node| (&node["node"], &node["model"], &node["guess"], &node["evidence"])).collect();
     let expected = [
         (&json!(1), &Value::Null, &Value::Null, &Value::Null),
         (&json!(2), &Value::Null, &json!("zlim42c"), &json!("2069h:00")),
         (&json!(4), &Value::Null, &json!("zlac8030l"), &json!("2029h:00")),
     ];
-    assert_eq!(told, expected);
+    assert_eq!(stated, expected);
     assert_eq!(nodes[1]["models"], json!(["zlac8030l", "zlim42c", "zlim42c-82"]));
     assert_eq!(nodes[2]["models"], nodes[1]["models"]);
     let text = bench.run(&["scan"]).out;
@@ -175,7 +175,7 @@ fn signed_values_are_signed_whether_the_model_is_said_or_not() {
 }
 
 /// A data sheet of the servo with another name for its bus voltage.
-const SHEET: &str = "[FileInfo]\nFileName=wheel.eds\n[DeviceInfo]\nVendorName=Somebody\nProductName=Wheel\n\
+const SHEET: &str = "[FileInfo]\nFileName=wheel.eds\n[DeviceInfo]\nVendorName=Anyone\nProductName=Wheel\n\
     VendorNumber=0x100\nProductNumber=1\nRevisionNumber=0\n\
     [MandatoryObjects]\nSupportedObjects=1\n1=0x1000\n\
     [OptionalObjects]\nSupportedObjects=2\n1=0x6040\n2=0x6041\n\
@@ -195,17 +195,17 @@ fn a_data_sheet_stands_for_a_model_wherever_one_is_asked_for() {
     assert_eq!((&listed["model"], listed["objects"].as_array().unwrap().len()), (&json!("wheel"), 4));
 
     let bench = bench();
-    let told = format!("4={sheet}");
-    let read = bench.json(&["--model", &told, "read", "4", "rail_voltage"]);
+    let stated = format!("4={sheet}");
+    let read = bench.json(&["--model", &stated, "read", "4", "rail_voltage"]);
     assert_eq!((&read["object"], &read["value"]), (&json!("2029h:00"), &json!(4800)));
-    let found = bench.json(&["--model", &told, "scan"]);
+    let found = bench.json(&["--model", &stated, "scan"]);
     let four = found["nodes"].as_array().unwrap().iter().find(|node| node["node"] == 4).cloned().unwrap();
     assert_eq!((&four["model"], &four["remark"]), (&json!("wheel"), &Value::Null));
     assert!(four["models"].as_array().unwrap().contains(&json!("wheel")), "{four}");
     // 1000h of the joint is another one.
     bench.refused(
         &["--model", &format!("1={sheet}"), "read", "1", "6041"],
-        &["Somebody Wheel", "device type (1000h) is 20192h"],
+        &["Anyone Wheel", "device type (1000h) is 20192h"],
     );
 
     std::fs::write(sheet, "no data sheet").unwrap();

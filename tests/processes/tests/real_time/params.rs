@@ -55,7 +55,7 @@ fn what_is_written_is_read_back_stored_and_there_after_a_start() {
     let file = folder.values("wheel.toml", "1017 = 200\n\"1800:02\" = 1\nprofile_acceleration = 150\n");
     let ended = done(&["params", "apply", "4", &file, "--save", "--prove"]);
     assert!(ended.out.contains("stored in the drive's memory"), "{}", ended.out);
-    assert!(ended.out.contains("after an NMT reset everything that is kept reads as written"), "{}", ended.out);
+    assert!(ended.out.contains("after an NMT reset all stored values read as written"), "{}", ended.out);
     // The manual has no S at 6083h (RW, not RW/S).
     assert!(ended.out.contains("6083h:00 profile_acceleration is not kept"), "{}", ended.out);
     // Nothing of it is there on another bus, so that verify fails and says what differs.
@@ -238,7 +238,7 @@ fn a_power_cycle_proves_what_was_stored() {
     let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     // A cut during the writes is reported as such, and is not a proof.
     assert!(
-        said.contains("after a power cycle everything that is kept reads as written") || !output.status.success(),
+        said.contains("after a power cycle all stored values read as written") || !output.status.success(),
         "{said}"
     );
     assert!(said.contains("power cycle") || said.contains("did not answer"), "{said}");
@@ -282,7 +282,7 @@ fn after_a_kill_between_two_writes_the_journal_leads_back() {
     // The answer to its last request is still on its way, and would be one to the wrong question.
     std::thread::sleep(Duration::from_secs(1));
     assert!(served.journal().exists(), "it was killed while it wrote");
-    // Nobody begins another one over it.
+    // No other one begins over it.
     let ended = run(&["params", "apply", "4", &wanted]);
     assert!(ended.status == Some(1) && ended.err.contains("params rollback 4"), "{}{}", ended.out, ended.err);
     let back = run(&["params", "rollback", "4"]);
@@ -340,7 +340,7 @@ fn what_a_pdo_cannot_carry_is_said_before_anything_is_written() {
         (&["rpdo1=0005,controlword"], "a zlac8030l has no object 0005h:00"),
         (&["tpdo1=statusword", "--inhibit", "100s"], "is not taken for the inhibit time"),
         (&["tpdo1=statusword", "--id", "0x601"], "another service"),
-        (&["tpdo1=statusword", "tpdo2=6064", "--id", "0x185"], "--id is of one PDO"),
+        (&["tpdo1=statusword", "tpdo2=6064", "--id", "0x185"], "--id takes one PDO"),
         (&["tpdo1"], "expected a PDO and its objects"),
         (&["pdo1=statusword"], "is not a PDO; expected tpdo1"),
         (&[], "which PDOs?"),

@@ -29,7 +29,7 @@ fn a_record_tells_how_a_drive_turned_and_what_was_done_to_it() {
         let mut simulator = simulator(&path, &[]);
         let bus = simulator.bus("socketcand");
         done(&["--bus", &bus, "--model", "4=zlac8030l", "move", "4", "360deg", "--profile-velocity", "60rpm"]);
-        let told = simulator.ask("4 get")["position"].as_f64().unwrap();
+        let reported = simulator.ask("4 get")["position"].as_f64().unwrap();
         let done_at = simulator.ask("4 load torque 0.5")["t"].as_f64().unwrap();
         assert_eq!(simulator.ask("quit")["ok"], true);
         assert_eq!(simulator.wait(), Some(0));
@@ -41,7 +41,10 @@ fn a_record_tells_how_a_drive_turned_and_what_was_done_to_it() {
         };
         // A turn has 4096 counts, and the drive measures within a count of where it is.
         let (_, position) = of("4.position_counts").iter().rev().find(|(at, _)| *at <= done_at).unwrap();
-        assert!((position - told).abs() <= 2.0 && (position - 4096.0).abs() < 8.0, "{name}: {position}, {told}");
+        assert!(
+            (position - reported).abs() <= 2.0 && (position - 4096.0).abs() < 8.0,
+            "{name}: {position}, {reported}"
+        );
         let fastest = of("4.velocity_rpm").iter().map(|(_, rpm)| *rpm).fold(0.0, f64::max);
         assert!((50.0..70.0).contains(&fastest), "{name}: {fastest} r/min");
         // A sample each millisecond, none missing, none twice.
@@ -175,7 +178,7 @@ fn a_scenario_that_is_recorded_is_the_same_run() {
         assert!(recorded.marks.iter().any(|mark| mark.text.contains("under-voltage")), "{name}: {:?}", recorded.marks);
     }
     let both = ferrodrive(&["run", scenario, "--seeds", "1..3", "--record", place.join("a.csv").to_str().unwrap()]);
-    assert!(both.status == Some(2) && both.err.contains("a sweep is many runs"), "{}", both.err);
+    assert!(both.status == Some(2) && both.err.contains("a sweep has many"), "{}", both.err);
 }
 
 #[test]
@@ -301,8 +304,8 @@ fn the_master_records_objects_by_sdo_and_by_the_pdos_that_carry_them() {
             let series = found.series.iter().find(|series| series.column.name() == name);
             series.unwrap_or_else(|| panic!("{name}")).points.iter().map(|(_, value)| *value).collect()
         };
-        let told = master(&["read", "4", "statusword", "--json"]).json();
-        assert_eq!(told["value"].as_f64(), of(&found, "4.statusword").last().copied(), "{name}: {told}");
+        let reported = master(&["read", "4", "statusword", "--json"]).json();
+        assert_eq!(reported["value"].as_f64(), of(&found, "4.statusword").last().copied(), "{name}: {reported}");
         assert_eq!(found.series.len(), 2, "{name}");
         // CiA 301, 7.5.2.36: PDO off, mapping off, entries, how many, PDO on.
         for (object, value) in [
@@ -316,7 +319,7 @@ fn the_master_records_objects_by_sdo_and_by_the_pdos_that_carry_them() {
             master(&["write", "4", object, value]);
         }
         master(&["nmt", "4", "start"]);
-        // Nobody drives the wheel: its load turns it, and the TPDO comes with each change.
+        // No host drives the wheel: its load turns it, and the TPDO comes with each change.
         assert_eq!(simulator.ask("4 load torque -1")["ok"], true);
         let by_pdo = report("2s");
         assert!(by_pdo["by_pdo"].as_u64() > Some(0) && by_pdo["missing"] == 0, "{name}: {by_pdo}");

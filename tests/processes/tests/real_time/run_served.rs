@@ -128,11 +128,11 @@ fn what_makes_no_sense_together_is_refused() {
     let (_folder, file) = scenario("served-refused", "end = '1s'\n");
     let file = file.to_str().unwrap();
     for (options, said) in [
-        (&["--serve", "socketcand://127.0.0.1:0", "--seeds", "1..3"][..], "a sweep is many runs"),
+        (&["--serve", "socketcand://127.0.0.1:0", "--seeds", "1..3"][..], "a sweep has many"),
         (&["--serve", "socketcand://127.0.0.1:0", "--clock", "manual"], "the time cannot be advanced"),
         (&["--speed", "10"], "--serve"),
         (&["--serve", "nowhere"], "nowhere"),
-        (&["--jobs", "2"], "--jobs is about many runs"),
+        (&["--jobs", "2"], "--jobs needs several runs"),
         (&[file, "--serve", "socketcand://127.0.0.1:0"], "takes one scenario, and there are 2"),
         (&[file, "--record", "a.csv"], "takes one scenario, and there are 2"),
     ] {

@@ -73,7 +73,7 @@ fn a_line_that_is_no_frame_is_told_with_its_number_and_passed_over() {
     assert!(shown.out.contains("CAN FD frame 604 with 4 bytes passed over"), "{}", shown.out);
     assert!(shown.err.contains("warning: line 3 passed over, '(1.15) can0 60'"), "{}", shown.err);
     assert!(
-        shown.err.contains("line 5") && shown.err.contains("3 frames read; 2 places were passed over"),
+        shown.err.contains("line 5") && shown.err.contains("3 frames read; 2 places were skipped"),
         "{}",
         shown.err
     );

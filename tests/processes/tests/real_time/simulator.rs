@@ -136,7 +136,7 @@ fn only_a_live_bus_given_on_the_command_line_is_joined() {
     let drive = ["sim", "--drive", "zlac8030l@4", "--bus"];
     let ended = ferrodrive(&[&drive[..], &["sim"]].concat());
     assert_eq!(ended.status, Some(2));
-    assert!(ended.err.contains("a live one only"), "{}", ended.err);
+    assert!(ended.err.contains("a live bus only"), "{}", ended.err);
     let ended = ferrodrive(&[&drive[..], &["socketcand://127.0.0.1:1/can0"]].concat());
     assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("cannot connect") && !ended.out.contains("ready"), "{}", ended.err);

@@ -27,7 +27,7 @@ impl Flood {
                 stream.set_write_timeout(Some(std::time::Duration::from_millis(50))).unwrap();
                 let burst = bytes.repeat(4096 / bytes.len());
                 let _ = stream.write_all(greeting.as_bytes());
-                // Nobody reads the answers: a flooder may be held up by that as well as by the bus.
+                // The answers are not read: a flooder may be held up by that as well as by the bus.
                 while !over.load(Ordering::Relaxed) {
                     let _ = stream.write(burst.as_bytes());
                 }
@@ -244,7 +244,7 @@ fn what_is_no_file_of_ours_is_refused_before_anything_is_written() {
         ("--state", "state", "a FIFO"),
         ("--state", "link", "a symbolic link"),
         ("--state", "letter", "not a directory"),
-        ("--log", "letter", "no candump log"),
+        ("--log", "letter", "not a log of the format candump"),
         ("--log", "pipe", "a FIFO"),
         ("--log", "state", "a directory"),
     ] {

@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn of_a_file_what_makes_no_sense_and_what_has_no_effect_is_counted_and_with_v_named() {
         let counted = said(false);
-        assert!(counted.contains("says that it is a drive (1000h), and has no 6040h"), "{counted}");
+        assert!(counted.contains("claims to be a drive (1000h), but has no 6040h"), "{counted}");
         assert!(counted.contains("1 of its 4 objects are stored and answered, and have no effect; -v"), "{counted}");
         assert!(
             counted.contains("1 of its PDOs cannot be mapped as delivered") && counted.contains("TPDO1 (object"),

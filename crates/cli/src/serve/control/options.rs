@@ -11,8 +11,7 @@ use crate::serve::world::ServedWorld;
 /// Where the world can be commanded from, and by whom.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct ControlOptions {
-    /// Control connection for other programs, to give world commands and receive events: HOST:PORT, or the path of a
-    /// Unix socket
+    /// Serve world commands and events to other programs: HOST:PORT, or the path of a Unix socket
     ///
     /// Lines of JSON, for `ferrodrive world`, `ferrodrive events` and programs; docs/control.md describes them. On an
     /// address that other machines can reach a token is required.

@@ -307,15 +307,15 @@ async fn closing_an_slcan_bus_closes_its_channel() {
     let adapter = async {
         let (mut stream, _) = listener.accept().await.unwrap();
         stream.write_all(b"\x07\r\rV1013\r").await.unwrap();
-        let mut told = vec![0; 10];
-        stream.read_exact(&mut told).await.unwrap();
+        let mut reported = vec![0; 10];
+        stream.read_exact(&mut reported).await.unwrap();
         stream.write_all(b"\r\r").await.unwrap();
-        stream.read_to_end(&mut told).await.unwrap();
-        String::from_utf8(told).unwrap()
+        stream.read_to_end(&mut reported).await.unwrap();
+        String::from_utf8(reported).unwrap()
     };
     let host = async { spec.open(&clock).await.unwrap().close().await.unwrap() };
-    let (told, ()) = soon(&clock, async { tokio::join!(adapter, host) }).await;
-    assert_eq!(told, "\r\rC\rV\rS5\rO\rF\rC\r");
+    let (reported, ()) = soon(&clock, async { tokio::join!(adapter, host) }).await;
+    assert_eq!(reported, "\r\rC\rV\rS5\rO\rF\rC\r");
 }
 
 /// The frames from another bus, and to it, for a test.
@@ -344,8 +344,8 @@ async fn a_bus_that_is_joined_is_a_client_until_it_ends() {
     let mut hub = hub(&clock).await;
     let (say, heard_there) = tokio::sync::mpsc::channel(1);
     let (sent, mut sent_there) = tokio::sync::mpsc::unbounded_channel();
-    let (told, mut notes) = tokio::sync::mpsc::unbounded_channel();
-    let ended = hub.join(Other { heard: heard_there, sent }, move |note| drop(told.send(note.clone())));
+    let (reported, mut notes) = tokio::sync::mpsc::unbounded_channel();
+    let ended = hub.join(Other { heard: heard_there, sent }, move |note| drop(reported.send(note.clone())));
     assert_eq!(hub.client_count(), 1);
     say.send(Ok(frame("604#40").into())).await.unwrap();
     let (client, from_there) = next_frame(&mut hub, &clock).await;

@@ -73,7 +73,7 @@ async fn what_is_not_there_at_the_start_is_an_error_at_once() {
 /// An adapter as far as hosts ask it: answers each line, and keeps those that are not frames. Ends when `frames` frames have come,
 /// or with the connection.
 async fn adapter<S: AsyncReadExt + AsyncWriteExt + Unpin>(line: &mut S, frames: usize) -> (String, Vec<String>) {
-    let (mut told, mut sent, mut command) = (String::new(), Vec::new(), Vec::new());
+    let (mut received, mut sent, mut command) = (String::new(), Vec::new(), Vec::new());
     while sent.len() < frames {
         let Ok(byte) = line.read_u8().await else { break };
         if byte != b'\r' {
@@ -89,13 +89,13 @@ async fn adapter<S: AsyncReadExt + AsyncWriteExt + Unpin>(line: &mut S, frames: 
         };
         match text.starts_with('t') {
             true => sent.push(text),
-            false => told.push_str(&format!("{text} ")),
+            false => received.push_str(&format!("{text} ")),
         }
         if line.write_all(answer.as_bytes()).await.is_err() {
             break;
         }
     }
-    (told, sent)
+    (received, sent)
 }
 
 #[tokio::test]
@@ -112,8 +112,8 @@ async fn the_bit_rate_is_selected_again_when_an_adapter_behind_tcp_is_back() {
         bus.send(&frame("601#01")).await.unwrap();
         bus
     };
-    let ((told, sent), mut bus) = soon(&clock, async { tokio::join!(first, host) }).await;
-    assert_eq!((told.as_str(), sent), ("  C V S5 O F ", vec!["t601101".to_owned()]));
+    let ((received, sent), mut bus) = soon(&clock, async { tokio::join!(first, host) }).await;
+    assert_eq!((received.as_str(), sent), ("  C V S5 O F ", vec!["t601101".to_owned()]));
     lost(&mut bus, &clock).await;
     let second = async {
         let (mut line, _) = listener.accept().await.unwrap();
@@ -123,8 +123,8 @@ async fn the_bit_rate_is_selected_again_when_an_adapter_behind_tcp_is_back() {
         assert_eq!(note(&mut bus, &clock).await, Note::ConnectionBack);
         bus.send(&frame("601#02")).await.unwrap();
     };
-    let ((told, sent), ()) = soon(&clock, async { tokio::join!(second, host) }).await;
-    assert_eq!((told.as_str(), sent), ("  C V S5 O F ", vec!["t601102".to_owned()]));
+    let ((received, sent), ()) = soon(&clock, async { tokio::join!(second, host) }).await;
+    assert_eq!((received.as_str(), sent), ("  C V S5 O F ", vec!["t601102".to_owned()]));
 }
 
 #[tokio::test]
@@ -159,8 +159,8 @@ async fn noise_costs_itself_and_is_told() {
     let place = format!("slcan://{}", listener.local_addr().unwrap());
     let peer = async {
         let (mut line, _) = listener.accept().await.unwrap();
-        let (told, _) = adapter(&mut line, 1).await;
-        assert_eq!(told, "  C V O F ");
+        let (received, _) = adapter(&mut line, 1).await;
+        assert_eq!(received, "  C V O F ");
         line.write_all(&vec![b'x'; 1_000_000]).await.unwrap();
         line.write_all(b"\rt18421\rt18420102\r").await.unwrap();
         line
@@ -245,9 +245,9 @@ mod on_a_tty {
     /// As [`adapter`], one that waits for its host: until the other end is open, reading a line fails.
     async fn patient_adapter(line: &mut SerialStream, clock: &WallClock) -> (String, Vec<String>) {
         loop {
-            let (told, sent) = adapter(line, 1).await;
-            if !told.is_empty() {
-                return (told, sent);
+            let (received, sent) = adapter(line, 1).await;
+            if !received.is_empty() {
+                return (received, sent);
             }
             clock.sleep(std::time::Duration::from_millis(5)).await;
         }
@@ -264,9 +264,9 @@ mod on_a_tty {
             bus.send(&frame("601#01")).await.unwrap();
             bus
         };
-        let ((told, sent), mut bus) =
+        let ((received, sent), mut bus) =
             soon(&clock, async { tokio::join!(patient_adapter(&mut line, &clock), host) }).await;
-        assert_eq!((told.as_str(), sent), ("  C V S6 O F ", vec!["t601101".to_owned()]));
+        assert_eq!((received.as_str(), sent), ("  C V S6 O F ", vec!["t601101".to_owned()]));
         // Unplugged: the device and its name go.
         drop(line);
         std::fs::remove_file(&link).unwrap();
@@ -279,8 +279,9 @@ mod on_a_tty {
             assert_eq!(note(&mut bus, &clock).await, Note::ConnectionBack);
             bus.send(&frame("601#03")).await.unwrap();
         };
-        let ((told, sent), ()) = soon(&clock, async { tokio::join!(patient_adapter(&mut line, &clock), host) }).await;
-        assert_eq!((told.as_str(), sent), ("  C V S6 O F ", vec!["t601103".to_owned()]));
+        let ((received, sent), ()) =
+            soon(&clock, async { tokio::join!(patient_adapter(&mut line, &clock), host) }).await;
+        assert_eq!((received.as_str(), sent), ("  C V S6 O F ", vec!["t601103".to_owned()]));
         line.write_all(b"t583101\r").await.unwrap();
         assert_eq!(heard(&mut bus, &clock).await, frame("583#01"));
         std::fs::remove_file(&link).unwrap();

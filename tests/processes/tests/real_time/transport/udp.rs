@@ -55,7 +55,7 @@ async fn a_plain_socket_that_speaks_cannelloni_is_understood() {
     peer.send_to(&[2, 0, 7, 0, 2, 0, 0, 1, 0x82, 0, 0, 0, 1, 0x83, 1, 5], at).await.unwrap();
     assert_eq!(heard(&mut bus, &clock).await, frame("182#"));
     assert_eq!(heard(&mut bus, &clock).await, frame("183#05"));
-    // Number 8 and 9 are missing; then a datagram that was overtaken, which is no loss.
+    // Number 8 and 9 are missing; then a datagram that was overtaken, which is not a loss.
     peer.send_to(&[2, 0, 10, 0, 0], at).await.unwrap();
     assert_eq!(note(&mut bus, &clock).await, Note::DatagramsLost { count: 2 });
     peer.send_to(&[2, 0, 9, 0, 1, 0, 0, 1, 0x84, 0], at).await.unwrap();
@@ -75,7 +75,7 @@ async fn a_cannelloni_peer_that_is_not_there_is_told_once_and_may_come() {
     let (mut bus, peer, at) = with_peer(&clock).await;
     let address = peer.local_addr().unwrap();
     drop(peer);
-    let told = soon(&clock, async {
+    let reported = soon(&clock, async {
         loop {
             // What the system says comes with a later call.
             bus.send(&frame("080#")).await.unwrap();
@@ -85,9 +85,9 @@ async fn a_cannelloni_peer_that_is_not_there_is_told_once_and_may_come() {
             }
         }
     });
-    let told = told.await;
+    let reported = reported.await;
     assert!(
-        matches!(&told, Received::Note(Note::ConnectionLost { reason }) if reason.contains("no program listens at 127.0.0.1:"))
+        matches!(&reported, Received::Note(Note::ConnectionLost { reason }) if reason.contains("no program listens at 127.0.0.1:"))
     );
     for _ in 0..5 {
         bus.send(&frame("080#")).await.unwrap();
