@@ -72,7 +72,7 @@ fn stepper(node: u8) -> (u8, Box<dyn VirtualDrive>) {
 
 fn not_enabled(count: u8) -> World {
     let mut world = World::new(Bitrate::M1, 1);
-    // Somebody who acknowledges: alone it would repeat its boot-up message for ever.
+    // A node that acknowledges: alone it would repeat its boot-up message for ever.
     world.add_probe();
     for (node, drive) in hub_servos(count) {
         world.add_drive(node, drive).expect("numbers differ");

@@ -1,4 +1,4 @@
-"""The drives under test: what differs between them for somebody who drives them, and their objects, from `tests/data`.
+"""The drives under test: what differs between them for a host, and their objects, from `tests/data`.
 
 A further drive is a further value here, in the tuples of those that it is like.
 """

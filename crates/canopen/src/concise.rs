@@ -237,7 +237,7 @@ mod tests {
         let bytes = stream(&[TYPE, NAME]);
         for length in 0..bytes.len() {
             match refusal(&bytes[..length]) {
-                ConciseError::NoCount { length: told } => assert!(told == length && length < 4),
+                ConciseError::NoCount { length: reported } => assert!(reported == length && length < 4),
                 ConciseError::Ends { entry, of: 2, at, left, .. } => {
                     assert_eq!((entry, at), if length < 12 { (1, 4) } else { (2, 12) });
                     assert_eq!(at + left, length);
@@ -253,8 +253,8 @@ mod tests {
     #[test]
     fn counts_and_sizes_that_nothing_could_have_are_refused_at_once() {
         let many = [0xFF; 4];
-        let told = ConciseError::Ends { entry: 1, of: u32::MAX, at: 4, mux: None, needed: 7, left: 0 };
-        assert_eq!(refusal(&many), told);
+        let reported = ConciseError::Ends { entry: 1, of: u32::MAX, at: 4, mux: None, needed: 7, left: 0 };
+        assert_eq!(refusal(&many), reported);
         let long = [1, 0, 0, 0, 0, 0x20, 0, 0xFF, 0xFF, 0xFF, 0xFF];
         let mux = Some(NAME.mux);
         let needed = u64::from(u32::MAX) + 7;

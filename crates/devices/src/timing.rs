@@ -1,6 +1,6 @@
 //! How long a device takes for what a bus does not show: to start, to answer, to store.
 //!
-//! The manuals that are here give none of these times, so that each is a guess with a reason, until somebody measures a real
+//! The manuals that are here give none of these times, so that each is a guess with a reason, until a measurement of a real
 //! device. A firmware has the rhythm of its own tasks besides; these are the times around it. A simulator of a device
 //! draws a time from each [`Span`] as often as the thing happens.
 

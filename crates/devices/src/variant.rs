@@ -2,7 +2,7 @@
 //! values, the motor that is wired to it.
 //!
 //! Each model lists its [`Variation`]s as const data; a [`Variant`] is what one drive picked of them, the first choice of each
-//! unless somebody said otherwise. A firmware asks its variant with a [`Pick`] that was looked up at compile time.
+//! unless otherwise chosen. A firmware asks its variant with a [`Pick`] that was looked up at compile time.
 
 use canopen::od::{Dictionary, Entry, Kind, Storage, Table, Value};
 use canopen::{AbortCode, Mux, NodeId};
@@ -101,7 +101,7 @@ impl Preset {
         Self { object: Mux::new(index, sub_index), value }
     }
 
-    /// Puts the value into a parameter store that `values` stand for: as if somebody had written and stored it.
+    /// Puts the value into a parameter store that `values` stand for: as if it had been written and stored.
     ///
     /// # Errors
     /// [`PresetError`]; the values are as before.

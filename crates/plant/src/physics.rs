@@ -1,4 +1,4 @@
-//! What a motor of any kind does at a moment, as somebody would see it who could look into it.
+//! What a motor of any kind does at a moment, as seen from inside it.
 //!
 //! In goes nothing: it is read from a motor's state and changes none of it. What a drive's sensors make of it is
 //! [`sense`](crate::HubMotor::sense).

@@ -76,7 +76,7 @@ fn block_on_until<F: Future>(world: &mut World, end: Instant, future: F) -> Resu
     }
 }
 
-/// Remembers that somebody called the waker.
+/// Remembers that the waker was called.
 struct Woken(AtomicBool);
 
 impl Wake for Woken {

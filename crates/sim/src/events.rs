@@ -117,7 +117,7 @@ pub enum EventKind {
     },
     /// The node's bus cable was cut (true), or joined.
     Cable(bool),
-    /// Somebody outside did something to the node, in the words of a world command.
+    /// A stimulus from outside, in the words of a world command.
     Stimulus {
         /// The command, without the node.
         words: Arc<str>,

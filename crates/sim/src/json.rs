@@ -24,7 +24,7 @@ pub fn to_string(value: &(impl Serialize + ?Sized)) -> serde_json::Result<String
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// One line of JSON that answers somebody. Answers are flags, numbers and texts: they always become JSON.
+/// One line of JSON that answers a request. Answers are flags, numbers and texts: they always become JSON.
 pub fn line(answer: &impl Serialize) -> String {
     to_string(answer).unwrap_or_else(|_| r#"{"ok":false,"error":{"kind":"failed","message":"an answer cannot be written","node":null,"object":null,"abort":null,"next":null}}"#.to_owned())
 }

@@ -4,7 +4,7 @@
 //! ([`wire`]), and moves time from event to event. The same seed and the same calls give the same
 //! frames at the same nanoseconds on every run; a clone of a world resumes with identical results.
 //! [`block_on`] runs a future against a world, [`command`] is the text protocol of `ferrodrive sim`,
-//! [`pace`] ties virtual time to a wall clock that somebody else reads.
+//! [`pace`] ties virtual time to a wall clock that the caller reads.
 //!
 //! ```
 //! use can::{Bitrate, Frame};

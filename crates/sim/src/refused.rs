@@ -1,4 +1,4 @@
-//! Why somebody at a machine is refused.
+//! Why a command to a machine is refused.
 
 use canopen::Mux;
 

@@ -40,9 +40,9 @@ impl WallClock {
     /// # Panics
     /// If the system has no thread left for the timer.
     pub fn start_in_real_time() -> Result<Self, RealTimeError> {
-        let (told, entered) = std::sync::mpsc::channel();
+        let (reported, entered) = std::sync::mpsc::channel();
         let face = Face::new();
-        let timer = Timer::start(face, since_epoch(), move || drop(told.send(realtime::enter())));
+        let timer = Timer::start(face, since_epoch(), move || drop(reported.send(realtime::enter())));
         // A thread that reports nothing has not entered anything.
         entered.recv().unwrap_or(Err(RealTimeError::NotHere))?;
         Ok(Self { face, timer })

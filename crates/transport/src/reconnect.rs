@@ -217,7 +217,7 @@ mod tests {
         let clock = WallClock::start();
         let mut bus = Reconnecting::<Scripted>::open(fate, &clock).await.unwrap();
         assert!(matches!(bus.recv().await, Err(BusError::Refused { .. })));
-        let nobody: Fate = Arc::default();
-        assert!(matches!(Reconnecting::<Scripted>::open(nobody, &clock).await, Err(BusError::Connect { .. })));
+        let absent: Fate = Arc::default();
+        assert!(matches!(Reconnecting::<Scripted>::open(absent, &clock).await, Err(BusError::Connect { .. })));
     }
 }

@@ -44,7 +44,7 @@ def registers(bench, unit=1):
     client = ModbusTcpClient("127.0.0.1", port=bench.simulator.port("modbus"), timeout=3)
     true(client.connect(), "pymodbus connects")
     try:
-        # "0: modbus forbid" (2600h) is the value as delivered. Nobody may be there to hear it.
+        # "0: modbus forbid" (2600h) is the value as delivered. There may be no listener.
         client.write_register(0, 1, device_id=unit)
         yield Registers(client, unit)
     finally:

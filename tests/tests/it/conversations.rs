@@ -37,7 +37,7 @@ fn every_conversation_goes_as_it_is_written() {
 fn a_line_that_differs_is_shown_with_its_neighbours_and_what_came_instead() {
     let text =
         "# Device type.\ndrive zlac8030l 4\n> 604#4000100000000000\n< 584#4300100092010200  another type\n# end\n";
-    let told = hold("wrong.can", text).expect_err("the drive says 00040192h");
+    let reported = hold("wrong.can", text).expect_err("the drive says 00040192h");
     let expected = [
         "wrong.can:4: heard 584#4300100092010400",
         "   2   drive zlac8030l 4",
@@ -45,18 +45,18 @@ fn a_line_that_differs_is_shown_with_its_neighbours_and_what_came_instead() {
         "   4 * < 584#4300100092010200  another type",
         "   5   # end",
     ];
-    assert_eq!(told.lines().collect::<Vec<_>>(), expected);
+    assert_eq!(reported.lines().collect::<Vec<_>>(), expected);
 }
 
 #[test]
 fn silence_and_surplus_are_differences_too() {
     let header = "drive zlac8030l 4\n";
-    let told = |lines: &str| hold("x.can", &format!("{header}{lines}")).expect_err("a difference");
-    assert!(told("< 704#00\n").starts_with("x.can:2: heard nothing"));
-    assert!(told("> 604#4000100000000000\n+ 5 ms\n+ 5 ms\n").starts_with("x.can:4: unexpected 584#"));
-    assert!(told("> 604#4000100000000000\n+ 5 ms\n").starts_with("x.can:3: unexpected 584#"));
-    assert!(told("> 604#4000100000000000\n< 584#43001000........  1..2\n").starts_with("x.can:3: heard 262546"));
-    assert!(told("hello\n").starts_with("x.can:2: "));
+    let reported = |lines: &str| hold("x.can", &format!("{header}{lines}")).expect_err("a difference");
+    assert!(reported("< 704#00\n").starts_with("x.can:2: heard nothing"));
+    assert!(reported("> 604#4000100000000000\n+ 5 ms\n+ 5 ms\n").starts_with("x.can:4: unexpected 584#"));
+    assert!(reported("> 604#4000100000000000\n+ 5 ms\n").starts_with("x.can:3: unexpected 584#"));
+    assert!(reported("> 604#4000100000000000\n< 584#43001000........  1..2\n").starts_with("x.can:3: heard 262546"));
+    assert!(reported("hello\n").starts_with("x.can:2: "));
 }
 
 /// Plays one file.

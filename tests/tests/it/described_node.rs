@@ -9,7 +9,7 @@ use sim::{StationId, World};
 
 /// Inputs and outputs of CiA 401, values of every length, TPDO1 by event and TPDO2 with SYNC. In Latin-1: the name has a letter
 /// beyond ASCII.
-const SHEET: &[u8] = b"[FileInfo]\nFileName=io.eds\n[DeviceInfo]\nVendorName=Nobody\nProductName=Inputs\n\
+const SHEET: &[u8] = b"[FileInfo]\nFileName=io.eds\n[DeviceInfo]\nVendorName=None\nProductName=Inputs\n\
 [1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\nDefaultValue=0x00030191\n\
 [1001]\nParameterName=Error register\nDataType=5\nAccessType=ro\n\
 [1003]\nParameterName=Errors\nObjectType=8\nSubNumber=3\n\

@@ -28,7 +28,7 @@ enum Step {
     },
     Found,
     /// There is no slave, or one went away.
-    Nobody,
+    Unanswered,
 }
 
 impl Default for FastScan {
@@ -52,11 +52,11 @@ impl FastScan {
             Step::Confirm { part } => {
                 Some(Request::FastScan { number: number(part), bit: 0, part, next: (part + 1) & 3 })
             }
-            Step::Found | Step::Nobody => None,
+            Step::Found | Step::Unanswered => None,
         }
     }
 
-    /// Whether somebody has said yes.
+    /// Whether a slave has answered.
     pub fn note(&mut self, identified: bool) {
         self.step = match self.step {
             Step::Anybody if identified => Step::Bit { part: 0, bit: HIGHEST_BIT },
@@ -69,7 +69,7 @@ impl FastScan {
             }
             Step::Confirm { part: 3 } if identified => Step::Found,
             Step::Confirm { part } if identified => Step::Bit { part: part + 1, bit: HIGHEST_BIT },
-            Step::Anybody | Step::Confirm { .. } | Step::Nobody => Step::Nobody,
+            Step::Anybody | Step::Confirm { .. } | Step::Unanswered => Step::Unanswered,
             Step::Found => Step::Found,
         };
     }

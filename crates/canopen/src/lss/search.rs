@@ -1,5 +1,5 @@
 //! The search for every device of one make, with a node-ID or without: ranges of revision and serial numbers are asked for, and halved
-//! where somebody answers (CiA 305, 6.5.1, LSS identify remote slave).
+//! where a slave answers (CiA 305, 6.5.1, LSS identify remote slave).
 
 use heapless::Vec;
 
@@ -88,7 +88,7 @@ impl Search {
         ))
     }
 
-    /// Whether somebody has said yes; the address of the device that is found by that, if one is.
+    /// Whether a slave has answered; the address of the device that is found by that, if one is.
     pub fn note(&mut self, identified: bool) -> Option<Address> {
         self.sent = 0;
         let asked = self.left.pop().filter(|_| identified)?;

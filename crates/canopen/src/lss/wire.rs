@@ -128,7 +128,7 @@ pub enum Reply {
     NodeId(u8),
     /// A slave fits. Of several that answer at once one frame is seen.
     Identified,
-    /// Somebody has no node-ID.
+    /// A slave has no node-ID.
     NonConfigured,
     /// Any other command specifier.
     Unknown(u8),
@@ -246,7 +246,7 @@ impl Request {
         }
     }
 
-    /// True if somebody may answer it.
+    /// True if a slave may answer it.
     pub const fn is_answered(&self) -> bool {
         match self {
             Self::SwitchGlobal(_) | Self::ActivateBitRate(_) => false,

@@ -144,7 +144,7 @@ pub struct Client {
     request: Option<[u8; LENGTH]>,
     /// What was asked for before, the newest first: a server that is slow answers to that still, and some answer twice.
     earlier: [Option<Mux>; REMEMBERED],
-    /// What somebody else asked for, as a reply that came meanwhile says.
+    /// What another client asked for, as a reply that came meanwhile shows.
     foreign: Option<Mux>,
 }
 

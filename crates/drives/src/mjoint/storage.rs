@@ -31,7 +31,7 @@ pub fn addressed(variant: &Variant, node_id: u8) -> Values {
 }
 
 /// What a save has to store: the identifiers of PDOs follow a new device address ("setting the device address via SDO
-/// sets this value as well"), unless somebody chose others.
+/// sets this value as well"), unless others were chosen.
 pub(super) fn contents(values: &Values, node_id: NodeId) -> Values {
     let mut contents = values.clone();
     let address = u8::try_from(values.get(DEVICE_ADDRESS)).ok().and_then(NodeId::new).unwrap_or(node_id);

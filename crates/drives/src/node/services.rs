@@ -154,7 +154,7 @@ impl<S: Storage> Services<S> {
         Written::Service
     }
 
-    /// Somebody who is watched has stayed away.
+    /// A monitored heartbeat producer is silent.
     fn misses_anybody(&self) -> bool {
         self.lost.contains(&true) || self.guarding.is_some_and(|guarding| guarding.is_lost())
     }

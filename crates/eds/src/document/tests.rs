@@ -57,7 +57,7 @@ fn latin_1_is_read_as_such() {
     assert_eq!((document.encoding(), document.value("a", "b")), (Encoding::Latin1, Some("gr\u{fc}\u{df}")));
 }
 
-/// A byte order mark is no part of the first line, whatever follows.
+/// A byte order mark is not a part of the first line, whatever follows.
 #[test]
 fn a_byte_order_mark_hides_no_section() {
     for (bytes, encoding, value) in [

@@ -31,7 +31,7 @@ impl Reader {
         }
     }
 
-    /// Sections about modules, and sections of somebody's own.
+    /// Sections about modules, and sections of a vendor's own.
     pub(super) fn keep(&mut self, section: Section<'_>) {
         let (what, taken) = if is_about_modules(section.name()) {
             (MODULES, "the device without modules; the section is kept as it is")

@@ -259,7 +259,7 @@ impl Reader {
         }
     }
 
-    /// The value of a DCF is what somebody wants, within the limits or not: the device will say what it thinks of it.
+    /// The value of a DCF is what the user wants, within the limits or not: the device accepts or refuses it.
     pub(super) fn check_value(&mut self, section: Section<'_>, at: Option<Entry<'_>>, variable: &Variable) {
         let Some(entry) = at else { return };
         if is_above(&variable.low, &variable.value) || is_above(&variable.value, &variable.high) {

@@ -1,4 +1,4 @@
-//! Files of real makers, where somebody has some: `FERRODRIVE_EDS_FILES` names the folder. The project has none of them.
+//! Files of real makers, where there are some: `FERRODRIVE_EDS_FILES` names the folder. The project has none of them.
 
 use std::fs;
 use std::path::PathBuf;

@@ -32,7 +32,7 @@ pub struct Link {
     pub first_rad: f64,
 }
 
-/// What never changes about an arm, or only when somebody changes it.
+/// What never changes about an arm, or only when the user changes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmModel {
     links: [Link; MOST],

@@ -23,7 +23,7 @@ use crate::shaft::{Motion, Push};
 /// Each wheel has three cases; more tries than all of them are for nothing.
 const MOST_TRIES: usize = 9;
 
-/// What never changes about the base, or only when somebody changes it.
+/// What never changes about the base, or only when the user changes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DifferentialDriveModel {
     /// Mass of all that moves, kg.

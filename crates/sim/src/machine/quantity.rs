@@ -2,7 +2,7 @@
 
 use crate::Refused;
 
-/// A quantity that somebody sets, and what makes sense for it.
+/// A quantity that a command sets, and what makes sense for it.
 pub struct Quantity {
     /// Its name.
     pub what: &'static str,

@@ -10,7 +10,7 @@ pub(super) enum Rest<F: Firmware> {
     Awake { look_at: Instant },
     /// They are, for a whole round, while nothing may change.
     Watching(Box<Watch<F>>),
-    /// They are not, until somebody disturbs the machine.
+    /// They are not, until the machine is disturbed.
     Resting(Resting<F>),
 }
 

@@ -23,7 +23,7 @@ const LOOK_AGAIN_NS: u64 = 20_000_000;
 const FORETOLD_NS: u64 = 100_000_000;
 
 impl<A: Assembly> Machine<A> {
-    /// Somebody acts on the machine: its control periods are computed again. After [`advance`](crate::VirtualDrive::advance).
+    /// A stimulus acts on the machine: its control periods are computed again. After [`advance`](crate::VirtualDrive::advance).
     #[inline]
     pub(super) fn disturb(&mut self) {
         if self.rest.is_resting() {

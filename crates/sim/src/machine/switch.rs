@@ -2,7 +2,7 @@ use devices::AxisId;
 
 use crate::SwitchRange;
 
-/// What the digital inputs of a drive are wired to: levels that somebody sets, low when nothing is connected, and
+/// What the digital inputs of a drive are wired to: levels that a command sets, low when nothing is connected, and
 /// switches beside the shaft.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inputs {

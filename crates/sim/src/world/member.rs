@@ -52,7 +52,7 @@ impl Member {
             Self::Drive { drive, .. } => &mut **drive,
             Self::Station(station) => &mut **station,
             Self::Probe(probe) => probe,
-            Self::Gone(nobody) => nobody,
+            Self::Gone(vacant) => vacant,
         }
     }
 }

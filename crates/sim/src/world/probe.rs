@@ -7,7 +7,7 @@ use can::{Frame, Instant, Station};
 /// Frames a probe holds for sending, and heard frames it keeps: as much as a busy bus brings in a second.
 const QUEUE: usize = 8192;
 
-/// A CAN adapter: queues between the bus and somebody outside.
+/// A CAN adapter: queues between the bus and a program outside.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Probe {
     outgoing: VecDeque<Frame>,

@@ -14,7 +14,7 @@ const OVERDUE_RETRY_NS: u64 = 1_000;
 impl World {
     /// Moves to the next event and does all that is due there: frames that end, deadlines, then arbitration.
     ///
-    /// False if nothing will ever happen any more unless somebody from outside acts.
+    /// False if nothing will ever happen any more unless a stimulus comes from outside.
     pub fn step(&mut self) -> bool {
         let Some(at) = self.next_event() else { return false };
         self.move_to(at);

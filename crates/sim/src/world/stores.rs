@@ -1,4 +1,4 @@
-//! Stores that somebody outside keeps: what a drive answers after a store waits until the store is kept.
+//! Stores that a program outside keeps: what a drive answers after a store waits until the store is kept.
 //!
 //! A drive's non-volatile memory lives in the world. A caller that brings it to a disk asks for that with
 //! [`World::guard_stores`]: from then on each new content is handed out once by [`World::poll_store`], and an SDO answer

@@ -183,12 +183,12 @@ fn who_is_asked_first_and_how_often_makes_no_difference() {
 #[test]
 fn a_free_base_rolls_down_a_slope_and_is_seen_in_what_is_got() {
     let (mut world, _) = base(BASE);
-    let told =
+    let reported =
         |world: &mut World, line: &str| -> Value { serde_json::from_str(&answer(world, line).unwrap().json).unwrap() };
-    assert_eq!(told(&mut world, "body base slope 10")["ok"], true);
+    assert_eq!(reported(&mut world, "body base slope 10")["ok"], true);
     world.run_for(Duration::from_millis(500));
-    let got = told(&mut world, "5 get");
-    let (body, by_name) = (&got["body"], told(&mut world, "body base get"));
+    let got = reported(&mut world, "5 get");
+    let (body, by_name) = (&got["body"], reported(&mut world, "body base get"));
     assert_eq!((body, &body["kind"]), (&by_name["body"], &Value::from("differential-drive")));
     // m g (sin 10 - 0.01 cos 10) less 0.1 N·m of dry friction at each wheel, over the mass and the wheels'.
     let angle = 10_f64.to_radians();
@@ -206,7 +206,7 @@ fn a_free_base_rolls_down_a_slope_and_is_seen_in_what_is_got() {
         ("body base fly", "expected: body NAME slope|grip|mass|payload VALUE"),
         ("4 load gear 2 1", "part of a coupled machine"),
     ] {
-        let answer = told(&mut world, line);
+        let answer = reported(&mut world, line);
         assert!(
             answer["ok"] == false && answer["error"]["message"].as_str().unwrap().contains(expected),
             "{line}: {answer}"

@@ -22,7 +22,7 @@ impl Bench {
         let bitrate = Bitrate::K500;
         let mut world = World::new(bitrate, seed);
         let adapter = world.add_probe();
-        // Somebody else acknowledges frames while the drive does not listen.
+        // Another node acknowledges frames while the drive does not listen.
         world.add_probe();
         world.set_timing(timing);
         let node = NodeId::new(NODE).unwrap();

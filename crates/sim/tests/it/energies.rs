@@ -27,8 +27,8 @@ fn world() -> World {
 }
 
 fn done(world: &mut World, line: &str) {
-    let told = answer(world, line).unwrap().json;
-    assert!(told.contains("\"ok\":true"), "{line}: {told}");
+    let reported = answer(world, line).unwrap().json;
+    assert!(reported.contains("\"ok\":true"), "{line}: {reported}");
 }
 
 /// Signals of one drive over time.

@@ -86,15 +86,15 @@ fn a_fault_is_told_with_its_remedy_and_its_emcy_and_its_end() {
     // "ZLAC8030L quick start guide V1.00", chapter 8: 0001h is over-voltage, and its supply is 24 to 48 V.
     apply(&mut world, "supply 80");
     world.run_for(Duration::from_millis(500));
-    let told = events(&mut world);
+    let reported = events(&mut world);
     let stimulus = EventKind::Stimulus { words: "supply 80".into(), by: Some("test".into()) };
-    assert_eq!(told[0].kind, stimulus);
-    let fault = told.iter().find(|event| matches!(event.kind, EventKind::Fault { code: 1, .. })).expect("a fault");
+    assert_eq!(reported[0].kind, stimulus);
+    let fault = reported.iter().find(|event| matches!(event.kind, EventKind::Fault { code: 1, .. })).expect("a fault");
     assert!(fault.remedy().is_some_and(|remedy| !remedy.is_empty()), "{fault:?}");
     assert!(fault.to_string().starts_with("node 4: fault 0001h, "), "{fault}");
-    let emcy = told.iter().find(|event| event.kind.name() == "emcy").expect("an EMCY message");
+    let emcy = reported.iter().find(|event| event.kind.name() == "emcy").expect("an EMCY message");
     assert_eq!((emcy.remedy(), emcy.place), (fault.remedy(), fault.place));
-    assert!(told.iter().any(|event| matches!(event.kind, EventKind::State { to: PowerState::Fault, .. })));
+    assert!(reported.iter().any(|event| matches!(event.kind, EventKind::State { to: PowerState::Fault, .. })));
     apply(&mut world, "supply 48");
     world.run_for(Duration::from_secs(1));
     send(&mut world, probe, &["604#2B40600080000000"]);
@@ -111,15 +111,15 @@ fn arriving_storing_and_dying_are_told() {
     send(&mut world, probe, &["604#23FF60003C000000"]);
     events(&mut world);
     world.run_for(Duration::from_secs(2));
-    let told = events(&mut world);
+    let reported = events(&mut world);
     // Held by a controller the speed leaves the window now and then; each return is an arrival.
-    assert!(told.iter().any(|event| event.kind == EventKind::TargetReached), "{told:?}");
+    assert!(reported.iter().any(|event| event.kind == EventKind::TargetReached), "{reported:?}");
     send(&mut world, probe, &["604#2B002000BC020000"]);
     world.run_for(Duration::from_millis(500));
-    let told = kinds(&mut world);
-    let begun = told.iter().position(|kind| *kind == EventKind::StoreBegun);
-    let done = told.iter().position(|kind| matches!(kind, EventKind::StoreDone { .. }));
-    assert!(done.is_some() && begun.is_none_or(|begun| Some(begun) < done), "{told:?}");
+    let reported = kinds(&mut world);
+    let begun = reported.iter().position(|kind| *kind == EventKind::StoreBegun);
+    let done = reported.iter().position(|kind| matches!(kind, EventKind::StoreDone { .. }));
+    assert!(done.is_some() && begun.is_none_or(|begun| Some(begun) < done), "{reported:?}");
     world.cut_power(4).unwrap();
     assert_eq!(kinds(&mut world), [EventKind::Power(PowerPhase::Off)]);
 }
@@ -130,8 +130,8 @@ fn a_drive_alone_on_its_bus_becomes_error_passive_and_attempts_are_told_ever_mor
     world.watch(true);
     world.add_drive(4, Box::new(zlac8030l(4, 1))).unwrap();
     world.run_for(Duration::from_secs(1));
-    let told = kinds(&mut world);
-    let attempts: Vec<u64> = told
+    let reported = kinds(&mut world);
+    let attempts: Vec<u64> = reported
         .iter()
         .filter_map(|kind| match kind {
             EventKind::BusError { cause: ErrorCause::NotAcknowledged, attempt, .. } => Some(*attempt),
@@ -141,7 +141,7 @@ fn a_drive_alone_on_its_bus_becomes_error_passive_and_attempts_are_told_ever_mor
     assert!(attempts.len() > 10 && attempts.iter().enumerate().all(|(n, attempt)| *attempt == 1 << n), "{attempts:?}");
     // Fault confinement, rule 3 and its exception 1: 8 for each attempt, 16 attempts make 128, which is passive; alone a
     // node never goes bus-off.
-    let states: Vec<_> = told.iter().filter(|kind| matches!(kind, EventKind::BusState { .. })).collect();
+    let states: Vec<_> = reported.iter().filter(|kind| matches!(kind, EventKind::BusState { .. })).collect();
     let passive = EventKind::BusState { from: ErrorState::ErrorActive, to: ErrorState::ErrorPassive };
     assert_eq!(states, [&passive]);
 }
@@ -156,14 +156,14 @@ fn bus_off_and_the_way_back_are_told() {
     apply(&mut world, "power cut");
     apply(&mut world, "power on");
     world.run_for(Duration::from_millis(100));
-    let told = kinds(&mut world);
-    let to = |state| told.iter().position(|kind| matches!(kind, EventKind::BusState { to, .. } if *to == state));
-    assert!(to(ErrorState::ErrorPassive) < to(ErrorState::BusOff) && to(ErrorState::BusOff).is_some(), "{told:?}");
+    let reported = kinds(&mut world);
+    let to = |state| reported.iter().position(|kind| matches!(kind, EventKind::BusState { to, .. } if *to == state));
+    assert!(to(ErrorState::ErrorPassive) < to(ErrorState::BusOff) && to(ErrorState::BusOff).is_some(), "{reported:?}");
     apply(&mut world, "bus corrupt 0");
     world.run_for(Duration::from_secs(2));
-    let told = kinds(&mut world);
+    let reported = kinds(&mut world);
     let back = EventKind::BusState { from: ErrorState::BusOff, to: ErrorState::ErrorActive };
-    assert!(told.contains(&back), "{told:?}");
+    assert!(reported.contains(&back), "{reported:?}");
 }
 
 #[test]
@@ -194,8 +194,8 @@ fn what_is_not_pulled_is_bounded_and_counted() {
     for _ in 0..MAX_WAITING + 5 {
         world.tell(None, EventKind::Behind(Duration::from_millis(100)));
     }
-    let told = kinds(&mut world);
-    assert_eq!((told.len(), &told[0]), (MAX_WAITING + 1, &EventKind::Missed(5)));
+    let reported = kinds(&mut world);
+    assert_eq!((reported.len(), &reported[0]), (MAX_WAITING + 1, &EventKind::Missed(5)));
     world.watch(false);
     world.tell(None, EventKind::Boot);
     assert_eq!(world.poll_event(), None);
@@ -229,8 +229,9 @@ fn a_bleeder_that_burns_out_is_told_shown_as_damage_and_mended() {
     world.run_for(Duration::from_secs_f64(0.1 * expected_s));
     let burnt = damage(&mut world).expect("the bleeder is burnt");
     assert!(burnt.contains("bleeder") && burnt.contains("'fault bleeder off'"), "{burnt}");
-    let told: Vec<_> = events(&mut world).into_iter().filter(|event| event.kind == EventKind::Damage(burnt)).collect();
-    assert!(told.len() == 1 && told[0].place == Some(Place::node(4)), "{told:?}");
+    let reported: Vec<_> =
+        events(&mut world).into_iter().filter(|event| event.kind == EventKind::Damage(burnt)).collect();
+    assert!(reported.len() == 1 && reported[0].place == Some(Place::node(4)), "{reported:?}");
     apply(&mut world, "supply 48");
     apply(&mut world, "fault bleeder off");
     assert_eq!(damage(&mut world), None);

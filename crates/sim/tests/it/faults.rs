@@ -200,7 +200,7 @@ fn a_bad_contact_drives_its_own_node_off_the_bus_and_mended_it_comes_back() {
 fn faults_of_the_bus_are_world_commands_too() {
     let mut world = World::new(Bitrate::K500, 1);
     let id = world.add_drive(4, Box::new(sim::machine::zlac8030l(4, 1))).unwrap();
-    world.add_probe(); // somebody has to acknowledge
+    world.add_probe(); // a node has to acknowledge
     let mut say = |line: &str| {
         let answer = sim::command::answer(&mut world, line).unwrap().json;
         assert!(answer.starts_with("{\"ok\":true"), "{line}: {answer}");

@@ -23,19 +23,19 @@ fn world() -> World {
     world
 }
 
-fn told(world: &mut World, line: &str) -> Value {
+fn reported(world: &mut World, line: &str) -> Value {
     serde_json::from_str(&answer(world, line).unwrap().json).unwrap()
 }
 
 fn done(world: &mut World, line: &str) -> Option<String> {
-    let answer = told(world, line);
+    let answer = reported(world, line);
     assert_eq!(answer["ok"], true, "{line}: {answer}");
     answer["note"].as_str().map(str::to_owned)
 }
 
 fn refused(world: &mut World, line: &str) -> String {
     let before = world.digest();
-    let answer = told(world, line);
+    let answer = reported(world, line);
     assert_eq!((&answer["ok"], world.digest()), (&Value::Bool(false), before), "{line}: {answer}");
     answer["error"]["message"].as_str().unwrap().to_owned()
 }

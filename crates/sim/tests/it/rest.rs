@@ -70,7 +70,7 @@ impl Run {
     }
 }
 
-/// What somebody does to the drives.
+/// What happens to the drives.
 #[derive(Clone, Debug)]
 enum Act {
     Wait(u64),

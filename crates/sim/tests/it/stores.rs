@@ -1,4 +1,4 @@
-//! Guarded stores: what a drive answers after a store waits until somebody has kept it, and nothing else waits.
+//! Guarded stores: what a drive answers after a store waits until it has been kept, and nothing else waits.
 
 use std::time::Duration;
 

@@ -71,7 +71,7 @@ pub(super) struct BlfReader<R> {
     used: usize,
     /// Bytes that came out of containers before those in `plain`.
     before: u64,
-    told: BTreeSet<u32>,
+    reported: BTreeSet<u32>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,8 +84,8 @@ enum Stage {
 impl<R: Read> BlfReader<R> {
     pub(super) fn new(input: R) -> Self {
         let source = Source::new(input);
-        let (plain, told) = (Vec::new(), BTreeSet::new());
-        Self { source, begin: Instant::ZERO, stage: Stage::Head, plain, used: 0, before: 0, told }
+        let (plain, reported) = (Vec::new(), BTreeSet::new());
+        Self { source, begin: Instant::ZERO, stage: Stage::Head, plain, used: 0, before: 0, reported }
     }
 
     pub(super) fn next_entry(&mut self) -> io::Result<Option<Entry>> {
@@ -224,7 +224,11 @@ impl<R: Read> BlfReader<R> {
             let kind = u32_at(object, 12);
             let result = match read {
                 Ok(Some(record)) => Some(Entry::Record(record)),
-                Ok(None) if KNOWN_OTHERS.contains(&kind) || self.told.len() >= MAX_TOLD || !self.told.insert(kind) => {
+                Ok(None)
+                    if KNOWN_OTHERS.contains(&kind)
+                        || self.reported.len() >= MAX_TOLD
+                        || !self.reported.insert(kind) =>
+                {
                     None
                 }
                 Ok(None) => Some(Entry::Finding(self.found_inside(format!("objects of type {kind} are not read")))),

@@ -1,4 +1,4 @@
-//! Lines of a text that somebody else wrote, of bounded length.
+//! Lines of a text that another program wrote, of bounded length.
 
 use std::io::{self, BufRead, Read};
 

@@ -9,7 +9,7 @@ use crate::BusSpec;
 #[derive(Clone, Debug)]
 pub struct BusNotes {
     bus: String,
-    told: BTreeSet<&'static str>,
+    reported: BTreeSet<&'static str>,
     lost: Option<String>,
     troubles: Vec<String>,
 }
@@ -17,7 +17,7 @@ pub struct BusNotes {
 impl BusNotes {
     /// Nothing has been reported yet of `bus`.
     pub fn of(bus: &BusSpec) -> Self {
-        Self { bus: bus.to_string(), told: BTreeSet::new(), lost: None, troubles: Vec::new() }
+        Self { bus: bus.to_string(), reported: BTreeSet::new(), lost: None, troubles: Vec::new() }
     }
 
     /// The line to show for `note`: what happened and what to do about it, if that is new.
@@ -27,7 +27,7 @@ impl BusNotes {
             let is_lost = matches!(note, Note::ConnectionLost { .. });
             self.lost = is_lost.then(|| note.to_string());
         }
-        if !self.told.insert(note.kind()) && !comes_and_goes {
+        if !self.reported.insert(note.kind()) && !comes_and_goes {
             return None;
         }
         // An advice names the interface of which most have only one.

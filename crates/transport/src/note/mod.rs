@@ -3,9 +3,9 @@
 //! A [`Note`] is never an error of [`crate::AsyncBus`]: the bus goes on, or comes back. The caller that runs a bus hands notes to
 //! its listener ([`crate::run_station`]). Terms are those of ISO 11898-1.
 
+mod bus_notes;
 mod error_frame;
 mod suspicion;
-mod told;
 
 use std::fmt;
 
@@ -13,9 +13,9 @@ use can::{CanId, Frame};
 
 use crate::log::Finding;
 
+pub use bus_notes::BusNotes;
 pub use error_frame::{ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds};
 pub(crate) use suspicion::Suspicions;
-pub use told::BusNotes;
 
 /// What comes from a bus: mostly frames.
 #[derive(Clone, Debug, PartialEq, Eq)]

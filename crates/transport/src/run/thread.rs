@@ -48,10 +48,10 @@ impl fmt::Debug for BusThread {
 impl BusThread {
     /// Starts the thread and opens the bus there. The clock is that of the bus.
     pub async fn open(spec: BusSpec) -> Result<(Self, WallClock), BusThreadError> {
-        let (told, opened) = oneshot::channel();
+        let (reported, opened) = oneshot::channel();
         let (work, given) = oneshot::channel();
         let thread = thread::Builder::new().name("ferrodrive bus".into());
-        thread.spawn(move || serve(&spec, told, given)).map_err(BusThreadError::Thread)?;
+        thread.spawn(move || serve(&spec, reported, given)).map_err(BusThreadError::Thread)?;
         match opened.await {
             Ok(clock) => Ok((Self { work }, clock?)),
             Err(_) => Err(BusThreadError::Thread(std::io::Error::other("it has ended"))),
@@ -72,11 +72,11 @@ impl BusThread {
         U: Future,
     {
         let (over, is_over) = oneshot::channel::<()>();
-        let (told, mut notes) = mpsc::channel(NOTES_WAITING);
+        let (reported, mut notes) = mpsc::channel(NOTES_WAITING);
         let (ended, mut end) = oneshot::channel();
         let work: Work = Box::new(move |mut bus, clock| {
             Box::pin(async move {
-                let tell = |at, note: &Note| drop(told.try_send((at, note.clone())));
+                let tell = |at, note: &Note| drop(reported.try_send((at, note.clone())));
                 let run = run_station(&mut bus, &mut station, &clock, &wakeup, is_over, tell);
                 let _ = ended.send(run.await.map(drop));
             })
@@ -104,22 +104,22 @@ impl BusThread {
     }
 }
 
-fn serve(spec: &BusSpec, told: oneshot::Sender<Result<WallClock, BusThreadError>>, given: oneshot::Receiver<Work>) {
+fn serve(spec: &BusSpec, reported: oneshot::Sender<Result<WallClock, BusThreadError>>, given: oneshot::Receiver<Work>) {
     let entered = realtime::enter().and_then(|()| WallClock::start_in_real_time());
     let clock = match entered {
         Ok(clock) => clock,
-        Err(error) => return drop(told.send(Err(BusThreadError::RealTime(error)))),
+        Err(error) => return drop(reported.send(Err(BusThreadError::RealTime(error)))),
     };
     let runtime = match tokio::runtime::Builder::new_current_thread().enable_all().build() {
         Ok(runtime) => runtime,
-        Err(error) => return drop(told.send(Err(BusThreadError::Thread(error)))),
+        Err(error) => return drop(reported.send(Err(BusThreadError::Thread(error)))),
     };
     runtime.block_on(async {
         let bus = match spec.open(&clock).await {
             Ok(bus) => bus,
-            Err(error) => return drop(told.send(Err(BusThreadError::Bus(error)))),
+            Err(error) => return drop(reported.send(Err(BusThreadError::Bus(error)))),
         };
-        if told.send(Ok(clock.clone())).is_err() {
+        if reported.send(Ok(clock.clone())).is_err() {
             return;
         }
         if let Ok(work) = given.await {

@@ -13,7 +13,7 @@ use crate::{ClientId, ErrorFrame, Hub, HubEvent, LeaveReason, WallClock};
 /// moved to now at once.
 const LONGEST_STEP: Duration = Duration::from_millis(20);
 
-/// A world of stations on a simulated wire whose time somebody else moves. Its time is that of the [`WallClock`], unless it
+/// A world of stations on a simulated wire whose time the caller moves. Its time is that of the [`WallClock`], unless it
 /// has a pace of its own.
 pub trait RealTimeWorld {
     /// How far the world has come.
@@ -40,7 +40,7 @@ pub trait RealTimeWorld {
     fn next_deadline(&self) -> Option<Instant>;
 
     /// Moves the world to `instant`, which is never earlier than `now`, serving everything due on the way at its own time. A world
-    /// that has to wait for somebody outside may stop before.
+    /// that has to wait for a program outside may stop before.
     fn advance_to(&mut self, instant: Instant);
 
     /// A client offers `frame` at the world's now: it takes part in arbitration from here on. At most 64 frames of one

@@ -253,12 +253,12 @@ mod tests {
 
     /// Answers one line after the other on the adapter's end of a serial line; what it was sent.
     async fn adapter(mut line: SerialStream, answers: &[&str]) -> String {
-        let mut told = Vec::new();
+        let mut received = Vec::new();
         for answer in answers {
-            while line.read_u8().await.map(|byte| told.push(byte)).is_ok() && told.last() != Some(&b'\r') {}
+            while line.read_u8().await.map(|byte| received.push(byte)).is_ok() && received.last() != Some(&b'\r') {}
             line.write_all(answer.as_bytes()).await.unwrap();
         }
-        String::from_utf8(told).unwrap()
+        String::from_utf8(received).unwrap()
     }
 
     #[tokio::test]
@@ -269,7 +269,7 @@ mod tests {
         // Then flags of an error-passive adapter that has lost arbitration; a frame with a time stamp comes last.
         let frames = "z\rnoise\r\x07t100211330FA0\r";
         let answers = ["\x07", "t1002", "1133\r\r", "V1013\r", "\r", "\r", "F64\r", frames];
-        let (told, bus) = tokio::join!(adapter(line, &answers), async {
+        let (received, bus) = tokio::join!(adapter(line, &answers), async {
             let mut bus =
                 SlcanBus::begin(Link::over_serial("tty", host, &clock), Some(Bitrate::K500), &clock).await.unwrap();
             bus.send(&"601#40".parse().unwrap()).await.unwrap();
@@ -287,7 +287,7 @@ mod tests {
             assert_eq!(notes, ["the controller is error-passive", lost, torn, full]);
             bus
         });
-        assert_eq!(told, "\r\rC\rV\rS6\rO\rF\rt601140\r");
+        assert_eq!(received, "\r\rC\rV\rS6\rO\rF\rt601140\r");
         assert_eq!((bus.frames_refused(), bus.lines_malformed()), (1, 1));
     }
 

@@ -260,7 +260,7 @@ fn a_damaged_blf_container_costs_itself() {
         (container(0, 1_000_000_000, b""), "a container declares 1000000000 bytes", 20),
         (container(7, 0, b""), "compressed by method 7", 20),
         (container(2, 100, b"no zlib"), "cannot be unpacked", 20),
-        (b"GARBAGE that is no object ".to_vec(), "no object begins here", 20),
+        (b"GARBAGE and not an object ".to_vec(), "no object begins here", 20),
         (unknown, "objects of type 999 are not read", 20),
         // It declares that it goes on behind the end of the file.
         (huge, "an object declares 1000000000 bytes", 0),

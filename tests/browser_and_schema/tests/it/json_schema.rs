@@ -177,8 +177,8 @@ fn files_and_logs_are_told_of_in_the_same_form() {
     std::fs::write(&odd, format!("{frames}no frame\n")).unwrap();
     let bus = format!("log:{odd}");
     let ended = ferrodrive(&["--bus", &bus, "dump", "--json"]);
-    let (told, last) = ended.out.trim_end().rsplit_once('\n').unwrap();
-    let (frames, skipped) = told.rsplit_once('\n').unwrap();
+    let (reported, last) = ended.out.trim_end().rsplit_once('\n').unwrap();
+    let (frames, skipped) = reported.rsplit_once('\n').unwrap();
     for (out, definition) in [(frames, "frame"), (skipped, "log_line"), (last, "log_summary")] {
         let part = Ended { status: ended.status, out: out.to_owned(), err: String::new() };
         hold(&part, definition, definition);

@@ -490,12 +490,12 @@ async fn a_parameter_is_found_changed_and_rolled_back() {
     stage.click(row).await;
     stage.find("#parameter-value").await.send_keys("500").await.expect("typed");
     stage.click("#parameter-write").await;
-    stage.says("#parameter-told", "1 to 300").await;
+    stage.says("#parameter-notice", "1 to 300").await;
     let field = stage.find("#parameter-value").await;
     field.clear().await.expect("cleared");
     field.send_keys("60rpm").await.expect("typed");
     stage.click("#parameter-write").await;
-    stage.says("#parameter-told", "Written and read back").await;
+    stage.says("#parameter-notice", "Written and read back").await;
     stage.says(row, "60 r/min").await;
     stage.find(".parameters tr.changed[data-object='2008h:00']").await;
     stage.says(".parameters tr.chosen", "3C 00").await;
@@ -509,18 +509,18 @@ async fn a_parameter_is_found_changed_and_rolled_back() {
     stage.click("#parameters-back").await;
     stage.says(row, "1 r/min").await;
     stage.find("#parameters-file").await.send_keys(&kept.to_string_lossy()).await.expect("chosen");
-    stage.says("#parameters-told", "node4.dcf").await;
-    stage.says("#parameters-told", "1 differ from the drive").await;
+    stage.says("#parameters-notice", "node4.dcf").await;
+    stage.says("#parameters-notice", "1 differ from the drive").await;
     let file = stage.profile.join("node4.toml");
     stage.find("#parameters-file").await.send_keys(&file.to_string_lossy()).await.expect("chosen");
-    stage.says("#parameters-told", "1 differ from the drive").await;
+    stage.says("#parameters-notice", "1 differ from the drive").await;
     stage.find(".parameters-diff tr.other").await;
     stage.click("#parameters-plan").await;
-    stage.says("#parameters-told", "1 write, in this order").await;
+    stage.says("#parameters-notice", "1 write, in this order").await;
     stage.says(".parameters-diff", "60 r/min").await;
     stage.shoot("parameters_file").await;
     stage.click("#parameters-apply").await;
-    stage.says("#parameters-told", "1 write done and read back").await;
+    stage.says("#parameters-notice", "1 write done and read back").await;
     stage.says(row, "60 r/min").await;
     stage.close().await;
 }

@@ -27,16 +27,16 @@ fn another_encoder_counts_four_times_its_lines_a_turn() {
 
 #[test]
 fn another_motor_runs_with_its_own_pole_pairs_and_is_found_out_with_others() {
-    for (motor, told, runs) in [(10, 10, true), (15, 15, true), (15, 10, false), (10, 15, false)] {
+    for (motor, reported, runs) in [(10, 10, true), (15, 15, true), (15, 10, false), (10, 15, false)] {
         let mut bench = Bench::open();
         bench.motor().model.pmsm.pole_pairs = motor;
-        bench.set(0x200C, i64::from(told)).run_ms(10);
+        bench.set(0x200C, i64::from(reported)).run_ms(10);
         let (rpm, fault) = run(&mut bench);
         if runs {
             assert_eq!(fault, 0, "{motor} pole pairs");
             assert_within("speed", rpm, 59.0, 61.0);
         } else {
-            assert_eq!(fault & ENCODER_FAULT, ENCODER_FAULT, "{told} for {motor} pole pairs: {fault:04X}h");
+            assert_eq!(fault & ENCODER_FAULT, ENCODER_FAULT, "{reported} for {motor} pole pairs: {fault:04X}h");
         }
     }
 }

@@ -17,8 +17,8 @@ fn a_load_of_four_holding_torques_makes_the_free_shaft_run_away_until_its_bearin
     // 36,000 r/min, the makers' limit of such bearings; the suppressors hold the bus at some 50 V.
     assert_within("r/min", fastest, 34_000.0, 36_000.0);
     assert_within("V", highest_v, 40.0, 60.0);
-    let told = bench.world_answer("1 get");
-    assert!(told.contains("\"velocity_rpm\":0") && told.contains("bearings seized"), "{told}");
+    let reported = bench.world_answer("1 get");
+    assert!(reported.contains("\"velocity_rpm\":0") && reported.contains("bearings seized"), "{reported}");
     assert_eq!(bench.get(0x603F), 0xFF01, "the drive saw the bus above 40 V (2.1)");
     // New bearings, and it works again.
     bench.world("1 load torque 0").world("1 rotor free").run_ms(2000);

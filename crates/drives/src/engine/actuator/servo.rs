@@ -202,7 +202,7 @@ impl Servo {
         self.setpoint_a = if current_a.is_finite() { current_a } else { 0.0 };
     }
 
-    /// A current that somebody knows to be needed besides what the loops find out, A (CiA 402-2, object 60B2h).
+    /// A current that is known to be needed besides what the loops find out, A (CiA 402-2, object 60B2h).
     pub const fn set_torque_offset(&mut self, current_a: f32) {
         self.torque_offset_a = current_a;
     }

@@ -118,7 +118,7 @@ impl Homing {
         }
     }
 
-    /// Somebody else moves or stops the motor.
+    /// Another command moves or stops the motor.
     pub(super) fn abort(&mut self) {
         if matches!(self.state, HomingState::Running | HomingState::Stopping) {
             *self = Self { state: HomingState::Failed, ..Self::default() };

@@ -45,7 +45,7 @@ pub struct Axis {
     speed: Speed,
     torque: Torque,
     homing: Homing,
-    /// Where the home position was found, until somebody asks.
+    /// Where the home position was found, until it is taken.
     home: Option<i32>,
     switches: Switches,
     stop: Option<Stopping>,

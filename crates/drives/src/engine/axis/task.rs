@@ -46,7 +46,7 @@ pub enum Task {
         /// A position further away than this allows takes longer; 0 for any speed.
         max_speed: f64,
     },
-    /// Follow a set-point that somebody else has planned. To be given every period.
+    /// Follow a set-point that the host has planned. To be given every period.
     Cyclic(Cyclic),
     /// Find the home position. Given again it begins anew.
     Home(HomingParameters),

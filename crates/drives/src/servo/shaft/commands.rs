@@ -210,12 +210,12 @@ impl Shaft {
         let begins = if at_once { axis.point().position } else { axis.target() };
         let middle = if relative { begins.wrapping_sub(axis.target()) } else { begins };
         let [middle, most] = [middle, i32::MAX].map(i64::from);
-        let told = counter(within.saturating_sub(from).clamp(middle - most, middle + most));
+        let reported = counter(within.saturating_sub(from).clamp(middle - most, middle + most));
         let hold = match within.saturating_sub(from) {
-            way if i64::from(told) != way => TargetHold::Counter,
+            way if i64::from(reported) != way => TargetHold::Counter,
             _ if within != wanted => TargetHold::Limit,
             _ => TargetHold::None,
         };
-        (told, hold)
+        (reported, hold)
     }
 }

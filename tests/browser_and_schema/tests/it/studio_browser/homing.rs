@@ -26,7 +26,7 @@ async fn homing_is_chosen_by_its_drawing_and_ends_with_a_stop() {
     field.clear().await.expect("cleared");
     field.send_keys("60rpm").await.expect("typed");
     stage.click("#home-write").await;
-    stage.says("#home-told", "Written and read back").await;
+    stage.says("#home-notice", "Written and read back").await;
     // Nothing stops this model when the studio dies: the page asks before it moves it.
     stage.click("#home-start").await;
     stage.click("#guarding button:focus").await;

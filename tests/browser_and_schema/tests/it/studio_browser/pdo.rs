@@ -77,7 +77,7 @@ async fn a_pdo_is_mapped_seen_in_the_trace_and_undone() {
     let timer = stage.find("#pdo-event_ms").await;
     timer.clear().await.expect("cleared");
     timer.send_keys("100").await.expect("typed");
-    stage.says("#pdo-told", "Nothing has been written yet").await;
+    stage.says("#pdo-notice", "Nothing has been written yet").await;
     let load = stage.says("#pdo-load", "in time").await;
     assert!(load.contains('→'), "{load}");
     stage.says("#pdo-plan", "off while it is changed").await;
@@ -85,7 +85,7 @@ async fn a_pdo_is_mapped_seen_in_the_trace_and_undone() {
     stage.client.execute(bar, Vec::new()).await.expect("it scrolls");
     stage.shoot("pdo").await;
     stage.click("#pdo-apply").await;
-    stage.says("#pdo-told", "TPDO1: written and read back").await;
+    stage.says("#pdo-notice", "TPDO1: written and read back").await;
     stage.says("tr[data-pdo=TPDO1]", "6064h:00 position_actual_value (32), 6041h:00 statusword (16)").await;
     stage.to_top().await;
     stage.click("#pdo-nmt").await;

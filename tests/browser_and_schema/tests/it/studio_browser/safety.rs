@@ -92,9 +92,9 @@ async fn a_studio_that_freezes_or_dies_is_said_to_and_so_is_a_stop_that_nobody_c
     stage.click("#go-turn").await;
     stage.stepper("a stepper that turns", |node| speed(node) > 50.0);
     stage.signal("-STOP");
-    let told = stage.says("#banner:not([hidden])", "no longer knows what moves").await;
-    assert!(told.contains("Nothing stops node 2 if the studio is dead: use the emergency stop"), "{told}");
-    assert!(!told.contains("is stopped"), "{told}");
+    let shown = stage.says("#banner:not([hidden])", "no longer knows what moves").await;
+    assert!(shown.contains("Nothing stops node 2 if the studio is dead: use the emergency stop"), "{shown}");
+    assert!(!shown.contains("is stopped"), "{shown}");
     stage.find("body.unseen .motion fieldset[disabled]").await;
     assert!(!stage.says("#control", "is stale").await.contains("You have control"));
     assert!(!stage.says(".motion .status", "Unknown").await.contains("in motion"));
@@ -157,8 +157,8 @@ async fn an_old_tab_says_what_to_do_after_a_restart_and_goes_on_where_the_token_
     let token = stage.profile.join("token");
     let kept = ["--token-file", token.to_str().expect("a path")];
     stage.studio = Studio::start_at(&address, &[], &kept);
-    let told = stage.says("#banner:not([hidden])", "does not admit this page: open the address").await;
-    assert!(!told.contains("Trying again"), "{told}");
+    let shown = stage.says("#banner:not([hidden])", "does not admit this page: open the address").await;
+    assert!(!shown.contains("Trying again"), "{shown}");
     stage.shoot("restart").await;
     // The address that it printed, in the same browser; and once more, where nothing has to be done.
     stage.load().await;

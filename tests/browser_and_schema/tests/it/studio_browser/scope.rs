@@ -156,9 +156,12 @@ async fn the_scope_waits_for_its_trigger_and_measures_the_step() {
     stage.find("#scope-pause[aria-pressed=true]").await;
     stage.click("#scope-step").await;
     // A ramp of less than a second, read nine times a second: reported as too few readings.
-    let told = stage.says(".readout", "Step of Speed").await;
-    assert!(told.contains("Step of Speed: too few readings: ") && told.contains("event timer of 1 ms"), "{told}");
-    assert!(!told.contains("rise time") && !told.contains("Step of Current"), "{told}");
+    let reported = stage.says(".readout", "Step of Speed").await;
+    assert!(
+        reported.contains("Step of Speed: too few readings: ") && reported.contains("event timer of 1 ms"),
+        "{reported}"
+    );
+    assert!(!reported.contains("rise time") && !reported.contains("Step of Current"), "{reported}");
     measures_what_comes_each_millisecond(&stage).await;
     stage.click("#scope-svg").await;
     let drawing = std::fs::read_to_string(stage.saved("node4.svg").await).expect("text");
@@ -201,15 +204,15 @@ async fn measures_what_comes_each_millisecond(stage: &Stage) {
     stage.turns();
     stage.click("#tabs [data-name=scope]").await;
     stage.find("#scope-pause[aria-pressed=true]").await;
-    let told = stage.says(".readout", "Step of 4:606C:00").await;
-    let told = told.lines().find(|line| line.starts_with("Step of 4:606C:00")).expect("its line").to_owned();
-    let rise = told.split("rise time (10 to 90 %) ").nth(1).unwrap_or_else(|| panic!("{told}"));
+    let reported = stage.says(".readout", "Step of 4:606C:00").await;
+    let reported = reported.lines().find(|line| line.starts_with("Step of 4:606C:00")).expect("its line").to_owned();
+    let rise = reported.split("rise time (10 to 90 %) ").nth(1).unwrap_or_else(|| panic!("{reported}"));
     let mut rise =
         rise.split(" s,").next().expect("a time").split(" ± ").map(|part| part.parse::<f64>().expect("a number"));
     let (rise_s, grid_s) = (rise.next().expect("a time"), rise.next().expect("what it may be off by"));
     let truth_s = (1.0 - 2.0 * 0.05_f64.sqrt()) * 60.0 / 500.0;
     // The shaft follows its loop, which takes some milliseconds of its own.
-    assert!(grid_s < 0.01 && (rise_s - truth_s).abs() < grid_s + 0.003, "{told}, not {truth_s} s");
+    assert!(grid_s < 0.01 && (rise_s - truth_s).abs() < grid_s + 0.003, "{reported}, not {truth_s} s");
     let readout = "document.querySelector('.readout').scrollIntoView({ block: 'end' })";
     stage.client.execute(readout, Vec::new()).await.expect("it scrolls");
     stage.shoot("scope_step").await;

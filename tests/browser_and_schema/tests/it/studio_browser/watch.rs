@@ -20,8 +20,8 @@ async fn who_only_looks_can_stop() {
     // That is shown in view, at any scroll position, and once, though a press takes two channels.
     stage.says("#news li:first-child", "node 4: stopped by a press of stop").await;
     let seen = "const line = document.querySelector('#news li').getBoundingClientRect(); \
-                const told = [...document.querySelectorAll('#news li')].filter((one) => one.textContent.includes('node 4: stopped by a press')); \
-                return [line.bottom <= innerHeight && line.height > 0, told.length]";
+                const reported = [...document.querySelectorAll('#news li')].filter((one) => one.textContent.includes('node 4: stopped by a press')); \
+                return [line.bottom <= innerHeight && line.height > 0, reported.length]";
     let seen = stage.client.execute(seen, Vec::new()).await.expect("it runs");
     assert_eq!(seen, serde_json::json!([true, 1]));
     stage.close().await;
