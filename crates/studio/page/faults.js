@@ -18,7 +18,7 @@ export function faultsView() {
   const only = toggle("faults-only", "faults only", false, () => draw());
   const here = h("span", { class: "quiet", role: "status" });
   const list = h("div", { class: "timeline", tabindex: "0", role: "log", "aria-label": "What happened, newest first" });
-  const detail = h("div", { class: "told" });
+  const detail = h("div", { class: "fault-detail" });
   const frames = h("div", { class: "around", hidden: true });
   const root = h(
     "section",

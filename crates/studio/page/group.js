@@ -74,7 +74,7 @@ export function groupMotion(report) {
   const rpm = input("group-rpm", "", { placeholder: "30" });
   const ramp = input("group-ramp", "", { placeholder: "60" });
   const within = input("group-within", "", { placeholder: "shortest" });
-  const notice = h("p", { role: "status", id: "group-told", class: "quiet" });
+  const notice = h("p", { role: "status", id: "group-notice", class: "quiet" });
   const held = holder((name, answer) => showAnswer(name, answer));
   const risk = guarding("group-guarding", report);
   /** The drives of the last request to move. */

@@ -24,7 +24,7 @@ const texts = new WeakMap();
 /** Marks an element whose help came with it: `{ title, text, source }`. */
 export function documented(element, meaning) {
   texts.set(element, meaning);
-  return pointed(element, "told", meaning.title);
+  return pointed(element, "documented", meaning.title);
 }
 
 /** A word that shows its help when pressed. */

@@ -20,7 +20,7 @@ export function homingWizard(shared, report, isAccepted) {
   const remark = h("p", { class: "quiet" });
   const inputs = h("ul", { class: "inputs", id: "home-inputs" });
   const settings = h("form", { class: "settings", onsubmit: write });
-  const notice = h("p", { role: "status", id: "home-told" });
+  const notice = h("p", { role: "status", id: "home-notice" });
   const progress = h("p", { class: "status", role: "status", id: "home-progress" });
   const start = h("button", { type: "button", id: "home-start", class: "primary", onclick: run }, "Start homing");
   const body = h(

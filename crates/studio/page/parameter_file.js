@@ -24,7 +24,7 @@ export function parameterFile({ node, report, mark, written }) {
   const input = h("input", { type: "file", id: "parameters-file", accept: ".toml,.dcf", "aria-label": "Parameter file", onchange: load });
   const dry = h("button", { type: "button", id: "parameters-plan", onclick: plan, disabled: true }, "Dry run");
   const apply = h("button", { type: "button", id: "parameters-apply", class: "primary", onclick: write, hidden: true }, "Write all");
-  const notice = h("p", { role: "status", id: "parameters-told" });
+  const notice = h("p", { role: "status", id: "parameters-notice" });
   const shown = h("div", { class: "parameters-diff" });
   const root = h("div", {}, h("div", { class: "bar" }, ...backups, h("label", {}, "File ", input), dry, apply), notice, shown);
   let text = null;

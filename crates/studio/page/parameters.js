@@ -217,7 +217,7 @@ export function parametersView(shared, report) {
 
   function form(row) {
     const input = h("input", { id: "parameter-value", autocomplete: "off", "aria-label": `New value of ${row.name}`, placeholder: row.unit ? `number, or with its unit (${row.unit})` : "number" });
-    const notice = h("span", { role: "status", id: "parameter-told" });
+    const notice = h("span", { role: "status", id: "parameter-notice" });
     const write = h("button", { type: "submit", id: "parameter-write", class: "primary", title: inControl() ? "" : "Take control first" }, "Write");
     const submit = async (event) => {
       event.preventDefault();

@@ -20,7 +20,7 @@ export function pdoPlan({ write, forget }) {
   const rate = h("input", { id: "pdo-rate", type: "number", min: "10", max: "1000", step: "any", placeholder: "unknown" });
   const apply = h("button", { type: "button", id: "pdo-apply", class: "primary", onclick: go }, "Apply");
   const drop = h("button", { type: "button", id: "pdo-drop", onclick: forget }, "Discard the changes");
-  const notice = h("p", { role: "status", id: "pdo-told" });
+  const notice = h("p", { role: "status", id: "pdo-notice" });
   const shown = h("div", { id: "pdo-plan" });
   const inputs = h("div", { class: "bar", hidden: true }, h("label", {}, "SYNC period (ms) ", cycle), h("label", {}, "Bit rate (kbit/s) ", rate), apply, drop);
   const root = h("div", {}, inputs, notice, shown);

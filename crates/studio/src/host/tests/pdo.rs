@@ -229,8 +229,8 @@ fn a_node_goes_to_operational_and_back_and_not_while_it_turns() {
         page.must(Command::Disable { node: WHEEL }).await;
         page.must(nmt(NmtWish::PreOperational)).await;
         assert_eq!(is().await, Some(NmtState::PreOperational));
-        let nobody = Command::Nmt { node: super::node(9), command: NmtWish::Start };
-        assert_eq!(page.refused(nobody).await.0, "no_such_drive");
+        let absent = Command::Nmt { node: super::node(9), command: NmtWish::Start };
+        assert_eq!(page.refused(absent).await.0, "no_such_drive");
         assert_eq!(page.refused(Command::Pdos { node: super::node(9) }).await.0, "no_such_drive");
     });
 }
