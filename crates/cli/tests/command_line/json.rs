@@ -105,8 +105,8 @@ fn a_run_that_fails_has_its_error_where_other_commands_have_it() {
     const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/homing_stuck_switch.toml");
     let directory = scratch("run_error");
     let fails = directory.join("fails.toml");
-    let text = "title = 'fails'\nuntil = '100ms'\n[[machine.drive]]\nmodel = 'zlac8030l'\nnode = 4\n\
-                [[expect]]\nname = 'turns'\nwhen = '4 velocity > 50rpm'\nwithin = '50ms'\n";
+    let text = "title = 'fails'\nend = '100ms'\n[[machine.drive]]\nmodel = 'zlac8030l'\nnode = 4\n\
+                [[expect]]\nthat = '4 velocity > 50'\nwithin = '50ms'\n";
     std::fs::write(&fails, text).unwrap();
     let fails = fails.to_str().unwrap();
     let error = |words: &[&str], kind: &str| {

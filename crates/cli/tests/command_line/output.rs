@@ -1,6 +1,6 @@
 //! `-o`: a new file, by its ending; `-` is standard output, and no file is written over without --force.
 
-use processes::{done, ferrodrive, scratch};
+use processes::{command, done, ferrodrive, scratch};
 
 #[test]
 fn what_goes_to_standard_output_goes_to_a_file_as_well() {
@@ -41,8 +41,8 @@ fn pictures_records_and_bytes_go_to_standard_output_alone() {
         assert_eq!(drawn.matches("<svg").count(), 1);
     }
     // CiA 301, 7.5.2.1: 1000h of a ZLAC8030L is 40192h, least significant byte first.
-    let bytes = done(&["read", "4", "1000", "-o", "-"]).out;
-    assert_eq!(bytes.as_bytes(), b"\x92\x01\x04\0");
+    let bytes = command(&["read", "4", "1000", "-o", "-"]).output().unwrap().stdout;
+    assert_eq!(bytes, b"\x92\x01\x04\0");
     assert!(!std::path::Path::new("-").exists());
     for words in [&["read", "4", "1000"][..], &["record", "4", "606C"]] {
         let both = ferrodrive(&[&["--json"], words, &["-o", "-"]].concat());
