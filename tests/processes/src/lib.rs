@@ -46,7 +46,7 @@ pub fn program() -> &'static str {
 }
 
 /// Commands that need no node, or scan all node-IDs.
-const NOT_PATIENT: [&str; 3] = ["sim", "dump", "scan"];
+const NOT_PATIENT: [&str; 4] = ["sim", "dump", "scan", "init"];
 
 /// The program with these arguments, and nothing of this environment that it would listen to. Who asks on a served bus waits longer
 /// for an answer than a person would: on a busy machine the bus may be seconds behind.
