@@ -209,10 +209,7 @@ fn judged(format: Format, report: &impl Report, failure: Option<Failure>) -> Res
 
 fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Result<(), Failure> {
     match command {
-        Command::Demo(demo) => {
-            let report = demo.run(global)?;
-            judged(format, &report, report.failure())
-        }
+        Command::Demo(demo) => demo.run(global).and_then(|report| judged(format, &report, report.failure())),
         Command::Sim(sim) => sim.run(global, typed.bus.then_some(&global.bus)),
         Command::Run(run) => run.run(format),
         Command::Scan(command) => on_bus(global, format, async |context| command.run(context).await),

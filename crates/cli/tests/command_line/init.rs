@@ -86,7 +86,7 @@ fn where_nobody_is_on_the_bus_no_file_is_written() {
     std::fs::write(&source, "[[drive]]\nmodel = 'cia402'\nnode = 9\noptions = { node-id = 'none' }\n").unwrap();
     let bus = format!("sim:{}", source.display());
     let ended = ferrodrive(&["--json", "--bus", &bus, "init", "-o", made.to_str().unwrap()]);
-    assert_eq!((ended.status, &ended.json()["error"]["kind"]), (Some(1), &"nobody".into()), "{}", ended.out);
+    assert_eq!((ended.status, &ended.json()["error"]["kind"]), (Some(1), &"no_node".into()), "{}", ended.out);
     assert!(!made.exists());
 }
 
