@@ -72,7 +72,7 @@ impl Init {
 
     /// Finds the drives, and writes the file. `is_bus_typed` is whether the command line names a bus, be it that of every command.
     pub(crate) fn run(&self, global: &Global, is_bus_typed: bool) -> Result<InitReport, Failure> {
-        // Before anything is asked for: nobody waits for what cannot be kept.
+        // Before anything is asked for: what cannot be kept is not worth the wait.
         let output = new_file(self.output.as_deref(), self.force)?;
         let (mut nodes, bitrate) = if self.is_without_bus() {
             (self.named()?, None)
