@@ -55,7 +55,7 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["eds", "zlac8030l"], "eds"),
     (&["dcf", "4"], "dcf"),
     (&["init", "--drive", "zlac8030l@4"], "init"),
-    (&["--bus", "sim", "init"], "init"),
+    (&["init", "--bus", "sim"], "init"),
     (&["init"], "failure"),
     (&["params", "backup", "4"], "params_backup"),
     (&["params", "rollback", "4"], "failure"),
@@ -176,6 +176,18 @@ fn files_and_logs_are_told_of_in_the_same_form() {
     ] {
         hold(&ferrodrive(&[arguments, &["--json"]].concat()), definition, &format!("{arguments:?}"));
     }
+    for words in [&["eds", "zlac8030l", "-o"][..], &["export", "dbc", "4", "-o"]] {
+        let path = path(if words[0] == "eds" { "b.eds" } else { "b.dbc" });
+        hold(&ferrodrive(&[words, &[&path, "--json"]].concat()), words[0], &format!("{words:?}"));
+    }
+    for words in [&["plot", &csv][..], &["latency", "4", "--count", "20"]] {
+        hold(&ferrodrive(&[words, &["-o", "-", "--json"]].concat()), words[0], &format!("{words:?}"));
+    }
+    let unread = path("unread.log");
+    std::fs::write(&unread, "no frame\n").unwrap();
+    let ended = ferrodrive(&["decode", &unread, "--json"]);
+    let last = ended.out.trim_end().rsplit('\n').next().unwrap().to_owned();
+    hold(&Ended { status: ended.status, out: last, err: String::new() }, "failure", "an error behind lines");
     let frames = std::fs::read_to_string(&log).unwrap();
     std::fs::write(&odd, format!("{frames}no frame\n")).unwrap();
     let bus = format!("log:{odd}");
