@@ -126,7 +126,7 @@ const CHECK_OF_A_FILE: Unheeded = Unheeded {
 const INIT_OF_DRIVES: Unheeded = Unheeded {
     command: "init",
     options: ALL,
-    why: "--drive says which drives there are, and nobody is asked",
+    why: "--drive says which drives there are, and the bus is not asked",
     next: "omit it, or give --bus in place of --drive",
 };
 

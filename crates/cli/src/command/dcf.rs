@@ -82,7 +82,7 @@ struct Refused {
 impl Dcf {
     /// Reads the values and writes the file.
     pub(crate) async fn run(&self, context: &Context) -> Result<DcfReport, Failure> {
-        // Before anything is asked for: nobody waits for what cannot be kept.
+        // Before anything is asked for: a file that cannot be kept is not worth waiting for.
         let output = new_file(self.output.as_deref(), self.force)?;
         let (mut made, model) = self.sheet(context).await?;
         let node = context.node(self.node);

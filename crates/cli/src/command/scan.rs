@@ -33,7 +33,7 @@ impl Scan {
     }
 }
 
-/// Who is on the bus, and what others sent meanwhile; a failure where nobody is.
+/// Who is on the bus, and what others sent meanwhile; a failure where there is no node.
 pub(super) async fn look(context: &Context) -> Result<(Vec<Found>, Vec<Heard>), Failure> {
     let asked = |count| context.progress.count(format!("asked {count} of 127"));
     let (mut counted, mut decoder) = (Counted::default(), context.decoder());

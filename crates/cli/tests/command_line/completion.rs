@@ -64,6 +64,9 @@ fn bash_completes_nodes_objects_models_and_modes() {
     assert!(of(&["watch", "--count", "1", "4", "201"]).contains(&"2014".to_owned()));
     assert_eq!(of(&["objects", "zla"]), ["zlac8030l"]);
     assert!(of(&["sim", "--drive", "m42"]).len() >= 2);
+    assert_eq!(of(&["ini"]), ["init"]);
+    assert_eq!(of(&["init", "--drive", "zla"]), ["zlac8030l"]);
+    assert!(of(&["init", "--"]).iter().any(|word| word == "--output"));
     assert_eq!(of(&["plan", "machine.toml", "--mode", "cs"]), ["csp", "csv", "cst"]);
     // What makes no sense is completed by nothing, and is not an error.
     assert!(of(&["read", "4", "no_such_obj"]).is_empty());

@@ -79,10 +79,10 @@ fn without_a_bus_the_drives_are_named_as_for_sim() {
 }
 
 #[test]
-fn where_nobody_is_on_the_bus_no_file_is_written() {
-    let directory = scratch("init_nobody");
+fn where_no_node_is_on_the_bus_no_file_is_written() {
+    let directory = scratch("init_no_node");
     let (source, made) = (directory.join("source.toml"), directory.join("made.toml"));
-    // A device that waits for its node-ID answers nobody (CiA 305).
+    // A device that waits for its node-ID answers no SDO request (CiA 305).
     std::fs::write(&source, "[[drive]]\nmodel = 'cia402'\nnode = 9\noptions = { node-id = 'none' }\n").unwrap();
     let bus = format!("sim:{}", source.display());
     let ended = ferrodrive(&["--json", "--bus", &bus, "init", "-o", made.to_str().unwrap()]);

@@ -91,14 +91,6 @@ impl Host {
         }
     }
 
-    fn hold_jog(&mut self, node: NodeId, asked: Asked) {
-        let now = self.network.now();
-        match self.jogs.get_mut(&node).is_some_and(|held| held.renew(now)) {
-            true => done(asked),
-            false => not_held(asked, node),
-        }
-    }
-
     /// Starts a command of a drive.
     fn take_motion(&mut self, command: Command, asked: Asked) {
         let Some((id, drive)) = subject(&command).and_then(|id| Some((id, self.nodes.get(&id)?.drive.clone()?))) else {

@@ -12,7 +12,7 @@ use plot::Paint;
 
 impl super::Backup {
     pub(super) async fn run(&self, context: &Context) -> Result<BackupReport, Failure> {
-        // Before anything is asked for: nobody waits for what cannot be kept.
+        // Before anything is asked for: a file that cannot be kept is not worth waiting for.
         let output = self.output.as_deref().filter(|path| !is_stdout(path));
         let form = output.map(Form::of).transpose().map_err(Failure::usage)?;
         let output = new_file(output, self.force)?;

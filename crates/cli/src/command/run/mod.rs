@@ -26,7 +26,7 @@ use serving::ServeOptions;
 /// Run scenarios in virtual time, and check what they expect
 ///
 /// A scenario is a TOML file: a machine, what happens to it, what a host does with it, what is expected
-/// (docs/scenarios.md). The exit status is 0 if everything is as expected, 1 if not, 2 if a file cannot be used.
+/// (docs/scenarios.md). The exit status is 0 if everything is as expected, 1 if not or if a file cannot be used.
 /// Several files are shown in a row each, and all are run, whatever the results of the others.
 ///
 /// With --serve the host is a program outside, and the scenario follows the clock.
