@@ -1,7 +1,7 @@
 //! `ferrodrive init`: the machine file to begin with. What a scan leaves open, and what follows for the file, is tested in
 //! `crates/testbench/tests/it/init.rs`.
 
-use processes::{Simulator, done, ferrodrive, scratch};
+use processes::{Simulator, command, done, ferrodrive, scratch};
 
 const MACHINE: &str = "bitrate = '250k'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\noptions = { 1017 = 200 }\n\
     [[drive]]\nmodel = 'zlim42c-82'\nnode = 5\n[[drive]]\nmodel = 'm8025e25b80'\nnode = 3\n[[drive]]\nmodel = 'cia402'\nnode = 9\n";
@@ -68,6 +68,11 @@ fn without_a_bus_the_drives_are_named_as_for_sim() {
     let named = format!("{}@7", sheet.display());
     done(&["init", "--drive", &named, "-o", path, "--force"]);
     done(&["check", path]);
+
+    // The file of the environment may be the one that is to be written.
+    let later = directory.join("later.toml");
+    let mut line = command(&[&["init", "-o", later.to_str().unwrap()][..], &drives].concat());
+    assert!(line.env("FERRODRIVE_MACHINE", &later).output().unwrap().status.success() && later.exists());
 
     let neither = ferrodrive(&["init"]);
     assert_eq!(neither.status, Some(2));

@@ -7,8 +7,8 @@
 use std::fmt::Write as _;
 
 use can::Bitrate;
-use canopen::Mux;
 use canopen::od::DefaultValue;
+use canopen::{Mux, NodeId};
 use devices::Description;
 use devices::variant::Variant;
 use master::Network;
@@ -19,7 +19,7 @@ use sim::machine::models;
 use super::scan::ScannedNode;
 use crate::failure::{Failure, FailureBody};
 use crate::machine_file::Machine;
-use crate::models::{file_of, how_to_say};
+use crate::models::file_of;
 use crate::words::drive::DriveSpec;
 use crate::words::plain;
 
@@ -83,7 +83,7 @@ impl InitNode {
     ///
     /// Reads its serial number.
     pub async fn found(network: &Network, known: Option<&'static Description>, found: &Found) -> Self {
-        let scanned = ScannedNode::new(known, found, how_to_say);
+        let scanned = ScannedNode::new(known, found, here);
         let serial_number = match found.identity {
             Some(_) => network.node(found.node).read::<u32>(SERIAL_NUMBER).await.ok().filter(|number| *number != 0),
             None => None,
@@ -221,6 +221,12 @@ impl InitReport {
         let failure = failure.next(format!("say which it is: --model {}={example}", first.node));
         Some(failure.next("or choose in the file, and remove the # of its lines"))
     }
+}
+
+/// How the user says which of `models` a node is, who reads the file.
+fn here(node: NodeId, models: &[&str]) -> String {
+    let model = models.first().unwrap_or(&"MODEL");
+    format!("--model {node}={model} of `ferrodrive init`, or the line `model` below")
 }
 
 /// Which models a node may be, in words.
