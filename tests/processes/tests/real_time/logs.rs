@@ -181,7 +181,7 @@ fn a_log_that_the_disk_has_no_room_for_is_a_failure_of_the_command() {
     let ended = on_a_full_disk("", &format!("--log {} --bus sim scan", log.display()));
     assert_eq!(ended.status, Some(1), "{}", ended.err);
     // What was asked for was done, and is shown.
-    assert!(ended.out.contains("zlac8030l") && ended.err.contains("is not whole"), "{}{}", ended.out, ended.err);
+    assert!(ended.out.contains("zlac8030l") && ended.err.contains("is not complete"), "{}{}", ended.out, ended.err);
     for name in ["--log run.log", "--record run.csv"] {
         let (option, name) = name.split_once(' ').unwrap();
         let file = folder.join(name);

@@ -121,7 +121,11 @@ fn a_write_that_means_something_else_on_the_other_model_is_refused() {
     assert_eq!(bench.stepper_bit_rate(), 1);
     let written = bench.run(&["write", "4", "6083", "300"]);
     assert_eq!(written.status, Some(0), "{}", written.err);
-    assert!(written.err.contains("cannot tell") && written.err.contains("--model 4=zlac8030l"), "{}", written.err);
+    assert!(
+        written.err.contains("its model is not certain") && written.err.contains("--model 4=zlac8030l"),
+        "{}",
+        written.err
+    );
     assert_eq!(bench.json(&["write", "4", "6083", "300"])["guess"], "zlac8030l");
 }
 
@@ -135,7 +139,7 @@ fn reading_and_moving_use_the_guess_and_say_so() {
         assert_eq!((&moved["model"], &moved["guess"]), (&Value::Null, &guess));
     }
     let state = bench.run(&["state", "4"]);
-    assert_eq!(state.err.matches("cannot tell").count(), 1, "{}", state.err);
+    assert_eq!(state.err.matches("its model is not certain").count(), 1, "{}", state.err);
     let state = bench.run(&["--model", "4=zlac8030l", "state", "4"]);
     assert!(state.err.is_empty() && state.out.starts_with("node 4 (zlac8030l): "), "{}{}", state.out, state.err);
 }

@@ -42,7 +42,7 @@ fn a_backup_in_any_form_is_what_the_node_has() {
         assert_eq!(done(&["params", "plan", "4", &file, "--json"]).json()["steps"], serde_json::json!([]));
         // A file that is there is not written over unasked.
         let again = ferrodrive(&["params", "backup", "4", "-o", &file]);
-        assert!(again.status == Some(1) && again.err.contains("is there already"), "{}", again.err);
+        assert!(again.status == Some(1) && again.err.contains("already exists"), "{}", again.err);
     }
     // One without an extension that says what it is, before anybody is asked.
     let ended = ferrodrive(&["params", "backup", "4", "-o", &folder.path("wheel.txt")]);

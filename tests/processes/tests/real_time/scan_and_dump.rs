@@ -88,5 +88,5 @@ fn a_line_that_is_no_frame_is_told_with_its_number_and_passed_over() {
     std::fs::write(&log, "no log\n".repeat(1000)).unwrap();
     let shown = dump(&log, &[]);
     assert_eq!(shown.status, Some(1));
-    assert!(shown.err.contains("no frame, and 1000 passed over") && shown.err.lines().count() < 30, "{}", shown.err);
+    assert!(shown.err.contains("no frame, and 1000 places skipped") && shown.err.lines().count() < 30, "{}", shown.err);
 }
