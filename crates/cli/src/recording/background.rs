@@ -118,7 +118,7 @@ impl<B: Send + 'static> Background<B> {
     pub(super) fn finish(self, patience: Duration) -> Result<(), Failure> {
         drop(self.batches);
         let Words { file, pieces } = self.words;
-        let torn = |why: String| Failure::new(format!("{file} is not whole")).of_kind("file").because(why);
+        let torn = |why: String| Failure::new(format!("{file} is not complete")).of_kind("file").because(why);
         let lost = self.lost + self.missing;
         match self.written.recv_timeout(patience) {
             Ok(Err(error)) => Err(torn(format!("{error}; it ends there")).next("see that the disk has room")),

@@ -189,7 +189,7 @@ fn a_log_that_the_disk_has_no_room_for_is_a_failure_of_the_command() {
         let options = format!("sim {drive} {option} {}", file.display());
         // Its heartbeat is sent each second (M joint manual, 5.11.1).
         let ended = on_a_full_disk("run 900s\\nquit\\n", &options);
-        assert!(ended.status == Some(1) && ended.err.contains("is not whole"), "{option}: {}", ended.err);
+        assert!(ended.status == Some(1) && ended.err.contains("is not complete"), "{option}: {}", ended.err);
     }
 }
 
