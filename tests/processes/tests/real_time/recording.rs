@@ -152,7 +152,7 @@ fn a_record_is_asked_for_in_words_that_make_sense() {
         assert!(ended.err.contains(part), "{arguments:?}: {part:?} in {}", ended.err);
     };
     refused(&["--record", "run.txt"], "NAME.mcap or NAME.csv");
-    refused(&["--record", "run.csv", "--record-period", "1us"], "a control period is 50us");
+    refused(&["--record", "run.csv", "--record-period", "1us"], "expected 50us or more: a control period");
     refused(&["--record-period", "1ms"], "--record <FILE>");
     let place = scratch("refused-record");
     let csv = place.join("run.csv");
