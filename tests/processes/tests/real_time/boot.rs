@@ -61,12 +61,12 @@ fn the_dcf_of_a_manager_says_who_is_booted_and_as_what() {
     // A configuration that is not there, and one that is cut short, before anybody is asked.
     std::fs::write(&path, manager(vendor, "nowhere.bin")).expect("a DCF");
     let ended = ferrodrive(&["boot", file]);
-    assert_eq!(ended.status, Some(2));
+    assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("nowhere.bin") && ended.err.contains("1F22h:04"), "{}", ended.err);
     std::fs::write(folder.join("wheel.bin"), [1, 0, 0, 0, 0x17, 0x10, 0, 2, 0, 0]).expect("half a stream");
     std::fs::write(&path, manager(vendor, "wheel.bin")).expect("a DCF");
     let ended = ferrodrive(&["boot", file]);
-    assert!(ended.status == Some(2) && ended.err.contains("node 4, is not whole"), "{}", ended.err);
+    assert!(ended.status == Some(1) && ended.err.contains("node 4, is not whole"), "{}", ended.err);
 }
 
 #[test]
@@ -98,6 +98,6 @@ fn a_machine_file_that_is_cut_short_is_refused_with_its_line_before_the_bus() {
         .expect("half a file");
     // No program listens there: the error is not about the bus.
     let ended = ferrodrive(&["--bus", "socketcand://127.0.0.1:1/can0", "boot", path.to_str().expect("UTF-8")]);
-    assert_eq!(ended.status, Some(2), "{}", ended.err);
+    assert_eq!(ended.status, Some(1), "{}", ended.err);
     assert!(ended.err.contains("machine.toml:6:") && !ended.err.contains("socketcand"), "{}", ended.err);
 }

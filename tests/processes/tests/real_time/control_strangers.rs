@@ -109,7 +109,7 @@ fn quit_ends_a_run_that_would_take_for_ever_in_the_end_and_at_once_if_said_twice
     for (n, is_ok) in [false, true, false, true].into_iter().enumerate() {
         assert_eq!(answers[n]["ok"], is_ok, "{answers:#?}");
     }
-    assert!(answers[0]["error"].as_str().unwrap().contains("the run was ended at"), "{answers:#?}");
+    assert!(answers[0]["error"]["message"].as_str().unwrap().contains("the run was ended at"), "{answers:#?}");
     assert_eq!(simulator.wait(), Some(0));
     assert_eq!((answer(waits.line())["ok"].clone(), waits.wait()), (json!(false), Some(0)));
 }

@@ -175,7 +175,7 @@ fn a_terminal_that_is_lost_stops_what_it_moves() {
 fn what_is_no_terminal_is_told_what_to_use() {
     let ended = ferrodrive(&["top"]);
     assert_eq!(ended.status, Some(2));
-    assert!(ended.err.contains("no terminal") && ended.err.contains("ferrodrive watch"), "{}", ended.err);
+    assert!(ended.err.contains("not a terminal") && ended.err.contains("ferrodrive watch"), "{}", ended.err);
     let json = ferrodrive(&["--json", "top"]);
     assert_eq!(json.status, Some(2));
     assert!(format!("{}{}", json.out, json.err).contains("for programs"), "{}{}", json.out, json.err);
