@@ -80,7 +80,7 @@ async fn the_scope_draws_any_object_that_passes() {
     level.send_keys("3000").await.expect("typed");
     stage.choose("#scope-window", "1").await;
     stage.choose("#trigger-mode", "once").await;
-    stage.says("#trigger-status", "waits").await;
+    stage.says("#trigger-status", "waiting").await;
     stage.click("#take").await;
     stage.find("#release").await;
     stage.click("#tabs [data-name=world]").await;
@@ -146,7 +146,7 @@ async fn the_scope_waits_for_its_trigger_and_measures_the_step() {
     stage.click("#tabs [data-name=scope]").await;
     stage.choose("#scope-window", "10").await;
     stage.choose("#trigger-mode", "once").await;
-    stage.says("#trigger-status", "waits").await;
+    stage.says("#trigger-status", "waiting").await;
     stage.click("#tabs [data-name=motion]").await;
     stage.click("#go-turn").await;
     stage.turns();
@@ -197,7 +197,7 @@ async fn measures_what_comes_each_millisecond(stage: &Stage) {
     // 0.1 r/min is a count.
     level.send_keys("100").await.expect("typed");
     stage.choose("#trigger-mode", "once").await;
-    stage.says("#trigger-status", "waits").await;
+    stage.says("#trigger-status", "waiting").await;
     stage.click("#tabs [data-name=motion]").await;
     stage.find("#velocity-ramp").await.send_keys("500").await.expect("typed");
     stage.click("#go-turn").await;
