@@ -294,7 +294,7 @@ fn a_dump_of_one_node_has_the_kernel_keep_back_the_others() {
     let mut dump = dump;
     let mut said = String::new();
     dump.child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
-    assert!(said.contains("kept back all but the identifiers of these nodes"), "{said}");
+    assert!(said.contains("filtered out all but the identifiers of these nodes"), "{said}");
     assert!(!said.contains("5: ") && !said.contains("of them shown"), "a frame of node 5 came through: {said}");
 }
 
