@@ -4,6 +4,7 @@ use core::fmt;
 use core::time::Duration;
 
 use can::Instant;
+use canopen::NodeId;
 use cia402::ModeOfOperation;
 
 use super::kinematics::{Geometry, Pose, Twist, Wheels};
@@ -11,13 +12,20 @@ use super::limits::{BaseError, BaseLimits};
 use super::state::StopCause;
 use crate::core::NodeSet;
 use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, Refusal};
-use crate::drive::{CONTROLWORD, Drive};
+
+use crate::drive::{CONTROLWORD, Drive, STANDSTILL_RPM};
 use crate::error::Error;
 use crate::network::{Claim, Exchange, Network};
 use crate::units::{Rpm, Turns};
 
 /// How long drives may take to be enabled, and to be without power again.
 const POWER_LIMIT: Duration = Duration::from_secs(5);
+
+/// How long both wheels are seen to stand before that is reported.
+const REST_TIME: Duration = Duration::from_millis(200);
+
+/// How long after the last set-point a wheel may take to show that it stands.
+const REST_LIMIT: Duration = Duration::from_secs(2);
 
 /// How long a wheel that is behind stays so, s: its speed is rounded to what its object counts, and that adds up.
 const LAG_MEMORY_S: f64 = 5.0;
@@ -303,11 +311,11 @@ impl Base {
         Err(BaseError::NotEnabled { limit: POWER_LIMIT, left, right })
     }
 
-    /// Brings the base to rest within its limits; it stays powered.
+    /// Brings the base to rest within its limits, until both wheels were seen to stand; it stays powered.
     ///
     /// # Errors
     /// As [`cycle`](Self::cycle); [`BaseError::Stopped`], once it has been commanded to speed 0, where a wheel was lost
-    /// before or on the way to rest.
+    /// before or on the way to rest; [`BaseError::StillTurns`] for a wheel that does not come to rest.
     pub async fn stop(&mut self) -> Result<(), BaseError> {
         self.wanted = Twist::default();
         // From the highest speed, and some cycles.
@@ -317,7 +325,27 @@ impl Base {
                 break;
             }
         }
-        self.lost_wheel().map_or(Ok(()), |cause| Err(BaseError::Stopped(cause)))
+        // A wheel follows its set-point some time later, its speed is a mean, and it may swing through 0.
+        let mut standing = 0;
+        for _ in 0..self.cycles(REST_LIMIT) {
+            if self.lost_wheel().is_some() || standing >= self.cycles(REST_TIME) {
+                break;
+            }
+            self.cycle().await?;
+            standing = if self.turning().is_none() { standing + 1 } else { 0 };
+        }
+        match (self.lost_wheel(), self.turning()) {
+            (Some(cause), _) => Err(BaseError::Stopped(cause)),
+            (None, Some((node, rpm))) => Err(BaseError::StillTurns { node, rpm, limit: REST_LIMIT }),
+            (None, None) => Ok(()),
+        }
+    }
+
+    /// A wheel that shows a speed, in r/min.
+    fn turning(&self) -> Option<(NodeId, f64)> {
+        let speed = |wheel: &Wheel| wheel.shows.and_then(|shown| shown.velocity).map_or(0.0, |Rpm(speed)| speed);
+        let turning = self.wheels.iter().find(|wheel| speed(wheel).abs() >= STANDSTILL_RPM)?;
+        Some((turning.drive.node(), speed(turning)))
     }
 
     /// Asks the wheel that stopped the base what is the matter with it: its fault with its text, or what it is missing. The
@@ -352,11 +380,15 @@ impl Base {
         let off = if matches!(stopped, Err(BaseError::NoCycle(_))) { Ok(()) } else { self.switch_off().await };
         self.network.sync(None);
         let nodes: NodeSet = self.drives.iter().map(|drive| drive.node().id()).collect();
-        let heard = self.wheels.iter().filter(|wheel| wheel.shows.is_some_and(|shown| shown.statusword.is_some()));
-        let coasting = self.network.stop_moved(heard.map(|wheel| wheel.drive.node()).collect()).await;
+        // One that is not heard is not asked again, which would take its time; that it was not seen to stand is the error.
+        let is_heard = |wheel: &&Wheel| wheel.shows.is_some_and(|shown| shown.statusword.is_some());
+        let (heard, unseen): (Vec<_>, Vec<_>) = self.wheels.iter().partition(is_heard);
+        let unseen = unseen.first().map(|wheel| BaseError::NotSeen { node: wheel.drive.node() });
+        let coasting = self.network.stop_moved(heard.iter().map(|wheel| wheel.drive.node()).collect()).await;
         let released = self.network.release_guards(nodes).await;
         stopped.and(off)?;
         coasting.into_iter().try_for_each(|stopped| stopped.outcome.map(drop))?;
+        unseen.map_or(Ok(()), Err)?;
         Ok(released?)
     }
 

@@ -18,6 +18,15 @@ pub(super) const PERIODS: core::ops::RangeInclusive<Duration> = Duration::from_m
 /// Why a group cannot be made, or did not do what it should.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum GroupError {
+    /// A drive is not heard, so that it was not seen to stand.
+    #[error(
+        "node {node} is not heard and was not seen to stand: it may still be moving. It stops by its own watch over its host, if it \
+         has one; take its power by the emergency stop if it must not move"
+    )]
+    NotSeen {
+        /// The node.
+        node: NodeId,
+    },
     /// A group without axes.
     #[error("a group needs at least one axis")]
     NoAxis,

@@ -254,11 +254,15 @@ impl Group {
         let disabled = self.disable().await;
         self.network.sync(None);
         let nodes: NodeSet = self.drives.iter().map(|drive| drive.node().id()).collect();
-        let heard = self.runner.axes.iter().zip(&self.runner.states).filter(|(_, state)| state.statusword.is_some());
-        let coasting = self.network.stop_moved(heard.map(|(axis, _)| axis.drive.node()).collect()).await;
+        // One that is not heard is not asked again, which would take its time; that it was not seen to stand is the error.
+        let axes = self.runner.axes.iter().zip(&self.runner.states);
+        let (heard, unseen): (Vec<_>, Vec<_>) = axes.partition(|(_, state)| state.statusword.is_some());
+        let unseen = unseen.first().map(|(axis, _)| GroupError::NotSeen { node: axis.drive.node() });
+        let coasting = self.network.stop_moved(heard.iter().map(|(axis, _)| axis.drive.node()).collect()).await;
         let released = self.network.release_guards(nodes).await;
         disabled?;
         coasting.into_iter().try_for_each(|stopped| stopped.outcome.map(drop))?;
+        unseen.map_or(Ok(()), Err)?;
         Ok(released?)
     }
 
