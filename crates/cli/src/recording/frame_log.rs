@@ -145,6 +145,6 @@ mod tests {
             log.write(batch(second));
         }
         let failure = log.finish(SOON).unwrap_err();
-        assert_eq!((failure.what.as_str(), failure.kind), ("the log is not whole", "file"), "{failure:?}");
+        assert_eq!((failure.what.as_str(), failure.kind), ("the log is not complete", "file"), "{failure:?}");
     }
 }
