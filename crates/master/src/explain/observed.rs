@@ -10,7 +10,7 @@ use devices::{AxisDescription, Description, HostWatch, Meaning, PowerStyle, Quan
 use super::overheard::Overheard;
 use crate::core::Twins;
 use crate::decode::common_row;
-use crate::drive::{Drive, faults_in};
+use crate::drive::{Drive, STANDSTILL_RPM, faults_in};
 use crate::error::Error;
 use crate::pdo::PdoConfig;
 
@@ -291,9 +291,6 @@ impl Observed {
         self.row(mux).map_or_else(|| mux.to_string(), |row| format!("{mux} {}", row.name))
     }
 }
-
-/// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
-const STANDSTILL_RPM: f64 = 1.0;
 
 async fn measure(drive: &Drive, quantity: Option<Quantity>) -> Result<Option<f64>, Error> {
     match quantity {
