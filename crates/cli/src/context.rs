@@ -17,7 +17,7 @@ use crate::frames::tap::Traffic;
 use crate::global::Global;
 use crate::progress::Progress;
 use crate::remembered::Remembered;
-use studio::{Wire, WorldDoor};
+use host::{Wire, WorldDoor};
 use testbench::machine_file::{self, Machine};
 use testbench::models::{self, Description};
 

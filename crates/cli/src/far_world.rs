@@ -2,8 +2,8 @@
 //!
 //! A thread of its own asks and waits. When the simulator has gone, it ends, and requests are answered that there is no world.
 
+use host::{Around, Changed, WorldDoor};
 use serde_json::{Value, json};
-use studio::{Around, Changed, WorldDoor};
 use testbench::around;
 
 use crate::control_client::{ControlArgs, ControlClient};
@@ -12,7 +12,7 @@ use crate::failure::Failure;
 /// Connects, and gives where to ask.
 pub(crate) fn open(control: &ControlArgs) -> Result<WorldDoor, Failure> {
     let mut far = FarWorld { client: control.connect()?, gone: false };
-    let (door, mut asks) = studio::world_door();
+    let (door, mut asks) = host::world_door();
     std::thread::spawn(move || while !far.gone && asks.answer_next(&mut far) {});
     Ok(door)
 }

@@ -33,6 +33,7 @@
 //! | test software against virtual drives | [`sim::World`], [`sim::block_on`] |
 //! | describe a machine in a file | [`testbench::machine_file`] |
 //! | move drives, virtual or real | [`master::Drive`], [`master::Network`] |
+//! | let several people or programs move drives, each held by what it shows of life | [`host::Host`], [`studio::app`] |
 //! | reach a bus: socketcand, slcan, a log | [`transport::BusSpec`], [`transport::run_station`] |
 //! | serve a virtual bus to other programs | [`transport::Hub`], [`transport::run_world`] |
 //! | know what a device is: objects, units, faults | [`devices::Description`] |
@@ -48,4 +49,7 @@
 //! `ARCHITECTURE.md` shows how the crates fit together.
 
 #[doc(inline)]
-pub use {can, canopen, cia402, devices, drives, eds, master, motion, plant, showcase, sim, testbench, transport};
+pub use {
+    can, canopen, cia402, devices, drives, eds, host, master, motion, plant, plot, showcase, sim, studio, testbench,
+    transport,
+};

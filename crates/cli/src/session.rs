@@ -10,9 +10,9 @@ use std::time::Duration;
 
 use can::{Instant, Station};
 use canopen::NodeId;
+use host::{Wire, WorldDoor};
 use master::Network;
 use master::drive::{HostLoss, Stopped};
-use studio::{Wire, WorldDoor};
 use tokio::sync::Notify;
 use transport::realtime::{self, RealTimeError};
 use transport::{AnyBus, BusError, BusNotes, BusSpec, BusThread, BusThreadError, Note, WallClock, run_station};

@@ -1,6 +1,6 @@
 //! What a bus says beside frames, kept for display.
 
-use studio::Wire;
+use host::Wire;
 use transport::{ControllerState, Note};
 
 /// Takes a note of the bus down.
@@ -36,7 +36,7 @@ const fn word(state: ControllerState) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use studio::Health;
+    use host::Health;
     use transport::{ErrorCounters, ErrorFrame};
 
     use super::*;

@@ -6,9 +6,9 @@
 use std::time::Duration;
 
 use can::{Frame, Instant};
+use host::{Around, Changed, Wire, WorldAsks, WorldDoor};
 use sim::pace::Pace;
 use sim::{StationId, World, WorldError};
-use studio::{Around, Changed, Wire, WorldAsks, WorldDoor};
 use testbench::around;
 use transport::{AsyncBus, BusError, Received, WallClock};
 
@@ -33,7 +33,7 @@ impl WorldBus {
     pub(crate) fn new(mut world: World, clock: &WallClock, wire: Wire) -> (Self, WorldDoor) {
         let probe = world.add_probe();
         let pace = Pace::real_time(world.now()).rebased(elapsed(clock), world.now());
-        let (door, asks) = studio::world_door();
+        let (door, asks) = host::world_door();
         (Self { world, probe, clock: clock.clone(), pace, asks, wire }, door)
     }
 

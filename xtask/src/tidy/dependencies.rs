@@ -43,7 +43,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "testbench",
         &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives", "sim", "master", "plot"],
     ),
-    ("studio", &["can", "canopen", "cia402", "devices", "master", "testbench"]),
+    ("host", &["can", "canopen", "cia402", "devices", "master", "testbench"]),
+    ("studio", &["can", "canopen", "cia402", "devices", "host", "master", "testbench"]),
     ("python", &["can", "canopen", "cia402", "devices", "eds", "master", "sim", "testbench", "transport"]),
     (
         "cli",

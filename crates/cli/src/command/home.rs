@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use cia402::ModeOfOperation;
-use master::drive::HomingOptions;
+use master::drive::{Manner, Motion};
 use master::units::{Along, Rpm, parse_duration};
 
-use super::motion::{MotionOutcome, Then, outcome, shown_while, speed};
+use super::motion::{MotionOutcome, Then, outcome, perform, speed};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::GuardArgs;
@@ -51,11 +51,14 @@ impl Home {
             return Err(self.refusal(model, axis));
         }
         let doing = format!("node {}: searching its reference", self.node);
-        context.progress.show(&doing);
-        let speed = self.profile_velocity.map(|speed| drive.turning(speed)).transpose()?;
-        let options = HomingOptions { speed, limit: self.within, wait: !self.no_wait };
-        let guard = self.guard.begin(context, &drive).await?;
-        let motion = shown_while(context, &drive, &doing, drive.home(self.method, options)).await?;
+        let manner = Manner {
+            speed: self.profile_velocity,
+            within: Some(self.within),
+            wait: !self.no_wait,
+            ..Manner::default()
+        };
+        let command = Motion::Home { method: self.method, manner };
+        let (motion, guard) = perform(context, &drive, &doing, &self.guard, &command).await?;
         let then = Then::goes_on_if(motion.reached_after.is_none());
         outcome(context, &drive, ("home with method", &self.method), motion, then, guard).await
     }

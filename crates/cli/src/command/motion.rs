@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use devices::{Quantity, Ramps, Scale};
-use master::drive::{Commanded, Drive, MotionOptions, MotionReport, Note};
+use master::drive::{Commanded, Drive, Manner, MotionReport, Note};
 use master::units::{Along, Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
 use serde::Serialize;
 
@@ -174,12 +174,9 @@ impl Velocity {
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
         let doing = format!("node {}: to {}", self.node, self.speed);
-        context.progress.show(&doing);
-        let guard = self.ramps.guard.begin(context, &drive).await?;
-        let speed = drive.turning(self.speed)?;
-        let turning = drive.velocity(speed, self.ramps.options(&drive, None)?);
-        let motion = shown_while(context, &drive, &doing, turning).await?;
-        let then = self.duration.map_or(Then::goes_on_if(speed.0 != 0.0), Then::StopAfter);
+        let command = master::drive::Motion::Velocity(self.speed, self.ramps.manner(None));
+        let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &command).await?;
+        let then = self.duration.map_or(Then::goes_on_if(!stands_at(&self.speed)), Then::StopAfter);
         outcome(context, &drive, ("turn at", &self.speed), motion, then, guard).await
     }
 }
@@ -188,17 +185,11 @@ impl Move {
     /// Moves.
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
-        let options = self.ramps.options(&drive, self.profile_velocity)?;
-        let position = drive.turning(self.position)?;
         let verb = if self.relative { "move by" } else { "move to" };
         let doing = format!("node {}: {verb} {}", self.node, self.position);
-        context.progress.show(&doing);
-        let guard = self.ramps.guard.begin(context, &drive).await?;
-        let motion = if self.relative {
-            shown_while(context, &drive, &doing, drive.move_relative(position, options)).await?
-        } else {
-            shown_while(context, &drive, &doing, drive.move_absolute(position, options)).await?
-        };
+        let manner = self.ramps.manner(self.profile_velocity);
+        let command = master::drive::Motion::Move { to: self.position, relative: self.relative, manner };
+        let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &command).await?;
         let then = Then::goes_on_if(motion.reached_after.is_none());
         outcome(context, &drive, (verb, &self.position), motion, then, guard).await
     }
@@ -208,24 +199,44 @@ impl Torque {
     /// Pushes.
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
-        let guard = self.guard.begin(context, &drive).await?;
-        let motion = drive.torque(self.current).await?;
+        let doing = format!("node {}: applying {}", self.node, self.current);
+        let command = master::drive::Motion::Torque(self.current);
+        let (motion, guard) = perform(context, &drive, &doing, &self.guard, &command).await?;
         let then = self.duration.map_or(Then::goes_on_if(self.current.0 != 0.0), Then::StopAfter);
         outcome(context, &drive, ("apply", &self.current), motion, then, guard).await
     }
 }
 
 impl RampArgs {
-    fn options(&self, drive: &Drive, speed: Option<Along<Rpm>>) -> Result<MotionOptions, Failure> {
-        let ramp = |wish: Option<Along<Ramp>>| wish.map(|wish| drive.turning(wish)).transpose();
-        Ok(MotionOptions {
-            speed: speed.map(|wish| drive.turning(wish)).transpose()?,
-            acceleration: ramp(self.acceleration)?,
-            deceleration: ramp(self.deceleration)?,
+    fn manner(&self, speed: Option<Along<Rpm>>) -> Manner {
+        Manner {
+            speed,
+            acceleration: self.acceleration,
+            deceleration: self.deceleration,
             wait: !self.no_wait,
             within: self.within,
-        })
+        }
     }
+}
+
+/// Whether a motor that turns at this speed stands.
+fn stands_at(speed: &Along<Rpm>) -> bool {
+    matches!(speed, Along::Turning(Rpm(value)) | Along::Metres(value) if *value == 0.0)
+}
+
+/// Carries out a command that moves a drive, which is guarded first, and shows meanwhile what it is doing.
+pub(super) async fn perform(
+    context: &Context,
+    drive: &Drive,
+    doing: &str,
+    guard: &GuardArgs,
+    command: &master::drive::Motion,
+) -> Result<(MotionReport, Guard), Failure> {
+    drive.check_motion(command)?;
+    context.progress.show(doing);
+    let guard = guard.begin(context, drive).await?;
+    let report = shown_while(context, drive, doing, drive.make(command)).await?;
+    Ok((report, guard))
 }
 
 /// How often a motion that goes on is shown to a person who waits at a terminal.

@@ -10,8 +10,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use can::Bitrate;
 use canopen::NodeId;
+use host::{Host, Journals, Setting};
 use serde::Serialize;
-use studio::{Access, AccessError, Host, Journals, Password, Setting, Token};
+use studio::{Access, AccessError, Password, Token};
 use testbench::parameters::journal::Journal;
 use tokio::net::TcpListener;
 use transport::BusSpec;
@@ -156,9 +157,9 @@ pub(super) fn setting(context: &Context) -> Setting {
 }
 
 /// The next frame that has passed, for the host.
-pub(super) fn passed(context: &Context) -> Option<studio::BusFrame> {
+pub(super) fn passed(context: &Context) -> Option<host::BusFrame> {
     let passed = context.traffic.take_passed()?;
-    Some(studio::BusFrame { at: passed.at, frame: passed.frame, own: passed.own })
+    Some(host::BusFrame { at: passed.at, frame: passed.frame, own: passed.own })
 }
 
 /// Journals in the working folder, as `params apply` keeps them. A virtual bus of this command ends with it.

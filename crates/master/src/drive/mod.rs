@@ -6,6 +6,7 @@
 //! never asked for. Without a description only what the standard fixes is offered.
 //! While a motion is supervised, the polling keeps the drive's watch over its host content.
 
+mod command;
 mod conclude;
 mod everything;
 mod explain;
@@ -26,6 +27,7 @@ mod store;
 pub use crate::error::{Explanation, Fact};
 pub use crate::host_loss::HostLoss;
 pub use crate::limits::{Limits, Setting};
+pub use command::{Command, Manner, Motion, ParseCommandError, Report};
 pub(crate) use conclude::Trigger;
 pub use everything::{StopWay, StoppedAxis};
 pub use explain::faults_in;

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use devices::Description;
-use master::drive::{Drive, MotionOptions, MotionReport};
-use master::units::{Degrees, Ramp, Rpm};
+use master::drive::{Command, Drive, Manner, Motion, MotionReport, Report};
+use master::units::{Along, Angle, Degrees, Ramp, Rpm};
 use master::{Elapsed, Error, Network, Node, join_all};
 
 use crate::bench::Bench;
@@ -33,42 +33,13 @@ const WINDING_DECAY: Duration = Duration::from_millis(40);
 /// How near to a target a shaft comes to rest: the coarsest of the three is in place within 30 of 4096 counts.
 const IN_PLACE_DEG: f64 = 30.0 / 4096.0 * 360.0;
 
-/// What is asked of all drives at once.
-#[derive(Clone, Copy)]
-enum Intent {
-    Turn(Rpm),
-    KeepTurning(Duration),
-    Stop,
-    By(Degrees),
-    To(Degrees),
-    Disable,
+fn to_angle(degrees: f64) -> Along<Angle> {
+    Along::Turning(Angle::from(Degrees(degrees)))
 }
 
-impl Intent {
-    async fn of(self, drive: &Drive) -> Result<Option<MotionReport>, Error> {
-        let ramp = Some(Ramp::RpmPerSecond(RAMP_RPM_S));
-        let options =
-            MotionOptions { speed: Some(SPEED), acceleration: ramp, deceleration: ramp, ..MotionOptions::default() };
-        match self {
-            Self::Turn(speed) => drive.velocity(speed, MotionOptions { speed: None, ..options }).await.map(Some),
-            Self::KeepTurning(time) => drive.supervise(time).await.map(|()| None),
-            Self::Stop => drive.stop().await.map(|()| None),
-            Self::By(angle) => drive.move_relative(angle, options).await.map(Some),
-            Self::To(angle) => drive.move_absolute(angle, options).await.map(Some),
-            Self::Disable => drive.disable().await.map(|_| None),
-        }
-    }
-
-    fn text(self) -> String {
-        match self {
-            Self::Turn(speed) => format!("turn at {:.0} r/min", speed.0),
-            Self::KeepTurning(time) => format!("for {:.0} s", time.as_secs_f64()),
-            Self::Stop => "stop".into(),
-            Self::By(angle) => format!("move by {:.0}°", angle.0),
-            Self::To(angle) => format!("move to {:.0}°", angle.0),
-            Self::Disable => "disable".into(),
-        }
-    }
+fn manner(speed: Option<Rpm>) -> Manner {
+    let ramp = Some(Ramp::RpmPerSecond(RAMP_RPM_S).into());
+    Manner { speed: speed.map(Along::from), acceleration: ramp, deceleration: ramp, ..Manner::default() }
 }
 
 /// The master's drives.
@@ -120,26 +91,26 @@ fn node_id(number: u8) -> NodeId {
 
 impl Fleet {
     /// Asks all of them at once; their answers in words, and the times of those that reached a target.
-    fn ask(&self, bench: &mut Bench, intent: Intent) -> Vec<(String, f64)> {
-        let calls = join_all(self.drives.iter().map(|drive| intent.of(drive)));
+    fn ask(&self, bench: &mut Bench, command: Command) -> Vec<(String, f64)> {
+        let calls = join_all(self.drives.iter().map(|drive| drive.perform(&command)));
         let Ok(answers) = sim::block_on_for(bench.world(), LIMIT, calls) else { return Vec::new() };
-        let words = |answer: Result<Option<MotionReport>, Error>| match answer {
-            Ok(report) => match report.and_then(|report| report.reached_after) {
-                Some(after) => (format!("reached after {:.2} s", after.as_secs_f64()), after.as_secs_f64()),
-                None => ("done".into(), f64::NAN),
-            },
+        let words = |answer: Result<Report, Error>| match answer {
+            Ok(Report::Moved(MotionReport { reached_after: Some(after), .. })) => {
+                (format!("reached after {:.2} s", after.as_secs_f64()), after.as_secs_f64())
+            }
+            Ok(_) => ("done".into(), f64::NAN),
             Err(error) => (error.to_string(), f64::NAN),
         };
         answers.into_iter().map(words).collect()
     }
 
     /// A row for each drive, with what it answered.
-    fn rows(&self, bench: &mut Bench, intent: Intent, check: impl Fn(&mut Bench, usize, f64)) {
-        bench.mark(intent.text(), EventKind::Note);
-        let answers = self.ask(bench, intent);
+    fn rows(&self, bench: &mut Bench, what: &str, command: impl Into<Command>, check: impl Fn(&mut Bench, usize, f64)) {
+        bench.mark(what.to_owned(), EventKind::Note);
+        let answers = self.ask(bench, command.into());
         for place in 0..self.drives.len() {
             let (node, title) = (bench.drives()[place].1, bench.drives()[place].0.title);
-            bench.step(format!("{title}: {}", intent.text()));
+            bench.step(format!("{title}: {what}"));
             let (words, after_s) = answers.get(place).cloned().unwrap_or_else(|| ("nothing in time".into(), f64::NAN));
             let ok = words.starts_with("reached") || words == "done";
             bench.asked(format!("node {node}"));
@@ -151,8 +122,16 @@ impl Fleet {
         }
     }
 
+    /// Leaves all of them turning for a time.
+    fn keep_turning(&self, bench: &mut Bench, time: Duration) {
+        let calls = join_all(self.drives.iter().map(|drive| drive.supervise(time)));
+        // One that does not turn shows in the way that is measured.
+        let _ = sim::block_on_for(bench.world(), LIMIT, calls);
+    }
+
     fn turn(&self, bench: &mut Bench, before_rpm: f64, rpm: f64) {
-        self.rows(bench, Intent::Turn(Rpm(rpm)), |bench, place, after_s| {
+        let turn = Motion::Velocity(Rpm(rpm).into(), manner(None));
+        self.rows(bench, &format!("turn at {rpm:.0} r/min"), turn, |bench, place, after_s| {
             let seen = report(bench, place).velocity_rpm;
             bench.moved(format!("{seen:+.1} r/min"));
             // The master takes 5 % off as reached, and looks each 10 ms.
@@ -162,7 +141,7 @@ impl Fleet {
         let from: Vec<f64> = (0..self.drives.len()).map(|place| angle_deg(bench, place)).collect();
         let (time, begin) = (Duration::from_secs(1), bench.now());
         // The drives are left alone together, so that the way of each is that of one stretch of time.
-        self.ask(bench, Intent::KeepTurning(time));
+        self.keep_turning(bench, time);
         let time_s = (bench.now() - begin).as_secs_f64();
         for (place, from) in from.iter().enumerate() {
             let title = bench.drives()[place].0.title;
@@ -175,7 +154,7 @@ impl Fleet {
     }
 
     fn stop(&self, bench: &mut Bench) {
-        self.rows(bench, Intent::Stop, |bench, place, _| {
+        self.rows(bench, "stop", Command::Stop, |bench, place, _| {
             let seen = report(bench, place).velocity_rpm;
             bench.moved(format!("{seen:+.1} r/min"));
             bench.expect("speed", Expect::Near(0.0, 2.0), "r/min", seen);
@@ -184,7 +163,8 @@ impl Fleet {
 
     fn go_by(&self, bench: &mut Bench, angle: f64) {
         let from: Vec<f64> = (0..self.drives.len()).map(|place| angle_deg(bench, place)).collect();
-        self.rows(bench, Intent::By(Degrees(angle)), |bench, place, after_s| {
+        let by = Motion::Move { to: to_angle(angle), relative: true, manner: manner(Some(SPEED)) };
+        self.rows(bench, &format!("move by {angle:.0}°"), by, |bench, place, after_s| {
             let seen = angle_deg(bench, place) - from[place];
             bench.moved(format!("{seen:+.1}°"));
             bench.expect("way", Expect::Near(angle, IN_PLACE_DEG), "°", seen);
@@ -194,7 +174,8 @@ impl Fleet {
 
     fn go_to(&self, bench: &mut Bench, angle: f64) {
         let from: Vec<f64> = (0..self.drives.len()).map(|place| angle_deg(bench, place)).collect();
-        self.rows(bench, Intent::To(Degrees(angle)), |bench, place, after_s| {
+        let to = Motion::Move { to: to_angle(angle), relative: false, manner: manner(Some(SPEED)) };
+        self.rows(bench, &format!("move to {angle:.0}°"), to, |bench, place, after_s| {
             let seen = angle_deg(bench, place);
             bench.moved(format!("{:+.1}°", seen - from[place]));
             bench.expect("at", Expect::Near(angle, IN_PLACE_DEG), "°", seen);
@@ -203,7 +184,7 @@ impl Fleet {
     }
 
     fn disable(&self, bench: &mut Bench) {
-        self.rows(bench, Intent::Disable, |bench, place, _| {
+        self.rows(bench, "disable", Command::Disable, |bench, place, _| {
             bench.run_silently(WINDING_DECAY);
             let current = report(bench, place).current_a;
             bench.expect("current", Expect::Near(0.0, 0.05), "A", current);

@@ -33,11 +33,11 @@ use serde_json::json;
 use tokio::sync::Semaphore;
 
 use crate::access::Access;
-use crate::handle::HostHandle;
 use answer::{json_text, trouble};
 use door::Visitor;
 pub use door::serve;
 use guessers::Guessers;
+use host::HostHandle;
 use openapi::{Operation, ROUTES};
 
 /// The largest message or body that is read.

@@ -15,9 +15,10 @@ use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{mpsc, oneshot};
 
 use crate::access::{is_same, secret};
-use crate::handle::{HostHandle, Session};
-use crate::host::{JOG_SPAN, PRESENCE_SPAN};
-use crate::message::{Answer, Command, Malformed, Message};
+use crate::message::{Malformed, Message};
+use host::session::{HostHandle, Session};
+use host::{Answer, Command};
+use host::{JOG_SPAN, PRESENCE_SPAN};
 
 /// Pending requests per page.
 const UNDER_WAY: usize = 64;
@@ -89,7 +90,7 @@ fn take(text: &str, session: &Session, word: &str, is_full: bool) -> Result<ones
         return Err(Answer::failed(Some(seq), "foreign_session", text));
     }
     // A stop is always accepted.
-    if is_full && command != (Command::StopAll {}) {
+    if is_full && command != Command::STOP_ALL {
         return Err(Answer::failed(
             Some(seq),
             "busy",

@@ -20,10 +20,10 @@ use tower::ServiceExt;
 use super::door::Visitor;
 use super::{LARGEST_MESSAGE, ROUTES, app, openapi, serve};
 use crate::access::{Access, Password};
-use crate::authority::Authority;
-use crate::handle::{HostHandle, Inbox, Request as HostRequest, StateUpdate, channel};
-use crate::message::Answer;
-use crate::trace::{BusFrame, Origin, Trace};
+use host::Answer;
+use host::session::Authority;
+use host::session::{HostHandle, Inbox, Request as HostRequest, StateUpdate, channel};
+use host::trace::{BusFrame, Origin, Trace};
 
 /// A watchdog against hangs.
 const PATIENCE: Duration = Duration::from_secs(600);

@@ -14,8 +14,8 @@ use futures_util::stream;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::answer::{json_text, trouble};
-use crate::handle::HostHandle;
-use crate::trace::{Asked, AskedSeries, Held, Query};
+use host::HostHandle;
+use host::trace::{Asked, AskedSeries, Held, Query};
 
 /// Readers whose lines are decoded at the same time; others wait their turn. However many read, a second core is free for
 /// the task that moves drives.

@@ -8,22 +8,16 @@ use std::time::Duration;
 use can::Frame;
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{NmtCommand, NodeId};
-use master::Drive;
-use master::drive::{HomingOptions, MotionOptions};
+use master::drive::{self, ParseCommandError};
 use master::pdo::TransmissionType;
-use master::units::{Along, Amperes, Angle, Ramp, Rpm, parse_duration};
+use master::units::parse_duration;
 use sim::Place;
 
 use super::condition::Condition;
 use crate::words::object::{ObjectArg, object};
 
-/// Every form of a line of a host, for messages and the manual.
-pub const FORMS: &[&str] = &[
-    "NODE enable|disable|stop|quick-stop|reset|save|restore|guard|release",
-    "NODE velocity SPEED [acceleration RAMP] [deceleration RAMP] [no-wait]",
-    "NODE move [by] POSITION [at SPEED] [acceleration RAMP] [deceleration RAMP] [no-wait]",
-    "NODE torque CURRENT",
-    "NODE home METHOD [at SPEED] [within TIME] [no-wait]",
+/// The forms of a line of a host beside `NODE COMMAND`, whose forms are those of a [drive's](drive::Command::FORMS).
+const FORMS: &[&str] = &[
     "NODE read OBJECT",
     "NODE write OBJECT VALUE",
     "NODE pdo map rpdo|tpdo NUMBER OBJECT.. [type TYPE]",
@@ -39,40 +33,25 @@ pub const FORMS: &[&str] = &[
     "wait for CONDITION [within TIME]",
 ];
 
+/// Every form of a line of a host, for messages and the manual.
+pub fn forms() -> impl Iterator<Item = String> {
+    let of_drive = drive::Command::FORMS.iter().map(|form| format!("NODE {form}"));
+    of_drive.chain(FORMS.iter().map(|form| (*form).to_owned()))
+}
+
+/// Those that begin so, as a list in a message.
+fn forms_of(start: &str) -> String {
+    forms().filter(|form| form.starts_with(start)).collect::<Vec<_>>().join("; ")
+}
+
 /// How long a condition is waited for by default.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// One thing that a host does.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
-    /// An intent without a value.
-    Drive(Place, Intent),
-    /// Turns at a speed.
-    Velocity(Place, Along<Rpm>, Manner),
-    /// Turns to a position, or by an angle.
-    Move {
-        /// Which axis.
-        place: Place,
-        /// Where to.
-        to: Along<Angle>,
-        /// By so much from the last target.
-        relative: bool,
-        /// How.
-        manner: Manner,
-    },
-    /// Pushes with a current.
-    Torque(Place, Amperes),
-    /// Finds the reference position.
-    Home {
-        /// Which axis.
-        place: Place,
-        /// The method of CiA 402.
-        method: i8,
-        /// How long it may take; the master's own limit without it.
-        within: Option<Duration>,
-        /// How.
-        manner: Manner,
-    },
+    /// A command to a drive.
+    Drive(Place, drive::Command),
     /// Uploads an object.
     Read(NodeId, ObjectArg),
     /// Downloads an object.
@@ -95,45 +74,6 @@ pub enum Command {
     WaitFor(Condition, Duration),
 }
 
-/// The options of a motion, as typed: along a way too, which becomes a rotation by the [gear](Drive::gear) of a drive.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Manner {
-    /// Largest speed on the way.
-    pub speed: Option<Along<Rpm>>,
-    /// How fast the speed may rise.
-    pub acceleration: Option<Along<Ramp>>,
-    /// How fast the speed may fall.
-    pub deceleration: Option<Along<Ramp>>,
-    /// The next line does not wait for the end of it.
-    pub no_wait: bool,
-}
-
-impl Manner {
-    /// The same for this drive.
-    ///
-    /// # Errors
-    /// [`master::Error::NoFeed`] for a way, where nothing says how far a turn of the output moves something.
-    pub fn motion(&self, drive: &Drive) -> Result<MotionOptions, master::Error> {
-        let ramp = |wish: Option<Along<Ramp>>| wish.map(|wish| drive.turning(wish)).transpose();
-        Ok(MotionOptions {
-            speed: self.speed.map(|wish| drive.turning(wish)).transpose()?,
-            acceleration: ramp(self.acceleration)?,
-            deceleration: ramp(self.deceleration)?,
-            wait: !self.no_wait,
-            ..MotionOptions::default()
-        })
-    }
-
-    /// The same for a homing that may take this long.
-    ///
-    /// # Errors
-    /// As [`motion`](Self::motion).
-    pub fn homing(&self, drive: &Drive, within: Option<Duration>) -> Result<HomingOptions, master::Error> {
-        let MotionOptions { speed, wait, .. } = self.motion(drive)?;
-        Ok(HomingOptions { speed, wait, limit: within.unwrap_or(HomingOptions::default().limit) })
-    }
-}
-
 /// What is done with process data.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PdoCommand {
@@ -146,41 +86,6 @@ pub enum PdoCommand {
     /// What the TPDOs have brought of an object last.
     Read(ObjectArg),
 }
-
-/// An intent without a value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Intent {
-    /// To operation enabled.
-    Enable,
-    /// To switched on or below.
-    Disable,
-    /// Stops with the ramp of the mode.
-    Stop,
-    /// Quick stop.
-    QuickStop,
-    /// Resets a fault.
-    Reset,
-    /// Stores the parameters.
-    Save,
-    /// Restores the factory's.
-    Restore,
-    /// Has the drive stop when this host falls silent.
-    Guard,
-    /// No more of that.
-    Release,
-}
-
-const INTENTS: [(&str, Intent); 9] = [
-    ("enable", Intent::Enable),
-    ("disable", Intent::Disable),
-    ("stop", Intent::Stop),
-    ("quick-stop", Intent::QuickStop),
-    ("reset", Intent::Reset),
-    ("save", Intent::Save),
-    ("restore", Intent::Restore),
-    ("guard", Intent::Guard),
-    ("release", Intent::Release),
-];
 
 const NMT: [(&str, NmtCommand); 5] = [
     ("start", NmtCommand::Start),
@@ -215,7 +120,7 @@ impl FromStr for Command {
             ["wait", duration] => Ok(Self::Wait(time(duration)?)),
             ["all", "nmt", command] => Ok(Self::Nmt(None, nmt(command)?)),
             [place, ref rest @ ..] if place.parse::<Place>().is_ok() => of_node(place, rest),
-            _ => Err(format!("'{line}' is not a host command; expected one of: {}", FORMS.join("; "))),
+            _ => Err(format!("'{line}' is not a host command; expected one of: {}", forms_of(""))),
         }
     }
 }
@@ -224,10 +129,6 @@ fn of_node(place_word: &str, words: &[&str]) -> Result<Command, String> {
     let place: Place = place_word.parse().map_err(|()| format!("'{place_word}' is not a node"))?;
     let id = || node(&place.node.to_string());
     match *words {
-        [word] if INTENTS.iter().any(|(name, _)| *name == word) => {
-            let found = INTENTS.iter().find(|(name, _)| *name == word);
-            found.map(|(_, intent)| Command::Drive(place, *intent)).ok_or_else(|| unknown(words))
-        }
         ["nmt", command] => Ok(Command::Nmt(Some(id()?), nmt(command)?)),
         ["watch", period] => Ok(Command::Watch(id()?, time(period)?)),
         ["read", name] => Ok(Command::Read(id()?, object(name)?)),
@@ -235,21 +136,13 @@ fn of_node(place_word: &str, words: &[&str]) -> Result<Command, String> {
         ["write", name, ref value @ ..] if !value.is_empty() => {
             Ok(Command::Write(id()?, object(name)?, value.join(" ")))
         }
-        ["velocity", speed, ref rest @ ..] => {
-            let (manner @ Manner { speed: None, .. }, None) = manner(rest)? else { return Err(unknown(words)) };
-            Ok(Command::Velocity(place, quantity(speed)?, manner))
-        }
-        ["move", "by", to, ref rest @ ..] => movement(place, to, true, rest),
-        ["move", to, ref rest @ ..] => movement(place, to, false, rest),
-        ["torque", current] => Ok(Command::Torque(place, quantity::<Amperes>(current)?)),
-        ["home", method, ref rest @ ..] => {
-            let method = method
-                .parse()
-                .map_err(|_| format!("'{method}' is not a homing method; expected a number, as in: home 17"))?;
-            let (manner, within) = manner(rest)?;
-            Ok(Command::Home { place, method, within, manner })
-        }
-        _ => Err(unknown(words)),
+        _ => match words.join(" ").parse() {
+            Ok(command) => Ok(Command::Drive(place, command)),
+            Err(ParseCommandError::Form(text)) => {
+                Err(format!("'{text}' is not a host command for a node; expected one of: {}", forms_of("NODE")))
+            }
+            Err(error) => Err(error.to_string()),
+        },
     }
 }
 
@@ -267,10 +160,7 @@ fn pdo(words: &[&str]) -> Result<PdoCommand, String> {
         ["adopt", direction, number] => Ok(PdoCommand::Adopt(pdo_id(direction, number)?)),
         ["write", name, ref value @ ..] if !value.is_empty() => Ok(PdoCommand::Write(object(name)?, value.join(" "))),
         ["read", name] => Ok(PdoCommand::Read(object(name)?)),
-        _ => {
-            let forms: Vec<_> = FORMS.iter().filter(|form| form.starts_with("NODE pdo")).copied().collect();
-            Err(format!("'pdo {}' is not a host command; expected one of: {}", words.join(" "), forms.join("; ")))
-        }
+        _ => Err(format!("'pdo {}' is not a host command; expected one of: {}", words.join(" "), forms_of("NODE pdo"))),
     }
 }
 
@@ -292,51 +182,6 @@ fn transmission_type(text: &str) -> Result<TransmissionType, String> {
     text.parse().map(TransmissionType).map_err(|_| {
         format!("'{text}' is not a transmission type; expected 0 to 255 (CiA 301, tables 64 and 68), as in: type 1 for each SYNC")
     })
-}
-
-fn unknown(words: &[&str]) -> String {
-    let forms: Vec<_> = FORMS.iter().filter(|form| form.starts_with("NODE")).copied().collect();
-    format!("'{}' is not a host command for a node; expected one of: {}", words.join(" "), forms.join("; "))
-}
-
-fn movement(place: Place, to: &str, relative: bool, rest: &[&str]) -> Result<Command, String> {
-    let (manner, None) = manner(rest)? else { return Err(unknown(rest)) };
-    Ok(Command::Move { place, to: quantity(to)?, relative, manner })
-}
-
-/// What may stand behind an intent: how, and for how long at most.
-fn manner(mut words: &[&str]) -> Result<(Manner, Option<Duration>), String> {
-    let mut manner = Manner::default();
-    let mut within = None;
-    while let Some((&word, rest)) = words.split_first() {
-        words = rest;
-        if word == "no-wait" {
-            manner.no_wait = true;
-            continue;
-        }
-        let Some((&value, rest)) = rest.split_first() else {
-            return Err(format!(
-                "'{word}' has no value; expected [at SPEED] [acceleration RAMP] [deceleration RAMP] [within TIME] [no-wait]"
-            ));
-        };
-        words = rest;
-        match word {
-            "at" => manner.speed = Some(quantity(value)?),
-            "acceleration" => manner.acceleration = Some(quantity(value)?),
-            "deceleration" => manner.deceleration = Some(quantity(value)?),
-            "within" => within = Some(time(value)?),
-            _ => {
-                return Err(format!(
-                    "'{word}' is not an option of a motion; expected at, acceleration, deceleration, within or no-wait"
-                ));
-            }
-        }
-    }
-    Ok((manner, within))
-}
-
-fn quantity<T: FromStr<Err = master::units::ParseUnitError>>(text: &str) -> Result<T, String> {
-    text.parse().map_err(|error: master::units::ParseUnitError| error.to_string())
 }
 
 fn time(text: &str) -> Result<Duration, String> {
@@ -390,7 +235,7 @@ mod tests {
             ("4 dance", "NODE enable"),
             ("4 velocity", "NODE enable"),
             ("4 velocity fast", "does not begin with a number"),
-            ("4 velocity 60rpm at 5rpm", "is not a host command"),
+            ("4 velocity 60rpm at 5rpm", "is not an option of velocity"),
             ("4 move 90deg at", "has no value"),
             ("4 nmt go", "expected start"),
             ("4 pdo", "NODE pdo map"),

@@ -15,13 +15,13 @@ use canopen::pdo::MappingRecord;
 use canopen::{Mux, NodeId};
 use devices::Description;
 use master::core::PdoMap;
-use master::drive::{MotionReport, SwitchedOff};
+use master::drive::{MotionReport, Report};
 use master::pdo::{PdoConfig, TimerUnits};
-use master::units::{Along, Angle, Shown};
+use master::units::Shown;
 use master::{Drive, Network};
 use sim::Place;
 
-use super::command::{Command, Intent, Manner, PdoCommand};
+use super::command::{Command, PdoCommand};
 use super::outcome::{Row, RowKind, Verdict};
 use super::plan::{HostLine, Wanted};
 use crate::machine_file::Machine;
@@ -148,21 +148,7 @@ impl HostTask {
         let done = |seen: &str| Ok((seen.to_owned(), None));
         let network = &self.network;
         match command {
-            Command::Drive(place, intent) => self.intend(*place, *intent).await,
-            Command::Velocity(place, speed, manner) => {
-                let drive = self.drive(*place)?;
-                let turn = async { drive.velocity(drive.turning(*speed)?, manner.motion(&drive)?).await };
-                moved(turn.await)
-            }
-            Command::Move { place, to, relative, manner } => {
-                moved(move_drive(&self.drive(*place)?, *to, *relative, manner).await)
-            }
-            Command::Torque(place, current) => moved(self.drive(*place)?.torque(*current).await),
-            Command::Home { place, method, within, manner } => {
-                let drive = self.drive(*place)?;
-                let home = async { drive.home(*method, manner.homing(&drive, *within)?).await };
-                moved(home.await)
-            }
+            Command::Drive(place, command) => report(self.drive(*place)?.perform(command).await),
             Command::Read(node, object) => self.read(*node, object).await,
             Command::Write(node, object, text) => self.write(*node, object, text).await,
             Command::Pdo(node, pdo) => self.exchange(*node, pdo).await,
@@ -203,25 +189,6 @@ impl HostTask {
             }
             Command::WaitFor(_, within) => self.wait_for(line, *within).await,
         }
-    }
-
-    async fn intend(&self, place: Place, intent: Intent) -> Done {
-        let drive = self.drive(place)?;
-        let done = match intent {
-            Intent::Enable => drive.enable().await,
-            Intent::Disable => drive.disable().await,
-            Intent::Stop => drive.stop().await,
-            Intent::QuickStop => drive.quick_stop().await,
-            Intent::Reset => drive.reset_fault().await,
-            Intent::Save => drive.save().await,
-            Intent::Restore => drive.restore().await,
-            Intent::Guard => {
-                let loss = drive.guard(SwitchedOff::SwitchOn).await.map_err(|error| error.to_string())?;
-                return Ok((loss.to_string(), None));
-            }
-            Intent::Release => drive.release_guard().await,
-        };
-        done.map(|()| ("done".into(), None)).map_err(|error| error.to_string())
     }
 
     fn resolve(&self, node: NodeId, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), String> {
@@ -339,20 +306,14 @@ fn number_of(raw: u64, length: usize, row: Option<&'static Entry>) -> (String, O
     (format!("{number} ({raw:0width$X}h)", width = 2 * length), Some(number as f64))
 }
 
-async fn move_drive(
-    drive: &Drive,
-    to: Along<Angle>,
-    relative: bool,
-    manner: &Manner,
-) -> Result<MotionReport, master::Error> {
-    let (to, options) = (drive.turning(to)?, manner.motion(drive)?);
-    if relative { drive.move_relative(to, options).await } else { drive.move_absolute(to, options).await }
-}
-
-fn moved(report: Result<MotionReport, master::Error>) -> Done {
-    let report = report.map_err(|error| error.to_string())?;
-    Ok(match report.reached_after {
-        Some(time) => (format!("reached after {} s", Shown(time.as_secs_f64())), None),
-        None => ("commanded".into(), None),
-    })
+fn report(report: Result<Report, master::Error>) -> Done {
+    let seen = match report.map_err(|error| error.to_string())? {
+        Report::Done => "done".into(),
+        Report::Guarded(loss) => loss.to_string(),
+        Report::Moved(MotionReport { reached_after: Some(time), .. }) => {
+            format!("reached after {} s", Shown(time.as_secs_f64()))
+        }
+        Report::Moved(_) => "commanded".into(),
+    };
+    Ok((seen, None))
 }

@@ -66,8 +66,8 @@ fn the_page_of_scenarios_has_every_key_and_form_and_its_examples_are_scenarios()
     table_has(&page, "Hosts", HOST_KEYS);
     table_has(&page, "Lines of a host", LINE_KEYS);
     table_has(&page, "Expectations", EXPECT_KEYS);
-    for form in condition::FORMS.iter().chain(command::FORMS) {
-        assert!(page.contains(form), "{form} is not on the page");
+    for form in condition::FORMS.iter().map(|form| (*form).to_owned()).chain(command::forms()) {
+        assert!(page.contains(&form), "{form} is not on the page");
     }
     for (kind, _) in testbench::events::KINDS {
         assert!(page.contains(&format!("`{kind}`")), "the event {kind} is not on the page");

@@ -20,10 +20,10 @@ use crossterm::event::{
     PushKeyboardEnhancementFlags,
 };
 use crossterm::{execute, terminal};
+use host::{Host, LocalClient, Shown};
 use master::drive::Stopped;
 use ratatui::DefaultTerminal;
 use serde_json::Value;
-use studio::{Host, LocalClient, Shown};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 
@@ -135,7 +135,7 @@ fn listen() -> mpsc::Receiver<Event> {
     receiver
 }
 
-async fn show(context: &Context, host: studio::HostHandle, format: Format) -> Result<(), Failure> {
+async fn show(context: &Context, host: host::HostHandle, format: Format) -> Result<(), Failure> {
     let gone = || Failure::new("the host of the drives has ended");
     let mut client = LocalClient::take(&host).await.ok_or_else(gone)?;
     let cannot = |error: std::io::Error| Failure::new("cannot draw on this terminal").because(error);

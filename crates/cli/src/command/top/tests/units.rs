@@ -6,9 +6,9 @@ use std::time::Duration;
 use canopen::{Mux, NodeId};
 use clap::Parser;
 use crossterm::event::KeyCode;
+use host::{Host, LocalClient, Shown};
 use processes::scratch;
 use serde_json::{Value, json};
-use studio::{Host, LocalClient, Shown};
 
 use super::key;
 use crate::command::studio::{passed, setting};
@@ -55,7 +55,7 @@ fn near(what: &str, counts: i32, expected: f64) {
 }
 
 /// A page of the studio says what it wants by messages; so does the terminal, by its keys.
-async fn by_both_doors(context: &Context, app: &studio::HostHandle) {
+async fn by_both_doors(context: &Context, app: &host::HostHandle) {
     let node = context.network.node(NodeId::new(1).expect("a node-ID"));
     let read = async |mux| node.read::<i32>(mux).await.expect("it answers");
     let mut client = LocalClient::take(app).await.expect("there is room");

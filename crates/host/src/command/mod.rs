@@ -1,0 +1,126 @@
+//! What a session asks for, one enum: as JSON an object such as `{"do":"enable","node":4}`. Units are in the names: `rpm`,
+//! `degrees`, `amperes`, `rpm_per_s`.
+//!
+//! It is nested, so that the compiler knows what concerns one node, several drives, parameters, PDOs or the session. A command to a
+//! drive is the master's own ([`master::drive::Command`]).
+
+mod group;
+mod node;
+mod parameters;
+mod pdo;
+mod session;
+
+pub use group::{AxisSpeed, AxisTarget, BaseJog, GroupCommand, GroupMove};
+pub use node::NodeCommand;
+pub use parameters::{FileForm, NewValue, ParameterChange, ParameterReading};
+pub use pdo::{NewEntry, NewPdo, NmtChange, PdoCommand};
+pub use session::{SessionCommand, Topic, WorldCommand};
+
+use canopen::NodeId;
+use serde::de::{DeserializeOwned, Error};
+use serde::{Deserialize, Deserializer};
+use serde_json::{Map, Value};
+
+/// A command of a session.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Concerns the session, or the bus as a whole.
+    Session(SessionCommand),
+    /// Concerns the world around virtual drives.
+    World(WorldCommand),
+    /// Concerns several drives.
+    Group(GroupCommand),
+    /// Concerns one node.
+    Node(NodeId, NodeCommand),
+}
+
+impl Command {
+    /// Quick-stops every drive.
+    pub const STOP_ALL: Self = Self::Session(SessionCommand::StopAll {});
+
+    /// Whether it needs control.
+    pub const fn needs_control(&self) -> bool {
+        match self {
+            Self::Session(_) => false,
+            Self::World(command) => command.needs_control(),
+            Self::Group(_) => true,
+            Self::Node(_, command) => command.needs_control(),
+        }
+    }
+}
+
+impl From<SessionCommand> for Command {
+    fn from(command: SessionCommand) -> Self {
+        Self::Session(command)
+    }
+}
+
+impl From<WorldCommand> for Command {
+    fn from(command: WorldCommand) -> Self {
+        Self::World(command)
+    }
+}
+
+impl From<GroupCommand> for Command {
+    fn from(command: GroupCommand) -> Self {
+        Self::Group(command)
+    }
+}
+
+/// The fields of a message.
+type Fields = Map<String, Value>;
+
+impl<'de> Deserialize<'de> for Command {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        read(Fields::deserialize(deserializer)?).map_err(D::Error::custom)
+    }
+}
+
+fn read(mut fields: Fields) -> Result<Command, String> {
+    let word = match fields.get("do") {
+        Some(Value::String(word)) => word.clone(),
+        Some(_) => return Err("expected `do` to be the word of a command".into()),
+        None => return Err("missing field `do`".into()),
+    };
+    let of = |words: &[&str]| words.contains(&word.as_str());
+    if of(SessionCommand::WORDS) {
+        return whole(fields).map(Command::Session);
+    }
+    if of(WorldCommand::WORDS) {
+        return whole(fields).map(Command::World);
+    }
+    if of(GroupCommand::WORDS) {
+        return whole(fields).map(Command::Group);
+    }
+    if !NodeCommand::words().any(|known| known == word) {
+        return Err(format!("unknown command `{word}`"));
+    }
+    let node = node::node_id(fields.remove("node"))?;
+    node::read(&word, fields).map(|command| Command::Node(node, command))
+}
+
+fn whole<T: DeserializeOwned>(fields: Fields) -> Result<T, String> {
+    serde_json::from_value(Value::Object(fields)).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The variants that serde names when it meets one that it does not know.
+    fn variants<T: DeserializeOwned>() -> Vec<String> {
+        let refused = serde_json::from_str::<T>(r#"{"do":"none"}"#).err().map(|error| error.to_string());
+        let refused = refused.unwrap_or_default();
+        refused.split('`').skip(3).step_by(2).map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn the_words_of_each_kind_are_its_variants() {
+        assert_eq!(variants::<SessionCommand>(), SessionCommand::WORDS);
+        assert_eq!(variants::<WorldCommand>(), WorldCommand::WORDS);
+        assert_eq!(variants::<GroupCommand>(), GroupCommand::WORDS);
+        assert_eq!(variants::<ParameterReading>(), ParameterReading::WORDS);
+        assert_eq!(variants::<ParameterChange>(), ParameterChange::WORDS);
+        assert_eq!(variants::<PdoCommand>(), PdoCommand::WORDS);
+    }
+}

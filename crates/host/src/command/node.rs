@@ -1,0 +1,192 @@
+//! Commands to one node, as JSON.
+
+use canopen::NodeId;
+use master::drive::{self, Manner};
+use master::units::{Amperes, Angle, Ramp, Rpm};
+use serde::de::DeserializeOwned;
+use serde_json::{Value, from_value};
+
+use super::{Fields, ParameterChange, ParameterReading, PdoCommand, whole};
+
+/// What one node is to do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NodeCommand {
+    /// A command of the master to a drive.
+    Drive(drive::Command),
+    /// Turns as long as it is held.
+    Jog {
+        /// Speed in r/min.
+        rpm: f64,
+    },
+    /// Holds a jog; at least every 100 ms.
+    JogHold,
+    /// Ends a jog: the drive stops with its ramp.
+    JogEnd,
+    /// Allows motions of this drive although nothing stops it when this program dies. Holds until control changes hands.
+    AcceptUnguarded,
+    /// Explains what keeps a drive from moving.
+    Explain,
+    /// Reads the homing methods of a drive, its homing settings and the present levels of its switches.
+    Homing,
+    /// Lists the objects in the description of a drive.
+    Objects,
+    /// Reads or plans parameters.
+    Read(ParameterReading),
+    /// Changes parameters.
+    Change(ParameterChange),
+    /// Something with its PDOs.
+    Pdos(PdoCommand),
+}
+
+impl NodeCommand {
+    const WORDS: &[&str] = &[
+        "enable",
+        "disable",
+        "reset_fault",
+        "stop",
+        "quick_stop",
+        "velocity",
+        "move",
+        "torque",
+        "home",
+        "jog",
+        "jog_hold",
+        "jog_end",
+        "accept_unguarded",
+        "explain",
+        "homing",
+        "objects",
+    ];
+
+    pub(super) fn words() -> impl Iterator<Item = &'static str> {
+        [Self::WORDS, ParameterReading::WORDS, ParameterChange::WORDS, PdoCommand::WORDS].into_iter().flatten().copied()
+    }
+
+    /// Whether it needs control.
+    pub(super) const fn needs_control(&self) -> bool {
+        match self {
+            Self::Drive(drive::Command::QuickStop) | Self::Explain | Self::Homing | Self::Objects | Self::Read(_) => {
+                false
+            }
+            Self::Drive(_)
+            | Self::Jog { .. }
+            | Self::JogHold
+            | Self::JogEnd
+            | Self::AcceptUnguarded
+            | Self::Change(_) => true,
+            Self::Pdos(command) => command.needs_control(),
+        }
+    }
+
+    /// The same to this node.
+    pub const fn to(self, node: NodeId) -> super::Command {
+        super::Command::Node(node, self)
+    }
+}
+
+impl From<drive::Command> for NodeCommand {
+    fn from(command: drive::Command) -> Self {
+        Self::Drive(command)
+    }
+}
+
+pub(super) fn node_id(value: Option<Value>) -> Result<NodeId, String> {
+    let raw: u8 = field("node", value)?;
+    NodeId::new(raw).ok_or_else(|| format!("expected a node-ID from 1 to 127, got {raw}"))
+}
+
+/// A command of one of the [words](NodeCommand::words).
+pub(super) fn read(word: &str, mut fields: Fields) -> Result<NodeCommand, String> {
+    if ParameterReading::WORDS.contains(&word) {
+        return whole(fields).map(NodeCommand::Read);
+    }
+    if ParameterChange::WORDS.contains(&word) {
+        return whole(fields).map(NodeCommand::Change);
+    }
+    if PdoCommand::WORDS.contains(&word) {
+        return whole(fields).map(NodeCommand::Pdos);
+    }
+    fields.remove("do");
+    let command = match word {
+        "jog" => NodeCommand::Jog { rpm: taken(&mut fields, "rpm")? },
+        "jog_hold" => NodeCommand::JogHold,
+        "jog_end" => NodeCommand::JogEnd,
+        "accept_unguarded" => NodeCommand::AcceptUnguarded,
+        "explain" => NodeCommand::Explain,
+        "homing" => NodeCommand::Homing,
+        "objects" => NodeCommand::Objects,
+        _ => NodeCommand::Drive(to_drive(word, &mut fields)?),
+    };
+    match fields.keys().next() {
+        Some(name) => Err(format!("unknown field `{name}`")),
+        None => Ok(command),
+    }
+}
+
+fn to_drive(word: &str, fields: &mut Fields) -> Result<drive::Command, String> {
+    use drive::{Command, Motion};
+    let speed = |fields: &mut Fields| Ok::<_, String>(taken::<Option<f64>>(fields, "rpm")?.map(|rpm| Rpm(rpm).into()));
+    Ok(match word {
+        "enable" => Command::Enable,
+        "disable" => Command::Disable,
+        "reset_fault" => Command::ResetFault,
+        "stop" => Command::Stop,
+        "quick_stop" => Command::QuickStop,
+        "velocity" => {
+            let ramp: Option<f64> = taken(fields, "rpm_per_s")?;
+            let ramp = ramp.map(|rate| Ramp::RpmPerSecond(rate).into());
+            let manner = Manner { acceleration: ramp, deceleration: ramp, ..Manner::default() };
+            Motion::Velocity(Rpm(taken(fields, "rpm")?).into(), manner).into()
+        }
+        "move" => {
+            let degrees: f64 = taken(fields, "degrees")?;
+            let relative: Option<bool> = taken(fields, "relative")?;
+            let manner = Manner { speed: speed(fields)?, ..Manner::default() };
+            let to = Angle::Turns(degrees / 360.0).into();
+            Motion::Move { to, relative: relative.unwrap_or_default(), manner }.into()
+        }
+        "torque" => Motion::Torque(Amperes(taken(fields, "amperes")?)).into(),
+        "home" => Motion::Home {
+            method: taken(fields, "method")?,
+            manner: Manner { speed: speed(fields)?, ..Manner::default() },
+        }
+        .into(),
+        _ => return Err(format!("unknown command `{word}`")),
+    })
+}
+
+/// A field, taken out; one that is omitted is `null`.
+fn taken<T: DeserializeOwned>(fields: &mut Fields, name: &str) -> Result<T, String> {
+    field(name, fields.remove(name))
+}
+
+fn field<T: DeserializeOwned>(name: &str, value: Option<Value>) -> Result<T, String> {
+    match value {
+        Some(value) => from_value(value).map_err(|error| format!("field `{name}`: {error}")),
+        None => from_value(Value::Null).map_err(|_| format!("missing field `{name}`")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_is_a_command_and_a_field_that_it_does_not_have_is_refused() {
+        let all = || Fields::from_iter(["rpm", "degrees", "amperes", "method"].map(|name| (name.into(), 1.into())));
+        for word in NodeCommand::WORDS {
+            // With what it has of these fields it is whole; what is left over is named.
+            let mut fields = all();
+            let refused = loop {
+                match read(word, fields.clone()) {
+                    Ok(_) => break None,
+                    Err(error) => match error.strip_prefix("unknown field `").and_then(|rest| rest.strip_suffix('`')) {
+                        Some(name) => fields.remove(name),
+                        None => break Some(error),
+                    },
+                };
+            };
+            assert_eq!(refused, None, "{word}");
+        }
+    }
+}

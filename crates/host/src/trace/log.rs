@@ -1,0 +1,32 @@
+//! The kept frames as a candump log, which `ferrodrive dump` and can-utils read.
+
+use super::bus_frame::Origin;
+use super::query::Query;
+use super::ring::{CHUNK, Held};
+
+/// A part of a log, and where the next one begins.
+#[derive(Debug)]
+pub struct Part {
+    pub text: String,
+    pub next: u64,
+}
+
+impl Query {
+    /// The next lines of the log, of frames from this number on; `None` at its end. Nodes and services are chosen as for the view;
+    /// words are not, since a transfer cannot be decoded without some of its frames.
+    pub fn log_part(&self, held: &Held, origin: &Origin, from: u64) -> Option<Part> {
+        let (floor, ceiling) = self.bounds(held);
+        let from = from.max(floor);
+        let next = ceiling.min(from + CHUNK as u64);
+        if from >= next {
+            return None;
+        }
+        let mut text = String::new();
+        held.decode(from, next, |_, passed, decoded| {
+            if self.chooses(decoded) {
+                origin.push_line(&mut text, passed);
+            }
+        });
+        Some(Part { text, next })
+    }
+}
