@@ -210,3 +210,116 @@ fn in_words(way: &'static str) -> String {
         "by its ramp; it stays enabled if it was".to_owned()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use processes::{Scratch, scratch};
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::global::Global;
+    use crate::session;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        global: Global,
+    }
+
+    /// A bus with these drives, and the models of all that should be there.
+    fn line(folder: &Scratch, there: &str, named: &[&str]) -> Line {
+        let path = folder.join("bus.toml");
+        std::fs::write(&path, there).expect("written");
+        let bus = format!("sim:{}", path.display());
+        let models = named.iter().flat_map(|model| ["--model", model]);
+        Line::parse_from(["ferrodrive", "--bus", &bus].into_iter().chain(models))
+    }
+
+    const SERVO: &str = "[[drive]]\nmodel = 'cia402'\nnode = 5\n";
+    const STEPPER: &str = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\n";
+
+    fn node(raw: u8) -> NodeId {
+        NodeId::new(raw).expect("a node-ID")
+    }
+
+    /// Sets a drive in motion as another program does: the master has no part in it.
+    async fn turn(context: &Context, id: NodeId) -> Drive {
+        let (node, drive) = (context.network.node(id), context.drive(id).await.expect("it is known"));
+        node.write(Mux::new(0x6060, 0), 3_i8).await.expect("profile velocity");
+        // The servo counts encoder increments, the stepper r/min.
+        let counts = if id.raw() == 5 { 131_072 } else { 60 };
+        node.write(Mux::new(0x60FF, 0), counts).await.expect("60 r/min");
+        for controlword in [0x06_u16, 0x07, 0x0F] {
+            node.write(Mux::new(0x6040, 0), controlword).await.expect("it follows");
+            context.network.sleep(Duration::from_millis(100)).await;
+        }
+        context.network.sleep(Duration::from_secs(2)).await;
+        assert!(speed_rpm(&drive).await > 50.0, "node {id} turns at {} r/min", speed_rpm(&drive).await);
+        drive
+    }
+
+    async fn speed_rpm(drive: &Drive) -> f64 {
+        drive.state().await.expect("it answers").velocity.expect("it has one").0.abs()
+    }
+
+    fn json_of(report: &StopReport) -> Value {
+        serde_json::to_value(report).expect("JSON")
+    }
+
+    #[test]
+    fn everything_stops_and_each_drive_is_said_to_stand() {
+        let both = format!("{SERVO}{STEPPER}");
+        for by_ramp in [false, true] {
+            let folder = scratch("estop_all");
+            let line = line(&folder, &both, &[]);
+            session::run(&line.global, async |context| {
+                let drives = [turn(context, node(5)).await, turn(context, node(2)).await];
+                let report = if by_ramp { stop_all(context).await? } else { Estop {}.run(context).await? };
+                let said = json_of(&report);
+                let nodes = said["nodes"].as_array().expect("a list");
+                assert_eq!(nodes.iter().map(|row| &row["node"]).collect::<Vec<_>>(), [2, 5], "{said}");
+                assert!(said["ok"] == true && nodes.iter().all(|row| row["stands"] == true), "{said}");
+                for drive in &drives {
+                    assert!(speed_rpm(drive).await < 1.0, "{said}");
+                }
+                Ok(())
+            })
+            .unwrap_or_else(|failure| panic!("{failure}"));
+        }
+    }
+
+    #[test]
+    fn a_drive_that_was_not_seen_to_stand_may_still_be_moving() {
+        let folder = scratch("estop_silent");
+        let line = line(&folder, SERVO, &["2=zlim42c"]);
+        session::run(&line.global, async |context| {
+            turn(context, node(5)).await;
+            let report = Estop {}.run(context).await?;
+            let said = json_of(&report);
+            let stands = said["nodes"].as_array().expect("a list").iter().map(|row| (&row["node"], &row["stands"]));
+            assert_eq!(stands.collect::<Vec<_>>(), [(&json!(2), &json!(false)), (&json!(5), &json!(true))], "{said}");
+            assert_eq!((&said["ok"], &said["error"]["kind"]), (&json!(false), &json!("not_stopped")), "{said}");
+            assert!(said["error"]["next"].as_str().is_some_and(|next| next.contains("emergency stop")), "{said}");
+            assert!(report.failure().is_some(), "and the status is 1");
+            let people = report.text(Paint::OFF);
+            assert!(people.contains("node 2 (zlim42c): may still be moving"), "{people}");
+            Ok(())
+        })
+        .unwrap_or_else(|failure| panic!("{failure}"));
+    }
+
+    #[test]
+    fn a_bus_where_no_drive_answers_is_not_said_to_stand() {
+        let folder = scratch("estop_none");
+        let line = line(&folder, SERVO, &[]);
+        session::run(&line.global, async |context| {
+            let failure = StopReport::new(context, Vec::new(), "the emergency stop of the machine").err();
+            let body = failure.as_ref().map(FailureBody::from).expect("it is a failure");
+            let said = serde_json::to_value(&body).expect("JSON");
+            assert_eq!(said["kind"], "no_node", "{said}");
+            Ok(())
+        })
+        .unwrap_or_else(|failure| panic!("{failure}"));
+    }
+}

@@ -4,7 +4,6 @@ mod broken_pipe;
 mod completion;
 mod cycles;
 mod eds;
-mod estop;
 mod handbook;
 mod init;
 mod json;

@@ -177,7 +177,8 @@ impl Drive {
                 (None, Some(_)) => *limit.insert(self.time_to_rest().await),
                 (None, None) => SILENCE,
             };
-            if network.now() - began >= limit + SILENCE {
+            // One whose last look showed it at rest is looked at once more: the answers may have been slow.
+            if network.now() - began >= limit + SILENCE && rest.looks == 0 {
                 return Err(self
                     .not_reached(INTENT, Trigger::StillTurning(self.speed_rpm().await.unwrap_or(0.0)))
                     .await);

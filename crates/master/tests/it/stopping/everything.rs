@@ -160,6 +160,25 @@ fn a_drive_without_power_is_left_without_it() {
 }
 
 #[test]
+fn a_drive_whose_answers_come_late_is_seen_to_stand_all_the_same() {
+    for name in models() {
+        let mut bench = Bench::new(name);
+        bench.turn();
+        let other = bench.other();
+        for number in NODES {
+            // Just in time for each question: the looks that show its rest take longer than its ramp.
+            let late = "bus late 130 140".parse::<Stimulus>().unwrap();
+            bench.world.apply(Place::node(number), &late).unwrap().unwrap();
+        }
+        let stopped = bench.stop_everything_by(&other);
+        for axis in &stopped {
+            assert!(axis.outcome.is_ok(), "{name}: {stopped:?}");
+        }
+        assert_eq!(stopped.len(), NODES.len(), "{name}");
+    }
+}
+
+#[test]
 fn what_was_heard_or_is_known_and_does_not_answer_may_still_be_moving() {
     for name in models() {
         let mut bench = Bench::new(name);
