@@ -3,8 +3,6 @@ use canopen::{NmtState, NodeId};
 use cia402::{ModeOfOperation, PowerState};
 use devices::AxisId;
 
-use crate::engine::device::ResetTimes;
-
 /// The firmware of a drive: a station on the bus that also owns a power stage.
 ///
 /// # Contract
@@ -26,8 +24,6 @@ pub trait Firmware: Station + Clone {
 
     /// Time between two ticks, in nanoseconds.
     const CONTROL_PERIOD_NS: u64;
-    /// Ticks after which all that counts them has come round.
-    const ROUND: u32;
 
     /// Supply voltage arrives: starts from `hardware` and sends the boot-up message.
     fn power_on(&mut self, hardware: &Self::Hardware, now: Instant);
@@ -35,31 +31,8 @@ pub trait Firmware: Station + Clone {
     /// Supply voltage is gone: everything that is not in the EEPROM is forgotten.
     fn power_off(&mut self, now: Instant);
 
-    /// How long the next resets by NMT take, which depends on the microcontroller: none unless it is set.
-    fn set_reset_times(&mut self, times: ResetTimes);
-
     /// One control period.
     fn tick(&mut self, sensors: &Self::Sensors, now: Instant) -> Self::Actuation;
-
-    /// Whether nothing that a tick reads or writes differs from `earlier`, which is this firmware whole [rounds](Self::ROUND) of
-    /// ticks before, and nothing of it depends on the time. Then ticks with the same sensors change nothing any more, nor what
-    /// they return, until a frame is handed in or something is [due](Self::next_event). False when in doubt.
-    fn rests_since(&self, earlier: &Self, now: Instant) -> bool;
-
-    /// [`Station::poll_timeout`] but for the communication task, which does nothing for a firmware that rests.
-    fn next_event(&self) -> Option<Instant>;
-
-    /// When the communication task runs for the first time at or after `at`, if nothing disturbs it; `None` for never.
-    fn task_from(&self, at: Instant) -> Option<Instant>;
-
-    /// The runs of the communication task before `now` have been left out, of a firmware that rests: they would have done nothing.
-    fn leave_out_tasks(&mut self, now: Instant);
-
-    /// So many whole [rounds](Self::ROUND) of ticks have been left out, of a firmware that rests: what only counts them, and decides
-    /// nothing any more, goes on.
-    fn leave_out_rounds(&mut self, rounds: u64) {
-        let _ = rounds;
-    }
 
     /// Contents of the EEPROM, and a number that changes with them.
     fn eeprom(&self) -> (&[u8], u32);

@@ -1,7 +1,8 @@
 //! Firmware of real CANopen motor drives, from their manuals.
 //!
 //! A drive here is what runs on the drive's microcontroller: sensors and frames go in, power-stage commands and frames
-//! come out. It knows nothing of physics, of a simulator or of a clock; [`Firmware`] is the whole contract.
+//! come out. It knows nothing of physics, of a simulator or of a clock; [`Firmware`] is the whole contract,
+//! beside [`Resting`] for one that may be left alone while nothing changes.
 //! [`engine`] holds the parts that all drives are made of; a drive's own folder holds what is particular to it, mostly
 //! as tables, and `zltech` what only the two drives of one maker share. What a drive is to its host, its
 //! objects, faults and units, is described in crate `devices`.
@@ -41,6 +42,7 @@ mod firmware;
 pub mod mjoint;
 pub mod node;
 mod register_error;
+mod resting;
 mod row;
 pub mod servo;
 pub mod zlac8030l;
@@ -49,3 +51,4 @@ mod zltech;
 
 pub use firmware::{Firmware, Report};
 pub use register_error::RegisterError;
+pub use resting::Resting;

@@ -249,13 +249,13 @@ impl<S: Storage> Device<S> {
         true
     }
 
-    /// See [`Firmware::task_from`](crate::Firmware::task_from).
+    /// See [`Resting::task_from`](crate::Resting::task_from).
     pub fn task_from(&self, at: Instant) -> Option<Instant> {
         let runs = at.nanos_since(self.next_task).div_ceil(self.task_period_ns);
         self.running.then(|| self.next_task.plus_nanos(runs * self.task_period_ns))
     }
 
-    /// See [`Firmware::leave_out_tasks`](crate::Firmware::leave_out_tasks).
+    /// See [`Resting::leave_out_tasks`](crate::Resting::leave_out_tasks).
     pub fn leave_out_tasks(&mut self, now: Instant) {
         if let Some(next) = self.task_from(now) {
             self.next_task = next;

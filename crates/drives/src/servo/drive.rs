@@ -5,6 +5,7 @@
 
 mod connection;
 mod faults;
+mod resting;
 
 use can::Instant;
 use canopen::node::NodeProfile;
@@ -76,6 +77,11 @@ impl<S: Storage> ServoDrive<S> {
     /// The values of the objects, to look at.
     pub const fn values(&self) -> &Dictionary<S> {
         self.base.device.values()
+    }
+
+    /// How long the next resets by NMT take, which depends on the microcontroller: none unless it is set.
+    pub const fn set_reset_times(&mut self, times: ResetTimes) {
+        self.base.device.set_reset_times(times);
     }
 
     /// What the control loops of an axis are asked for, to look at.
@@ -156,7 +162,6 @@ impl<S: Storage> Firmware for ServoDrive<S> {
     type Hardware = Hardware<S>;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
-    const ROUND: u32 = SUPERVISION_DIVIDER as u32;
 
     fn power_on(&mut self, hardware: &Hardware<S>, now: Instant) {
         self.base.node_id = hardware.node_id;
@@ -169,10 +174,6 @@ impl<S: Storage> Firmware for ServoDrive<S> {
     fn power_off(&mut self, _now: Instant) {
         self.base.device.power_off();
         self.make_shafts();
-    }
-
-    fn set_reset_times(&mut self, times: ResetTimes) {
-        self.base.device.set_reset_times(times);
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
@@ -204,47 +205,6 @@ impl<S: Storage> Firmware for ServoDrive<S> {
             }
         }
         actuation
-    }
-
-    fn rests_since(&self, earlier: &Self, _now: Instant) -> bool {
-        // Each by name, so that no new one is forgotten.
-        let Self {
-            description: _,
-            base,
-            shafts,
-            motors: _,
-            faults,
-            protection,
-            bleeder,
-            bleeder_limits: _,
-            probes,
-            periods,
-        } = self;
-        (faults, protection, bleeder) == (&earlier.faults, &earlier.protection, &earlier.bleeder)
-            && (probes, periods) == (&earlier.probes, &earlier.periods)
-            && shafts
-                .iter()
-                .flatten()
-                .zip(earlier.shafts.iter().flatten())
-                .all(|(shaft, before)| shaft.rests_since(before))
-            && base.device.rests_since(&earlier.base.device)
-    }
-
-    fn next_event(&self) -> Option<Instant> {
-        self.base.device.next_event().into_iter().chain(self.base.next_watch()).min()
-    }
-
-    fn task_from(&self, at: Instant) -> Option<Instant> {
-        self.base.device.task_from(at)
-    }
-
-    fn leave_out_tasks(&mut self, now: Instant) {
-        self.base.device.leave_out_tasks(now);
-    }
-
-    fn leave_out_rounds(&mut self, rounds: u64) {
-        // A round has one supervision.
-        self.shafts.iter_mut().flatten().for_each(|shaft| shaft.leave_out_supervisions(rounds));
     }
 
     fn eeprom(&self) -> (&[u8], u32) {

@@ -2,7 +2,8 @@
 
 use devices::{AxisId, Description};
 use drives::engine::axis::Demand;
-use drives::{Firmware, RegisterError};
+use drives::engine::device::ResetTimes;
+use drives::{Firmware, RegisterError, Resting};
 use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
 use plant::physics::Physics;
@@ -47,7 +48,7 @@ pub struct ShaftFacts {
 /// Changes take effect from the next control period on.
 pub trait Assembly: Clone + Send + 'static {
     /// The firmware that runs on it.
-    type Firmware: Firmware<Actuation: Default + Send, Sensors: Send> + Send + 'static;
+    type Firmware: Resting + Firmware<Actuation: Default + Send, Sensors: Send> + Send + 'static;
 
     /// The model's name as users type it.
     const MODEL: &'static str;
@@ -87,6 +88,11 @@ pub trait Assembly: Clone + Send + 'static {
 
     /// What the firmware finds when it wakes.
     fn hardware(&self) -> <Self::Firmware as Firmware>::Hardware;
+
+    /// How long the next resets by NMT take on this hardware; a firmware that ignores it takes no time.
+    fn set_reset_times(firmware: &mut Self::Firmware, times: ResetTimes) {
+        let _ = (firmware, times);
+    }
 
     /// What the sensors read now; bit `n` of `inputs` is the level of input `n`.
     fn sense(&self, inputs: u64) -> <Self::Firmware as Firmware>::Sensors;

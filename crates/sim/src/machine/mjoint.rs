@@ -10,6 +10,7 @@ use can::Bitrate;
 use devices::AxisId;
 use devices::Description;
 use drives::RegisterError;
+use drives::engine::device::ResetTimes;
 use drives::engine::storage::StoredImage;
 use drives::mjoint::assumptions::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
 use drives::mjoint::variations::VARIANT;
@@ -191,6 +192,10 @@ impl Assembly for Joint {
     fn hardware(&self) -> Hardware {
         let eeprom = if self.eeprom_broken { StoredImage::from_bytes(&[]) } else { self.image };
         Hardware { eeprom, bitrate: self.bitrate }
+    }
+
+    fn set_reset_times(firmware: &mut Self::Firmware, times: ResetTimes) {
+        firmware.set_reset_times(times);
     }
 
     #[inline]

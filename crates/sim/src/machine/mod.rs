@@ -28,7 +28,7 @@ mod zlim42c;
 
 use can::{Bitrate, Frame, Instant, Station};
 use devices::{AxisId, Description, Timing};
-use drives::{Firmware, RegisterError};
+use drives::{Firmware, RegisterError, Resting};
 use plant::FreeRun;
 use plant::shaft::{Motion, Push};
 
@@ -195,7 +195,7 @@ impl<A: Assembly> Machine<A> {
     fn hand_over(&mut self, frame: &Frame, now: Instant) {
         self.disturb();
         if let Some(own_time) = self.own_time.as_mut().filter(|_| frame.standard_data_id() == Some(NMT)) {
-            self.firmware.set_reset_times(own_time.reset_times());
+            A::set_reset_times(&mut self.firmware, own_time.reset_times());
             if nmt_reset::is_asked_of(frame, || self.firmware.report(AxisId::FIRST).node_id.raw()) {
                 own_time.chip.forget_answers();
             }
@@ -377,7 +377,8 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         let (image, generation) = (self.nvm_image(), self.nvm_generation());
         let timing = A::description(&self.firmware, &self.assembly).map_or(Timing::GUESSED, |model| model.timing);
         self.own_time = (mode == TimingMode::Device).then(|| OwnTime::new(timing, seed, &image, generation));
-        self.firmware.set_reset_times(self.own_time.as_mut().map(OwnTime::reset_times).unwrap_or_default());
+        let times = self.own_time.as_mut().map(OwnTime::reset_times).unwrap_or_default();
+        A::set_reset_times(&mut self.firmware, times);
     }
 
     fn set_realism(&mut self, realism: Realism, seed: u64, now: Instant) {

@@ -1,33 +1,33 @@
 //! Whether a machine's control periods are computed, and a round of them that is watched: [`resting`](super::resting).
 
 use can::Instant;
-use drives::Firmware;
+use drives::Resting;
 
 /// Whether the control periods of a machine are computed.
 #[derive(Clone)]
-pub(super) enum Rest<F: Firmware> {
+pub(super) enum Rest<F: Resting> {
     /// They are. From this time on it is worth a look whether they have to be.
     Awake { look_at: Instant },
     /// They are, for a whole round, while nothing may change.
     Watching(Box<Watch<F>>),
     /// They are not, until the machine is disturbed.
-    Resting(Resting<F>),
+    Resting(LeftOut<F>),
 }
 
 /// Control periods that are left out.
 #[derive(Clone)]
-pub(super) struct Resting<F: Firmware> {
+pub(super) struct LeftOut<F: Resting> {
     /// What the firmware would read in each; `None` if it has no power, and reads nothing.
     pub(super) sensors: Option<F::Sensors>,
     /// So many since its last one.
-    pub(super) left_out: u64,
+    pub(super) periods: u64,
     /// When the sensors may read otherwise: nothing is foretold of what comes then.
     pub(super) foretold_to: Instant,
 }
 
 /// A round under way.
 #[derive(Clone)]
-pub(super) struct Watch<F: Firmware> {
+pub(super) struct Watch<F: Resting> {
     /// The firmware as it was at the beginning.
     before: F,
     sensors: Option<F::Sensors>,
@@ -37,7 +37,7 @@ pub(super) struct Watch<F: Firmware> {
     same: bool,
 }
 
-impl<F: Firmware> Rest<F> {
+impl<F: Resting> Rest<F> {
     pub(super) const fn from(look_at: Instant) -> Self {
         Self::Awake { look_at }
     }
@@ -49,13 +49,13 @@ impl<F: Firmware> Rest<F> {
     /// While they are left out of a firmware that runs: when its sensors may read otherwise.
     pub(super) const fn foretold_to(&self) -> Option<Instant> {
         match self {
-            Self::Resting(Resting { sensors: Some(_), foretold_to, .. }) => Some(*foretold_to),
+            Self::Resting(LeftOut { sensors: Some(_), foretold_to, .. }) => Some(*foretold_to),
             _ => None,
         }
     }
 }
 
-impl<F: Firmware> Watch<F> {
+impl<F: Resting> Watch<F> {
     /// Begins, with what the pins do now.
     pub(super) fn begin(firmware: &F, actuation: &F::Actuation) -> Self {
         let (before, actuation) = (firmware.clone(), actuation.clone());

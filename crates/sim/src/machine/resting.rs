@@ -2,7 +2,7 @@
 //!
 //! A drive that is not enabled, on a shaft that stands and a bus that is charged, comes back to the same state with each round of
 //! control periods: same sensors in, same pins out. That is found out by watching one round, not foretold: the firmware says
-//! whether all that its ticks read and write is as it was ([`Firmware::rests_since`]), the plant whether a step of it changes
+//! whether all that its ticks read and write is as it was ([`Resting::rests_since`]), the plant whether a step of it changes
 //! anything but heat ([`plant::rest`]). From then on only heat is booked, step by step, until a frame or a hand at the machine
 //! comes, something is due, or a thermometer reads otherwise. When that will be is foretold by booking ahead, so that the runs of
 //! the communication task on the way, which find nothing to do, are left out too: the world hears of a machine at rest only
@@ -10,10 +10,10 @@
 //! does not.
 
 use can::{Instant, Station};
-use drives::Firmware;
+use drives::{Firmware, Resting};
 
 use super::assembly::Assembly;
-use super::rest::{Rest, Resting, Watch};
+use super::rest::{LeftOut, Rest, Watch};
 use super::{Life, Machine, Supply};
 
 /// From the last disturbance, or from a look in vain, to the next look. A look costs as much as some ten control periods.
@@ -36,7 +36,7 @@ impl<A: Assembly> Machine<A> {
     #[cold]
     fn wake_up(&mut self) {
         let now = std::mem::replace(&mut self.rest, Rest::from(self.next_tick));
-        let Rest::Resting(Resting { sensors: Some(sensors), left_out, .. }) = now else { return };
+        let Rest::Resting(LeftOut { sensors: Some(sensors), periods: left_out, .. }) = now else { return };
         let round = u64::from(A::Firmware::ROUND);
         self.firmware.leave_out_rounds(left_out / round);
         for back in (1..=left_out % round).rev() {
@@ -87,7 +87,7 @@ impl<A: Assembly> Machine<A> {
         let rested = self.assembly.rest(&self.actuation, due);
         self.next_tick = self.next_tick.plus_nanos(rested.steps * period_ns);
         if let Rest::Resting(resting) = &mut self.rest {
-            resting.left_out += rested.steps;
+            resting.periods += rested.steps;
         }
         if !rested.same {
             self.disturb();
@@ -112,7 +112,7 @@ impl<A: Assembly> Machine<A> {
             !self.kept_awake && !self.coupled && self.noise.is_none() && self.assembly.can_rest(&self.actuation);
         let before = std::mem::replace(&mut self.rest, again);
         // Foretold is nothing yet: the communication task runs once more first.
-        let from_now = |sensors| Rest::Resting(Resting { sensors, left_out: 0, foretold_to: self.next_tick });
+        let from_now = |sensors| Rest::Resting(LeftOut { sensors, periods: 0, foretold_to: self.next_tick });
         self.rest = match (self.life, self.supply, before) {
             _ if !still => return,
             (Life::Dead, Supply::Off, _) => from_now(None),

@@ -7,6 +7,7 @@ use canopen::Mux;
 use devices::servo::variations::VARIATIONS;
 use devices::variant::Pick;
 use devices::{AxisId, Description};
+use drives::engine::device::ResetTimes;
 use drives::node::Memory;
 use drives::servo::{
     Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Motor, Sensors, ServoDrive, acts_on, conditions,
@@ -292,6 +293,10 @@ impl Assembly for ServoBench {
 
     fn hardware(&self) -> Hardware<Boxed> {
         self.hardware.clone()
+    }
+
+    fn set_reset_times(firmware: &mut Self::Firmware, times: ResetTimes) {
+        firmware.set_reset_times(times);
     }
 
     fn sense(&self, inputs: u64) -> Sensors {

@@ -9,6 +9,7 @@ use canopen::Mux;
 use devices::variant::Variant;
 use devices::zltech::ZLAC8030L;
 use devices::{AxisId, Description};
+use drives::engine::device::ResetTimes;
 use drives::engine::storage::StoredImage;
 use drives::zlac8030l::assumptions::REFERENCE_V;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
@@ -146,6 +147,10 @@ impl Assembly for HubWheel {
 
     fn hardware(&self) -> Hardware {
         Hardware { dip_address: self.dip_address, eeprom: self.image }
+    }
+
+    fn set_reset_times(firmware: &mut Self::Firmware, times: ResetTimes) {
+        firmware.set_reset_times(times);
     }
 
     #[inline]

@@ -11,6 +11,7 @@ use devices::AxisId;
 use devices::Description;
 use devices::zltech::{ZLIM42C, ZLIM42C_82};
 use drives::engine::axis::Demand;
+use drives::engine::device::ResetTimes;
 use drives::engine::storage::StoredImage;
 use drives::zlim42c::assumptions::{REFERENCE_V, TEETH};
 use drives::zlim42c::hardware::{Actuation, Hardware, PowerStage, Sensors};
@@ -193,6 +194,10 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
 
     fn hardware(&self) -> Hardware {
         Hardware { dip_address: self.dip_address, eeprom: self.image }
+    }
+
+    fn set_reset_times(firmware: &mut Self::Firmware, times: ResetTimes) {
+        firmware.set_reset_times(times);
     }
 
     #[inline]

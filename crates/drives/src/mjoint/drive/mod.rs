@@ -8,6 +8,7 @@ mod commands;
 mod control;
 mod publish;
 mod registers;
+mod resting;
 
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::NodeId;
@@ -206,6 +207,11 @@ impl MJoint {
         self.device.values()
     }
 
+    /// How long the next resets by NMT take, which depends on the microcontroller: none unless it is set.
+    pub const fn set_reset_times(&mut self, times: ResetTimes) {
+        self.device.set_reset_times(times);
+    }
+
     /// What the control loops are asked for, to look at.
     pub const fn demand(&self) -> &Demand {
         &self.demand
@@ -334,7 +340,6 @@ impl Firmware for MJoint {
     type Hardware = Hardware;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
-    const ROUND: u32 = SUPERVISION_DIVIDER as u32 * INTERPOLATION_PERIODS as u32;
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.device.power_on(hardware.eeprom);
@@ -357,10 +362,6 @@ impl Firmware for MJoint {
         self.demand = Demand::Off;
     }
 
-    fn set_reset_times(&mut self, times: ResetTimes) {
-        self.device.set_reset_times(times);
-    }
-
     // Inlined by force: a run of a machine that wakes up calls it too, and the frequent caller would not get it.
     #[inline(always)]
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
@@ -377,87 +378,6 @@ impl Firmware for MJoint {
         }
         self.modulate(sensors);
         self.actuation(now)
-    }
-
-    fn rests_since(&self, earlier: &Self, now: Instant) -> bool {
-        // Each by name, so that no new one is forgotten.
-        let Self {
-            model: _,
-            device,
-            powered_at,
-            host: _,
-            host_lost,
-            function: _,
-            amplitude: _,
-            parameters: _,
-            parameters_changed,
-            address,
-            power_off_position,
-            gear_numerator,
-            origin_asked,
-            set_origin,
-            save_asked,
-            output_was_enabled,
-            controlword,
-            mode,
-            own_motion,
-            next_point,
-            axis,
-            servo,
-            weakening,
-            demand,
-            duty,
-            alarms,
-            protection,
-            pulses,
-            inputs,
-            battery,
-            dir,
-            dir_changes,
-            awake,
-            angle_count,
-            shaft_count,
-            turns,
-            position,
-            shown_velocity_rpm,
-            shown_current_a,
-            periods,
-            base_periods,
-        } = self;
-        // The lights go by the time in the lamp test, with an alarm and without a full battery.
-        let tested = now.nanos_since(*powered_at) >= LAMP_TEST_MS * 1_000_000;
-        let lights_are_steady = tested && alarms.latched().is_empty() && *battery == Battery::Full;
-        lights_are_steady
-            && !(*parameters_changed || *save_asked || *set_origin)
-            && (awake, host_lost, output_was_enabled)
-                == (&earlier.awake, &earlier.host_lost, &earlier.output_was_enabled)
-            && (address, power_off_position) == (&earlier.address, &earlier.power_off_position)
-            && (gear_numerator, origin_asked) == (&earlier.gear_numerator, &earlier.origin_asked)
-            && (controlword, mode) == (&earlier.controlword, &earlier.mode)
-            && (own_motion, next_point) == (&earlier.own_motion, &earlier.next_point)
-            && (axis, servo, weakening) == (&earlier.axis, &earlier.servo, &earlier.weakening)
-            && (demand, duty) == (&earlier.demand, &earlier.duty)
-            && (alarms, protection) == (&earlier.alarms, &earlier.protection)
-            && (pulses, inputs) == (&earlier.pulses, &earlier.inputs)
-            && (dir, dir_changes) == (&earlier.dir, &earlier.dir_changes)
-            && (angle_count, shaft_count, turns) == (&earlier.angle_count, &earlier.shaft_count, &earlier.turns)
-            && *position == earlier.position
-            && (shown_velocity_rpm, shown_current_a) == (&earlier.shown_velocity_rpm, &earlier.shown_current_a)
-            && (periods, base_periods) == (&earlier.periods, &earlier.base_periods)
-            && device.rests_since(&earlier.device)
-    }
-
-    fn next_event(&self) -> Option<Instant> {
-        let host = self.host.and_then(|host| host.poll_timeout());
-        self.device.next_event().into_iter().chain(host).min()
-    }
-
-    fn task_from(&self, at: Instant) -> Option<Instant> {
-        self.device.task_from(at)
-    }
-
-    fn leave_out_tasks(&mut self, now: Instant) {
-        self.device.leave_out_tasks(now);
     }
 
     fn eeprom(&self) -> (&[u8], u32) {

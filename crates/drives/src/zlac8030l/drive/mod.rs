@@ -4,6 +4,7 @@
 //! (`handle_timeout`), and the control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
 
 mod commands;
+mod resting;
 
 use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
@@ -108,6 +109,11 @@ impl Zlac8030l {
     /// The values of the objects, to look at.
     pub fn values(&self) -> &Values {
         self.device.values()
+    }
+
+    /// How long the next resets by NMT take, which depends on the microcontroller: none unless it is set.
+    pub const fn set_reset_times(&mut self, times: ResetTimes) {
+        self.device.set_reset_times(times);
     }
 
     /// What the control loops are asked for, to look at.
@@ -310,7 +316,6 @@ impl Firmware for Zlac8030l {
     type Hardware = Hardware;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
-    const ROUND: u32 = SUPERVISION_DIVIDER as u32;
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
@@ -321,10 +326,6 @@ impl Firmware for Zlac8030l {
     fn power_off(&mut self, _now: Instant) {
         self.device.power_off();
         self.shell.power_off();
-    }
-
-    fn set_reset_times(&mut self, times: ResetTimes) {
-        self.device.set_reset_times(times);
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
@@ -347,52 +348,6 @@ impl Firmware for Zlac8030l {
             outputs: self.shell.outputs,
             brake_engaged: terminals::brake_engaged(self.values()),
         }
-    }
-
-    fn rests_since(&self, earlier: &Self, _now: Instant) -> bool {
-        // Each by name, so that no new one is forgotten. The watch over the host goes by the time while it is armed.
-        let Self {
-            device,
-            dip_address: _,
-            parameters: _,
-            shell,
-            servo,
-            awake,
-            speed_setting_wrong,
-            position_offset,
-            faults,
-            protection,
-            bleeder,
-            watchdog: _,
-            last_sync: _,
-            shown_velocity_rpm,
-            shown_current_a,
-        } = self;
-        let watched =
-            shell.axis.state() == PowerState::OperationEnabled && self.values().get(COMMUNICATION_OFFLINE_TIME) != 0;
-        !watched
-            && !shell.parameters_changed
-            && (*awake, *speed_setting_wrong) == (earlier.awake, earlier.speed_setting_wrong)
-            && *position_offset == earlier.position_offset
-            && *shell == earlier.shell
-            && *servo == earlier.servo
-            && *faults == earlier.faults
-            && *protection == earlier.protection
-            && *bleeder == earlier.bleeder
-            && (shown_velocity_rpm, shown_current_a) == (&earlier.shown_velocity_rpm, &earlier.shown_current_a)
-            && device.rests_since(&earlier.device)
-    }
-
-    fn next_event(&self) -> Option<Instant> {
-        self.device.next_event()
-    }
-
-    fn task_from(&self, at: Instant) -> Option<Instant> {
-        self.device.task_from(at)
-    }
-
-    fn leave_out_tasks(&mut self, now: Instant) {
-        self.device.leave_out_tasks(now);
     }
 
     fn eeprom(&self) -> (&[u8], u32) {

@@ -4,6 +4,7 @@
 //! (`handle_timeout`), and the control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
 
 mod commands;
+mod resting;
 
 use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
@@ -83,6 +84,11 @@ impl Zlim42c {
     /// The values of the objects, to look at.
     pub fn values(&self) -> &Values {
         self.device.values()
+    }
+
+    /// How long the next resets by NMT take, which depends on the microcontroller: none unless it is set.
+    pub const fn set_reset_times(&mut self, times: ResetTimes) {
+        self.device.set_reset_times(times);
     }
 
     /// What the current vector is asked for, to look at.
@@ -297,7 +303,6 @@ impl Firmware for Zlim42c {
     type Hardware = Hardware;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
-    const ROUND: u32 = SUPERVISION_DIVIDER as u32;
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
@@ -310,10 +315,6 @@ impl Firmware for Zlim42c {
         self.device.power_off();
         self.shell.power_off();
         self.energise(Demand::Off);
-    }
-
-    fn set_reset_times(&mut self, times: ResetTimes) {
-        self.device.set_reset_times(times);
     }
 
     // Inlined by force: a run of a machine that wakes up calls it too, and the frequent caller would not get it.
@@ -331,43 +332,6 @@ impl Firmware for Zlim42c {
         }
         let flashes = self.shown_fault.map_or(0, |row| FLASHES[row]);
         Actuation { power_stage: self.power_stage(sensors), outputs: self.shell.outputs, led: led::shown(flashes, now) }
-    }
-
-    fn rests_since(&self, earlier: &Self, _now: Instant) -> bool {
-        // Each by name, so that no new one is forgotten. The lights flash a fault by the time.
-        let Self {
-            device,
-            dip_address: _,
-            parameters: _,
-            shell,
-            stepper,
-            controlword,
-            faults,
-            phases,
-            bus_a,
-            shown_fault,
-        } = self;
-        shown_fault.is_none()
-            && !shell.parameters_changed
-            && *shell == earlier.shell
-            && *stepper == earlier.stepper
-            && *controlword == earlier.controlword
-            && *faults == earlier.faults
-            && *phases == earlier.phases
-            && *bus_a == earlier.bus_a
-            && device.rests_since(&earlier.device)
-    }
-
-    fn next_event(&self) -> Option<Instant> {
-        self.device.next_event()
-    }
-
-    fn task_from(&self, at: Instant) -> Option<Instant> {
-        self.device.task_from(at)
-    }
-
-    fn leave_out_tasks(&mut self, now: Instant) {
-        self.device.leave_out_tasks(now);
     }
 
     fn eeprom(&self) -> (&[u8], u32) {
