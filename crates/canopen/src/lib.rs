@@ -62,6 +62,7 @@ mod mux;
 pub mod nmt;
 pub mod node;
 mod node_id;
+pub mod object;
 pub mod od;
 pub mod pdo;
 pub mod sdo;

@@ -1,8 +1,8 @@
 //! The drive profile CiA 402-2 as tables and pure functions.
 //!
 //! Controlword and statusword by bit, the power drive state machine and the homing methods as const tables, modes, option
-//! and error codes as open newtypes, the factor group as exact fractions, windows and touch probes as small machines. Nothing here moves a motor or knows a dictionary: the drives' firmware and the
-//! master both read these tables. Manufacturer meanings of bits are deliberately absent: they are the drives'.
+//! and error codes as open newtypes, the factor group as exact fractions, windows and touch probes as small machines; where the objects stand is [`object`]. Nothing here moves a motor or
+//! knows a dictionary: the drives' firmware and the master both read these tables. Manufacturer meanings of bits are deliberately absent: they are the drives'.
 //!
 //! ```
 //! use cia402::{PowerEvent, PowerState, Statusword, next_command, transition};
@@ -26,6 +26,7 @@ mod error_code;
 mod homing_method;
 mod interpolation;
 mod mode;
+pub mod object;
 mod option_code;
 mod power;
 mod statusword;

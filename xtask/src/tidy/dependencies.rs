@@ -12,7 +12,7 @@ pub(crate) const NO_STD: &[&str] = &["can", "canopen", "cia402", "motion", "plan
 const MAY_USE: &[(&str, &[&str])] = &[
     ("can", &[]),
     ("canopen", &["can"]),
-    ("cia402", &[]),
+    ("cia402", &["canopen"]),
     ("motion", &[]),
     ("plant", &[]),
     ("devices", &["can", "canopen", "cia402"]),
