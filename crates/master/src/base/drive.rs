@@ -6,6 +6,7 @@ use core::time::Duration;
 use can::Instant;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
+use cia402::object::CONTROLWORD;
 
 use super::kinematics::{Geometry, Pose, Twist, Wheels};
 use super::limits::{BaseError, BaseLimits};
@@ -13,7 +14,7 @@ use super::state::StopCause;
 use crate::core::NodeSet;
 use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, Refusal};
 
-use crate::drive::{CONTROLWORD, Drive, STANDSTILL_RPM};
+use crate::drive::{Drive, STANDSTILL_RPM};
 use crate::error::Error;
 use crate::network::{Claim, Exchange, Network};
 use crate::units::{Rpm, Turns};

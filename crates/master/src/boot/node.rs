@@ -7,6 +7,9 @@
 use std::time::Duration;
 
 use can::Instant;
+use canopen::object::{
+    APPLICATION_SOFTWARE_IDENTIFICATION, CONFIGURATION_DATE, CONFIGURATION_TIME, DEVICE_TYPE, PRODUCER_HEARTBEAT_TIME,
+};
 use canopen::{Mux, NmtCommand, NmtState, NodeId};
 use devices::HostWatch;
 
@@ -20,11 +23,6 @@ use crate::drive::{HostLoss, SwitchedOff};
 use crate::error::Error;
 use crate::network::{Elapsed, Network, Node, NodeView};
 
-const DEVICE_TYPE: Mux = Mux::new(0x1000, 0);
-const PRODUCER_HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
-const CONFIGURATION_DATE: Mux = Mux::new(0x1020, 1);
-const CONFIGURATION_TIME: Mux = Mux::new(0x1020, 2);
-const SOFTWARE: Mux = Mux::new(0x1F56, 1);
 const IDENTITY: u16 = 0x1018;
 const RESTORE: u16 = 0x1011;
 /// The signature that 1011h expects. Source: CiA 301, 7.5.2.14.
@@ -225,16 +223,22 @@ impl<'a> NodeBoot<'a> {
         }
         let Some(expected) = self.expectation.software else {
             let found = Found::Text("a plan without one (1F55h is 0)".to_owned());
-            return self.fail(StepKind::Software, Some(SOFTWARE), Expected::Answer, found, ErrorStatus::NoProgram);
+            return self.fail(
+                StepKind::Software,
+                Some(APPLICATION_SOFTWARE_IDENTIFICATION),
+                Expected::Answer,
+                found,
+                ErrorStatus::NoProgram,
+            );
         };
         let allowed = assignment.has(Assignment::UPDATE_SOFTWARE) && !assignment.has(Assignment::KEEP_ALIVE);
-        let found = self.read(SOFTWARE).await;
+        let found = self.read(APPLICATION_SOFTWARE_IDENTIFICATION).await;
         let status = match found {
             Found::Value(value) if value == expected => None,
             Found::Value(_) if !allowed => Some(ErrorStatus::ProgramNotAllowed),
             _ => Some(ErrorStatus::NoProgram),
         };
-        self.judge(StepKind::Software, SOFTWARE, Expected::Value(expected), found, status)
+        self.judge(StepKind::Software, APPLICATION_SOFTWARE_IDENTIFICATION, Expected::Value(expected), found, status)
     }
 
     /// Writes its configuration, unless it has it by date and time.

@@ -30,6 +30,7 @@ use std::time::Duration;
 use can::{Frame, Instant, Station};
 use canopen::connection_set::Service;
 use canopen::{Mux, NodeId};
+use cia402::object::STATUSWORD;
 
 pub use cycle::Cycle;
 pub use event::{Event, two_devices};
@@ -55,9 +56,6 @@ use timers::Timers;
 
 /// Frames that wait for [`Core::poll_transmit`] besides SDO, SYNC and PDO; a further one replaces the oldest.
 const OUTBOX: usize = 128;
-
-/// What a drive is asked to show it that this master lives: something that any drive has and that changes nothing.
-const STATUSWORD: Mux = Mux::new(0x6041, 0);
 
 /// Names those questions; no caller waits for their answers. Other tickets count from 1.
 const FEED: Ticket = Ticket(0);

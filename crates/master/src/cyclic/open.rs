@@ -3,25 +3,20 @@ use core::time::Duration;
 use canopen::pdo::{Direction, EventTrigger, MappingRecord, PdoId, PdoNumber};
 use canopen::{Mux, NmtCommand, NmtState, NodeId};
 use cia402::ModeOfOperation;
+use cia402::object::{
+    CONTROLWORD, INTERPOLATION_DATA_RECORD_1ST_SET_POINT, MAX_MOTOR_SPEED, MAX_PROFILE_VELOCITY, MODES_OF_OPERATION,
+    POSITION_ACTUAL_VALUE, STATUSWORD, TARGET_POSITION,
+};
 use devices::{AxisDescription, Description, Quantity};
 
 use super::demand::Bound;
 use super::drive::{ControlwordPath, CyclicDrive, Progress};
 use super::target::{Kind, Target};
 use crate::core::{Cadence, CycleRules, NumberForm, PdoMap, Sample, Signal};
-use crate::drive::{CONTROLWORD, Drive, MODE, POSITION_ACTUAL, STATUSWORD, STOP, SwitchedOff, TARGET_POSITION};
+use crate::drive::{Drive, STOP, SwitchedOff};
 use crate::error::Error;
 use crate::host_loss::HostLoss;
 use crate::pdo::{PdoConfig, PdoError, SignalError, TimerUnits, TransmissionType};
-
-/// The interpolation data record (CiA 402-2, 12.3).
-const INTERPOLATION_DATA: Mux = Mux::new(0x60C1, 1);
-
-/// Highest velocity of profiles, in the units of the target velocity (CiA 402-2, 10.3).
-const MAX_PROFILE_VELOCITY: Mux = Mux::new(0x607F, 0);
-
-/// Highest speed of the motor, in r/min (CiA 402-2, 10.3).
-const MAX_MOTOR_SPEED: Mux = Mux::new(0x6080, 0);
 
 const INTENT: &str = "move it cycle by cycle";
 
@@ -86,7 +81,7 @@ enum SetPointKind {
 
 /// The set-point of a mode that follows one each cycle.
 fn set_point_of(description: &Description, axis: &AxisDescription, mode: ModeOfOperation) -> Option<SetPointKind> {
-    let interpolation_data = axis.object(INTERPOLATION_DATA);
+    let interpolation_data = axis.object(INTERPOLATION_DATA_RECORD_1ST_SET_POINT);
     match mode {
         ModeOfOperation::INTERPOLATED_POSITION if description.row(interpolation_data).is_some() => {
             Some(SetPointKind::Position(interpolation_data))
@@ -132,7 +127,7 @@ impl Drive {
         let statusword = self.node().signal_in(statusword_in, axis.object(STATUSWORD))?;
         if let Kind::Position { actual, .. } = &mut target.kind {
             // A TPDO that comes, if one of them does.
-            *actual = self.node().signal_in(statusword_in, axis.object(POSITION_ACTUAL)).unwrap_or(*actual);
+            *actual = self.node().signal_in(statusword_in, axis.object(POSITION_ACTUAL_VALUE)).unwrap_or(*actual);
         }
         let place = axis.object(CONTROLWORD);
         let controlword = self.controlword_path(number, &mapped);
@@ -277,9 +272,9 @@ impl Drive {
         let [velocity, current] = quantities.map(|quantity| quantity.map(|quantity| quantity.object));
         let statusword = Some(axis.object(STATUSWORD));
         let state = match set_point_of(description, axis, mode) {
-            Some(SetPointKind::Position(_)) => map(&[statusword, Some(axis.object(POSITION_ACTUAL))]),
+            Some(SetPointKind::Position(_)) => map(&[statusword, Some(axis.object(POSITION_ACTUAL_VALUE))]),
             // What does not fit any more is left out.
-            _ if position => map(&[statusword, Some(axis.object(POSITION_ACTUAL)), velocity, current]),
+            _ if position => map(&[statusword, Some(axis.object(POSITION_ACTUAL_VALUE)), velocity, current]),
             _ => map(&[statusword, velocity, current]),
         };
         let command = map(&[Some(axis.object(CONTROLWORD)), Some(target)]);
@@ -334,12 +329,12 @@ impl Drive {
         let velocity = self.has(axis.units.target_velocity, "a target velocity")?;
         let (rpm, speed) = self.highest_speed(axis, velocity).await?;
         let kind = Kind::Position {
-            actual: self.node().signal(axis.object(POSITION_ACTUAL))?,
+            actual: self.node().signal(axis.object(POSITION_ACTUAL_VALUE))?,
             counts_per_turn,
             counts_per_s: rpm / 60.0 * counts_per_turn,
             speed,
         };
-        let last_sent = self.read_number(axis.object(POSITION_ACTUAL)).await?;
+        let last_sent = self.read_number(axis.object(POSITION_ACTUAL_VALUE)).await?;
         Ok((number, Target { set_point, limits: self.limits(object).await?, kind, last_sent }))
     }
 
@@ -407,7 +402,7 @@ impl Drive {
         let Some(pdo) = mapped.rpdos.iter().find(|pdo| pdo.pdo.number == number) else { return Ok(()) };
         for object in &pdo.map.0 {
             let raw = match object.mux {
-                mux if mux == self.place(MODE) => u64::from(mode.0 as u8),
+                mux if mux == self.place(MODES_OF_OPERATION) => u64::from(mode.0 as u8),
                 mux => match self.node().upload(mux).await {
                     Ok(payload) => payload.raw().into(),
                     // An object that can only be written, or a gap.
@@ -423,7 +418,7 @@ impl Drive {
 
     async fn position_signal<T: Sample>(&self, near: PdoNumber) -> Result<Option<Signal<T>>, Error> {
         let per_count = 1.0 / self.counts_per_turn().await?;
-        Ok(self.signal_near(near, self.place(POSITION_ACTUAL), NumberForm::Signed, per_count))
+        Ok(self.signal_near(near, self.place(POSITION_ACTUAL_VALUE), NumberForm::Signed, per_count))
     }
 
     /// An object in this TPDO, or else in another one.

@@ -23,6 +23,7 @@ use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
 use canopen::lss::{Reply, Request};
 use canopen::nmt::{NmtRequest, NmtTarget};
+use canopen::object::DEVICE_TYPE;
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::sync::Sync;
 use canopen::time_stamp::TimeOfDay;
@@ -193,7 +194,7 @@ impl Decoder {
         let step = self.conversations.step(node, from, frame.padded());
         if let Some((mux, bytes)) = step.learned() {
             self.pdos.learn(node, mux, bytes);
-            if mux == Mux::new(0x1000, 0) {
+            if mux == DEVICE_TYPE {
                 self.learn_model(node, bytes);
             }
         }

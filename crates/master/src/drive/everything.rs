@@ -5,9 +5,10 @@ use std::time::Duration;
 
 use canopen::{AbortCode, Mux, NmtCommand, NodeId};
 use cia402::PowerState;
+use cia402::object::{CONTROLWORD, STATUSWORD};
 use devices::{AxisId, Description, PowerStyle};
 
-use super::handle::{CONTROLWORD, Drive, STATUSWORD};
+use super::handle::Drive;
 use super::safety::{ANSWER, STOP};
 use crate::core::NodeSet;
 use crate::error::Error;

@@ -1,9 +1,10 @@
 use cia402::ModeOfOperation;
+use cia402::object::MODES_OF_OPERATION;
 use devices::Description;
 use devices::faults::FaultRow;
 
 use super::conclude::{Trigger, conclude};
-use super::handle::{Drive, MODE};
+use super::handle::Drive;
 use crate::error::{Error, Explanation, Fact};
 use crate::units::Volts;
 
@@ -55,7 +56,8 @@ impl Drive {
                 self.description.map(|description| faults_in(description, code)).unwrap_or_default(),
             ));
         }
-        if let (Ok(wanted), Ok(shown)) = (self.node.read::<i8>(self.place(MODE)).await, self.mode().await) {
+        if let (Ok(wanted), Ok(shown)) = (self.node.read::<i8>(self.place(MODES_OF_OPERATION)).await, self.mode().await)
+        {
             facts.push(Fact::Mode(ModeOfOperation(wanted), shown));
         }
         if let Some(voltage) = self.axis_description().and_then(|axis| axis.units.bus_voltage)

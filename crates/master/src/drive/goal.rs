@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use canopen::Mux;
+use cia402::object::{CONTROLWORD, POSITION_ACTUAL_VALUE};
 use cia402::{Controlword, PowerState, Statusword};
 use devices::{HomingRules, Quantity};
 
 use super::conclude::{Interference, Trigger};
-use super::handle::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL};
+use super::handle::{Drive, POLL};
 use super::power::STANDSTILL_RPM;
 use crate::error::Error;
 
@@ -81,7 +82,7 @@ impl Goal {
                 if settled && rules.failed.matches(statusword) {
                     return Err(drive.not_reached(intent, Trigger::HomingFailed(*method)).await);
                 }
-                let at = drive.read_number(drive.place(POSITION_ACTUAL)).await?;
+                let at = drive.read_number(drive.place(POSITION_ACTUAL_VALUE)).await?;
                 Ok(Look { reached: settled && rules.attained.matches(statusword), at: at as f64, rests: false })
             }
             Self::Speed(held) => {
@@ -90,7 +91,7 @@ impl Goal {
                 Ok(Look { reached, at, rests: !reached && at.abs() < drive.gear.at_output(STANDSTILL_RPM) })
             }
             Self::Position { target, band, .. } => {
-                let position = drive.read_number(drive.place(POSITION_ACTUAL)).await?;
+                let position = drive.read_number(drive.place(POSITION_ACTUAL_VALUE)).await?;
                 let near = position.abs_diff(*target) as f64 <= *band;
                 let at = position as f64;
                 let least = (*band / REACHED_TURNS * REST_TURNS).max(1.0);

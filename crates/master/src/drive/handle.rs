@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use canopen::Mux;
 use canopen::od::Entry;
+use cia402::object::{CONTROLWORD, MODES_OF_OPERATION_DISPLAY, STATUSWORD};
 use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
 use devices::{AxisDescription, AxisId, Description, HostWatch, PowerStyle, Quantity};
 
@@ -11,14 +12,6 @@ use crate::error::{Access, Error};
 use crate::gear::Gear;
 use crate::identify::{Guess, Knowledge};
 use crate::network::Node;
-
-pub(crate) const CONTROLWORD: Mux = Mux::new(0x6040, 0);
-pub(crate) const STATUSWORD: Mux = Mux::new(0x6041, 0);
-pub(crate) const MODE: Mux = Mux::new(0x6060, 0);
-pub(super) const MODE_DISPLAY: Mux = Mux::new(0x6061, 0);
-pub(crate) const POSITION_ACTUAL: Mux = Mux::new(0x6064, 0);
-pub(crate) const TARGET_POSITION: Mux = Mux::new(0x607A, 0);
-pub(super) const ERROR_CODE: Mux = Mux::new(0x603F, 0);
 
 /// How often a drive is looked at while something is waited for: quick to a person, about 10 % of a 500 kbit/s bus
 /// for two objects.
@@ -198,7 +191,7 @@ impl Drive {
 
     /// The mode that the drive is in.
     pub(super) async fn mode(&self) -> Result<ModeOfOperation, Error> {
-        let display = self.axis_description().map_or(MODE_DISPLAY, |axis| axis.mode_display);
+        let display = self.axis_description().map_or(MODES_OF_OPERATION_DISPLAY, |axis| axis.mode_display);
         match self.in_process_data(display, 8) {
             Some(raw) => Ok(ModeOfOperation(raw as i8)),
             None => self.node.read::<i8>(display).await.map(ModeOfOperation),

@@ -5,11 +5,12 @@
 
 use std::time::Duration;
 
+use cia402::object::MODES_OF_OPERATION;
 use cia402::{Controlword, ModeOfOperation};
 use devices::{HomingRules, HomingStart};
 
 use super::goal::Goal;
-use super::handle::{Drive, MODE};
+use super::handle::Drive;
 use super::motion::{MotionReport, Note};
 use crate::error::Error;
 use crate::units::Rpm;
@@ -87,7 +88,7 @@ impl Drive {
                 self.enable().await?;
                 self.release_halt().await?;
                 self.note_moved();
-                self.node.write(self.place(MODE), ModeOfOperation::HOMING.0).await?;
+                self.node.write(self.place(MODES_OF_OPERATION), ModeOfOperation::HOMING.0).await?;
                 Ok(None)
             }
         }

@@ -33,7 +33,6 @@ pub use everything::{StopWay, StoppedAxis};
 pub use explain::faults_in;
 pub use guard::SwitchedOff;
 pub use handle::Drive;
-pub(crate) use handle::{CONTROLWORD, MODE, POSITION_ACTUAL, STATUSWORD, TARGET_POSITION};
 pub use homing::HomingOptions;
 pub use motion::{MotionOptions, MotionReport, Note};
 pub(crate) use power::STANDSTILL_RPM;

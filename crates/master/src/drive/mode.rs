@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
+use cia402::object::MODES_OF_OPERATION;
 use cia402::{ModeOfOperation, PowerState};
 use devices::AxisDescription;
 
 use super::conclude::Trigger;
-use super::handle::{Drive, MODE, POLL, STEP_TIMEOUT};
+use super::handle::{Drive, POLL, STEP_TIMEOUT};
 use super::motion::Note;
 use super::power::STANDSTILL_RPM;
 use crate::error::Error;
@@ -24,7 +25,7 @@ impl Drive {
             return Ok(None);
         }
         let stopped = self.stop_if_turning(axis).await?;
-        self.node.write(self.place(MODE), mode.0).await?;
+        self.node.write(self.place(MODES_OF_OPERATION), mode.0).await?;
         let mut waited = Duration::ZERO;
         while self.mode().await? != mode {
             if waited >= STEP_TIMEOUT {

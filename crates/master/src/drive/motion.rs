@@ -3,10 +3,11 @@
 use core::fmt;
 use std::time::Duration;
 
+use cia402::object::CONTROLWORD;
 use cia402::{Controlword, ModeOfOperation, PowerState};
 
 use super::goal::{Goal, Held, Sent};
-use super::handle::{CONTROLWORD, Drive};
+use super::handle::Drive;
 use super::scale::{Commanded, REACHED_LEAST_RPM};
 use crate::error::Error;
 use crate::host_loss::HostLoss;

@@ -3,12 +3,13 @@
 
 use std::time::Duration;
 
+use cia402::object::{CONTROLWORD, POSITION_ACTUAL_VALUE, TARGET_POSITION};
 use cia402::{Controlword, ModeOfOperation, Statusword};
 use devices::NewSetPoint;
 
 use super::conclude::{Interference, Trigger};
 use super::goal::{Goal, REACHED_TURNS, Sent};
-use super::handle::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL, STEP_TIMEOUT, TARGET_POSITION};
+use super::handle::{Drive, POLL, STEP_TIMEOUT};
 use super::motion::{LATE_FACTOR, LATE_MARGIN_S, MotionOptions, MotionReport};
 use super::scale::Commanded;
 use crate::error::Error;
@@ -51,7 +52,7 @@ impl Drive {
         commanded.extend(self.write_ramps(options.acceleration, options.deceleration, speed).await?);
         let stopped = self.set_mode(ModeOfOperation::PROFILE_POSITION).await?;
         self.enable().await?;
-        let began_at = self.read_number(self.place(POSITION_ACTUAL)).await?;
+        let began_at = self.read_number(self.place(POSITION_ACTUAL_VALUE)).await?;
         let target = if relative { began_at.saturating_add(counts) } else { counts };
         let turn = self.counts_per_shaft_turn().await?.max(1.0);
         let of_output = turn * self.gear.ratio();
@@ -68,7 +69,7 @@ impl Drive {
         let sent = Sent { object: self.place(TARGET_POSITION), raw: counts };
         let reached = self.watch(INTENT, Goal::Position { target, band, sent }, limit).await?;
         self.settle(INTENT).await?;
-        let at = self.answered(INTENT, self.read_number(self.place(POSITION_ACTUAL)).await).await?;
+        let at = self.answered(INTENT, self.read_number(self.place(POSITION_ACTUAL_VALUE)).await).await?;
         if at.abs_diff(target) as f64 > band {
             let (at, target, unit) = (at as f64, target as f64, "counts");
             let elsewhere = Trigger::Elsewhere { at, target, unit, by: Interference::Unknown };

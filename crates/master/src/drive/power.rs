@@ -1,10 +1,11 @@
 use std::time::Duration;
 
+use cia402::object::{CONTROLWORD, MODES_OF_OPERATION};
 use cia402::{Controlword, ModeOfOperation, PowerCommand, PowerState, Statusword, next_command};
 use devices::{HomingStart, PowerStyle, Quantity};
 
 use super::conclude::Trigger;
-use super::handle::{CONTROLWORD, Drive, MODE, POLL, STEP_TIMEOUT};
+use super::handle::{Drive, POLL, STEP_TIMEOUT};
 use crate::error::Error;
 
 /// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
@@ -224,7 +225,7 @@ impl Drive {
         let rules = self.axis_description().and_then(|axis| axis.homing);
         let by_mode = rules.is_some_and(|rules| rules.start == HomingStart::ModeWrite);
         if by_mode && self.mode().await? == ModeOfOperation::HOMING {
-            self.node.write(self.place(MODE), ModeOfOperation::PROFILE_POSITION.0).await?;
+            self.node.write(self.place(MODES_OF_OPERATION), ModeOfOperation::PROFILE_POSITION.0).await?;
         }
         Ok(())
     }

@@ -6,11 +6,12 @@
 use std::time::Duration;
 
 use canopen::{Mux, NodeId};
+use cia402::object::{CONTROLWORD, POSITION_ACTUAL_VALUE, STATUSWORD};
 use cia402::{Controlword, PowerCommand, PowerState, Statusword};
 use devices::PowerStyle;
 
 use super::conclude::Trigger;
-use super::handle::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL, STATUSWORD};
+use super::handle::{Drive, POLL};
 use super::power::{STANDSTILL_LOOKS, STANDSTILL_RPM};
 use crate::core::{Command, Core, NodeSet, Payload, Request, Transfer};
 use crate::error::Error;
@@ -211,7 +212,7 @@ impl Drive {
         let stands = match self.axis_description().and_then(|axis| axis.units.actual_velocity) {
             Some(velocity) => self.read_quantity(velocity).await?.abs() < STANDSTILL_RPM,
             None => {
-                let at = i64::from(self.node.read::<i32>(self.place(POSITION_ACTUAL)).await?);
+                let at = i64::from(self.node.read::<i32>(self.place(POSITION_ACTUAL_VALUE)).await?);
                 let before = rest.position.replace(at);
                 network.sleep(REST_LOOK.saturating_sub(POLL)).await;
                 before.is_some_and(|before| (at - before).abs() <= REST_COUNTS)

@@ -3,9 +3,10 @@ use std::time::Duration;
 
 use canopen::Mux;
 use canopen::od::Entry;
+use cia402::object::TARGET_POSITION;
 use devices::{CountsPerTurn, Quantity, Ramps, Scale};
 
-use super::handle::{Drive, TARGET_POSITION};
+use super::handle::Drive;
 use crate::error::Error;
 use crate::units::{Along, Angle, Ramp, Shown, Turning};
 

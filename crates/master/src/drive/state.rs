@@ -1,12 +1,13 @@
 use std::time::Duration;
 
 use canopen::NmtState;
+use cia402::object::{ERROR_CODE, POSITION_ACTUAL_VALUE};
 use cia402::{ModeOfOperation, PowerState, Statusword};
 use devices::faults::FaultRow;
 use devices::{PowerStyle, Quantity};
 
 use super::explain::faults_in;
-use super::handle::{Drive, ERROR_CODE, POSITION_ACTUAL};
+use super::handle::Drive;
 use crate::error::Error;
 use crate::units::{Amperes, Celsius, Counts, Degrees, Rpm, Volts};
 use canopen::Mux;
@@ -59,8 +60,8 @@ impl Drive {
         let fault_code =
             refused_is_none(self.node.upload(self.fault_code()).await)?.map_or(0, |payload| payload.raw() as u16);
         let faults = self.description.map(|description| faults_in(description, fault_code)).unwrap_or_default();
-        let position =
-            refused_is_none(self.node.read::<i32>(self.place(POSITION_ACTUAL)).await)?.map(|raw| Counts(raw.into()));
+        let position = refused_is_none(self.node.read::<i32>(self.place(POSITION_ACTUAL_VALUE)).await)?
+            .map(|raw| Counts(raw.into()));
         let angle = match (position, self.axis_description()) {
             (Some(Counts(counts)), Some(_)) => {
                 let turn = self.counts_per_turn().await?;

@@ -1,17 +1,16 @@
 //! The mode asked for (6060h) and the one that the drive is in (6061h).
 
-use canopen::Mux;
 use cia402::ModeOfOperation;
+use cia402::object::MODES_OF_OPERATION;
 
 use super::finding::{Finding, Topic, cause};
 use super::observed::Observed;
 
 const TOPIC: Topic = Topic::Mode;
-const MODE: Mux = Mux::new(0x6060, 0);
 
 pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
-    let (Some(shown), Some(wanted)) = (seen.mode, seen.axis_value(MODE)) else { return };
-    let (mode, display) = (seen.place(MODE), seen.mode_object());
+    let (Some(shown), Some(wanted)) = (seen.mode, seen.axis_value(MODES_OF_OPERATION)) else { return };
+    let (mode, display) = (seen.place(MODES_OF_OPERATION), seen.mode_object());
     let none = ModeOfOperation::NONE;
     let wanted = ModeOfOperation(i8::try_from(wanted).unwrap_or_default());
     if shown != wanted && mode != display {

@@ -1,8 +1,15 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use canopen::object::{DEVICE_TYPE, PRODUCER_HEARTBEAT_TIME};
 use canopen::od::Entry;
 use canopen::{CobId, Mux, NmtState, NodeId};
+use cia402::object::{
+    CONTROLWORD, MAX_CURRENT, MAX_MOTOR_SPEED, MAX_POSITION_LIMIT, MAX_PROFILE_VELOCITY, MAX_TORQUE,
+    MIN_POSITION_LIMIT, MODES_OF_OPERATION, MODES_OF_OPERATION_DISPLAY, NEGATIVE_TORQUE_LIMIT_VALUE,
+    POSITION_ACTUAL_VALUE, POSITION_WINDOW, POSITIVE_TORQUE_LIMIT_VALUE, PROFILE_ACCELERATION, PROFILE_VELOCITY,
+    TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
+};
 use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
 use devices::faults::FaultRow;
 use devices::{AxisDescription, Description, HostWatch, Meaning, PowerStyle, Quantity, Scale, Terminals};
@@ -17,46 +24,26 @@ use crate::pdo::PdoConfig;
 /// Objects of an axis that rules ask for (CiA 402-2); those that a drive does not have are passed over.
 const OF_AXIS: [Mux; 17] = [
     CONTROLWORD,
-    Mux::new(0x6060, 0),
-    POSITION_ACTUAL,
+    MODES_OF_OPERATION,
+    POSITION_ACTUAL_VALUE,
     TARGET_POSITION,
     TARGET_TORQUE,
     MAX_TORQUE,
     MAX_CURRENT,
-    POSITION_LIMIT_LOW,
-    POSITION_LIMIT_HIGH,
+    MIN_POSITION_LIMIT,
+    MAX_POSITION_LIMIT,
     MAX_PROFILE_VELOCITY,
     MAX_MOTOR_SPEED,
     PROFILE_VELOCITY,
     TARGET_VELOCITY,
     POSITION_WINDOW,
     PROFILE_ACCELERATION,
-    POSITIVE_TORQUE_LIMIT,
-    NEGATIVE_TORQUE_LIMIT,
+    POSITIVE_TORQUE_LIMIT_VALUE,
+    NEGATIVE_TORQUE_LIMIT_VALUE,
 ];
 
-pub(super) const CONTROLWORD: Mux = Mux::new(0x6040, 0);
-pub(super) const POSITION_ACTUAL: Mux = Mux::new(0x6064, 0);
-pub(super) const POSITION_WINDOW: Mux = Mux::new(0x6067, 0);
-pub(super) const TARGET_TORQUE: Mux = Mux::new(0x6071, 0);
-pub(super) const MAX_TORQUE: Mux = Mux::new(0x6072, 0);
-pub(super) const MAX_CURRENT: Mux = Mux::new(0x6073, 0);
-pub(super) const TARGET_POSITION: Mux = Mux::new(0x607A, 0);
-pub(super) const POSITION_LIMIT_LOW: Mux = Mux::new(0x607D, 1);
-pub(super) const POSITION_LIMIT_HIGH: Mux = Mux::new(0x607D, 2);
-pub(super) const MAX_PROFILE_VELOCITY: Mux = Mux::new(0x607F, 0);
-pub(super) const MAX_MOTOR_SPEED: Mux = Mux::new(0x6080, 0);
-pub(super) const PROFILE_VELOCITY: Mux = Mux::new(0x6081, 0);
-pub(super) const PROFILE_ACCELERATION: Mux = Mux::new(0x6083, 0);
-pub(super) const POSITIVE_TORQUE_LIMIT: Mux = Mux::new(0x60E0, 0);
-pub(super) const NEGATIVE_TORQUE_LIMIT: Mux = Mux::new(0x60E1, 0);
-pub(super) const TARGET_VELOCITY: Mux = Mux::new(0x60FF, 0);
-
 /// Limits in thousandths of what is rated (CiA 402-2, torque profile).
-const CURRENT_LIMITS: [Mux; 4] = [MAX_TORQUE, MAX_CURRENT, POSITIVE_TORQUE_LIMIT, NEGATIVE_TORQUE_LIMIT];
-
-/// Producer heartbeat time in ms (CiA 301, 7.5.2.17).
-pub(super) const HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
+const CURRENT_LIMITS: [Mux; 4] = [MAX_TORQUE, MAX_CURRENT, POSITIVE_TORQUE_LIMIT_VALUE, NEGATIVE_TORQUE_LIMIT_VALUE];
 
 /// Between the two looks at the speed: a shaft that starts has moved on, one that is held has not.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(100);
@@ -114,7 +101,7 @@ pub struct Observed {
 impl Observed {
     /// How often it sends a heartbeat by its own word, if it does.
     pub(super) fn heartbeat_period(&self) -> Option<Duration> {
-        let ms = u64::try_from(self.value(HEARTBEAT_TIME)?).ok().filter(|ms| *ms > 0)?;
+        let ms = u64::try_from(self.value(PRODUCER_HEARTBEAT_TIME)?).ok().filter(|ms| *ms > 0)?;
         Some(Duration::from_millis(ms))
     }
 
@@ -157,7 +144,7 @@ impl Observed {
     async fn read(&mut self, drive: &Drive) -> Result<(), Error> {
         let units = self.axis.map(|axis| &axis.units);
         // Every node answers this one: the first request shows whether one is there.
-        answered(drive.node().upload(Mux::new(0x1000, 0)).await)?;
+        answered(drive.node().upload(DEVICE_TYPE).await)?;
         if let Some(statusword) = answered(drive.statusword().await)? {
             (self.statusword, self.power) = (Some(statusword), drive.power_state(statusword));
         }
@@ -199,7 +186,7 @@ impl Observed {
     /// The objects to read, those that the model's units and limits name among them.
     fn wanted(&self) -> Vec<Mux> {
         let mut wanted: Vec<Mux> = OF_AXIS.iter().map(|mux| self.place(*mux)).collect();
-        wanted.extend([HEARTBEAT_TIME, self.mode_object()]);
+        wanted.extend([PRODUCER_HEARTBEAT_TIME, self.mode_object()]);
         if let Some(units) = self.axis.map(|axis| &axis.units) {
             let quantities = [units.target_velocity, units.profile_velocity, units.target_current];
             wanted.extend(quantities.into_iter().flatten().map(|quantity| quantity.object));
@@ -252,7 +239,7 @@ impl Observed {
 
     /// Where the mode is shown.
     pub(super) fn mode_object(&self) -> Mux {
-        self.axis.map_or(Mux::new(0x6061, 0), |axis| axis.mode_display)
+        self.axis.map_or(MODES_OF_OPERATION_DISPLAY, |axis| axis.mode_display)
     }
 
     /// What an object has, where it is the drive's.

@@ -1,12 +1,12 @@
 //! The way to Operation enabled (CiA 402-2, 8.2), or what replaces it.
 
 use canopen::pdo::Direction;
+use cia402::object::CONTROLWORD;
 use cia402::{Controlword, PowerCommand, PowerEvent, PowerState, Statusword, next_command, transition};
 use devices::PowerStyle;
 use devices::faults::FaultRow;
 
 use super::finding::{Finding, Topic, cause, warning};
-use super::observed::CONTROLWORD;
 use super::observed::Observed;
 
 const TOPIC: Topic = Topic::Power;

@@ -1,16 +1,16 @@
 //! What an enabled drive that stands still is commanded to do (CiA 402-2, the clauses of its modes).
 
 use canopen::Mux;
+use cia402::object::{
+    MAX_CURRENT, MAX_MOTOR_SPEED, MAX_POSITION_LIMIT, MAX_PROFILE_VELOCITY, MAX_TORQUE, MIN_POSITION_LIMIT,
+    NEGATIVE_TORQUE_LIMIT_VALUE, POSITION_ACTUAL_VALUE, POSITION_WINDOW, POSITIVE_TORQUE_LIMIT_VALUE,
+    PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
+};
 use cia402::{Controlword, ModeOfOperation, Statusword};
 use devices::{HomingStart, NewSetPoint};
 
 use super::finding::{Finding, Topic, cause};
 use super::observed::Observed;
-use super::observed::{
-    MAX_CURRENT, MAX_MOTOR_SPEED, MAX_PROFILE_VELOCITY, MAX_TORQUE, NEGATIVE_TORQUE_LIMIT, POSITION_ACTUAL,
-    POSITION_LIMIT_HIGH, POSITION_LIMIT_LOW, POSITION_WINDOW, POSITIVE_TORQUE_LIMIT, PROFILE_ACCELERATION,
-    PROFILE_VELOCITY, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
-};
 
 const TOPIC: Topic = Topic::SetPoint;
 
@@ -87,7 +87,7 @@ fn halt(seen: &Observed, mode: ModeOfOperation) -> Option<Finding> {
 
 /// Profile position: is there a way to go, and was it started?
 fn position(seen: &Observed) -> Option<Finding> {
-    let (target, at) = (seen.axis_value(TARGET_POSITION)?, seen.axis_value(POSITION_ACTUAL)?);
+    let (target, at) = (seen.axis_value(TARGET_POSITION)?, seen.axis_value(POSITION_ACTUAL_VALUE)?);
     let (controlword, statusword) = (seen.controlword()?, seen.statusword?);
     let relative = controlword.has(Controlword::RELATIVE);
     let window = seen.axis_value(POSITION_WINDOW).filter(|window| *window < i64::from(u32::MAX)).unwrap_or(0).max(1);
@@ -138,7 +138,7 @@ fn position(seen: &Observed) -> Option<Finding> {
 
 /// 607Dh (CiA 402-2, 10.4). No limits where the lower one is not below the upper one.
 fn software_limit(seen: &Observed) -> Option<Finding> {
-    let (low, high) = (seen.axis_value(POSITION_LIMIT_LOW)?, seen.axis_value(POSITION_LIMIT_HIGH)?);
+    let (low, high) = (seen.axis_value(MIN_POSITION_LIMIT)?, seen.axis_value(MAX_POSITION_LIMIT)?);
     let target = seen.axis_value(TARGET_POSITION)?;
     (low < high && !(low..=high).contains(&target)).then(|| {
         cause(
@@ -192,7 +192,8 @@ fn homing(seen: &Observed) -> Option<Finding> {
 fn limits(seen: &Observed, mode: ModeOfOperation, findings: &mut Vec<Finding>) {
     let held_to = seen.row(target_velocity(seen)).and_then(|row| row.held_to).map(|held| held.object);
     let speed = [MAX_PROFILE_VELOCITY, MAX_MOTOR_SPEED].map(|mux| seen.place(mux));
-    let torque = [MAX_TORQUE, MAX_CURRENT, POSITIVE_TORQUE_LIMIT, NEGATIVE_TORQUE_LIMIT].map(|mux| seen.place(mux));
+    let torque =
+        [MAX_TORQUE, MAX_CURRENT, POSITIVE_TORQUE_LIMIT_VALUE, NEGATIVE_TORQUE_LIMIT_VALUE].map(|mux| seen.place(mux));
     let by_speed = matches!(mode.0, 1 | 3 | 9);
     let rows = speed.into_iter().chain(held_to).filter(|_| by_speed).map(|object| ("speed_limit_zero", object));
     let mut zero = Vec::new();

@@ -1,10 +1,11 @@
 //! What stops a motor from outside the bus, where objects show it: an emergency stop, limit switches, a brake that is set.
 //! The description says which input that is, by its name in the manual.
 
+use cia402::object::{POSITION_ACTUAL_VALUE, TARGET_POSITION};
 use devices::{BrakeOutput, Input, InputSignal, Meaning, Terminals};
 
 use super::finding::{Finding, Topic, Weight, cause, warning};
-use super::observed::{Observed, POSITION_ACTUAL, TARGET_POSITION};
+use super::observed::Observed;
 use cia402::ModeOfOperation;
 
 const TOPIC: Topic = Topic::Terminals;
@@ -77,7 +78,7 @@ fn limit_switch(seen: &Observed, input: &Input, positive: bool) -> Option<Findin
     }
     let heading = match mode {
         ModeOfOperation::PROFILE_POSITION | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => {
-            seen.axis_value(TARGET_POSITION)?.saturating_sub(seen.axis_value(POSITION_ACTUAL)?).signum() as f64
+            seen.axis_value(TARGET_POSITION)?.saturating_sub(seen.axis_value(POSITION_ACTUAL_VALUE)?).signum() as f64
         }
         _ => seen.target_rpm.unwrap_or(0.0),
     };

@@ -7,6 +7,7 @@ use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
 use canopen::{Mux, NmtCommand, NmtState, NodeId};
 use cia402::PowerCommand;
+use cia402::object::CONTROLWORD;
 
 use super::data_type::GatewayType;
 use super::refusal::Refusal;
@@ -21,9 +22,6 @@ const NET: u64 = 1;
 
 /// PDOs that a client may set up, each way.
 const MAX_PDOS: usize = 512;
-
-/// The controlword of a drive's first axis: where a quick stop goes.
-const CONTROLWORD: Mux = Mux::new(0x6040, 0);
 
 /// A client's connection: what it has set, and what it may have moved.
 #[derive(Debug)]

@@ -1,12 +1,13 @@
 //! Homing of the axes of a group, before it is opened: each drive by a method of its own (CiA 402-2, clause 11), all at once or
 //! one after the other, as the machine allows.
 
+use cia402::object::CONTROLWORD;
 use core::future::{Future, poll_fn};
 use core::pin::Pin;
 use core::task::Poll;
 
 use super::error::GroupError;
-use crate::drive::{CONTROLWORD, Drive, HomingOptions, MotionReport};
+use crate::drive::{Drive, HomingOptions, MotionReport};
 use crate::network::join_all;
 
 /// How an axis finds its reference.

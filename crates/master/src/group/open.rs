@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use canopen::Mux;
 use cia402::ModeOfOperation;
+use cia402::object::{CONTROLWORD, INTERPOLATION_TIME_INDEX, INTERPOLATION_TIME_PERIOD_VALUE};
 
 use super::axis::Axis;
 use super::error::{GroupError, PERIODS};
@@ -11,11 +12,11 @@ use super::handle::Group;
 use super::limits::AxisLimits;
 use super::runner::Runner;
 use crate::cyclic::{CyclicDrive, CyclicOptions};
-use crate::drive::{CONTROLWORD, Drive};
+use crate::drive::Drive;
 use crate::units::Rpm;
 
 /// The interpolation time period (CiA 402-2, 12.3.4): value, and its power of ten in seconds.
-const INTERPOLATION_TIME: [Mux; 2] = [Mux::new(0x60C2, 1), Mux::new(0x60C2, 2)];
+const INTERPOLATION_TIME: [Mux; 2] = [INTERPOLATION_TIME_PERIOD_VALUE, INTERPOLATION_TIME_INDEX];
 
 /// A future axis, and how it is moved.
 #[derive(Clone, Debug)]

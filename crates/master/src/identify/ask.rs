@@ -1,6 +1,7 @@
 use std::time::Duration;
 
 use can::Instant;
+use canopen::object::{DEVICE_TYPE, PRODUCER_HEARTBEAT_TIME, PRODUCT_CODE, REVISION_NUMBER, VENDOR_ID};
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 use devices::Description;
 
@@ -19,9 +20,6 @@ pub const SCAN_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// How often an object is asked for at most, beside another master.
 const TRIES: usize = 4;
-
-/// 1017h, in ms, 16 bits. Source: CiA 301, 7.5.2.20.
-const PRODUCER_HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
 
 /// Longest heartbeat period that a scan waits for: twice that of the joint as delivered, the slowest of the drives here. A
 /// guess of how long a user waits for a scan; of slower ones the period is reported.
@@ -72,10 +70,10 @@ impl Found {
 /// [`Error::NoAnswer`] when it is silent. Objects that it refuses are left out.
 pub async fn identity(node: &Node) -> Result<Identity, Error> {
     Ok(Identity {
-        device_type: optional(node, Mux::new(0x1000, 0)).await?,
-        vendor_id: optional(node, Mux::new(0x1018, 1)).await?,
-        product_code: optional(node, Mux::new(0x1018, 2)).await?,
-        revision_number: optional(node, Mux::new(0x1018, 3)).await?,
+        device_type: optional(node, DEVICE_TYPE).await?,
+        vendor_id: optional(node, VENDOR_ID).await?,
+        product_code: optional(node, PRODUCT_CODE).await?,
+        revision_number: optional(node, REVISION_NUMBER).await?,
     })
 }
 

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
+use canopen::CobId;
+use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use canopen::pdo::{Direction, EventTrigger};
-use canopen::{CobId, Mux};
 use cia402::ModeOfOperation;
 use devices::Timing;
 
@@ -12,9 +13,6 @@ use crate::cyclic::CyclicError;
 use crate::drive::Drive;
 use crate::error::Error;
 use crate::pdo::{PdoConfig, SignalError};
-
-/// In ms (CiA 301, 7.5.2.20).
-const PRODUCER_HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
 
 impl NodeTraffic {
     /// Reads the heartbeat and the PDOs of a node; writes nothing. How fast it answers is what its model says.
