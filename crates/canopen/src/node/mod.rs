@@ -52,10 +52,11 @@ pub use profile::NodeProfile;
 use crate::emcy::{self, Emcy, EmcyErrorCode};
 use crate::heartbeat;
 use crate::nmt::Transition;
+use crate::object::ERROR_REGISTER;
 use crate::od::{Dictionary, Storage, Table};
 use crate::pdo::{PdoNumber, Rpdo, Tpdo};
 use crate::sdo::Server;
-use crate::{Mux, NmtCommand, NmtState, NodeId};
+use crate::{NmtCommand, NmtState, NodeId};
 use identifiers::Identifiers;
 use pdos::Pdos;
 use pending::{Pending, Source};
@@ -194,7 +195,7 @@ impl<S: Storage> Node<S> {
     /// Queues an EMCY message and sets the error register (1001h).
     pub fn raise_emcy(&mut self, code: EmcyErrorCode, error_register: u8, manufacturer: [u8; 5], now: Instant) {
         self.now = now;
-        if let Ok(slot) = self.dictionary.table().find(Mux::new(0x1001, 0)) {
+        if let Ok(slot) = self.dictionary.table().find(ERROR_REGISTER) {
             self.dictionary.set_raw(slot, u32::from(error_register));
         }
         if self.emcy_id.is_some() && self.state != NmtState::Initialising {

@@ -8,9 +8,10 @@ mod errors;
 
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::node::{Node, NodeEvent, NodeProfile, Ticket, Via};
+use canopen::object::ERROR_REGISTER;
 use canopen::od::{Dictionary, Entry, Slot, Storage};
 use canopen::pdo::PdoNumber;
-use canopen::{AbortCode, Mux, NmtCommand, NmtState, NodeId};
+use canopen::{AbortCode, NmtCommand, NmtState, NodeId};
 
 use super::communication_errors::CommunicationErrors;
 use super::storage::{Store, StoredImage};
@@ -366,7 +367,7 @@ impl<S: Storage> Device<S> {
     }
 
     fn error_register(&self) -> Option<Slot> {
-        self.profile.table.find(Mux::new(0x1001, 0)).ok()
+        self.profile.table.find(ERROR_REGISTER).ok()
     }
 }
 

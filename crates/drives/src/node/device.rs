@@ -2,13 +2,14 @@
 
 use can::{Bitrate, Instant};
 use canopen::node::{NodeProfile, Via};
+use canopen::object::ERROR_REGISTER;
 use canopen::od::{Dictionary, Slot, Storage};
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 use devices::Description;
 use devices::variant::Variant;
 
+use super::Memory;
 use super::described::{Described, DescribedDevice, described_station};
-use super::{Memory, services};
 use crate::engine::device::{Application, Device, ResetTimes};
 
 /// The firmware of a described device that is not a drive.
@@ -96,7 +97,7 @@ impl<S: Storage> DescribedNode<S> {
     /// [`AbortCode::READ_ONLY`] for a string that never changes.
     pub fn set(&mut self, slot: Slot, bytes: &[u8], now: Instant) -> Result<(), AbortCode> {
         let device = &mut self.base.device;
-        if device.values().table().row(slot).mux() == services::ERROR_REGISTER {
+        if device.values().table().row(slot).mux() == ERROR_REGISTER {
             device.values().view().check_length(slot, bytes.len())?;
             device.report_own_errors(bytes.first().copied().unwrap_or(0), now);
         } else {

@@ -6,9 +6,9 @@
 //! can never put a value out of range into a dictionary.
 
 use canopen::Mux;
+use canopen::object::SERIAL_NUMBER;
 use canopen::od::{Access, Dictionary, Entry, Slot, Storage, Table};
 
-use super::SERIAL_NUMBER;
 use crate::engine::storage::crc32;
 
 const MAGIC: [u8; 4] = *b"FDN2";

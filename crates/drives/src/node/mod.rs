@@ -15,10 +15,8 @@ pub use memory::{Memory, image_size, is_makers_mark, is_storable};
 pub use services::{Services, Written, conditions};
 
 use canopen::Mux;
+use canopen::object::COMMUNICATION_ERROR;
 use canopen::od::{Dictionary, Storage};
-
-/// The serial number of a device: what distinguishes it from all others of its make. Source: CiA 301, 7.5.2.19.
-pub const SERIAL_NUMBER: Mux = Mux::new(0x1018, 4);
 
 /// Whether these services do something with an object.
 pub const fn acts_on(mux: Mux) -> bool {
@@ -53,5 +51,5 @@ pub const fn acts_on(mux: Mux) -> bool {
 
 /// 1029h:01, where the device has it (CiA 301, 7.5.2.32): 0 to pre-operational, 1 no change, 2 stopped.
 fn error_behaviour(values: &Dictionary<impl Storage>) -> Option<i64> {
-    values.view().value(Mux::new(0x1029, 1)).ok()
+    values.view().value(COMMUNICATION_ERROR).ok()
 }

@@ -4,6 +4,7 @@
 use can::{Frame, Instant};
 use canopen::guarding::Guarding;
 use canopen::heartbeat::{Consumer, ConsumerEvent};
+use canopen::object::{COB_ID_EMCY, COMMUNICATION_CYCLE_PERIOD, GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME};
 use canopen::od::{Condition, Dictionary, Entry, Slot, Storage, Table, View};
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 
@@ -23,16 +24,9 @@ const HISTORY: u16 = 0x1003;
 const STORE: u16 = 0x1010;
 const RESTORE: u16 = 0x1011;
 const WATCH: u16 = 0x1016;
-const SYNC_PERIOD: Mux = Mux::new(0x1006, 0);
 const SYNC_WINDOW: u16 = 0x1007;
 const TIME_COB_ID: u16 = 0x1012;
 const SYNC_COUNTER: u16 = 0x1019;
-const GUARD_TIME: Mux = Mux::new(0x100C, 0);
-const LIFE_TIME_FACTOR: Mux = Mux::new(0x100D, 0);
-const HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
-const EMCY_COB_ID: Mux = Mux::new(0x1014, 0);
-/// The error register.
-pub(super) const ERROR_REGISTER: Mux = Mux::new(0x1001, 0);
 
 /// The services of one device.
 #[derive(Clone, Debug)]
@@ -115,7 +109,7 @@ impl<S: Storage> Services<S> {
         let view = device.values().view();
         let value = |mux| view.value(mux).ok();
         self.guarding = match (value(GUARD_TIME), value(LIFE_TIME_FACTOR)) {
-            (Some(time_ms), Some(factor)) if value(HEARTBEAT_TIME).unwrap_or(0) == 0 => {
+            (Some(time_ms), Some(factor)) if value(PRODUCER_HEARTBEAT_TIME).unwrap_or(0) == 0 => {
                 Some(Guarding::new(time_ms as u16, factor as u8))
             }
             _ => None,
@@ -210,7 +204,7 @@ impl<S: Storage> Services<S> {
 
     /// A frame was handed to the bus: an EMCY message goes into the error history.
     pub fn sent(&self, values: &mut Dictionary<impl Storage>, frame: &Frame) {
-        let Ok(slot) = values.table().find(EMCY_COB_ID) else { return };
+        let Ok(slot) = values.table().find(COB_ID_EMCY) else { return };
         let is_emcy = frame.id().raw() == values.raw(slot) & 0x7FF;
         let &[low, high, _, manufacturer_low, manufacturer_high, ..] = frame.data() else { return };
         if is_emcy && (low, high) != (0, 0) {
@@ -280,7 +274,7 @@ fn counter_of_sync(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if matches!(raw, 1 | 241..) {
         return Err(AbortCode::INVALID_VALUE);
     }
-    let runs = values.value(SYNC_PERIOD).is_ok_and(|period_us| period_us != 0);
+    let runs = values.value(COMMUNICATION_CYCLE_PERIOD).is_ok_and(|period_us| period_us != 0);
     let changes = values.value(Mux::new(SYNC_COUNTER, 0)) != Ok(i64::from(raw));
     if runs && changes { Err(AbortCode::DEVICE_STATE) } else { Ok(()) }
 }

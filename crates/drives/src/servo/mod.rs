@@ -21,8 +21,10 @@ pub use drive::ServoDrive;
 pub use hardware::{Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Sensors};
 pub use motor::{CONTROL_PERIOD_NS, Motor};
 
+use canopen::object::COMMUNICATION_CYCLE_PERIOD;
 use canopen::od::{Condition, Dictionary, Slot, Storage, Table, View};
 use canopen::{AbortCode, Mux};
+use cia402::object::{INTERPOLATION_DATA_RECORD_1ST_SET_POINT, MODES_OF_OPERATION};
 use cia402::{ModeOfOperation, SupportedModes};
 use devices::{Description, Placement};
 
@@ -38,7 +40,7 @@ pub fn acts_on(description: &Description, mux: Mux) -> bool {
         };
         slots::AxisSlots::OBJECTS.iter().any(counts)
     });
-    by_axis || mux == slots::SYNC_PERIOD || node::acts_on(mux)
+    by_axis || mux == COMMUNICATION_CYCLE_PERIOD || node::acts_on(mux)
 }
 
 /// What a drive so described refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).
@@ -51,9 +53,12 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
         let check = checks.iter().find(|(index, _)| is_by_index && *index == placed.index)?.1;
         Some((table.find(placed).ok()?, Condition::Check(check)))
     };
-    let modes = description.axes.iter().filter_map(move |axis| of_axis(axis.placement, MODE, MODE_CHECKS));
-    let set_points =
-        description.axes.iter().filter_map(move |axis| of_axis(axis.placement, SET_POINT, SET_POINT_CHECKS));
+    let modes =
+        description.axes.iter().filter_map(move |axis| of_axis(axis.placement, MODES_OF_OPERATION, MODE_CHECKS));
+    let set_points = description
+        .axes
+        .iter()
+        .filter_map(move |axis| of_axis(axis.placement, INTERPOLATION_DATA_RECORD_1ST_SET_POINT, SET_POINT_CHECKS));
     let factors = table.iter().filter(|(_, row)| {
         let of_axis = (0x6000..=0x9FFF).contains(&row.index) && row.index % 0x800 == VELOCITY_FACTOR_1 % 0x800;
         of_axis && matches!(row.sub_index, 1 | 2)
@@ -64,8 +69,6 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
 
 type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
 
-const MODE: Mux = Mux::new(0x6060, 0);
-const SET_POINT: Mux = Mux::new(0x60C1, 1);
 /// Velocity factor 1: numerator at sub-index 1, divisor at 2.
 const VELOCITY_FACTOR_1: u16 = 0x6095;
 

@@ -1,5 +1,6 @@
 //! The objects of one axis in increments and amperes, as the engine wants them. Written anew when one changes.
 
+use canopen::object::COMMUNICATION_CYCLE_PERIOD;
 use canopen::od::{Dictionary, Slot, Storage};
 use cia402::{
     AbortConnectionOption, DisableOperationOption, FaultReactionOption, HaltOption, HomingMethod, InterpolationPeriod,
@@ -11,7 +12,7 @@ use motion::travel::{Bounds, Travel};
 use super::motor::Motor;
 use super::read;
 use super::scales::Scales;
-use super::slots::{AxisSlots, SYNC_PERIOD};
+use super::slots::AxisSlots;
 use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, VelocityRamps};
 use crate::engine::cia402::{self as power, DisableOptions, ExternalStop, Tolerances};
 
@@ -212,7 +213,7 @@ impl<S: Storage> Reader<'_, S> {
 
     /// Three periods of SYNC where 1006h says how long one is, in us (CiA 301, 7.5.2.6).
     fn set_point_patience_s(&self) -> f64 {
-        match self.values.view().value(SYNC_PERIOD) {
+        match self.values.view().value(COMMUNICATION_CYCLE_PERIOD) {
             Ok(period_us @ 1..) => (1.0 + FORGIVEN_PERIODS) * period_us as f64 * 1e-6,
             _ => PATIENCE_S,
         }

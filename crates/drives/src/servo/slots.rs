@@ -4,9 +4,6 @@ use canopen::Mux;
 use canopen::od::{Slot, Table};
 use devices::Placement;
 
-/// Communication cycle period, which all axes share: set-points of csv and cst are awaited in its rhythm.
-pub(super) const SYNC_PERIOD: Mux = Mux::new(0x1006, 0);
-
 macro_rules! slots {
     ($(#[$doc:meta])* $name:ident { $($field:ident: $index:literal $sub:literal,)* }) => {
         $(#[$doc])*

@@ -1,6 +1,7 @@
 //! What a host sets in motion at an axis.
 
 use canopen::node::Via;
+use canopen::object::COMMUNICATION_CYCLE_PERIOD;
 use canopen::od::{Dictionary, Slot, Storage};
 use cia402::{AbortConnectionOption, Controlword, FaultReactionOption, ModeOfOperation, PowerCommand};
 
@@ -9,7 +10,6 @@ use super::{Shaft, TargetHold};
 use crate::engine::faults::FaultSet;
 use crate::servo::parameters::counter;
 use crate::servo::read;
-use crate::servo::slots::SYNC_PERIOD;
 
 /// What a write to an axis did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +69,7 @@ impl Shaft {
         } else if !slots.is_target(slot) {
             let index = values.table().row(slot).index;
             let known = index >= 0x6000;
-            self.parameters_changed |= known || index == SYNC_PERIOD.index;
+            self.parameters_changed |= known || index == COMMUNICATION_CYCLE_PERIOD.index;
             return if known { Written::Value } else { Written::Elsewhere };
         }
         Written::Value
