@@ -3,6 +3,7 @@
 use super::rows::Row;
 use canopen::Mux;
 use canopen::od::{DefaultValue, Table};
+use cia402::object::SUPPORTED_DRIVE_MODES;
 use cia402::{ModeOfOperation, SupportedModes};
 use devices::servo::{self, objects::INCREMENTS_PER_TURN};
 use devices::{AxisDescription, CountsPerTurn, HomingRules, Placement, Quantity, Ramps, Scale, Units};
@@ -113,7 +114,7 @@ impl Objects {
     }
 
     fn supported_modes(&self) -> Option<SupportedModes> {
-        let slot = self.table.find(self.placement.place(Mux::new(0x6502, 0))).ok()?;
+        let slot = self.table.find(self.placement.place(SUPPORTED_DRIVE_MODES)).ok()?;
         match self.table.row(slot).default {
             DefaultValue::Value(bits) => u32::try_from(bits).ok().filter(|bits| *bits != 0).map(SupportedModes),
             _ => None,

@@ -6,6 +6,7 @@ use std::hash::{BuildHasher, RandomState};
 use std::sync::{LazyLock, Mutex, PoisonError};
 
 use can::Bitrate;
+use canopen::object::CONSUMER_HEARTBEAT_TIME_1;
 use canopen::od::{DefaultValue, Entry, FREE_PLACES, MAX_ROWS, RowFacts, Table, TableError};
 use canopen::{Mux, NodeId};
 use cia402::ErrorCode;
@@ -139,7 +140,7 @@ fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
         bitrate: eds.commissioning.as_ref().and_then(|of| of.bit_rate).and_then(|k| Bitrate::new(u32::from(k) * 1_000)),
         axes,
         host_watch: if watches {
-            HostWatch::Heartbeat { consumer: Mux::new(0x1016, 1), fault: ErrorCode::LIFE_GUARD_OR_HEARTBEAT.0 }
+            HostWatch::Heartbeat { consumer: CONSUMER_HEARTBEAT_TIME_1, fault: ErrorCode::LIFE_GUARD_OR_HEARTBEAT.0 }
         } else {
             HostWatch::None
         },
