@@ -1,6 +1,7 @@
 //! What Lely's `dcfgen` makes of a node of a `bus.yml`: the writes of its concise DCF (1F22h), in their order. It compares with the
 //! data sheet, not with the device: what the sheet has already is not written.
 
+use canopen::object::{GUARD_TIME, PRODUCER_HEARTBEAT_TIME};
 use canopen::{Mux, NodeId};
 use master::boot::Assignment;
 
@@ -44,10 +45,10 @@ impl<'a> Generator<'a> {
         let mut writes = Writes { device, node, all: Vec::new() };
         self.host_watch(slave, &mut writes);
         if let Some(time) = &slave.heartbeat_producer_ms {
-            writes.change(Mux::new(0x1017, 0), time.value.into(), time.at);
+            writes.change(PRODUCER_HEARTBEAT_TIME, time.value.into(), time.at);
         }
         if let Some(time) = &slave.guard_time {
-            writes.change(Mux::new(0x100C, 0), time.value.into(), time.at);
+            writes.change(GUARD_TIME, time.value.into(), time.at);
         }
         for pdo in slave.pdos.iter().filter(|pdo| !pdo.is_transmit) {
             self.pdo(pdo, &mut writes);

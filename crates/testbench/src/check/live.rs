@@ -1,5 +1,9 @@
 //! A described bus held against the drives that are there: who they are, and what their objects have. Only reads.
 
+use canopen::object::{
+    APPLICATION_SOFTWARE_IDENTIFICATION, DEVICE_TYPE, MANUFACTURER_SOFTWARE_VERSION, PRODUCER_HEARTBEAT_TIME,
+    PRODUCT_CODE, REVISION_NUMBER, SERIAL_NUMBER, VENDOR_ID,
+};
 use canopen::{Mux, NodeId};
 use master::boot::Expectation;
 use master::parameters::{Deviation, verify};
@@ -82,15 +86,15 @@ async fn look(
     live: &mut LiveNode,
     report: &mut Reporter<'_>,
 ) -> Result<(), Error> {
-    live.device_type = number(node, Mux::new(0x1000, 0)).await?;
+    live.device_type = number(node, DEVICE_TYPE).await?;
     live.answers = true;
-    live.vendor_id = number(node, Mux::new(0x1018, 1)).await?;
-    live.product_code = number(node, Mux::new(0x1018, 2)).await?;
-    live.revision_number = number(node, Mux::new(0x1018, 3)).await?;
-    live.serial_number = number(node, Mux::new(0x1018, 4)).await?;
-    live.heartbeat_ms = number(node, Mux::new(0x1017, 0)).await?.and_then(|ms| u16::try_from(ms).ok());
-    live.software = text(node, Mux::new(0x100A, 0)).await?;
-    let software = number(node, Mux::new(0x1F56, 1)).await?;
+    live.vendor_id = number(node, VENDOR_ID).await?;
+    live.product_code = number(node, PRODUCT_CODE).await?;
+    live.revision_number = number(node, REVISION_NUMBER).await?;
+    live.serial_number = number(node, SERIAL_NUMBER).await?;
+    live.heartbeat_ms = number(node, PRODUCER_HEARTBEAT_TIME).await?.and_then(|ms| u16::try_from(ms).ok());
+    live.software = text(node, MANUFACTURER_SOFTWARE_VERSION).await?;
+    let software = number(node, APPLICATION_SOFTWARE_IDENTIFICATION).await?;
     if let Some(expected) = expectation {
         report.rule = "live-identity";
         let identity = [

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use can::Bitrate;
+use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use canopen::pdo::{Direction, PdoNumber};
 use canopen::{Mux, NodeId};
 use devices::HostWatch;
@@ -25,8 +26,6 @@ struct Places {
     pdos: BTreeMap<(bool, PdoNumber), Place>,
 }
 
-const HEARTBEAT: Mux = Mux::new(0x1017, 0);
-
 /// Limits by CiA 402-2 that the key `limits` sets.
 const LIMITS: [u16; 5] = [0x6072, 0x6073, 0x607D, 0x607F, 0x6080];
 
@@ -41,7 +40,7 @@ impl Places {
                 let place = number.and_then(|number| self.pdos.get(&(object.index >= 0x1800, number)).copied());
                 place.unwrap_or(start_up)
             }
-            _ if object == HEARTBEAT => key("heartbeat").unwrap_or(start_up),
+            _ if object == PRODUCER_HEARTBEAT_TIME => key("heartbeat").unwrap_or(start_up),
             index if LIMITS.contains(&index) => key("limits").unwrap_or(start_up),
             _ => start_up,
         }
@@ -154,9 +153,14 @@ fn traps(node: NodeId, place: &IntendedNode, report: &mut Reporter<'_>) {
         report.say(Severity::Warning, place.at, what, "give the drive another node-ID");
     }
     report.rule = "heartbeat";
-    if number(HEARTBEAT) == Some(0) {
+    if number(PRODUCER_HEARTBEAT_TIME) == Some(0) {
         let what = "its heartbeat is switched off: its loss or restart goes unnoticed";
-        report.say(Severity::Warning, place.place_of(Some(HEARTBEAT)), what, "set `heartbeat` to 100ms to 500ms");
+        report.say(
+            Severity::Warning,
+            place.place_of(Some(PRODUCER_HEARTBEAT_TIME)),
+            what,
+            "set `heartbeat` to 100ms to 500ms",
+        );
     }
     report.rule = "host-watch";
     match place.description.host_watch {

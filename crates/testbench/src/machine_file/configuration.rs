@@ -4,8 +4,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{Mux, NodeId};
+use cia402::object::{MAX_POSITION_LIMIT, MIN_POSITION_LIMIT};
 use devices::Description;
 use master::core::PdoMap;
 use master::pdo::{PdoConfig, TransmissionType, record_of, values_off};
@@ -32,10 +34,7 @@ const LIMIT_OBJECTS: [(&str, &[u16]); 3] =
     [("speed", &[0x607F, 0x6080]), ("torque", &[0x6072]), ("current", &[0x6073])];
 
 /// Software position limit: lower and upper (CiA 402-2, 607Dh).
-const POSITION_LIMITS: [Mux; 2] = [Mux::new(0x607D, 1), Mux::new(0x607D, 2)];
-
-/// Producer heartbeat time (CiA 301, 7.5.2.20).
-const HEARTBEAT: Mux = Mux::new(0x1017, 0);
+const POSITION_LIMITS: [Mux; 2] = [MIN_POSITION_LIMIT, MAX_POSITION_LIMIT];
 
 /// The values that the objects of a drive get at its start. What is wrong is added to `problems`, each thing on its own.
 pub(super) fn values(
@@ -53,7 +52,7 @@ pub(super) fn values(
     }
     if let Some(field) = table.get("heartbeat") {
         let value = heartbeat(&field, model);
-        all.add(&field, value.map(|value| vec![(HEARTBEAT, value)]));
+        all.add(&field, value.map(|value| vec![(PRODUCER_HEARTBEAT_TIME, value)]));
     }
     if let Some(field) = table.get("start_up") {
         match field.table("the values at the start", START_UP).map_err(|problem| vec![problem]) {
@@ -150,7 +149,7 @@ fn position(field: &Field<'_>, model: &'static Description) -> Result<Vec<(Mux, 
 }
 
 fn heartbeat(field: &Field<'_>, model: &'static Description) -> Result<Vec<u8>, Problem> {
-    if model.row(HEARTBEAT).is_none_or(|row| !row.access.is_writable()) {
+    if model.row(PRODUCER_HEARTBEAT_TIME).is_none_or(|row| !row.access.is_writable()) {
         return Err(
             field.problem(format!("a {} has no producer heartbeat time (1017h) that can be written", model.name))
         );

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use can::Bitrate;
 use canopen::NodeId;
+use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use cia402::ModeOfOperation;
 use master::group::{AxisSetup, GroupError};
 use master::plan::{NodeTraffic, Plan, Settings, plan, shortest_cycle};
@@ -162,7 +163,7 @@ impl Machine {
         let pdos = read.pdos.iter().map(|(config, id)| config.with_values(*id, &placed.start_up, model)).collect();
         let ms = placed
             .start_up
-            .get(&HEARTBEAT)
+            .get(&PRODUCER_HEARTBEAT_TIME)
             .map(|bytes| bytes.iter().rev().fold(0, |ms, byte| ms << 8 | u64::from(*byte)));
         let heartbeat = match ms {
             Some(ms) => Some(Duration::from_millis(ms)).filter(|time| !time.is_zero()),
@@ -171,6 +172,3 @@ impl Machine {
         NodeTraffic { pdos, heartbeat, ..read }
     }
 }
-
-/// The producer heartbeat time, in ms (CiA 301, 7.5.2.20).
-const HEARTBEAT: canopen::Mux = canopen::Mux::new(0x1017, 0);

@@ -7,8 +7,9 @@
 use std::fmt::Write as _;
 
 use can::Bitrate;
+use canopen::NodeId;
+use canopen::object::{PRODUCER_HEARTBEAT_TIME, SERIAL_NUMBER};
 use canopen::od::DefaultValue;
-use canopen::{Mux, NodeId};
 use devices::Description;
 use devices::variant::Variant;
 use master::Network;
@@ -22,12 +23,6 @@ use crate::machine_file::Machine;
 use crate::models::file_of;
 use crate::words::drive::DriveSpec;
 use crate::words::plain;
-
-/// Producer heartbeat time (CiA 301, 7.5.2.20).
-const HEARTBEAT: Mux = Mux::new(0x1017, 0);
-
-/// Serial number of the identity object (CiA 301, 7.5.2.19).
-const SERIAL_NUMBER: Mux = Mux::new(0x1018, 4);
 
 /// Values of the example of `limits`, by its keys: what no drive is harmed by.
 const LIMITS: [(&str, &str); 4] =
@@ -147,8 +142,9 @@ impl InitNode {
         self.model = Some(file_of(model).unwrap_or(model.name).to_owned());
         self.options = edition(model);
         // A heartbeat that is not the model's own as delivered has been stored.
-        let delivered = model.row(HEARTBEAT).map(|row| row.default);
-        if let Some(ms) = self.heartbeat_ms.filter(|_| model.row(HEARTBEAT).is_some_and(|row| row.access.is_writable()))
+        let delivered = model.row(PRODUCER_HEARTBEAT_TIME).map(|row| row.default);
+        if let Some(ms) =
+            self.heartbeat_ms.filter(|_| model.row(PRODUCER_HEARTBEAT_TIME).is_some_and(|row| row.access.is_writable()))
             && !matches!(delivered, Some(DefaultValue::Value(value)) if value == ms as i64)
         {
             self.options.push(("1017".to_owned(), ms.to_string()));
@@ -281,8 +277,9 @@ fn drive(text: &mut String, node: &InitNode) {
             "# What a simulated one has already when its power comes on.\n{off}options = {{ {options} }}"
         );
     }
-    let has_heartbeat =
-        node.description.is_none_or(|model| model.row(HEARTBEAT).is_some_and(|row| row.access.is_writable()));
+    let has_heartbeat = node
+        .description
+        .is_none_or(|model| model.row(PRODUCER_HEARTBEAT_TIME).is_some_and(|row| row.access.is_writable()));
     if has_heartbeat {
         let _ = match node.heartbeat_ms {
             Some(ms) if ms > 0 => writeln!(text, "# As read (1017h); `boot` sets it.\n{off}heartbeat = \"{ms}ms\""),

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use can::Bitrate;
+use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use canopen::{Mux, NodeId};
 use master::Network;
 use serde_json::Value;
@@ -91,7 +92,7 @@ fn a_machine_made_of_the_file_is_scanned_as_the_bus_was_and_the_file_passes_its_
     let (mut world, network) = bench(&DRIVES);
     // Stored by an earlier master.
     let slow = network.node(node(4));
-    block_on(&mut world, slow.write(Mux::new(0x1017, 0), 200_u16)).unwrap().unwrap();
+    block_on(&mut world, slow.write(PRODUCER_HEARTBEAT_TIME, 200_u16)).unwrap().unwrap();
     let (scanned, rows) = block_on(&mut world, look(&network, &DRIVES)).unwrap();
     assert!(rows.iter().all(|row| row.certain), "{rows:?}");
     let report = InitReport::new(rows, Some(Bitrate::K250));
