@@ -17,7 +17,8 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant, Station};
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
+use cia402::object::{CONTROLWORD, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE, STATUSWORD, TARGET_VELOCITY};
 use master::Network;
 use master::drive::{self, Manner, Motion};
 use master::units::{Amperes, Angle, Rpm};
@@ -146,7 +147,7 @@ impl Stage {
 
     /// The power state: a stop leaves Operation enabled at once, however long the ramp takes.
     async fn power_state(&self, id: NodeId) -> cia402::PowerState {
-        let word: u16 = self.network.node(id).read(Mux::new(0x6041, 0)).await.expect("it answers");
+        let word: u16 = self.network.node(id).read(STATUSWORD).await.expect("it answers");
         cia402::Statusword(word).state().expect("a state of CiA 402")
     }
 
@@ -411,12 +412,12 @@ fn a_message_that_is_sent_again_moves_nothing() {
         let mut page = stage.page().await;
         page.must(SessionCommand::TakeControl {}).await;
         page.must(move_by(WHEEL, 90.0, None)).await;
-        let before: i32 = stage.network.node(WHEEL).read(Mux::new(0x6064, 0)).await.expect("it answers");
+        let before: i32 = stage.network.node(WHEEL).read(POSITION_ACTUAL_VALUE).await.expect("it answers");
         page.seq -= 1;
         let again = page.ask(move_by(WHEEL, 90.0, None)).await;
         assert_eq!(again.error_kind(), "replayed");
         stage.sleep(1000).await;
-        let after: i32 = stage.network.node(WHEEL).read(Mux::new(0x6064, 0)).await.expect("it answers");
+        let after: i32 = stage.network.node(WHEEL).read(POSITION_ACTUAL_VALUE).await.expect("it answers");
         // 4096 counts are a turn (ZLAC8030L).
         assert!(after.abs_diff(before) < 20 && before.abs_diff(1024) < 40, "{before} {after}");
     });
@@ -446,12 +447,12 @@ fn every_powered_drive_is_stopped_even_if_another_program_moves_it() {
     play(async |stage| {
         // As another program on the bus does it: not a motion of this studio.
         let arm = stage.network.node(ARM);
-        arm.write(Mux::new(0x6060, 0), 3_i8).await.expect("profile velocity");
+        arm.write(MODES_OF_OPERATION, 3_i8).await.expect("profile velocity");
         for controlword in [0x06_u16, 0x07, 0x0F] {
-            arm.write(Mux::new(0x6040, 0), controlword).await.expect("it follows");
+            arm.write(CONTROLWORD, controlword).await.expect("it follows");
             stage.sleep(50).await;
         }
-        arm.write(Mux::new(0x60FF, 0), 30_i32).await.expect("r/min");
+        arm.write(TARGET_VELOCITY, 30_i32).await.expect("r/min");
         stage.turns(ARM, 30.0).await;
         assert!(stage.network.moved().is_empty());
         let mut page = stage.page().await;

@@ -6,6 +6,9 @@
 //! [`Command::Home`]: crate::command::Command::Home
 
 use canopen::{Mux, NodeId};
+use cia402::object::{
+    HOME_OFFSET, HOMING_ACCELERATION, SPEED_DURING_SEARCH_FOR_SWITCH, SPEED_DURING_SEARCH_FOR_ZERO, STATUSWORD,
+};
 use cia402::{Direction, HomingMethod, HomingSequence, HomingSwitch, ModeOfOperation, Statusword, SwitchEdge};
 use devices::{AxisDescription, Description, HomingRules, InputSignal, Meaning, Terminals};
 use master::{Drive, Error};
@@ -18,9 +21,8 @@ use crate::state::Host;
 use crate::work::{Asked, Done, refusal_of, send};
 
 /// Homing settings (CiA 402-2, 11.2): speed to the switch, speed to the edge, acceleration, and home offset.
-const SETTINGS: [Mux; 4] = [Mux::new(0x6099, 1), Mux::new(0x6099, 2), Mux::new(0x609A, 0), Mux::new(0x607C, 0)];
-
-const STATUSWORD: Mux = Mux::new(0x6041, 0);
+const SETTINGS: [Mux; 4] =
+    [SPEED_DURING_SEARCH_FOR_SWITCH, SPEED_DURING_SEARCH_FOR_ZERO, HOMING_ACCELERATION, HOME_OFFSET];
 
 /// Below this speed in r/min a shaft counts as at rest: the actual velocity of a shaft at rest may be as high.
 const STANDS_RPM: f64 = 1.0;

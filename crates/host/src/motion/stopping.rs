@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use can::Instant;
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
 use cia402::PowerCommand;
+use cia402::object::CONTROLWORD;
 
 use crate::nodes::known_node::has_power;
 use crate::snapshot::DriveView;
@@ -20,8 +21,6 @@ const RESTING_RPM: f64 = 1.0;
 
 /// Consecutive readings at rest that are needed: a single one may catch a shaft that reverses.
 const RESTING_LOOKS: u32 = 2;
-
-const CONTROLWORD: Mux = Mux::new(0x6040, 0);
 
 impl Host {
     /// Quick-stops every drive of the bus that may move, including those moved by other programs.

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use can::Instant;
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
+use cia402::object::CONTROLWORD;
 use master::core::Event;
 use master::identify::Found;
 use master::{Drive, Error};
@@ -14,8 +15,6 @@ use crate::nodes::known_node::KnownNode;
 use crate::snapshot::{DriveView, NodeView};
 use crate::state::Host;
 use crate::work::{Asked, Done, Look, send};
-
-const CONTROLWORD: Mux = Mux::new(0x6040, 0);
 
 /// The device profile of a drive in the low half of 1000h (CiA 402-1).
 const DRIVE_PROFILE: u32 = 402;

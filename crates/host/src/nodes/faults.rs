@@ -3,6 +3,7 @@
 use can::Instant;
 use canopen::emcy::{Emcy, EmcyErrorCode};
 use canopen::{Mux, NmtState, NodeId};
+use cia402::object::{ERROR_CODE, STATUSWORD};
 use devices::Description;
 use devices::faults::FaultRow;
 use master::core::Event;
@@ -11,10 +12,6 @@ use master::{Drive, Error};
 use crate::snapshot::DriveView;
 use crate::state::Host;
 use crate::timeline::{Kind, TimelineEvent};
-
-const STATUSWORD: Mux = Mux::new(0x6041, 0);
-/// The present error code, unless a model has another object for it (CiA 402-2).
-const ERROR_CODE: Mux = Mux::new(0x603F, 0);
 
 const CHECK_SUPPLY: &str =
     "Check its supply and its cable; it may also have restarted with another node-ID or bit rate.";

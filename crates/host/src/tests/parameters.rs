@@ -6,6 +6,7 @@
 use std::sync::{Arc, Mutex};
 
 use canopen::{Mux, NodeId};
+use cia402::object::{PROFILE_ACCELERATION, PROFILE_VELOCITY};
 use serde_json::Value;
 use testbench::parameters::journal::Journal;
 
@@ -14,9 +15,6 @@ use master::drive;
 use super::{Page, Stage, WHEEL, play, play_with, to, velocity};
 use crate::Journals;
 use crate::command::{Command, FileForm, NewValue, NodeCommand, ParameterChange, ParameterReading, SessionCommand};
-
-const MAX_SPEED: Mux = Mux::new(0x6081, 0);
-const ACCELERATION: Mux = Mux::new(0x6083, 0);
 
 fn setting(object: &str, value: &str) -> Command {
     let values = vec![NewValue { object: object.into(), value: value.into() }];
@@ -63,10 +61,10 @@ fn a_parameter_is_changed_read_back_and_rolled_back() {
             NodeCommand::Read(ParameterReading::ReadObjects { objects }).to(WHEEL)
         };
         let (kind, _) = page.refused(setting("6081h:00", "60rpm")).await;
-        assert_eq!((kind.as_str(), stage.has(MAX_SPEED).await), ("not_in_control", 120));
+        assert_eq!((kind.as_str(), stage.has(PROFILE_VELOCITY).await), ("not_in_control", 120));
         page.must(SessionCommand::TakeControl {}).await;
         let done = page.knows(setting("6081h:00", "60rpm")).await;
-        assert_eq!((&done["steps"][0]["object"], stage.has(MAX_SPEED).await), (&"6081h:00".into(), 60));
+        assert_eq!((&done["steps"][0]["object"], stage.has(PROFILE_VELOCITY).await), (&"6081h:00".into(), 60));
         page.knows(setting("6083", "700")).await;
         let values = page.knows(read(&["6081h:00", "6083h:00", "1000h:00"])).await;
         let is_default = |at: usize| values["values"][at]["is_default"].clone();
@@ -76,9 +74,9 @@ fn a_parameter_is_changed_read_back_and_rolled_back() {
             "{values}"
         );
         assert_eq!(page.knows(NodeCommand::Change(ParameterChange::RollBack {}).to(WHEEL)).await["can_roll_back"], 1);
-        assert_eq!((stage.has(MAX_SPEED).await, stage.has(ACCELERATION).await), (60, 500));
+        assert_eq!((stage.has(PROFILE_VELOCITY).await, stage.has(PROFILE_ACCELERATION).await), (60, 500));
         page.knows(NodeCommand::Change(ParameterChange::RollBack {}).to(WHEEL)).await;
-        assert_eq!(stage.has(MAX_SPEED).await, 120);
+        assert_eq!(stage.has(PROFILE_VELOCITY).await, 120);
         assert_eq!(
             page.refused(NodeCommand::Change(ParameterChange::RollBack {}).to(WHEEL)).await.0,
             "nothing_to_roll_back"
@@ -105,13 +103,13 @@ fn invalid_values_and_commands_are_not_written() {
             let (found, text) = page.refused(setting(object, value)).await;
             assert!(found == kind && text.contains(words), "{object}: {found}: {text}");
         }
-        assert_eq!(stage.has(MAX_SPEED).await, 120);
+        assert_eq!(stage.has(PROFILE_VELOCITY).await, 120);
         let neither =
             NodeCommand::Change(ParameterChange::WriteParameters { values: Vec::new(), file: None }).to(WHEEL);
         assert_eq!(page.refused(neither).await.0, "malformed");
         page.must(to(WHEEL, drive::Command::Enable)).await;
         assert_eq!(page.refused(setting("6081", "60")).await.0, "at_work");
-        assert_eq!(stage.has(MAX_SPEED).await, 120);
+        assert_eq!(stage.has(PROFILE_VELOCITY).await, 120);
         page.must(to(WHEEL, drive::Command::Disable)).await;
         page.knows(setting("6081", "60")).await;
     });
@@ -154,7 +152,7 @@ fn a_file_is_saved_compared_planned_and_applied_as_a_whole() {
         let both =
             NodeCommand::Change(ParameterChange::WriteParameters { values: Vec::new(), file: Some(file) }).to(WHEEL);
         assert_eq!(page.refused(both).await.0, "bad_parameters");
-        assert_eq!((stage.has(MAX_SPEED).await, stage.has(ACCELERATION).await), (120, 500));
+        assert_eq!((stage.has(PROFILE_VELOCITY).await, stage.has(PROFILE_ACCELERATION).await), (120, 500));
     });
 }
 
@@ -172,7 +170,7 @@ fn a_transaction_is_completed_without_its_page_and_the_drive_is_not_enabled_mean
         assert_eq!(page.refused(setting("6081", "70")).await.0, "busy");
         drop((unheard, page));
         stage.sleep(2000).await;
-        assert_eq!((stage.has(MAX_SPEED).await, stage.has(ACCELERATION).await), (60, 700));
+        assert_eq!((stage.has(PROFILE_VELOCITY).await, stage.has(PROFILE_ACCELERATION).await), (60, 700));
     });
 }
 
@@ -218,7 +216,7 @@ fn a_journal_is_kept_from_the_first_write_to_the_last_and_without_it_nothing_is_
         page.must(SessionCommand::TakeControl {}).await;
         let (kind, text) = page.refused(setting("6081h:00", "60rpm")).await;
         assert_eq!((kind.as_str(), text.as_str()), ("journal", "nothing was written: the disk is full"));
-        assert_eq!(stage.has(MAX_SPEED).await, 120);
+        assert_eq!(stage.has(PROFILE_VELOCITY).await, 120);
     });
 }
 
@@ -228,7 +226,10 @@ fn a_journal_that_cannot_be_deleted_is_news_for_every_page_and_the_write_holds()
         let (mut page, mut news) = (stage.page().await, stage.handle.news());
         page.must(SessionCommand::TakeControl {}).await;
         let done = page.knows(setting("6081h:00", "60rpm")).await;
-        assert_eq!((&done["journal"], stage.has(MAX_SPEED).await), (&"the journal could not be deleted".into(), 60));
+        assert_eq!(
+            (&done["journal"], stage.has(PROFILE_VELOCITY).await),
+            (&"the journal could not be deleted".into(), 60)
+        );
         let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
         assert!(heard.iter().any(|news| news.contains("could not be deleted")), "{heard:?}");
     });

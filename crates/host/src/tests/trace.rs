@@ -2,6 +2,8 @@
 
 use can::Instant;
 use canopen::Mux;
+use canopen::object::DEVICE_TYPE;
+use cia402::object::{POSITION_ACTUAL_VALUE, TARGET_VELOCITY};
 use serde_json::{Value, json};
 
 use super::{ARM, Stage, WHEEL, play};
@@ -33,9 +35,9 @@ fn text(line: &Value) -> &str {
 fn an_sdo_transfer_is_one_line_in_words_with_its_client_and_its_duration() {
     play(async |stage| {
         let begin = stage.trace(json!({}))["next"].clone();
-        stage.network.node(ARM).read::<u32>(Mux::new(0x1000, 0)).await.expect("it has a type");
-        stage.network.node(WHEEL).write(Mux::new(0x60FF, 0), 60_i32).await.expect("it is taken");
-        stage.network.node(WHEEL).write(Mux::new(0x6064, 0), 1_i32).await.expect_err("it is read only");
+        stage.network.node(ARM).read::<u32>(DEVICE_TYPE).await.expect("it has a type");
+        stage.network.node(WHEEL).write(TARGET_VELOCITY, 60_i32).await.expect("it is taken");
+        stage.network.node(WHEEL).write(POSITION_ACTUAL_VALUE, 1_i32).await.expect_err("it is read only");
         stage.settle().await;
         let shown = |asked: &str| {
             let lines = stage.lines(json!({ "after": begin, "text": asked, "transfers": true }));
@@ -109,7 +111,7 @@ fn filters_show_only_matching_lines() {
 #[test]
 fn the_reads_of_the_studio_can_be_omitted() {
     play(async |stage| {
-        stage.network.node(WHEEL).write(Mux::new(0x60FF, 0), 60_i32).await.expect("it is taken");
+        stage.network.node(WHEEL).write(TARGET_VELOCITY, 60_i32).await.expect("it is taken");
         stage.sleep(300).await;
         for transfers in [false, true] {
             let of = |quiet: bool| {
