@@ -4,7 +4,8 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
+use cia402::object::{CONTROLWORD, STATUSWORD};
 use cia402::{PowerCommand, PowerState, Statusword};
 use master::decode::Decoder;
 use master::drive::Drive;
@@ -23,9 +24,6 @@ use testbench::models::{self, Description};
 
 /// Time for a frame without an answer (NMT) to get onto the bus before a command ends.
 const SETTLING_TIME: Duration = Duration::from_millis(50);
-
-const CONTROLWORD: Mux = Mux::new(0x6040, 0);
-const STATUSWORD: Mux = Mux::new(0x6041, 0);
 
 /// How long a quick stop may be held up by a look at the statusword: drives answer within a few milliseconds.
 const GLANCE: Duration = Duration::from_millis(50);

@@ -4,7 +4,8 @@ use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
+use canopen::object::SERIAL_NUMBER;
 use eds::document::Document;
 use eds::{Commissioning, Configuration, Sheet, write};
 use master::parameters::Parameters;
@@ -229,7 +230,7 @@ async fn commissioning(node: &Node, model: Option<&'static Description>, name: &
         node_name: name.to_owned(),
         bit_rate,
         net_number: Some(1),
-        lss_serial_number: node.read::<u32>(Mux::new(0x1018, 4)).await.ok(),
+        lss_serial_number: node.read::<u32>(SERIAL_NUMBER).await.ok(),
         ..Commissioning::default()
     }
 }

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
+use cia402::object::STATUSWORD;
 use devices::AxisId;
 use master::drive::{Drive, StopWay, StoppedAxis};
 use master::{Error, join_all};
@@ -59,7 +60,6 @@ const RAMP: &str = "ramp";
 
 /// How long a node is given to say whether it is a drive.
 const PATIENCE: Duration = Duration::from_millis(150);
-const STATUSWORD: Mux = Mux::new(0x6041, 0);
 
 impl Estop {
     /// Stops everything.

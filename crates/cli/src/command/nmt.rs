@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use can::Instant;
-use canopen::{Mux, NmtCommand, NmtState};
+use canopen::object::PRODUCER_HEARTBEAT_TIME;
+use canopen::{NmtCommand, NmtState};
 use clap::ValueEnum;
 use master::units::parse_duration;
 use master::{Elapsed, Node, NodeView};
@@ -73,9 +74,6 @@ struct Said {
     /// Its boot-up message has come.
     booted: bool,
 }
-
-/// How often a node sends a heartbeat, in ms. Source: CiA 301, 7.5.2.20.
-const PRODUCER_HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
 
 impl Nmt {
     /// Sends the command; after a reset of one node waits for its boot-up message.

@@ -6,8 +6,9 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use can::{Frame, Instant};
+use canopen::NodeId;
 use canopen::connection_set::Service;
-use canopen::{Mux, NodeId};
+use cia402::object::CONTROLWORD;
 use master::decode::Decoder;
 use serde::Serialize;
 use testbench::models::with_files;
@@ -120,9 +121,6 @@ impl FromStr for ReplaySpeed {
 /// Frames that go out before the run loop has its turn, where time does not divide them: fewer than wait in the master's
 /// queue.
 const BURST: u64 = 64;
-
-/// The controlword of a drive's first axis: where a quick stop goes.
-const CONTROLWORD: Mux = Mux::new(0x6040, 0);
 
 /// Frames that move, shown of a log that is refused.
 const SHOWN: usize = 3;

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use can::Instant;
+use canopen::object::DEVICE_TYPE;
 use canopen::pdo::TransmissionType;
 use canopen::{CobId, Mux, NodeId};
 use cia402::Statusword;
@@ -12,8 +13,6 @@ use master::{Error, Node};
 use super::spread::Times;
 use crate::context::Context;
 use crate::failure::Failure;
-
-const DEVICE_TYPE: Mux = Mux::new(0x1000, 0);
 
 /// How long another producer's SYNC is waited for: longer than any period that a machine runs at.
 const LISTEN_TIME: Duration = Duration::from_millis(500);

@@ -3,7 +3,8 @@
 use std::pin::pin;
 use std::time::Duration;
 
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
+use cia402::object::{PROFILE_VELOCITY, TARGET_POSITION, TARGET_VELOCITY};
 use clap::Parser;
 use crossterm::event::KeyCode;
 use host::{Host, LocalClient, Shown};
@@ -22,10 +23,6 @@ use crate::session;
 const MACHINE: &str = "[[drive]]\nmodel = 'cia402'\nnode = 1\nunits = { gear_ratio = 50 }\n";
 
 const COUNTS_PER_TURN: f64 = 131_072.0 * 50.0;
-
-const TARGET_POSITION: Mux = Mux::new(0x607A, 0);
-const PROFILE_VELOCITY: Mux = Mux::new(0x6081, 0);
-const TARGET_VELOCITY: Mux = Mux::new(0x60FF, 0);
 
 #[derive(Parser)]
 struct Line {
