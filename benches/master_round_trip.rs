@@ -6,8 +6,9 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use can::{Frame, Instant, Station};
+use canopen::NodeId;
 use canopen::pdo::{MappingRecord, PdoNumber};
-use canopen::{Mux, NodeId};
+use cia402::object::STATUSWORD;
 use criterion::{Criterion, criterion_group, criterion_main};
 use master::core::{Command, Core, PdoMap};
 
@@ -36,7 +37,7 @@ fn round_trip(criterion: &mut Criterion) {
     criterion.bench_function("expedited upload, master core", |bencher| {
         bencher.iter(|| {
             now = now.plus_nanos(1_000);
-            core.upload(NODE, Mux::new(0x6041, 0), Duration::from_millis(500), now);
+            core.upload(NODE, STATUSWORD, Duration::from_millis(500), now);
             while let Some(frame) = core.poll_transmit() {
                 if let Some(reply) = answer(&frame) {
                     core.handle_frame(&reply, now);

@@ -7,6 +7,7 @@ use can::{CanId, Frame, Instant, Station};
 use canopen::nmt::NmtTarget;
 use canopen::pdo::{MappingRecord, PdoNumber};
 use canopen::{Mux, NmtCommand, NodeId};
+use cia402::object::STATUSWORD;
 use master::core::{Command, Core, Payload, PdoMap, Request, RpdoTrigger, Ticket, Transfer};
 
 use super::selected_frame::selected_frame;
@@ -52,7 +53,7 @@ pub(super) fn master_core(data: &[u8]) {
         match command(&mut core, chunk) {
             None if byte(0) % 12 == 8 => core.handle_timeout(at),
             None if byte(0) % 12 == 7 => {
-                core.image_mut().write(node, Mux::new(0x6041, 0), u64::from(byte(2)));
+                core.image_mut().write(node, STATUSWORD, u64::from(byte(2)));
             }
             None => core.handle_frame(&selected_frame(chunk.get(2..).unwrap_or(&[]), &IDS), at),
             Some(command) => {

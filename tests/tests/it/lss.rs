@@ -4,8 +4,9 @@
 use std::time::Duration;
 
 use can::{Bitrate, Frame};
+use canopen::NodeId;
 use canopen::lss::{Address, Bound, Client, FastScan, Outcome, Part, Reply, Request, Search};
-use canopen::{Mux, NodeId};
+use canopen::object::SERIAL_NUMBER;
 use devices::variant::Preset;
 use sim::machine::{Order, order};
 use sim::{StationId, World};
@@ -14,7 +15,6 @@ use sim::{StationId, World};
 const MAKE: [u32; 3] = [0, 402, 0x1_0000];
 /// No drive takes longer to answer.
 const PATIENCE: Duration = Duration::from_millis(50);
-const SERIAL_NUMBER: Mux = Mux::new(0x1018, 4);
 
 const fn address(serial: u32) -> Address {
     Address { numbers: [MAKE[0], MAKE[1], MAKE[2], serial] }

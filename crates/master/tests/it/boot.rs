@@ -10,6 +10,7 @@ use crate::support::toy::Toy;
 use crate::support::{Bus, mux, node};
 use can::Bitrate;
 use canopen::concise::{Entry, emit};
+use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use canopen::{Mux, NmtState, NodeId};
 use devices::model;
 use drives::mjoint::Model;
@@ -310,7 +311,7 @@ fn a_mandatory_node_is_waited_for_without_limit_where_1f89h_is_0() {
 #[test]
 fn a_node_that_was_left_operational_without_its_configuration_is_reported() {
     let mut bench = Bench::new();
-    let heartbeat = Mux::new(0x1017, 0);
+    let heartbeat = PRODUCER_HEARTBEAT_TIME;
     let of_joint = Expectation { configuration: vec![(heartbeat, vec![200, 0])], ..expected("m4230e17b50") };
     let others = all().into_iter().filter(|(id, _)| *id != node(JOINT));
     let plan = BootPlan::new(others.chain([(node(JOINT), of_joint)]));

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use can::{Bitrate, CanId, Frame, Instant, Station};
+use canopen::NodeId;
+use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use canopen::pdo::PdoId;
-use canopen::{Mux, NodeId};
 use cia402::ModeOfOperation;
 use master::cyclic::{CyclicDrive, CyclicOptions, Demand};
 use master::pdo::TimerUnits;
@@ -323,7 +324,7 @@ async fn set_up(network: Network) -> Result<(Vec<CyclicDrive>, Vec<NodeTraffic>)
                 pdos.push(drive.node().pdo_config(pdo, TimerUnits::of(model)).await?);
             }
         }
-        let heartbeat: u16 = drive.node().read(Mux::new(0x1017, 0)).await.unwrap_or(0);
+        let heartbeat: u16 = drive.node().read(PRODUCER_HEARTBEAT_TIME).await.unwrap_or(0);
         nodes.push(NodeTraffic {
             node: drive.node().id(),
             pdos,

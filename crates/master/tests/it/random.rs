@@ -5,8 +5,10 @@ use std::time::Duration;
 
 use can::{CanId, Frame, Instant, Station};
 use canopen::nmt::NmtTarget;
+use canopen::object::{DEVICE_TYPE, MANUFACTURER_DEVICE_NAME};
 use canopen::pdo::{MappingRecord, PdoNumber};
-use canopen::{Mux, NmtCommand, NodeId};
+use canopen::{NmtCommand, NodeId};
+use cia402::object::STATUSWORD;
 use master::core::{Command, Core, Cycle, Payload, PdoMap, Request, RpdoTrigger, Transfer};
 
 /// Marsaglia's xorshift32.
@@ -75,7 +77,7 @@ impl Random {
                 let bytes: Vec<u8> = (0..length).map(|_| self.next() as u8).collect();
                 let transfer = if upload { Transfer::Upload } else { Transfer::Download(Payload::new(&bytes)) };
                 let timeout = Duration::from_micros(self.below(20_000).into());
-                Command::Request(ticket, Request { node, mux: Mux::new(0x1008, 0), transfer, timeout })
+                Command::Request(ticket, Request { node, mux: MANUFACTURER_DEVICE_NAME, transfer, timeout })
             }
         }
     }
@@ -104,7 +106,7 @@ fn random_traffic_never_panics_and_every_request_ends_once() {
                 }
                 1 => core.handle_timeout(now),
                 2 => {
-                    core.image_mut().write(NodeId::MIN, Mux::new(0x6041, 0), random.next().into());
+                    core.image_mut().write(NodeId::MIN, STATUSWORD, random.next().into());
                 }
                 _ => core.handle_frame(&random.frame(), now),
             }
@@ -138,7 +140,7 @@ fn random_traffic_never_panics_and_every_request_ends_once() {
 fn a_core_that_is_given_no_time_does_not_time_out() {
     let mut core = Core::new();
     let start = Instant::from_secs(100);
-    core.upload(NodeId::MIN, Mux::new(0x1000, 0), Duration::from_millis(100), start);
+    core.upload(NodeId::MIN, DEVICE_TYPE, Duration::from_millis(100), start);
     for _ in 0..1_000 {
         core.handle_timeout(start);
     }
