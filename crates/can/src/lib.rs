@@ -47,6 +47,7 @@
 #![no_std]
 
 mod bitrate;
+mod duration;
 mod frame;
 mod id;
 mod instant;
@@ -54,6 +55,7 @@ mod length;
 mod station;
 
 pub use bitrate::Bitrate;
+pub use duration::{DURATION_UNITS, ParseDurationError, parse_duration, parse_duration_in};
 pub use frame::{Frame, FrameKind, MAX_DATA_LENGTH, ParseFrameError};
 pub use id::CanId;
 pub use instant::Instant;

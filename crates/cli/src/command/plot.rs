@@ -18,18 +18,18 @@ use plot::Paint;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive plot run.mcap -o run.svg\n  \
-    ferrodrive plot run.csv --signals velocity,4.current_a --from 1.5 --to 3 -o run.html")]
+    ferrodrive plot run.csv --signals velocity,4.current_a --from 1.5s --to 3s -o run.html")]
 pub(crate) struct Plot {
     /// Record, NAME.mcap or NAME.csv
     file: PathBuf,
     /// Signals, e.g. velocity,4.current_a,5.* (default: positions, velocities, currents and supplies)
     #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',')]
     signals: Vec<String>,
-    /// Start, in s
-    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
+    /// Start, e.g. 500ms (a bare number is s)
+    #[arg(long, value_name = "TIME", default_value = "0s", value_parser = seconds)]
     from: f64,
-    /// End, in s (default: that of the record)
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    /// End (default: that of the record)
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
     to: Option<f64>,
     /// Write the picture to this file, NAME.svg or NAME.html, or as - to standard output; without it, it goes beside the record, as NAME.svg
     #[arg(long, short, alias = "svg", alias = "html", value_name = "FILE", value_parser = picture_path)]
@@ -58,9 +58,7 @@ pub(super) fn svg_path(text: &str) -> Result<PathBuf, String> {
 const LARGEST: u64 = 4 << 30;
 
 fn seconds(text: &str) -> Result<f64, String> {
-    let wrong = || format!("expected seconds such as 1.5, got '{text}'");
-    let number: f64 = text.trim_end_matches('s').parse().map_err(|_| wrong())?;
-    if number.is_finite() && number >= 0.0 { Ok(number) } else { Err(wrong()) }
+    can::parse_duration_in("s", text).map(|time| time.as_secs_f64()).map_err(|error| error.to_string())
 }
 
 /// What was drawn.
@@ -154,5 +152,21 @@ impl Report for Drawn {
         let drawn = format!("{} signals and {} marks are drawn in {}", self.signals, self.marks, files.join(" and "));
         let torn = "the end of the record is missing: its writer was killed, or is still running";
         if self.torn { format!("{drawn}\n{torn}") } else { drawn }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::seconds;
+
+    #[test]
+    fn a_bare_number_is_in_seconds_and_a_wrong_unit_is_refused() {
+        assert_eq!(seconds("1.5"), Ok(1.5));
+        assert_eq!(seconds("1.5s"), Ok(1.5));
+        assert_eq!(seconds("500ms"), Ok(0.5));
+        assert_eq!(seconds("0.5min"), Ok(30.0));
+        for text in ["1.5sss", "-1", "nan", "inf", "", "s"] {
+            assert!(seconds(text).is_err(), "{text}");
+        }
     }
 }

@@ -13,6 +13,8 @@ use core::fmt;
 use core::str::FromStr;
 use std::time::Duration;
 
+use can::ParseDurationError;
+
 /// Speed of rotation in revolutions per minute.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Rpm(pub f64);
@@ -164,7 +166,6 @@ const CURRENT: &str = "a current such as 1.5A or 1500mA";
 const RAMP: &str = "a ramp such as 500ms, 0.5s, 120rpm/s or 12.6rad/s2";
 const NO_SIGN: &str = "a ramp has no sign";
 const NO_RATE: &str = "at a rate of zero no speed is ever reached; without a ramp it is 0ms";
-const TIME: &str = "a time such as 500ms, 2s, 5min or 1h";
 
 impl FromStr for Rpm {
     type Err = ParseUnitError;
@@ -224,36 +225,30 @@ impl FromStr for Ramp {
             return Err(out_of_range(text, NO_SIGN));
         }
         match unit {
-            "ms" | "s" => parse_duration(text).map(Self::Time),
             "rpm/s" | "r/min/s" | "rad/s2" | "rad/s²" | "rad/s^2" if number == 0.0 => Err(out_of_range(text, NO_RATE)),
             "rpm/s" | "r/min/s" => Ok(Self::RpmPerSecond(number)),
             "rad/s2" | "rad/s²" | "rad/s^2" => Ok(Self::RpmPerSecond(Rpm::from(RadiansPerSecond(number)).0)),
             "" => Err(ParseUnitError::NoUnit { text: text.to_owned(), expected: RAMP }),
-            _ => Err(wrong_unit(text, unit, RAMP)),
+            _ => match parse_duration(text) {
+                Err(ParseUnitError::WrongUnit { .. }) => Err(wrong_unit(text, unit, RAMP)),
+                time => time.map(Self::Time),
+            },
         }
     }
 }
 
-/// A duration such as `500ms` or `2s`.
+/// A duration such as `500ms` or `2s`: [`can::parse_duration`], with the text in the error.
 ///
 /// # Errors
 /// [`ParseUnitError`] when it is not a time, negative, or longer than a year.
 pub fn parse_duration(text: &str) -> Result<Duration, ParseUnitError> {
-    let (number, unit) = split(text, TIME)?;
-    let seconds = match unit {
-        "ns" => number * 1e-9,
-        "us" | "µs" => number * 1e-6,
-        "ms" => number * 1e-3,
-        "s" => number,
-        "min" => number * 60.0,
-        "h" => number * 3600.0,
-        "" => return Err(ParseUnitError::NoUnit { text: text.to_owned(), expected: TIME }),
-        _ => return Err(wrong_unit(text, unit, TIME)),
-    };
-    if !(0.0..=31_536_000.0).contains(&seconds) {
-        return Err(out_of_range(text, "a time is between 0 and a year"));
-    }
-    Ok(Duration::from_secs_f64(seconds))
+    let expected = ParseDurationError::EXPECTED;
+    can::parse_duration(text).map_err(|error| match error {
+        ParseDurationError::NoNumber => ParseUnitError::NoNumber { text: text.to_owned(), expected },
+        ParseDurationError::NoUnit => ParseUnitError::NoUnit { text: text.to_owned(), expected },
+        ParseDurationError::WrongUnit(unit) => wrong_unit(text, unit, expected),
+        ParseDurationError::OutOfRange => out_of_range(text, "a time is between 0 and a year"),
+    })
 }
 
 /// Number and unit of `text`; blanks between them are allowed.
@@ -380,19 +375,23 @@ mod tests {
     fn ramps_are_times_or_rates() {
         assert_eq!("500ms".parse(), Ok(Ramp::Time(Duration::from_millis(500))));
         assert_eq!("0.5s".parse(), Ok(Ramp::Time(Duration::from_millis(500))));
+        assert_eq!("500000µs".parse(), Ok(Ramp::Time(Duration::from_millis(500))));
         assert_eq!("120rpm/s".parse(), Ok(Ramp::RpmPerSecond(120.0)));
         assert!("-120rpm/s".parse::<Ramp>().is_err());
     }
 
     #[test]
-    fn times_have_their_unit() {
-        for (text, ns) in [("7ns", 7), ("7us", 7_000), ("7 µs", 7_000), ("7ms", 7_000_000), ("7s", 7_000_000_000)] {
-            assert_eq!(parse_duration(text), Ok(Duration::from_nanos(ns)), "{text}");
-        }
-        assert_eq!(parse_duration("1.5min"), Ok(Duration::from_secs(90)));
-        assert_eq!(parse_duration("2h"), Ok(Duration::from_secs(7200)));
-        for wrong in ["2", "-1s", "9000h", "2d", "h"] {
-            assert!(parse_duration(wrong).is_err(), "{wrong}");
+    fn a_time_that_is_refused_is_quoted() {
+        for (wrong, why) in [
+            ("2", "\"2\" has no unit; expected a time such as 500ms, 2s, 5min or 1h"),
+            ("h", "\"h\" does not begin with a number; expected a time such as 500ms, 2s, 5min or 1h"),
+            (
+                "1.5sss",
+                "\"sss\" in \"1.5sss\" is not a unit of this quantity; expected a time such as 500ms, 2s, 5min or 1h",
+            ),
+            ("-1s", "\"-1s\" is out of range: a time is between 0 and a year"),
+        ] {
+            assert_eq!(parse_duration(wrong).unwrap_err().to_string(), why);
         }
     }
 

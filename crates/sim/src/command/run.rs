@@ -18,12 +18,6 @@ pub enum Run {
     Until(Instant),
 }
 
-/// Longest time that can be asked for, in seconds: a year.
-const LONGEST_S: f64 = 366.0 * 86_400.0;
-
-/// Units and their seconds, the longer names first: `min` ends with no other's name, `ms` with that of `s`.
-const UNITS: [(&str, f64); 6] = [("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("h", 3600.0)];
-
 impl Run {
     /// The words after `run`.
     pub(super) fn parse(text: &str) -> Result<Self, StimulusError> {
@@ -31,18 +25,14 @@ impl Run {
             Some(time) => (true, time.trim()),
             None => (false, text.trim()),
         };
-        let wrong = || StimulusError::BadValue { text: time.to_owned(), what: "time of up to a year", usage: RUN };
         if time.is_empty() {
             return Err(StimulusError::Usage(RUN));
         }
-        let unit = UNITS.iter().find_map(|(unit, seconds)| Some((time.strip_suffix(unit)?, seconds)));
-        let (number, unit_s) = unit.ok_or_else(wrong)?;
-        let number: f64 = number.trim().parse().map_err(|_| wrong())?;
-        let seconds = number * unit_s;
-        if !(0.0..=LONGEST_S).contains(&seconds) {
-            return Err(wrong());
-        }
-        let duration = Duration::from_nanos((seconds * 1e9).round() as u64);
+        let duration = can::parse_duration(time).map_err(|_| StimulusError::BadValue {
+            text: time.to_owned(),
+            what: "time of up to a year",
+            usage: RUN,
+        })?;
         Ok(if until { Self::Until(Instant::ZERO + duration) } else { Self::For(duration) })
     }
 

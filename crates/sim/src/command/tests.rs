@@ -65,6 +65,8 @@ fn understands_times_of_every_unit() {
         ("run 1min", Run::For(ms(60_000))),
         ("run 2h", Run::For(Duration::from_secs(7200))),
         ("run 100us", Run::For(Duration::from_micros(100))),
+        ("run 100 µs", Run::For(Duration::from_micros(100))),
+        ("run until 8760h", Run::Until(Instant::from_secs(365 * 86_400))),
         ("run 1ns", Run::For(Duration::from_nanos(1))),
         ("run 0s", Run::For(Duration::ZERO)),
         ("run until 2.5s", Run::Until(Instant::from_millis(2500))),
@@ -83,6 +85,8 @@ fn understands_times_of_every_unit() {
         "run ms",
         "run until dawn",
         "run 1 d",
+        "run 1.5sss",
+        "run 8760.1h",
     ] {
         let error = line.parse::<Command>().expect_err(line).to_string();
         assert!(error.contains("run 20ms"), "{line}: {error}");
@@ -167,6 +171,7 @@ fn says_what_it_expected_of_a_malformed_fault_of_the_bus() {
         ("4 bus", "expected: NODE bus silent|late|babble|overrun|corrupt .."),
         ("4 bus late 5", "expected: NODE bus late MIN_MS MAX_MS, or NODE bus late off"),
         ("4 bus late 5 1", "invalid longest delay \"1\"; expected: NODE bus late MIN_MS MAX_MS, or NODE bus late off"),
+        ("4 bus late 5 20d", "invalid time in ms \"20d\"; expected: NODE bus late MIN_MS MAX_MS, or NODE bus late off"),
         ("4 bus late nan 5", "invalid time in ms \"nan\"; expected: NODE bus late MIN_MS MAX_MS, or NODE bus late off"),
         (
             "4 bus corrupt 1.5",

@@ -1,6 +1,7 @@
 //! What can be wrong with a node's access to the bus, and with the wire, in words: `4 bus late 5 20`, `bus corrupt 0.01`.
 
 use std::fmt;
+use std::time::Duration;
 
 use can::Frame;
 
@@ -44,8 +45,8 @@ pub(super) const CORRUPT: &str = "NODE bus corrupt PROBABILITY (0 to 1), or NODE
 pub(super) const WIRE: &str = "bus corrupt PROBABILITY (0 to 1), bus corrupt off, or bus destroy NTH_FRAME BIT";
 const ANY: &str = "NODE bus silent|late|babble|overrun|corrupt ..";
 
-/// Longest delay that is taken, in ms: a day.
-const LONGEST_MS: f64 = 86_400_000.0;
+/// Longest delay that is taken: a day.
+const LONGEST: Duration = Duration::from_secs(86_400);
 
 impl BusFault {
     /// From the words after `bus`.
@@ -122,9 +123,9 @@ fn probability(text: &str, usage: &'static str) -> Result<f64, StimulusError> {
 }
 
 fn nanos(text: &str, usage: &'static str) -> Result<u64, StimulusError> {
-    let ms = text.parse().ok().filter(|ms| (0.0..=LONGEST_MS).contains(ms));
+    let time = can::parse_duration_in("ms", text).ok().filter(|time| *time <= LONGEST);
     let bad = || StimulusError::BadValue { text: text.into(), what: "time in ms", usage };
-    Ok((ms.ok_or_else(bad)? * 1e6).round() as u64)
+    Ok(time.ok_or_else(bad)?.as_nanos() as u64)
 }
 
 /// Milliseconds as they are read back: nanoseconds of a day fit a double.

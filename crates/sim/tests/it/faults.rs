@@ -211,6 +211,7 @@ fn faults_of_the_bus_are_world_commands_too() {
     let faults = say("4 bus babble 080# 0.5");
     assert!(faults.late.is_some() && faults.babble == Some(Babble { frame: frame("080#"), gap_ns: 500_000 }));
     assert!(say("4 bus silent on").silent && !say("4 bus silent off").silent);
+    assert_eq!(say("4 bus late 5000µs 0.02s").late, faults.late, "times with their units");
     assert_eq!(say("4 bus late off").late, None);
     say("4 bus babble off");
     // The boot-up message is the first frame: destroyed once, it comes again.

@@ -147,6 +147,5 @@ fn parse(frame: &str) -> Frame {
 
 #[track_caller]
 fn duration(text: &str) -> Duration {
-    let millis: f64 = text.trim().strip_suffix("ms").and_then(|number| number.parse().ok()).expect(text);
-    Duration::from_nanos((millis * 1e6) as u64)
+    can::parse_duration(text).unwrap_or_else(|error| panic!("{text}: {error}"))
 }
