@@ -2,9 +2,9 @@
 //!
 //! A thread of its own asks and waits. When the simulator has gone, it ends, and requests are answered that there is no world.
 
-use host::{Around, Changed, WorldDoor};
+use host::WorldDoor;
 use serde_json::{Value, json};
-use testbench::around;
+use testbench::around::{Around, Changed, understand};
 
 use crate::control_client::{ControlArgs, ControlClient};
 use crate::failure::Failure;
@@ -33,10 +33,6 @@ impl FarWorld {
 }
 
 impl Around for FarWorld {
-    fn forms(&self) -> Vec<&'static str> {
-        around::forms()
-    }
-
     fn look(&mut self) -> Value {
         let mut nodes = Vec::new();
         for node in self.client.nodes() {
@@ -51,9 +47,9 @@ impl Around for FarWorld {
     }
 
     fn change(&mut self, line: &str) -> Result<Changed, (&'static str, String)> {
-        let (_, around::Changed { node, line, back, .. }) = around::understand(line)?;
-        let answer = self.ask(json!({ "request": "world", "line": line }))?;
-        Ok(Changed { node, line, back, note: answer["note"].as_str().map(str::to_owned) })
+        let (_, changed) = understand(line)?;
+        let answer = self.ask(json!({ "request": "world", "line": changed.line }))?;
+        Ok(Changed { note: answer["note"].as_str().map(str::to_owned), ..changed })
     }
 }
 

@@ -6,10 +6,9 @@
 use std::time::Duration;
 
 use can::{Frame, Instant};
-use host::{Around, Changed, Wire, WorldAsks, WorldDoor};
+use host::{Wire, WorldAsks, WorldDoor};
 use sim::pace::Pace;
 use sim::{StationId, World, WorldError};
-use testbench::around;
 use transport::{AsyncBus, BusError, Received, WallClock};
 
 /// How finely the world follows the clock: the joints' answers come within some milliseconds.
@@ -47,7 +46,7 @@ impl WorldBus {
         if target > self.world.now() {
             self.world.run_until(target);
         }
-        self.asks.answer(&mut Outside(&mut self.world));
+        self.asks.answer(&mut self.world);
         let counters = self.world.counters(self.probe);
         self.wire.update(|health| {
             health.state = Some(counters.state().word());
@@ -83,22 +82,4 @@ impl AsyncBus for WorldBus {
 
 fn elapsed(clock: &WallClock) -> Duration {
     clock.now() - Instant::ZERO
-}
-
-/// The world for a host that is asked about it.
-struct Outside<'a>(&'a mut World);
-
-impl Around for Outside<'_> {
-    fn forms(&self) -> Vec<&'static str> {
-        around::forms()
-    }
-
-    fn look(&mut self) -> serde_json::Value {
-        around::look(self.0)
-    }
-
-    fn change(&mut self, line: &str) -> Result<Changed, (&'static str, String)> {
-        let around::Changed { node, line, back, note } = around::change(self.0, line)?;
-        Ok(Changed { node, line, back, note })
-    }
 }

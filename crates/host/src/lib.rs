@@ -41,4 +41,4 @@ pub use session::{DeadMan, HostHandle, LocalClient, Shown};
 pub use state::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};
 pub use trace::BusFrame;
 pub use wire::{Health, Wire};
-pub use world::door::{Around, Changed, WorldAsks, WorldDoor, world_door};
+pub use world::door::{WorldAsks, WorldDoor, world_door};

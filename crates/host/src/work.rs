@@ -18,7 +18,8 @@ use crate::motion::group_run::GroupOutcome;
 use crate::parameters::transactions::{Refusal, Written};
 use crate::pdo::load::PlannedPdos;
 use crate::snapshot::DriveView;
-use crate::world::door::{Changed, NoAnswer};
+use crate::world::door::NoAnswer;
+use testbench::around::Changed;
 
 /// Everything under way.
 pub(crate) type Work = FuturesUnordered<LocalBoxFuture<'static, Done>>;

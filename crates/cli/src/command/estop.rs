@@ -213,6 +213,7 @@ fn in_words(way: &'static str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use cia402::object::{CONTROLWORD, MODES_OF_OPERATION, TARGET_VELOCITY};
     use clap::Parser;
     use processes::{Scratch, scratch};
     use serde_json::{Value, json};
@@ -246,12 +247,12 @@ mod tests {
     /// Sets a drive in motion as another program does: the master has no part in it.
     async fn turn(context: &Context, id: NodeId) -> Drive {
         let (node, drive) = (context.network.node(id), context.drive(id).await.expect("it is known"));
-        node.write(Mux::new(0x6060, 0), 3_i8).await.expect("profile velocity");
+        node.write(MODES_OF_OPERATION, 3_i8).await.expect("profile velocity");
         // The servo counts encoder increments, the stepper r/min.
         let counts = if id.raw() == 5 { 131_072 } else { 60 };
-        node.write(Mux::new(0x60FF, 0), counts).await.expect("60 r/min");
+        node.write(TARGET_VELOCITY, counts).await.expect("60 r/min");
         for controlword in [0x06_u16, 0x07, 0x0F] {
-            node.write(Mux::new(0x6040, 0), controlword).await.expect("it follows");
+            node.write(CONTROLWORD, controlword).await.expect("it follows");
             context.network.sleep(Duration::from_millis(100)).await;
         }
         context.network.sleep(Duration::from_secs(2)).await;

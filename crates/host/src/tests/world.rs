@@ -5,26 +5,7 @@ use std::task::{Context, Poll, Waker};
 
 use super::*;
 use crate::command::WorldCommand;
-use crate::world::door::{Around, Changed, WorldAsks, world_door};
-use testbench::around;
-
-/// A world for a host.
-struct Outside<'a>(&'a mut World);
-
-impl Around for Outside<'_> {
-    fn forms(&self) -> Vec<&'static str> {
-        around::forms()
-    }
-
-    fn look(&mut self) -> serde_json::Value {
-        around::look(self.0)
-    }
-
-    fn change(&mut self, line: &str) -> Result<Changed, (&'static str, String)> {
-        let around::Changed { node, line, back, note } = around::change(self.0, line)?;
-        Ok(Changed { node, line, back, note })
-    }
-}
+use crate::world::door::{WorldAsks, world_door};
 
 /// Runs a scene with a studio that has a world.
 fn play_around(scene: impl AsyncFnOnce(&Stage)) {
@@ -56,7 +37,7 @@ fn run(world: &mut World, asks: &mut WorldAsks, whole: impl Future<Output = ()>)
         if let Poll::Ready(()) = whole.as_mut().poll(&mut context) {
             return;
         }
-        asks.answer(&mut Outside(world));
+        asks.answer(world);
         world.refresh();
         world.run_for(Duration::from_millis(1));
     }

@@ -3,38 +3,11 @@
 //! Bounded: a request that finds no room is refused. Unanswered ones end with the world.
 
 use serde_json::Value;
+use testbench::around::{self, Around, Changed};
 use tokio::sync::{mpsc, oneshot};
 
 /// Queued requests; they are answered every millisecond.
 const MOST_WAITING: usize = 64;
-
-/// The world around virtual drives, as a host sees it: command lines and values.
-pub trait Around {
-    /// The usage text of every command.
-    fn forms(&self) -> Vec<&'static str>;
-
-    /// Every drive as it truly is, in `nodes`, and the names of the bodies that several drives move, in `bodies`.
-    fn look(&mut self) -> Value;
-
-    /// Executes a command line.
-    ///
-    /// # Errors
-    /// A stable word for programs, and the reason; nothing is changed then.
-    fn change(&mut self, line: &str) -> Result<Changed, (&'static str, String)>;
-}
-
-/// The result of a command line.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Changed {
-    /// The node concerned, by the number under which it was added.
-    pub node: Option<u8>,
-    /// The command in its normal form.
-    pub line: String,
-    /// The command that undoes it, if that does not depend on the state before.
-    pub back: Option<String>,
-    /// Consequences that a person may not expect.
-    pub note: Option<String>,
-}
 
 /// The host's end.
 #[derive(Clone, Debug)]
@@ -96,25 +69,25 @@ impl WorldDoor {
 
 impl WorldAsks {
     /// Waits for a request (blocks the thread) and answers it; false when no host is left.
-    pub fn answer_next(&mut self, around: &mut impl Around) -> bool {
-        self.0.blocking_recv().map(|ask| ask.answer(around)).is_some()
+    pub fn answer_next(&mut self, world: &mut impl Around) -> bool {
+        self.0.blocking_recv().map(|ask| ask.answer(world)).is_some()
     }
 
     /// Answers the queued requests.
-    pub fn answer(&mut self, around: &mut impl Around) {
+    pub fn answer(&mut self, world: &mut impl Around) {
         while let Ok(ask) = self.0.try_recv() {
-            ask.answer(around);
+            ask.answer(world);
         }
     }
 }
 
 impl Ask {
-    fn answer(self, around: &mut impl Around) {
+    fn answer(self, world: &mut impl Around) {
         // The requester may have gone.
         match self {
-            Self::Forms(answer) => drop(answer.send(around.forms())),
-            Self::Look(answer) => drop(answer.send(around.look())),
-            Self::Change(line, answer) => drop(answer.send(around.change(&line))),
+            Self::Forms(answer) => drop(answer.send(around::forms())),
+            Self::Look(answer) => drop(answer.send(world.look())),
+            Self::Change(line, answer) => drop(answer.send(world.change(&line))),
         }
     }
 }

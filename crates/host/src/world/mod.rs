@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 use crate::answer::Answer;
 use crate::state::Host;
 use crate::work::{Asked, Done, send};
-use crate::world::door::{Changed, NoAnswer};
+use crate::world::door::NoAnswer;
+use testbench::around::Changed;
 
 /// Longest line in bytes: many times the longest useful one.
 const LONGEST_LINE: usize = 400;
