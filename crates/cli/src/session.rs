@@ -100,8 +100,8 @@ fn virtual_bus<R>(
     };
     let ended = sim::block_on_for(&mut world, VIRTUAL_LIMIT, whole);
     progress.clear();
-    if let (Some(missing), Some(log)) = (writing.finish(), &global.log) {
-        log.lacks(missing);
+    if let (Err(torn), Some(log)) = (writing.finish(), &global.log) {
+        log.lacks(torn);
     }
     ended.map_err(|error| Failure::new("the virtual bus came to a halt").because(error))?
 }
@@ -228,8 +228,8 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     progress.clear();
     context.remember_nodes();
     context.note_twins();
-    if let (Some(missing), Some(log)) = (writing.finish(), &global.log) {
-        log.lacks(missing);
+    if let (Err(torn), Some(log)) = (writing.finish(), &global.log) {
+        log.lacks(torn);
     }
     ended.map_err(|error| {
         let failure = bus_failure(global, &error);

@@ -166,10 +166,8 @@ impl Dump {
         // A bus has no end; of a log there would be more.
         let partial = matches!(global.bus, BusSpec::Log { .. }) && sink.has_printed.get();
         let summarised = summarised.map_err(|failure| Failure { partial, ..failure });
-        match writing.finish() {
-            Some(missing) => summarised.and(Err(Failure::new(missing))),
-            None => summarised,
-        }
+        let written = writing.finish();
+        summarised.and(written)
     }
 
     /// Shows what a log has, as fast as it can be read.

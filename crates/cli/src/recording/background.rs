@@ -1,7 +1,8 @@
 //! Files that a thread of their own writes: a slow disk costs what is in the file, never time of the bus.
 
+use std::collections::VecDeque;
 use std::io;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, channel, sync_channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::failure::Failure;
@@ -27,88 +28,118 @@ impl Pace {
     }
 }
 
-/// What the file is called in messages, and what it is made of.
-#[derive(Clone, Copy)]
-pub(super) struct Words {
+/// A file, and what it is called in messages.
+pub(super) trait Output<B>: Send + 'static {
     /// "the log".
-    pub(super) file: &'static str,
+    const FILE: &'static str;
     /// "frames".
-    pub(super) pieces: &'static str,
+    const PIECES: &'static str;
+
+    /// Writes a batch.
+    fn write(&mut self, batch: B) -> io::Result<()>;
+
+    /// Hands what was written to the system, when nothing waits any more.
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// Writes the end.
+    fn end(self) -> io::Result<()>;
 }
 
-/// See the [module](self).
-pub(super) struct Background<B> {
-    batches: SyncSender<B>,
-    /// Says how it ended, when everything is written.
-    written: Receiver<Result<(), String>>,
-    words: Words,
-    pace: Pace,
+/// How batches wait.
+#[derive(Clone, Copy)]
+pub(super) struct Waiting {
+    pub(super) pace: Pace,
+    /// So many find room.
+    pub(super) room: usize,
+    /// How long the first of several may wait for the others, so that small ones are written together.
+    pub(super) gathers: Duration,
+}
+
+impl Waiting {
+    /// Each batch is written as soon as it comes.
+    pub(super) const fn of(pace: Pace) -> Self {
+        Self { pace, room: pace.room(), gathers: Duration::ZERO }
+    }
+}
+
+/// A file under way; the clones hand batches to the same one.
+pub(super) struct Background<B>(Arc<Shared<B>>);
+
+impl<B> Clone for Background<B> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+struct Shared<B> {
+    queue: Mutex<Queue<B>>,
+    /// Notified when a first batch waits, when there is room again, when nothing more comes, and when the file has ended.
+    changed: Condvar,
+    waiting: Waiting,
+    file: &'static str,
+    pieces: &'static str,
+    messages: Option<Messages>,
+}
+
+struct Queue<B> {
+    batches: VecDeque<B>,
+    /// Nothing more comes.
+    over: bool,
+    /// How the file has ended.
+    ended: Option<Result<(), String>>,
     missing: u64,
     /// Pieces that are missing before the file was written again.
     lost: u64,
-    messages: Messages,
 }
 
 impl<B: Send + 'static> Background<B> {
-    /// Hands batches to `write` until it fails or all are written, then calls `end`. Errors are reported to `messages`.
-    pub(super) fn start<W: Send + 'static>(
-        words: Words,
-        writer: W,
-        write: impl Fn(&mut W, B) -> io::Result<()> + Send + 'static,
-        end: impl FnOnce(W) -> io::Result<()> + Send + 'static,
-        pace: Pace,
-        messages: Messages,
-    ) -> Self {
-        let (batches, incoming) = sync_channel(pace.room());
-        let (done, written) = channel();
-        let reporter = messages.clone();
-        std::thread::spawn(move || {
-            let mut writer = writer;
-            let all = incoming.iter().try_for_each(|batch| write(&mut writer, batch));
-            let ended = all.and_then(|()| end(writer)).map_err(|error| error.to_string());
-            if let Err(error) = &ended {
-                // The drives are worth more than what is written about them.
-                reporter.say(&format!("warning: cannot write {}: {error}; it ends here", words.file));
-            }
-            // The receiver may have gone.
-            let _ = done.send(ended);
-            drop(incoming);
-        });
-        Self { batches, written, words, pace, missing: 0, lost: 0, messages }
+    /// Hands batches to `output` until it fails or all are written. Errors are reported to `messages`, if there are any.
+    pub(super) fn start<O: Output<B>>(output: O, waiting: Waiting, messages: Option<Messages>) -> Self {
+        let queue = Queue { batches: VecDeque::new(), over: false, ended: None, missing: 0, lost: 0 };
+        let (queue, changed) = (Mutex::new(queue), Condvar::new());
+        let shared = Arc::new(Shared { queue, changed, waiting, file: O::FILE, pieces: O::PIECES, messages });
+        let mut ending = Ending(Arc::clone(&shared), Err("its writer has failed".to_owned()));
+        std::thread::spawn(move || ending.come(output));
+        Self(shared)
     }
 
     /// Takes a batch of so many pieces; one that the disk has no time for is left out and reported, or waited for, by the pace.
-    pub(super) fn write(&mut self, batch: B, pieces: u64) {
-        if self.pace == Pace::Free {
-            // Why the file has ended has been said.
-            let _ = self.batches.send(batch);
+    pub(super) fn write(&self, batch: B, pieces: u64) {
+        let Shared { changed, waiting: Waiting { pace, room, .. }, file, pieces: what, .. } = &*self.0;
+        let is_full = |queue: &mut Queue<B>| queue.ended.is_none() && queue.batches.len() >= *room;
+        let mut queue = self.0.lock();
+        if *pace == Pace::Free {
+            queue = changed.wait_while(queue, is_full).unwrap_or_else(PoisonError::into_inner);
+        }
+        if queue.ended.is_some() {
+            // Why it has ended has been said.
             return;
         }
-        let Words { file, pieces: what } = self.words;
-        match self.batches.try_send(batch) {
-            Ok(()) if self.missing > 0 => {
-                let missing = std::mem::take(&mut self.missing);
-                self.lost += missing;
-                self.messages
-                    .say(&format!("warning: {file} is being written again; {missing} {what} are missing in it"));
+        if is_full(&mut queue) {
+            if queue.missing == 0 {
+                self.0.say(&format!("{file} cannot be written as fast as the bus runs; {what} are left out"));
             }
-            // When the file has ended for good, that has been said.
-            Ok(()) | Err(TrySendError::Disconnected(_)) => {}
-            Err(TrySendError::Full(_)) => {
-                if self.missing == 0 {
-                    self.messages.say(&format!(
-                        "warning: {file} cannot be written as fast as the bus runs; {what} are left out"
-                    ));
-                }
-                self.missing += pieces;
-            }
+            queue.missing += pieces;
+            return;
+        }
+        if queue.missing > 0 {
+            let missing = std::mem::take(&mut queue.missing);
+            queue.lost += missing;
+            self.0.say(&format!("{file} is being written again; {missing} {what} are missing in it"));
+        }
+        queue.batches.push_back(batch);
+        if queue.batches.len() == 1 || queue.batches.len() == *room {
+            changed.notify_all();
         }
     }
 
-    /// How many pieces are missing since the file was last written.
+    /// How many batches wait, and how many pieces are missing.
     #[cfg(test)]
-    pub(super) fn missing(&self) -> u64 {
-        self.missing
+    pub(super) fn waiting_and_missing(&self) -> (usize, u64) {
+        let queue = self.0.lock();
+        (queue.batches.len(), queue.lost + queue.missing)
     }
 
     /// Waits until everything is written, at most for `patience`.
@@ -116,19 +147,154 @@ impl<B: Send + 'static> Background<B> {
     /// # Errors
     /// The file is not whole.
     pub(super) fn finish(self, patience: Duration) -> Result<(), Failure> {
-        drop(self.batches);
-        let Words { file, pieces } = self.words;
+        let Shared { changed, file, pieces, .. } = &*self.0;
+        let mut queue = self.0.lock();
+        queue.over = true;
+        changed.notify_all();
+        let is_written = changed.wait_timeout_while(queue, patience, |queue| queue.ended.is_none());
+        let queue = is_written.unwrap_or_else(PoisonError::into_inner).0;
         let torn = |why: String| Failure::new(format!("{file} is not complete")).of_kind("file").because(why);
-        let lost = self.lost + self.missing;
-        match self.written.recv_timeout(patience) {
-            Ok(Err(error)) => Err(torn(format!("{error}; it ends there")).next("see that the disk has room")),
-            Ok(Ok(())) if lost == 0 => Ok(()),
-            Ok(Ok(())) if self.missing == 0 => Err(torn(format!("the disk was too slow: {lost} {pieces} are missing"))),
-            Ok(Ok(())) | Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
-                self.messages
-                    .say(&format!("warning: the end of {file} is missing, and {} {pieces} before", self.missing));
+        let (missing, lost) = (queue.missing, queue.lost + queue.missing);
+        match &queue.ended {
+            Some(Err(error)) => Err(torn(format!("{error}; it ends there")).next("see that the disk has room")),
+            Some(Ok(())) if lost == 0 => Ok(()),
+            Some(Ok(())) if missing == 0 => Err(torn(format!("the disk was too slow: {lost} {pieces} are missing"))),
+            Some(Ok(())) | None => {
+                self.0.say(&format!("the end of {file} is missing, and {missing} {pieces} before"));
                 Err(torn(format!("the disk was too slow: its end is missing, and {lost} {pieces} before")))
             }
         }
+    }
+}
+
+impl<B> Shared<B> {
+    fn lock(&self) -> MutexGuard<'_, Queue<B>> {
+        // Nothing is half done between two batches, whichever thread panicked.
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn say(&self, what: &str) {
+        self.messages.iter().for_each(|messages| messages.say(&format!("warning: {what}")));
+    }
+
+    /// Writes what comes until nothing more does.
+    fn write_all(&self, mut output: impl Output<B>) -> io::Result<()> {
+        let Waiting { room, gathers, .. } = self.waiting;
+        loop {
+            let idle = |queue: &mut Queue<B>| queue.batches.is_empty() && !queue.over;
+            let queue = self.changed.wait_while(self.lock(), idle).unwrap_or_else(PoisonError::into_inner);
+            if queue.batches.is_empty() {
+                return output.end();
+            }
+            let gathering = |queue: &mut Queue<B>| !queue.over && queue.batches.len() < room;
+            drop(self.changed.wait_timeout_while(queue, gathers, gathering));
+            while let Some(batch) = self.next() {
+                output.write(batch)?;
+            }
+            output.flush()?;
+        }
+    }
+
+    /// The oldest batch that waits.
+    fn next(&self) -> Option<B> {
+        let mut queue = self.lock();
+        let was_full = queue.batches.len() >= self.waiting.room;
+        let batch = queue.batches.pop_front();
+        if was_full {
+            self.changed.notify_all();
+        }
+        batch
+    }
+}
+
+/// How the file ends: said when the thread that writes it does, by a panic too.
+struct Ending<B>(Arc<Shared<B>>, Result<(), String>);
+
+impl<B> Ending<B> {
+    fn come(&mut self, output: impl Output<B>) {
+        self.1 = self.0.write_all(output).map_err(|error| error.to_string());
+    }
+}
+
+impl<B> Drop for Ending<B> {
+    fn drop(&mut self) {
+        let ended = std::mem::replace(&mut self.1, Ok(()));
+        if let Err(error) = &ended {
+            // The drives are worth more than what is written about them.
+            self.0.say(&format!("cannot write {}: {error}; it ends here", self.0.file));
+        }
+        self.0.lock().ended = Some(ended);
+        self.0.changed.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::{Receiver, Sender, channel};
+
+    use super::*;
+
+    /// An hour: a test that waits for it has failed.
+    const LONG: Duration = Duration::from_secs(3600);
+
+    #[derive(Debug, PartialEq)]
+    enum Did {
+        Write(u8),
+        Flush,
+        End,
+    }
+
+    struct Paper(Sender<Did>);
+
+    impl Output<u8> for Paper {
+        const FILE: &'static str = "the log";
+        const PIECES: &'static str = "frames";
+
+        fn write(&mut self, batch: u8) -> io::Result<()> {
+            assert!(batch < 100, "a writer that panics");
+            self.0.send(Did::Write(batch)).map_err(io::Error::other)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.0.send(Did::Flush).map_err(io::Error::other)
+        }
+
+        fn end(self) -> io::Result<()> {
+            self.0.send(Did::End).map_err(io::Error::other)
+        }
+    }
+
+    fn log(pace: Pace, room: usize, gathers: Duration) -> (Background<u8>, Receiver<Did>) {
+        let (paper, did) = channel();
+        (Background::start(Paper(paper), Waiting { pace, room, gathers }, None), did)
+    }
+
+    #[test]
+    fn small_batches_of_every_clone_are_written_together_and_the_end_is_not_waited_for() {
+        let (log, did) = log(Pace::RealTime, 10, LONG);
+        (0..3).for_each(|batch| log.clone().write(batch, 1));
+        assert_eq!(log.finish(LONG), Ok(()));
+        assert_eq!(did.iter().collect::<Vec<_>>(), [Did::Write(0), Did::Write(1), Did::Write(2), Did::Flush, Did::End]);
+    }
+
+    #[test]
+    fn a_full_queue_is_not_gathered_for() {
+        let (log, did) = log(Pace::Free, 2, LONG);
+        (0..5).for_each(|batch| log.write(batch, 1));
+        assert_eq!(log.finish(LONG), Ok(()));
+        let written = did.iter().filter_map(|did| if let Did::Write(batch) = did { Some(batch) } else { None });
+        assert_eq!(written.collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn a_writer_that_fails_or_panics_holds_up_nobody() {
+        let (failing, did) = log(Pace::Free, 1, Duration::ZERO);
+        drop(did);
+        (0..5).for_each(|batch| failing.write(batch, 1));
+        assert!(failing.finish(LONG).is_err());
+        let (panicking, _did) = log(Pace::Free, 1, Duration::ZERO);
+        (100..105).for_each(|batch| panicking.write(batch, 1));
+        let failure = panicking.finish(LONG).expect_err("it has panicked");
+        assert_eq!(failure.because, ["its writer has failed; it ends there"]);
     }
 }

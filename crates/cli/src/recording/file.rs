@@ -9,7 +9,7 @@ use sim::events::Event;
 use sim::recorder::Recorder;
 use testbench::recording::{Column, Kind, Mark, Record};
 
-use super::background::{Background, Pace, Words};
+use super::background::{Background, Output, Pace, Waiting};
 use crate::failure::Failure;
 use crate::serve::messages::Messages;
 
@@ -39,9 +39,8 @@ impl RecordFile {
         pace: Pace,
         messages: Messages,
     ) -> io::Result<Self> {
-        let words = Words { file: "the record", pieces: "samples" };
         let record = Record::begin(kind, Box::new(file), columns)?;
-        Ok(Self(Background::start(words, record, write, Record::finish, pace, messages)))
+        Ok(Self(Background::start(record, Waiting::of(pace), Some(messages))))
     }
 
     /// Takes a batch.
@@ -59,23 +58,32 @@ impl RecordFile {
     }
 }
 
-/// Writes samples, frames and marks in the order of their times, and hands them to the system.
-fn write(record: &mut Record, batch: Batch) -> io::Result<()> {
-    let mut frames = batch.frames.iter().peekable();
-    // A frame's event has the frame's time, which may be before that of an event that was found first.
-    let mut marks: Vec<Mark> = batch.events.iter().map(Mark::from).collect();
-    marks.sort_by_key(|mark| mark.at);
-    let mut marks = marks.iter().peekable();
-    for (at, values) in batch.recorded.iter().flat_map(Recorder::rows) {
-        while let Some((ended, frame)) = frames.next_if(|(ended, _)| *ended <= at) {
-            record.frame(*ended, frame)?;
+impl Output<Batch> for Record {
+    const FILE: &'static str = "the record";
+    const PIECES: &'static str = "samples";
+
+    /// Writes samples, frames and marks in the order of their times, and hands them to the system.
+    fn write(&mut self, batch: Batch) -> io::Result<()> {
+        let mut frames = batch.frames.iter().peekable();
+        // A frame's event has the frame's time, which may be before that of an event that was found first.
+        let mut marks: Vec<Mark> = batch.events.iter().map(Mark::from).collect();
+        marks.sort_by_key(|mark| mark.at);
+        let mut marks = marks.iter().peekable();
+        for (at, values) in batch.recorded.iter().flat_map(Recorder::rows) {
+            while let Some((ended, frame)) = frames.next_if(|(ended, _)| *ended <= at) {
+                self.frame(*ended, frame)?;
+            }
+            while let Some(mark) = marks.next_if(|mark| mark.at <= at) {
+                self.mark(mark)?;
+            }
+            self.row(at, values)?;
         }
-        while let Some(mark) = marks.next_if(|mark| mark.at <= at) {
-            record.mark(mark)?;
-        }
-        record.row(at, values)?;
+        frames.try_for_each(|(ended, frame)| self.frame(*ended, frame))?;
+        marks.try_for_each(|mark| self.mark(mark))?;
+        self.flush()
     }
-    frames.try_for_each(|(ended, frame)| record.frame(*ended, frame))?;
-    marks.try_for_each(|mark| record.mark(mark))?;
-    record.flush()
+
+    fn end(self) -> io::Result<()> {
+        self.finish()
+    }
 }

@@ -47,10 +47,10 @@ impl LogPath {
         &self.path
     }
 
-    /// Puts down what a command has found missing in it, in words.
-    pub(crate) fn lacks(&self, missing: String) {
+    /// Puts down why it is not complete.
+    pub(crate) fn lacks(&self, torn: Failure) {
         // The first is what went wrong.
-        let _ = self.missing.set(missing);
+        let _ = self.missing.set(torn.because.join("; "));
     }
 
     /// Why the log is not what was asked for, if it is not.

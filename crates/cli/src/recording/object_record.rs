@@ -7,7 +7,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use testbench::recording::{Column, Kind, Mark, Record};
 
-use super::background::{Background, Pace, Words};
+use super::background::{Background, Output, Pace, Waiting};
 use crate::failure::Failure;
 use crate::serve::messages::Messages;
 
@@ -31,9 +31,8 @@ impl ObjectRecord {
     /// # Errors
     /// That of writing the begin.
     pub(crate) fn start(kind: Kind, file: File, columns: &[Column], messages: Messages) -> io::Result<Self> {
-        let words = Words { file: "the record", pieces: "samples" };
         let record = Record::begin(kind, Box::new(file), columns)?;
-        Ok(Self(Background::start(words, record, write, Record::finish, Pace::RealTime, messages)))
+        Ok(Self(Background::start(record, Waiting::of(Pace::RealTime), Some(messages))))
     }
 
     /// Takes a batch; one that the disk has no time for is left out and reported.
@@ -51,20 +50,29 @@ impl ObjectRecord {
     }
 }
 
-/// Writes samples, frames and marks in the order of their times, and hands them to the system.
-fn write(record: &mut Record, batch: ObjectBatch) -> io::Result<()> {
-    let mut frames = batch.frames.iter().peekable();
-    let mut marks = batch.marks.iter().peekable();
-    for (at, values) in &batch.rows {
-        while let Some((came, frame)) = frames.next_if(|(came, _)| came <= at) {
-            record.frame(*came, frame)?;
+impl Output<ObjectBatch> for Record {
+    const FILE: &'static str = "the record";
+    const PIECES: &'static str = "samples";
+
+    /// Writes samples, frames and marks in the order of their times, and hands them to the system.
+    fn write(&mut self, batch: ObjectBatch) -> io::Result<()> {
+        let mut frames = batch.frames.iter().peekable();
+        let mut marks = batch.marks.iter().peekable();
+        for (at, values) in &batch.rows {
+            while let Some((came, frame)) = frames.next_if(|(came, _)| came <= at) {
+                self.frame(*came, frame)?;
+            }
+            while let Some(mark) = marks.next_if(|mark| mark.at <= *at) {
+                self.mark(mark)?;
+            }
+            self.row(*at, values)?;
         }
-        while let Some(mark) = marks.next_if(|mark| mark.at <= *at) {
-            record.mark(mark)?;
-        }
-        record.row(*at, values)?;
+        frames.try_for_each(|(came, frame)| self.frame(*came, frame))?;
+        marks.try_for_each(|mark| self.mark(mark))?;
+        self.flush()
     }
-    frames.try_for_each(|(came, frame)| record.frame(*came, frame))?;
-    marks.try_for_each(|mark| record.mark(mark))?;
-    record.flush()
+
+    fn end(self) -> io::Result<()> {
+        self.finish()
+    }
 }
