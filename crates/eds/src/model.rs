@@ -1,11 +1,13 @@
 //! What a file says, typed. Source: CiA 306-1, clauses 4.3 to 4.6 (EDS) and 5 (DCF).
 
+use std::hash::{Hash, Hasher};
+
 use crate::read::is_about_modules;
 use crate::{TypeCode, Value};
 
 /// An electronic data sheet, or a device configuration file, which has [`commissioning`](Self::commissioning) and values
 /// beside.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Hash)]
 pub struct Eds {
     /// `[FileInfo]`.
     pub file: FileInfo,
@@ -27,7 +29,7 @@ pub struct Eds {
 }
 
 /// Who made the file, and when. Times and dates as the file writes them (`10:30AM`, `12-31-2024`).
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct FileInfo {
     /// Name of the file.
     pub file_name: String,
@@ -56,7 +58,7 @@ pub struct FileInfo {
 }
 
 /// What the device is and supports.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct DeviceInfo {
     /// Name of its maker.
     pub vendor_name: String,
@@ -94,7 +96,7 @@ pub struct DeviceInfo {
 }
 
 /// `[DeviceComissioning]`: the one device that a DCF is about.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Commissioning {
     /// Its node-ID.
     pub node_id: Option<u8>,
@@ -117,7 +119,7 @@ pub struct Commissioning {
 }
 
 /// One segment of `[DynamicChannels]`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct DynamicChannel {
     /// Number of the segment, from 1.
     pub number: u16,
@@ -360,6 +362,31 @@ impl AccessType {
     /// It may be mapped into a TPDO, where mapping is allowed at all.
     pub const fn fits_tpdo(self) -> bool {
         !matches!(self, Self::WriteOnly | Self::ReadWriteOutput)
+    }
+}
+
+// Where something stands in a file is not what the file says.
+
+impl Hash for KeptSection {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        let Self { line: _, name, entries } = self;
+        (name, entries).hash(state);
+    }
+}
+
+impl Hash for Object {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        let Self { line: _, index, name, object_type, list, flags, compact, variables } = self;
+        (index, name, object_type, list, flags, compact, variables).hash(state);
+    }
+}
+
+impl Hash for Variable {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        let Self { line: _, sub_index, name, is_domain, data_type, access, pdo_mapping, flags, .. } = self;
+        (sub_index, name, is_domain, data_type, access, pdo_mapping, flags).hash(state);
+        let Self { default, low, high, value, denotation, upload_file, download_file, .. } = self;
+        (default, low, high, value, denotation, upload_file, download_file).hash(state);
     }
 }
 

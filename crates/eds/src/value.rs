@@ -1,6 +1,8 @@
 //! Values as an EDS writes them: numbers in three bases, numbers that depend on the node-ID, others.
 
 use std::fmt;
+use std::hash::{Hash, Hasher};
+use std::mem::discriminant;
 
 /// A whole number, as it stands or with the node-ID added to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -39,6 +41,18 @@ pub enum Value {
     Real(f64),
     /// Text; also the bytes of an OCTET_STRING or DOMAIN and the days and milliseconds of a time, as the file writes them.
     Text(String),
+}
+
+impl Hash for Value {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        discriminant(self).hash(state);
+        match self {
+            Self::Number(number) => number.hash(state),
+            // Zero and minus zero are equal, and have to have one hash.
+            Self::Real(real) => (real + 0.0).to_bits().hash(state),
+            Self::Text(text) => text.hash(state),
+        }
+    }
 }
 
 impl fmt::Display for Value {

@@ -16,7 +16,7 @@ use devices::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoR
 use super::axis::{axes, say_modes};
 use super::names;
 use super::rows::{Row, leak, rows};
-use crate::{Eds, write};
+use crate::Eds;
 
 /// All descriptions that were made of files, by a fingerprint of what the files say: one for each place that such a file
 /// came from.
@@ -29,12 +29,12 @@ struct Kept {
     descriptions: HashMap<Fingerprint, Vec<&'static Description>>,
 }
 
-/// Two hashes of 64 bits, and the length.
-type Fingerprint = ([u64; 2], usize);
+/// Two hashes of 64 bits.
+type Fingerprint = [u64; 2];
 
 impl Kept {
-    fn fingerprint(&self, content: &str) -> Fingerprint {
-        (self.keys.each_ref().map(|key| key.hash_one(content)), content.len())
+    fn fingerprint(&self, eds: &Eds) -> Fingerprint {
+        self.keys.each_ref().map(|key| key.hash_one(eds))
     }
 }
 
@@ -64,10 +64,9 @@ pub fn keep_of(eds: &Eds, file: &str) -> Result<&'static Description, Unkept> {
 
 fn keep_named(eds: &Eds, file: &str) -> Result<&'static Description, Unkept> {
     let manual = &if eds.has_modules() { format!("{file}, without its modules") } else { file.to_owned() };
-    let content = write(eds);
     // A panic while it was locked has left the map as it was.
     let mut all = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-    let fingerprint = all.fingerprint(&content);
+    let fingerprint = all.fingerprint(eds);
     let kept = all.descriptions.get(&fingerprint).map_or(&[][..], Vec::as_slice);
     if let Some(known) = kept.iter().find(|known| known.manual == manual) {
         return Ok(known);

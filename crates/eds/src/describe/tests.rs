@@ -165,6 +165,23 @@ fn the_same_content_is_kept_once() {
     assert!(std::ptr::eq(first, again));
     let other = keep(&read(&Sheet { node_id: NodeId::new(9), ..Sheet::of(model) }).eds).expect("it fits");
     assert!(!std::ptr::eq(first, other));
+    // Where it stands in the file, and how a number is written, is not what it says.
+    let text = write(&Sheet::of(model).eds());
+    let moved = format!("; a remark\n\n{}", text.replace("0x1000", "0x001000"));
+    assert_ne!(
+        Eds::load(moved.as_bytes()).expect("a small file").eds,
+        Eds::load(text.as_bytes()).expect("a small file").eds
+    );
+    assert!(std::ptr::eq(first, keep(&Eds::load(moved.as_bytes()).expect("a small file").eds).expect("it fits")));
+    // One name, one limit, one default, one comment more or less is another file.
+    for (said, otherwise) in
+        [("=Device type", "=Device Type"), ("LowLimit=0", "LowLimit=1"), ("DefaultValue=500", "DefaultValue=501")]
+    {
+        let changed = text.replacen(said, otherwise, 1);
+        assert_ne!(changed, text, "{said}");
+        let changed = keep(&Eds::load(changed.as_bytes()).expect("a small file").eds).expect("it fits");
+        assert!(!std::ptr::eq(first, changed), "{said}");
+    }
     // Under another path it is called otherwise, and nothing else is kept twice.
     let copy = keep_of(&read(&Sheet::of(model)).eds, "line/wheel.eds").expect("it fits");
     assert_eq!((first.manual, copy.manual), ("the file zlac8030l.eds", "the file line/wheel.eds"));
