@@ -39,6 +39,11 @@ impl<'a> Catalogue<'a> {
         Self(known)
     }
 
+    /// How many.
+    pub const fn count(self) -> usize {
+        self.0.len()
+    }
+
     /// All of them.
     pub fn iter(self) -> impl ExactSizeIterator<Item = &'static Description> + Clone + use<'a> {
         self.0.iter().copied()

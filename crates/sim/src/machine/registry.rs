@@ -1,4 +1,4 @@
-//! Which machine is built for which description: the one list that joins the two.
+//! Which machine is built for which description. Which there are says [`devices::all`].
 
 use devices::servo::CIA402;
 use devices::zltech::{ZLAC8030L, ZLIM42C, ZLIM42C_82};
@@ -10,7 +10,7 @@ use crate::VirtualDrive;
 /// Builds a machine, without power.
 type Maker = fn(&'static Description, &Order) -> Result<Box<dyn VirtualDrive>, OrderError>;
 
-static MACHINES: [(&Description, Maker); 8] = [
+static MACHINES: [(&Description, Maker); devices::all().count()] = [
     (&ZLAC8030L, super::zlac8030l::ordered),
     (&mjoint::M4230E17B50, super::mjoint::ordered),
     (&mjoint::M4230E17B80, super::mjoint::ordered),
@@ -21,9 +21,9 @@ static MACHINES: [(&Description, Maker); 8] = [
     (&CIA402, super::servo::ordered),
 ];
 
-/// The models that can be simulated.
+/// The models that can be simulated: all that are described.
 pub fn models() -> impl ExactSizeIterator<Item = &'static Description> + Clone {
-    MACHINES.iter().map(|(model, _)| *model)
+    devices::all().iter()
 }
 
 /// True for the models that have a machine of their own, which [`models`] lists.
@@ -60,8 +60,12 @@ mod tests {
     #[test]
     fn every_model_that_is_described_can_be_had() {
         for model in devices::all().iter() {
-            let drive = order(model, &Order::new(model, node(33), Bitrate::K500)).map(|drive| drive.model());
-            assert_eq!(drive, Ok(model.name));
+            let machines = MACHINES.iter().filter(|(known, _)| std::ptr::eq(*known, model)).count();
+            assert_eq!(machines, 1, "{}", model.name);
+            let order = order(model, &Order::new(model, node(33), Bitrate::K500));
+            let drive =
+                order.map(|drive| (drive.model(), drive.description().is_some_and(|of| of.is_edition_of(model))));
+            assert_eq!(drive, Ok((model.name, true)));
         }
     }
 
