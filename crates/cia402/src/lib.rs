@@ -51,5 +51,5 @@ pub use power::{PowerEvent, PowerState, TRANSITIONS, Transition, next_command, t
 pub use statusword::Statusword;
 pub use terminals::{DigitalInputs, DigitalOutputs};
 pub use touch_probe::{Latched, TouchProbe, TouchProbeFunction, TouchProbeSource};
-pub use units::{FactorGroup, Factors, NoFactor, Polarity, Ratio, SiUnit};
+pub use units::{FactorGroup, Factors, NoFactor, Polarity, RAD_S_PER_RPM, RPM_PER_RAD_S, Ratio, SiUnit};
 pub use window::{Dwell, Window};

@@ -11,7 +11,14 @@
 //! Every factor is an exact fraction. A value is multiplied and divided in 128 bits and rounded to the nearest whole, half
 //! away from zero; what does not fit is held to the ends of its range.
 
+use core::f64::consts::TAU;
 use core::fmt;
+
+/// rad/s in one r/min.
+pub const RAD_S_PER_RPM: f64 = TAU / 60.0;
+
+/// r/min in one rad/s.
+pub const RPM_PER_RAD_S: f64 = 60.0 / TAU;
 
 /// A positive fraction in lowest terms, both parts below 2^64: a 64-bit value times it is exact.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]

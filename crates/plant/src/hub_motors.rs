@@ -23,7 +23,7 @@ use crate::clamp::ClampModel;
 use crate::encoder::EncoderModel;
 use crate::hall::HallModel;
 use crate::hub_motor::HubMotorModel;
-use crate::mechanics::RotorModel;
+use crate::mechanics::{RAD_S_PER_RPM, RotorModel};
 use crate::pmsm::{PmsmModel, SQRT_3};
 use crate::rig::RigModel;
 use crate::supply::{BleederModel, SupplyModel};
@@ -99,7 +99,7 @@ const CLAMP: ClampModel = ClampModel { from_v: 91.25, resistance_ohm: (126.0 - 9
 const POWER_STAGE_LIMIT_C: f64 = 175.0;
 
 /// Assumed: sealed ball bearings for a shaft of 20 mm (6204-2RS), whose makers limit them to 10,000 r/min.
-const BEARING_LIMIT_RAD_S: f64 = 10_000.0 * core::f64::consts::TAU / 60.0;
+const BEARING_LIMIT_RAD_S: f64 = 10_000.0 * RAD_S_PER_RPM;
 
 impl HubMotorModel {
     /// ZLTECH ZLLG65ASM250-L, the 24 V to 48 V wheel motor: 0.761 N m/A, 261 r/min at 24 V, 521 r/min at 48 V.

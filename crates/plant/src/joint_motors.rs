@@ -25,13 +25,11 @@ use crate::brake::BrakeModel;
 use crate::clamp::ClampModel;
 use crate::gear::GearModel;
 use crate::joint_motor::JointMotorModel;
-use crate::mechanics::RotorModel;
+use crate::mechanics::{RAD_S_PER_RPM, RotorModel};
 use crate::pmsm::PmsmModel;
 use crate::rig::RigModel;
 use crate::supply::{BleederModel, SupplyModel};
 use crate::thermal::{BodyModel, COPPER_PER_K};
-
-const RAD_S_PER_R_MIN: f64 = core::f64::consts::TAU / 60.0;
 
 /// Assumed: "multistage DD motor structure" is a multi-pole direct-drive motor, and 36 slots with 42 poles are its usual
 /// winding. With the printed inductance, a d current of 5 A then takes the unloaded M4230 to its 2000 r/min; fewer
@@ -238,7 +236,7 @@ const fn joint(name: &'static str, motor: Motor, reducer: Reducer) -> JointMotor
     let copper_w = 3.0 * motor.current_a * motor.current_a * motor.resistance_ohm;
     let no_load_nm = NO_LOAD_SHARE * motor.torque_nm;
     let dry_nm = DRY_SHARE * no_load_nm;
-    let viscous_nm_s = (1.0 - DRY_SHARE) * no_load_nm / (motor.rated_r_min * RAD_S_PER_R_MIN);
+    let viscous_nm_s = (1.0 - DRY_SHARE) * no_load_nm / (motor.rated_r_min * RAD_S_PER_RPM);
     // The gear's dry share is at its output, behind the spring: the output's hysteresis is twice that over the stiffness,
     // 0.6 and 0.4 arc minutes at a ratio of 50. Catalogues of such gears have one to two.
     let output_dry_nm = (1.0 - MOTOR_SHARE) * dry_nm * ratio;
@@ -287,6 +285,6 @@ const fn joint(name: &'static str, motor: Motor, reducer: Reducer) -> JointMotor
         },
         clamp: CLAMP,
         power_stage_limit_c: POWER_STAGE_LIMIT_C,
-        bearing_limit_rad_s: reducer.input_limit_r_min * RAD_S_PER_R_MIN,
+        bearing_limit_rad_s: reducer.input_limit_r_min * RAD_S_PER_RPM,
     }
 }

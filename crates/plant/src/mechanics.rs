@@ -12,6 +12,9 @@ use crate::angle::Angle;
 
 const INV_TAU: f64 = 1.0 / core::f64::consts::TAU;
 
+/// rad/s in one r/min.
+pub(crate) const RAD_S_PER_RPM: f64 = core::f64::consts::TAU / 60.0;
+
 /// What never changes about a rotor and its bearings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotorModel {

@@ -25,7 +25,7 @@ use crate::clamp::ClampModel;
 use crate::encoder::EncoderModel;
 use crate::hall::HallModel;
 use crate::hub_motor::HubMotorModel;
-use crate::mechanics::RotorModel;
+use crate::mechanics::{RAD_S_PER_RPM, RotorModel};
 use crate::pmsm::PmsmModel;
 use crate::rig::RigModel;
 use crate::supply::{BleederModel, SupplyModel};
@@ -34,13 +34,12 @@ use crate::thermal::{BodyModel, COPPER_PER_K};
 const TORQUE_CONSTANT_NM_A_RMS: f64 = 0.498;
 const RATED_TORQUE_NM: f64 = 1.27;
 const RATED_CURRENT_A_RMS: f64 = 2.8;
-const RATED_VELOCITY_RAD_S: f64 = 3000.0 * RAD_S_PER_R_MIN;
+const RATED_VELOCITY_RAD_S: f64 = 3000.0 * RAD_S_PER_RPM;
 const INERTIA_KG_M2: f64 = 0.173e-4;
 const BRAKE_INERTIA_KG_M2: f64 = 0.058e-4;
 const INERTIA_TIME_CONSTANT_S: f64 = 0.25e-3;
 const INDUCTIVE_TIME_CONSTANT_S: f64 = 5.4e-3;
 
-const RAD_S_PER_R_MIN: f64 = core::f64::consts::TAU / 60.0;
 const SQRT_2: f64 = core::f64::consts::SQRT_2;
 
 /// Assumed: eight poles, as servo motors of this size have.
@@ -95,7 +94,7 @@ const CLAMP: ClampModel = ClampModel { from_v: 470.0, resistance_ohm: 5.0 };
 const POWER_STAGE_LIMIT_C: f64 = 150.0;
 
 /// Assumed: small sealed ball bearings stand three times the motor's highest speed.
-const BEARING_LIMIT_RAD_S: f64 = 15_000.0 * RAD_S_PER_R_MIN;
+const BEARING_LIMIT_RAD_S: f64 = 15_000.0 * RAD_S_PER_RPM;
 
 impl HubMotorModel {
     /// Yaskawa SGMAH-04A: 400 W, 1.27 N m, 3000 r/min, 17-bit encoder, on rectified 200 V mains. No brake.

@@ -18,7 +18,7 @@
 //! What is assumed is a named constant with its reason.
 
 use crate::clamp::ClampModel;
-use crate::mechanics::RotorModel;
+use crate::mechanics::{RAD_S_PER_RPM, RotorModel};
 use crate::rig::RigModel;
 use crate::stepper::StepperModel;
 use crate::stepper_motor::StepperMotorModel;
@@ -56,7 +56,7 @@ const CLAMP: ClampModel = ClampModel { from_v: 46.75, resistance_ohm: (64.5 - 46
 /// nothing to the junction.
 const POWER_STAGE_LIMIT_C: f64 = 150.0;
 /// Assumed: shielded ball bearings for a shaft of 5 mm (625ZZ), whose makers limit them to 36,000 r/min with grease.
-const BEARING_LIMIT_RAD_S: f64 = 36_000.0 * core::f64::consts::TAU / 60.0;
+const BEARING_LIMIT_RAD_S: f64 = 36_000.0 * RAD_S_PER_RPM;
 
 /// Bus voltage below which the drive's own converter stops. A guess: its manual (2.1) wants 20 V of the supply, and cable and
 /// bus take some tenths when the motor draws its most.

@@ -175,7 +175,7 @@ fn drive(
 /// moments would show that swing as a wrong speed.
 fn mean_rpm(finished: &Finished, drive: usize) -> Vec<(f64, f64)> {
     let angles = samples(finished, drive, Signal::ShaftAngle);
-    let rpm = |pair: &[(f64, f64)]| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0) / TAU * 60.0;
+    let rpm = |pair: &[(f64, f64)]| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0) * cia402::RPM_PER_RAD_S;
     angles.windows(2).map(|pair| (pair[1].0, rpm(pair))).collect()
 }
 

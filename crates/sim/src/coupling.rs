@@ -298,7 +298,7 @@ pub(crate) fn state(name: &str, body: &Body) -> BodyState {
         },
         Body::CommonShaft(_, data) => BodyKind::CommonShaft {
             angle_deg: data.angle.as_turns() * 360.0,
-            speed_rpm: data.velocity_rad_s * 30.0 / core::f64::consts::PI,
+            speed_rpm: data.velocity_rad_s * cia402::RPM_PER_RAD_S,
         },
         Body::Arm(model, data) => {
             let degrees =

@@ -22,6 +22,8 @@ use super::objects::{POSITION_PROPORTIONAL, VELOCITY_FEED_FORWARD, VELOCITY_INTE
 use crate::engine::actuator::observer::TrackingGains;
 use crate::engine::actuator::servo::ServoGains;
 
+const RAD_S_PER_RPM: f32 = cia402::RAD_S_PER_RPM as f32;
+
 const VELOCITY_KP_A_PER_RAD_S: f32 = 0.2 / 3000.0;
 const POSITION_KP_PER_S: f32 = 0.02;
 
@@ -29,7 +31,7 @@ const POSITION_KP_PER_S: f32 = 0.02;
 const NO_INTEGRATION_MS: u16 = 2000;
 
 /// V for each rad/s of the shaft in one count of 60FBh:02: 1/327 V at 1000 r/min.
-const FEED_FORWARD_V_S: f32 = 60.0 / (327.0 * 1000.0 * core::f32::consts::TAU);
+const FEED_FORWARD_V_S: f32 = 1.0 / (327.0 * 1000.0 * RAD_S_PER_RPM);
 
 /// Bandwidth of the current loop: 0.15 of it are one control period.
 const CURRENT_BANDWIDTH_RAD_S: f32 = 3000.0;
@@ -63,7 +65,7 @@ pub(super) fn gains(values: &Values, model: &Model) -> ServoGains {
             // No object holds it: the joint knows its own motor.
             acceleration_feed_forward: model.acceleration_a_s2,
             friction_feed_forward: 0.0,
-            velocity_limit_rad_s: model.max_rpm as f32 * core::f32::consts::TAU / 60.0,
+            velocity_limit_rad_s: model.max_rpm as f32 * RAD_S_PER_RPM,
         },
         velocity_filter: LowPassGains::from_time_constant(VELOCITY_FILTER_S, SUPERVISION_PERIOD_S),
         feed_forward_filter: none,

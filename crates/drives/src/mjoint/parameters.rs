@@ -14,8 +14,7 @@ use super::{Values, homing};
 use crate::engine::actuator::servo::{ServoGains, ServoLimits, ServoModel};
 use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, VelocityRamps};
 
-/// rad/s in one r/min.
-const RAD_S_PER_RPM: f32 = core::f32::consts::TAU / 60.0;
+const RAD_S_PER_RPM: f32 = cia402::RAD_S_PER_RPM as f32;
 
 /// Everything that the control task reads of the dictionary besides its targets.
 #[derive(Clone, Copy, Debug)]

@@ -33,8 +33,7 @@ use super::objects::{
 use crate::engine::actuator::observer::TrackingGains;
 use crate::engine::actuator::servo::ServoGains;
 
-/// rad/s in one r/min.
-const RAD_S_PER_RPM: f32 = core::f32::consts::TAU / 60.0;
+const RAD_S_PER_RPM: f32 = cia402::RAD_S_PER_RPM as f32;
 
 const CURRENT_KP_V_PER_A: f32 = 1e-3;
 const CURRENT_KI_V_PER_A_S: f32 = 1.0;

@@ -25,8 +25,7 @@ const HALL_SEQUENCE: [u8; 6] = [5, 1, 3, 2, 6, 4];
 /// Counts in one encoder line: both edges of both channels.
 const COUNTS_PER_LINE: u32 = 4;
 
-/// rad/s in one r/min.
-const RAD_S_PER_RPM: f32 = core::f32::consts::TAU / 60.0;
+const RAD_S_PER_RPM: f32 = cia402::RAD_S_PER_RPM as f32;
 
 /// Everything that the control task reads of the dictionary besides its targets.
 #[derive(Clone, Copy, Debug)]

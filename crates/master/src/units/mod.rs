@@ -67,13 +67,13 @@ pub enum Ramp {
 
 impl From<RadiansPerSecond> for Rpm {
     fn from(speed: RadiansPerSecond) -> Self {
-        Self(speed.0 / TAU * 60.0)
+        Self(speed.0 * cia402::RPM_PER_RAD_S)
     }
 }
 
 impl From<Rpm> for RadiansPerSecond {
     fn from(speed: Rpm) -> Self {
-        Self(speed.0 / 60.0 * TAU)
+        Self(speed.0 * cia402::RAD_S_PER_RPM)
     }
 }
 

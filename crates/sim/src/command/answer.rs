@@ -106,7 +106,7 @@ fn outlook(world: &mut World, place: Place) -> Option<String> {
         drive.advance(now);
         drive.free_run(place.axis)
     });
-    let rpm = |velocity_rad_s: f64| (velocity_rad_s * 30.0 / core::f64::consts::PI).round();
+    let rpm = |velocity_rad_s: f64| (velocity_rad_s * cia402::RPM_PER_RAD_S).round();
     Some(match free_run.ok()?? {
         FreeRun::Held => "the shaft is not driven; its friction or its brake holds it".to_owned(),
         FreeRun::Turns { velocity_rad_s } => {

@@ -1,7 +1,5 @@
 //! What is joined to an output shaft, from the words of a person at the machine: ranges, units, places.
 
-use core::f64::consts::TAU;
-
 use devices::AxisId;
 use plant::attachment::{Attachment, Fan, LoadGear, Pulley, Spring, Stops, Stribeck};
 use plant::mechanics::Load;
@@ -67,7 +65,7 @@ impl<A: Assembly> Machine<A> {
                 what.stops = Some(self.stops(axis, range, stiffness, DAMPING.check(damping)?)?);
             }
             LoadPart::Fan { torque_nm, speed_rpm } => {
-                let velocity_rad_s = FAN_SPEED.check(speed_rpm)? * TAU / 60.0;
+                let velocity_rad_s = FAN_SPEED.check(speed_rpm)? * cia402::RAD_S_PER_RPM;
                 what.fan = Some(Fan { torque_nm: FAN_TORQUE.check(torque_nm)?, velocity_rad_s });
             }
             LoadPart::Gear { ratio, backlash_deg, stiffness_nm_rad } => {

@@ -58,8 +58,6 @@ const WAKE_PERIOD_NS: u64 = 1_000_000;
 /// The identifier of NMT commands (CiA 301, 7.3.5).
 const NMT: u16 = 0;
 
-const RPM_PER_RAD_S: f64 = 30.0 / core::f64::consts::PI;
-
 /// A drive's firmware on its hardware, as a station of a world.
 #[derive(Clone)]
 pub struct Machine<A: Assembly> {
@@ -432,7 +430,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             mode: (self.life == Life::Running).then_some(own.mode),
             error_code: u32::from(own.fault_code),
             position: i64::from(own.position_counts),
-            velocity_rpm: direction * shaft.velocity_rad_s * RPM_PER_RAD_S,
+            velocity_rpm: direction * shaft.velocity_rad_s * cia402::RPM_PER_RAD_S,
             current_a: f64::from(own.current_a),
             supply_v: rig.supply.bus_v,
             motor_c: Some(rig.winding.temperature_c),

@@ -122,7 +122,7 @@ fn hardware(order: &Order, memory: Memory<Boxed>) -> Hardware<Boxed> {
         rated_torque_nm: rated_torque_nm as f32,
         rated_current_a: amplitude(rated_current_a_rms),
         max_current_a: amplitude(max_current_a_rms),
-        max_velocity_rad_s: (max_rpm * core::f64::consts::TAU / 60.0) as f32,
+        max_velocity_rad_s: (max_rpm * cia402::RAD_S_PER_RPM) as f32,
         braking_ohm: bleeder.resistance_ohm as f32,
         braking_w: bleeder.rated_power_w as f32,
         bus_v: bus_v as f32,

@@ -40,9 +40,6 @@ pub struct Unit {
 
 use Dimension::*;
 
-/// r/min in one rad/s.
-const RPM_PER_RAD_S: f64 = 60.0 / std::f64::consts::TAU;
-
 #[rustfmt::skip]
 const UNITS: &[(Dimension, f64, &[&str])] = &[
     (Angle, 1.0, &["turn", "turns", "rev", "revs", "r"]),
@@ -51,7 +48,7 @@ const UNITS: &[(Dimension, f64, &[&str])] = &[
     (AngularVelocity, 1.0, &["rpm", "r/min", "rev/min"]),
     (AngularVelocity, 60.0, &["rps", "r/s", "rev/s", "turn/s"]),
     (AngularVelocity, 1.0 / 6.0, &["deg/s", "°/s"]),
-    (AngularVelocity, RPM_PER_RAD_S, &["rad/s"]),
+    (AngularVelocity, cia402::RPM_PER_RAD_S, &["rad/s"]),
     (Current, 1.0, &["A", "amp", "amps"]),
     (Current, 1e-3, &["mA"]),
     (CurrentRate, 1.0, &["A/s"]),

@@ -244,7 +244,7 @@ impl Servo {
 
     /// The same in r/min.
     pub const fn velocity_rpm(&self) -> f32 {
-        self.velocity_rad_s * (60.0 / TAU)
+        self.velocity_rad_s * cia402::RPM_PER_RAD_S as f32
     }
 
     /// Measured torque-producing current, A.
