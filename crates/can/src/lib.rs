@@ -53,6 +53,7 @@ mod id;
 mod instant;
 mod length;
 mod station;
+mod tap;
 
 pub use bitrate::Bitrate;
 pub use duration::{DURATION_UNITS, ParseDurationError, parse_duration, parse_duration_in};
@@ -61,3 +62,4 @@ pub use id::CanId;
 pub use instant::Instant;
 pub use length::{ERROR_FRAME_BITS, INTERFRAME_SPACE_BITS, fewest_frame_bits, frame_bits, most_frame_bits};
 pub use station::Station;
+pub use tap::{BusFrame, Listen, Tap};

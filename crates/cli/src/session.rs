@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::task::{Wake, Waker};
 use std::time::Duration;
 
-use can::{Instant, Station};
+use can::{Instant, Station, Tap};
 use canopen::NodeId;
 use host::{Wire, WorldDoor};
 use master::Network;
@@ -22,10 +22,10 @@ use crate::embedded::{self, Embedded, EmbeddedDrives};
 use crate::failure::Failure;
 use crate::frames::decoder;
 use crate::frames::stamp::Stamps;
-use crate::frames::tap::{Tap, Traffic};
+use crate::frames::tap::Traffic;
 use crate::global::Global;
 use crate::progress::Progress;
-use crate::recording::{CommandLog, LogPath, Logged, Pace, interface_of};
+use crate::recording::{CommandLog, LogPath, Pace, interface_of};
 use crate::signals::asked_to_end;
 use crate::wire;
 use crate::world_bus::WorldBus;
@@ -90,7 +90,7 @@ fn virtual_bus<R>(
     let traffic = Traffic::default();
     let context = Context::new(global, network.clone(), Some(&drives), progress.clone(), traffic.clone());
     let tapped = Tap::new(network.clone(), traffic.clone());
-    world.add_station(Logged::new(tapped, log));
+    world.add_station(Tap::new(tapped, log));
     let whole = async {
         embedded::wait_until_booted(&network, &drives).await?;
         if global.verbose {
@@ -215,7 +215,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         let failure = notes.troubles().filter(|_| global.json).fold(failure, Failure::because);
         Err(notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost))))
     };
-    let station = Logged::new(Tap::new(network.clone(), traffic), log);
+    let station = Tap::new(Tap::new(network.clone(), traffic), log);
     let report = |_, note: &Note| {
         wire::put_down(&context.wire, note);
         let news = notes.borrow_mut().news(note);

@@ -39,6 +39,5 @@ pub use command::Command;
 pub use parameters::journals::Journals;
 pub use session::{DeadMan, HostHandle, LocalClient, Shown};
 pub use state::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};
-pub use trace::BusFrame;
 pub use wire::{Health, Wire};
 pub use world::door::{WorldAsks, WorldDoor, world_door};

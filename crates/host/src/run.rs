@@ -11,8 +11,8 @@ use crate::session::authority::SessionId;
 use crate::session::handle::{Request, StateUpdate};
 use crate::snapshot::{BusView, Snapshot};
 use crate::state::{Host, PRESENCE_SPAN, TICK};
-use crate::trace::BusFrame;
 use crate::work::send;
+use can::BusFrame;
 
 /// Period of the state while a page is connected, and while none is.
 const STATE_INTERVAL: Duration = Duration::from_millis(50);

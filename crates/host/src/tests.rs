@@ -31,8 +31,8 @@ use crate::answer::Answer;
 use crate::command::{Command, NodeCommand, SessionCommand};
 use crate::session::handle::{HostHandle, Session};
 use crate::state::TICK;
-use crate::trace::BusFrame;
 use crate::wire::Wire;
+use can::BusFrame;
 
 const WHEEL: NodeId = node(4);
 const ARM: NodeId = node(2);

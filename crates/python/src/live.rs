@@ -3,6 +3,7 @@
 //! The thread ends with its handle. Before it does, what it was asked is given up, every drive that this program has set in
 //! motion is quick-stopped, and the guards of those that stand are released.
 
+use can::Tap;
 use master::Network;
 use master::drive::Stopped;
 use std::collections::VecDeque;
@@ -12,7 +13,7 @@ use tokio::sync::{Notify, mpsc};
 use tokio::task::{JoinSet, LocalSet};
 use transport::{BusNotes, BusSpec, Note, WallClock, run_station};
 
-use crate::master::tap::{Tap, Traffic};
+use crate::master::tap::Traffic;
 use crate::world::Job;
 
 /// What the bus says that may wait for a program: each kind comes once, only a connection may come and go for ever.

@@ -17,6 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use can::Tap;
 use canopen::{Mux, NmtCommand, NodeId};
 use master::drive::{Drive, HomingOptions, MotionOptions, SwitchedOff};
 use master::units::{Amperes, Angle, Ramp, Rpm};
@@ -30,7 +31,7 @@ use transport::BusSpec;
 pub(crate) use job::Job;
 use job::Trouble;
 use runner::Runner;
-use tap::{Tap, Traffic};
+use tap::Traffic;
 use value::Value;
 
 use crate::failure::{bad_value, raised, wrong_use};

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use can::BusFrame;
 use canopen::emcy::{Emcy as Message, EmcyErrorCode};
 use canopen::{AbortCode, Mux, NodeId};
 use devices::Description;
@@ -103,7 +104,7 @@ impl Watch {
         let mut stamps = Stamps::new(self.time, context.traffic.unix_zero());
         let follow = async {
             loop {
-                let (at, frame) = context.traffic.next().await;
+                let BusFrame { at, frame, .. } = context.traffic.next().await;
                 let Decoded::Emcy(node, message, fault) = decoder.decode(&frame) else { continue };
                 if self.nodes == Nodes::All || self.nodes == Nodes::One(node) {
                     let entry = ErrorEntry::message(at.as_secs_f64(), node, &message, fault, stamps.text(at));

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use can::BusFrame;
 use canopen::NodeId;
 use master::Drive;
 use master::explain::Overheard;
@@ -54,7 +55,7 @@ impl Explain {
         context.progress.show(format!("listening for {} ms", self.watch.as_millis()));
         let listening = async {
             loop {
-                let (at, frame) = context.traffic.next().await;
+                let BusFrame { at, frame, .. } = context.traffic.next().await;
                 heard.note(&frame, at);
             }
         };

@@ -257,8 +257,8 @@ impl LssMaster<'_> {
             let now = network.now();
             let left = if due > now { due - now } else { Duration::ZERO };
             tokio::select! {
-                (_, frame) = self.context.traffic.next() => {
-                    if let Some(reply) = self.client.handle_frame(&frame) {
+                passed = self.context.traffic.next() => {
+                    if let Some(reply) = self.client.handle_frame(&passed.frame) {
                         return Some(reply);
                     }
                 }

@@ -5,6 +5,7 @@ mod silent;
 
 use std::time::Duration;
 
+use can::BusFrame;
 use canopen::pdo::Direction;
 use canopen::{CobId, NmtState, NodeId};
 use devices::Description;
@@ -187,7 +188,7 @@ impl Watch {
         let mut stamps = Stamps::new(self.time, context.traffic.unix_zero());
         let follow = async {
             loop {
-                let (at, frame) = context.traffic.next().await;
+                let BusFrame { at, frame, .. } = context.traffic.next().await;
                 let Decoded::Pdo(pdo) = decoder.decode(&frame) else { continue };
                 if pdo.node == self.node {
                     let line = Line::new(&decoder, drive.description(), &pdo, at.as_secs_f64(), stamps.text(at));

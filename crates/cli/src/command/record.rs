@@ -197,8 +197,8 @@ impl Record {
             let since = |at: Instant| Instant::ZERO + (at - begin);
             batch.rows.push((since(at), values));
             report.samples += 1;
-            while let Ok((came, frame)) = heard.try_recv() {
-                batch.frames.push((since(came), frame));
+            while let Ok(passed) = heard.try_recv() {
+                batch.frames.push((since(passed.at), passed.frame));
             }
             while let Some((came, event)) = network.poll_event() {
                 batch.marks.extend(mark(since(came), &event));

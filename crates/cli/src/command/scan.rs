@@ -43,15 +43,15 @@ pub(super) async fn look(context: &Context) -> Result<(Vec<Found>, Vec<Heard>), 
         tokio::select! {
             found = &mut scanning => break found,
             passed = others.recv() => match passed {
-                Ok((_, frame)) => counted.note(&mut decoder, &frame),
+                Ok(passed) => counted.note(&mut decoder, &passed.frame),
                 // A busy bus is faster than this: what was missed is of the kinds that come again.
                 Err(RecvError::Lagged(_)) => {}
                 Err(RecvError::Closed) => break scanning.await,
             },
         }
     };
-    while let Ok((_, frame)) = others.try_recv() {
-        counted.note(&mut decoder, &frame);
+    while let Ok(passed) = others.try_recv() {
+        counted.note(&mut decoder, &passed.frame);
     }
     let heard = counted.reported(|node| found.iter().any(|found| found.node == node));
     if found.is_empty() { Err(no_node(&heard).into()) } else { Ok((found, heard)) }

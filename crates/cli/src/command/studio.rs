@@ -113,7 +113,7 @@ impl Studio {
         tokio::select! {
             served = studio::serve(listener, app) => served.map_err(cannot),
             // Not before the router is gone, which holds the handle.
-            () = host.run(|| passed(context)) => Ok(()),
+            () = host.run(|| context.traffic.take()) => Ok(()),
             never = self.keep_open(context, &url) => match never {},
         }
     }
@@ -154,12 +154,6 @@ pub(super) fn setting(context: &Context) -> Setting {
         world: context.world.clone(),
         wire: context.wire.clone(),
     }
-}
-
-/// The next frame that has passed, for the host.
-pub(super) fn passed(context: &Context) -> Option<host::BusFrame> {
-    let passed = context.traffic.take_passed()?;
-    Some(host::BusFrame { at: passed.at, frame: passed.frame, own: passed.own })
 }
 
 /// Journals in the working folder, as `params apply` keeps them. A virtual bus of this command ends with it.

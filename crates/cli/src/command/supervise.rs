@@ -4,6 +4,7 @@ use std::io::{self, BufRead, IsTerminal};
 use std::path::PathBuf;
 use std::time::Duration;
 
+use can::BusFrame;
 use canopen::NodeId;
 use master::core::{Event, NodeSet};
 use master::supervise::{EmcyRecord, Supervisor, SupervisorEvent};
@@ -89,7 +90,7 @@ impl Supervise {
         let end = self.duration.or(context.is_embedded().then_some(EMBEDDED_DURATION));
         let end = end.map(|duration| context.network.now() + duration);
         while end.is_none_or(|end| context.network.now() < end) {
-            while let Ok((at, frame)) = others.try_recv() {
+            while let Ok(BusFrame { at, frame, .. }) = others.try_recv() {
                 supervisor.hear(at, &frame);
             }
             while let Ok(word) = words.try_recv() {

@@ -7,8 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Poll, Waker};
 use std::time::Duration;
 
-use can::{Frame, Instant, Station};
-use master::Network;
+use can::{BusFrame, Listen};
 use master::decode::Decoder;
 use tokio::sync::broadcast;
 
@@ -21,18 +20,11 @@ const KEPT: usize = 1 << 16;
 /// Frames of others that wait for a listener; one that is slower misses the oldest.
 const HEARD: usize = 1024;
 
-/// A network whose frames are seen by others as they pass.
-#[derive(Clone)]
-pub(crate) struct Tap {
-    network: Network,
-    traffic: Traffic,
-}
-
-/// What passes a [`Tap`].
+/// What passes the network of a command.
 #[derive(Clone)]
 pub(crate) struct Traffic {
     passing: Arc<Mutex<Passing>>,
-    others: broadcast::Sender<(Instant, Frame)>,
+    others: broadcast::Sender<BusFrame>,
 }
 
 #[derive(Default)]
@@ -55,22 +47,6 @@ struct Shown {
 struct Heard {
     frames: VecDeque<BusFrame>,
     waker: Option<Waker>,
-}
-
-/// A frame that has passed.
-#[derive(Clone, Copy)]
-pub(crate) struct BusFrame {
-    pub(crate) at: Instant,
-    pub(crate) frame: Frame,
-    /// This command has sent it.
-    pub(crate) own: bool,
-}
-
-impl Tap {
-    /// A station that is `network`, and reports to `traffic`.
-    pub(crate) fn new(network: Network, traffic: Traffic) -> Self {
-        Self { network, traffic }
-    }
 }
 
 impl Default for Traffic {
@@ -98,7 +74,7 @@ impl Traffic {
     }
 
     /// The frames that others send from now on, with their times.
-    pub(crate) fn of_others(&self) -> broadcast::Receiver<(Instant, Frame)> {
+    pub(crate) fn of_others(&self) -> broadcast::Receiver<BusFrame> {
         self.others.subscribe()
     }
 
@@ -108,12 +84,12 @@ impl Traffic {
     }
 
     /// The next frame on the bus, of others or of this command, and when it came.
-    pub(crate) async fn next(&self) -> (Instant, Frame) {
+    pub(crate) async fn next(&self) -> BusFrame {
         poll_fn(|context| {
             let mut passing = self.lock();
             let heard = passing.heard.get_or_insert_default();
             match heard.frames.pop_front() {
-                Some(passed) => Poll::Ready((passed.at, passed.frame)),
+                Some(passed) => Poll::Ready(passed),
                 None => {
                     heard.waker = Some(context.waker().clone());
                     Poll::Pending
@@ -124,27 +100,23 @@ impl Traffic {
     }
 
     /// The next frame that has passed, if there is one; as [`next`](Self::next).
-    pub(crate) fn take(&self) -> Option<(Instant, Frame)> {
-        self.take_passed().map(|passed| (passed.at, passed.frame))
-    }
-
-    /// As [`take`](Self::take), with whose it was.
-    pub(crate) fn take_passed(&self) -> Option<BusFrame> {
+    pub(crate) fn take(&self) -> Option<BusFrame> {
         self.lock().heard.as_mut()?.frames.pop_front()
     }
 
-    fn note(&self, frame: &Frame, now: Instant, own: bool) {
+    fn note(&self, passed: BusFrame) {
         let mut passing = self.lock();
         if let Some(Shown { decoder, stamps, progress }) = &mut passing.shown {
             let paint = Paint::for_stream(&std::io::stderr());
-            let text = decoder.decode(frame).to_string();
-            progress.line(&format!("{} {:<20}  {text}", paint.dim(&stamps.text(now)), frame.to_string()));
+            let BusFrame { at, frame, .. } = passed;
+            let text = decoder.decode(&frame).to_string();
+            progress.line(&format!("{} {:<20}  {text}", paint.dim(&stamps.text(at)), frame.to_string()));
         }
         let Some(heard) = &mut passing.heard else { return };
         if heard.frames.len() == KEPT {
             heard.frames.pop_front();
         }
-        heard.frames.push_back(BusFrame { at: now, frame: *frame, own });
+        heard.frames.push_back(passed);
         let waker = heard.waker.take();
         drop(passing);
         if let Some(waker) = waker {
@@ -158,34 +130,12 @@ impl Traffic {
     }
 }
 
-impl Station for Tap {
-    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        self.traffic.note(frame, now, false);
-        if self.traffic.others.receiver_count() > 0 {
+impl Listen for Traffic {
+    fn hear(&mut self, passed: BusFrame) {
+        self.note(passed);
+        if !passed.own && self.others.receiver_count() > 0 {
             // The receiver may have gone.
-            let _ = self.traffic.others.send((now, *frame));
+            let _ = self.others.send(passed);
         }
-        self.network.handle_frame(frame, now);
-    }
-
-    fn handle_timeout(&mut self, now: Instant) {
-        self.network.handle_timeout(now);
-    }
-
-    fn poll_transmit(&mut self) -> Option<Frame> {
-        self.network.poll_transmit()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        self.network.poll_timeout()
-    }
-
-    fn handle_bus_off(&mut self, off: bool, now: Instant) {
-        self.network.handle_bus_off(off, now);
-    }
-
-    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
-        self.traffic.note(frame, now, true);
-        self.network.handle_transmitted(frame, now);
     }
 }

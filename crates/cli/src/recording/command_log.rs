@@ -6,7 +6,7 @@
 use std::io;
 use std::time::Duration;
 
-use can::{Frame, Instant, Station};
+use can::{BusFrame, Frame, Instant, Listen};
 use transport::log::{Content, Direction, Interface, Record};
 
 use super::background::{Background, Output, Pace, Waiting};
@@ -19,12 +19,12 @@ const INTERVAL: Duration = Duration::from_millis(100);
 /// Frames that may wait for the disk: some 10 s of a full bus at 1 Mbit/s.
 const MOST_WAITING: usize = 1 << 17;
 
-/// A log under way; the clones write the same file. Without a file nothing is kept.
+/// A log under way; the clones write the same file. Without a file nothing is log.
 #[derive(Clone, Default)]
-pub(crate) struct CommandLog(Option<Kept>);
+pub(crate) struct CommandLog(Option<Log>);
 
 #[derive(Clone)]
-struct Kept {
+struct Log {
     file: Background<Record>,
     interface: Interface,
     unix_zero: Duration,
@@ -61,7 +61,7 @@ impl CommandLog {
     ) -> (Self, Writing) {
         let waiting = Waiting { pace, room: MOST_WAITING, gathers: INTERVAL };
         let file = file.map(|file| Background::start(file, waiting, None));
-        (Self(file.clone().map(|file| Kept { file, interface, unix_zero })), Writing(file))
+        (Self(file.clone().map(|file| Log { file, interface, unix_zero })), Writing(file))
     }
 
     /// Takes a frame that passed.
@@ -71,14 +71,14 @@ impl CommandLog {
 
     /// Takes what was on the bus.
     pub(crate) fn take(&self, content: Content, now: Instant, direction: Option<Direction>) {
-        let Some(Kept { file, interface, unix_zero }) = &self.0 else { return };
+        let Some(Log { file, interface, unix_zero }) = &self.0 else { return };
         file.write(Record { at: Some(now + *unix_zero), interface: *interface, direction, content }, 1);
     }
 
     /// Takes a record of another log as it is.
     pub(crate) fn record(&self, record: &Record) {
-        if let Some(kept) = &self.0 {
-            kept.file.write(record.clone(), 1);
+        if let Some(log) = &self.0 {
+            log.file.write(record.clone(), 1);
         }
     }
 }
@@ -93,44 +93,8 @@ impl Writing {
     }
 }
 
-/// A station whose frames are logged as they pass.
-#[derive(Clone)]
-pub(crate) struct Logged<S> {
-    station: S,
-    log: CommandLog,
-}
-
-impl<S> Logged<S> {
-    /// `station`, whose frames go to `log`.
-    pub(crate) const fn new(station: S, log: CommandLog) -> Self {
-        Self { station, log }
-    }
-}
-
-impl<S: Station> Station for Logged<S> {
-    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        self.log.frame(frame, now, Direction::Received);
-        self.station.handle_frame(frame, now);
-    }
-
-    fn handle_timeout(&mut self, now: Instant) {
-        self.station.handle_timeout(now);
-    }
-
-    fn poll_transmit(&mut self) -> Option<Frame> {
-        self.station.poll_transmit()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        self.station.poll_timeout()
-    }
-
-    fn handle_bus_off(&mut self, off: bool, now: Instant) {
-        self.station.handle_bus_off(off, now);
-    }
-
-    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
-        self.log.frame(frame, now, Direction::Transmitted);
-        self.station.handle_transmitted(frame, now);
+impl Listen for CommandLog {
+    fn hear(&mut self, BusFrame { at, frame, own }: BusFrame) {
+        self.frame(&frame, at, if own { Direction::Transmitted } else { Direction::Received });
     }
 }

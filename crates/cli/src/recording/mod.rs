@@ -9,7 +9,7 @@ mod object_record;
 mod options;
 
 pub(crate) use background::Pace;
-pub(crate) use command_log::{CommandLog, Logged};
+pub(crate) use command_log::CommandLog;
 pub(crate) use file::{Batch, RecordFile};
 pub(crate) use frame_log::FrameLog;
 pub(crate) use log_options::{LogPath, NewLog, interface_of, log_path};

@@ -7,7 +7,8 @@ use cia402::object::{POSITION_ACTUAL_VALUE, TARGET_VELOCITY};
 use serde_json::{Value, json};
 
 use super::{ARM, Stage, WHEEL, play};
-use crate::trace::{Asked, BusFrame, Origin, Trace};
+use crate::trace::{Asked, Origin, Trace};
+use can::BusFrame;
 
 impl Stage {
     /// The answer to a query.

@@ -9,7 +9,7 @@ use canopen::pdo::Direction;
 use master::decode::{Decoded, Sdo, SdoStep, Side};
 use serde::Serialize;
 
-use super::bus_frame::BusFrame;
+use can::BusFrame;
 
 /// A line of the trace.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -1,6 +1,6 @@
 //! The kept frames as a candump log, which `ferrodrive dump` and can-utils read.
 
-use super::bus_frame::Origin;
+use super::origin::Origin;
 use super::query::Query;
 use super::ring::{CHUNK, Held};
 

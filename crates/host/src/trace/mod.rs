@@ -3,17 +3,15 @@
 //! In: every frame of the bus. Out: parts of the kept frames, decoded then ([`Query`]), or as a log ([`Origin`]). The memory is
 //! bounded, and no reader makes the host wait: the lock is held for a push, or for the copy of some pointers.
 
-mod bus_frame;
 pub(crate) mod learning;
 mod line;
 mod log;
+mod origin;
 mod query;
 mod ring;
 mod series;
 
-pub use bus_frame::BusFrame;
-
-pub use bus_frame::Origin;
+pub use origin::Origin;
 pub use query::{Asked, Query};
 pub use ring::{Held, Trace};
 pub use series::AskedSeries;

@@ -11,7 +11,8 @@ use devices::Description;
 use master::Models;
 use master::decode::{Decoded, Decoder};
 
-use super::bus_frame::{BusFrame, Origin};
+use super::origin::Origin;
+use can::BusFrame;
 
 /// Least number of kept frames: about seven minutes of a bus with three drives, half a minute of a full one at 1 Mbit/s.
 pub(super) const KEPT: usize = 200_000;

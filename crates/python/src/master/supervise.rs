@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use can::BusFrame;
 use canopen::NodeId;
 use master::Network as Core;
 use master::core::NodeSet;
@@ -66,7 +67,7 @@ impl Watch {
             return Ok(Value::None);
         };
         while !self.closed.load(Ordering::Relaxed) {
-            while let Some((at, frame)) = others.take() {
+            while let Some(BusFrame { at, frame, .. }) = others.take() {
                 supervisor.hear(at, &frame);
             }
             let asked = self.lock().resume.pop_front();

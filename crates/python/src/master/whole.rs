@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use can::Bitrate;
+use can::{Bitrate, BusFrame};
 use canopen::NodeId;
 use cia402::ModeOfOperation;
 use master::decode::Decoder;
@@ -101,7 +101,7 @@ pub(crate) fn scan(py: Python<'_>, network: &Bound<'_, Network>) -> PyResult<Job
         let found = core.scan(TIMEOUT, |_| ()).await;
         let (mut counted, mut decoder) = (Counted::default(), Decoder::knowing(core.models()));
         known.iter().for_each(|(node, model)| decoder.set_model(*node, model));
-        while let Some((_, frame)) = listener.take() {
+        while let Some(BusFrame { frame, .. }) = listener.take() {
             counted.note(&mut decoder, &frame);
         }
         let heard = counted.reported(|node| found.iter().any(|found| found.node == node));
@@ -291,7 +291,7 @@ pub(crate) fn explain(
     network.begin_said(py, async move {
         let mut heard = Overheard::from(core.now());
         core.sleep(watch).await;
-        while let Some((at, frame)) = listener.take() {
+        while let Some(BusFrame { at, frame, .. }) = listener.take() {
             heard.note(&frame, at);
         }
         heard.until(core.now());

@@ -20,10 +20,11 @@ use tower::ServiceExt;
 use super::door::Visitor;
 use super::{LARGEST_MESSAGE, ROUTES, app, openapi, serve};
 use crate::access::{Access, Password};
+use can::BusFrame;
 use host::Answer;
 use host::session::Authority;
 use host::session::{HostHandle, Inbox, Request as HostRequest, StateUpdate, channel};
-use host::trace::{BusFrame, Origin, Trace};
+use host::trace::{Origin, Trace};
 
 /// A watchdog against hangs.
 const PATIENCE: Duration = Duration::from_secs(600);

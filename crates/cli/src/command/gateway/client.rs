@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use can::{Frame, Instant};
+use can::BusFrame;
 use master::Network;
 use master::core::{Event, NodeSet};
 use master::gateway::{MAX_LINE, Session};
@@ -22,7 +22,7 @@ const READER_PATIENCE: Duration = Duration::from_secs(10);
 
 /// What a client has of the gateway.
 pub(super) struct Handle {
-    pub(super) frames: broadcast::Receiver<(Instant, Frame)>,
+    pub(super) frames: broadcast::Receiver<BusFrame>,
     pub(super) events: broadcast::Receiver<Event>,
     pub(super) guards: mpsc::Sender<Guard>,
     pub(super) gone: mpsc::UnboundedSender<Gone>,
@@ -70,7 +70,7 @@ async fn converse(
                 }
             }
             frame = handle.frames.recv() => match frame {
-                Ok((_, frame)) => session.frame_line(&frame),
+                Ok(passed) => session.frame_line(&passed.frame),
                 Err(RecvError::Lagged(_)) => None,
                 Err(RecvError::Closed) => return Ok(()),
             },

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use can::Instant;
+use can::{BusFrame, Instant};
 use canopen::object::DEVICE_TYPE;
 use canopen::pdo::TransmissionType;
 use canopen::{CobId, Mux, NodeId};
@@ -203,7 +203,7 @@ impl<'a> Measurement<'a> {
     }
 
     fn fetch(&mut self) {
-        while let Some((at, frame)) = self.context.traffic.take() {
+        while let Some(BusFrame { at, frame, .. }) = self.context.traffic.take() {
             self.meter.handle_frame(&frame, at);
         }
         while let Some(sample) = self.meter.poll_sample() {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use can::{CanId, Frame, Instant};
+use can::{BusFrame, CanId};
 use canopen::CobId;
 use canopen::pdo::EventTrigger;
 use master::Drive;
@@ -20,7 +20,7 @@ const LISTENED: Duration = Duration::from_millis(300);
 
 /// The identifiers that others send with.
 pub(super) struct Heard {
-    frames: Receiver<(Instant, Frame)>,
+    frames: Receiver<BusFrame>,
     ids: BTreeSet<u32>,
 }
 
@@ -40,8 +40,8 @@ impl Heard {
     pub(super) fn take(&mut self) {
         loop {
             match self.frames.try_recv() {
-                Ok((_, frame)) => {
-                    self.ids.insert(frame.id().raw());
+                Ok(passed) => {
+                    self.ids.insert(passed.frame.id().raw());
                 }
                 Err(tokio::sync::broadcast::error::TryRecvError::Lagged(_)) => {}
                 Err(_) => return,

@@ -27,7 +27,7 @@ use serde_json::Value;
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 
-use super::studio::{passed, setting};
+use super::studio::setting;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Format;
@@ -70,7 +70,7 @@ impl Top {
         context.progress.clear();
         context.traffic.listen();
         let (host, app) = Host::new(context.network.clone(), setting(context));
-        let mut host = pin!(host.run(|| passed(context)));
+        let mut host = pin!(host.run(|| context.traffic.take()));
         tokio::select! {
             ended = show(context, app, format) => ended?,
             () = &mut host => {}

@@ -12,7 +12,7 @@ use processes::scratch;
 use serde_json::{Value, json};
 
 use super::key;
-use crate::command::studio::{passed, setting};
+use crate::command::studio::setting;
 use crate::command::top::app::{Action, App};
 use crate::context::Context;
 use crate::failure::Failure;
@@ -100,7 +100,7 @@ fn the_units_of_a_machine_file_count_in_the_studio_and_in_top() {
     let ended = session::run(&line.global, async |context| {
         context.traffic.listen();
         let (host, app) = Host::new(context.network.clone(), setting(context));
-        let mut host = pin!(host.run(|| passed(context)));
+        let mut host = pin!(host.run(|| context.traffic.take()));
         tokio::select! {
             () = by_both_doors(context, &app) => Ok::<(), Failure>(()),
             () = &mut host => panic!("a host runs as long as there is a app"),

@@ -1,20 +1,9 @@
-//! A frame of the bus, and its line in a log.
+//! The line of a frame of the bus in a log.
 
 use core::fmt::Write;
 use std::time::Duration;
 
-use can::{Frame, Instant};
-
-/// A frame of the bus.
-#[derive(Clone, Copy, Debug)]
-pub struct BusFrame {
-    /// Its bus time.
-    pub at: Instant,
-    /// The frame.
-    pub frame: Frame,
-    /// This program sent it.
-    pub own: bool,
-}
+use can::BusFrame;
 
 /// The contents of a log besides frames.
 #[derive(Clone, Debug)]
