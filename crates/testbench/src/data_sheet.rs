@@ -1,27 +1,24 @@
 //! Data sheets from the disk, to be shown, checked or used.
 
-use std::fs::File;
-use std::io::{self, Read};
 use std::path::Path;
 
 use eds::document::{Bounds, Document};
 use eds::{Eds, Reading, Refusal};
 
+use crate::document::read_bytes;
 use crate::failure::Failure;
 
 /// Why a file gave no data sheet.
 pub enum Unread {
-    /// It cannot be read.
-    File(io::Error),
+    /// It cannot be read, and why.
+    File(String),
     /// Not a data sheet.
     Refused(Refusal),
 }
 
 /// Reads a file as it stands, no more of it than an EDS may have.
 pub fn document(path: &Path) -> Result<Document, Unread> {
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(Unread::File)?;
-    file.take(Bounds::DEFAULT.bytes as u64 + 1).read_to_end(&mut bytes).map_err(Unread::File)?;
+    let bytes = read_bytes(path, Bounds::DEFAULT.bytes as u64).map_err(Unread::File)?;
     Document::parse(&bytes).map_err(Unread::Refused)
 }
 
@@ -34,9 +31,9 @@ impl Unread {
     /// What it means for a file that was asked for.
     pub fn failure(&self, path: &Path) -> Failure {
         match self {
-            Self::File(error) => Failure::new(format!("cannot read {}", path.display()))
+            Self::File(error) => Failure::bad_file(format!("cannot read {}", path.display()))
                 .because(error)
-                .next("is the name right, and may this user read the file?"),
+                .next("give the path of an EDS or DCF file that this user may read"),
             Self::Refused(refusal) => {
                 let at = if refusal.line > 0 { format!(", line {}", refusal.line) } else { String::new() };
                 Failure::new(format!("{}{at} is not read as an EDS", path.display()))

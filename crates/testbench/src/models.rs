@@ -72,10 +72,6 @@ fn is_file(text: &str) -> bool {
 /// The device that a file describes.
 fn described(path: &Path) -> Result<&'static Description, String> {
     let shown = path.display();
-    // Of a pipe the end might never come.
-    if std::fs::metadata(path).is_ok_and(|kind| !kind.is_file()) {
-        return Err(format!("cannot read {shown}: not a regular file"));
-    }
     let reading = data_sheet::reading(path).map_err(|unread| match unread {
         Unread::File(error) => format!("cannot read {shown}: {error}"),
         Unread::Refused(refusal) => format!("{shown}: {refusal}"),

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use testbench::document::read_bytes;
 use testbench::recording::{Kind, Recorded, picture, read};
 
 use super::dcf::is_stdout;
@@ -110,9 +111,9 @@ impl Plot {
     }
 
     fn read(&self) -> Result<Recorded, Failure> {
-        let unreadable = || {
-            Failure::new(format!("cannot read the record {}", self.file.display()))
-                .of_kind("record")
+        let unreadable = |reason| {
+            Failure::bad_file(format!("cannot read the record {}", self.file.display()))
+                .because(reason)
                 .next("give a file that --record of this program has written")
         };
         let kind = Kind::of_name(&self.file.to_string_lossy()).ok_or_else(|| {
@@ -120,12 +121,8 @@ impl Plot {
                 .because("a record is called NAME.mcap or NAME.csv")
                 .next("make one, e.g. ferrodrive sim --drive zlac8030l@4 --record run.mcap")
         })?;
-        let length = std::fs::metadata(&self.file).map_err(|error| unreadable().because(error))?;
-        if !length.is_file() || length.len() > LARGEST {
-            return Err(unreadable().because("it is not a regular file, or larger than 4 GiB"));
-        }
-        let bytes = std::fs::read(&self.file).map_err(|error| unreadable().because(error))?;
-        read(kind, &bytes).map_err(|reason| unreadable().because(reason))
+        let bytes = read_bytes(&self.file, LARGEST).map_err(unreadable)?;
+        read(kind, &bytes).map_err(|reason| unreadable(reason).of_kind("record"))
     }
 }
 

@@ -1,7 +1,5 @@
 //! `ferrodrive write`: an object of a node by SDO download (CiA 301, clause 7.2.4), and objects as they are shown.
 
-use std::fs::File;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use canopen::od::Entry;
@@ -16,6 +14,7 @@ use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
 use testbench::decode::{Decoded, decode};
+use testbench::document::read_bytes;
 use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
 use testbench::words::value::{Typed, typed_alone, typed_for};
@@ -112,21 +111,14 @@ const MOST: u64 = 1 << 20;
 const LONG: usize = 1024;
 
 fn content(path: &Path) -> Result<Vec<u8>, Failure> {
-    let unreadable = |error| {
+    let bytes = read_bytes(path, MOST).map_err(|reason| {
         Failure::bad_file(format!("cannot read {}", path.display()))
-            .because(error)
-            .next("give the path of a file with the bytes to write")
-    };
-    let file = File::open(path).map_err(unreadable)?;
-    let mut bytes = Vec::new();
-    file.take(MOST + 1).read_to_end(&mut bytes).map_err(unreadable)?;
-    if bytes.len() as u64 > MOST {
-        return Err(Failure::new(format!("{} is longer than {MOST} bytes", path.display()))
-            .because("objects of more than a megabyte cannot be written")
-            .next("check whether this is the right file"));
-    }
+            .because(reason)
+            .next("give the path of a file with the bytes to write, at most 1 MB")
+    })?;
     if bytes.is_empty() {
-        return Err(Failure::new(format!("{} is empty", path.display())).next("check whether this is the right file"));
+        let empty = Failure::bad_file(format!("{} is empty", path.display()));
+        return Err(empty.next("check whether this is the right file"));
     }
     Ok(bytes)
 }

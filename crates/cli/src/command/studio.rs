@@ -13,6 +13,7 @@ use canopen::NodeId;
 use host::{Host, Journals, Setting};
 use serde::Serialize;
 use studio::{Access, AccessError, Password, Token};
+use testbench::document::read_text;
 use testbench::parameters::journal::Journal;
 use tokio::net::TcpListener;
 use transport::BusSpec;
@@ -192,12 +193,12 @@ pub(super) fn bitrate(context: &Context) -> Option<Bitrate> {
 }
 
 fn read_password(path: &Path) -> Result<Password, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|error| {
-        Failure::new(format!("cannot read the password from {}", path.display()))
-            .because(error)
+    let text = read_text(path).map_err(|reason| {
+        Failure::bad_file(format!("cannot read the password from {}", path.display()))
+            .because(reason)
             .next("give --password-file a file that you can read, with the password as its first line")
     })?;
-    Password::new(text.lines().next().unwrap_or_default()).map_err(|error| refused(&error))
+    Password::new(text.lines().next().unwrap_or_default()).map_err(|error| refused(&error).because(path.display()))
 }
 
 /// The token of a file, which is made with a new one where it is not there.
@@ -213,9 +214,9 @@ fn kept_token(path: &Path) -> Result<Token, Failure> {
             Ok(token)
         }
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-            let text = std::fs::read_to_string(path).map_err(|error| {
-                Failure::new(format!("cannot read the token from {}", path.display()))
-                    .because(error)
+            let text = read_text(path).map_err(|reason| {
+                Failure::bad_file(format!("cannot read the token from {}", path.display()))
+                    .because(reason)
                     .next("give --token-file a file that you can read, or a path where no file is: it is created")
             })?;
             Token::new(text.lines().next().unwrap_or_default()).map_err(|error| refused(&error).because(path.display()))
@@ -225,14 +226,15 @@ fn kept_token(path: &Path) -> Result<Token, Failure> {
 }
 
 fn refused(error: &AccessError) -> Failure {
-    let failure = Failure::usage(error.to_string());
+    let of_file = Failure::bad_file(error.to_string());
     match error {
-        AccessError::NoPassword(_) => failure
+        AccessError::NoPassword(_) => Failure::usage(error.to_string())
             .because("anyone who reaches a studio from another machine can move the drives and see all traffic")
             .next("give --password-file FILE too, or --listen 127.0.0.1:8402 and reach it through `ssh -L 8402:127.0.0.1:8402`"),
-        AccessError::ShortPassword(_) => failure.next("choose a longer one, e.g. four words that do not belong together"),
-        AccessError::BadToken => failure.next("delete the file: it is created with a new token"),
-        AccessError::NoRandom(_) => Failure::new(error.to_string()),
+        AccessError::ShortPassword(_) => of_file.next("choose a longer one, e.g. four words that do not belong together"),
+        AccessError::BadToken => of_file.next("delete the file: it is created with a new token"),
+        AccessError::NoRandom(_) => Failure::new(error.to_string())
+            .next("start it again when the system has random numbers, which it may lack just after it was booted"),
     }
 }
 

@@ -103,39 +103,76 @@ fn a_machine_file_that_is_missing_or_bad_is_a_1_of_every_command_that_takes_one(
     }
 }
 
+/// A line of each way to name a file that is read.
+const INPUTS: &[&str] = &[
+    "boot FOLDER/m.toml",
+    "boot FOLDER/m.dcf",
+    "supervise FOLDER/m.toml",
+    "plan FOLDER/m.toml",
+    "check FOLDER/m.toml",
+    "check FOLDER/bus.yml",
+    "group move FOLDER/m.toml 4=90deg",
+    "drive-base FOLDER/m.toml --linear 0.2 --for 1s",
+    "--bus sim:FOLDER/m.toml scan",
+    "--bus log:FOLDER/a.log dump",
+    "run FOLDER/s.toml",
+    "params apply 4 FOLDER/p.toml",
+    "params plan 4 FOLDER/p.dcf",
+    "params verify 4 FOLDER/p.bin",
+    "params diff 4 FOLDER/p.toml",
+    "params diff FOLDER/p.dcf FOLDER/p.toml",
+    "decode FOLDER/a.log",
+    "convert FOLDER/a.log b.asc",
+    "replay FOLDER/a.log",
+    "replay FOLDER/a.log --skip-motion",
+    "plot FOLDER/run.csv",
+    "eds lint FOLDER/a.eds",
+    "eds show FOLDER/a.eds",
+    "eds diff FOLDER/a.eds zlac8030l",
+    "dcf 4 --eds FOLDER/a.eds",
+    "--model 4=FOLDER/a.eds scan",
+    "sim --drive FOLDER/a.eds@4",
+    "init --drive FOLDER/a.eds@4",
+    "eds FOLDER/a.eds",
+    "objects FOLDER/a.eds",
+    "write 4 6060 --from FOLDER/a.bin",
+    "studio --listen 127.0.0.1:0 --password-file FOLDER/password",
+];
+
 #[test]
 fn an_input_file_that_is_missing_is_a_1() {
-    for line in [
-        "boot /no/such/m.toml",
-        "boot /no/such/m.dcf",
-        "supervise /no/such/m.toml",
-        "plan /no/such/m.toml",
-        "check /no/such/m.toml",
-        "check /no/such/bus.yml",
-        "group move /no/such/m.toml 4=90deg",
-        "drive-base /no/such/m.toml --linear 0.2 --for 1s",
-        "--bus sim:/no/such/m.toml scan",
-        "--bus log:/no/such/a.log dump",
-        "run /no/such/s.toml",
-        "params apply 4 /no/such/p.toml",
-        "params plan 4 /no/such/p.dcf",
-        "params verify 4 /no/such/p.bin",
-        "params diff 4 /no/such/p.toml",
-        "decode /no/such/a.log",
-        "convert /no/such/a.log b.asc",
-        "replay /no/such/a.log",
-        "plot /no/such/run.csv",
-        "eds show /no/such/a.eds",
-        "eds diff /no/such/a.eds zlac8030l",
-        "dcf 4 --eds /no/such/a.eds",
-        "--model 4=/no/such/a.eds scan",
-        "sim --drive /no/such/a.eds@4",
-        "init --drive /no/such/a.eds@4",
-        "eds /no/such/a.eds",
-        "objects /no/such/a.eds",
-        "write 4 6060 --from /no/such/a.bin",
-    ] {
-        failed(&line.split(' ').collect::<Vec<_>>(), 1);
+    for line in INPUTS {
+        let line = line.replace("FOLDER", "/no/such");
+        let error = failed(&line.split(' ').collect::<Vec<_>>(), 1);
+        assert_eq!(error["kind"], "bad_file", "{line}: {error}");
+    }
+}
+
+/// A pipe that nothing writes to would be waited for, and a device may never end.
+#[cfg(unix)]
+#[test]
+fn an_input_that_is_not_a_regular_file_is_a_1_and_not_waited_for() {
+    let directory = scratch("not_regular");
+    let token = ["studio --listen 127.0.0.1:0 --token-file FOLDER/token"];
+    let lines: Vec<_> = INPUTS.iter().chain(&token).copied().collect();
+    for kind in ["folder", "pipe", "device"] {
+        let folder = directory.join(kind);
+        std::fs::create_dir(&folder).unwrap();
+        for word in lines.iter().flat_map(|line| line.split(' ')) {
+            let Some((_, name)) = word.split_once("FOLDER/") else { continue };
+            let path = folder.join(name.trim_end_matches("@4"));
+            match kind {
+                _ if path.symlink_metadata().is_ok() => {}
+                "folder" => std::fs::create_dir(path).unwrap(),
+                "pipe" => assert!(std::process::Command::new("mkfifo").arg(path).status().unwrap().success()),
+                _ => std::os::unix::fs::symlink("/dev/zero", path).unwrap(),
+            }
+        }
+        for line in &lines {
+            let line = line.replace("FOLDER", folder.to_str().unwrap());
+            let error = failed(&line.split(' ').collect::<Vec<_>>(), 1);
+            assert_eq!(error["kind"], "bad_file", "{line}: {error}");
+        }
     }
 }
 

@@ -20,10 +20,6 @@ pub(super) struct Device {
 pub(super) fn read(path: &Path, at: Place, report: &mut Reporter<'_>) -> Option<Device> {
     report.rule = "data-sheet";
     let shown = path.display();
-    if std::fs::metadata(path).is_ok_and(|kind| !kind.is_file()) {
-        report.say(Severity::Error, at, format!("{shown} is not a regular file"), "name an EDS or DCF file");
-        return None;
-    }
     let reading = match data_sheet::reading(path) {
         Ok(reading) => reading,
         Err(Unread::File(error)) => {

@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use super::read_machine;
 use crate::data_sheet;
+use crate::document::read_bytes;
 use crate::failure::Failure;
 use crate::machine_file::Machine;
 
@@ -278,9 +279,5 @@ fn configuration(path: &Path, object: Mux) -> Result<Vec<u8>, Failure> {
             .because(why)
             .next("it is looked for beside the DCF; is it there?")
     };
-    let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
-    if size > LONGEST_CONFIGURATION {
-        return Err(unreadable(format!("{size} bytes are more than any configuration has")));
-    }
-    std::fs::read(path).map_err(|error| unreadable(error.to_string()))
+    read_bytes(path, LONGEST_CONFIGURATION).map_err(unreadable)
 }

@@ -15,8 +15,8 @@ use canopen::concise::{Concise, Entry, emit};
 use devices::Description;
 use master::parameters::Parameters;
 
-use crate::data_sheet::{self, Unread};
-use crate::document::{LARGEST, read_text};
+use crate::data_sheet;
+use crate::document::{LARGEST, read_bytes, read_text};
 
 pub use dcf::{of_dcf, to_dcf};
 
@@ -52,37 +52,40 @@ impl Form {
     }
 }
 
+/// Why a file gave no parameters, for people.
+#[derive(Debug)]
+pub enum Unread {
+    /// Its name does not end as that of such a file.
+    Name(String),
+    /// It cannot be read.
+    File(String),
+    /// Everything that is wrong with it.
+    Content(String),
+}
+
 /// Reads the parameters in a file. `model` gives names and types, `node` is what the file is read for where it does not
 /// say a node itself.
 ///
 /// # Errors
-/// Everything that is wrong with it, for people.
-pub fn read(path: &Path, model: Option<&'static Description>, node: NodeId) -> Result<Parameters, String> {
-    match Form::of(path)? {
-        Form::Dcf => dcf(path, node),
+/// [`Unread`].
+pub fn read(path: &Path, model: Option<&'static Description>, node: NodeId) -> Result<Parameters, Unread> {
+    let read = match Form::of(path).map_err(Unread::Name)? {
+        Form::Dcf => return dcf(path, node),
         Form::Toml => {
-            let text = read_text(path)?;
+            let text = read_text(path).map_err(Unread::File)?;
             sheet::parse(&text, model).map_err(|bad| bad.named(path.display().to_string()).to_string())
         }
-        Form::Concise => concise(path, node),
-    }
+        Form::Concise => of_concise(&read_bytes(path, LARGEST).map_err(Unread::File)?, node),
+    };
+    read.map_err(Unread::Content)
 }
 
-fn dcf(path: &Path, node: NodeId) -> Result<Parameters, String> {
+fn dcf(path: &Path, node: NodeId) -> Result<Parameters, Unread> {
     let reading = data_sheet::reading(path).map_err(|unread| match unread {
-        Unread::File(error) => error.to_string(),
-        Unread::Refused(refusal) => dcf::refused(&refusal),
+        data_sheet::Unread::File(error) => Unread::File(error),
+        data_sheet::Unread::Refused(refusal) => Unread::Content(dcf::refused(&refusal)),
     })?;
-    dcf::of_reading(reading, node, &path.display().to_string())
-}
-
-fn concise(path: &Path, node: NodeId) -> Result<Parameters, String> {
-    let length = std::fs::metadata(path).map_err(|error| error.to_string())?;
-    if !length.is_file() || length.len() > LARGEST {
-        return Err("not a regular file of at most 1 MB".into());
-    }
-    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
-    of_concise(&bytes, node)
+    dcf::of_reading(reading, node, &path.display().to_string()).map_err(Unread::Content)
 }
 
 /// The values of a concise DCF. What is written to an object more than once counts as the last write: a stream empties

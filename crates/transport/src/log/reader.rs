@@ -48,12 +48,12 @@ impl AnyLogReader {
     /// extension, else candump's.
     ///
     /// # Errors
-    /// That of opening the file, or of reading its first bytes; [`io::ErrorKind::InvalidData`] for a file that they show to be
-    /// no log.
+    /// That of opening the file, or of reading its first bytes; [`io::ErrorKind::InvalidInput`] for one that is not a regular file,
+    /// [`io::ErrorKind::InvalidData`] for one that they show to be no log.
     pub fn open(path: &Path) -> io::Result<Self> {
         let mut input: Box<dyn BufRead + Send> = match path.to_str() {
             Some("-") => Box::new(BufReader::new(io::stdin())),
-            _ => Box::new(BufReader::with_capacity(1 << 16, File::open(path)?)),
+            _ => Box::new(BufReader::with_capacity(1 << 16, open_regular(path)?)),
         };
         let begin = input.fill_buf()?;
         let begin = &begin[..begin.len().min(ENOUGH_TO_TELL)];
@@ -67,6 +67,14 @@ impl AnyLogReader {
         };
         Ok(Self::new(input, format))
     }
+}
+
+/// A pipe would be waited for where it is opened, and a device may never end: those come by standard input.
+fn open_regular(path: &Path) -> io::Result<File> {
+    if std::fs::metadata(path)?.is_file() {
+        return File::open(path);
+    }
+    Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file; - reads standard input"))
 }
 
 impl<R: BufRead> LogReader<R> {

@@ -36,7 +36,7 @@ fn elsewhere_takes_a_password_and_says_what_that_means() {
     let short = directory.join("short");
     std::fs::write(&short, "hunter2\n").unwrap();
     let ended = ferrodrive(&["studio", "--listen", "0.0.0.0:0", "--password-file", short.to_str().unwrap()]);
-    assert_eq!(ended.status, Some(2), "{}", ended.err);
+    assert_eq!(ended.status, Some(1), "{}", ended.err);
     assert!(ended.err.contains("at least 12"), "{}", ended.err);
     let missing = ferrodrive(&["studio", "--password-file", "/no/such/file"]);
     assert_eq!(missing.status, Some(1), "{}", missing.err);

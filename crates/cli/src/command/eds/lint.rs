@@ -42,6 +42,9 @@ struct OfFile {
     /// Why it is not read at all.
     #[serde(skip_serializing_if = "Option::is_none")]
     refused: Option<Refused>,
+    /// The same, where the file itself cannot be read.
+    #[serde(skip)]
+    unread: Option<Failure>,
     objects: usize,
     values: usize,
     errors: usize,
@@ -80,8 +83,11 @@ impl Lint {
 }
 
 impl LintReport {
-    /// Why the command fails, if it does.
+    /// Why the command fails, if it does: a file that cannot be read comes before what is wrong in the others.
     pub(super) fn failure(&self, strict: bool) -> Option<Failure> {
+        if let Some(unread) = self.files.iter().find_map(|file| file.unread.clone()) {
+            return Some(unread);
+        }
         let bad = |file: &&OfFile| file.refused.is_some() || file.errors > 0 || (strict && file.warnings > 0);
         let count = self.files.iter().filter(bad).count();
         let of = self.files.len();
@@ -96,6 +102,7 @@ impl OfFile {
         let empty = Self {
             file: path.display().to_string(),
             refused: None,
+            unread: None,
             objects: 0,
             values: 0,
             errors: 0,
@@ -115,7 +122,8 @@ impl OfFile {
             },
             Err(failure) => {
                 let message = format!("{}: {}", failure.what, failure.because.join("; "));
-                Self { refused: Some(Refused { message, next: failure.next.join("; ") }), ..empty }
+                let refused = Some(Refused { message, next: failure.next.join("; ") });
+                Self { refused, unread: (failure.kind == "bad_file").then_some(failure), ..empty }
             }
         }
     }

@@ -8,19 +8,25 @@ use master::parameters::{Deviation, Parameters, PlanError, Unfit};
 
 use crate::failure::Failure;
 use crate::machine_file::Machine;
+use crate::parameters::Unread;
 
 /// Reads a file for a node. What the file has of another node of the same model follows this one's node-ID.
 ///
 /// # Errors
 /// It is not read as parameters.
 pub fn read(path: &Path, model: Option<&'static Description>, node: Option<NodeId>) -> Result<Parameters, Failure> {
-    let unreadable = |reason| {
-        Failure::new(format!("{} is not read as parameters", path.display()))
-            .of_kind("bad_parameters")
+    let unreadable = |unread| {
+        let what = format!("{} is not read as parameters", path.display());
+        let (failure, reason) = match unread {
+            Unread::Name(reason) => (Failure::usage(what), reason),
+            Unread::File(reason) => (Failure::bad_file(what), reason),
+            Unread::Content(reason) => (Failure::new(what).of_kind("bad_parameters"), reason),
+        };
+        failure
             .because(reason)
             .next("nothing was written; mend the file, or make one: ferrodrive params backup NODE -o FILE.toml")
     };
-    let reader = node.or(NodeId::new(1)).ok_or_else(|| unreadable("no node".to_owned()))?;
+    let reader = node.unwrap_or(NodeId::MIN);
     let parameters = crate::parameters::read(path, model, reader).map_err(unreadable)?;
     Ok(match node {
         Some(node) => parameters.for_node(node, model),
