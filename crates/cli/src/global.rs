@@ -6,6 +6,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use transport::BusSpec;
 
+use crate::command::repeat::some_time;
 use crate::failure::Failure;
 use crate::recording::{LogPath, log_path};
 use testbench::machine_file::Machine;
@@ -56,7 +57,7 @@ pub(crate) struct Global {
     pub(crate) log: Option<LogPath>,
 
     /// Longest wait for each answer of a node
-    #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "500ms", global = true)]
+    #[arg(long, value_name = "TIME", value_parser = some_time, default_value = "500ms", global = true)]
     pub(crate) timeout: Duration,
 
     /// What it says.

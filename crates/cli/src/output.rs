@@ -1,9 +1,11 @@
 //! What a command has to say: one value, printed as text for people or as JSON for programs.
 
 use std::io::{self, Write};
+use std::path::PathBuf;
 
 use serde::Serialize;
 
+use crate::failure::{Failure, FailureBody};
 use plot::Paint;
 
 /// A value that a command prints.
@@ -27,6 +29,21 @@ impl Format {
         if self.json { self.print_json(report) } else { print_line(&report.text(self.paint)) }
     }
 
+    /// Prints a report, of which `failure` says what is wrong: as JSON both in one line.
+    pub(crate) fn print_failed(self, report: &impl Report, failure: Option<&Failure>) -> Result<(), Failure> {
+        #[derive(Serialize)]
+        struct Failed<'a, R> {
+            #[serde(flatten)]
+            report: &'a R,
+            error: FailureBody,
+        }
+        let printed = match failure.filter(|_| self.json) {
+            Some(failure) => self.print_json(&Failed { report, error: failure.into() }),
+            None => self.print(report),
+        };
+        printed.map_err(Failure::of_stdout)
+    }
+
     /// Prints one line of JSON about something that was done.
     pub(crate) fn print_json(self, value: &impl Serialize) -> io::Result<()> {
         print_line(&json(value)?)
@@ -42,6 +59,14 @@ fn json(value: &impl Serialize) -> io::Result<String> {
     let rest = line.strip_prefix('{').unwrap_or(&line);
     let comma = if rest == "}" { "" } else { "," };
     Ok(format!("{{\"ok\":true{comma}{rest}"))
+}
+
+/// A file that is written beside what goes to standard output.
+pub(crate) fn file_path(text: &str) -> Result<PathBuf, String> {
+    match text {
+        "" | "-" => Err("expected the path of a file: only -o/--output takes - for standard output".into()),
+        path => Ok(path.into()),
+    }
 }
 
 /// One text and a line end on standard output, at once.

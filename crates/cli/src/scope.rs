@@ -158,12 +158,13 @@ pub(crate) fn heeds_machine(command: &str) -> bool {
 pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgMatches) -> Result<(), Failure> {
     let typed = |option: &str| matches.value_source(option) == Some(ValueSource::CommandLine);
     let own_bus = matches!(global.bus, BusSpec::Sim { .. });
-    // The bus that every command has by itself is not a contradiction.
-    let given = |option: &&&str| typed(option) && (**option != BUS || global.bus != BusSpec::Sim { file: None });
     let of_model = matches!(command, Command::Objects(objects) if matches!(objects.whose, Whose::Model(_)));
     let name = matches.subcommand_name().unwrap_or_default();
     let of_file = matches!(command, Command::Check(_)) && global.bus == BusSpec::Sim { file: None };
     let of_drives = matches!(command, Command::Init(init) if init.is_without_bus());
+    // The bus that every command has by itself is not a contradiction, but for one that would look at it.
+    let is_own = |option: &str| option == BUS && global.bus == (BusSpec::Sim { file: None }) && !of_drives;
+    let given = |option: &&&str| typed(option) && !is_own(option);
     let special = [(of_model, &OBJECTS_OF_A_MODEL), (of_file, &CHECK_OF_A_FILE), (of_drives, &INIT_OF_DRIVES)];
     let special = special.iter().filter_map(|(is_so, row)| is_so.then_some(*row));
     let rows = UNHEEDED.iter().filter(|row| row.command == name).chain(special);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 use transport::log::{Content, Entry};
 
-use crate::command::dump::{open_log, unreadable};
+use crate::command::dump::{no_log, open_log, unreadable};
 use crate::failure::Failure;
 use crate::output::Report;
 use crate::plain::plain;
@@ -83,9 +83,7 @@ impl Convert {
         }
         writer.finish().map_err(not_written)?;
         if report.frames + report.error_frames + report.fd_frames == 0 && report.passed_over > 0 {
-            return Err(
-                Failure::new(format!("no frame in {}: it is not a {} log", report.from, report.form)).of_kind("no_log")
-            );
+            return Err(no_log(&self.from, reader.format()));
         }
         Ok(report)
     }

@@ -247,9 +247,16 @@ async fn bit_rate(node: &Node, model: &Description) -> Option<u16> {
 /// The file of `--output`; `None` for standard output, which has no such option or `-`.
 ///
 /// # Errors
-/// The file exists, and `force` does not allow replacing it.
+/// The file exists, and `force` does not allow replacing it; or it is a folder, a pipe or a device, which nothing replaces.
 pub(super) fn new_file(output: Option<&Path>, force: bool) -> Result<Option<&Path>, Failure> {
     let path = output.filter(|path| !is_stdout(path));
+    if let Some(path) = path.filter(|path| path.metadata().is_ok_and(|there| !there.is_file())) {
+        return Err(Failure::of_writing(
+            "the file",
+            path,
+            &std::io::Error::other("it exists and is not a regular file"),
+        ));
+    }
     match path.filter(|path| !force && path.exists()) {
         Some(path) => Err(exists(path)),
         None => Ok(path),
@@ -278,8 +285,12 @@ pub(super) fn keep(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure
     let mut beside = path.as_os_str().to_owned();
     beside.push(".new");
     let mut file = File::create(&beside).map_err(cannot)?;
-    file.write_all(bytes).and_then(|()| file.sync_all()).map_err(cannot)?;
-    std::fs::rename(&beside, path).map_err(cannot)
+    let written = file.write_all(bytes).and_then(|()| file.sync_all()).and_then(|()| std::fs::rename(&beside, path));
+    written.map_err(|error| {
+        // Half a file is of no use to anyone; why it is half is in the error.
+        let _ = std::fs::remove_file(&beside);
+        cannot(error)
+    })
 }
 
 impl DcfReport {

@@ -154,6 +154,11 @@ impl Bounds {
 impl DriveBase {
     /// Drives, and prints where the base came to.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
+        if self.duration.is_some() && self.linear.is_none() && self.angular.is_none() {
+            return Err(Failure::usage("--for needs a twist").next(
+                "give --linear M/S, --angular RAD/S or both, or omit --for: twists are then read from standard input",
+            ));
+        }
         let global = match &self.file {
             Some(path) => global.on_machine(path, &session::read_machine(path)?)?,
             None => global.clone(),
@@ -164,8 +169,15 @@ impl DriveBase {
 
     async fn drive(&self, context: &Context) -> Result<BaseDriven, Failure> {
         let Some(plan) = context.machine.as_ref().and_then(|machine| machine.base) else {
-            return Err(Failure::usage("expected a machine file with a [base]")
-                .next("give one: ferrodrive drive-base --machine FILE.toml (docs/machine-file.md describes it)"));
+            // A file that was given is the one that has to have it.
+            let failure = if context.machine.is_some() {
+                Failure::bad_file("the machine file has no [base]")
+            } else {
+                Failure::usage("expected a machine file with a [base]")
+            };
+            return Err(
+                failure.next("give one: ferrodrive drive-base --machine FILE.toml (docs/machine-file.md describes it)")
+            );
         };
         let watchdog = self.dead_man.unwrap_or(plan.limits.watchdog);
         let limits = BaseLimits { watchdog, ..plan.limits };

@@ -375,10 +375,9 @@ impl Sink {
         }
         if frames == 0 && fd_frames == 0 {
             let form = self.of.map_or("candump", LogFormat::name);
-            return Err(Failure::new(format!("no frame, and {lines_skipped} places skipped: this is not a {form} log"))
-                .of_kind("no_log")
-                .next("a log is recognised by its first bytes, then by their extension: .log (candump), .asc, .blf, .trc, .pcap, .pcapng")
-                .next("candump -L can0 writes one"));
+            return Err(without_frames(format!(
+                "no frame, and {lines_skipped} places skipped: this is not a {form} log"
+            )));
         }
         if self.format.json {
             let summary = Summary { frames, lines_skipped, fd_frames };
@@ -409,6 +408,18 @@ pub(crate) fn open_log(path: &Path) -> Result<AnyLogReader, Failure> {
             .because(error)
             .next("give the path of a log: .log, .asc, .blf or .pcapng")
     })
+}
+
+/// A file in which there is no frame, and something that is not one.
+pub(crate) fn no_log(path: &Path, form: LogFormat) -> Failure {
+    without_frames(format!("no frame in {}: it is not a {form} log", path.display()))
+}
+
+fn without_frames(what: String) -> Failure {
+    Failure::new(what)
+        .of_kind("no_log")
+        .next("a log is recognised by its first bytes, then by their extension: .log (candump), .asc, .blf, .trc, .pcap, .pcapng")
+        .next("candump -L can0 writes one")
 }
 
 /// A log that cannot be read on.

@@ -37,8 +37,16 @@ use plot::Paint;
     printf '[1] 4 r 0x1018 1 x32\\n' | nc 127.0.0.1 7000")]
 pub(crate) struct Gateway {
     /// Address to listen at; port 0 takes a free one, which the first line of output names
-    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7000")]
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7000", value_parser = address)]
     listen: String,
+}
+
+/// An address to listen at, as far as that can be said without asking for its name.
+pub(super) fn address(text: &str) -> Result<String, String> {
+    match text.rsplit_once(':') {
+        Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok() => Ok(text.to_owned()),
+        _ => Err("expected HOST:PORT, e.g. 127.0.0.1:0, with a port of 0 to 65535".into()),
+    }
 }
 
 /// How often what the network has noticed is looked for.

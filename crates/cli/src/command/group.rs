@@ -15,6 +15,7 @@ use testbench::words::node::node;
 
 use super::cycles::{CycleArgs, ask_why, refuse_too_full};
 use super::motion::speed;
+use super::repeat::period;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -81,7 +82,7 @@ struct Move {
     #[arg(long, value_name = "ANGLE", value_parser = angle)]
     following_error: Option<Angle>,
     /// Period of SYNC (default: the file's, or 5ms)
-    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long, value_name = "TIME", value_parser = period)]
     period: Option<Duration>,
     /// Mode of operation of each axis (default: the file's, or the first of csp, ip, csv, pv that its model has)
     #[arg(long, value_name = "MODE", value_parser = mode)]
@@ -229,7 +230,8 @@ impl Move {
             self.words.iter().filter_map(|word| if let Word::File(path) = word { Some(path) } else { None });
         let Some(path) = files.next() else { return Ok(global.clone()) };
         if let Some(other) = files.next() {
-            return Err(Failure::usage(format!("two machine files: {} and {}", path.display(), other.display())));
+            return Err(Failure::usage(format!("two machine files: {} and {}", path.display(), other.display()))
+                .next("name one: the axes of a group are in one file"));
         }
         global.on_machine(path, &session::read_machine(path)?)
     }
@@ -271,7 +273,9 @@ impl Move {
         }
         for (position, (node, _)) in targets.iter().enumerate() {
             if targets[..position].iter().any(|(other, _)| other == node) {
-                return Err(Failure::usage(format!("node {node} gets two positions")).at_node(*node));
+                return Err(Failure::usage(format!("node {node} gets two positions"))
+                    .at_node(*node)
+                    .next("name each node once, with the position where it is to end"));
             }
         }
         let plan = self.of_file(context, &targets)?;
@@ -307,21 +311,26 @@ impl Move {
             // Limits that the file has for an axis are not passed over because of its neighbour.
             let parted = groups.iter().any(|group| targets.iter().any(|(node, _)| has(&group, *node)));
             if found.is_none() && parted {
-                return Err(Failure::usage("these nodes are not in one [[group]] of the machine file")
+                return Err(Failure::bad_file("these nodes are not in one [[group]] of the machine file")
                     .next(format!("move those of one group together; its groups: {}", names())));
             }
             return Ok(found);
         };
         let Some(group) = groups.iter().find(|group| group.name == *name) else {
-            let failure = Failure::usage(format!("there is no group '{name}'"));
+            let what = format!("there is no group '{name}'");
+            let advice = "a group is a [[group]] of a machine file (docs/machine-file.md); give that file";
             return Err(match groups {
-                [] => failure.next("a group is a [[group]] of a machine file (docs/machine-file.md); give that file"),
-                _ => failure.next(format!("the machine file has: {}", names())),
+                [] if context.machine.is_none() => Failure::usage(what).next(advice),
+                [] => Failure::bad_file(what).next(advice),
+                _ => Failure::bad_file(what).next(format!("the machine file has: {}", names())),
             });
         };
         match targets.iter().find(|(node, _)| !has(&group, *node)) {
             Some((node, _)) => {
-                Err(Failure::usage(format!("node {node} is not an axis of the group '{name}'")).at_node(*node))
+                let axes: Vec<_> = group.axes.iter().map(|axis| axis.node.to_string()).collect();
+                Err(Failure::bad_file(format!("node {node} is not an axis of the group '{name}'"))
+                    .at_node(*node)
+                    .next(format!("move its axes, nodes {}, or add the node to its [[group]]", axes.join(", "))))
             }
             None => Ok(Some(group)),
         }

@@ -7,16 +7,17 @@ pub(super) mod journal;
 mod plan;
 mod source;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
 use master::units::parse_duration;
+use testbench::parameters::Form;
 use testbench::words::node::node;
 
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::Format;
+use crate::output::{Format, file_path};
 
 pub(super) use plan::{PlanReport, plan_of};
 
@@ -52,7 +53,7 @@ struct Backup {
     #[arg(value_parser = node)]
     node: NodeId,
     /// Write to this file, .toml, .dcf or .bin (default, and -: TOML to standard output)
-    #[arg(long, short, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE", value_parser = output_path)]
     output: Option<PathBuf>,
     /// Overwrite an existing file
     #[arg(long, requires = "output")]
@@ -66,7 +67,7 @@ struct Diff {
     #[arg(value_name = "NODE|FILE")]
     first: String,
     /// File
-    #[arg(value_name = "FILE")]
+    #[arg(value_name = "FILE", value_parser = parameters_path)]
     second: PathBuf,
 }
 
@@ -131,7 +132,7 @@ pub(super) struct Transaction {
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "2min", requires = "prove")]
     within: Duration,
     /// File for the journal
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = file_path)]
     journal: Option<PathBuf>,
 }
 
@@ -142,8 +143,17 @@ struct Wanted {
     #[arg(value_parser = node)]
     node: NodeId,
     /// The parameters: .toml, .dcf or .bin (default: the values in the machine file)
-    #[arg(value_name = "FILE")]
+    #[arg(value_name = "FILE", value_parser = parameters_path)]
     file: Option<PathBuf>,
+}
+
+/// A file of parameters: its ending gives its form.
+fn parameters_path(text: &str) -> Result<PathBuf, String> {
+    Form::of(Path::new(text)).map(|_| text.into())
+}
+
+fn output_path(text: &str) -> Result<PathBuf, String> {
+    if text == "-" { Ok(text.into()) } else { parameters_path(text) }
 }
 
 /// How a drive is restarted.
@@ -169,13 +179,10 @@ impl Params {
             What::Rollback(rollback) => format.print(&rollback.run(context).await?),
             What::Verify(verify) => {
                 let report = verify.run(context).await?;
-                let printed = format.print(&report);
-                if let Some(failure) = report.failure().filter(|_| printed.is_ok()) {
-                    // For programs the report has it.
-                    let failure = Failure::from(failure);
-                    return Err(if format.json { Failure { reported: true, ..failure } } else { failure });
-                }
-                printed
+                let failure = report.failure().map(Failure::from);
+                format.print_failed(&report, failure.as_ref())?;
+                // For programs the report has it.
+                return failure.map_or(Ok(()), |failure| Err(Failure { reported: format.json, ..failure }));
             }
         };
         printed.map_err(Failure::not_printed)

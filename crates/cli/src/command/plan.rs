@@ -83,7 +83,9 @@ impl Plan {
     /// Plans, and fails if something is late.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
         if self.cycle.is_some_and(|cycle| cycle < SHORTEST_CYCLE) {
-            return Err(Failure::usage("--cycle is too short").because("expected 250us or more"));
+            return Err(Failure::usage("--cycle is too short")
+                .because("expected 250us or more")
+                .next("give the period of SYNC, e.g. --cycle 10ms"));
         }
         let mut global = global.clone();
         if let Some(file) = &self.file {
@@ -92,11 +94,12 @@ impl Plan {
         }
         let bitrate = self.bitrate_of(&global.bus)?;
         let report = session::run(&global, async |context| self.plan(context, bitrate).await)?;
-        format.print(&report).map_err(Failure::of_stdout)?;
-        if report.ok {
-            return Ok(());
-        }
-        Err(Failure { reported: true, ..Failure::new("some frames are late") })
+        let failure = (!report.ok).then(|| {
+            let failure = Failure::new("some frames are late").of_kind("bus_load");
+            failure.next("take a longer --cycle, a higher --bitrate or fewer drives")
+        });
+        format.print_failed(&report, failure.as_ref())?;
+        failure.map_or(Ok(()), |failure| Err(Failure { reported: true, ..failure }))
     }
 
     fn bitrate_of(&self, bus: &BusSpec) -> Result<Bitrate, Failure> {
@@ -135,7 +138,10 @@ impl Plan {
         found.sort_unstable();
         let modes = self.modes.iter().filter_map(|(node, _)| *node);
         if let Some(missing) = modes.clone().find(|node| !found.contains(node)) {
-            return Err(Failure::usage(format!("--mode names node {missing}, which does not answer")).at_node(missing));
+            return Err(Failure::new(format!("--mode names node {missing}, which does not answer"))
+                .of_kind("no_answer")
+                .at_node(missing)
+                .next("ferrodrive scan shows which nodes answer"));
         }
         let mut nodes = Vec::new();
         for id in found {

@@ -14,7 +14,7 @@ use serde::Serialize;
 use testbench::models::with_files;
 use transport::log::{Direction, Entry, Record};
 
-use crate::command::dump::{open_log, unreadable};
+use crate::command::dump::{no_log, open_log, unreadable};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -150,6 +150,8 @@ struct Frames<'a> {
     path: &'a Path,
     not_chosen: u64,
     passed_over: u64,
+    /// Nothing but places that are not read has come.
+    is_garbage: bool,
 }
 
 /// A frame that is to be sent.
@@ -166,6 +168,7 @@ impl Frames<'_> {
                 self.passed_over += 1;
                 continue;
             };
+            self.is_garbage = false;
             let Some(frame) = record.frame().copied() else {
                 self.passed_over += 1;
                 continue;
@@ -178,6 +181,9 @@ impl Frames<'_> {
             }
             let moves = decoded.may_move().map(|why| (why, decoded.may_move_node()));
             return Ok(Some(Next { at: record.at.unwrap_or(Instant::ZERO), frame, moves }));
+        }
+        if self.is_garbage && self.passed_over > 0 {
+            return Err(no_log(self.path, self.reader.format()));
         }
         Ok(None)
     }
@@ -234,7 +240,15 @@ impl Replay {
             }
         }
         let reader = open_log(&self.file)?;
-        Ok(Frames { reader, decoder, only: &self.only, path: &self.file, not_chosen: 0, passed_over: 0 })
+        Ok(Frames {
+            reader,
+            decoder,
+            only: &self.only,
+            path: &self.file,
+            not_chosen: 0,
+            passed_over: 0,
+            is_garbage: true,
+        })
     }
 
     /// Waits for the time of the next frame.

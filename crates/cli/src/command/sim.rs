@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
+use canopen::Mux;
 use sim::machine::{Realism, TimingMode};
 use sim::{VirtualDrive, World};
 use tokio::sync::mpsc;
@@ -17,6 +18,7 @@ use transport::{
 use crate::embedded;
 use crate::failure::Failure;
 use crate::global::Global;
+use crate::output::file_path;
 use crate::plain::plain;
 use crate::recording::{FrameLog, LogPath, NewLog, Pace, RecordFile, RecordOptions};
 use crate::serve::control::{ControlOptions, ControlServer};
@@ -32,6 +34,7 @@ use crate::session::{bus_failure, enter_real_time, failure_of, start_clock};
 use described::notes;
 use testbench::document::BadFile;
 use testbench::machine_file::{Machine, Placed};
+use testbench::models::is_from_file;
 use testbench::words::drive::{DriveSpec, drive_spec};
 
 const WORLD_COMMANDS: &str = "World commands (4 is the node of --drive):\n  \
@@ -109,7 +112,7 @@ pub(crate) struct Sim {
     /// reported on standard error. Stores without an acknowledgement (values written by PDO, the position that a joint
     /// notes when its supply falls) follow within 100 ms and the time that the disk takes. Symbolic links and files of
     /// others are refused, and never changed.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = file_path)]
     state: Option<PathBuf>,
     /// Random seed (default: the machine file's, or 1)
     #[arg(long, value_name = "N")]
@@ -150,6 +153,9 @@ pub(crate) struct Sim {
     verbose: bool,
 }
 
+/// The object of a joint that allows Modbus (M4230 and M8025).
+const MODBUS_ENABLE: Mux = Mux::new(0x2600, 0);
+
 /// The note of a simulator that no program can reach.
 const UNREACHABLE: &str = "note: no program can reach these drives: give --serve socketcand://127.0.0.1:29536, or --modbus, or \
                       --bus to join a bus. World commands on standard input are still answered";
@@ -177,6 +183,7 @@ impl Sim {
                 .because("--speed and --clock manual need a bus of its own")
                 .next("omit them, or --bus"));
         }
+        self.refuse_unanswered_registers(&machine, file.is_some())?;
         // Everything that its drives refuse is reported at once, before any of them is created.
         file.map(Machine::build).transpose().map_err(unusable)?;
         let warnings = Messages::of_warnings();
@@ -199,6 +206,22 @@ impl Sim {
         // Threads that wait for standard input must not hold up the end.
         runtime.shutdown_background();
         ended
+    }
+
+    /// Refuses a Modbus server that no drive would answer at.
+    fn refuse_unanswered_registers(&self, machine: &Machine, by_file: bool) -> Result<(), Failure> {
+        let has_registers = |placed: &Placed| {
+            let model = placed.spec.model;
+            !is_from_file(model) && model.row(MODBUS_ENABLE).is_some_and(|row| row.name == "modbus_enable")
+        };
+        if self.modbus.is_none() || machine.drives.iter().any(has_registers) {
+            return Ok(());
+        }
+        let what = "no drive answers at --modbus";
+        let failure = if by_file { Failure::bad_file(what) } else { Failure::usage(what) };
+        Err(failure
+            .because("of the models only the joints have registers")
+            .next("omit it, or add a joint, e.g. --drive m4230e17b50@1"))
     }
 
     /// Whether log and record have to keep up with the clock.

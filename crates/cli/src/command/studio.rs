@@ -18,12 +18,13 @@ use testbench::parameters::journal::Journal;
 use tokio::net::TcpListener;
 use transport::BusSpec;
 
+use super::gateway::address;
 use super::params::journal::{Kept, default_path, note_kept};
 use crate::context::Context;
 use crate::control_client::ControlArgs;
 use crate::failure::Failure;
 use crate::far_world;
-use crate::output::{Format, Report};
+use crate::output::{Format, Report, file_path};
 use crate::recording::interface_of;
 use plot::Paint;
 
@@ -39,7 +40,7 @@ use plot::Paint;
 pub(crate) struct Studio {
     /// Address to listen at; port 0 takes a free one. One that other machines reach (not 127.0.0.1, [::1]) needs a
     /// password
-    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8402")]
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8402", value_parser = address)]
     listen: String,
     /// File whose first line is the password for other machines, 12 characters or more
     ///
@@ -51,7 +52,7 @@ pub(crate) struct Studio {
     ///
     /// Without it each launch has a token of its own, and pages that were open before have to be opened again by the
     /// address that is printed. Anyone who can read the file can move the drives: it is created for its owner alone.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = file_path)]
     token_file: Option<PathBuf>,
     /// Name by which browsers may call this server, e.g. drives.local; may be repeated
     ///

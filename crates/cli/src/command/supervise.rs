@@ -73,10 +73,11 @@ impl Supervise {
         let report = context.network.boot(&plan).await;
         let unconfigured = context.network.unconfigured(&plan, &report).await;
         let booted = BootReport::new(&plan, &report, &unconfigured);
-        format.print(&booted).map_err(Failure::not_printed)?;
-        if let Some(failure) = booted.failure().filter(|_| !unconfigured.is_empty()) {
+        let failure = booted.failure().map(Failure::from);
+        format.print_failed(&booted, failure.as_ref())?;
+        if let Some(failure) = failure.filter(|_| !unconfigured.is_empty()) {
             // What is watched had better be what was planned.
-            return Err(Failure { reported: true, ..failure.into() });
+            return Err(Failure { reported: true, ..failure });
         }
         while let Some((at, event)) = context.network.poll_event() {
             // What the report of the boot-up does not have.

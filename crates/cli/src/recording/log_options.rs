@@ -7,6 +7,7 @@ use transport::BusSpec;
 use transport::log::{Format, Interface, LogWriter};
 
 use crate::failure::Failure;
+use crate::output::file_path;
 use crate::serve::files::create_log;
 
 /// A log that is to be written.
@@ -23,11 +24,13 @@ pub(crate) type NewLog = LogWriter<std::io::BufWriter<std::fs::File>>;
 
 /// Reads the name of a log to be written: its extension selects the format, candump where it has none.
 pub(crate) fn log_path(text: &str) -> Result<LogPath, String> {
-    let path = PathBuf::from(text);
+    let path = file_path(text)?;
     let format = match (Format::of_name(&path), path.extension()) {
-        (Some(format), _) => format,
+        // Many a text is called so, and what reads it back would not know it for a log.
+        (Some(format), extension) if extension.is_none_or(|extension| !extension.eq_ignore_ascii_case("txt")) => format,
         (None, None) => Format::Candump,
-        (None, Some(extension)) => {
+        (_, extension) => {
+            let extension = extension.unwrap_or_default();
             let extension = extension.to_string_lossy();
             return Err(format!(
                 "no form of log has the extension .{extension}; a log is written as {}",
@@ -35,7 +38,7 @@ pub(crate) fn log_path(text: &str) -> Result<LogPath, String> {
             ));
         }
     };
-    if text.is_empty() || !format.is_written() {
+    if !format.is_written() {
         return Err(format!("a {format} file is only read; a log is written as {}", Format::written_extensions()));
     }
     Ok(LogPath { path, format, missing: Arc::default() })

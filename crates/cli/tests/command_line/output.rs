@@ -26,6 +26,31 @@ fn what_goes_to_standard_output_goes_to_a_file_as_well() {
     }
 }
 
+/// Neither is half a file left beside it, nor is something else than a file replaced.
+#[test]
+fn a_folder_in_place_of_the_output_is_refused_and_nothing_is_left_beside_it() {
+    let directory = scratch("output_folder");
+    for (words, name) in [
+        (&["eds", "zlac8030l"][..], "a.eds"),
+        (&["params", "backup", "4"], "a.toml"),
+        (&["dcf", "4"], "a.dcf"),
+        (&["export", "dbc", "4"], "a.dbc"),
+        (&["read", "4", "1000"], "a.bin"),
+    ] {
+        let folder = directory.join(name);
+        std::fs::create_dir(&folder).unwrap();
+        let ended = ferrodrive(&[words, &["-o", folder.to_str().unwrap(), "--force", "--json"]].concat());
+        assert_eq!(
+            (ended.status, &ended.json()["error"]["kind"]),
+            (Some(1), &"file".into()),
+            "{words:?}: {}",
+            ended.out
+        );
+        assert!(folder.is_dir());
+    }
+    assert_eq!(std::fs::read_dir(&directory).unwrap().count(), 5);
+}
+
 #[test]
 fn pictures_records_and_bytes_go_to_standard_output_alone() {
     let directory = scratch("output_alone");

@@ -201,3 +201,69 @@ fn what_a_drive_does_not_take_is_a_1_however_it_is_asked_for() {
         failed(&line.split(' ').collect::<Vec<_>>(), 1);
     }
 }
+
+/// Words alone make no sense: neither a file nor a bus is needed to see that.
+#[test]
+fn words_that_make_no_sense_together_are_a_2() {
+    let base = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/base.toml");
+    for line in [
+        "--timeout 0s scan",
+        "studio --listen foo",
+        "studio --listen 127.0.0.1:99999",
+        "studio --token-file -",
+        "gateway --listen foo",
+        "params plan 4 note.txt",
+        "params diff 4 note.txt",
+        "params diff note.txt other.txt",
+        "params backup 4 -o x.txt",
+        "params apply 4 p.toml --journal -",
+        "--log x.txt scan",
+        "--log - scan",
+        "convert a.log -",
+        "run s.toml --junit -",
+        "run s.toml --clock manual",
+        "run s.toml --jobs 2",
+        "sim --drive zlac8030l@4 --state -",
+        "sim --drive zlac8030l@4 --modbus 127.0.0.1:0",
+        "man-pages -",
+        "pdo plan 4 tpdo1=statusword --cycle 0s",
+        "group move 4=90deg --period 0s",
+        "group move 4=90deg --group zz",
+        "plan --cycle 0s",
+        "latency 4 --sync 0s",
+        "--bus sim init --drive zlac8030l@4",
+        "drive-base BASE --for 1s",
+        "drive-base --linear 0.2 --for 1s",
+    ] {
+        let line = line.replace("BASE", base);
+        failed(&line.split(' ').collect::<Vec<_>>(), 2);
+    }
+    assert!(!std::path::Path::new("-").exists());
+}
+
+#[test]
+fn what_only_a_file_or_a_bus_shows_is_a_1() {
+    let directory = scratch("shown_by_a_file");
+    let (machine, garbage) = (directory.join("machine.toml"), directory.join("garbage.log"));
+    let text = "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n\n[[drive]]\nmodel = 'zlac8030l'\nnode = 5\n\n\
+                [[group]]\nname = 'wheels'\naxes = [{ node = 4 }]\n";
+    std::fs::write(&machine, text).unwrap();
+    std::fs::write(&garbage, "no frame\nnor this\n").unwrap();
+    for (line, kind) in [
+        ("replay GARBAGE", "no_log"),
+        ("replay GARBAGE --skip-motion", "no_log"),
+        ("convert GARBAGE GARBAGE.asc", "no_log"),
+        ("drive-base MACHINE --linear 0.2 --for 1s", "bad_file"),
+        ("group move MACHINE 4=90deg --group zz", "bad_file"),
+        ("group move MACHINE 5=90deg --group wheels", "bad_file"),
+        ("group move MACHINE 4=90deg 5=90deg", "bad_file"),
+        ("boot MACHINE --node 99", "bad_file"),
+        ("boot --node 99", "not_booted"),
+        ("sim --machine MACHINE --modbus 127.0.0.1:0", "bad_file"),
+        ("plan --mode 99=pv", "no_answer"),
+    ] {
+        let line = line.replace("MACHINE", machine.to_str().unwrap()).replace("GARBAGE", garbage.to_str().unwrap());
+        let error = failed(&line.split(' ').collect::<Vec<_>>(), 1);
+        assert_eq!(error["kind"], kind, "{line}: {error}");
+    }
+}

@@ -76,7 +76,9 @@ impl Latency {
     /// Measures.
     pub(crate) async fn run(&self, context: &Context) -> Result<LatencyReport, Failure> {
         if self.sync < Duration::from_micros(500) {
-            return Err(Failure::usage("--sync is too short").because("a SYNC and its answers need 500us at least"));
+            return Err(Failure::usage("--sync is too short")
+                .because("a SYNC and its answers need 500us at least")
+                .next("give the period of SYNC, e.g. --sync 10ms"));
         }
         let measurement = Measurement::new(context, self.node, self.count, self.duration);
         let measured = measurement.run(self.sync).await?;

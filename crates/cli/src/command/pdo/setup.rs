@@ -18,6 +18,7 @@ use testbench::machine_file::{mapped, pdo_id};
 use testbench::words::node::node;
 
 use crate::command::params::{PlanReport, Transaction, plan_of};
+use crate::command::repeat::period;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -53,7 +54,7 @@ pub(super) struct PlanPdos {
     #[command(flatten)]
     wanted: Wanted,
     /// Period of SYNC for which the bus load is calculated
-    #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "10ms")]
+    #[arg(long, value_name = "TIME", value_parser = period, default_value = "10ms")]
     cycle: Duration,
     /// Bit rate for which the bus load is calculated
     #[arg(long, value_name = "RATE", default_value = "500k")]
@@ -137,7 +138,8 @@ impl Wanted {
             return Ok((parameters, "the machine file".to_owned()));
         }
         if self.id.is_some() && self.pdos.len() > 1 {
-            return Err(Failure::usage("--id takes one PDO: two with the same identifier would disturb each other"));
+            return Err(Failure::usage("--id takes one PDO: two with the same identifier would disturb each other")
+                .next("name one PDO with it, or omit --id: each PDO keeps its identifier"));
         }
         let mut values: BTreeMap<Mux, Vec<u8>> = BTreeMap::new();
         for asked in &self.pdos {

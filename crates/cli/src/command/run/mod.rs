@@ -14,7 +14,7 @@ use std::time::Duration;
 use testbench::scenario::{Kept, Outcome, Runner, Scenario};
 
 use crate::failure::Failure;
-use crate::output::Format;
+use crate::output::{Format, file_path};
 use crate::progress::Progress;
 use crate::recording::{Batch, Pace, RecordOptions};
 use crate::serve::messages::Messages;
@@ -53,7 +53,7 @@ pub(crate) struct Run {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
     /// Also write the result as JUnit XML, as build servers read it
-    #[arg(long, value_name = "FILE", conflicts_with = "seeds")]
+    #[arg(long, value_name = "FILE", conflicts_with = "seeds", value_parser = file_path)]
     junit: Option<PathBuf>,
     #[command(flatten)]
     recording: RecordOptions,
@@ -73,16 +73,17 @@ const STEPS_A_LOOK: u32 = 4096;
 impl Run {
     /// Runs it.
     pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
+        self.serving.check()?;
         let [file] = self.files.as_slice() else {
             self.refuse_for_several()?;
             return several::run(&self.files, self.seed, &self.set, self.jobs, self.junit.as_deref(), format);
         };
+        if self.jobs.is_some() && self.seeds.is_none() {
+            return Err(Failure::usage("--jobs needs several runs, and this is one")
+                .next("omit it, or give --seeds 1..100 or several files"));
+        }
         let scenario = Loaded::read(file, &self.set).and_then(Loaded::with_all)?;
         let Some(seeds) = &self.seeds else {
-            if self.jobs.is_some() {
-                return Err(Failure::usage("--jobs needs several runs, and this is one")
-                    .next("omit it, or give --seeds 1..100 or several files"));
-            }
             return self.once(&scenario, file, format);
         };
         if self.recording.path().is_some() {

@@ -45,6 +45,16 @@ impl ServeOptions {
         !self.places.is_empty() || self.control.place().is_some()
     }
 
+    /// Refuses a clock that nothing could advance.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        if self.clock == Clock::Manual && self.control.place().is_none() {
+            return Err(Failure::usage("the time cannot be advanced with --clock manual")
+                .because("that is for a scenario that is served to programs outside")
+                .next("give --serve URL, and --control 127.0.0.1:0: its clients advance time with `run 20ms`"));
+        }
+        Ok(())
+    }
+
     /// Goes through the scenario with a host outside; what came of it, and what ended it if that was not its own end.
     ///
     /// # Errors
@@ -56,10 +66,6 @@ impl ServeOptions {
         recording: &RecordOptions,
         file: &Path,
     ) -> Result<(Outcome, Result<(), Failure>), Failure> {
-        if self.clock == Clock::Manual && self.control.place().is_none() {
-            return Err(Failure::usage("the time cannot be advanced with --clock manual")
-                .next("give --control 127.0.0.1:0: its clients advance time with `run 20ms`"));
-        }
         let (mut world, execution) = Execution::begin(scenario, seed).map_err(|bad| unbuildable(file, bad))?;
         let warnings = Messages::of_warnings();
         let real_time = self.clock == Clock::Real && self.speed.is_none();
