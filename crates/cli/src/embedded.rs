@@ -30,7 +30,7 @@ pub(crate) fn world() -> Result<Embedded, Failure> {
     let mut drives = Vec::new();
     for (node, model) in embedded() {
         let drive = ordered_drive(model, &Order::new(model, node, world.bitrate()))?;
-        world.add_drive(node.raw(), drive).map_err(|error| Failure::new(error.to_string()))?;
+        world.add_drive(node.raw(), drive).map_err(|error| Failure::new(error.to_string()).next(OWN_BUS))?;
         drives.push((node, model));
     }
     Ok((world, drives))
@@ -38,8 +38,14 @@ pub(crate) fn world() -> Result<Embedded, Failure> {
 
 /// A virtual drive as it was ordered, without power.
 pub(crate) fn ordered_drive(model: &'static Description, order: &Order) -> Result<Box<dyn VirtualDrive>, Failure> {
-    sim::machine::order(model, order).map_err(|error| Failure::usage(error.to_string()))
+    sim::machine::order(model, order).map_err(|error| {
+        let advice = format!("ferrodrive objects {} shows its objects and what they take", model.name);
+        Failure::usage(error.to_string()).next(advice)
+    })
 }
+
+/// What to do where the virtual bus of a command does not begin.
+const OWN_BUS: &str = "name the drives in a machine file: --machine FILE.toml";
 
 /// Waits until every drive has booted and looked about.
 pub(crate) async fn wait_until_booted(
@@ -51,7 +57,12 @@ pub(crate) async fn wait_until_booted(
     }
     for (node, _) in drives {
         let booted = network.node(*node).wait(|node| node.facts.boot_up, BOOT_PATIENCE).await;
-        booted.map_err(|_| Failure::new(format!("the virtual drive at node {node} did not boot")))?;
+        booted.map_err(|_| {
+            Failure::new(format!("the virtual drive at node {node} did not boot"))
+                .of_kind("no_boot_up")
+                .at_node(*node)
+                .next("see that the machine file gives it power and the bit rate of the bus")
+        })?;
     }
     network.sleep(SETTLING_TIME).await;
     Ok(())

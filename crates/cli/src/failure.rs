@@ -53,7 +53,7 @@ impl Failure {
     /// Standard output cannot be written.
     #[allow(clippy::needless_pass_by_value, reason = "for map_err")]
     pub(crate) fn not_printed(error: std::io::Error) -> Self {
-        Self::new("cannot write to standard output").because(error)
+        Self::of_stdout(error)
     }
 
     /// The command line makes no sense, as found out only now.
@@ -78,6 +78,13 @@ impl Failure {
         Self::new(format!("cannot write {what} {}", path.display())).of_kind("file").because(error).next(
             "make sure that its folder exists, can be written and has room; an existing file of another kind is not overwritten",
         )
+    }
+
+    /// What is asked for needs the model of a node, and that is not known.
+    pub(crate) fn unknown_model(node: NodeId) -> Self {
+        let failure =
+            Self::new(format!("the model of node {node} is not known")).of_kind("unknown_model").at_node(node);
+        failure.next(format!("name its model: {}", how_to_say(node, &["MODEL"])))
     }
 
     /// A signal asked the command to end.

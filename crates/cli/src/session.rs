@@ -58,7 +58,12 @@ pub(crate) fn run_live<R>(
 /// A tokio runtime of this thread alone.
 pub(crate) fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
     let built = tokio::runtime::Builder::new_current_thread().enable_all().build();
-    built.map_err(|error| Failure::new("cannot start the runtime").because(error))
+    built.map_err(|error| no_runtime(&error))
+}
+
+/// The system gives this program no more of what it needs to wait for several things at once.
+pub(crate) fn no_runtime(error: &std::io::Error) -> Failure {
+    Failure::new("cannot start the runtime").because(error).next("raise the limit of open files: ulimit -n")
 }
 
 /// The world that `--bus sim` or `--bus sim:FILE.toml` means, and which drives are in it.
@@ -103,7 +108,10 @@ fn virtual_bus<R>(
     if let (Err(torn), Some(log)) = (writing.finish(), &global.log) {
         log.lacks(torn);
     }
-    ended.map_err(|error| Failure::new("the virtual bus came to a halt").because(error))?
+    ended.map_err(|error| {
+        let failure = Failure::new("the virtual bus came to a halt").because(error);
+        failure.next("give the command less to do, or a shorter --for")
+    })?
 }
 
 /// Where the master of a command runs.
@@ -319,6 +327,13 @@ pub(crate) fn bus_failure(global: &Global, error: &dyn Error) -> Failure {
             .next("check that it exists and is spelled correctly; `ferrodrive help options` lists the forms of --bus");
     }
     failure
+}
+
+/// That a place cannot be listened at.
+pub(crate) fn not_served(error: &dyn Error) -> Failure {
+    failure_of(error)
+        .of_kind("bus")
+        .next("give an address of this machine with a port that no other program has, or a device that is there; port 0 takes a free one")
 }
 
 /// An error with every cause that is known.

@@ -162,17 +162,19 @@ impl CommandError {
         }
     }
 
-    /// What to do, where the words do not say it.
-    pub const fn next(&self) -> Option<&'static str> {
+    /// What to do.
+    pub const fn next(&self) -> &'static str {
         match self {
             Self::Unknown(_) | Self::BadNode(_) | Self::NoAction(_) | Self::Stimulus(_) => {
-                Some("help lists what a line may say")
+                "help lists what a line may say"
             }
-            Self::NotManual => Some("start the simulator with --clock manual"),
-            Self::Running { .. } | Self::TooMany { .. } => Some("wait for the answer to the run"),
-            Self::Ended { .. } => Some("now shows how far time has come; run goes on from there"),
-            Self::TooLong => Some("give each command a line of its own"),
-            Self::NoSuchDrive { .. } | Self::NoSuchBody { .. } | Self::Refused(_) => None,
+            Self::NotManual => "start the simulator with --clock manual",
+            Self::Running { .. } | Self::TooMany { .. } => "wait for the answer to the run",
+            Self::Ended { .. } => "now shows how far time has come; run goes on from there",
+            Self::TooLong => "give each command a line of its own",
+            Self::NoSuchDrive { .. } => "name a drive that was started; --drive MODEL@NODE starts another",
+            Self::NoSuchBody { .. } => "name a body that is there; a [[body]] of the machine file makes one",
+            Self::Refused(_) => "give what this drive has and takes; help lists the commands",
         }
     }
 
@@ -260,7 +262,7 @@ struct RefusalBody<'a> {
     node: Option<u8>,
     object: Option<&'a str>,
     abort: Option<u32>,
-    next: Option<&'a str>,
+    next: &'a str,
 }
 
 /// The answer to a line that was not done: why in words, and what a program goes by.

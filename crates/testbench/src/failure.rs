@@ -157,16 +157,37 @@ impl fmt::Display for Failure {
 impl From<master::Error> for Failure {
     /// The master's errors have what, why and what to do; how a model is named is the caller's to add.
     fn from(error: master::Error) -> Self {
-        use master::Error;
         let subject = Subject { node: Some(error.node()), object: error.object(), abort: error.abort() };
         let failure = Self { kind: error.kind(), subject, ..parts(&error) };
-        match error {
-            Error::OutOfLimits { .. } | Error::TooFine { .. } if failure.next.is_empty() => {
-                failure.next("ask for a value that the drive takes, or change the setting that limits it")
-            }
+        match remedy(&error) {
+            Some(remedy) if failure.next.is_empty() => failure.next(remedy),
             _ => failure,
         }
     }
+}
+
+/// What to do about an error of the master whose words do not have it apart; of a model that is not known the caller says how it is named.
+fn remedy(error: &master::Error) -> Option<&'static str> {
+    use master::Error;
+    Some(match error {
+        Error::OutOfLimits { .. } | Error::TooFine { .. } => {
+            "ask for a value that the drive takes, or change the setting that limits it"
+        }
+        Error::BadAnswer { .. } => "try again; ferrodrive scan shows whether two devices have this node-ID",
+        Error::WrongLength { .. } => "ferrodrive scan shows what the node is; name its model if it is another one",
+        Error::QueueFull { .. } => "wait for the requests that are under way, then send the next one",
+        Error::NoSuchAxis { .. } => "name an axis that the model has; the first is number 1",
+        Error::NoSuchQuantity { .. } => "ferrodrive objects NODE lists what the model has",
+        Error::NoFeed { .. } => {
+            "give an angle such as 90deg, or a machine file whose [[drive]] has units = { feed_constant = \"10mm\" }"
+        }
+        Error::NoParameterStore { .. } => {
+            "write them after each start: ferrodrive params apply NODE FILE, or boot by a machine file"
+        }
+        Error::NoFactorySettings { .. } => "write each object instead: ferrodrive params apply NODE FILE",
+        Error::NoSuchMode { .. } => "choose one of the modes that the model has",
+        _ => return None,
+    })
 }
 
 /// What the error says, and apart from it what it advises.

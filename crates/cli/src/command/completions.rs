@@ -52,10 +52,11 @@ impl Completions {
             script.extend_from_slice(BASH.as_bytes());
         } else {
             let known = Shells::builtins();
-            let shell =
-                known.completer(name).ok_or_else(|| Failure::new(format!("cannot print a script for {name}")))?;
+            let shell = known.completer(name).ok_or_else(|| {
+                Failure::new(format!("cannot print a script for {name}")).next("name bash, fish or zsh")
+            })?;
             let written = shell.write_registration(ASKED_BY, "ferrodrive", "ferrodrive", "ferrodrive", &mut script);
-            written.map_err(|error| Failure::new("cannot make the script").because(error))?;
+            written.map_err(Failure::not_printed)?;
         }
         if matches!(self.shell, Shell::Zsh) {
             script.extend_from_slice(ZSH_AUTOLOAD.as_bytes());

@@ -84,7 +84,10 @@ async fn too_full(
     let mut nodes = Vec::new();
     for drive in drives {
         let read = set_up(NodeTraffic::of(drive).await?);
-        nodes.push(cycle.traffic(drive, read).map_err(|error| Failure::new(error.to_string()).of_kind("group"))?);
+        nodes.push(cycle.traffic(drive, read).map_err(|error| {
+            let advice = "give a --mode for speed, torque or positions that the model has, e.g. pv";
+            Failure::new(error.to_string()).of_kind("group").at_node(drive.node().id()).next(advice)
+        })?);
     }
     Ok(too_full_at(&nodes, cycle.period, bitrate))
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use canopen::NodeId;
 use canopen::object::SERIAL_NUMBER;
 use eds::document::Document;
-use eds::{Commissioning, Configuration, Sheet, write};
+use eds::{Commissioning, Configuration, Refusal, Sheet, write};
 use master::parameters::Parameters;
 use master::{Error, Node};
 use serde::Serialize;
@@ -95,7 +95,7 @@ impl Dcf {
         let device = commissioning(&node, model, &self.name).await;
         let file_name = output.and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
         let file_name = file_name.unwrap_or_else(|| format!("node{}.dcf", self.node));
-        made.commission(&device, &file_name).map_err(|error| Failure::usage(error.to_string()))?;
+        made.commission(&device, &file_name).map_err(|error| not_commissioned(&error))?;
         let document = made.into_document();
         let mut report = DcfReport { node: self.node.raw(), file: None, dcf: None, read, values, refused, left_out };
         match output {
@@ -118,13 +118,12 @@ impl Dcf {
             Some(path) => (source::document(path)?, None),
             None => {
                 let drive = context.known_drive(self.node).await?;
-                let model =
-                    drive.description().ok_or_else(|| Failure::new("the model is not known").at_node(self.node))?;
+                let model = drive.description().ok_or_else(|| Failure::unknown_model(self.node))?;
                 (sheet_of(model)?, Some(model))
             }
         };
         let made = Configuration::new(document, self.node.raw());
-        Ok((made.map_err(|refusal| Failure::new(refusal.to_string()).of_kind("not_an_eds"))?, model))
+        Ok((made.map_err(|refusal| not_an_eds(&refusal))?, model))
     }
 
     /// Reads all requested objects. An object that the device refuses is noted; a device that does not answer ends it.
@@ -190,17 +189,18 @@ pub(super) async fn of_parameters(
     parameters: &Parameters,
     file_name: &str,
 ) -> Result<Vec<u8>, Failure> {
-    let mut made = Configuration::new(sheet_of(model)?, node.id().raw())
-        .map_err(|refusal| Failure::new(refusal.to_string()).of_kind("not_an_eds"))?;
+    let mut made = Configuration::new(sheet_of(model)?, node.id().raw()).map_err(|refusal| not_an_eds(&refusal))?;
     put(&mut made, parameters)?;
     let device = commissioning(node, Some(model), "").await;
-    made.commission(&device, file_name).map_err(|error| Failure::usage(error.to_string()))?;
+    made.commission(&device, file_name).map_err(|error| not_commissioned(&error))?;
     Ok(made.into_document().to_bytes())
 }
 
 fn put(made: &mut Configuration, parameters: &Parameters) -> Result<(), Failure> {
     for (object, bytes) in &parameters.values {
-        made.set(*object, bytes, true).map_err(|error| Failure::new(format!("{object}: {error}")))?;
+        made.set(*object, bytes, true).map_err(|error| {
+            Failure::new(format!("{object}: {error}")).next("give the data sheet of this device: --eds FILE.eds")
+        })?;
     }
     Ok(())
 }
@@ -208,7 +208,19 @@ fn put(made: &mut Configuration, parameters: &Parameters) -> Result<(), Failure>
 /// The data sheet of a model.
 fn sheet_of(model: &'static Description) -> Result<Document, Failure> {
     let sheet = Document::parse(write(&Sheet::of(model).eds()).as_bytes());
-    sheet.map_err(|refusal| Failure::new(refusal.to_string()))
+    sheet.map_err(|refusal| not_an_eds(&refusal))
+}
+
+fn not_an_eds(refusal: &Refusal) -> Failure {
+    let at = if refusal.line > 0 { format!("line {}: ", refusal.line) } else { String::new() };
+    let failure = Failure::new(format!("the data sheet is not read as an EDS: {at}{}", refusal.reason));
+    failure.of_kind("not_an_eds").next(&refusal.next)
+}
+
+/// The name of the file or of the node cannot be in a DCF.
+fn not_commissioned(error: &impl std::fmt::Display) -> Failure {
+    Failure::usage(error.to_string())
+        .next("give a short --name and file name, on one line, with letters of the data sheet's encoding")
 }
 
 fn dcf_path(text: &str) -> Result<PathBuf, String> {

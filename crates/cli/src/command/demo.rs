@@ -39,8 +39,8 @@ impl Demo {
         let progress = Progress::new(global.json);
         let shown = progress.clone();
         let only = self.drive.as_deref().and_then(|name| resolve(name).ok());
-        let showcase =
-            showcase::run(only, move |section| shown.show(section)).map_err(|error| Failure::new(error.to_string()))?;
+        let showcase = showcase::run(only, move |section| shown.show(section))
+            .map_err(|error| Failure::new(error.to_string()).next("--drive MODEL runs the part of one drive alone"))?;
         progress.clear();
         let picture = write_svg(&self.svg, showcase.poster.to_svg())?;
         let (svg, took_s) = (self.svg.display().to_string(), clock.now().as_secs_f64());

@@ -12,7 +12,7 @@ use serde::Serialize;
 use testbench::machine_file::{BASE_PERIOD, BasePlan, CyclePlan, speed_mode};
 
 use super::cycles::{CycleArgs, refuse_too_full};
-use super::group::end_guards;
+use super::group::{SEE_AXES, end_guards};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -143,7 +143,7 @@ impl Bounds {
         if beyond && !seen.beyond {
             let [linear, angular] = [twist.linear_m_s, twist.angular_rad_s].map(Shown);
             let [to_linear, to_angular] = [driven.linear_m_s, driven.angular_rad_s].map(Shown);
-            context.progress.note(&format!(
+            context.note(&format!(
                 "{linear} m/s and {angular} rad/s are beyond the limits of the base: it is driven at {to_linear} m/s and {to_angular} rad/s"
             ));
         }
@@ -194,7 +194,7 @@ impl DriveBase {
         for wheel in &wheels {
             guards.push(self.guard.begin(context, &wheel.drive).await?);
         }
-        let [left, right] = &wheels[..] else { return Err(Failure::new("a base has two wheels")) };
+        let [left, right] = &wheels[..] else { return Err(Failure::new("a base has two wheels").next(SEE_AXES)) };
         let options = self.cycles.options();
         let period = plan.period.unwrap_or(BASE_PERIOD);
         let driven = match Base::open([left, right], plan.geometry, limits, period, options).await {
@@ -208,7 +208,8 @@ impl DriveBase {
         };
         let reports = end_guards(context, guards, [&left.drive, &right.drive].into_iter()).await;
         let (seen, state) = driven?;
-        let reports: [GuardReport; 2] = reports?.try_into().map_err(|_| Failure::new("a wheel was not released"))?;
+        let reports: [GuardReport; 2] =
+            reports?.try_into().map_err(|_| Failure::new("a wheel was not released").next(SEE_AXES))?;
         Ok(BaseDriven::new(&seen, &state, limits, [left, right], reports))
     }
 
@@ -353,7 +354,7 @@ async fn follow_lines(
         let is_late = matches!(state.cause, Some(StopCause::Watchdog { .. }));
         if let Some(cause) = state.cause.filter(|_| is_late && !was_late) {
             seen.dead_man_stops += 1;
-            context.progress.note(&format!("{cause}; the next line continues"));
+            context.note(&format!("{cause}; the next line continues"));
         }
         was_late = is_late;
         if ended {
@@ -392,7 +393,7 @@ fn take(
     match base.command(twist) {
         Err(error @ BaseError::BadTwist { .. }) => {
             seen.bad_lines += 1;
-            context.progress.note(&error.to_string());
+            context.note(&error.to_string());
             Ok(())
         }
         taken => taken,
@@ -410,7 +411,7 @@ fn twist_of(context: &Context, line: &str, seen: &mut Seen) -> Option<Twist> {
     if twist.is_none() {
         seen.bad_lines += 1;
         let shown: String = line.chars().take(60).collect();
-        context.progress.note(&format!("expected a twist of two numbers, m/s and rad/s, e.g. 0.3 -0.1, got '{shown}'"));
+        context.note(&format!("expected a twist of two numbers, m/s and rad/s, e.g. 0.3 -0.1, got '{shown}'"));
     }
     twist
 }
@@ -418,13 +419,17 @@ fn twist_of(context: &Context, line: &str, seen: &mut Seen) -> Option<Twist> {
 fn failure(error: BaseError) -> Failure {
     match error {
         BaseError::Drive(error) => error.into(),
-        BaseError::BadLimit { .. } | BaseError::BadTwist { .. } => Failure::usage(error.to_string()),
-        BaseError::BeyondDrive { .. } => Failure::new(error.to_string()).of_kind("out_of_limits"),
+        BaseError::BadLimit { .. } | BaseError::BadTwist { .. } => {
+            Failure::usage(error.to_string()).next("give finite numbers, and a --dead-man above 0")
+        }
+        BaseError::BeyondDrive { .. } => {
+            Failure::new(error.to_string()).of_kind("out_of_limits").next("lower the limits in [base]")
+        }
         BaseError::NotEnabled { limit, left, right } => {
             let what = format!("the wheels were not enabled within {} s: {left}; {right}", limit.as_secs());
             Failure::new(what).of_kind("base").next("ferrodrive explain NODE says what keeps each of them")
         }
-        error => Failure::new(error.to_string()).of_kind("base"),
+        error => Failure::new(error.to_string()).of_kind("base").next(SEE_AXES),
     }
 }
 

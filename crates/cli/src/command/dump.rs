@@ -424,9 +424,11 @@ fn without_frames(what: String) -> Failure {
 
 /// A log that cannot be read on.
 pub(crate) fn unreadable(path: &Path, error: &io::Error) -> Failure {
-    Failure::new(format!("cannot read the log {} to its end", path.display())).of_kind("bus").because(error)
+    Failure::bad_file(format!("cannot read the log {} to its end", path.display()))
+        .because(error)
+        .next("copy it to this machine's disk, and see whether it can be read there")
 }
 
 fn not_printed(error: &io::Error) -> Failure {
-    Failure::new("cannot write to standard output").because(error)
+    Failure::of_stdout(io::Error::new(error.kind(), error.to_string()))
 }

@@ -91,7 +91,7 @@ impl Gateway {
         if !address.ip().is_loopback() {
             context.note(&format!("there is no password: anyone who can reach {address} can move the drives"));
         }
-        format.print(&Ready { listen: address }).map_err(|error| Failure::new("cannot write").because(error))?;
+        format.print(&Ready { listen: address }).map_err(Failure::of_stdout)?;
         let (guard, guards) = mpsc::channel(REQUESTS);
         // Unbounded in type only: each client goes once.
         let (gone, parted) = mpsc::unbounded_channel();

@@ -15,7 +15,7 @@ use testbench::words::node::node;
 
 use super::cycles::{CycleArgs, ask_why, refuse_too_full};
 use super::motion::speed;
-use super::repeat::period;
+use super::repeat::{period, some_time};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -76,7 +76,7 @@ struct Move {
     #[arg(long, value_name = "RATE", value_parser = rate)]
     acceleration: Option<f64>,
     /// Time in which the acceleration reaches its highest value, which limits the jerk
-    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long, value_name = "TIME", value_parser = some_time)]
     rounding: Option<Duration>,
     /// Largest distance of a shaft from its set-point, beyond which all axes are stopped
     #[arg(long, value_name = "ANGLE", value_parser = angle)]
@@ -442,18 +442,27 @@ async fn turns_of(drive: &Drive, angle: Angle) -> Result<Turns, Failure> {
 fn failure(error: GroupError) -> Failure {
     match error {
         GroupError::Drive(error) => error.into(),
-        GroupError::NoMode { node } => Failure::new(error.to_string()).at_node(node),
+        GroupError::NoMode { node } => Failure::new(error.to_string()).at_node(node).next(GROUP_MODES),
         GroupError::NotEnabled { node, .. } => {
             Failure::new(error.to_string()).of_kind("group").at_node(node).next(ask_why(node))
         }
-        GroupError::Period { .. } => Failure::usage(error.to_string()),
+        GroupError::Period { .. } => Failure::usage(error.to_string()).next("give a --period within that, e.g. 5ms"),
         // The path is beyond what the axes may do, or one of them takes.
         GroupError::Path(_) | GroupError::BeyondDrive { .. } => {
-            Failure::new(error.to_string()).of_kind("out_of_limits")
+            let failure = Failure::new(error.to_string()).of_kind("out_of_limits");
+            failure.next("give a position, --velocity, --acceleration or --rounding within what the axes may do")
         }
-        error => Failure::new(error.to_string()).of_kind("group"),
+        GroupError::Cyclic(_) => Failure::new(error.to_string()).of_kind("group").next(GROUP_MODES),
+        error => Failure::new(error.to_string()).of_kind("group").next(SEE_AXES),
     }
 }
+
+const GROUP_MODES: &str =
+    "give a --mode that the model has: csp, ip, csv or pv; ferrodrive objects NODE 6060 shows them";
+
+/// What shows why an axis or a wheel does not follow.
+pub(super) const SEE_AXES: &str =
+    "ferrodrive state NODE shows where each stands, ferrodrive explain NODE what keeps it";
 
 impl GroupMoved {
     fn new(planned: &Planned, seen: Seen, guards: Vec<GuardReport>) -> Self {

@@ -431,6 +431,8 @@ fn without_lss() -> String {
     format!("by their manuals {} have none", without.join(", "))
 }
 
+const LSS_REFUSED: &str = "choose what its manual lists for LSS (CiA 305), or set it by its own objects";
+
 /// What was set, or why not.
 fn checked(what: &str, answer: Option<Reply>, refused: &str) -> Result<String, Failure> {
     match answer {
@@ -438,11 +440,11 @@ fn checked(what: &str, answer: Option<Reply>, refused: &str) -> Result<String, F
             match outcome {
                 Outcome::DONE => Ok(what.to_owned()),
                 Outcome { code: 255, specific } => Err(Failure::new(format!("the device refused: {what}"))
-                    .because(format!("the maker's error {specific}"))),
-                Outcome { code, .. } => {
-                    Err(Failure::new(format!("the device refused: {what}"))
-                        .because(format!("{refused} (error {code})")))
-                }
+                    .because(format!("the maker's error {specific}"))
+                    .next(LSS_REFUSED)),
+                Outcome { code, .. } => Err(Failure::new(format!("the device refused: {what}"))
+                    .because(format!("{refused} (error {code})"))
+                    .next(LSS_REFUSED)),
             }
         }
         _ => Err(no_answer("the device")),

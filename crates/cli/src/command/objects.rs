@@ -160,16 +160,14 @@ impl Objects {
     /// Where a node's model departs from the standards.
     pub(crate) async fn departures_of_node(&self, context: &Context, node: NodeId) -> Result<DepartureList, Failure> {
         let drive = context.known_drive(node).await?;
-        let model =
-            drive.description().ok_or_else(|| Failure::new(format!("the model of node {node} is not known")))?;
+        let model = drive.description().ok_or_else(|| Failure::unknown_model(node))?;
         Ok(DepartureList::of(model, guessed(&drive)))
     }
 
     /// Searches the table of a node's model.
     pub(crate) async fn of_node(&self, context: &Context, node: NodeId) -> Result<ObjectList, Failure> {
         let drive = context.known_drive(node).await?;
-        let model =
-            drive.description().ok_or_else(|| Failure::new(format!("the model of node {node} is not known")))?;
+        let model = drive.description().ok_or_else(|| Failure::unknown_model(node))?;
         let mut list = ObjectList { guess: guessed(&drive), ..self.list(model)? };
         for row in list.objects.iter_mut().filter(|row| row.limits_times.is_some() || row.acts_up_to.is_some()) {
             row.now = Some(Now::of(&drive.limits(row.mux).await?));

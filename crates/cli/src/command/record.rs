@@ -21,6 +21,7 @@ use testbench::words::object::{ObjectArg, object};
 use testbench::words::unit::split_factor;
 
 use super::dcf::is_stdout;
+use super::sdo::resolve;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -145,8 +146,7 @@ impl Record {
         }
         let columns: Vec<Column> = sources.iter().map(|source| source.column.clone()).collect();
         let (path, kind) = &self.out;
-        let cannot =
-            |error: std::io::Error| Failure::new(format!("cannot write the record {}", path.display())).because(error);
+        let cannot = |error: std::io::Error| Failure::of_writing("the record", path, &error);
         let file = if is_stdout(path) { stdout_file() } else { create_record(path, *kind) };
         let file = file.map_err(cannot)?;
         let mut file = ObjectRecord::start(*kind, file, &columns, Messages::of_warnings()).map_err(cannot)?;
@@ -219,14 +219,13 @@ impl Record {
 impl Source {
     fn new(drive: &Drive, object: &ObjectArg) -> Result<Self, Failure> {
         let id = drive.node().id();
-        let (mux, row) = object
-            .resolve(drive.description().map(|model| model.dictionary))
-            .map_err(|reason| Failure::usage(reason).at_node(id))?;
+        let (mux, row) = resolve(drive, object)?;
         let row = if drive.description().is_some() { row } else { common_row(mux) };
         if row.is_some_and(|row| !row.data_type.fits_cell()) {
             return Err(Failure::usage(format!("{mux} is not a number of at most 32 bits, which a record requires"))
                 .at_node(id)
-                .at_object(mux));
+                .at_object(mux)
+                .next(format!("ferrodrive objects {id} shows the types; ferrodrive read shows such an object once")));
         }
         let name = row.map(|row| row.name).or_else(|| common_name(mux));
         let mut name = name.map_or_else(|| format!("object_{:04X}", mux.index), str::to_owned);

@@ -72,7 +72,19 @@ impl Write {
         let drive = context.drive_without_note(self.node).await?;
         let (mux, row) = resolve(&drive, &self.object)?;
         let limits = moving_limits(&drive, row).await?;
-        let wrong = |reason| Failure::usage(reason).at_node(self.node).at_object(mux);
+        let advice = match row {
+            Some(_) => {
+                format!("ferrodrive objects {} {:04X} shows its type, range, unit and words", self.node, mux.index)
+            }
+            None => {
+                let Mux { index, sub_index } = mux;
+                format!(
+                    "give its type with the value, e.g. ferrodrive write {} {index:04X}:{sub_index:02X} u16:15",
+                    self.node
+                )
+            }
+        };
+        let wrong = |reason| Failure::usage(reason).at_node(self.node).at_object(mux).next(&advice);
         let typed = self.value.as_deref().unwrap_or_default();
         let value = match (content, row) {
             (Some(bytes), _) => Typed::Bytes(bytes),
@@ -175,13 +187,9 @@ pub(super) fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<
     let found = object.resolve(drive.description().map(|model| model.dictionary));
     found.map_err(|reason| {
         let node = drive.node().id();
-        let failure = Failure::usage(reason).at_node(node);
-        match object {
-            ObjectArg::Name(_) => {
-                failure.next(format!("look for it: ferrodrive objects {node} WORD, or give its index, e.g. 6064"))
-            }
-            ObjectArg::Mux(_) => failure,
-        }
+        Failure::usage(reason)
+            .at_node(node)
+            .next(format!("look for it: ferrodrive objects {node} WORD, or give its index, e.g. 6064"))
     })
 }
 

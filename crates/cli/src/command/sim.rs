@@ -30,7 +30,7 @@ use crate::serve::service::{
 };
 use crate::serve::store_writer::{StoreWriter, file_name};
 use crate::serve::world::ServedWorld;
-use crate::session::{bus_failure, enter_real_time, failure_of, start_clock};
+use crate::session::{bus_failure, enter_real_time, not_served, start_clock};
 use described::notes;
 use testbench::document::BadFile;
 use testbench::machine_file::{Machine, Placed};
@@ -274,7 +274,7 @@ impl Sim {
             None => None,
         };
         let options = HubOptions { bitrate: Some(world.bitrate()), zero: clock.unix_zero(), ..HubOptions::default() };
-        let mut hub = Hub::bind(&self.places, options, &clock).await.map_err(|error| failure_of(&error))?;
+        let mut hub = Hub::bind(&self.places, options, &clock).await.map_err(|error| not_served(&error))?;
         let modbus = self.serve_registers(&requests, &clock).await?;
         if let Some(outer) = outer {
             join(&hub, outer, requests.clone(), global.clone(), warnings.clone());
@@ -331,7 +331,7 @@ impl Sim {
     ) -> Result<Option<ModbusServer>, Failure> {
         let Some(place) = &self.modbus else { return Ok(None) };
         let server = ModbusServer::bind(place, requests.clone(), clock).await;
-        server.map(Some).map_err(|error| failure_of(&error))
+        server.map(Some).map_err(|error| not_served(&error))
     }
 }
 
@@ -358,7 +358,9 @@ fn add_drive(
     if image.is_some() {
         note_what_the_image_changes(drive.clone(), world.bitrate(), number, &name, warnings);
     }
-    world.add_drive(number, drive).map_err(|error| Failure::usage(error.to_string()))?;
+    world.add_drive(number, drive).map_err(|error| {
+        Failure::usage(error.to_string()).next("give each --drive MODEL@NODE a node-ID of its own, 1 to 127")
+    })?;
     placed.furnish(world).map_err(unusable)
 }
 
@@ -399,7 +401,9 @@ impl From<EepromError> for Failure {
                 failure.next("put an EEPROM file of this program there, or none, and make sure that it can be written")
             }
             EepromError::InUse(_) => failure.next("end the other simulator, or give another --state directory"),
-            _ => failure,
+            EepromError::Directory(..) | EepromError::Replaced(_) => {
+                failure.next("give --state a directory that this user can write, or a path where it can be made")
+            }
         }
     }
 }

@@ -10,6 +10,7 @@ use master::{Drive, Error};
 use serde::Serialize;
 
 use super::repeat::{Pace, Repeat, period};
+use super::sdo::resolve;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
@@ -131,9 +132,7 @@ impl Watch {
 impl Watched {
     async fn new(drive: &Drive, object: &ObjectArg) -> Result<Self, Failure> {
         let model = drive.description();
-        let node = drive.node().id();
-        let found = object.resolve(model.map(|model| model.dictionary));
-        let (mux, row) = found.map_err(|reason| Failure::usage(reason).at_node(node))?;
+        let (mux, row) = resolve(drive, object)?;
         let row = if model.is_some() { row } else { common_row(mux) };
         let name = row.map(|row| row.name).or_else(|| common_name(mux).filter(|_| model.is_none()));
         let counts_per_unit = match row.filter(|row| model.is_some() && row.resolution.is_some()) {

@@ -5,6 +5,7 @@ use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use super::ROOM;
 use crate::failure::Failure;
 use crate::serve::messages::Messages;
 
@@ -153,10 +154,11 @@ impl<B: Send + 'static> Background<B> {
         changed.notify_all();
         let is_written = changed.wait_timeout_while(queue, patience, |queue| queue.ended.is_none());
         let queue = is_written.unwrap_or_else(PoisonError::into_inner).0;
-        let torn = |why: String| Failure::new(format!("{file} is not complete")).of_kind("file").because(why);
+        let torn =
+            |why: String| Failure::new(format!("{file} is not complete")).of_kind("file").because(why).next(ROOM);
         let (missing, lost) = (queue.missing, queue.lost + queue.missing);
         match &queue.ended {
-            Some(Err(error)) => Err(torn(format!("{error}; it ends there")).next("see that the disk has room")),
+            Some(Err(error)) => Err(torn(format!("{error}; it ends there"))),
             Some(Ok(())) if lost == 0 => Ok(()),
             Some(Ok(())) if missing == 0 => Err(torn(format!("the disk was too slow: {lost} {pieces} are missing"))),
             Some(Ok(())) | None => {

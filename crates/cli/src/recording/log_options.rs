@@ -19,6 +19,9 @@ pub(crate) struct LogPath {
     missing: Arc<OnceLock<String>>,
 }
 
+/// What a disk needs for a log.
+pub(crate) const ROOM: &str = "make sure that the disk has room and is fast enough";
+
 /// A log that has just been begun.
 pub(crate) type NewLog = LogWriter<std::io::BufWriter<std::fs::File>>;
 
@@ -60,7 +63,7 @@ impl LogPath {
     pub(crate) fn failure(&self) -> Option<Failure> {
         let missing = self.missing.get()?;
         let failure = Failure::new(format!("the log {} is not complete", self.path.display())).of_kind("file");
-        Some(failure.because(missing).next("make sure that the disk has room and is fast enough"))
+        Some(failure.because(missing).next(ROOM))
     }
 
     /// Begins the file: a new one, or one that is empty or a log of the same form already.
@@ -68,7 +71,8 @@ impl LogPath {
         let file =
             create_log(&self.path, self.format).map_err(|error| Failure::of_writing("the log", &self.path, &error))?;
         let cannot = |error: &dyn std::fmt::Display| {
-            Failure::new(format!("cannot write the log {}", self.path.display())).because(error)
+            let failure = Failure::new(format!("cannot write the log {}", self.path.display())).of_kind("file");
+            failure.because(error).next(ROOM)
         };
         LogWriter::new(std::io::BufWriter::new(file), self.format).map_err(|error| cannot(&error))
     }

@@ -12,6 +12,6 @@ pub(crate) use background::Pace;
 pub(crate) use command_log::CommandLog;
 pub(crate) use file::{Batch, RecordFile};
 pub(crate) use frame_log::FrameLog;
-pub(crate) use log_options::{LogPath, NewLog, interface_of, log_path};
+pub(crate) use log_options::{LogPath, NewLog, ROOM, interface_of, log_path};
 pub(crate) use object_record::{ObjectBatch, ObjectRecord};
 pub(crate) use options::RecordOptions;

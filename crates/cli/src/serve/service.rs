@@ -16,7 +16,7 @@ use super::messages::Messages;
 use super::world::{Commanded, ServedWorld};
 use crate::failure::Failure;
 use crate::recording::{Batch, FrameLog, RecordFile};
-use crate::session::runtime;
+use crate::session::{no_runtime, runtime};
 use crate::signals::{Signal, Signals};
 
 /// How often the log is handed on, and drives are looked at that nothing has happened to.
@@ -47,7 +47,7 @@ const TASKS_A_TURN: u32 = 16;
 /// The runtime of a served world and its clients.
 pub(crate) fn runtime_of_clients() -> Result<tokio::runtime::Runtime, Failure> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().event_interval(TASKS_A_TURN).build();
-    runtime.map_err(|error| Failure::new("cannot start the runtime").because(error))
+    runtime.map_err(|error| no_runtime(&error))
 }
 
 /// Something to be served between two steps of the world.

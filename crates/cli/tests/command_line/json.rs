@@ -1,7 +1,9 @@
 //! What programs read: failures as one line of JSON on standard output, numbers with the digits that were meant, and values
 //! apart from their names.
 
-use processes::{Ended, Simulator, done, ferrodrive, scratch};
+use std::process::Stdio;
+
+use processes::{Ended, Simulator, command, done, ferrodrive, scratch};
 use serde_json::{Value, json};
 
 /// Ends with `status`, and with exactly one line of JSON on standard output and nothing else; its `error`.
@@ -79,6 +81,22 @@ fn a_bus_that_is_not_there_and_a_log_that_cannot_be_written_are_failures_of_the_
     let log = picture.with_extension("log");
     let error = failed(&["sim", "--drive", "zlac8030l@4", "--log", log.to_str().unwrap()], 1);
     assert!(error["message"].as_str().unwrap().contains("cannot write the log"), "{error}");
+}
+
+/// What people read on standard error, programs have in the report.
+#[test]
+fn a_base_that_is_driven_by_a_program_prints_json_alone() {
+    use std::io::Write;
+    let base = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/base.toml");
+    let mut command = command(&["--json", "drive-base", base]);
+    let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = piped.spawn().unwrap();
+    child.stdin.take().unwrap().write_all(b"0.1 0\nfoo\n9 9\n").unwrap();
+    let output = child.wait_with_output().unwrap();
+    let (out, err) = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap()).into();
+    assert_eq!(err, "");
+    let said: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((&said["ok"], &said["bad_lines"]), (&json!(true), &json!(1)), "{said}");
 }
 
 #[test]

@@ -21,6 +21,141 @@ fn ended_with(status: i32, arguments: &[&str], parts: &[&str]) {
     for part in parts {
         assert!(ended.err.contains(part), "{arguments:?} should say {part:?}, but says: {}", ended.err);
     }
+    has_a_remedy(status, &[&["--json"], arguments].concat());
+}
+
+/// Ends with `status`, and one line of JSON with a kind, and with what to do.
+#[track_caller]
+fn has_a_remedy(status: i32, arguments: &[&str]) -> String {
+    let ended = ferrodrive(arguments);
+    assert_eq!((ended.status, ended.err.as_str()), (Some(status), ""), "{arguments:?}: {}", ended.out);
+    let error = ended.json()["error"].clone();
+    let text = |field: &str| error[field].as_str().unwrap_or_default().to_owned();
+    assert!(!text("next").is_empty() && !text("message").is_empty(), "{arguments:?} without a remedy: {error}");
+    assert_eq!(text("kind") == "usage", status == 2, "{arguments:?}: {error}");
+    text("kind")
+}
+
+/// What a file, a bus or a drive shows, each with the kind of its error.
+const NOT_DONE: &[(&str, &str)] = &[
+    ("write 4 6064 5", "aborted"),
+    ("write 9 6060 3", "no_answer"),
+    ("write 4 6060 --from FOLDER/empty.bin", "bad_file"),
+    ("read 4 5FFF", "aborted"),
+    ("watch 9 6064", "no_answer"),
+    ("record 4 6064 -o /no/such/a.csv", "file"),
+    ("record 4 6064 -o FOLDER/foreign.csv", "file"),
+    ("move 4 10mm", "no_feed"),
+    ("velocity 4 0.5m/s", "no_feed"),
+    ("torque 2 500mA", "no_such_mode"),
+    ("velocity 4 20000rpm", "out_of_limits"),
+    ("group move 4=90deg --mode hm", "group"),
+    ("group move 4=1e9turn", "out_of_limits"),
+    ("group move 4=90deg --velocity 99999rpm", "out_of_limits"),
+    ("latency 9 --count 5", "no_answer"),
+    ("eds lint FOLDER/bad.eds", "lint"),
+    ("eds show FOLDER/bad.eds", "not_an_eds"),
+    ("eds show zlac8030l zzzz", "failed"),
+    ("eds diff FOLDER/bad.eds zlac8030l", "not_an_eds"),
+    ("dcf 4 --eds FOLDER/bad.eds", "not_an_eds"),
+    ("boot FOLDER/bad.eds", "not_an_eds"),
+    ("boot FOLDER/device.eds", "bad_file"),
+    ("convert FOLDER/bad.eds FOLDER/b.log", "no_log"),
+    ("convert FOLDER/a.log /no/such/b.log", "file"),
+    ("sim --drive zlac8030l@4 --state FOLDER/a.log", "failed"),
+    ("sim --drive zlac8030l@4 --serve socketcand://192.0.2.1:1", "bus"),
+    ("sim --drive m4230e17b50@1 --modbus 192.0.2.1:1", "bus"),
+    ("sim --drive m4230e17b50@1 --modbus rtu:///no/such/tty?baud=115200", "bus"),
+    ("sim --drive zlac8030l@4 --control /no/such/socket", "control"),
+    ("sim --drive zlac8030l@4 --record /no/such/a.csv", "file"),
+    ("sim --drive zlac8030l@4 --log /no/such/a.log", "file"),
+    ("params backup 4 -o /no/such/x.toml", "file"),
+    ("params plan 4 FOLDER/p.toml", "bad_parameters"),
+    ("params diff FOLDER/p.toml FOLDER/p.toml", "bad_parameters"),
+    ("params rollback 4 /no/such/journal", "no_journal"),
+    ("params rollback 4 FOLDER/p.toml", "bad_journal"),
+    ("plot FOLDER/foreign.csv", "record"),
+    ("home 4 --method 17", "no_such_mode"),
+    ("nmt 9 start --wait 1s", "not_reached"),
+    ("--bus socketcand://127.0.0.1:1/can0 explain 4", "bus"),
+    ("demo --drive zlim42c -o /no/such/a.svg", "file"),
+    ("objects zlac8030l zzzz", "failed"),
+    ("boot --node 99", "not_booted"),
+    ("plan --mode hm", "failed"),
+    ("plan --cycle 250us --mode pv", "bus_load"),
+    ("world --control 127.0.0.1:1 now", "control"),
+    ("run FOLDER/a.log", "bad_file"),
+    ("export dbc 9", "no_answer"),
+    ("man-pages FOLDER/a.log", "file"),
+    ("replay FOLDER/moves.log", "motion"),
+    ("studio --listen 192.0.2.1:1", "failed"),
+    ("studio --listen 127.0.0.1:0 --password-file FOLDER/empty.bin", "bad_file"),
+    ("studio --listen 127.0.0.1:0 --token-file FOLDER/empty.bin", "bad_file"),
+    ("--bus nocan9 scan", "bus"),
+];
+
+/// What the words show by themselves; the tables below have more.
+const NO_SENSE: &[&str] = &[
+    "write 4 6040 65536",
+    "write 4 5FFF 1",
+    "watch 4 zzzz",
+    "record 4 zzzz -o a.csv",
+    "pdo plan 4",
+    "pdo plan 4 tpdo1=zzzz",
+    "pdo plan 4 tpdo1=1000",
+    "pdo plan 4 tpdo9=statusword",
+    "pdo plan 4 tpdo1=statusword tpdo1=off",
+    "pdo plan 4 tpdo1=statusword tpdo2=off --id 0x185",
+    "pdo plan 4 tpdo1=statusword --inhibit 100s",
+    "pdo apply 4 tpdo1=zzzz",
+    "torque 2 2",
+    "group move 4=90deg 4=10deg",
+    "group move 4=90deg --period 1s",
+    "group move 4=90deg --rounding 0s",
+    "group move a.toml b.toml 4=1deg",
+    "latency --sync 0s",
+    "eds",
+    "eds zlac8030l foo",
+    "eds zlac8030l foo=bar",
+    "eds zlac8030l 2014=99999999",
+    "eds show nope",
+    "convert a.log b.xyz",
+    "sim --drive zlac8030l@4,2014=99999999",
+    "sim --drive zlac8030l@4,9999=1",
+    "sim --drive zlac8030l@4 --serve tcp://x",
+    "sim --drive zlac8030l@4 --record a.csv --record-signals zzz",
+    "params backup 4 -o x.txt",
+    "sync --count 3",
+    "check",
+    "check a.log",
+    "boot a.log",
+    "init",
+    "gateway",
+    "replay -",
+    "studio --listen 0.0.0.0:0",
+];
+
+#[test]
+fn every_wrong_input_has_a_kind_and_a_remedy() {
+    let folder = scratch("remedies");
+    for (name, text) in [
+        ("empty.bin", ""),
+        ("bad.eds", "no data sheet\n"),
+        ("foreign.csv", "name,price\n"),
+        ("a.log", "(0.000000) can0 704#05\n"),
+        ("moves.log", "(0.000000) can0 000#0104\n"),
+        ("p.toml", "[values]\nnope = 1\n"),
+    ] {
+        std::fs::write(folder.join(name), text).unwrap();
+    }
+    done(&["eds", "zlac8030l", "-o", folder.join("device.eds").to_str().unwrap()]);
+    let words = |line: &str| format!("--json {}", line.replace("FOLDER", folder.to_str().unwrap()));
+    for (line, kind) in NOT_DONE {
+        assert_eq!(has_a_remedy(1, &words(line).split(' ').collect::<Vec<_>>()), *kind, "{line}");
+    }
+    for line in NO_SENSE {
+        has_a_remedy(2, &words(line).split(' ').collect::<Vec<_>>());
+    }
 }
 
 #[test]

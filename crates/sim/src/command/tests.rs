@@ -201,15 +201,15 @@ fn a_drive_has_the_axes_that_it_has_and_its_objects_are_its_own() {
     assert!(json("4.1 get").contains("\"node\":4"));
     assert_eq!(
         json("4.2 get"),
-        r#"{"ok":false,"error":{"kind":"refused","message":"a zlac8030l has no axis 2; it has 1","node":null,"object":null,"abort":null,"next":null}}"#
+        r#"{"ok":false,"error":{"kind":"refused","message":"a zlac8030l has no axis 2; it has 1","node":null,"object":null,"abort":null,"next":"give what this drive has and takes; help lists the commands"}}"#
     );
     assert_eq!(
         json("4.2 load torque 1"),
-        r#"{"ok":false,"error":{"kind":"refused","message":"a zlac8030l has no axis 2; it has 1","node":null,"object":null,"abort":null,"next":null}}"#
+        r#"{"ok":false,"error":{"kind":"refused","message":"a zlac8030l has no axis 2; it has 1","node":null,"object":null,"abort":null,"next":"give what this drive has and takes; help lists the commands"}}"#
     );
     assert_eq!(
         json("4 set 6041 0"),
-        r#"{"ok":false,"error":{"kind":"refused","message":"a zlac8030l sets its objects by itself; write 6041h:00 over the bus, as its host does","node":null,"object":null,"abort":null,"next":null}}"#
+        r#"{"ok":false,"error":{"kind":"refused","message":"a zlac8030l sets its objects by itself; write 6041h:00 over the bus, as its host does","node":null,"object":null,"abort":null,"next":"give what this drive has and takes; help lists the commands"}}"#
     );
 }
 

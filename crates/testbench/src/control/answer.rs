@@ -55,7 +55,7 @@ impl ControlError {
 
 impl From<CommandError> for ControlError {
     fn from(error: CommandError) -> Self {
-        let (node, next) = (error.node(), error.next().map(str::to_owned));
+        let (node, next) = (error.node(), Some(error.next().to_owned()));
         Self { node, next, ..Self::new(error.kind(), error.to_string()) }
     }
 }

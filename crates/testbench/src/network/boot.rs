@@ -189,9 +189,12 @@ impl Planned {
             }
             Self::Manager(values) => {
                 let plan = BootPlan::from_objects(|object| values.get(&object).cloned());
-                let mut plan = plan.map_err(|bad| match (Failure::bad_file(bad.to_string()), bad.node()) {
-                    (failure, Some(node)) => failure.at_node(node),
-                    (failure, None) => failure,
+                let mut plan = plan.map_err(|bad| {
+                    let failure = Failure::bad_file(bad.to_string());
+                    match bad.node() {
+                        Some(node) => failure.at_node(node).next("write that concise DCF again, as a whole"),
+                        None => failure.next("give the DCF of the CANopen manager, with bit 0 of its 1F80h set"),
+                    }
                 })?;
                 for (node, expectation) in &mut plan.nodes {
                     expectation.description = known.get(node).copied();

@@ -125,7 +125,10 @@ pub async fn traffic(
 ) -> Result<NodeTraffic, Failure> {
     let read = NodeTraffic::of(drive).await?;
     let set_up = file.map_or_else(|| read.clone(), |machine| machine.set_up(read.clone()));
-    let wrong = |error: &dyn fmt::Display| Failure::new(error.to_string()).at_node(drive.node().id());
+    let wrong = |error: &dyn fmt::Display| {
+        let failure = Failure::new(error.to_string()).at_node(drive.node().id());
+        failure.next("choose a mode for speed, torque or positions that the model has, e.g. pv or csp")
+    };
     match (mode, moved) {
         (Some(mode), _) => set_up.in_cycles(drive, mode, false).map_err(|error| wrong(&error)),
         (None, Some(moved)) => moved.traffic(drive, set_up).map_err(|error| wrong(&error)),

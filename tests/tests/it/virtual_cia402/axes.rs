@@ -243,7 +243,7 @@ fn the_outer_world_reaches_each_axis_by_its_number() {
     assert_eq!(report(&mut world, 1).velocity_rpm, 0.0);
     assert_eq!(
         world_command(&mut world, "5.3 get"),
-        r#"{"ok":false,"error":{"kind":"refused","message":"a two-axes-by-offset has no axis 3; it has 2","node":null,"object":null,"abort":null,"next":null}}"#
+        r#"{"ok":false,"error":{"kind":"refused","message":"a two-axes-by-offset has no axis 3; it has 2","node":null,"object":null,"abort":null,"next":"give what this drive has and takes; help lists the commands"}}"#
     );
     let recorder = world.stop_recording().unwrap();
     let names: Vec<String> = recorder.channels().iter().map(|channel| channel.place.to_string()).collect();

@@ -28,7 +28,7 @@ pub(crate) fn global_of(planned: &Planned, global: &Global) -> Result<Global, Fa
 /// Shows that the nodes of a plan are booted, with a note where that may not end by itself.
 pub(crate) fn announce(context: &Context, plan: &BootPlan) {
     if plan.boot_time.is_none() {
-        context.progress.note("1F89h is 0: mandatory nodes are waited for without limit; Ctrl-C ends that");
+        context.note("1F89h is 0: mandatory nodes are waited for without limit; Ctrl-C ends that");
     }
     context.progress.show(format!("booting {} nodes", plan.nodes.len()));
 }

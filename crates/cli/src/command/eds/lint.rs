@@ -83,17 +83,21 @@ impl Lint {
 }
 
 impl LintReport {
-    /// Why the command fails, if it does: a file that cannot be read comes before what is wrong in the others.
+    /// Why the command fails, if it does: that a file cannot be read weighs more than what is wrong in the others.
     pub(super) fn failure(&self, strict: bool) -> Option<Failure> {
-        if let Some(unread) = self.files.iter().find_map(|file| file.unread.clone()) {
-            return Some(unread);
-        }
         let bad = |file: &&OfFile| file.refused.is_some() || file.errors > 0 || (strict && file.warnings > 0);
         let count = self.files.iter().filter(bad).count();
         let of = self.files.len();
         let what = if strict { "errors or warnings" } else { "errors" };
+        let failure = Failure::new(format!("{count} of {of} files with {what}"));
         let next = "the table above has the lines; CiA 306 defines the format";
-        (count > 0).then(|| Failure::new(format!("{count} of {of} files with {what}")).of_kind("lint").next(next))
+        (count > 0).then(|| match self.files.iter().find_map(|file| file.unread.as_ref()) {
+            None => failure.of_kind("lint").next(next),
+            Some(unread) => {
+                let because = unread.because.iter().fold(failure.because(&unread.what), Failure::because);
+                unread.next.iter().fold(because.of_kind("bad_file"), Failure::next)
+            }
+        })
     }
 }
 

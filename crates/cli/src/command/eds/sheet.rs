@@ -68,18 +68,22 @@ pub(super) struct SheetReport {
     eds: Option<String>,
 }
 
+/// Where a user finds what a sheet is written of.
+const OPTIONS: &str = "ferrodrive objects lists the models, ferrodrive readings MODEL the options of one";
+
 impl SheetArgs {
     /// Writes it.
     pub(super) fn run(&self) -> Result<SheetReport, Failure> {
-        let model = self.model.ok_or_else(|| Failure::usage("no model given"))?;
+        let model = self.model.ok_or_else(|| Failure::usage("no model given").next(OPTIONS))?;
         let output = new_file(self.output.as_deref(), self.force)?;
         // Which node it is does not matter to the choices.
         let mut spec = DriveSpec::new(model, self.node.unwrap_or(NodeId::MIN));
         for choice in &self.choices {
             let (key, value) = choice.split_once('=').ok_or_else(|| {
                 Failure::usage(format!("expected an option of a drive, KEY=VALUE, e.g. defaults=eds, got '{choice}'"))
+                    .next(OPTIONS)
             })?;
-            spec.set(key.trim(), value.trim()).map_err(Failure::usage)?;
+            spec.set(key.trim(), value.trim()).map_err(|reason| Failure::usage(reason).next(OPTIONS))?;
         }
         check(spec.description(), spec.presets())?;
         let sheet = Sheet {
@@ -109,9 +113,9 @@ fn check(model: &Description, presets: &[Preset]) -> Result<(), Failure> {
     for Preset { object, value } in presets {
         let refused = model.row(*object).and_then(|row| row.check_value(*value).err());
         if let Some(code) = refused {
-            return Err(
-                Failure::usage(format!("{object} of a {} cannot be {value}: {code}", model.name)).at_object(*object)
-            );
+            let failure = Failure::usage(format!("{object} of a {} cannot be {value}: {code}", model.name));
+            let advice = format!("ferrodrive objects {} {:04X} shows what it takes", model.name, object.index);
+            return Err(failure.at_object(*object).next(advice));
         }
     }
     Ok(())

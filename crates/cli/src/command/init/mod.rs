@@ -93,8 +93,10 @@ impl Init {
         };
         // Programs are asked nothing.
         if !global.json && io::stdin().is_terminal() && io::stderr().is_terminal() {
-            nodes = ask::all(nodes, &mut io::stdin().lock(), &mut io::stderr())
-                .map_err(|error| Failure::new("cannot ask which models they are").because(error))?;
+            nodes = ask::all(nodes, &mut io::stdin().lock(), &mut io::stderr()).map_err(|error| {
+                let failure = Failure::new("cannot ask which models they are").because(error);
+                failure.next("give --model NODE=MODEL for each, or --json: then nothing is asked")
+            })?;
         }
         nodes.iter_mut().for_each(|node| node.with_file(|path| seen_from(path, output)));
         let mut report = InitReport::new(nodes, bitrate);

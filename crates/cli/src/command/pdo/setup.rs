@@ -143,7 +143,12 @@ impl Wanted {
         }
         let mut values: BTreeMap<Mux, Vec<u8>> = BTreeMap::new();
         for asked in &self.pdos {
-            let refused = |reason: String| Failure::usage(reason).at_node(node);
+            let refused = |reason: String| {
+                let advice = format!(
+                    "ferrodrive objects {node} WORD shows objects, ferrodrive pdo show {node} the PDOs and what they carry"
+                );
+                Failure::usage(reason).at_node(node).next(advice)
+            };
             let of_pdo = match &asked.objects {
                 None => values_off(model, asked.pdo, node),
                 Some(names) => {
@@ -169,7 +174,7 @@ impl Wanted {
 impl PlanPdos {
     pub(super) async fn run(&self, context: &Context) -> Result<PdoPlanReport, Failure> {
         let drive = context.known_drive(self.wanted.node).await?;
-        let model = drive.description().ok_or_else(|| Failure::new("the model is not known"))?;
+        let model = drive.description().ok_or_else(|| Failure::unknown_model(self.wanted.node))?;
         let (wanted, from) = self.wanted.parameters(context, model)?;
         let before = drive.pdos().await?;
         let after = before.iter().map(|(config, cob_id)| config.with_values(*cob_id, &wanted.values, model));
@@ -205,7 +210,7 @@ impl PlanPdos {
 impl ApplyPdos {
     pub(super) async fn run(&self, context: &Context) -> Result<impl Report + use<>, Failure> {
         let drive = context.known_drive(self.wanted.node).await?;
-        let model = drive.description().ok_or_else(|| Failure::new("the model is not known"))?;
+        let model = drive.description().ok_or_else(|| Failure::unknown_model(self.wanted.node))?;
         let (wanted, from) = self.wanted.parameters(context, model)?;
         self.how.run(context, &drive, &wanted, from).await
     }

@@ -17,7 +17,7 @@ use crate::serve::service::{
     PARTING_PATIENCE, REQUESTS_WAITING, Request, Service, listen_to_signals, runtime_of_clients, tick,
 };
 use crate::serve::world::ServedWorld;
-use crate::session::failure_of;
+use crate::session::not_served;
 
 /// Where and how fast a scenario is served.
 #[derive(clap::Args, Clone, Debug)]
@@ -89,7 +89,7 @@ impl ServeOptions {
         let (requests, mut incoming) = mpsc::channel(REQUESTS_WAITING);
         listen_to_signals(requests.clone());
         let options = HubOptions { bitrate: Some(world.bitrate()), zero: clock.unix_zero(), ..HubOptions::default() };
-        let mut hub = Hub::bind(&self.places, options, &clock).await.map_err(|error| failure_of(&error))?;
+        let mut hub = Hub::bind(&self.places, options, &clock).await.map_err(|error| not_served(&error))?;
         let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
         let (run_is_over, scenario_is_over, full) = (requests.clone(), requests.clone(), requests.clone());
         world.on_run_over(move || run_is_over.try_send(Request::RunIsOver).is_ok());
@@ -107,7 +107,8 @@ impl ServeOptions {
         if let Some(control) = control {
             control.part(PARTING_PATIENCE).await;
         }
-        let execution = execution.ok_or_else(|| Failure::new("the scenario was lost on the way"))?;
+        let execution = execution
+            .ok_or_else(|| Failure::new("the scenario was lost on the way").next("run it again without --serve"))?;
         Ok((execution.conclude(&mut world), ended))
     }
 }

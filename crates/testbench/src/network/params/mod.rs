@@ -20,6 +20,7 @@ pub use shown::{Shown, name};
 
 use super::Progress;
 use crate::failure::Failure;
+use crate::models::how_to_say;
 use crate::parameters::{Form, sheet, to_concise, to_dcf};
 
 /// What was read.
@@ -59,7 +60,10 @@ pub async fn back_up(
     drive: &Drive,
 ) -> Result<(BackupReport, Parameters, &'static Description), Failure> {
     let node = drive.node().id();
-    let model = drive.description().ok_or_else(|| Failure::new("the model is not known").at_node(node))?;
+    let model = drive.description().ok_or_else(|| {
+        let failure = Failure::new(format!("the model of node {node} is not known")).of_kind("unknown_model");
+        failure.at_node(node).next(format!("name its model: {}", how_to_say(node, &["MODEL"])))
+    })?;
     let backup = drive.back_up(|number, of, object| progress.count(format!("{number} of {of}: {object}"))).await?;
     let refused = backup.refused.iter().map(|(object, error)| Refused {
         object: object.to_string(),
@@ -81,12 +85,15 @@ pub fn bytes_of(
     path: &Path,
     form: Form,
 ) -> Result<Vec<u8>, Failure> {
-    let node = parameters.node.ok_or_else(|| Failure::new("these parameters are not of a node"))?;
+    let node = parameters.node.ok_or_else(|| {
+        Failure::new("these parameters are not of a node").next("read them from a node: ferrodrive params backup NODE")
+    })?;
     Ok(match form {
         Form::Toml => sheet::print(parameters, Some(model)).into_bytes(),
         Form::Dcf => {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
-            to_dcf(parameters, model, &name).map_err(Failure::usage)?
+            let advice = "give the file a short name on one line, or write .toml";
+            to_dcf(parameters, model, &name).map_err(|reason| Failure::usage(reason).next(advice))?
         }
         Form::Concise => to_concise(&from_any_state(Some(model), node, &parameters.values)),
     })
