@@ -6,12 +6,17 @@ use std::time::Duration;
 use canopen::NodeId;
 use transport::BusSpec;
 
-use crate::command::repeat::some_time;
 use crate::failure::Failure;
 use crate::recording::{LogPath, log_path};
 use testbench::machine_file::Machine;
 use testbench::models::Description;
 use testbench::words::drive::node_model;
+
+/// A time that is not zero, within which something is to happen.
+pub(crate) fn some_time(text: &str) -> Result<Duration, String> {
+    let time = master::units::parse_duration(text).map_err(|error| error.to_string())?;
+    if time.is_zero() { Err("expected a time above 0, e.g. 500ms".into()) } else { Ok(time) }
+}
 
 /// What every command takes.
 #[derive(Clone, clap::Args)]

@@ -15,10 +15,10 @@ use testbench::words::node::node;
 
 use super::cycles::{CycleArgs, ask_why, refuse_too_full};
 use super::motion::speed;
-use super::repeat::{period, some_time};
+use super::repeat::period;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::global::Global;
+use crate::global::{Global, some_time};
 use crate::guard::{Guard, GuardArgs, GuardReport};
 use crate::output::{Format, Report};
 use crate::session;

@@ -32,12 +32,6 @@ pub(crate) fn period(text: &str) -> Result<Duration, String> {
     if period < SHORTEST { Err("expected a period of 50us or more, e.g. 10ms".into()) } else { Ok(period) }
 }
 
-/// A time that is not zero, within which something is to happen.
-pub(crate) fn some_time(text: &str) -> Result<Duration, String> {
-    let time = parse_duration(text).map_err(|error| error.to_string())?;
-    if time.is_zero() { Err("expected a time above 0, e.g. 500ms".into()) } else { Ok(time) }
-}
-
 impl Repeat {
     /// How many times: once without a period, and not for ever on an embedded bus. `None` is until Ctrl-C.
     pub(crate) fn times(&self, context: &Context) -> Result<Option<u64>, Failure> {

@@ -19,7 +19,7 @@ pub const LARGEST: u64 = 1 << 20;
 /// # Errors
 /// Why it cannot be read, in a sentence.
 pub fn read_bytes(path: &Path, largest: u64) -> Result<Vec<u8>, String> {
-    // Before it is opened: opening a pipe waits for whoever writes it.
+    // Before it is opened: opening a pipe waits for a program that writes to it.
     let kind = std::fs::metadata(path).map_err(|error| error.to_string())?;
     if !kind.is_file() {
         return Err("not a regular file".into());
