@@ -57,7 +57,7 @@ const EXAMPLES: &str = "Without --bus everything happens on a private virtual bu
 pub(crate) fn dressed(command: Command) -> Command {
     let common: Vec<Arg> = command.get_arguments().filter(|arg| arg.is_global_set()).cloned().collect();
     let (short, long) = (overview(&command, false), overview(&command, true));
-    let command = command.mut_args(only_in_help_options).mut_subcommands(|its| {
+    let command = command.mut_args(|arg| only_in_help_options(arg, &common)).mut_subcommands(|its| {
         if its.get_name() == OPTIONS { with_shown(its, &common) } else { pointing_to_common(its, &common) }
     });
     command.help_template(TEMPLATE).after_help(short).after_long_help(long)
@@ -69,9 +69,18 @@ pub(crate) fn of_options(mut command: Command) -> String {
     command.find_subcommand_mut(OPTIONS).map(|its| its.render_long_help().to_string()).unwrap_or_default()
 }
 
+/// What is typed for the help of a command in place of `help -h` and `help COMMAND -h`: the parser's own `help` takes no options.
+pub(crate) fn without_help_of_help(words: &[String]) -> Option<Vec<String>> {
+    let asks = |word: &String| ["-h", "--help"].contains(&word.as_str());
+    let place = words.iter().position(|word| word == "help")?;
+    let rest = words.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, word)| word.clone());
+    words.iter().any(asks).then(|| rest.collect())
+}
+
 /// Options of all commands, left out of the help of each: `hide` would keep them from completion too.
-fn only_in_help_options(arg: Arg) -> Arg {
-    if arg.is_global_set() { arg.hide_short_help(true).hide_long_help(true) } else { arg }
+fn only_in_help_options(arg: Arg, common: &[Arg]) -> Arg {
+    let is_common = common.iter().any(|its| its.get_id() == arg.get_id());
+    if is_common { arg.hide_short_help(true).hide_long_help(true) } else { arg }
 }
 
 fn with_shown(command: Command, common: &[Arg]) -> Command {
@@ -83,10 +92,10 @@ fn pointing_to_common(command: Command, common: &[Arg]) -> Command {
     let heeded = |arg: &&Arg| !command.get_arguments().any(|own| own.get_id() == arg.get_id() && own.is_hide_set());
     let names = common.iter().filter(heeded).filter_map(|arg| Some(format!("--{}", arg.get_long()?)));
     let names = names.collect::<Vec<_>>().join(" ");
-    add_line(command, &format!("Common options, described by `ferrodrive help options`:\n  {names}"))
+    add_line(command, &format!("Common options, described by `ferrodrive help options`:\n  {names}"), common)
 }
 
-fn add_line(command: Command, line: &str) -> Command {
+fn add_line(command: Command, line: &str, common: &[Arg]) -> Command {
     let below = |text: Option<&clap::builder::StyledStr>| text.map(|text| format!("{line}\n\n{}", text.ansi()));
     let (short, long) = (below(command.get_after_help()), below(command.get_after_long_help()));
     let command = command.after_help(short.unwrap_or_else(|| line.to_owned()));
@@ -94,7 +103,7 @@ fn add_line(command: Command, line: &str) -> Command {
         Some(long) => command.after_long_help(long),
         None => command,
     };
-    command.mut_args(only_in_help_options).mut_subcommands(|its| add_line(its, line))
+    command.mut_args(|arg| only_in_help_options(arg, common)).mut_subcommands(|its| add_line(its, line, common))
 }
 
 /// The groups, with a line for each command or its name alone.
@@ -176,6 +185,61 @@ mod tests {
             }
         });
         assert!(too_long.is_empty(), "{}", too_long.join("\n\n"));
+    }
+
+    /// The words that a shell hands to `ferrodrive` from an example.
+    fn words_of(example: &str) -> Vec<String> {
+        let mut words = vec![String::new()];
+        let mut quoted = false;
+        for c in example.chars() {
+            match c {
+                '\'' => quoted = !quoted,
+                ' ' if !quoted => words.push(String::new()),
+                c => words.last_mut().unwrap().push(c),
+            }
+        }
+        let ends = |word: &String| ["|", ">", ";"].contains(&word.as_str()) || word.starts_with('#');
+        let words: Vec<_> = words.into_iter().filter(|word| !word.is_empty()).collect();
+        let from = words.iter().position(|word| word.ends_with("ferrodrive")).unwrap();
+        words[from..].iter().take_while(|word| !ends(word)).map(|word| word.trim_end_matches(')').to_owned()).collect()
+    }
+
+    /// An example is copied from the help of a terminal of 80 columns: it stands on one line there.
+    #[test]
+    fn every_command_has_examples_on_one_line_each_that_the_parser_takes() {
+        const COLUMNS: usize = 80;
+        let line = command_line();
+        let mut command = command_line();
+        command.build();
+        let mut wrong = Vec::new();
+        walk(&mut command, "", &mut |path, its| {
+            if path.is_empty() || path.ends_with(OPTIONS) {
+                return;
+            }
+            let below = [its.get_after_help(), its.get_after_long_help()].into_iter().flatten();
+            let below = below.map(ToString::to_string).collect::<Vec<_>>().join("\n");
+            let examples: Vec<&str> = below
+                .lines()
+                .filter(|line| line.split(' ').any(|word| word.trim_start_matches("<(") == "ferrodrive"))
+                .filter(|line| line.starts_with(' ') || line.starts_with("ferrodrive"))
+                .collect();
+            let mut used = false;
+            for example in examples {
+                let words = words_of(example);
+                let parsed = line.clone().try_get_matches_from(&words);
+                if let Err(error) = parsed.as_ref() {
+                    wrong.push(format!("{path}: {example}: {error}"));
+                }
+                if !example.starts_with("  ") || example.chars().count() > COLUMNS {
+                    wrong.push(format!("{path}: indented by two, and of {COLUMNS} columns at most: {example}"));
+                }
+                used |= format!(" {} ", words.join(" ")).contains(&format!("{path} "));
+            }
+            if !used {
+                wrong.push(format!("{path}: no example of it"));
+            }
+        });
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     }
 
     #[test]

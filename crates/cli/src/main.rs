@@ -97,6 +97,11 @@ fn matches() -> Result<ArgMatches, clap::Error> {
     else {
         return Err(error);
     };
+    if let Some(Err(help)) = help::without_help_of_help(&words).map(|words| parse(&command, &words))
+        && !help.use_stderr()
+    {
+        return Err(help);
+    }
     let meant = match word_order::mend(&command, &words, error.kind()) {
         Some(mended) if mended.is_harmless() => {
             if !words.iter().any(|word| word == "--json") {
@@ -113,6 +118,10 @@ fn matches() -> Result<ArgMatches, clap::Error> {
         None => suggest_by_sense(&mut error, &words),
     }
     Err(error)
+}
+
+fn parse(command: &clap::Command, words: &[String]) -> Result<ArgMatches, clap::Error> {
+    command.clone().try_get_matches_from(std::iter::once("ferrodrive").chain(words.iter().map(String::as_str)))
 }
 
 fn suggest(error: &mut clap::Error, tips: Vec<String>) {

@@ -12,11 +12,9 @@ use crate::output::print;
 /// the objects of their models, models, modes and buses. Commands at a terminal remember what was heard in
 /// $XDG_CACHE_HOME/ferrodrive.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples:\n  ferrodrive completions bash > ~/.local/share/bash-completion/completions/ferrodrive\n  \
-    ferrodrive completions zsh > ~/.zfunc/_ferrodrive        # a folder of $fpath\n  \
-    ferrodrive completions fish > ~/.config/fish/completions/ferrodrive.fish"
-)]
+#[command(after_help = "Examples:\n  source <(ferrodrive completions bash)              # in ~/.bashrc\n  \
+    ferrodrive completions zsh > ~/.zfunc/_ferrodrive     # a folder of $fpath\n  \
+    ferrodrive completions fish > ~/.config/fish/completions/ferrodrive.fish")]
 pub(crate) struct Completions {
     /// The shell
     shell: Shell,

@@ -29,7 +29,7 @@ use testbench::words::node::node;
 /// which are not configuration.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive dcf 4 -o left-wheel.dcf\n  \
-    ferrodrive --bus socketcand://HOST:29536/can0 dcf 5 --eds vendor.eds -o axis.dcf\n  ferrodrive dcf 4 --model 4=zlac8030l > left-wheel.dcf")]
+    ferrodrive --bus can0 dcf 5 --eds vendor.eds -o axis.dcf\n  ferrodrive dcf 4 --model 4=zlac8030l > left-wheel.dcf")]
 pub(crate) struct Dcf {
     /// Node-ID
     #[arg(value_parser = node)]

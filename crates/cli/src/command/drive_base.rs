@@ -42,8 +42,8 @@ const MOST_LINES: usize = 16;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive drive-base examples/base.toml --linear 0.3 --angular 0.2 --for 3s\n  \
-    while echo 0.2 0; do sleep 0.1; done | ferrodrive --bus can0 drive-base base.toml\n  \
-    my_controller | ferrodrive --bus can0 --json drive-base base.toml --dead-man 150ms")]
+    while echo 0.2 0; do sleep 0.1; done | ferrodrive drive-base base.toml\n  \
+    my_controller | ferrodrive --bus can0 drive-base base.toml --dead-man 150ms")]
 pub(crate) struct DriveBase {
     /// Machine file with a [base] (default: that of --machine or --bus sim:FILE.toml)
     #[arg(value_name = "FILE.toml")]

@@ -36,8 +36,8 @@ use testbench::machine_file::Machine;
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 --model 4=zlac8030l dump\n  \
     ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k dump --log trace.log\n  \
     ferrodrive --bus log:trace.log --model 4=zlac8030l dump\n  \
-    ferrodrive --bus slcan://HOST:3000 dump --node 4 --service sdo,emcy --time delta\n  \
-    ferrodrive --bus slcan://HOST:3000 dump --object 6041,target_velocity --time absolute")]
+    ferrodrive --bus can0 dump --node 4 --service sdo,emcy --time delta\n  \
+    ferrodrive --bus can0 dump --object 6041,target_velocity --time absolute")]
 pub(crate) struct Dump {
     /// End after this time; with a log, after this time of the log (default on an embedded virtual bus: 2s)
     #[arg(long = "for", value_name = "TIME", value_parser = master::units::parse_duration)]

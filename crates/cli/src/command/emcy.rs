@@ -21,7 +21,7 @@ use testbench::words::node::{Nodes, node, nodes};
 
 /// Show emergency messages as they arrive, or the errors that a node remembers
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 emcy watch\n  \
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 emcy watch\n  \
     ferrodrive emcy watch 4 --for 10s\n  ferrodrive emcy show 4")]
 pub(crate) struct Emcy {
     #[command(subcommand)]
@@ -37,6 +37,7 @@ enum What {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 emcy watch\n  ferrodrive --bus can0 emcy watch 4 --for 10s")]
 struct Watch {
     /// Node-ID, or all
     #[arg(value_name = "NODE|all", value_parser = nodes, default_value = "all")]
@@ -50,6 +51,7 @@ struct Watch {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  ferrodrive --bus can0 emcy show 4")]
 struct Show {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -18,7 +18,7 @@ use crate::session::exit_on_signal;
     after_help = "Kinds: power, boot, nmt, state, mode, fault, fault_reset, emcy, target_reached, internal_limit,\n\
     store_begun, store_done, damage, bus_error, bus_state, cable, stimulus, behind, caught_up, missed\n\n\
     Examples:\n  ferrodrive events --control 127.0.0.1:4000\n  \
-    ferrodrive events --control 127.0.0.1:4000 --node 4 --kind fault --kind fault_reset --json"
+    ferrodrive events --control 127.0.0.1:4000 --node 4 --kind fault --json"
 )]
 pub(crate) struct Events {
     #[command(flatten)]

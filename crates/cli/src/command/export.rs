@@ -17,6 +17,8 @@ use plot::Paint;
 
 /// Export the description of the bus for other programs
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 export dbc -o bus.dbc\n  \
+    ferrodrive --bus sim:base.toml export dbc     # as delivered")]
 pub(crate) struct Export {
     #[command(subcommand)]
     form: Form,
@@ -35,7 +37,7 @@ enum Form {
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 export dbc -o bus.dbc\n  \
     ferrodrive --bus can0 --model 4=zlac8030l export dbc 4 -o wheel.dbc\n  \
-    ferrodrive --bus sim:base.toml export dbc     # the drives of a machine file, as delivered")]
+    ferrodrive --bus sim:base.toml export dbc     # as delivered")]
 struct Dbc {
     /// Nodes (default: every node that answers)
     #[arg(value_name = "NODE", value_parser = node)]

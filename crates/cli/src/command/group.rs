@@ -37,8 +37,8 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
 /// is lost or lags, all come to rest. Afterwards the drives have no power.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    ferrodrive group move 1=90deg 4=0.5turn --within 3s            # default limits: group move --help\n  \
-    ferrodrive group move examples/machine.toml 1=90deg 2=-45deg   # limits, modes and period by its [[group]]\n  \
+    ferrodrive group move 1=90deg 4=0.5turn --within 3s           # default limits\n  \
+    ferrodrive group move examples/machine.toml 1=90deg 2=-45deg  # its [[group]]\n  \
     ferrodrive --bus can0 group move machine.toml --relative 1=10deg 2=10deg")]
 pub(crate) struct GroupCommand {
     #[command(subcommand)]
@@ -56,6 +56,8 @@ enum What {
 /// axis are 30 r/min and 60 (r/min)/s, reached within 100 ms, and a lag of 0.2 turns. A drive that takes no positions
 /// in cycles is moved by speeds.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive group move 1=90deg 4=0.5turn --within 3s\n  \
+    ferrodrive --bus can0 group move machine.toml 1=90deg 2=-45deg")]
 struct Move {
     /// Machine file, and the positions of the nodes: 1=90deg 4=0.5turn 2=-3000counts
     #[arg(value_name = "FILE.toml|NODE=POSITION", required = true, value_parser = word)]

@@ -20,10 +20,10 @@ use testbench::words::node::node;
 /// Find devices by their LSS address, and set their node-ID and bit rate (CiA 305)
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus slcan:///dev/ttyACM0 lss scan\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0 lss identify 100:1\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0 lss inquire only\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0 lss set 100:1:0:2A --node-id 5 --store\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0 lss set only --bitrate 250k --store --activate 500ms")]
+    ferrodrive --bus can0 lss identify 100:1\n  \
+    ferrodrive --bus can0 lss inquire only\n  \
+    ferrodrive --bus can0 lss set 100:1:0:2A --node-id 5 --store\n  \
+    ferrodrive --bus can0 lss set only --bitrate 250k --store --activate 500ms")]
 pub(crate) struct Lss {
     #[command(subcommand)]
     what: What,
@@ -35,18 +35,23 @@ pub(crate) struct Lss {
 #[derive(Debug, clap::Subcommand)]
 enum What {
     /// Find every device that has no node-ID (fastscan): some seconds for each
+    #[command(after_help = "Example:\n  ferrodrive --bus can0 lss scan")]
     Scan,
     /// Find every device of a vendor and product, with or without a node-ID (identify remote slave): some seconds for
     /// each
     ///
     /// Revision and serial numbers are requested in ranges, which are halved where a device answers. It only asks:
     /// nothing is changed.
+    #[command(after_help = "Examples:\n  ferrodrive --bus can0 lss identify 100:1\n  \
+        ferrodrive --bus can0 lss identify 100:1:2")]
     Identify {
         /// VENDOR:PRODUCT[:REVISION] (1018h:01 to 03) in hexadecimal; with the revision it takes half the time
         #[arg(value_name = "VENDOR:PRODUCT", value_parser = make)]
         make: Make,
     },
     /// Ask a device for its address and its node-ID
+    #[command(after_help = "Examples:\n  ferrodrive --bus can0 lss inquire only\n  \
+        ferrodrive --bus can0 lss inquire 100:1:0:2A")]
     Inquire {
         #[command(flatten)]
         device: DeviceArg,
@@ -63,6 +68,9 @@ struct DeviceArg {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 lss set 100:1:0:2A --node-id 5 --store\n  \
+    ferrodrive --bus can0 lss set only --node-id 5 --reset\n  \
+    ferrodrive --bus can0 lss set only --bitrate 250k --store --activate 500ms")]
 struct Set {
     #[command(flatten)]
     device: DeviceArg,

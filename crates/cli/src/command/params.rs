@@ -48,6 +48,8 @@ enum What {
 
 /// Read all parameters of a node's model into a file
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive params backup 4 -o wheel.toml\n  \
+    ferrodrive --bus can0 params backup 4 -o wheel.dcf --force")]
 struct Backup {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -62,6 +64,8 @@ struct Backup {
 
 /// Show the differences between a node and a file, or between two files
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 params diff 4 wheel.toml\n  \
+    ferrodrive params diff before.toml after.dcf")]
 struct Diff {
     /// Node-ID or file
     #[arg(value_name = "NODE|FILE")]
@@ -73,6 +77,8 @@ struct Diff {
 
 /// Show what `apply` would write, in order; nothing is written
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 params plan 4 wheel.toml\n  \
+    ferrodrive --bus can0 --machine machine.toml params plan 4")]
 struct PlanArguments {
     #[command(flatten)]
     wanted: Wanted,
@@ -87,6 +93,9 @@ struct PlanArguments {
 /// was written is put back in reverse order. A journal is kept meanwhile, with which `rollback` restores the node after
 /// a kill or a power failure.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 params apply 4 wheel.toml\n  \
+    ferrodrive --bus can0 params apply 4 wheel.toml --save --prove\n  \
+    ferrodrive --bus can0 --machine machine.toml params apply 4")]
 struct Apply {
     #[command(flatten)]
     wanted: Wanted,
@@ -99,6 +108,8 @@ struct Apply {
 
 /// Check that a node has a file's parameters; status 1 if not
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 params verify 4 wheel.toml\n  \
+    ferrodrive --bus can0 --machine machine.toml params verify 4")]
 struct Verify {
     #[command(flatten)]
     wanted: Wanted,
@@ -106,6 +117,8 @@ struct Verify {
 
 /// Restore a node to how it was before an interrupted `apply`
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 params rollback 4\n  \
+    ferrodrive --bus can0 params rollback 4 ferrodrive-node4.journal")]
 struct Rollback {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -27,8 +27,8 @@ use testbench::words::node::node;
 /// Show, watch and configure the PDOs of a node
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive pdo show 4\n  \
-    ferrodrive --bus socketcand://HOST:29536/can0 pdo watch 4 --time delta\n  \
-    ferrodrive --bus socketcand://HOST:29536/can0 pdo show\n  \
+    ferrodrive --bus can0 pdo show\n  \
+    ferrodrive --bus can0 pdo watch 4 --time delta\n  \
     ferrodrive pdo plan 4 tpdo1=statusword,position_actual_value --type 1\n  \
     ferrodrive pdo apply 4 tpdo1=statusword,6064 tpdo2=off --type 1 --save")]
 pub(crate) struct Pdo {
@@ -47,6 +47,7 @@ enum What {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive pdo show 4\n  ferrodrive --bus can0 pdo show")]
 struct Show {
     /// Node-IDs (default: every node on the bus)
     #[arg(value_parser = node)]
@@ -54,6 +55,8 @@ struct Show {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 pdo watch 4\n  \
+    ferrodrive --bus can0 pdo watch 4 --for 10s --time delta")]
 struct Watch {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -33,9 +33,9 @@ use plot::Table;
 /// is late in a cycle alone, without SDO and EMCY.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    ferrodrive plan machine.toml                             # the [[group]] or [base] of the file\n  \
-    ferrodrive plan machine.toml --cycle 5ms --mode pv       # as `Drive::configure_cyclic` maps the PDOs for that mode\n  \
-    ferrodrive --bus can0 plan --cycle 10ms --bitrate 500k   # as they are mapped now")]
+    ferrodrive plan machine.toml                            # its group or base\n  \
+    ferrodrive plan machine.toml --cycle 5ms --mode pv      # the PDOs of pv\n  \
+    ferrodrive --bus can0 plan --cycle 10ms --bitrate 500k  # as mapped now")]
 pub(crate) struct Plan {
     /// Machine file whose drives are planned (default: those on --bus)
     #[arg(value_name = "FILE.toml")]

@@ -39,7 +39,7 @@ use plot::Paint;
 /// or with Ctrl-C; everything older than a second is on the disk by then.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    ferrodrive --bus can0 --model 4=zlac8030l record 4 velocity_actual_value position_actual_value -o run.mcap --for 10s\n  \
+    ferrodrive record 4 velocity_actual_value 6064 -o run.mcap --for 10s\n  \
     ferrodrive --bus can0 record 4 606C 6077 --every 20ms -o run.csv\n  ferrodrive plot run.mcap")]
 pub(crate) struct Record {
     /// Node-ID

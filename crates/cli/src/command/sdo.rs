@@ -22,7 +22,7 @@ use testbench::words::value::{Typed, typed_alone, typed_for};
 /// Write an object of a node
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Values are decimal, 0x.., have a unit where the object has one, or are one of its words:\n  \
-    ferrodrive write 4 60FF 60rpm\n  ferrodrive write 4 6060 'profile velocity'\n  ferrodrive write 4 6040 0x0F\n\
+    ferrodrive write 4 60FF 60rpm\n  ferrodrive write 4 6060 'profile velocity'\n  ferrodrive write 4 6040 0x0F\n  \
     ferrodrive write 5 1008 'left wheel'\n  ferrodrive write 5 1F50:01 --from firmware.bin\n\
     An object of CiA 301 or CiA 402 has the standard's type where the model is not known:\n  ferrodrive write 32 6060 6\n\
     Any object that no known table has takes its type with the value: u16:15, i32:-100, text:'left wheel', hex:01AAFF")]

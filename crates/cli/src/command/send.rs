@@ -14,9 +14,9 @@ use plot::Paint;
 /// Their effect is not checked: a frame may start a motor. With --verbose the answers on the bus are shown.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Frames are written as by candump and cansend, in hexadecimal:\n  \
-    ferrodrive send 604#4041600000000000 -v      # an SDO upload of 6041h, and its answer\n  \
-    ferrodrive send 000#0104 080#                # NMT start for node 4, then SYNC\n  \
-    ferrodrive send 184#R8                       # a remote frame of 8 bytes\n  \
+    ferrodrive send 604#4041600000000000 -v   # read 6041h of node 4 by SDO\n  \
+    ferrodrive send 000#0104 080#             # NMT start for node 4, then SYNC\n  \
+    ferrodrive send 184#R8                    # a remote frame of 8 bytes\n  \
     ferrodrive send 123#11.22.33 --every 10ms --count 100")]
 pub(crate) struct Send {
     /// ID#DATA, ID#R or ID#RLENGTH; an identifier of 8 digits is an extended one

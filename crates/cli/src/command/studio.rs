@@ -35,8 +35,8 @@ use plot::Paint;
 /// drives. Without --bus it serves a virtual machine whose time follows the clock.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive studio --open\n  ferrodrive --bus can0 studio\n  \
-    ferrodrive --bus socketcand://127.0.0.1:29536/can0 studio --control 127.0.0.1:7001\n  \
-    ferrodrive --bus can0 studio --listen 0.0.0.0:8402 --password-file studio.password")]
+    ferrodrive --bus socketcand://HOST:29536/can0 studio --control HOST:7001\n  \
+    ferrodrive --bus can0 studio --listen 0.0.0.0:8402 --password-file FILE")]
 pub(crate) struct Studio {
     /// Address to listen at; port 0 takes a free one. One that other machines reach (not 127.0.0.1, [::1]) needs a
     /// password

@@ -27,7 +27,7 @@ use testbench::words::object::{ObjectArg, object};
 /// stop while it is watched.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 watch 4 6064 606C statusword\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0 watch 4 2026:01 --every 1s --count 60 --json > motor.jsonl")]
+    ferrodrive watch 4 2026:01 --every 1s --count 60 --json > motor.jsonl")]
 pub(crate) struct Watch {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -165,6 +165,16 @@ fn no_command_and_unknown_commands_are_refused() {
     refused(&["scan", "--jsn"], &["--json"]);
 }
 
+#[test]
+fn help_has_a_help_of_its_own() {
+    assert_eq!(done(&["help", "-h"]).out, done(&["-h"]).out);
+    assert_eq!(done(&["help", "--help"]).out, done(&["--help"]).out);
+    assert_eq!(done(&["params", "help", "-h"]).out, done(&["params", "-h"]).out);
+    assert_eq!(done(&["help", "move", "-h"]).out, done(&["move", "-h"]).out);
+    // An option of the commands of one command alone is described there.
+    assert!(done(&["lss", "scan", "-h"]).out.contains("--within <TIME>"));
+}
+
 /// By the sense of a word in other tools, not by its spelling.
 #[test]
 fn words_of_other_tools_are_answered_with_the_command_that_does_it() {

@@ -29,8 +29,8 @@ use testbench::network::boot::BootReport;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive boot examples/machine.toml\n  \
-    ferrodrive --bus can0 boot machine.toml --node 4     # only this node of it\n  \
-    ferrodrive --bus can0 boot master.dcf --no-start     # up to NMT start, without it")]
+    ferrodrive --bus can0 boot machine.toml --node 4   # only this node of it\n  \
+    ferrodrive --bus can0 boot master.dcf --no-start   # up to NMT start")]
 pub(crate) struct Boot {
     /// Machine file, or DCF of a CANopen manager (default: --machine, --model, or the nodes on the bus)
     #[arg(value_name = "FILE.toml|MASTER.dcf")]

@@ -15,6 +15,7 @@ use plot::Table;
 ///
 /// A DCF is compared by its values where it has any. Names are not compared.
 #[derive(clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive eds diff old.eds new.eds\n  ferrodrive eds diff vendor.eds zlac8030l")]
 pub(crate) struct Diff {
     /// EDS or DCF file, or a model
     #[arg(value_name = "FILE|MODEL")]

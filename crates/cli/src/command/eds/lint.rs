@@ -16,6 +16,9 @@ use plot::Table;
 ///
 /// Errors are what had to be guessed or left out, and what strict tools refuse; warnings can still be read.
 #[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive eds lint vendor.eds\n  ferrodrive eds lint left.dcf right.dcf --strict"
+)]
 pub(crate) struct Lint {
     /// EDS or DCF files
     #[arg(required = true, value_name = "FILE")]

@@ -14,6 +14,7 @@ use testbench::words::object::{ObjectArg, object};
 
 /// Show the device and the objects of an EDS or DCF file
 #[derive(clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive eds show vendor.eds\n  ferrodrive eds show vendor.eds 6040 velocity")]
 pub(crate) struct Show {
     /// EDS or DCF file, or a model
     #[arg(value_name = "FILE|MODEL")]

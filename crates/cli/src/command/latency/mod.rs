@@ -32,8 +32,8 @@ use spread::{Bin, Spread};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive --bus socketcand://HOST:29536/can0 latency 4\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k latency 4 --count 10000 -o latency.svg\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k latency --sync 5ms --for 1min")]
+    ferrodrive --bus can0 latency 4 --count 10000 -o latency.svg\n  \
+    ferrodrive --bus can0 latency --sync 5ms --for 1min")]
 pub(crate) struct Latency {
     /// Node to measure (default: only SYNC is measured)
     #[arg(value_parser = node)]

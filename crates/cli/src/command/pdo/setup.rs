@@ -50,6 +50,8 @@ pub(super) struct Wanted {
 
 /// Show what `pdo apply` would write, the bits of each PDO, and the bus load before and after
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive pdo plan 4 tpdo1=statusword,position_actual_value --type 1\n  \
+    ferrodrive --bus can0 --machine machine.toml pdo plan 4")]
 pub(super) struct PlanPdos {
     #[command(flatten)]
     wanted: Wanted,
@@ -66,6 +68,8 @@ pub(super) struct PlanPdos {
 /// As with `params apply`, each value is read back, everything is put back on the first refusal, and a journal restores
 /// the node after a kill (`ferrodrive params rollback`).
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive pdo apply 4 tpdo1=statusword,6064 tpdo2=off --type 1 --save\n  \
+    ferrodrive --bus can0 --machine machine.toml pdo apply 4")]
 pub(super) struct ApplyPdos {
     #[command(flatten)]
     wanted: Wanted,
