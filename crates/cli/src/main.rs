@@ -111,11 +111,15 @@ fn matches() -> Result<ArgMatches, clap::Error> {
             return Ok(mended.matches);
         }
         Some(mended) => Some(mended.text()),
-        None => senses::joined(&command, &words).map(|words| word_order::text(&words)),
+        None => {
+            let meant = senses::joined(&command, &words).or_else(|| senses::with_option(&command, &words));
+            meant.map(|words| word_order::text(&words))
+        }
     };
-    match meant {
-        Some(text) => suggest(&mut error, vec![format!("did you mean: {text}")]),
-        None => suggest_by_sense(&mut error, &words),
+    let meant = meant.map(|text| format!("did you mean: {text}"));
+    match meant.or_else(|| senses::stop_of_one(&command, &words)) {
+        Some(tip) => suggest(&mut error, vec![tip]),
+        None => suggest_by_sense(&mut error, &command, &words),
     }
     Err(error)
 }
@@ -130,17 +134,26 @@ fn suggest(error: &mut clap::Error, tips: Vec<String>) {
 }
 
 /// In place of commands that are spelt like an unknown one, those that do what it is the word for elsewhere.
-fn suggest_by_sense(error: &mut clap::Error, words: &[String]) {
-    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) else { return };
-    let word = word.clone();
-    let behind = words.iter().skip_while(|other| **other != word).nth(1).map(String::as_str);
+fn suggest_by_sense(error: &mut clap::Error, command: &clap::Command, words: &[String]) {
+    // A wrong command of `eds` is taken for a model.
+    let model = words.iter().position(|word| word == "eds").and_then(|eds| words.get(eds + 1));
+    let (word, is_model) = match (error.get(ContextKind::InvalidSubcommand), error.get(ContextKind::InvalidValue)) {
+        (Some(ContextValue::String(word)), _) => (word.clone(), false),
+        (_, Some(ContextValue::String(word))) if model == Some(word) => (word.clone(), true),
+        _ => return,
+    };
     let by_spelling = match error.remove(ContextKind::SuggestedSubcommand) {
         Some(ContextValue::Strings(names)) => names,
         Some(ContextValue::String(name)) => vec![name],
         _ => Vec::new(),
     };
-    if let Some(tips) = senses::tips(&word, behind) {
-        return suggest(error, tips);
+    let place = words.iter().position(|other| *other == word);
+    let tips = place.and_then(|place| senses::tips(command, words, place));
+    // The spelling of a model has its own suggestion.
+    match tips {
+        Some(tips) => return suggest(error, tips),
+        None if is_model => return,
+        None => {}
     }
     let names: Vec<_> = by_spelling.into_iter().filter(|name| senses::may_be_meant(&word, name)).collect();
     if !names.is_empty() {

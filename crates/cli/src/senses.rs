@@ -2,8 +2,14 @@
 //! command that does it here. A word for looking is never answered with a command that may set a motor in motion.
 
 use clap::Command;
+use master::units::parse_duration;
+use testbench::words::node::{node, nodes};
+use transport::BusSpec;
 
-/// Words of one sense, and what is typed here in their place. A word may be two: `sdo read`.
+use crate::word_order::{parses, text};
+
+/// Words of one sense, and what is typed here in their place. A word may be two: `sdo read`; `#` stands for a node, `=` for
+/// a node and its value.
 struct Row {
     words: &'static [&'static str],
     tips: &'static [&'static str],
@@ -110,7 +116,38 @@ const LOOKING: &[Row] = &[
     Row { words: &["log2asc", "asc2log", "log2long", "export-log"], tips: &["convert trace.log trace.asc"] },
     Row { words: &["parse", "decoder"], tips: &["decode trace.log"] },
     Row { words: &["dbc"], tips: &["export dbc"] },
-    Row { words: &["lint", "validate", "verify"], tips: &["check machine.toml", "eds lint vendor.eds"] },
+    Row {
+        words: &["lint", "validate", "verify"],
+        tips: &["check machine.toml", "eds lint vendor.eds", "params verify 4 drive.toml"],
+    },
+    Row {
+        words: &["params #", "params list", "params show", "params get", "params read", "params dump", "params export"],
+        tips: &["params backup 4 -o drive.toml", "read 4 6081", "objects 4"],
+    },
+    Row {
+        words: &["params compare", "params check"],
+        tips: &["params diff 4 drive.toml", "params verify 4 drive.toml"],
+    },
+    Row {
+        words: &["pdo #", "pdo list", "pdo map", "pdo mapping", "pdo get", "pdo read", "pdo info"],
+        tips: &["pdo show 4"],
+    },
+    Row { words: &["pdo monitor", "pdo dump", "pdo listen"], tips: &["pdo watch 4"] },
+    Row { words: &["lss find", "lss list", "lss fastscan", "lss discover", "lss search"], tips: &["lss scan"] },
+    Row { words: &["lss get", "lss info", "lss id", "lss show"], tips: &["lss inquire only"] },
+    Row {
+        words: &["emcy #", "emcy list", "emcy history", "emcy read", "emcy get", "emcy log"],
+        tips: &["emcy show 4"],
+    },
+    Row { words: &["emcy monitor", "emcy listen", "emcy dump"], tips: &["emcy watch"] },
+    Row { words: &["eds check", "eds validate", "eds verify"], tips: &["eds lint vendor.eds"] },
+    Row { words: &["eds info", "eds print", "eds list", "eds objects", "eds dump"], tips: &["eds show vendor.eds"] },
+    Row { words: &["eds compare"], tips: &["eds diff vendor.eds zlac8030l"] },
+    Row {
+        words: &["eds generate", "eds export", "eds create", "eds make", "eds write", "export eds"],
+        tips: &["eds zlac8030l -o zlac8030l.eds"],
+    },
+    Row { words: &["export dcf"], tips: &["dcf 4 -o drive.dcf"] },
     Row { words: &["gui", "ui", "web", "dashboard", "serve", "browser"], tips: &["studio"] },
     Row { words: &["shell", "console", "repl", "interactive", "tui", "htop"], tips: &["top", "studio"] },
     Row {
@@ -156,6 +193,29 @@ const ACTING: &[Row] = &[
         tips: &["params plan 4 drive.toml", "params apply 4 drive.toml", "params backup 4 -o drive.toml"],
     },
     Row { words: &["store", "save_configuration", "persist"], tips: &["save 4"] },
+    Row { words: &["rollback", "roll-back", "undo"], tips: &["params rollback 4"] },
+    Row {
+        words: &["flash", "firmware", "update", "upgrade", "program", "bootloader"],
+        tips: &["write 4 1F50:01 --from firmware.bin"],
+    },
+    Row { words: &["params set", "params write"], tips: &["write 4 6081 120", "params apply 4 drive.toml"] },
+    Row { words: &["params load", "params import"], tips: &["params plan 4 drive.toml", "params apply 4 drive.toml"] },
+    Row {
+        words: &["params restore", "params reset", "params undo"],
+        tips: &["params apply 4 drive.toml", "params rollback 4", "restore 4"],
+    },
+    Row { words: &["params save", "params store"], tips: &["save 4", "params backup 4 -o drive.toml"] },
+    Row {
+        words: &["pdo set", "pdo configure", "pdo config", "pdo write"],
+        tips: &["pdo plan 4 tpdo1=statusword", "pdo apply 4 tpdo1=statusword"],
+    },
+    Row {
+        words: &["lss set-id", "lss node-id", "lss assign", "lss configure", "lss store"],
+        tips: &["lss set only --node-id 5 --store"],
+    },
+    Row { words: &["lss bitrate", "lss baudrate"], tips: &["lss set only --bitrate 250k --store"] },
+    Row { words: &["emcy clear", "emcy reset"], tips: &["reset 4", "write 4 1003:00 0"] },
+    Row { words: &["group ="], tips: &["group move 1=90deg"] },
     Row {
         words: &["factory-reset", "factory", "defaults", "erase", "erase_configuration", "erase-config"],
         tips: &["restore 4"],
@@ -176,19 +236,140 @@ const ACTING: &[Row] = &[
         words: &["calibrate", "calibration", "zero", "set-zero", "homing", "reference"],
         tips: &["home 4 --method 35", "state 4"],
     },
-    Row { words: &["follow", "trajectory", "path", "interpolate"], tips: &["group move 1=90deg 4=90deg"] },
+    Row { words: &["follow", "trajectory", "path", "interpolate"], tips: &["group move 1=90deg"] },
     Row { words: &["drive", "cmd_vel", "twist"], tips: &["drive-base examples/base.toml --linear 0.2 --for 2s"] },
 ];
 
-/// What is typed here in place of an unknown command, with the word behind it where that belongs to it.
-pub(crate) fn tips(word: &str, behind: Option<&str>) -> Option<Vec<String>> {
-    let two = behind.map(|behind| format!("{word} {behind}"));
-    let said = |words: &str| {
-        let words = words.to_ascii_lowercase();
-        LOOKING.iter().chain(ACTING).find(|row| row.words.contains(&words.as_str()))
+/// What is typed here in place of the word at `place`, with the nodes, objects, values and options that were typed.
+pub(crate) fn tips(command: &Command, words: &[String], place: usize) -> Option<Vec<String>> {
+    let lower = |place: usize| words.get(place).map(|word| word.to_ascii_lowercase());
+    let row = |sense: &str| LOOKING.iter().chain(ACTING).find(|row| row.words.contains(&sense));
+    let parent = place.checked_sub(1).and_then(|before| command.find_subcommand(&words[before]));
+    // The value of an option may be spelt as a command is: `--bus sim`.
+    let parent = parent.filter(|its| its.has_subcommands());
+    let of_parent = parent.and_then(|its| {
+        let word = match &words[place] {
+            word if nodes(word).is_ok() => "#".to_owned(),
+            word if word.contains('=') => "=".to_owned(),
+            word => word.to_ascii_lowercase(),
+        };
+        // A node, and a node with its value, belong to the command that is meant.
+        let from = if ["#", "="].contains(&word.as_str()) { place } else { place + 1 };
+        Some((row(&format!("{} {word}", its.get_name()))?, place - 1, from))
+    });
+    let of_two = || Some((row(&format!("{} {}", lower(place)?, lower(place + 1)?))?, place, place + 2));
+    let of_one = || Some((row(&lower(place)?)?, parent.map_or(place, |_| place - 1), place + 1));
+    let (row, from, to) = of_parent.or_else(of_two).or_else(of_one)?;
+    Some(row.tips.iter().map(|tip| with_typed(command, &words[..from], tip, &words[to..])).collect())
+}
+
+/// A tip with what was typed before and behind the word that it replaces, as far as the parser takes it.
+fn with_typed(command: &Command, before: &[String], tip: &str, typed: &[String]) -> String {
+    let tip: Vec<String> = tip.split(' ').map(str::to_owned).collect();
+    let (bus, tip_words) = match &tip[..] {
+        [option, bus, rest @ ..] if option == "--bus" => (Some(bus), rest),
+        rest => (None, rest),
     };
-    let row = two.and_then(|two| said(&two)).or_else(|| said(word))?;
-    Some(row.tips.iter().map(|tip| format!("ferrodrive {tip}")).collect())
+    let typed_bus = typed.iter().find(|word| is_bus(word));
+    let typed: Vec<String> = typed.iter().filter(|word| !is_bus(word)).cloned().collect();
+    let before_has_bus = before.iter().any(|word| word == "--bus" || word.starts_with("--bus="));
+    let bus = typed_bus.or(bus).filter(|_| !before_has_bus);
+    let bus: Vec<String> = bus.into_iter().flat_map(|bus| ["--bus".to_owned(), bus.clone()]).collect();
+    let (path, arguments) = tip_words.split_at(depth(command, tip_words));
+    let ((named, options), (typed_named, typed_options)) = (apart(arguments), apart(&typed));
+    let missing = named.get(typed_named.len()..).unwrap_or_default();
+    let of_node = typed_named.first().filter(|word| node(word).is_ok() && !named.is_empty());
+    let of_node: Vec<String> = of_node.into_iter().chain(named.iter().skip(1)).cloned().collect();
+    let lines = [
+        [typed_named, missing, typed_options, options].concat(),
+        [typed_named, missing, typed_options].concat(),
+        [&of_node[..], options].concat(),
+        arguments.to_vec(),
+    ];
+    let lines = lines.iter().map(|line| [before, &bus, path, line].concat());
+    lines.into_iter().find(|line| parses(command, line)).map_or_else(|| text(&tip), |line| text(&line))
+}
+
+/// How many of the first words name a command.
+fn depth(command: &Command, words: &[String]) -> usize {
+    let mut its = Some(command);
+    words
+        .iter()
+        .take_while(|word| {
+            its = its.and_then(|its| its.find_subcommand(word));
+            its.is_some()
+        })
+        .count()
+}
+
+/// The arguments that stand by their place, and the options behind them.
+fn apart(words: &[String]) -> (&[String], &[String]) {
+    let is_option =
+        |word: &String| word.strip_prefix('-').is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_digit()));
+    words.split_at(words.iter().position(is_option).unwrap_or(words.len()))
+}
+
+/// A bus that can be nothing else: `can0`, `vcan1`, or an address.
+fn is_bus(word: &str) -> bool {
+    let interface = ["slcan", "vcan", "can"].iter().find_map(|kind| word.strip_prefix(kind));
+    let numbered = interface.is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|byte| byte.is_ascii_digit()));
+    (numbered || word.contains("://")) && word.parse::<BusSpec>().is_ok()
+}
+
+/// An argument that was typed without its option.
+struct WithoutOption {
+    /// The commands whose option it is; of all where there are none.
+    commands: &'static [&'static str],
+    option: &'static str,
+    fits: fn(&str) -> bool,
+}
+
+fn ends_in(word: &str, endings: &[&str]) -> bool {
+    let ending = std::path::Path::new(word).extension().and_then(std::ffi::OsStr::to_str);
+    ending.is_some_and(|ending| endings.iter().any(|other| other.eq_ignore_ascii_case(ending)))
+}
+
+const WITHOUT_OPTION: &[WithoutOption] = &[
+    WithoutOption { commands: &["home"], option: "--method", fits: |word| word.parse::<i8>().is_ok() },
+    WithoutOption { commands: &["init"], option: "-o", fits: |word| ends_in(word, &["toml"]) },
+    WithoutOption { commands: &["backup"], option: "-o", fits: |word| ends_in(word, &["toml", "dcf", "bin"]) },
+    WithoutOption { commands: &["record"], option: "-o", fits: |word| ends_in(word, &["mcap", "csv"]) },
+    WithoutOption { commands: &["dcf"], option: "-o", fits: |word| ends_in(word, &["dcf"]) },
+    WithoutOption { commands: &["eds"], option: "-o", fits: |word| ends_in(word, &["eds"]) },
+    WithoutOption { commands: &["dbc"], option: "-o", fits: |word| ends_in(word, &["dbc"]) },
+    WithoutOption { commands: &["demo", "latency"], option: "-o", fits: |word| ends_in(word, &["svg"]) },
+    WithoutOption { commands: &["plot"], option: "-o", fits: |word| ends_in(word, &["svg", "html"]) },
+    WithoutOption {
+        commands: &["dump", "emcy", "pdo", "record", "supervise", "torque", "velocity", "watch"],
+        option: "--for",
+        fits: |word| parse_duration(word).is_ok(),
+    },
+    WithoutOption { commands: &[], option: "--machine", fits: |word| ends_in(word, &["toml"]) },
+    WithoutOption { commands: &[], option: "--bus", fits: is_bus },
+];
+
+/// What was meant by a line with an argument whose option is missing: `home 2 17`, `scan can0`.
+pub(crate) fn with_option(command: &Command, words: &[String]) -> Option<Vec<String>> {
+    WITHOUT_OPTION.iter().find_map(|WithoutOption { commands, option, fits }| {
+        let of_all = commands.is_empty();
+        if !of_all && !words.iter().any(|word| commands.contains(&word.as_str())) {
+            return None;
+        }
+        (0..words.len()).rev().filter(|place| fits(&words[*place])).find_map(|place| {
+            let mut line = words.to_vec();
+            let pair = [(*option).to_owned(), line.remove(place)];
+            let line = if of_all { [&pair[..], &line].concat() } else { [&line[..], &pair].concat() };
+            parses(command, &line).then_some(line)
+        })
+    })
+}
+
+/// What is said to `estop 4`: one drive and all of them are stopped by different commands.
+pub(crate) fn stop_of_one(command: &Command, words: &[String]) -> Option<String> {
+    let place = words.iter().position(|word| word == "estop")?;
+    let mut line = words.to_vec();
+    "quick-stop".clone_into(&mut line[place]);
+    parses(command, &line).then(|| format!("`ferrodrive estop` stops every drive; one is stopped by: {}", text(&line)))
 }
 
 /// Whether a command that is spelt nearly so may be named: what moves a motor only to who wrote it but for a slip of the finger.
@@ -218,8 +399,7 @@ pub(crate) fn joined(command: &Command, words: &[String]) -> Option<Vec<String>>
         line.push(word.clone());
         line
     });
-    let line = ["ferrodrive".to_owned()].into_iter().chain(made.iter().cloned());
-    (made != words && command.clone().try_get_matches_from(line).is_ok()).then_some(made)
+    (made != words && parses(command, &made)).then_some(made)
 }
 
 #[cfg(test)]
@@ -234,6 +414,9 @@ mod tests {
         for row in all() {
             for word in row.words {
                 assert!(command.find_subcommand(word).is_none(), "{word} is a command");
+                let (parent, below) = word.split_once(' ').unwrap_or((word, ""));
+                let known = command.find_subcommand(parent).and_then(|its| its.find_subcommand(below));
+                assert!(known.is_none(), "{word} is a command");
                 assert!(all().filter(|other| other.words.contains(word)).count() == 1, "{word} is there twice");
             }
             for tip in row.tips {
@@ -261,39 +444,110 @@ mod tests {
         );
     }
 
+    fn words(line: &str) -> Vec<String> {
+        line.split(' ').map(Into::into).collect()
+    }
+
+    /// The first tip for a line, whose unknown word is its `place`th.
+    fn first(line: &str, place: usize) -> Option<String> {
+        tips(&command_line(), &words(line), place).map(|tips| tips[0].clone())
+    }
+
     #[test]
     fn what_other_tools_call_it_is_answered_by_its_sense() {
-        for (word, behind, first) in [
-            ("candump", None, "ferrodrive dump"),
-            ("cansend", None, "ferrodrive send 604#4041600000000000"),
-            ("get", Some("4"), "ferrodrive read 4 6064"),
-            ("set", Some("4"), "ferrodrive write 4 6081 120"),
-            ("sdo", Some("write"), "ferrodrive write 4 6081 120"),
-            ("sdo", Some("4"), "ferrodrive read 4 6064"),
-            ("info", None, "ferrodrive scan"),
-            ("monitor", None, "ferrodrive top"),
-            ("jog", Some("4"), "ferrodrive velocity 4 60rpm --for 2s"),
-            ("trace", None, "ferrodrive dump"),
-            ("backup", None, "ferrodrive params backup 4 -o drive.toml"),
-            ("fault", None, "ferrodrive explain 4"),
-            ("scope", None, "ferrodrive top"),
-            ("log", None, "ferrodrive dump --log trace.log"),
-            ("calibrate", None, "ferrodrive home 4 --method 35"),
-            ("tune", None, "ferrodrive objects 4 gain"),
-            ("follow", None, "ferrodrive group move 1=90deg 4=90deg"),
-            ("E-STOP", None, "ferrodrive estop"),
+        for (line, tip) in [
+            ("candump", "dump"),
+            ("cansend", "send 604#4041600000000000"),
+            ("get", "read 4 6064"),
+            ("set", "write 4 6081 120"),
+            ("sdo write", "write 4 6081 120"),
+            ("sdo", "read 4 6064"),
+            ("info", "scan"),
+            ("monitor", "top"),
+            ("jog", "velocity 4 60rpm --for 2s"),
+            ("trace", "dump"),
+            ("backup", "params backup 4 -o drive.toml"),
+            ("fault", "explain 4"),
+            ("scope", "top"),
+            ("log", "dump --log trace.log"),
+            ("calibrate", "home 4 --method 35"),
+            ("tune", "objects 4 gain"),
+            ("follow", "group move 1=90deg"),
+            ("E-STOP", "estop"),
+            ("rollback", "params rollback 4"),
+            ("flash", "write 4 1F50:01 --from firmware.bin"),
         ] {
-            assert_eq!(tips(word, behind).unwrap()[0], first, "{word}");
+            assert_eq!(first(line, 0).as_deref(), Some(&*format!("ferrodrive {tip}")), "{line}");
         }
-        assert_eq!(tips("zzzz", None), None);
+        assert_eq!(first("zzzz", 0), None);
+    }
+
+    #[test]
+    fn a_wrong_command_of_a_command_is_answered_by_its_sense() {
+        for (line, tip) in [
+            ("params list 5", "params backup 5 -o drive.toml"),
+            ("params restore 5 wheel.toml", "params apply 5 wheel.toml"),
+            ("params save 5", "save 5"),
+            ("pdo 5", "pdo show 5"),
+            ("pdo set 5 tpdo2=off", "pdo plan 5 tpdo2=off"),
+            ("lss find", "lss scan"),
+            ("emcy 5", "emcy show 5"),
+            ("emcy clear 5", "reset 5"),
+            ("eds check my.eds", "eds lint my.eds"),
+            ("export eds", "eds zlac8030l -o zlac8030l.eds"),
+            ("group 1=30deg 2=5deg", "group move 1=30deg 2=5deg"),
+        ] {
+            assert_eq!(first(line, 1).as_deref(), Some(&*format!("ferrodrive {tip}")), "{line}");
+        }
+    }
+
+    #[test]
+    fn a_tip_keeps_what_was_typed() {
+        for (line, place, tip) in [
+            ("get 5 2000", 0, "read 5 2000"),
+            ("get 5", 0, "read 5 6064"),
+            ("sdo read 5 2000:01 2001", 0, "read 5 2000:01 2001"),
+            ("set 5 6060 3", 0, "write 5 6060 3"),
+            ("jog 5 -60rpm", 0, "velocity 5 -60rpm --for 2s"),
+            ("jog 5 10rpm --for 1s", 0, "velocity 5 10rpm --for 1s"),
+            ("candump can1", 0, "--bus can1 dump"),
+            ("cansend vcan0 123#11", 0, "--bus vcan0 send 123#11"),
+            ("connect can2", 0, "--bus can2 scan"),
+            ("--bus can0 fault 7", 2, "--bus can0 explain 7"),
+            ("--bus sim fault 7", 2, "--bus sim explain 7"),
+            ("canplayer mine.log", 0, "replay mine.log --skip-motion"),
+            ("flash 5 fw.bin", 0, "write 5 1F50:01 --from firmware.bin"),
+            // What makes no sense there is left out.
+            ("get it", 0, "read 4 6064"),
+        ] {
+            assert_eq!(first(line, place).as_deref(), Some(&*format!("ferrodrive {tip}")), "{line}");
+        }
+    }
+
+    #[test]
+    fn an_argument_without_its_option_is_put_behind_it() {
+        let meant = |line: &str| with_option(&command_line(), &words(line)).map(|words| words.join(" "));
+        for (line, expected) in [
+            ("scan can0", "--bus can0 scan"),
+            ("state 4 socketcand://10.0.0.1/can0", "--bus socketcand://10.0.0.1/can0 state 4"),
+            ("home 2 17", "home 2 --method 17"),
+            ("home 2 -1", "home 2 --method -1"),
+            ("init machine.toml", "init -o machine.toml"),
+            ("state 4 machine.toml", "--machine machine.toml state 4"),
+            ("params backup 4 wheel.dcf", "params backup 4 -o wheel.dcf"),
+            ("record 4 606C run.csv", "record 4 606C -o run.csv"),
+            ("velocity 4 60rpm 2s", "velocity 4 60rpm --for 2s"),
+        ] {
+            assert_eq!(meant(line).as_deref(), Some(expected), "{line}");
+        }
+        for line in ["state 4 5", "home 2 backwards", "scan canned"] {
+            assert_eq!(meant(line), None, "{line}");
+        }
     }
 
     #[test]
     fn a_unit_and_a_drive_are_put_where_they_belong() {
-        let meant = |line: &str| {
-            let words: Vec<String> = line.split(' ').map(Into::into).collect();
-            joined(&command_line(), &words).map(|words| words.join(" "))
-        };
+        let meant = |line: &str| joined(&command_line(), &words(line)).map(|words| words.join(" "));
         assert_eq!(meant("velocity 4 60 rpm").as_deref(), Some("velocity 4 60rpm"));
         assert_eq!(
             meant("move 4 -90 deg --acceleration 500 ms").as_deref(),

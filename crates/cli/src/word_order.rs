@@ -40,6 +40,11 @@ pub(crate) fn text(words: &[String]) -> String {
     format!("ferrodrive {}", quoted.collect::<Vec<_>>().join(" "))
 }
 
+/// Whether the parser takes these words.
+pub(crate) fn parses(command: &Command, words: &[String]) -> bool {
+    command.clone().try_get_matches_from(std::iter::once("ferrodrive").chain(words.iter().map(String::as_str))).is_ok()
+}
+
 /// The order that was meant, if there is exactly one.
 pub(crate) fn mend(command: &Command, words: &[String], error: ErrorKind) -> Option<Mended> {
     let wrong_order = matches!(

@@ -221,7 +221,7 @@ impl Stop {
 impl QuickStop {
     /// Stops at once and shows the state. The stop goes out before the model is asked for.
     pub(crate) async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
-        let Nodes::One(node) = self.nodes else { return Estop {}.run(context).await.map(StopOutcome::all) };
+        let Nodes::One(node) = self.nodes else { return Estop::default().run(context).await.map(StopOutcome::all) };
         context.quick_stop(node).await?;
         let drive = context.drive_to_stop(node).await?;
         drive.quick_stop().await?;

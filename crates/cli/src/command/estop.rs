@@ -23,12 +23,16 @@ use plot::Paint;
 /// continues. Ends with status 0 only when every drive was seen to stand, by its statusword and its speed. A node that
 /// was heard, or is in the machine file, and does not answer may still be moving; --timeout has no effect on how long
 /// the command waits for it. This is software on a bus: it does not replace an emergency stop that removes the power.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive --bus can0 estop\n  ferrodrive --bus can0 --machine machine.toml estop --json\n  \
     ferrodrive --bus can0 quick-stop all    # the same\n  ferrodrive --bus can0 stop all          # by the ramps; stays enabled"
 )]
-pub(crate) struct Estop {}
+pub(crate) struct Estop {
+    /// The word all, as behind `stop` and `quick-stop`: there is nothing else to choose
+    #[arg(value_name = "all", value_parser = ["all"], hide = true)]
+    everything: Option<String>,
+}
 
 /// What became of every drive on the bus.
 #[derive(Debug, Serialize)]

@@ -178,15 +178,22 @@ fn help_has_a_help_of_its_own() {
 /// By the sense of a word in other tools, not by its spelling.
 #[test]
 fn words_of_other_tools_are_answered_with_the_command_that_does_it() {
-    refused(&["candump", "can0"], &["tip: ferrodrive dump"]);
+    refused(&["candump", "can0"], &["tip: ferrodrive --bus can0 dump"]);
+    refused(&["get", "5", "2000"], &["tip: ferrodrive read 5 2000"]);
+    refused(&["eds", "check", "my.eds"], &["tip: ferrodrive eds lint my.eds"]);
+    refused(&["pdo", "5"], &["tip: ferrodrive pdo show 5"]);
+    refused(&["scan", "can0"], &["did you mean: ferrodrive --bus can0 scan"]);
+    refused(&["home", "2", "17"], &["did you mean: ferrodrive home 2 --method 17"]);
+    refused(&["init", "machine.toml"], &["did you mean: ferrodrive init -o machine.toml"]);
+    refused(&["estop", "4"], &["`ferrodrive estop` stops every drive", "ferrodrive quick-stop 4"]);
     refused(&["sdo", "read", "4", "6064"], &["tip: ferrodrive read 4 6064"]);
-    refused(&["--bus", "sim", "fault", "4"], &["tip: ferrodrive explain 4"]);
+    refused(&["--bus", "sim", "fault", "4"], &["tip: ferrodrive --bus sim explain 4"]);
     refused(&["velocity", "4", "60", "rpm"], &["did you mean: ferrodrive velocity 4 60rpm"]);
     refused(&["sim", "zlac8030l@4"], &["did you mean: ferrodrive sim --drive zlac8030l@4"]);
     let traced = ferrodrive(&["trace"]).err;
     assert!(traced.contains("tip: ferrodrive dump") && !traced.contains("torque"), "{traced}");
     let json = ferrodrive(&["--json", "get", "4", "6064"]).json();
-    assert!(json["error"]["next"].as_str().unwrap().starts_with("ferrodrive read 4 6064"), "{json}");
+    assert!(json["error"]["next"].as_str().unwrap().starts_with("ferrodrive --json read 4 6064"), "{json}");
 }
 
 #[test]
