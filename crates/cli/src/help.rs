@@ -60,7 +60,15 @@ pub(crate) fn dressed(command: Command) -> Command {
     let command = command.mut_args(|arg| only_in_help_options(arg, &common)).mut_subcommands(|its| {
         if its.get_name() == OPTIONS { with_shown(its, &common) } else { pointing_to_common(its, &common) }
     });
-    command.help_template(TEMPLATE).after_help(short).after_long_help(long)
+    with_negative_numbers(command).help_template(TEMPLATE).after_help(short).after_long_help(long)
+}
+
+/// A negative number is the value of what it stands behind, to be judged there; no option is spelt like one.
+fn with_negative_numbers(command: Command) -> Command {
+    let takes = |arg: &Arg| arg.get_action().takes_values() && !arg.is_allow_hyphen_values_set();
+    command
+        .mut_args(|arg| if takes(&arg) { arg.allow_negative_numbers(true) } else { arg })
+        .mut_subcommands(with_negative_numbers)
 }
 
 /// The options of all commands, as `ferrodrive help options` shows them.

@@ -16,6 +16,7 @@ mod global;
 mod guard;
 mod help;
 mod machine_option;
+mod numbers;
 mod output;
 mod plain;
 mod progress;
@@ -93,6 +94,7 @@ fn matches() -> Result<ArgMatches, clap::Error> {
         Ok(matches) => return Ok(matches),
         Err(error) => error,
     };
+    drop_advice_to_quote(&mut error);
     let Some(words) = std::env::args_os().skip(1).map(|word| word.into_string().ok()).collect::<Option<Vec<_>>>()
     else {
         return Err(error);
@@ -126,6 +128,16 @@ fn matches() -> Result<ArgMatches, clap::Error> {
 
 fn parse(command: &clap::Command, words: &[String]) -> Result<ArgMatches, clap::Error> {
     command.clone().try_get_matches_from(std::iter::once("ferrodrive").chain(words.iter().map(String::as_str)))
+}
+
+/// An unknown option is hardly ever meant as a value behind `--`.
+fn drop_advice_to_quote(error: &mut clap::Error) {
+    if let Some(ContextValue::StyledStrs(tips)) = error.remove(ContextKind::Suggested) {
+        let others: Vec<_> = tips.into_iter().filter(|tip| !tip.to_string().contains("as a value, use '")).collect();
+        if !others.is_empty() {
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(others));
+        }
+    }
 }
 
 fn suggest(error: &mut clap::Error, tips: Vec<String>) {

@@ -13,6 +13,7 @@ use testbench::machine_file::{CyclePlan, Machine, TOLERANCE, TooFull, too_full_a
 use super::studio::bitrate;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::numbers::whole;
 
 /// The most cycles that `--tolerance` takes.
 const MOST_TOLERANCE: u32 = 100;
@@ -21,7 +22,7 @@ const MOST_TOLERANCE: u32 = 100;
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(super) struct CycleArgs {
     /// Consecutive cycles that this command, or a TPDO of a drive, may miss before all drives are stopped
-    #[arg(long, value_name = "CYCLES", default_value_t = TOLERANCE, value_parser = clap::value_parser!(u32).range(0..=i64::from(MOST_TOLERANCE)))]
+    #[arg(long, value_name = "CYCLES", default_value_t = TOLERANCE, value_parser = |text: &str| whole(text, 0..=MOST_TOLERANCE))]
     tolerance: u32,
 }
 

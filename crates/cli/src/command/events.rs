@@ -5,6 +5,7 @@ use testbench::events::Filter;
 
 use crate::control_client::ControlArgs;
 use crate::failure::Failure;
+use crate::numbers::whole;
 use crate::output::{Format, print_line};
 use crate::plain::plain;
 use crate::session::exit_on_signal;
@@ -24,13 +25,13 @@ pub(crate) struct Events {
     #[command(flatten)]
     control: ControlArgs,
     /// Show only events of this node; may be repeated
-    #[arg(long = "node", value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
+    #[arg(long = "node", value_name = "NODE", value_parser = |text: &str| whole(text, 1..=127_u8))]
     nodes: Vec<u8>,
     /// Show only events of this kind; may be repeated
     #[arg(long = "kind", value_name = "KIND")]
     kinds: Vec<String>,
     /// End after this many events
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=u64::MAX))]
     count: Option<u64>,
 }
 

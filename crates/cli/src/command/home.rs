@@ -11,6 +11,7 @@ use super::motion::{MotionOutcome, Then, outcome, perform, speed};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::GuardArgs;
+use crate::numbers::whole;
 use devices::AxisDescription;
 use testbench::models::Description;
 use testbench::words::node::node;
@@ -26,7 +27,7 @@ pub(crate) struct Home {
     #[arg(value_parser = node)]
     node: NodeId,
     /// Homing method of CiA 402, e.g. 17 (negative limit switch)
-    #[arg(long, value_parser = clap::value_parser!(i8), allow_hyphen_values = true)]
+    #[arg(long, value_parser = |text: &str| whole(text, i8::MIN..=i8::MAX), allow_hyphen_values = true)]
     method: i8,
     /// Speed of the search, where the drive has an object for it
     #[arg(long, value_name = "SPEED", value_parser = speed)]

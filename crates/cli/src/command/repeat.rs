@@ -8,6 +8,7 @@ use master::units::parse_duration;
 
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::numbers::whole;
 
 /// How often, and how many times.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
@@ -16,7 +17,7 @@ pub(crate) struct Repeat {
     #[arg(long, value_name = "TIME", value_parser = period)]
     pub(crate) every: Option<Duration>,
     /// Number of times (default: until Ctrl-C)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=u64::MAX))]
     pub(crate) count: Option<u64>,
 }
 

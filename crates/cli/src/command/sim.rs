@@ -18,6 +18,7 @@ use transport::{
 use crate::embedded;
 use crate::failure::Failure;
 use crate::global::Global;
+use crate::numbers::whole;
 use crate::output::file_path;
 use crate::plain::plain;
 use crate::recording::{FrameLog, LogPath, NewLog, Pace, RecordFile, RecordOptions};
@@ -115,7 +116,7 @@ pub(crate) struct Sim {
     #[arg(long, value_name = "DIR", value_parser = file_path)]
     state: Option<PathBuf>,
     /// Random seed (default: the machine file's, or 1)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 0..=u64::MAX))]
     seed: Option<u64>,
     /// Simulate drives as calculated (ideal), or with the imperfections of real ones (full): noise of encoder, current,
     /// voltage and temperature, dead time, cogging (default: the machine file's, or ideal)

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::repeat::{Pace, Repeat};
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::numbers::whole;
 use crate::output::Report;
 use plot::Paint;
 
@@ -22,7 +23,7 @@ pub(crate) struct SyncCommand {
     #[command(flatten)]
     repeat: Repeat,
     /// Add a counter from 1 up to this, equal to 1019h of the devices
-    #[arg(long, value_name = "OVERFLOW", value_parser = clap::value_parser!(u8).range(2..=240))]
+    #[arg(long, value_name = "OVERFLOW", value_parser = |text: &str| whole(text, 2..=240_u8))]
     counter: Option<u8>,
     /// Identifier, if 1005h of the devices is not 80h
     #[arg(long, value_name = "ID", value_parser = identifier)]

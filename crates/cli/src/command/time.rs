@@ -11,6 +11,7 @@ use transport::WallClock;
 use super::sync::identifier;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::numbers::whole;
 use crate::output::Report;
 use plot::Paint;
 
@@ -21,7 +22,7 @@ use plot::Paint;
 )]
 pub(crate) struct Time {
     /// Time to send instead of now, in seconds since 1 January 1970, UTC
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = |text: &str| whole(text, 0..=u64::MAX))]
     unix: Option<u64>,
     /// Identifier, if 1012h of the devices is not 100h
     #[arg(long, value_name = "ID", value_parser = identifier)]

@@ -13,6 +13,7 @@ use super::repeat::{Pace, Repeat, period};
 use super::sdo::resolve;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::numbers::whole;
 use crate::output::{Format, Report};
 use crate::progress::Screen;
 use plot::Paint;
@@ -39,7 +40,7 @@ pub(crate) struct Watch {
     #[arg(long, value_name = "TIME", value_parser = period, default_value = "100ms")]
     every: Duration,
     /// Number of readings (default: until Ctrl-C)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=u64::MAX))]
     count: Option<u64>,
     /// End after this time
     #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, conflicts_with = "count")]

@@ -207,6 +207,9 @@ fn nodes_are_checked() {
 
 #[test]
 fn objects_and_values_are_checked() {
+    refused(&["read", "4", "-2"], &["'-2' is not an object"]);
+    let unknown = ferrodrive(&["read", "4", "6064", "-x"]).err;
+    assert!(unknown.contains("unexpected argument '-x'") && !unknown.contains("-- -x"), "{unknown}");
     refused(&["read", "4", "60644"], &["is not an object", "position_actual_value"]);
     refused(&["read", "4", "6064:100"], &["sub-index", "00 to FF"]);
     refused(&["read", "4", "position_actual_vale"], &["did you mean position_actual_value?"]);
@@ -227,6 +230,10 @@ fn quantities_are_checked() {
     refused(&["move", "4", "90deg", "--acceleration", "5"], &["no unit", "500ms"]);
     refused(&["torque", "4", "1000"], &["no unit", "1.5A"]);
     refused(&["home", "4"], &["--method"]);
+    refused(&["sync", "--counter", "0"], &["expected 2 to 240, got 0"]);
+    refused(&["sync", "--count", "-2"], &["expected 1 or more, got -2"]);
+    refused(&["home", "4", "--method", "first"], &["expected a whole number, -128 to 127, got 'first'"]);
+    refused(&["run", "a.toml", "--jobs", "0"], &["expected 1 to 1024, got 0"]);
     refused(&["--timeout", "2", "scan"], &["no unit", "500ms"]);
 }
 

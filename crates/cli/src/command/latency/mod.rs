@@ -14,6 +14,7 @@ use testbench::words::node::node;
 use crate::command::plot::{svg_path, write_svg};
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::numbers::whole;
 use crate::output::Report;
 use measure::Measurement;
 use plot::Paint;
@@ -39,7 +40,7 @@ pub(crate) struct Latency {
     #[arg(value_parser = node)]
     node: Option<NodeId>,
     /// Number of requests, and of SYNCs
-    #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    #[arg(long, value_name = "N", default_value = "1000", value_parser = |text: &str| whole(text, 2..=10_000_000_u32))]
     count: u32,
     /// End each of the two measurements after this time, if it has not reached its count
     #[arg(long = "for", value_name = "TIME", value_parser = master::units::parse_duration)]

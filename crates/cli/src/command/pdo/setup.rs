@@ -21,6 +21,7 @@ use crate::command::params::{PlanReport, Transaction, plan_of};
 use crate::command::repeat::period;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::numbers::whole;
 use crate::output::Report;
 use plot::Paint;
 use plot::Table;
@@ -35,7 +36,7 @@ pub(super) struct Wanted {
     #[arg(value_name = "PDO=OBJECTS", value_parser = asked)]
     pdos: Vec<Asked>,
     /// Transmission type of the named PDOs: 1 with every SYNC, 255 on events (CiA 301, tables 66 and 71)
-    #[arg(long = "type", value_name = "0..255", requires = "pdos")]
+    #[arg(long = "type", value_name = "0-255", requires = "pdos", value_parser = |text: &str| whole(text, 0..=u8::MAX))]
     transmission: Option<u8>,
     /// Shortest time between two PDOs (inhibit time)
     #[arg(long, value_name = "TIME", value_parser = parse_duration, requires = "pdos")]

@@ -14,6 +14,7 @@ use std::time::Duration;
 use testbench::scenario::{Kept, Outcome, Runner, Scenario};
 
 use crate::failure::Failure;
+use crate::numbers::whole;
 use crate::output::{Format, file_path};
 use crate::progress::Progress;
 use crate::recording::{Batch, Pace, RecordOptions};
@@ -41,7 +42,7 @@ pub(crate) struct Run {
     #[arg(value_name = "FILE.toml", required = true)]
     files: Vec<PathBuf>,
     /// Random seed (default: the scenario's, its machine's, or 1)
-    #[arg(long, value_name = "N", conflicts_with = "seeds")]
+    #[arg(long, value_name = "N", conflicts_with = "seeds", value_parser = |text: &str| whole(text, 0..=u64::MAX))]
     seed: Option<u64>,
     /// Set a parameter of the scenario; may be repeated. With several scenarios, in those that have it
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = parameter)]
@@ -50,7 +51,7 @@ pub(crate) struct Run {
     #[arg(long, value_name = "FIRST..LAST", value_parser = seeds)]
     seeds: Option<RangeInclusive<u64>>,
     /// Number of runs at once, of a sweep or of several files (default: one for each core)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=1024_u16))]
     jobs: Option<u16>,
     /// Also write the result as JUnit XML, as build servers read it
     #[arg(long, value_name = "FILE", conflicts_with = "seeds", value_parser = file_path)]
