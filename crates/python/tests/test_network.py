@@ -201,7 +201,7 @@ def test_parameters_that_a_node_refuses_are_put_back(network, tmp_path):
     parameters, wanted = network.params(1), tmp_path / "wanted.toml"
     # Transmission type F1h to FBh is reserved (CiA 301, 7.5.2.37): what was written before is put back.
     wanted.write_text('[values]\n"1017h:00" = 123\n"1800h:02" = 251\n', encoding="utf-8")
-    with pytest.raises(ferrodrive.MasterError, match="was not done") as raised:
+    with pytest.raises(ferrodrive.MasterError, match=", failed") as raised:
         parameters.apply(wanted)
     error = raised.value
     # CiA 301, 7.2.4.3.17: invalid value for parameter.

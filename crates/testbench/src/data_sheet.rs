@@ -33,10 +33,10 @@ impl Unread {
         match self {
             Self::File(error) => Failure::bad_file(format!("cannot read {}", path.display()))
                 .because(error)
-                .next("give the path of an EDS or DCF file that this user may read"),
+                .next("check the name, and that this user may read the file"),
             Self::Refused(refusal) => {
                 let at = if refusal.line > 0 { format!(", line {}", refusal.line) } else { String::new() };
-                Failure::new(format!("{}{at} is not read as an EDS", path.display()))
+                Failure::new(format!("{}{at} cannot be read as an EDS", path.display()))
                     .of_kind("not_an_eds")
                     .because(&refusal.reason)
                     .next(&refusal.next)

@@ -61,7 +61,7 @@ impl Failure {
     /// A file that was asked for cannot be written.
     pub fn of_writing(what: &str, path: &std::path::Path, error: &std::io::Error) -> Self {
         Self::new(format!("cannot write {what} {}", path.display())).of_kind("file").because(error).next(
-            "see that its folder is there, can be written and has room; a file at that path that is not an earlier one of its kind is left alone",
+            "make sure that its folder exists, can be written and has room; an existing file of another kind is not overwritten",
         )
     }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use testbench::check::{LiveNode, Prediction, Severity};
 use testbench::network::check::{CheckReport, read};
+use testbench::words::counted;
 
 use crate::failure::Failure;
 use crate::global::Global;
@@ -101,7 +102,8 @@ impl Report for CheckReport {
         if let Some(live) = &self.live {
             text += &asked(live, paint);
         }
-        let counts = format!("{} errors, {} warnings, {} notes", self.errors, self.warnings, self.notes);
+        let counts = [(self.errors, "error"), (self.warnings, "warning"), (self.notes, "note")];
+        let counts = counts.map(|(count, what)| counted(count, what)).join(", ");
         let counts = if self.errors > 0 { paint.bad(&counts) } else { paint.good(&counts) };
         format!("{text}\n{counts}")
     }
@@ -109,7 +111,7 @@ impl Report for CheckReport {
 
 /// How the bus boots, and what is sent then.
 fn foretold(predicted: &Prediction, paint: Paint) -> String {
-    let mut text = format!("\n\n{}", paint.strong("boot-up, foretold in virtual time"));
+    let mut text = format!("\n\n{}", paint.strong("boot-up, as predicted in virtual time"));
     for node in &predicted.nodes {
         let outcome = match (node.letter, node.meaning) {
             (Some('L'), Some(meaning)) => format!("L: {meaning}"),
@@ -117,7 +119,12 @@ fn foretold(predicted: &Prediction, paint: Paint) -> String {
             _ => paint.good("boots"),
         };
         let state = node.state.as_ref().map(|state| format!("; it is {state}")).unwrap_or_default();
-        text += &format!("\nnode {} ({}): {outcome}{state}; {} writes", node.node, plain(&node.name), node.writes);
+        text += &format!(
+            "\nnode {} ({}): {outcome}{state}; {}",
+            node.node,
+            plain(&node.name),
+            counted(node.writes, "write")
+        );
     }
     let mut frames = Table::new(&["frame", "node", "id", "bytes", "every", "at most", "carries"]);
     let time = |us: f64| if us >= 10_000.0 { format!("{:.1} ms", us / 1e3) } else { format!("{us:.0} us") };

@@ -12,6 +12,7 @@ use crate::output::Report;
 use crate::plain::plain;
 use crate::recording::{LogPath, log_path};
 use plot::Paint;
+use testbench::words::counted;
 
 /// Convert a log file to another format
 ///
@@ -97,12 +98,14 @@ fn same_file(one: &std::path::Path, other: &std::path::Path) -> bool {
 impl Report for ConvertReport {
     fn text(&self, paint: Paint) -> String {
         let Self { from, to, frames, error_frames, fd_frames, passed_over, form } = self;
-        let mut text = format!("{} ({form}) written as {}: {frames} frames", from, paint.strong(to));
-        for (count, what) in
-            [(error_frames, "error frames"), (fd_frames, "CAN FD frames left out"), (passed_over, "places skipped")]
-        {
+        let mut text = format!("{} ({form}) written as {}: {}", from, paint.strong(to), counted(*frames, "frame"));
+        for (count, what, done) in [
+            (error_frames, "error frame", ""),
+            (fd_frames, "CAN FD frame", " left out"),
+            (passed_over, "place", " skipped"),
+        ] {
             if *count > 0 {
-                text.push_str(&format!(", {count} {what}"));
+                text.push_str(&format!(", {}{done}", counted(*count, what)));
             }
         }
         text

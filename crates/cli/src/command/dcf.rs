@@ -20,6 +20,7 @@ use crate::plain::plain;
 use plot::Paint;
 use plot::Table;
 use testbench::models::Description;
+use testbench::words::counted;
 use testbench::words::node::node;
 
 /// Read a device's parameters into a device configuration file (DCF)
@@ -307,8 +308,8 @@ pub(super) fn keep(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure
 
 impl DcfReport {
     fn summary(&self, paint: Paint) -> String {
-        let kept = if self.values == 1 { "1 value" } else { &format!("{} values", self.values) };
-        let mut text = format!("node {}: {} objects read, {kept} in the file", self.node, self.read);
+        let (read, kept) = (counted(self.read, "object"), counted(self.values, "value"));
+        let mut text = format!("node {}: {read} read, {kept} in the file", self.node);
         if !self.left_out.is_empty() {
             text += &format!("; left out, being commands or set-points: {}", self.left_out.join(", "));
         }

@@ -10,6 +10,7 @@ use master::base::{Base, BaseError, BaseLimits, BaseState, Geometry, StopCause, 
 use master::units::{Shown, parse_duration};
 use serde::Serialize;
 use testbench::machine_file::{BASE_PERIOD, BasePlan, CyclePlan, speed_mode};
+use testbench::words::counted;
 
 use super::cycles::{CycleArgs, refuse_too_full};
 use super::group::{SEE_AXES, end_guards};
@@ -446,7 +447,7 @@ impl BaseDriven {
         let [left, right] = guards;
         let report = |wheel: &WheelSetup, guard| WheelReport {
             node: wheel.drive.node().id().raw(),
-            mode: wheel.mode.name().unwrap_or("of its maker").to_owned(),
+            mode: wheel.mode.name().unwrap_or("manufacturer-specific").to_owned(),
             guard,
         };
         Self {
@@ -482,10 +483,10 @@ impl Report for BaseDriven {
         ];
         lines.extend(self.wheels.iter().map(|wheel| format!("  guard   node {}: {}", wheel.node, wheel.guard.text)));
         if self.dead_man_stops > 0 {
-            lines.push(format!("  note    stopped {} times because no line arrived", self.dead_man_stops));
+            lines.push(format!("  note    stopped {} because no line arrived", counted(self.dead_man_stops, "time")));
         }
         if self.bad_lines > 0 {
-            lines.push(format!("  note    {} lines were not a twist", self.bad_lines));
+            lines.push(format!("  note    {} ignored: not a twist", counted(self.bad_lines, "line")));
         }
         lines.join("\n")
     }

@@ -26,6 +26,7 @@ use crate::session::{bus_failure, enter_real_time, exit_on_signal, runtime, virt
 use crate::signals::asked_to_end;
 use plot::Paint;
 use testbench::machine_file::Machine;
+use testbench::words::counted;
 
 /// Show the traffic of the bus decoded: SDO, PDOs, statuswords in words
 ///
@@ -376,7 +377,8 @@ impl Sink {
         if frames == 0 && fd_frames == 0 {
             let form = self.of.map_or("candump", LogFormat::name);
             return Err(without_frames(format!(
-                "no frame, and {lines_skipped} places skipped: this is not a {form} log"
+                "no frame, and {} skipped: this is not a {form} log",
+                counted(lines_skipped, "place")
             )));
         }
         if self.format.json {
@@ -385,7 +387,10 @@ impl Sink {
         }
         let _ = writeln!(
             io::stderr(),
-            "warning: {frames} frames read; {lines_skipped} places were skipped, and {fd_frames} CAN FD frames seen"
+            "warning: {} read; {} skipped, and {} seen",
+            counted(frames, "frame"),
+            counted(lines_skipped, "place"),
+            counted(fd_frames, "CAN FD frame")
         );
         Ok(())
     }

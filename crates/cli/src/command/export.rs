@@ -6,6 +6,7 @@ use canopen::NodeId;
 use master::Drive;
 use serde::Serialize;
 use testbench::dbc::{self, DbcNode, DbcPdo};
+use testbench::words::counted;
 use testbench::words::node::node;
 
 use super::dcf::{keep, new_file};
@@ -78,7 +79,7 @@ impl Report for ExportReport {
             (Some(dbc), _) => dbc.trim_end().to_owned(),
             (None, file) => {
                 let (file, nodes) = (plain(file.as_deref().unwrap_or_default()), self.nodes.len());
-                format!("{file}: {} PDOs of {nodes} node{}", self.pdos, if nodes == 1 { "" } else { "s" })
+                format!("{file}: {} of {}", counted(self.pdos, "PDO"), counted(nodes, "node"))
             }
         }
     }

@@ -275,7 +275,7 @@ impl Move {
         }
         for (position, (node, _)) in targets.iter().enumerate() {
             if targets[..position].iter().any(|(other, _)| other == node) {
-                return Err(Failure::usage(format!("node {node} gets two positions"))
+                return Err(Failure::usage(format!("two positions for node {node}"))
                     .at_node(*node)
                     .next("name each node once, with the position where it is to end"));
             }
@@ -470,7 +470,7 @@ impl GroupMoved {
     fn new(planned: &Planned, seen: Seen, guards: Vec<GuardReport>) -> Self {
         let axes = planned.axes.iter().zip(guards).enumerate().map(|(index, (axis, guard))| AxisMoved {
             node: axis.drive.node().id().raw(),
-            mode: axis.mode.name().unwrap_or("of its maker").to_owned(),
+            mode: axis.mode.name().unwrap_or("manufacturer-specific").to_owned(),
             from_deg: seen.from[index] * 360.0,
             to_deg: seen.to[index] * 360.0,
             at_deg: seen.at[index] * 360.0,

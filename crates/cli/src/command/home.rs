@@ -51,7 +51,7 @@ impl Home {
         {
             return Err(self.refusal(model, axis));
         }
-        let doing = format!("node {}: searching its reference", self.node);
+        let doing = format!("node {}: searching for its reference", self.node);
         let manner = Manner {
             speed: self.profile_velocity,
             within: Some(self.within),

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use testbench::document::read_bytes;
 use testbench::recording::{Kind, Recorded, picture, read};
+use testbench::words::counted;
 
 use super::dcf::is_stdout;
 use crate::failure::Failure;
@@ -146,7 +147,8 @@ impl Report for Drawn {
             return picture.trim_end().to_owned();
         }
         let files: Vec<String> = self.files.iter().map(|path| path.display().to_string()).collect();
-        let drawn = format!("{} signals and {} marks are drawn in {}", self.signals, self.marks, files.join(" and "));
+        let drawn =
+            format!("{}: {} and {}", files.join(" and "), counted(self.signals, "signal"), counted(self.marks, "mark"));
         let torn = "the end of the record is missing: its writer was killed, or is still running";
         if self.torn { format!("{drawn}\n{torn}") } else { drawn }
     }

@@ -16,6 +16,7 @@ use master::{Drive, Node};
 use serde::Serialize;
 use sim::Place;
 use testbench::recording::{Column, Kind, Mark, Severity, Subject};
+use testbench::words::counted;
 use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
 use testbench::words::unit::split_factor;
@@ -318,11 +319,13 @@ impl RecordReport {
     fn summary(&self, paint: Paint) -> String {
         let Self { file, node, samples, by_pdo, by_sdo, missing, duration_s, .. } = self;
         let mut text = format!(
-            "{}: {samples} samples of node {node} in {duration_s:.3} s, {by_pdo} values by PDO, {by_sdo} by SDO",
-            paint.strong(file)
+            "{}: {} of node {node} in {duration_s:.3} s, {} by PDO, {by_sdo} by SDO",
+            paint.strong(file),
+            counted(*samples, "sample"),
+            counted(*by_pdo, "value")
         );
         if *missing > 0 {
-            text.push_str(&format!("; {missing} values did not come"));
+            text.push_str(&format!("; {} did not come", counted(*missing, "value")));
         }
         text
     }

@@ -12,6 +12,7 @@ use cia402::object::CONTROLWORD;
 use master::decode::Decoder;
 use serde::Serialize;
 use testbench::models::with_files;
+use testbench::words::counted;
 use transport::log::{Direction, Entry, Record};
 
 use crate::command::dump::{no_log, open_log, unreadable};
@@ -300,12 +301,12 @@ impl Replay {
 impl Report for ReplayReport {
     fn text(&self, paint: Paint) -> String {
         let Self { file, sent, not_chosen, motion_skipped, motion_sent, passed_over, took_s } = self;
-        let mut text = format!("{} frames of {file} sent in {took_s:.3} s", paint.strong(&sent.to_string()));
+        let mut text = format!("{} of {file} sent in {took_s:.3} s", paint.strong(&counted(*sent, "frame")));
         for (count, what) in [
             (motion_sent, "of them may move a drive"),
             (motion_skipped, "that may move a drive left out"),
             (not_chosen, "not chosen"),
-            (passed_over, "places skipped"),
+            (passed_over, "not read as frames"),
         ] {
             if *count > 0 {
                 text.push_str(&format!("; {count} {what}"));

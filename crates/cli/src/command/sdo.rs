@@ -15,6 +15,7 @@ use crate::output::Report;
 use plot::Paint;
 use testbench::decode::{Decoded, decode};
 use testbench::document::read_bytes;
+use testbench::words::counted;
 use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
 use testbench::words::value::{Typed, typed_alone, typed_for};
@@ -175,7 +176,7 @@ async fn with_limits(drive: &Drive, error: Error, number: Option<i64>) -> Failur
     match limits.resolution.filter(|setting| number.is_some_and(|number| limits.take(number)) && setting.since_restart)
     {
         Some(setting) => failure.next(format!(
-            "{} has been written since the drive's last restart: until the next one its value before counts",
+            "{} has been written since the drive's last restart: until the next one, the value before it is in effect",
             setting.object
         )),
         None => failure,
@@ -237,7 +238,7 @@ impl Report for ObjectReport {
         }
         if let Some(file) = &self.file {
             let (bytes, to) = (self.value.length(), if self.written { "from" } else { "to" });
-            return format!("node {} {}{name}: {bytes} bytes {to} {file}", self.node, self.object);
+            return format!("node {} {}{name}: {} {to} {file}", self.node, self.object, counted(bytes, "byte"));
         }
         let verb = if self.written { " written:" } else { " =" };
         let cut = (self.value.is_cut() && !self.written).then(|| "-o FILE writes all of them into a file".to_owned());

@@ -88,6 +88,7 @@ fn lint_fails_for_errors_and_with_strict_for_warnings_too() {
     let ended = ferrodrive(&["eds", "lint", "--strict", &warned]);
     assert_eq!(ended.status, Some(1));
     assert!(ended.out.contains("a count is decimal"), "{}", ended.out);
+    assert!(ended.err.contains("1 of 1 file with errors or warnings"), "{}", ended.err);
     let ended = ferrodrive(&["eds", "lint", &clean, &wrong, &refused, "/nowhere.eds"]);
     assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("3 of 4 files with errors"), "{}", ended.err);
@@ -138,7 +139,7 @@ fn a_bomb_is_refused_at_its_line() {
     let ended = ferrodrive(&["eds", "show", &path]);
     assert_eq!(ended.status, Some(1));
     assert!(
-        ended.err.contains("line 40001 is not read as an EDS") && ended.err.contains("more than 40000 sections"),
+        ended.err.contains("line 40001 cannot be read as an EDS") && ended.err.contains("more than 40000 sections"),
         "{}",
         ended.err
     );

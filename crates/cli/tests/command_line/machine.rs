@@ -66,3 +66,15 @@ fn two_machine_files_are_refused() {
         );
     }
 }
+
+/// The values of a machine file are not a file of parameters: the remedy is a command that can be typed.
+#[test]
+fn what_deviates_from_a_machine_file_is_applied_with_that_file() {
+    let directory = scratch("machine_verified");
+    let file = directory.join("machine.toml");
+    std::fs::write(&file, format!("{ONE}heartbeat = '100ms'\n")).unwrap();
+    let ended = ferrodrive(&["--machine", file.to_str().unwrap(), "params", "verify", "9"]);
+    assert_eq!(ended.status, Some(1), "{}", ended.err);
+    assert!(ended.err.contains("1 of 1 object has another value than the machine file"), "{}", ended.err);
+    assert!(ended.err.contains("ferrodrive params apply 9, with the same machine file"), "{}", ended.err);
+}

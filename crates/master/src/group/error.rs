@@ -53,7 +53,7 @@ pub enum GroupError {
         node: NodeId,
     },
     /// A period that cannot be held.
-    #[error("a period of {} ms is outside of {} to {} ms", ms(*given), ms(*PERIODS.start()), ms(*PERIODS.end()))]
+    #[error("a period of {} ms is out of range: expected {} to {} ms", ms(*given), ms(*PERIODS.start()), ms(*PERIODS.end()))]
     Period {
         /// What was given.
         given: Duration,
@@ -104,7 +104,7 @@ pub enum GroupError {
     },
     /// An option of a stream that bounds nothing, or that cannot be met.
     #[error(
-        "a stream's {option} of {given} is outside of {least} to {most}: nothing is moved. Cycles without a point are bounded by \
+        "a stream's {option} of {given} is out of range, expected {least} to {most}: nothing is moved. Cycles without a point are bounded by \
          100 ms, and points that are waited for by the capacity"
     )]
     StreamOption {

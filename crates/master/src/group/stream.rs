@@ -278,9 +278,15 @@ mod tests {
             "a stream's grace of 101 is outside of 0 to 100: nothing is moved. Cycles without a point are bounded by 100 ms, and \
              points that are waited for by the capacity"
         );
-        assert!(refused(StreamOptions { capacity: 0, ..good }).contains("capacity of 0 is outside of 1 to 60000"));
+        assert!(
+            refused(StreamOptions { capacity: 0, ..good })
+                .contains("capacity of 0 is out of range, expected 1 to 60000")
+        );
         // More than there is room for would never be there.
-        assert!(refused(StreamOptions { prefill: 251, ..good }).contains("prefill of 251 is outside of 0 to 250"));
+        assert!(
+            refused(StreamOptions { prefill: 251, ..good })
+                .contains("prefill of 251 is out of range, expected 0 to 250")
+        );
         // A cycle of grace at any period.
         StreamOptions { grace: 1, ..good }.check(0.1).unwrap();
         assert!(StreamOptions { grace: 2, ..good }.check(0.1).is_err());

@@ -56,7 +56,7 @@ class Parameters:
     def diff(self, file: Optional[File] = None) -> DiffReport:
         """In what the node and a file differ; ``first`` is the node, ``second`` the file.
 
-        :raises MasterError: the file is not read as parameters, or the node does not answer
+        :raises MasterError: the file cannot be read as parameters, or the node does not answer
 
         >>> parameters.diff("slow.toml")["differences"][0]["object"]
         '6081h:00'

@@ -9,6 +9,7 @@ use sim::machine::models;
 
 use super::finding::{Place, Reporter, Severity};
 use crate::data_sheet::{self, Unread};
+use crate::words::counted;
 
 /// A data sheet, and the model that it fits best.
 pub(super) struct Device {
@@ -39,7 +40,7 @@ pub(super) fn read(path: &Path, at: Place, report: &mut Reporter<'_>) -> Option<
     };
     let errors = reading.findings.count(LintSeverity::Error);
     if errors > 0 {
-        let what = format!("{shown} has {errors} errors, for which strict tools such as dcfgen refuse it");
+        let what = format!("{shown} has {}, for which strict tools such as dcfgen refuse it", counted(errors, "error"));
         report.say(Severity::Warning, at, what, format!("ferrodrive eds lint {shown}"));
     }
     let model = model_of(&reading.eds);

@@ -107,7 +107,7 @@ pub(super) fn of_bus_yml(bus: &Bus, devices: &[Option<Device>]) -> Result<Intend
             writes,
         };
         if node == own || nodes.insert(node, intended).is_some() {
-            return Err(format!("node-ID {node} is there twice"));
+            return Err(format!("two nodes have the node-ID {node}"));
         }
     }
     let ms = |ms: i64| u32::try_from(ms).ok().filter(|ms| *ms > 0).map(|ms| Duration::from_millis(ms.into()));

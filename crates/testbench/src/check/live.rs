@@ -68,7 +68,7 @@ pub(super) async fn ask(
         let expectation = intended.plan.nodes.get(id);
         if let Err(error) = look(&node, place, expectation, &mut live, report).await {
             report.rule = "live-silent";
-            let next = "look at its supply, its cable, its node-ID and the bit rate: ferrodrive scan";
+            let next = "check its supply, its cable, its node-ID and the bit rate: ferrodrive scan";
             report.say(Severity::Error, place.at, format!("on the bus: {error}"), next);
         }
         all.push(live);
@@ -110,7 +110,8 @@ async fn look(
             let found = found.map_or_else(|| "does not have it".to_owned(), |found| format!("has {found:X}h"));
             let what =
                 format!("on the bus: {object} is expected to be {wanted:X}h, and the device {found}: it will not boot");
-            let next = "another device or firmware is there than the file expects: exchange it, or correct the file";
+            let next =
+                "the device or its firmware is not the one that the file expects: replace it, or correct the file";
             report.say(Severity::Error, place.at, what, next);
         }
     }
@@ -147,7 +148,12 @@ fn strangers(intended: &Intended, network: &Network, report: &mut Reporter<'_>) 
     let is_known = |node: &NodeId| *node == intended.plan.own || intended.nodes.contains_key(node);
     for node in NodeId::all().filter(|node| seen.contains(*node) && !is_known(node)) {
         let what = format!("on the bus: node {node} is heard, which the file does not have");
-        report.say(Severity::Warning, intended.at, what, "add it to the file, or look who that is: ferrodrive scan");
+        report.say(
+            Severity::Warning,
+            intended.at,
+            what,
+            "add it to the file, or find out which device it is: ferrodrive scan",
+        );
     }
 }
 

@@ -159,20 +159,21 @@ fn traps(node: NodeId, place: &IntendedNode, report: &mut Reporter<'_>) {
             Severity::Warning,
             place.place_of(Some(PRODUCER_HEARTBEAT_TIME)),
             what,
-            "set `heartbeat` to 100ms to 500ms",
+            "set `heartbeat`, from 100ms to 500ms",
         );
     }
     report.rule = "host-watch";
     match place.description.host_watch {
         HostWatch::None if place.description.first_axis().is_some() => {
-            let what = format!("the {title} does not watch its host: when the master dies, it goes on");
+            let what = format!("the {title} does not watch its host: when the master dies, it keeps moving");
             let next = "stop it by other means than the bus: an input, or its supply";
             report.say(Severity::Note, place.at, what, next);
         }
         HostWatch::Silence { time: object } | HostWatch::Heartbeat { consumer: object, .. }
             if number(object).is_some_and(|value| value & 0xFFFF == 0) =>
         {
-            let what = format!("its watch over the host is switched off ({object}): when the master dies, it goes on");
+            let what =
+                format!("its watch over the host is switched off ({object}): when the master dies, it keeps moving");
             let next = format!("leave {object} out, or give it a time");
             report.say(Severity::Warning, place.place_of(Some(object)), what, next);
         }

@@ -17,6 +17,7 @@ use sim::{World, block_on_for};
 use super::finding::{Place, Reporter, Severity};
 use super::intended::{Intended, IntendedNode, MovedAt};
 use crate::machine_file::{Machine, TOLERANCE, too_full_at};
+use crate::words::counted;
 
 /// What a bus will do.
 #[derive(Clone, Debug, Serialize)]
@@ -257,8 +258,8 @@ fn of_plan(
     } else if let Some(first) = late.first() {
         let node = first.node.map(|node| format!(" of node {node}")).unwrap_or_default();
         let what = format!(
-            "{} frames may be later than their period at {rate} kbit/s and a cycle of {cycle} us, {}{node} first (bus load {percent:.0} %)",
-            late.len(),
+            "{} may miss the period at {rate} kbit/s and a cycle of {cycle} us, {}{node} first (bus load {percent:.0} %)",
+            counted(late.len(), "frame"),
             first.purpose
         );
         report.say(Severity::Warning, intended.at, what, next);

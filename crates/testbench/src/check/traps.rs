@@ -151,7 +151,7 @@ fn heartbeat(case: &Case<'_>, report: &mut Reporter<'_>) {
         }
         Some(time) if time >= 1000 => {
             let what = format!(
-                "a heartbeat each {time} ms: the master waits for one behind the configuration, and its first attempts to boot the node fail"
+                "a heartbeat every {time} ms: the master waits for one after the configuration, and its first attempts to boot the node fail"
             );
             report.say(Severity::Warning, at, what, "set `heartbeat_producer` to 100 to 500 (ms)");
         }

@@ -221,7 +221,7 @@ fn place(node: u8, axis: Option<u8>) -> Result<Place, ControlError> {
     let text = format!("{node}.{}", axis.unwrap_or(1));
     text.parse().map_err(|()| {
         ControlError::usage(format!(
-            "there is no node {node}, axis {}; expected a node of 1 to 127, and an axis from 1",
+            "there is no node {node}, axis {}; expected a node from 1 to 127, and an axis from 1",
             axis.unwrap_or(1)
         ))
     })

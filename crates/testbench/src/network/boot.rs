@@ -159,7 +159,7 @@ impl Planned {
         match ending.as_deref().and_then(|ending| ending.to_str()) {
             Some("toml") => Ok(Self::Machine(path.to_owned(), Box::new(read_machine(path)?))),
             Some("dcf" | "eds") => Ok(Self::Manager(values(path)?)),
-            _ => Err(Failure::usage(format!("what kind of file is {}?", path.display()))
+            _ => Err(Failure::usage(format!("cannot tell what kind of file {} is", path.display()))
                 .next("expected a machine file, FILE.toml, or the DCF of a CANopen manager, FILE.dcf")),
         }
     }

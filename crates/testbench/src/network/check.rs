@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::check::{self, Checked, CheckedNode, Finding, LiveNode, Prediction, Severity};
 use crate::document::{BadFile, read_text};
 use crate::failure::{Failure, FailureBody};
+use crate::words::counted;
 use crate::words::plain;
 
 /// What was found.
@@ -45,7 +46,7 @@ pub fn read(path: &Path) -> Result<Checked, Failure> {
         "yml" | "yaml" => read_as(path, check::of_bus_yml, "docs/handbook/ros2-canopen.md has a bus.yml that boots"),
         "toml" => read_as(path, check::of_machine, "docs/machine-file.md describes each key"),
         _ => Err(Failure::usage(format!("'{}' is neither NAME.yml nor NAME.toml", plain(&file)))
-            .because("the ending decides what it is: a bus.yml of ros2_canopen, or a machine file")
+            .because("the extension decides what it is: a bus.yml of ros2_canopen, or a machine file")
             .next("ferrodrive eds lint FILE checks a data sheet")),
     }
 }
@@ -93,7 +94,8 @@ impl CheckReport {
     /// Why the command fails, if it does.
     pub fn failure(&self, strict: bool) -> Option<Failure> {
         let bad = self.errors + if strict { self.warnings } else { 0 };
-        let what = format!("{}: {bad} of {} findings have to be corrected", plain(&self.file), self.findings.len());
+        let what =
+            format!("{}: {bad} of {} to be corrected", plain(&self.file), counted(self.findings.len(), "finding"));
         (bad > 0).then(|| Failure::new(what).of_kind("check").next("each line above says what to do"))
     }
 }

@@ -214,7 +214,7 @@ impl InitReport {
             failure.because(format!("node {}: {}", node.node, alternatives(&node.models)))
         });
         let example = first.models.first().map_or("FILE.eds", String::as_str);
-        let failure = failure.next(format!("say which it is: --model {}={example}", first.node));
+        let failure = failure.next(format!("name its model: --model {}={example}", first.node));
         Some(failure.next("or choose in the file, and remove the # of its lines"))
     }
 }
@@ -228,7 +228,7 @@ fn here(node: NodeId, models: &[&str]) -> String {
 /// Which models a node may be, in words.
 fn alternatives(models: &[String]) -> String {
     match models {
-        [] => "no model that is known here; its data sheet would do (FILE.eds)".to_owned(),
+        [] => "not a known model; give its data sheet (FILE.eds)".to_owned(),
         [one] => format!("it may be {one}"),
         several => format!("it may be one of {}", several.join(", ")),
     }

@@ -92,7 +92,7 @@ impl ScannedNode {
         match (&self.nmt_state, self.heartbeat_ms) {
             (Some(state), _) => state.clone(),
             (None, Some(0)) => "sends no heartbeat".into(),
-            (None, Some(ms)) => format!("heartbeat each {ms} ms, not heard yet"),
+            (None, Some(ms)) => format!("heartbeat every {ms} ms, not heard yet"),
             (None, None) => "no heartbeat heard".into(),
         }
     }
@@ -102,14 +102,14 @@ impl ScannedNode {
 fn contradiction(known: &'static Description, found: &Found) -> Option<String> {
     let said = format!("it is stated to be a {}", known.name);
     if !found.identity?.matches(&known.identity) {
-        return Some(format!("{said}, but its identity is another one: say the right model"));
+        return Some(format!("{said}, but its identity is that of another model: name the right one"));
     }
     let guess = found.knowledge.guess()?;
     let evidence = guess.evidence().filter(|_| guess.fitting().all(|model| model.name != known.name))?;
     // A data sheet that has the object too is not spoken against.
     let evidence = known.row(evidence).is_none().then_some(evidence)?;
     let fitting = guess.description().name;
-    Some(format!("{said}, but has {evidence} as a {fitting} has: say the right model"))
+    Some(format!("{said}, but has {evidence}, as a {fitting} has: name the right model"))
 }
 
 /// What is not certain, and what the user can do about it.
@@ -119,7 +119,7 @@ fn remark(found: &Found, doubt: String, say: impl Fn(NodeId, &[&str]) -> String)
         Knowledge::Guessed(guess) => guess.fitting().map(|model| model.name).collect(),
         Knowledge::Unknown => found.models.iter().map(|model| model.name).collect(),
     };
-    if candidates.is_empty() { doubt } else { format!("{doubt}. Say which: {}", say(found.node, &candidates)) }
+    if candidates.is_empty() { doubt } else { format!("{doubt}. Name its model: {}", say(found.node, &candidates)) }
 }
 
 /// That no node is on the bus, with what was heard all the same.

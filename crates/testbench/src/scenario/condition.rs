@@ -469,7 +469,12 @@ fn of_node(place: Place, words: &[&str]) -> Result<Condition, String> {
             signal(name)?;
             return Err(wrong(FORMS[0]));
         }
-        [] => return Err(format!("what about node {place}? expected: {}", FORMS[..NODE_FORMS].join("; "))),
+        [] => {
+            return Err(format!(
+                "a condition of node {place} is missing; expected: {}",
+                FORMS[..NODE_FORMS].join("; ")
+            ));
+        }
     })
 }
 

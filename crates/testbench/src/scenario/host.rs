@@ -135,7 +135,7 @@ impl HostTask {
     }
 
     fn drive(&self, place: Place) -> Result<Drive, String> {
-        let id = NodeId::new(place.node).ok_or("expected a node of 1 to 127")?;
+        let id = NodeId::new(place.node).ok_or("expected a node from 1 to 127")?;
         let drive = self.machine.drive(self.network.node(id));
         drive.axis(place.axis).map_err(|error| error.to_string())
     }

@@ -12,6 +12,13 @@ pub mod unit;
 pub mod unresolved;
 pub mod value;
 
+/// A number and what there are so many of: `1 value`, `2 values`.
+pub fn counted(count: impl TryInto<u64>, what: &str) -> String {
+    // A number beyond 64 bits counts nothing that there is.
+    let count = count.try_into().unwrap_or(u64::MAX);
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
 /// `text` with its control characters escaped, but for the ends of lines: file names, machine files and commands may carry
 /// sequences that a terminal obeys.
 pub fn plain(text: &str) -> String {
@@ -24,4 +31,15 @@ pub fn plain(text: &str) -> String {
         }
     }
     shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::counted;
+
+    #[test]
+    fn one_is_singular_and_any_other_number_plural() {
+        let said = [0, 1, 2, 1001].map(|count: usize| counted(count, "value"));
+        assert_eq!(said, ["0 values", "1 value", "2 values", "1001 values"]);
+    }
 }

@@ -80,10 +80,11 @@ pub fn typed_for(row: &Entry, text: &str, resolution: i64) -> Result<Typed, Stri
 /// A VISIBLE_STRING. Source: CiA 301, 7.1.6.2.
 fn visible(text: &str) -> Result<Typed, String> {
     match text.chars().find(|character| !matches!(character, ' '..='~')) {
-        Some(character) => {
-            Err(format!("'{}' has no place in a VISIBLE_STRING: 20h to 7Eh only", character.escape_default()))
-        }
-        None if text.is_empty() => Err("a text needs a character at least".into()),
+        Some(character) => Err(format!(
+            "'{}' cannot be in a VISIBLE_STRING; expected characters from 20h to 7Eh",
+            character.escape_default()
+        )),
+        None if text.is_empty() => Err("expected a text of one character or more".into()),
         None => Ok(Typed::Bytes(text.as_bytes().to_vec())),
     }
 }
@@ -156,7 +157,7 @@ fn with_unit(row: &Entry, text: &str, number: f64, unit: &str) -> Result<i64, St
     let expected = || format!("expected {} in a unit of {}, or a whole number of them", row.mux(), row.unit);
     let given = Unit::named(unit).ok_or_else(|| format!("'{text}' is not a value; {}", expected()))?;
     if given.dimension != own.dimension {
-        return Err(format!("'{unit}' does not measure what {} holds; {}", row.mux(), expected()));
+        return Err(format!("'{unit}' is not a unit of {}; {}", row.mux(), expected()));
     }
     let counts = number * given.factor / own.factor;
     let whole = counts.round();

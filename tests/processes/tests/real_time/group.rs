@@ -78,7 +78,7 @@ fn a_group_of_the_file_holds_the_axes_that_are_not_named_and_keeps_to_its_softwa
 
 #[test]
 fn what_is_no_group_move_is_refused() {
-    refused(&["group", "move", "1=90deg", "1=0deg"], 2, "node 1 gets two positions");
+    refused(&["group", "move", "1=90deg", "1=0deg"], 2, "two positions for node 1");
     refused(&["group", "move", "90deg"], 2, "expected a machine file, FILE.toml, or NODE=POSITION");
     refused(&["group", "move", "4=NaN"], 2, "does not begin with a number");
     refused(&["group", "move", "4=1turn", "--acceleration", "300ms"], 2, "expected a rate above 0");

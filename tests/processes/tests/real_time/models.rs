@@ -59,9 +59,9 @@ fn a_scan_says_that_it_cannot_tell_and_how_the_user_can() {
     for part in [
         "node 1: cannot tell: m4230e17b50, m4230e17b80, m8025e25b50 and m8025e25b80 answer the same identity and have",
         "node 2: cannot tell: zlac8030l, zlim42c and zlim42c-82 answer the same identity; it has 2069h:00 as zlim42c",
-        "Say which: --model 2=zlim42c",
+        "Name its model: --model 2=zlim42c",
         "node 4: cannot tell: zlac8030l, zlim42c and zlim42c-82 answer the same identity; it has 2029h:00 as zlac8030l has",
-        "Say which: --model 4=zlac8030l, or a machine file",
+        "Name its model: --model 4=zlac8030l, or a machine file",
     ] {
         assert!(text.contains(part), "{part:?} in {text}");
     }

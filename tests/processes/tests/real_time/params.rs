@@ -304,7 +304,7 @@ fn a_journal_of_another_device_or_half_a_one_is_refused() {
     let ended = served.run(&["params", "rollback", "4"]);
     assert!(ended.status == Some(1) && ended.err.contains("product ABCh"), "{}", ended.err);
     let ended = served.run(&["params", "rollback", "5", "ferrodrive-node4.journal"]);
-    assert!(ended.status == Some(1) && ended.err.contains("is of node 4"), "{}", ended.err);
+    assert!(ended.status == Some(1) && ended.err.contains("belongs to node 4"), "{}", ended.err);
 }
 
 #[test]
@@ -343,7 +343,7 @@ fn what_a_pdo_cannot_carry_is_said_before_anything_is_written() {
         (&["tpdo1=statusword", "tpdo2=6064", "--id", "0x185"], "--id takes one PDO"),
         (&["tpdo1"], "expected a PDO and its objects"),
         (&["pdo1=statusword"], "is not a PDO; expected tpdo1"),
-        (&[], "which PDOs?"),
+        (&[], "expected the PDOs to configure"),
     ] {
         let ended = ferrodrive(&[&["pdo", "apply", "4"], asked].concat());
         assert!(ended.status == Some(2) && ended.err.contains(said), "{asked:?}: {:?} {}", ended.status, ended.err);

@@ -29,7 +29,7 @@ fn a_scan_tells_who_beats_each_second_who_never_and_who_has_not_been_heard_yet()
 
     on_bus(&["--model", "4=zlac8030l", "write", "4", "1017", "30000"]);
     let text = on_bus(&["--timeout", "1s", "scan"]).out;
-    assert!(text.contains("heartbeat each 30000 ms, not heard yet"), "{text}");
+    assert!(text.contains("heartbeat every 30000 ms, not heard yet"), "{text}");
 }
 
 fn dump(log: &Path, arguments: &[&str]) -> Ended {
@@ -72,11 +72,7 @@ fn a_line_that_is_no_frame_is_told_with_its_number_and_passed_over() {
     assert_eq!(shown.out.lines().count(), 4, "{}", shown.out);
     assert!(shown.out.contains("CAN FD frame 604 with 4 bytes passed over"), "{}", shown.out);
     assert!(shown.err.contains("warning: line 3 passed over, '(1.15) can0 60'"), "{}", shown.err);
-    assert!(
-        shown.err.contains("line 5") && shown.err.contains("3 frames read; 2 places were skipped"),
-        "{}",
-        shown.err
-    );
+    assert!(shown.err.contains("line 5") && shown.err.contains("3 frames read; 2 places skipped"), "{}", shown.err);
 
     let shown = dump(&log, &["--json"]);
     let rows: Vec<Value> = shown.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();

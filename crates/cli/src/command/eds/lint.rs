@@ -11,6 +11,7 @@ use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
 use plot::Table;
+use testbench::words::counted;
 
 /// Check EDS and DCF files: report errors with their lines, and what is used instead
 ///
@@ -92,8 +93,8 @@ impl LintReport {
         let count = self.files.iter().filter(bad).count();
         let of = self.files.len();
         let what = if strict { "errors or warnings" } else { "errors" };
-        let failure = Failure::new(format!("{count} of {of} files with {what}"));
-        let next = "the table above has the lines; CiA 306 defines the format";
+        let failure = Failure::new(format!("{count} of {} with {what}", counted(of, "file")));
+        let next = "correct the lines listed above; CiA 306 defines the format";
         (count > 0).then(|| match self.files.iter().find_map(|file| file.unread.as_ref()) {
             None => failure.of_kind("lint").next(next),
             Some(unread) => {
@@ -146,7 +147,8 @@ impl OfFile {
             _ => paint.bad(&counts),
         };
         let file = plain(&self.file);
-        let head = format!("{file}: {} objects with {} values; {counts}", self.objects, self.values);
+        let head =
+            format!("{file}: {} with {}; {counts}", counted(self.objects, "object"), counted(self.values, "value"));
         if self.findings.is_empty() {
             return head;
         }
@@ -180,10 +182,6 @@ impl Row {
             taken_instead: finding.taken_instead.clone(),
         }
     }
-}
-
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 impl Report for LintReport {

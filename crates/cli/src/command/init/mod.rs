@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use can::Bitrate;
 use plot::Paint;
 use testbench::network::init::{InitNode, InitReport};
+use testbench::words::counted;
 use testbench::words::drive::{DriveSpec, drive_spec};
 use testbench::words::unresolved::Unresolved;
 use transport::BusSpec;
@@ -141,7 +142,7 @@ impl Report for InitReport {
         match &self.file {
             None => self.toml.trim_end().to_owned(),
             Some(file) => {
-                let drives = if self.nodes.len() == 1 { "1 drive" } else { &format!("{} drives", self.nodes.len()) };
+                let drives = counted(self.nodes.len(), "drive");
                 format!("{}: {drives}; next: ferrodrive check {0}", plain(file))
             }
         }

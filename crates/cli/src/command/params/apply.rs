@@ -4,6 +4,7 @@ use canopen::NodeId;
 use master::Drive;
 use master::parameters::Parameters;
 use testbench::network::params::{ApplyReport, LeftOut, Proof, Transaction};
+use testbench::words::counted;
 
 use super::journal::{default_path, note_kept};
 use super::{Prove, source};
@@ -80,7 +81,11 @@ impl Report for ApplyReport {
         let file = plain(&self.file);
         let mut lines = vec![match self.writes {
             0 => format!("node {} already has the values of {file}: nothing was written", self.node),
-            writes => format!("node {}: {writes} writes done and read back; it has the values of {file}", self.node),
+            writes => format!(
+                "node {}: {} done and read back; it has the values of {file}",
+                self.node,
+                counted(writes, "write")
+            ),
         }];
         for rounded in &self.rounded {
             lines.push(format!(

@@ -2,6 +2,7 @@
 
 use testbench::network::params::{BackupReport, back_up, bytes_of};
 use testbench::parameters::{Form, sheet};
+use testbench::words::counted;
 
 use crate::command::dcf::{is_stdout, keep, new_file, of_parameters};
 use crate::context::Context;
@@ -45,7 +46,7 @@ impl Report for BackupReport {
             return parameters.trim_end().to_owned();
         }
         let file = self.file.as_deref().map(plain).unwrap_or_default();
-        let mut text = format!("{file}: {} values of node {}", self.values, self.node);
+        let mut text = format!("{file}: {} of node {}", counted(self.values, "value"), self.node);
         for refused in &self.refused {
             text += &format!(
                 "\n  {} {} is not in the file: {}",

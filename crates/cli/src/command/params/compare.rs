@@ -5,6 +5,7 @@ use std::path::Path;
 use testbench::network::params::{
     DiffReport, Shown, VerifyReport, diff_of_files, diff_of_node, source as files, verify_node,
 };
+use testbench::words::counted;
 use testbench::words::node::node;
 
 use super::source;
@@ -52,7 +53,12 @@ impl Report for DiffReport {
 impl Report for VerifyReport {
     fn text(&self, paint: Paint) -> String {
         if self.ok {
-            return format!("node {} has the values of {}: {} objects", self.node, plain(&self.file), self.compared);
+            return format!(
+                "node {} has the values of {}: {}",
+                self.node,
+                plain(&self.file),
+                counted(self.compared, "object")
+            );
         }
         let mut table = Table::new(&["object", "name", "should be", "is"]);
         for row in &self.deviations {

@@ -4,6 +4,7 @@ use std::io::Write;
 
 pub(in crate::command) use testbench::network::params::journal::{Kept, default_path};
 use testbench::network::params::journal::{RollbackReport, read, roll_back_by};
+use testbench::words::counted;
 
 use crate::context::Context;
 use crate::failure::Failure;
@@ -23,13 +24,17 @@ impl super::Rollback {
         // Before the node is asked for: there may be nothing to go back to.
         let journal = read(&path, self.node)?;
         let drive = context.drive(self.node).await?;
-        context.progress.show(format!("node {}: writing {} values back", self.node, journal.undo.len()));
+        context.progress.show(format!("node {}: writing {} back", self.node, counted(journal.undo.len(), "value")));
         Ok(roll_back_by(&path, &drive).await?)
     }
 }
 
 impl Report for RollbackReport {
     fn text(&self, _: Paint) -> String {
-        format!("node {}: {} objects read as before; {} is deleted", self.node, self.put_back, plain(&self.journal))
+        {
+            let read = if self.put_back == 1 { "reads" } else { "read" };
+            let objects = counted(self.put_back, "object");
+            format!("node {}: {objects} {read} as before; {} is deleted", self.node, plain(&self.journal))
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use testbench::network::params::LeftOut;
 pub(in crate::command) use testbench::network::params::{PlanReport, plan_of};
+use testbench::words::counted;
 
 use super::source;
 use crate::context::Context;
@@ -37,7 +38,8 @@ impl Report for PlanReport {
                 ]);
             }
             lines.push(table.plain(paint));
-            lines.push(format!("\n{} values are already set", self.same));
+            let are = if self.same == 1 { "is" } else { "are" };
+            lines.push(format!("\n{} {are} already set", counted(self.same, "value")));
         }
         lines.extend(self.left.iter().map(LeftOut::text));
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));

@@ -15,6 +15,7 @@ use master::plan::{NodeTraffic, Settings, plan};
 use master::units::parse_duration;
 use serde::Serialize;
 use testbench::machine_file::{mapped, pdo_id};
+use testbench::network::params::source::MACHINE_FILE;
 use testbench::words::node::node;
 
 use crate::command::params::{PlanReport, Transaction, plan_of};
@@ -134,13 +135,13 @@ impl Wanted {
             let mut parameters = of_machine.unwrap_or_default();
             parameters.values.retain(|object, _| PdoId::of_object(object.index).is_some());
             if parameters.values.is_empty() {
-                return Err(Failure::usage("which PDOs?")
+                return Err(Failure::usage("expected the PDOs to configure")
                     .next(format!(
                         "name them, e.g. ferrodrive pdo plan {node} tpdo1=statusword,position_actual_value --type 1"
                     ))
                     .next("or give a machine file whose [[drive]] has pdos: --machine FILE.toml"));
             }
-            return Ok((parameters, "the machine file".to_owned()));
+            return Ok((parameters, MACHINE_FILE.to_owned()));
         }
         if self.id.is_some() && self.pdos.len() > 1 {
             return Err(Failure::usage("--id takes one PDO: two with the same identifier would disturb each other")

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use testbench::scenario::{Outcome, OutcomeReport, Runner, Scenario, Verdict, junit};
+use testbench::words::counted;
 
 use super::crew::Crew;
 use super::loaded::{Loaded, unbuildable, write};
@@ -135,12 +136,12 @@ impl SeveralReport<'_> {
     /// That a file cannot be used weighs more than that something is not as expected: nothing is known of it.
     fn failure(&self) -> Option<Failure> {
         let (failed, unusable) = (self.failed(), self.unusable());
-        let of = self.files.len();
+        let of = counted(self.files.len(), "scenario");
         let failure = match (unusable, failed) {
             (0, 0) => return None,
-            (0, _) => Failure::new(format!("{failed} of {of} scenarios failed")).of_kind("scenario"),
-            (_, 0) => Failure::bad_file(format!("{unusable} of {of} scenarios cannot be used")),
-            _ => Failure::bad_file(format!("{unusable} of {of} scenarios cannot be used, {failed} failed")),
+            (0, _) => Failure::new(format!("{failed} of {of} failed")).of_kind("scenario"),
+            (_, 0) => Failure::bad_file(format!("{unusable} of {of} cannot be used")),
+            _ => Failure::bad_file(format!("{unusable} of {of} cannot be used, {failed} failed")),
         };
         let first = self.each().find_map(|(file, result)| match result.as_ref()? {
             Ok(outcome) => RunReport::new(outcome, file).failure(),
@@ -205,7 +206,7 @@ impl Report for SeveralReport<'_> {
             (0, "FAILED" | "UNUSABLE") => Some(paint.bad(cell)),
             _ => None,
         };
-        let mut last = format!("{} of {} scenarios passed", self.passed(), self.files.len());
+        let mut last = format!("{} of {} passed", self.passed(), counted(self.files.len(), "scenario"));
         for (count, what) in [(self.failed(), "failed"), (self.unusable(), "cannot be used")] {
             if count > 0 {
                 last.push_str(&format!(", {count} {what}"));

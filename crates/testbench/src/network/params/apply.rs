@@ -15,6 +15,7 @@ use super::{LeftOut, is_kept, notes, source};
 use crate::failure::Failure;
 use crate::network::Progress;
 use crate::parameters::journal::Journal;
+use crate::words::counted;
 
 /// How long after its boot-up message a drive is left alone.
 const SETTLED: Duration = Duration::from_millis(100);
@@ -111,9 +112,9 @@ impl Transaction {
             let found = source::found(displaced);
             let found = found.map_or_else(|why| why, |bytes| Shown::new(model, displaced.object, bytes).text);
             let object = displaced.object;
-            report
-                .notes
-                .push(format!("{object} was as wanted, and is {found} after all writes: another object moves it"));
+            report.notes.push(format!(
+                "{object} had the wanted value, and has {found} after all writes: writing another object changed it"
+            ));
         }
         if self.save {
             progress.show(format!("node {id}: storing"));
@@ -177,7 +178,8 @@ impl Transaction {
             }
         };
         booted.map_err(|error| {
-            Failure::from(error).because("the parameters are written and stored, and that is not proved")
+            Failure::from(error)
+                .because("the parameters are written and stored, but were not read again after a restart")
         })?;
         drive.node().network().sleep(SETTLED).await;
         let model = drive.description();
@@ -188,7 +190,9 @@ impl Transaction {
             return Ok(how);
         }
         let many = deviations.len();
-        let failure = Failure::new(format!("node {id}: after {how} {many} objects have other values than were stored"));
+        let have = if many == 1 { "has another value than was" } else { "have other values than were" };
+        let objects = counted(many, "object");
+        let failure = Failure::new(format!("node {id}: after {how}, {objects} {have} stored"));
         let failure = deviations.iter().fold(failure.of_kind("not_stored").at_node(id), |failure, deviation| {
             let found = source::found(deviation);
             let found = found.map_or_else(|why| why, |bytes| Shown::new(model, deviation.object, bytes).text);
@@ -217,7 +221,7 @@ fn refused(error: &ApplyError, model: Option<&'static Description>, path: &Path)
     let named = name(model, error.object).map(|name| format!(" {name}")).unwrap_or_default();
     let value = Shown::new(model, error.object, &error.value).text;
     let what = format!(
-        "node {}: write {} of {}, {}{named} = {value} ({}), was not done",
+        "node {}: write {} of {}, {}{named} = {value} ({}), failed",
         error.node, error.step, error.of, error.object, error.purpose
     );
     let mut failure = Failure::new(what).of_kind("rolled_back").at_node(error.node).at_object(error.object);
@@ -241,6 +245,6 @@ fn refused(error: &ApplyError, model: Option<&'static Description>, path: &Path)
 
 /// The values act, and are not kept.
 fn unsaved(error: master::Error, report: &ApplyReport) -> Failure {
-    let written = format!("{} values were written and act now; they are not stored", report.writes);
+    let written = format!("{} written, in effect now, and not stored", counted(report.writes, "value"));
     Failure::from(error).because(written).next(format!("ferrodrive save {}", report.node))
 }

@@ -11,7 +11,9 @@ use serde::Serialize;
 
 use super::shown::{Shown, name};
 use super::source;
+use super::source::MACHINE_FILE;
 use crate::failure::Failure;
+use crate::words::counted;
 use crate::words::plain;
 
 /// In what two sets of parameters differ.
@@ -162,12 +164,16 @@ impl VerifyReport {
     pub fn failure(&self) -> Option<Failure> {
         let many = self.deviations.len();
         (!self.ok).then(|| {
-            Failure::new(format!(
-                "node {}: {many} of {} objects have another value than the file",
-                self.node, self.compared
-            ))
-            .of_kind("deviates")
-            .next(format!("ferrodrive params apply {} {}", self.node, plain(&self.file)))
+            let have = if many == 1 { "has another value" } else { "have other values" };
+            let of = counted(self.compared, "object");
+            let next = if self.file == MACHINE_FILE {
+                format!("ferrodrive params apply {}, with the same machine file", self.node)
+            } else {
+                format!("ferrodrive params apply {} {}", self.node, plain(&self.file))
+            };
+            Failure::new(format!("node {}: {many} of {of} {have} than {}", self.node, plain(&self.file)))
+                .of_kind("deviates")
+                .next(next)
         })
     }
 }

@@ -43,9 +43,9 @@ impl Kept {
                 return Err(Failure::new(format!("{} is there already; nothing was written", path.display()))
                     .of_kind("journal_exists")
                     .at_node(journal.node)
-                    .because("an earlier apply has not come to its end, or one is running now")
-                    .next(format!("go back first: ferrodrive params rollback {} {}", journal.node, path.display()))
-                    .next("or delete that file, if the node is to stay as it is"));
+                    .because("an earlier apply was not completed, or one is running now")
+                    .next(format!("undo it first: ferrodrive params rollback {} {}", journal.node, path.display()))
+                    .next("or delete that file to keep the node as it is"));
             }
             Err(error) => return Err(Failure::of_writing("the journal", path, &error)),
         };
@@ -69,7 +69,7 @@ impl Drop for Kept {
     fn drop(&mut self) {
         if !self.is_done {
             (self.on_drop)(&format!(
-                "the writes to node {} have not come to their end; go back: ferrodrive params rollback {0} {}",
+                "the writes to node {} were not completed; to undo them: ferrodrive params rollback {0} {}",
                 self.node,
                 plain(&self.path.display().to_string())
             ));
@@ -81,7 +81,7 @@ fn remove(path: &Path) -> Result<(), Failure> {
     std::fs::remove_file(path).map_err(|error| {
         Failure::new(format!("cannot delete the journal {}", path.display()))
             .because(error)
-            .next("delete it by hand: it leads back to what the node had before")
+            .next("delete it by hand: a rollback with it would write what the node had before")
     })
 }
 
@@ -143,20 +143,24 @@ pub fn read(path: &Path, node: NodeId) -> Result<Journal, Failure> {
         return Err(Failure::new(format!("there is no journal {}", path.display()))
             .of_kind("no_journal")
             .at_node(node)
-            .because("every apply to this node from this folder has come to its end, or it had another --journal")
+            .because("every apply to this node from this folder was completed, or had another --journal")
             .next("name the journal, or write parameters that were kept: ferrodrive params apply NODE FILE"));
     }
     let unusable = |reason: String| {
-        Failure::new(format!("{} is not read as a journal; nothing was written", path.display()))
+        Failure::new(format!("cannot read {} as a journal; nothing was written", path.display()))
             .of_kind("bad_journal")
             .because(reason)
-            .next("an apply that was broken off while it wrote its journal had not written to the node: delete the file then")
+            .next("an apply that was interrupted while it wrote its journal had not written to the node: then delete the file")
     };
     let text = read_text(path).map_err(unusable)?;
     let journal = Journal::parse(&text).map_err(|bad| unusable(bad.named(path.display().to_string()).to_string()))?;
     if journal.node != node {
-        return Err(Failure::bad_file(format!("{} is of node {}, not of node {node}", path.display(), journal.node))
-            .next(format!("ferrodrive params rollback {} {}", journal.node, path.display())));
+        return Err(Failure::bad_file(format!(
+            "{} belongs to node {}, not to node {node}",
+            path.display(),
+            journal.node
+        ))
+        .next(format!("ferrodrive params rollback {} {}", journal.node, path.display())));
     }
     Ok(journal)
 }

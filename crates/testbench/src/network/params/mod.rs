@@ -165,7 +165,7 @@ fn notes(plan: &Plan, model: Option<&'static Description>) -> Vec<String> {
     if let Some(revision) = plan.other_revision {
         let found = plan.identity.revision_number.unwrap_or_default();
         notes.push(format!(
-            "the file is of revision {revision:X}h, the node has {found:X}h: the same behaviour on the bus by CiA 301, 7.5.2.21"
+            "the file is for revision {revision:X}h, the node has {found:X}h: the same behaviour on the bus by CiA 301, 7.5.2.21"
         ));
     }
     let Some(model) = model else { return notes };
@@ -217,7 +217,7 @@ pub async fn plan_of(
     let changed = plan.wanted.keys().filter(|object| plan.steps.iter().any(|step| step.object == **object)).count();
     let mut notes = notes(&plan, model);
     if drive.check_at_rest().await.is_err() {
-        notes.push(format!("the drive is at work: apply will refuse it until ferrodrive disable {id}"));
+        notes.push(format!("the drive is enabled: apply refuses it until it is disabled (ferrodrive disable {id})"));
     }
     let (same, left) = (plan.wanted.len() - changed, LeftOut::of(model, &plan));
     Ok(PlanReport { node: id.raw(), file, same, steps: steps.collect(), left, notes })

@@ -9,14 +9,18 @@ use master::parameters::{Deviation, Parameters, PlanError, Unfit};
 use crate::failure::Failure;
 use crate::machine_file::Machine;
 use crate::parameters::Unread;
+use crate::words::counted;
+
+/// The source of parameters that no file of their own has.
+pub const MACHINE_FILE: &str = "the machine file";
 
 /// Reads a file for a node. What the file has of another node of the same model follows this one's node-ID.
 ///
 /// # Errors
-/// It is not read as parameters.
+/// It cannot be read as parameters.
 pub fn read(path: &Path, model: Option<&'static Description>, node: Option<NodeId>) -> Result<Parameters, Failure> {
     let unreadable = |unread| {
-        let what = format!("{} is not read as parameters", path.display());
+        let what = format!("cannot read {} as parameters", path.display());
         let (failure, reason) = match unread {
             Unread::Name(reason) => (Failure::usage(what), reason),
             Unread::File(reason) => (Failure::bad_file(what), reason),
@@ -24,7 +28,7 @@ pub fn read(path: &Path, model: Option<&'static Description>, node: Option<NodeI
         };
         failure
             .because(reason)
-            .next("nothing was written; mend the file, or make one: ferrodrive params backup NODE -o FILE.toml")
+            .next("nothing was written; correct the file, or make one: ferrodrive params backup NODE -o FILE.toml")
     };
     let reader = node.unwrap_or(NodeId::MIN);
     let parameters = crate::parameters::read(path, model, reader).map_err(unreadable)?;
@@ -41,10 +45,10 @@ pub fn read(path: &Path, model: Option<&'static Description>, node: Option<NodeI
 pub fn of_machine(machine: &Machine, node: NodeId) -> Result<(Parameters, String), Failure> {
     let found = machine.parameters(node).filter(|parameters| !parameters.values.is_empty());
     let found = found.ok_or_else(|| {
-        Failure::bad_file(format!("the machine file does not say what node {node} is to be set to"))
+        Failure::bad_file(format!("the machine file has no settings for node {node}"))
             .next("give its [[drive]] pdos, limits, heartbeat or start_up (docs/machine-file.md), or name a file of parameters")
     })?;
-    Ok((found, "the machine file".to_owned()))
+    Ok((found, MACHINE_FILE.to_owned()))
 }
 
 /// A refusal before anything was written.
@@ -52,14 +56,14 @@ pub fn refused(error: PlanError) -> Failure {
     match error {
         PlanError::Node(error) => error.into(),
         PlanError::OtherDevice { node, wanted, found } => Failure::new(format!(
-            "node {node} is another device than these parameters are of; nothing was written"
+            "node {node} is not the device that these parameters are for; nothing was written"
         ))
         .of_kind("other_device")
         .at_node(node)
-        .because(format!("the file is of {wanted}"))
-        .because(format!("the node says {found}"))
+        .because(format!("the file is for {wanted}"))
+        .because(format!("the node reports {found}"))
         .next(format!(
-            "see who is there: ferrodrive scan; if the drive was replaced by another model, it needs parameters of \
+            "ferrodrive scan shows which device is there; if the drive was replaced by another model, it needs parameters of \
                      its own: ferrodrive params backup {node}"
         )),
         PlanError::AtWork { node, axis, state } => Failure::new(format!(
@@ -71,7 +75,7 @@ pub fn refused(error: PlanError) -> Failure {
         .at_node(node)
         .next(format!("ferrodrive disable {node}, if that may stop what it holds or drives")),
         PlanError::Unfit { node, unfit } => {
-            let objects = if unfit.len() == 1 { "1 value".to_owned() } else { format!("{} values", unfit.len()) };
+            let objects = counted(unfit.len(), "value");
             let failure = Failure::new(format!("node {node} cannot have {objects} of the file; nothing was written"));
             let failure = failure.of_kind("unfit_parameters").at_node(node);
             let first = unfit.first().map(Unfit::object);
