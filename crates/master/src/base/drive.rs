@@ -279,6 +279,12 @@ impl Base {
         self.state
     }
 
+    /// The twist that the base is to have: the newest one that was commanded, as the limits allow it. `commanded` of
+    /// [`state`](Self::state) comes to it with `wheel_m_s2`.
+    pub const fn wanted(&self) -> Twist {
+        self.wanted
+    }
+
     /// Begins to count from this pose.
     pub const fn set_pose(&mut self, pose: Pose) {
         self.state.pose = pose;

@@ -157,7 +157,7 @@ pub enum BaseError {
     /// The wheels were not enabled in time.
     #[error(
         "the wheels were not enabled within {} s: {left}; {right}. Look at the faults, the supply and the enable input of the wheel that \
-         is not enabled: `ferrodrive explain NODE` names the cause, `ferrodrive plan` says whether the bus carries the cycle",
+         is not enabled, and whether the bus carries the cycle",
         limit.as_secs()
     )]
     NotEnabled {
@@ -177,4 +177,15 @@ pub enum BaseError {
     /// There is no next cycle.
     #[error(transparent)]
     NoCycle(#[from] NoCycle),
+}
+
+impl BaseError {
+    /// What a drive said, where that is why.
+    pub const fn of_drive(&self) -> Option<&Error> {
+        match self {
+            Self::Drive(error) => Some(error),
+            Self::Cyclic(error) => error.of_drive(),
+            _ => None,
+        }
+    }
 }

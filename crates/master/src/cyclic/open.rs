@@ -72,6 +72,16 @@ pub enum CyclicError {
     },
 }
 
+impl CyclicError {
+    /// What a drive said, where that is why.
+    pub const fn of_drive(&self) -> Option<&Error> {
+        match self {
+            Self::Drive(error) | Self::Pdo(PdoError::Step { cause: error, .. }) => Some(error),
+            _ => None,
+        }
+    }
+}
+
 /// What the set-point of a mode is.
 #[derive(Clone, Copy)]
 enum SetPointKind {

@@ -232,6 +232,15 @@ impl Drive {
         self.description.ok_or(Error::UnknownModel { node: self.node.id(), intent })
     }
 
+    /// An error if a group or a base of this program moves the axis: its next cycle would take back what is written here.
+    pub(super) fn check_unclaimed(&self, intent: &'static str) -> Result<(), Error> {
+        let node = self.node.id();
+        match self.node.network().is_claimed(node, self.place(CONTROLWORD)) {
+            true => Err(Error::InCycles { node, intent }),
+            false => Ok(()),
+        }
+    }
+
     /// The model's description, if it is more than a guess.
     pub(super) fn named(&self, intent: &'static str) -> Result<&'static Description, Error> {
         match self.guess() {

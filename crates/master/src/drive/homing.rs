@@ -34,16 +34,23 @@ impl Default for HomingOptions {
     }
 }
 
+const INTENT: &str = "find its reference position";
+
 impl Drive {
     /// Finds the reference position with a homing method of CiA 402. Enables the drive first; leaves it in mode 6.
     ///
     /// A drive that does not find it in time is quick-stopped.
     ///
     /// # Errors
-    /// [`Error::NoSuchMode`] for a model without homing; [`Error::OutOfLimits`] for a method that it does not have, before
-    /// anything moves; [`Error::NotReached`] with an explanation; those of the requests.
+    /// [`Error::NoSuchMode`] for a model without homing; [`Error::OutOfLimits`] for a method that it does not have, and
+    /// [`Error::InCycles`], before anything moves; [`Error::NotReached`] with an explanation; those of the requests.
     pub async fn home(&self, method: i8, options: HomingOptions) -> Result<MotionReport, Error> {
-        const INTENT: &str = "find its reference position";
+        self.check_unclaimed(INTENT)?;
+        self.home_claimed(method, options).await
+    }
+
+    /// [`home`](Self::home) for a group, which has claimed the axis.
+    pub(crate) async fn home_claimed(&self, method: i8, options: HomingOptions) -> Result<MotionReport, Error> {
         let axis = self.motion(INTENT)?;
         let rules = axis.homing.ok_or_else(|| self.no_such_mode(axis, ModeOfOperation::HOMING))?;
         self.write_number(rules.method, method.into()).await?;

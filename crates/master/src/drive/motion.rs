@@ -85,11 +85,12 @@ impl Drive {
     /// Turns at this speed (profile velocity) until commanded otherwise. Enables the drive first.
     ///
     /// # Errors
-    /// [`Error::OutOfLimits`] and [`Error::TooFine`] before anything moves; [`Error::NotReached`] with an explanation; those
-    /// of the requests.
+    /// [`Error::OutOfLimits`], [`Error::TooFine`] and [`Error::InCycles`] before anything moves; [`Error::NotReached`] with an
+    /// explanation; those of the requests.
     pub async fn velocity(&self, speed: impl Into<Rpm>, options: MotionOptions) -> Result<MotionReport, Error> {
         const INTENT: &str = "turn it at the wanted speed";
         let Rpm(requested) = speed.into();
+        self.check_unclaimed(INTENT)?;
         let units = self.motion(INTENT)?.units;
         let target_velocity = self.has(units.target_velocity, "a target velocity")?;
         let speed = self.quantity(("speed", "r/min"), target_velocity, requested).await?;
@@ -125,6 +126,7 @@ impl Drive {
     /// As [`velocity`](Self::velocity).
     pub async fn torque(&self, current: Amperes) -> Result<MotionReport, Error> {
         const INTENT: &str = "set its torque";
+        self.check_unclaimed(INTENT)?;
         let axis = self.motion(INTENT)?;
         let Some(target) = axis.units.target_current else {
             return Err(self.no_such_mode(axis, ModeOfOperation::PROFILE_TORQUE));

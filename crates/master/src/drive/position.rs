@@ -22,8 +22,8 @@ impl Drive {
     /// Turns to an absolute position. Enables the drive first.
     ///
     /// # Errors
-    /// [`Error::OutOfLimits`] and [`Error::TooFine`] before anything moves; [`Error::NotReached`] with an explanation when the drive faults,
-    /// is stopped, falls silent or does not get there; those of the requests.
+    /// [`Error::OutOfLimits`], [`Error::TooFine`] and [`Error::InCycles`] before anything moves; [`Error::NotReached`] with an explanation
+    /// when the drive faults, is stopped, falls silent or does not get there; those of the requests.
     pub async fn move_absolute(&self, to: impl Into<Angle>, options: MotionOptions) -> Result<MotionReport, Error> {
         let target = self.position("position", to.into()).await?;
         self.move_counts(target, false, options).await
@@ -40,6 +40,7 @@ impl Drive {
 
     async fn move_counts(&self, to: Commanded, relative: bool, options: MotionOptions) -> Result<MotionReport, Error> {
         const INTENT: &str = "move it to the wanted position";
+        self.check_unclaimed(INTENT)?;
         let units = self.motion(INTENT)?.units;
         let profile_velocity = self.has(units.profile_velocity, "a profile velocity")?;
         let (counts, mut commanded) = (to.raw, vec![to]);

@@ -177,6 +177,16 @@ pub enum Error {
         /// The node.
         node: NodeId,
     },
+    /// A group or a base of this program moves the axis in each cycle.
+    #[error(
+        "node {node}: could not {intent}: a group or a base of this program moves it, and nothing was sent. {IN_CYCLES_ADVICE}"
+    )]
+    InCycles {
+        /// The node.
+        node: NodeId,
+        /// What was to be done.
+        intent: &'static str,
+    },
     /// The model has no parameter store.
     #[error("node {node}: the {model} stores no parameters: write them after each start")]
     NoParameterStore {
@@ -257,6 +267,7 @@ impl Error {
             Self::NoSuchAxis { .. } => "no_such_axis",
             Self::NoSuchQuantity { .. } => "no_such_quantity",
             Self::NoFeed { .. } => "no_feed",
+            Self::InCycles { .. } => "in_cycles",
             Self::NoParameterStore { .. } => "no_parameter_store",
             Self::NoFactorySettings { .. } => "no_factory_settings",
             Self::NoSuchMode { .. } => "no_such_mode",
@@ -281,6 +292,7 @@ impl Error {
             | Self::NoSuchAxis { node, .. }
             | Self::NoSuchQuantity { node, .. }
             | Self::NoFeed { node }
+            | Self::InCycles { node, .. }
             | Self::NoParameterStore { node, .. }
             | Self::NoFactorySettings { node, .. }
             | Self::NoSuchMode { node, .. }
@@ -315,10 +327,14 @@ impl Error {
             Self::NoAnswer { hints, .. } | Self::NoBootUp { hints, .. } => Some(hints.to_string()),
             Self::Aborted { code, access, .. } => Some(advice(*code, *access).to_owned()),
             Self::NotReached(explanation) => Some(explanation.advice.clone()),
+            Self::InCycles { .. } => Some(IN_CYCLES_ADVICE.to_owned()),
             _ => None,
         }
     }
 }
+
+/// What to do about [`Error::InCycles`].
+const IN_CYCLES_ADVICE: &str = "Move it by that, or close that first";
 
 /// What a node says otherwise than the model that it was taken for.
 fn differences(found: &Identity, wanted: &devices::Identity) -> String {

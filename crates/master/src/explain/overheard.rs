@@ -58,6 +58,16 @@ impl Overheard {
         (heard.last, heard.bits, heard.length) = (at, bits, length);
     }
 
+    /// Takes a frame that this program sent itself. Its SYNC and its PDOs are what the drive gets; its SDO requests and NMT commands are
+    /// not those of another master, and are left out.
+    pub fn note_own(&mut self, frame: &Frame, at: Instant) {
+        let by_master = |id| id == NMT || (SDO_REQUEST + 1..=SDO_REQUEST + u16::from(NodeId::MAX.raw())).contains(&id);
+        match frame.standard_data_id() {
+            Some(id) if by_master(id) => self.until(at),
+            _ => self.note(frame, at),
+        }
+    }
+
     /// It was listened until now.
     pub fn until(&mut self, now: Instant) {
         self.began.get_or_insert(now);
@@ -128,5 +138,20 @@ mod tests {
         assert_eq!(heard.longest_silence([0x204, 0x604]), Duration::from_millis(250));
         assert_eq!(heard.longest_silence([0x604]), Duration::from_millis(500));
         assert_eq!((heard.sync(), heard.nmt()), (None, None));
+    }
+
+    #[test]
+    fn own_requests_and_commands_are_not_those_of_another_master() {
+        let node = NodeId::new(4).unwrap();
+        let mut heard = Overheard::from(ms(0));
+        // CiA 301, 7.3.3: NMT, SYNC, RPDO1 and SDO request of node 4.
+        for (id, at) in [(0x000, 10), (0x080, 20), (0x204, 30), (0x604, 40)] {
+            heard.note_own(&Frame::new(CanId::standard(id), &[0, 0]), ms(at));
+        }
+        assert_eq!((heard.nmt(), heard.requests(node)), (None, None));
+        assert!(heard.sync().is_some() && heard.under(0x204).is_some());
+        assert_eq!(heard.listened(), Duration::from_millis(40));
+        heard.note(&Frame::new(CanId::standard(0x604), &[0, 0]), ms(50));
+        assert_eq!(heard.requests(node).map(|frames| frames.count), Some(1));
     }
 }

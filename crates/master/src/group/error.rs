@@ -153,6 +153,17 @@ pub enum GroupError {
     NoCycle(#[from] NoCycle),
 }
 
+impl GroupError {
+    /// What a drive said, where that is why.
+    pub const fn of_drive(&self) -> Option<&Error> {
+        match self {
+            Self::Drive(error) | Self::Homing { source: error, .. } => Some(error),
+            Self::Cyclic(error) => error.of_drive(),
+            _ => None,
+        }
+    }
+}
+
 fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }

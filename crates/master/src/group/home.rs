@@ -67,7 +67,7 @@ pub async fn home(axes: &[AxisHoming], order: HomingOrder) -> Result<Vec<MotionR
 impl AxisHoming {
     async fn search(&self, axis: usize) -> Result<MotionReport, GroupError> {
         let options = HomingOptions { wait: true, ..self.options };
-        let found = self.drive.home(self.method, options).await;
+        let found = self.drive.home_claimed(self.method, options).await;
         found.map_err(|source| GroupError::Homing { axis, node: self.drive.node().id(), source })
     }
 }

@@ -163,7 +163,8 @@ pub(crate) async fn has(node: &Node, mux: Mux) -> Result<bool, Error> {
 impl Network {
     /// Asks all 127 node-IDs who they are. `progress` is given how many have been asked.
     ///
-    /// Nodes that answer no SDO are found by their boot-up or heartbeat messages, if any came before or meanwhile.
+    /// Nodes that answer no SDO are found by their boot-up or heartbeat messages, if any came before or meanwhile; one that boots
+    /// meanwhile is asked again.
     pub async fn scan(&self, timeout: Duration, mut progress: impl FnMut(usize)) -> Vec<Found> {
         let nodes: Vec<NodeId> = NodeId::all().collect();
         let mut found = Vec::new();
@@ -175,8 +176,24 @@ impl Network {
             asked += window.len();
             progress(asked);
         }
+        self.ask_late_comers(&mut found, timeout).await;
         self.hear_heartbeats(&mut found, began).await;
         found
+    }
+
+    /// Asks those that were first heard after they had been asked, a drive that booted meanwhile. Each is asked once, so that this ends.
+    async fn ask_late_comers(&self, found: &mut Vec<Found>, timeout: Duration) {
+        loop {
+            let is_new = |id: &NodeId| found.iter().all(|found| found.node != *id);
+            let late: Vec<_> = NodeId::all().filter(|id| self.facts(*id).seen_at.is_some()).filter(is_new).collect();
+            let asking: Vec<_> = late.iter().map(|id| self.look_at(*id, timeout)).collect();
+            let answers: Vec<_> = join_all(asking).await.into_iter().flatten().collect();
+            if answers.is_empty() {
+                break;
+            }
+            found.extend(answers);
+        }
+        found.sort_by_key(|found| found.node);
     }
 
     /// Waits for one and a half heartbeat periods of each node since `began`, and puts down what all have said by then: a node

@@ -17,6 +17,11 @@ impl Network {
         let axis = (node, controlword);
         self.lock().claims.insert(axis).then(|| Claim { network: self.clone(), axis })
     }
+
+    /// True while the axis with this controlword is claimed.
+    pub(crate) fn is_claimed(&self, node: NodeId, controlword: Mux) -> bool {
+        self.lock().claims.contains(&(node, controlword))
+    }
 }
 
 impl Drop for Claim {

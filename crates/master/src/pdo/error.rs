@@ -37,7 +37,7 @@ pub enum PdoError {
         unit: Duration,
     },
     /// The device refused a step, or did not answer.
-    #[error("{pdo} of node {node} could not be set up, at \"{step}\". {cause} {}", back(*restored))]
+    #[error("{pdo} of node {node} could not be set up, at \"{step}\". {}. {}", cause.to_string().trim_end_matches('.'), back(*restored))]
     Step {
         /// The device.
         node: NodeId,

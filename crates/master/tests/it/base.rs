@@ -8,7 +8,9 @@ use can::{Bitrate, Instant};
 use cia402::ModeOfOperation;
 use master::base::{Base, BaseError, BaseLimits, Geometry, Pose, StopCause, Twist, WheelSetup};
 use master::cyclic::{CyclicOptions, Refusal};
-use master::{Drive, Network};
+use master::drive::MotionOptions;
+use master::units::Rpm;
+use master::{Drive, Error, Network};
 use plant::coupled::DifferentialDriveModel;
 use sim::coupling::{BodyKind, CoupledShaft, Coupling};
 use sim::machine::{Order, order};
@@ -304,6 +306,9 @@ fn bad_input_is_refused() {
         assert!(error.to_string().contains("both have to be finite numbers"), "{error}");
     }
     assert!(matches!(bench.try_open(LIMITS), Err(BaseError::Taken { .. })));
+    let wheel = bench.wheels[0].drive.clone();
+    let beside = block_on(&mut bench.world, wheel.velocity(Rpm(60.0), MotionOptions::default())).unwrap();
+    assert!(matches!(beside, Err(Error::InCycles { .. })), "{beside:?}");
     drop(base);
     let zero = bench.try_open(BaseLimits { wheel_m_s2: 0.0, ..LIMITS }).unwrap_err();
     assert_eq!(zero.to_string(), "the limit wheel_m_s2 is 0: state a finite number above 0");

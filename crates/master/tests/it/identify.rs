@@ -14,7 +14,7 @@ use master::drive::MotionOptions;
 use master::identify::{Found, Guess, Knowledge, knowledge};
 use master::units::Rpm;
 use master::{Drive, Error, Network};
-use sim::machine::{mjoint, zlac8030l, zlim42c, zlim42c_82};
+use sim::machine::{TimingMode, mjoint, zlac8030l, zlim42c, zlim42c_82};
 use sim::{World, block_on};
 
 const K500: u16 = 1;
@@ -206,6 +206,22 @@ fn a_joint_in_alarm_is_operational_though_its_heartbeat_says_04h() {
     let state = block_on(&mut world, drive.state()).unwrap().unwrap();
     assert_eq!(state.nmt, Some(NmtState::Operational), "{state:?}");
     assert_ne!(state.fault_code, 0);
+}
+
+/// A drive takes about a second to boot, in which it is deaf; the scan comes to it in its first half second.
+#[test]
+fn a_node_that_boots_during_a_scan_is_asked_once_it_has() {
+    let mut world = World::new(Bitrate::K500, 5);
+    world.set_timing(TimingMode::Device);
+    let network = Network::new();
+    world.add_station(network.clone());
+    for number in [SERVO, STEPPER] {
+        world.add_drive(number, Box::new(zlac8030l(number, K500))).unwrap();
+    }
+    let found = block_on(&mut world, network.scan(Duration::from_millis(500), |_| {})).unwrap();
+    let nodes: Vec<_> = found.iter().map(|found| found.node.raw()).collect();
+    assert_eq!(nodes, [STEPPER, SERVO]);
+    assert!(found.iter().all(|found| found.identity.is_some()), "{found:?}");
 }
 
 /// CiA 301, 7.2.4.3: one SDO channel has one client. Where there are two masters all the same, the answers to both mix.
