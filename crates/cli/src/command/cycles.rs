@@ -1,14 +1,12 @@
 //! What commands that move drives cycle by cycle have in common: how late a host may be, whether the bus carries the cycle, and
 //! what to do where the host was late.
 
-use std::time::Duration;
-
 use canopen::NodeId;
 use master::Drive;
 use master::core::CycleLoss;
 use master::cyclic::{CyclicOptions, Refusal};
 use master::plan::NodeTraffic;
-use testbench::machine_file::{CyclePlan, Machine, TOLERANCE, TooFull, too_full_at};
+use testbench::machine_file::{CyclePlan, Machine, TOLERANCE, TooFull};
 
 use super::studio::bitrate;
 use crate::context::Context;
@@ -47,10 +45,6 @@ impl CycleArgs {
     }
 }
 
-/// The most that SYNC, and a set-point of 8 bytes and its answer for each drive, take on the wire, in bits.
-const SYNC_BITS: u64 = 55;
-const DRIVE_BITS: u64 = 2 * 135;
-
 /// Refuses a cycle that does not fit the bus, before anything is written. Without a known bit rate nothing is refused.
 pub(super) async fn refuse_too_full(context: &Context, cycle: &CyclePlan, drives: &[&Drive]) -> Result<(), Failure> {
     let full = too_full(context, cycle, drives, |read| read).await?;
@@ -77,20 +71,7 @@ async fn too_full(
     set_up: impl Fn(NodeTraffic) -> NodeTraffic,
 ) -> Result<Option<TooFull>, Failure> {
     let Some(bitrate) = bitrate(context) else { return Ok(None) };
-    let most_ns = (SYNC_BITS + DRIVE_BITS * drives.len() as u64) * bitrate.bit_nanos();
-    if Duration::from_nanos(most_ns) <= cycle.period {
-        // It fits in any case: no drive need be asked.
-        return Ok(None);
-    }
-    let mut nodes = Vec::new();
-    for drive in drives {
-        let read = set_up(NodeTraffic::of(drive).await?);
-        nodes.push(cycle.traffic(drive, read).map_err(|error| {
-            let advice = "give a --mode for speed, torque or positions that the model has, e.g. pv";
-            Failure::new(error.to_string()).of_kind("group").at_node(drive.node().id()).next(advice)
-        })?);
-    }
-    Ok(too_full_at(&nodes, cycle.period, bitrate))
+    Ok(cycle.too_full(drives, bitrate, set_up).await?)
 }
 
 fn refusal(cycle: &CyclePlan, what: String, next: String) -> Failure {
@@ -105,6 +86,8 @@ pub(super) fn ask_why(node: NodeId) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     #[test]

@@ -13,6 +13,7 @@ use master::units::Shown;
 use master::{Drive, Gear, Node};
 
 use super::{BasePlan, GroupPlan, Machine};
+use crate::failure::Failure;
 
 /// From one SYNC of a group to the next where nothing says it.
 pub const GROUP_PERIOD: Duration = Duration::from_millis(5);
@@ -22,6 +23,10 @@ pub const BASE_PERIOD: Duration = Duration::from_millis(10);
 
 /// Cycles in a row without a PDO that a group and a base tolerate where nothing says it.
 pub const TOLERANCE: u32 = 2;
+
+/// The most that SYNC, and a set-point of 8 bytes and its answer for each drive, take on the wire, in bits.
+const SYNC_BITS: u64 = 55;
+const DRIVE_BITS: u64 = 2 * 135;
 
 /// What is moved in one cycle of SYNC.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,6 +85,32 @@ impl CyclePlan {
         let Some((_, said)) = self.nodes.iter().find(|(node, _)| *node == drive.node().id()) else { return Ok(read) };
         let mode = self.mode(drive, *said)?;
         Ok(read.in_cycles(drive, mode, true)?)
+    }
+
+    /// Whether a bus carries it, by what its drives say of their PDOs; `set_up` is what becomes of that before it is moved. They are
+    /// asked only where it may not fit.
+    ///
+    /// # Errors
+    /// A drive cannot be asked, or not be moved so.
+    pub async fn too_full(
+        &self,
+        drives: &[&Drive],
+        bitrate: Bitrate,
+        set_up: impl Fn(NodeTraffic) -> NodeTraffic,
+    ) -> Result<Option<TooFull>, Failure> {
+        let most_ns = (SYNC_BITS + DRIVE_BITS * drives.len() as u64) * bitrate.bit_nanos();
+        if Duration::from_nanos(most_ns) <= self.period {
+            return Ok(None);
+        }
+        let mut nodes = Vec::new();
+        for drive in drives {
+            let read = set_up(NodeTraffic::of(drive).await?);
+            nodes.push(self.traffic(drive, read).map_err(|error| {
+                let advice = "take a mode for speed, torque or positions that the model has, e.g. pv";
+                Failure::new(error.to_string()).of_kind("group").at_node(drive.node().id()).next(advice)
+            })?);
+        }
+        Ok(too_full_at(&nodes, self.period, bitrate))
     }
 }
 

@@ -207,7 +207,7 @@ impl Planned {
         if let Some(stranger) = only.iter().find(|node| !plan.nodes.contains_key(node)) {
             let named = plan.nodes.keys().map(ToString::to_string).collect::<Vec<_>>().join(", ");
             let named = if named.is_empty() { "none".to_owned() } else { named };
-            return Err(Failure::bad_file(format!("--node names node {stranger}, which the file does not have"))
+            return Err(Failure::bad_file(format!("node {stranger} is to be booted, and the file does not have it"))
                 .at_node(*stranger)
                 .next(format!("its nodes: {named}")));
         }

@@ -2,6 +2,7 @@
 //!
 //! Every error says what was wrong, what is expected, and shows an example; clap prints it with exit status 2.
 
+pub mod calls;
 pub mod drive;
 pub mod mode;
 pub mod node;
