@@ -5,6 +5,7 @@ use std::path::Path;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use testbench::failure::{Failure, Subject};
+use testbench::words::calls::in_python;
 
 mod classes {
     #![allow(missing_docs, reason = "the classes have their words in ferrodrive/errors.py")]
@@ -35,12 +36,12 @@ pub(crate) fn wrong_use(error: impl ToString) -> PyErr {
 /// Why the master did not get there: its words, what is wrong with the bus, and the parts for programs.
 pub(crate) fn master_error(py: Python<'_>, text: &str, failure: &Failure, bus: Option<&str>) -> PyErr {
     let Subject { node, object, abort } = failure.subject;
-    let bus_said = bus.map(|bus| format!("; {bus}")).unwrap_or_default();
+    let (text, bus_said) = (in_python(text), bus.map(|bus| format!("; {bus}")).unwrap_or_default());
     let parts = (
         failure.kind,
-        &failure.what,
-        failure.because.iter().map(String::as_str).chain(bus).collect::<Vec<_>>(),
-        &failure.next,
+        in_python(&failure.what),
+        failure.because.iter().map(String::as_str).chain(bus).map(in_python).collect::<Vec<_>>(),
+        failure.next.iter().map(|advice| in_python(advice)).collect::<Vec<_>>(),
         (
             node.map(|node| u16::from(node.raw())),
             object.map(|mux| (mux.index, mux.sub_index)),

@@ -34,9 +34,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(master::whole::plan, module)?)?;
     module.add_function(wrap_pyfunction!(master::whole::explain, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_backup, module)?)?;
-    module.add_function(wrap_pyfunction!(master::params::params_diff, module)?)?;
-    module.add_function(wrap_pyfunction!(master::params::params_plan, module)?)?;
-    module.add_function(wrap_pyfunction!(master::params::params_verify, module)?)?;
+    module.add_function(wrap_pyfunction!(master::params::params_compare, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_apply, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_rollback, module)?)?;
     module.add_class::<scenario::Sweep>()?;

@@ -12,6 +12,7 @@ pub(crate) mod tap;
 mod value;
 pub(crate) mod whole;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -20,6 +21,7 @@ use std::time::Duration;
 use can::Tap;
 use canopen::{Mux, NmtCommand, NodeId};
 use master::drive::{Drive, HomingOptions, MotionOptions, SwitchedOff};
+use master::identify::Knowledge;
 use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Error, Gear, Network as Core, Node};
 use pyo3::prelude::*;
@@ -48,6 +50,8 @@ pub(crate) struct Network {
     closed: AtomicBool,
     /// What a machine file says of its drives.
     machine: Option<Arc<Machine>>,
+    /// What nodes have shown of their models, of those that were asked for it.
+    identified: Arc<Mutex<BTreeMap<NodeId, Knowledge>>>,
 }
 
 /// What a drive is asked to do, in plain values.
@@ -73,6 +77,9 @@ struct Order {
     limit_s: Option<f64>,
     #[pyo3(item, default)]
     gear_ratio: Option<f64>,
+    /// Its model is what the node has shown, and no more than a guess.
+    #[pyo3(item, default)]
+    guessed: bool,
 }
 
 impl Order {
@@ -167,6 +174,7 @@ impl Network {
 
     /// Sends an NMT command, to all nodes or to one.
     fn nmt(&self, command: &str, node: Option<u8>) -> PyResult<()> {
+        self.check_open()?;
         let command = nmt_command(command)?;
         match node {
             Some(raw) => self.node(raw)?.nmt(command),
@@ -177,6 +185,7 @@ impl Network {
 
     /// Produces SYNC with this period in seconds, or stops.
     fn sync(&self, period_s: Option<f64>) -> PyResult<()> {
+        self.check_open()?;
         self.core.sync(period_s.map(duration).transpose()?);
         Ok(())
     }
@@ -215,20 +224,26 @@ impl Network {
         Ok(self.described(node_id(node)?).map(|model| model.name))
     }
 
-    /// Which model a node is by its identity and objects; its name, or `None` if that is not certain.
+    /// Which model a node is by its identity and objects: its name, and whether that is a guess by an object that others of this identity
+    /// lack; `None` if nothing speaks for one.
     fn identify(&self, py: Python<'_>, node: u8) -> PyResult<Job> {
-        let node = self.node(node)?;
+        let (node, identified) = (self.node(node)?, Arc::clone(&self.identified));
         self.begin(py, async move {
             let knowledge = master::identify::knowledge(&node).await?;
-            let known =
-                knowledge.description().filter(|_| knowledge.guess().is_none_or(|guess| guess.evidence().is_none()));
-            Ok(known.map_or(Value::None, |model| Value::Text(model.name.to_owned())))
+            let guessed = knowledge.guess().is_some_and(|guess| guess.evidence().is_some());
+            let known = knowledge.description().map(|model| Value::Text(model.name.to_owned()));
+            identified.lock().unwrap_or_else(PoisonError::into_inner).insert(node.id(), knowledge);
+            Ok(known.map_or(Value::None, |name| Value::List(vec![name, Value::Bool(guessed)])))
         })
     }
 
     /// Does what an order says with a drive of a model.
     fn drive(&self, py: Python<'_>, node: u8, model: &str, order: Order) -> PyResult<Job> {
-        let drive = Drive::new(self.node(node)?, self.model(node, model)?).behind(self.gear(node, order.gear_ratio)?);
+        let drive = match self.guess(node, model).filter(|_| order.guessed) {
+            Some(knowledge) => Drive::known_as(self.node(node)?, knowledge),
+            None => Drive::new(self.node(node)?, self.model(node, model)?),
+        };
+        let drive = drive.behind(self.gear(node, order.gear_ratio)?);
         match order.do_.as_str() {
             "enable" => self.begin(py, async move { drive.enable().await.map(|()| Value::None) }),
             "disable" => self.begin(py, async move { drive.disable().await.map(|()| Value::None) }),
@@ -302,7 +317,14 @@ impl Network {
     fn new(core: Core, traffic: Traffic, runner: Runner, machine: Option<Arc<Machine>>) -> Self {
         let described = machine.iter().flat_map(|machine| machine.models()).map(|(_, model)| model);
         core.set_models(with_files(described));
-        Self { core, traffic, runner: Arc::new(runner), closed: AtomicBool::new(false), machine }
+        Self {
+            core,
+            traffic,
+            runner: Arc::new(runner),
+            closed: AtomicBool::new(false),
+            machine,
+            identified: Arc::default(),
+        }
     }
 
     /// Distinguishes its jobs from those of other networks in the same world.
@@ -320,6 +342,18 @@ impl Network {
     fn model(&self, node: u8, name: &str) -> PyResult<&'static Description> {
         let described = self.described(node_id(node)?).filter(|model| model.name == name);
         described.map_or_else(|| model_of(name), Ok)
+    }
+
+    /// What a node has shown, where this model is the guess by it.
+    fn guess(&self, node: u8, name: &str) -> Option<Knowledge> {
+        let identified = self.identified.lock().unwrap_or_else(PoisonError::into_inner);
+        let knowledge = identified.get(&NodeId::new(node)?)?;
+        (knowledge.description()?.name == name).then(|| knowledge.clone())
+    }
+
+    /// An error once it was closed.
+    fn check_open(&self) -> PyResult<()> {
+        if self.closed.load(Ordering::Relaxed) { Err(closed()) } else { Ok(()) }
     }
 
     /// What stands behind the shaft of a node: this ratio, or else what the machine file says.
@@ -350,20 +384,22 @@ impl Network {
         py: Python<'_>,
         work: impl Future<Output = Result<Value, Trouble>> + Send + 'static,
     ) -> PyResult<Job> {
-        if self.closed.load(Ordering::Relaxed) {
-            return Err(wrong_use("the network is closed"));
-        }
+        self.check_open()?;
         let (job, future) = Job::new(work, &self.runner);
         match &*self.runner {
             Runner::World(shared) => job.set_number(shared.lock(py)?.jobs.begin(self.owner(), future)),
             Runner::Live(live) => {
                 let live = live.lock().unwrap_or_else(PoisonError::into_inner);
-                let open = live.as_ref().ok_or_else(|| wrong_use("the network is closed"))?;
+                let open = live.as_ref().ok_or_else(closed)?;
                 open.begin(future).map_err(wrong_use)?;
             }
         }
         Ok(job)
     }
+}
+
+fn closed() -> PyErr {
+    wrong_use("the network is closed; open another one: Network(bus)")
 }
 
 fn nmt_command(word: &str) -> PyResult<NmtCommand> {

@@ -1,15 +1,19 @@
 //! A world that Python holds: drives, adapters and time, behind a lock, and what waits for it.
 
+mod happened;
 mod jobs;
 mod record;
 mod report;
 
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::process;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
+use canopen::NodeId;
+use master::decode::Decoder;
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -21,11 +25,12 @@ use sim::wire::{Statistics, WireEvent};
 use sim::{StationId, VirtualDrive};
 use testbench::events;
 use testbench::machine_file::{self, Machine};
-use testbench::words::drive::DriveSpec;
+use testbench::words::drive::{DriveSpec, drive_spec};
 
 use crate::failure::{bad_value, named, refused, wrong_use};
 use crate::frames::{Plain, frame, plain};
 use crate::sheets::{model_of, node_id};
+use happened::Happened;
 pub(crate) use jobs::{Job, Jobs};
 use record::Recordings;
 
@@ -66,6 +71,7 @@ pub(crate) struct State {
     /// In the order in which Python numbers them.
     probes: Vec<StationId>,
     recordings: Recordings,
+    happened: Happened,
     /// What its machine file says, for a master that joins it.
     machine: Option<Arc<Machine>>,
 }
@@ -109,7 +115,8 @@ impl Shared {
 
 impl State {
     fn new(world: sim::World) -> Self {
-        Self { world, jobs: Jobs::default(), probes: Vec::new(), recordings: Recordings::default(), machine: None }
+        let (recordings, happened) = (Recordings::default(), Happened::default());
+        Self { world, jobs: Jobs::default(), probes: Vec::new(), recordings, happened, machine: None }
     }
 
     /// What its machine file says, if it is of one.
@@ -228,6 +235,14 @@ impl World {
         self.put(py, node, order(spec.model, &spec.order(bitrate)).map_err(refused)?)
     }
 
+    /// The same of a drive in words, `zlac8030l@4,motor=fast`; its number.
+    fn add_described(&self, py: Python<'_>, words: &str) -> PyResult<u8> {
+        let spec = drive_spec(words).map_err(bad_value)?;
+        let (number, bitrate) = (spec.node.raw(), self.shared.lock(py)?.world.bitrate());
+        self.put(py, number, order(spec.model, &spec.order(bitrate)).map_err(refused)?)?;
+        Ok(number)
+    }
+
     /// How long boot, answers and stores take of drives that are added from here on: `ideal`, or `device`.
     fn set_timing(&self, py: Python<'_>, timing: &str) -> PyResult<()> {
         self.shared.lock(py)?.world.set_timing(timing_mode(timing)?);
@@ -286,14 +301,28 @@ impl World {
 
     /// Notes what happens in the world from now on, or stops that.
     fn watch(&self, py: Python<'_>, on: bool) -> PyResult<()> {
-        self.shared.lock(py)?.world.watch(on);
+        let state = &mut *self.shared.lock(py)?;
+        state.happened.watch(&mut state.world, on);
         Ok(())
     }
 
     /// What happened since the last call, one line of JSON each.
     fn take_events(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        let mut state = self.shared.lock(py)?;
-        Ok(std::iter::from_fn(|| state.world.poll_event()).map(|event| events::json(&event).to_string()).collect())
+        let state = &mut *self.shared.lock(py)?;
+        Ok(state.happened.take(&mut state.world).iter().map(|event| events::json(event).to_string()).collect())
+    }
+
+    /// Has the last events kept for a report, whoever asks for them.
+    fn keep_events(&self, py: Python<'_>) -> PyResult<()> {
+        let state = &mut *self.shared.lock(py)?;
+        state.happened.keep(&mut state.world);
+        Ok(())
+    }
+
+    /// The last of them, oldest first, one line of JSON each.
+    fn last_events(&self, py: Python<'_>, most: usize) -> PyResult<Vec<String>> {
+        let state = &mut *self.shared.lock(py)?;
+        Ok(state.happened.last(&mut state.world, most).map(|event| events::json(event).to_string()).collect())
     }
 
     /// Records every signal of every drive to a file `.mcap` or `.csv`, a sample every `period_ns`.
@@ -419,6 +448,30 @@ impl World {
         let mut lines: Vec<_> = carried.take(last).collect();
         lines.reverse();
         Ok(lines)
+    }
+
+    /// The last frames on the wire, oldest first, each with its time in s and what it says.
+    fn decoded_frames(&self, py: Python<'_>, last: usize) -> PyResult<Vec<String>> {
+        let mut state = self.shared.lock(py)?;
+        let mut decoder = Decoder::new();
+        let numbers: Vec<u8> = state.world.drive_numbers().collect();
+        for number in numbers {
+            let model = state.world.with_drive(number, |drive, _| drive.model()).map_err(refused)?;
+            // The model of a drive by its file is not known by its name.
+            if let (Some(node), Ok(model)) = (NodeId::new(number), testbench::models::resolve(model)) {
+                decoder.set_model(node, model);
+            }
+        }
+        let mut lines = VecDeque::new();
+        for event in state.world.log().iter() {
+            let WireEvent::Frame { end, frame, .. } = event else { continue };
+            if lines.len() == last {
+                lines.pop_front();
+            }
+            // Each has to be decoded: it may say what those behind it mean.
+            lines.push_back((end.as_secs_f64(), frame, decoder.decode(frame)));
+        }
+        Ok(lines.into_iter().map(|(at_s, frame, said)| format!("{at_s:.6}  {frame:<22}  {said}")).collect())
     }
 
     /// Becomes a copy of `other`, which is a copy of this world or has none of its adapters.

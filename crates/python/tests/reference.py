@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import ForwardRef, NamedTuple, Optional
 
 import ferrodrive
+import ferrodrive.pytest_plugin
 import ferrodrive.reports
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -48,10 +49,9 @@ typed, in `ferrodrive.reports`. Quantities have their units in their names, or i
 tests of the package. In the examples of methods `world` is a `World` with a servo (`cia402`) at node 5, `network` a `Network` on it,
 `drive` is `network.drive(5)`, and files such as `base.toml` are those of `examples`.
 
-In pytest there are the fixtures `ferrodrive_world` (a virtual bus whose virtual time is in use) and `ferrodrive_sim` (`ferrodrive sim` in
-real time), and the marker `@pytest.mark.ferrodrive(drives, machine, timing, bitrate, seed)` with what they begin with. `timing` is
-`"device"` unless `"ideal"` is chosen: drives take the time that real ones take to boot, to answer and to store.
-"""
+## In pytest
+
+{plugin}"""
 
 
 class Entry(NamedTuple):
@@ -162,7 +162,8 @@ STUB: dict[str, Entry] = stub()
 
 def page() -> str:
     """The text of the page."""
-    text = [HEAD.format(write=WRITE)]
+    plugin = markdown(inspect.getdoc(ferrodrive.pytest_plugin) or "")
+    text = [HEAD.format(write=WRITE, plugin=plugin.split("\n\n", 1)[1].rstrip() + "\n")]
     for section, names in SECTIONS.items():
         text.append(f"\n## {section}\n")
         for name in names:

@@ -32,6 +32,24 @@ def on_bus(ferrodrive_world, tmp_path):
     network.disconnect()
 
 
+def test_two_nodes_have_booted(ferrodrive_world):
+    network = canopen.Network()
+    network.connect(interface="ferrodrive", channel=ferrodrive_world)
+    for number in (4, 5):
+        ferrodrive_world.add("zlac8030l", node=number)
+        network.add_node(number, canopen.ObjectDictionary())
+    for node in network.values():
+        # The boot-up of the second one passes while the first is waited for: have each boot when it is waited for.
+        node.nmt.state = "RESET"
+        node.nmt.wait_for_bootup(5)
+    for node in network.values():
+        assert node.sdo.upload(0x1000, 0)
+    # Without the line of the reset: both boot-ups have passed.
+    with pytest.raises(canopen.nmt.NmtError, match="Timeout"):
+        network[4].nmt.wait_for_bootup(5)
+    network.disconnect()
+
+
 @pytest.mark.parametrize("model", ferrodrive.models())
 def test_every_model_turns_by_the_names_of_its_objects(on_bus, model):
     node, drive = on_bus(model, canopen.RemoteNode)

@@ -26,7 +26,52 @@ def test_a_failing_test_shows_the_last_frames_and_the_drives(pytester):
     )
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
     result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["*last frames on the bus*", "*704#00*", "*zlac8030l at 4*statusword*48.0 V*"])
+    result.stdout.fnmatch_lines(
+        [
+            "*last frames on the bus*",
+            "*704#00*boot-up*node 4*",
+            "*last events*",
+            "*node 4: boot-up message*",
+            "*zlac8030l at 4*statusword*48.0 V*",
+        ]
+    )
+
+
+def test_the_report_of_a_failing_test_is_bounded_and_has_what_went_wrong(pytester):
+    pytester.makepyfile(
+        """
+        import ferrodrive, pytest
+
+        @pytest.fixture
+        def network():
+            world = ferrodrive.World()
+            world.add("zlac8030l", node=4)
+            with ferrodrive.Network(world) as network:
+                network.boot()
+                yield network
+
+        @pytest.fixture
+        def stopped(network):
+            network.drive(4, "zlac8030l").velocity(60)
+            network._world[4].set_supply(85)  # the limit of a ZLAC8030L is 75 V
+            network.sleep(1)
+            assert list(network._world.events()) == []  # a watch of one's own begins here
+            network._world[4].set_supply(48)
+            assert network._world[4].error_code == 0, "in a fixture"
+
+        def test_it(stopped):
+            pass
+        """
+    )
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
+    result.assert_outcomes(errors=1)
+    shown = "\n".join(result.outlines)
+    frames, events = (shown.split(f" {head} ")[1].split(" ---")[0].splitlines()[1:-1] for head in ("last frames on the bus", "last events"))
+    assert len(frames) == 40 and 0 < len(events) <= 20 and max(map(len, [*frames, *events])) <= 160
+    # Decoded: the master's questions by name; the fault by its name, with what the manual advises (ZLAC8030L, fault 0001h).
+    assert any("statusword" in line for line in frames), frames
+    assert any("node 4" in line and "fault" in line and "over-voltage" in line.lower() for line in events), events
+    assert any("supply 48" in line for line in events), events
 
 
 PLOTTED = """
@@ -168,6 +213,90 @@ def test_the_served_simulator_is_ready(pytester):
     )
     pytester.makefile(".toml", machine="seed = 5\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n")
     pytester.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=3)
+
+
+def test_a_machine_file_is_looked_for_beside_the_test_and_then_in_the_root(pytester, monkeypatch):
+    text = "[[drive]]\\nmodel = 'zlac8030l'\\nnode = {}\\n".replace("\\n", "\n")
+    suite = pytester.mkdir("suite")
+    (suite / "near.toml").write_text(text.format(4))
+    (pytester.path / "near.toml").write_text(text.format(5))
+    (pytester.path / "far.toml").write_text(text.format(6))
+    (suite / "test_places.py").write_text(
+        """
+import pytest
+
+@pytest.mark.ferrodrive(machine="near.toml")
+def test_near(ferrodrive_world):
+    assert ferrodrive_world.nodes == [4]
+
+@pytest.mark.ferrodrive(machine="far.toml")
+def test_far(ferrodrive_world):
+    assert ferrodrive_world.nodes == [6]
+
+@pytest.mark.ferrodrive(machine="nowhere.toml")
+def test_nowhere(ferrodrive_world):
+    pass
+
+@pytest.mark.ferrodrive(machine="far.toml", drives=["zlac8030l@4"])
+def test_drives_beside(ferrodrive_world):
+    pass
+
+@pytest.mark.ferrodrive(extra=["--clock", "manual"])
+def test_extra(ferrodrive_world):
+    pass
+"""
+    )
+    # The current folder decides nothing.
+    monkeypatch.chdir(pytester.mkdir("elsewhere"))
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--rootdir", pytester.path, suite)
+    result.assert_outcomes(passed=2, errors=3)
+    result.stdout.fnmatch_lines(
+        [f"*no machine file nowhere.toml; looked for {suite}*and {pytester.path}*", "*the drives are in the machine file*", "*omit it*"]
+    )
+
+
+def test_drives_of_the_marker_are_described_as_for_the_simulator(pytester):
+    pytester.makepyfile(
+        """
+        import ferrodrive, pytest
+
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4,motor=fast,6060=3"], timing="ideal")
+        def test_options(ferrodrive_world):
+            with ferrodrive.Network(ferrodrive_world) as network:
+                network.wait_for(4)
+                assert network.upload(4, 0x6060) == bytes([3])
+                # The other motor ends at some 510 r/min at 48 V.
+                drive = network.drive(4, "zlac8030l")
+                drive.velocity(600)
+                drive.velocity(0, deceleration_rpm_s=200)  # slow, for it feeds back what it brakes
+
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4,motor=fats"])
+        def test_wrong(ferrodrive_world):
+            pass
+        """
+    )
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
+    result.assert_outcomes(passed=1, errors=1)
+    result.stdout.fnmatch_lines(["*'fats' is not a choice for motor of a zlac8030l*"])
+
+
+def test_a_bus_that_an_earlier_test_left_open_is_named_with_that_test(pytester):
+    pytester.makepyfile(
+        """
+        import can, ferrodrive
+
+        kept = []
+
+        def test_leaves_its_bus_open():
+            kept.append(can.Bus(interface="ferrodrive", channel=ferrodrive.World()))
+
+        def test_next(ferrodrive_world):
+            pass
+        """
+    )
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
+    result.assert_outcomes(passed=1, errors=1)
+    result.stdout.fnmatch_lines(["*TimeInUse: *in use since *test_leaves_its_bus_open*bus.shutdown()*"])
 
 
 def test_the_marker_says_the_timing_and_the_machine(pytester):

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Optional, Union, cast
 
 from ._native import Base as NativeBase
 from ._native import Group as NativeGroup
-from .reports import BaseState, GroupState
+from .reports import BaseState, BaseTwist, GroupState
 
 if TYPE_CHECKING:
     from .master import Network
@@ -70,23 +70,9 @@ class _Open:
         self._keeper = self._native.keep()
 
     def stop(self) -> None:
-        """Comes to rest within its limits, and keeps its power.
-
-        :raises MasterError: what went wrong before or on the way
-
-        >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
-        ...     group.stop()
-        """
         self.network._finish(self._native.stop())
 
     def close(self) -> None:
-        """Comes to rest and takes the drives' power. Does nothing the second time, nor after its network, which has stopped it.
-
-        :raises MasterError: a drive was not seen to stand
-
-        >>> group = network.group([ferrodrive.Axis(5, "cia402", mode="csp")])
-        >>> group.close()
-        """
         if not self.network.closed:
             self.network._finish(self._native.close())
 
@@ -114,6 +100,26 @@ class Group(_Open):
 
     def __enter__(self) -> Group:
         return self
+
+    def stop(self) -> None:
+        """Comes to rest within its limits, and keeps its power.
+
+        :raises MasterError: what went wrong before or on the way
+
+        >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
+        ...     group.stop()
+        """
+        super().stop()
+
+    def close(self) -> None:
+        """Comes to rest and takes the drives' power. Does nothing the second time, nor after its network, which has stopped it.
+
+        :raises MasterError: a drive was not seen to stand
+
+        >>> group = network.group([ferrodrive.Axis(5, "cia402", mode="csp")])
+        >>> group.close()
+        """
+        super().close()
 
     def move(self, to_deg: Sequence[float], within: Optional[float] = None) -> float:
         """All axes to these positions, together. Waits until they are there; returns how long the path takes, in s.
@@ -144,6 +150,7 @@ class Group(_Open):
         """What the last cycle showed.
 
         :raises MasterError: it was closed
+        :raises RuntimeError: its network is closed
 
         >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
         ...     group.state()["missed_cycles"]
@@ -158,8 +165,9 @@ class Base(_Open):
     >>> with ferrodrive.Network(ferrodrive.World.machine("base.toml")) as network:
     ...     report = network.boot()
     ...     with network.base() as base:
-    ...         base.drive(0.2, 0.0, seconds=1)
+    ...         base.drive(0.2, 0.0, seconds=1)["limited"]
     ...         0.1 < base.state()["x_m"] < 0.3
+    False
     True
     """
 
@@ -173,29 +181,55 @@ class Base(_Open):
     def __enter__(self) -> Base:
         return self
 
-    def command(self, linear_m_s: float, angular_rad_s: float) -> None:
-        """Drives with this twist from the next cycle on, until a new one comes, and no longer than the watchdog's time. Does not wait.
+    def stop(self) -> None:
+        """Comes to rest within its limits, and keeps its power.
+
+        :raises MasterError: a wheel was lost before or on the way
+
+        >>> base.command(0.3, 0.0)["limited"]
+        False
+        >>> base.stop()
+        """
+        super().stop()
+
+    def close(self) -> None:
+        """Comes to rest and takes the wheels' power. Does nothing the second time, nor after its network, which has stopped it.
+
+        :raises MasterError: a wheel was not seen to stand
+
+        >>> base.close()
+        """
+        super().close()
+
+    def command(self, linear_m_s: float, angular_rad_s: float) -> BaseTwist:
+        """Drives with this twist from the next cycle on, until a new one comes, and no longer than the watchdog's time. Does not wait. One
+        beyond the limits of the base is driven as fast as they allow, on its circle; what is returned is that one, and whether it
+        was limited.
 
         :param linear_m_s: speed along the heading in m/s; ``angular_rad_s`` that of the heading in rad/s, above 0 to the left
         :raises MasterError: it is not a finite number, or a wheel has stopped the base
+        :raises RuntimeError: its network is closed
 
-        >>> base.command(0.1, 0.0)
+        >>> base.command(0.1, 0.0)["limited"]
+        False
         """
-        self._native.command(linear_m_s, angular_rad_s)
+        return cast(BaseTwist, self._native.command(linear_m_s, angular_rad_s))
 
-    def drive(self, linear_m_s: float, angular_rad_s: float, seconds: float) -> None:
-        """Drives with this twist for so many seconds, and comes to rest.
+    def drive(self, linear_m_s: float, angular_rad_s: float, seconds: float) -> BaseTwist:
+        """Drives with this twist for so many seconds, and comes to rest. Limits and what is returned are those of :meth:`command`.
 
         :raises MasterError: what stopped it on its way
 
-        >>> base.drive(0.1, 0.2, seconds=0.5)
+        >>> base.drive(5.0, 0.0, seconds=0.5)       # 0.8 m/s is the most of this base
+        {'linear_m_s': 0.8, 'angular_rad_s': 0.0, 'limited': True}
         """
-        self.network._finish(self._native.drive(linear_m_s, angular_rad_s, seconds))
+        return cast(BaseTwist, self.network._finish(self._native.drive(linear_m_s, angular_rad_s, seconds)))
 
     def state(self) -> BaseState:
-        """What the last cycle showed.
+        """What the last cycle showed. Its twist is the one of this cycle: that of :meth:`command` once the wheels have come to it.
 
         :raises MasterError: it was closed
+        :raises RuntimeError: its network is closed
 
         >>> base.state()["cause"] is None
         True

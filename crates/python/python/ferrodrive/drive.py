@@ -14,13 +14,17 @@ if TYPE_CHECKING:
 class _Orders:
     """What can be asked of a drive, as jobs. Both kinds of drive wait for these."""
 
-    def __init__(self, network: Network, node: int, model: str, gear_ratio: Optional[float] = None) -> None:
+    def __init__(
+        self, network: Network, node: int, model: str, gear_ratio: Optional[float] = None, guessed: bool = False
+    ) -> None:
         model_name(model)
         self.network = network
         #: Its node-ID, 1 to 127.
         self.node = node
         #: Its model.
         self.model = model
+        #: Its model is what its objects show, where others have the same identity: enough to read and to move it.
+        self.guessed = guessed
         #: Turns of its shaft for one turn of the output; None: as the machine file says, or 1.
         self.gear_ratio = gear_ratio
 
@@ -30,7 +34,7 @@ class _Orders:
     def _begin(self, do_: str, **order: Any) -> Job:
         given = {name: value for name, value in order.items() if value is not None}
         behind = {} if self.gear_ratio is None else {"gear_ratio": self.gear_ratio}
-        return self.network._native.drive(self.node, self.model, {"do_": do_, **behind, **given})
+        return self.network._native.drive(self.node, self.model, {"do_": do_, "guessed": self.guessed, **behind, **given})
 
 
 def _angle(degrees: Optional[float], counts: Optional[int]) -> dict[str, Any]:
@@ -99,7 +103,7 @@ class Drive(_Orders):
     def save(self) -> None:
         """Stores its parameters in the drive (1010h, or what its model has for that).
 
-        :raises MasterError: its model has no store, or it refused
+        :raises MasterError: its model has no store or is guessed, or it refused
 
         >>> drive.save()
         """
@@ -108,7 +112,7 @@ class Drive(_Orders):
     def restore(self) -> None:
         """Has the drive take its factory values from the next start on (1011h). What was set is lost.
 
-        :raises MasterError: its model has no such command, or it refused
+        :raises MasterError: its model has no such command or is guessed, or it refused
 
         >>> drive.restore()
         """
@@ -169,6 +173,7 @@ class Drive(_Orders):
         :param wait: until the speed is reached
         :raises NotReached: the speed was not reached, with what was seen
         :raises BadRequest: the speed is beyond what the drive takes
+        :raises MasterError: an open group or base of this network moves the drive (kind ``in_cycles``), as for all that moves it
 
         >>> drive.velocity(60, acceleration_rpm_s=600)["reached_after_s"] is not None
         True

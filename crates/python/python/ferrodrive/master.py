@@ -22,7 +22,7 @@ import atexit
 import os
 import warnings
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Optional, Union, cast
 
@@ -34,15 +34,16 @@ from .drive import AsyncDrive, Drive
 from .errors import BusWarning, MasterError, Stalled, made
 from .parameters import File, Parameters
 from .real_time import REAL
-from .reports import BootReport, CheckReport, ExplainReport, PlanReport, ScanReport
+from .reports import CheckReport
 from .supervisor import Supervisor, path_of
 from .turns import taking_part
+from .whole import Whole
 from .world import World
 
 _open: weakref.WeakSet[Network] = weakref.WeakSet()
 
 
-class Network:
+class Network(Whole):
     """The network as its master sees it.
 
     :param bus: a :class:`~ferrodrive.World`, ``socketcand://HOST:PORT/can0`` or ``slcan:///dev/ttyACM0?bitrate=500k``
@@ -177,19 +178,26 @@ class Network:
 
         :param node: its node-ID, 1 to 127
         :param model: as :func:`~ferrodrive.models` lists them, or a file that describes it (``FILE.eds``); without it the machine file's, else
-            its identity and objects are read
+            its identity and objects are read. Where several models answer alike, the one whose objects the node has is a guess
+            (:attr:`Drive.guessed`): enough to read and to move, not to :meth:`Drive.save` and :meth:`Drive.restore`
         :param gear_ratio: turns of its shaft for one turn of the output behind a gear: angles and speeds are the output's, counts the
             drive's; without it what ``units`` of the machine file say, or 1
-        :raises MasterError: its model was not given and is not certain, or it does not answer
+        :raises MasterError: its model was not given, and nothing speaks for one (kind ``unknown_model``), or it does not answer
         :raises ValueError: the model is not known
 
         >>> network.drive(5).model
         'cia402'
         """
-        model = model or self._native.model_by_file(node) or self._finish(self._native.identify(node))
+        guessed = False
+        model = model or self._native.model_by_file(node)
         if model is None:
-            raise MasterError(f"the model of node {node} is not certain from its identity and objects; state it: drive({node}, MODEL)")
-        return Drive(self, node, model, gear_ratio)
+            identified = self._finish(self._native.identify(node))
+            if identified is None:
+                advice = f'name its model: network.drive({node}, "MODEL"), or a machine file: Network(bus, machine=FILE)'
+                what = f"node {node}: its identity and objects do not show its model"
+                raise made(f"{what}; {advice}", ("unknown_model", what, [], [advice], (node, None, None)))
+            model, guessed = identified
+        return Drive(self, node, model, gear_ratio, guessed)
 
     def async_drive(self, node: int, model: Optional[str] = None, *, gear_ratio: Optional[float] = None) -> AsyncDrive:
         """:meth:`drive` with coroutines; a model that the machine file does not have is to be given.
@@ -207,12 +215,15 @@ class Network:
     def group(
         self, axes: Union[str, Sequence[Axis]], *, period: Optional[float] = None, tolerance: int = 2
     ) -> Group:
-        """Opens a group of axes that move as one, and enables its drives; nothing moves. Close it, or use it with ``with``.
+        """Opens a group of axes that move as one, and enables its drives; nothing moves. Close it, or use it with ``with``. Boot its nodes
+        first (:meth:`boot`). A cycle that the bus cannot carry is refused before anything is written (kind ``bus_load``; on a real bus
+        where the machine file has the bit rate).
 
         :param axes: the name of a ``[[group]]`` of the machine file, or its axes
         :param period: from one SYNC to the next in s, 0.0005 to 0.1; without it the file's, or 0.005
         :param tolerance: cycles in a row that this program may be late for, or a drive's TPDO, before the drives are stopped
-        :raises MasterError: a drive was not enabled, with what keeps it; the file has no such group (:class:`BadRequest`)
+        :raises MasterError: a drive does not answer (:class:`NoAnswer`) or was not enabled, with what keeps it; the bus cannot carry the
+            cycle; the file has no such group (:class:`BadRequest`)
 
         >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
         ...     group.state()["phase"]
@@ -225,89 +236,69 @@ class Network:
         left: Optional[tuple[int, str]] = None,
         right: Optional[tuple[int, str]] = None,
         *,
-        wheel_base_m: float = 0.0,
-        wheel_radius_m: float = 0.0,
-        linear_m_s: float = 0.0,
-        angular_rad_s: float = 0.0,
-        wheel_m_s: float = 0.0,
-        wheel_m_s2: float = 0.0,
-        turns: tuple[float, float] = (1.0, -1.0),
-        mode: str = "pv",
-        watchdog: float = 0.3,
+        wheel_base_m: Optional[float] = None,
+        wheel_radius_m: Optional[float] = None,
+        linear_m_s: Optional[float] = None,
+        angular_rad_s: Optional[float] = None,
+        wheel_m_s: Optional[float] = None,
+        wheel_m_s2: Optional[float] = None,
+        turns: Optional[tuple[float, float]] = None,
+        mode: Optional[str] = None,
+        watchdog: Optional[float] = None,
         lag_m: Optional[float] = None,
         period: Optional[float] = None,
         tolerance: int = 2,
     ) -> Base:
         """Opens a base on two wheels and enables both; nothing moves. Close it, or use it with ``with``. Without wheels it is the ``[base]``
-        of the machine file, and nothing but ``period`` and ``tolerance`` may be given beside.
+        of the machine file, and nothing but ``period`` and ``tolerance`` may be given beside. Boot its nodes first (:meth:`boot`). A cycle
+        that the bus cannot carry is refused before anything is written (kind ``bus_load``).
 
         :param left: node and model of the left wheel, ``right`` those of the right one
         :param wheel_base_m: distance between the wheels in m; ``wheel_radius_m`` their radius in m
         :param linear_m_s: highest speed along the heading; ``angular_rad_s`` that of the heading, ``wheel_m_s`` that of a wheel over
-            the ground, ``wheel_m_s2`` how fast that may change
-        :param turns: turns of each drive for a turn of its wheel forward; the right one of two hub motors sits the other way round
-        :param watchdog: how long a twist counts, in s
+            the ground, ``wheel_m_s2`` how fast that may change. A twist beyond them is driven as fast as they allow
+            (:meth:`Base.command`)
+        :param turns: turns of each drive for a turn of its wheel forward; without it (1, -1): the right one of two hub motors sits the
+            other way round
+        :param mode: mode of operation of the wheels, ``pv`` or ``csv``; without it ``pv``
+        :param watchdog: how long a twist counts, in s; without it 0.3
         :param lag_m: how far a wheel may stay behind its way over the ground before both are stopped, in m; None is what it goes in
             0.25 s at ``wheel_m_s``, and 0.1 m at least
         :param period: from one SYNC to the next in s; without it the file's, or 0.01
         :param tolerance: cycles in a row that this program may be late for, or a drive's TPDO, before the drives are stopped
-        :raises MasterError: a wheel was not enabled; the file has no base (:class:`BadRequest`)
+        :raises MasterError: a wheel does not answer (:class:`NoAnswer`) or was not enabled; the file has no base (:class:`BadRequest`)
+        :raises TypeError: an argument is given that the machine file decides, or that only a base with wheels has
+        :raises ValueError: one wheel is given and the other is not
 
         >>> with ferrodrive.Network(ferrodrive.World.machine("base.toml")) as network:
         ...     network.boot()["ok"]
         ...     with network.base() as base:
-        ...         base.drive(0.2, 0.0, seconds=1)
+        ...         base.drive(0.2, 0.0, seconds=1)["limited"]
         True
+        False
         """
-        if left is None or right is None:
-            if left is not None or right is not None or wheel_base_m or wheel_radius_m:
-                raise ValueError("a base has two wheels: give left and right, or neither for the [base] of the machine file")
-            return Base(self, None, period, tolerance)
-        order = {
-            "wheels": ((*left, turns[0]), (*right, turns[1])),
-            "mode": mode,
-            "wheel_base_m": wheel_base_m,
-            "wheel_radius_m": wheel_radius_m,
-            "linear_m_s": linear_m_s,
-            "angular_rad_s": angular_rad_s,
-            "wheel_m_s": wheel_m_s,
-            "wheel_m_s2": wheel_m_s2,
-            "watchdog_s": watchdog,
-            "lag_m": lag_m,
-        }
-        return Base(self, order, period, tolerance)
-
-    def scan(self) -> ScanReport:
-        """Asks all 127 node-IDs who they are; reads only. What others sent meanwhile is in ``heard``.
-
-        :raises MasterError: no node is on the bus (kind ``no_node``)
-
-        >>> [(node["node"], node["model"]) for node in network.scan()["nodes"]]
-        [(5, 'cia402')]
-        """
-        return cast(ScanReport, self._finish(_native.scan(self._native)))
-
-    def boot(
-        self,
-        file: Optional[File] = None,
-        *,
-        nodes: Sequence[int] = (),
-        reset: bool = False,
-        start: bool = True,
-    ) -> BootReport:
-        """Boots the nodes by CiA 302-2: who they are is checked, they are configured and started; no motor is moved. What is expected is in
-        a machine file or the DCF of a CANopen manager, else in the network's machine file, else each node is booted as what it is.
-
-        :param nodes: these alone
-        :param reset: nodes that are operational too: a motor that turns may stop at once, or go on
-        :param start: False leaves them pre-operational
-        :raises MasterError: a mandatory node has failed (kind ``not_booted``), or one that was left as it is does not have what the file
-            says (``not_configured``); ``report`` of the exception has each step
-
-        >>> [step["step"] for step in network.boot()["nodes"][0]["steps"]][-1]
-        'start'
-        """
-        return cast(BootReport, self._finish(_native.boot(self._native, path_of(file), list(nodes), reset, start)))
+        lengths = {"wheel_base_m": wheel_base_m, "wheel_radius_m": wheel_radius_m}
+        speeds = {"linear_m_s": linear_m_s, "angular_rad_s": angular_rad_s, "wheel_m_s": wheel_m_s, "wheel_m_s2": wheel_m_s2}
+        if left is not None and right is not None:
+            of_left, of_right = (1.0, -1.0) if turns is None else turns
+            order = {
+                "wheels": ((*left, of_left), (*right, of_right)),
+                "mode": "pv" if mode is None else mode,
+                # What is not stated is refused with what is expected.
+                **{name: 0.0 if value is None else value for name, value in {**lengths, **speeds}.items()},
+                "watchdog_s": 0.3 if watchdog is None else watchdog,
+                "lag_m": lag_m,
+            }
+            return Base(self, order, period, tolerance)
+        if left is not None or right is not None:
+            raise ValueError("a base has two wheels: give left and right, or neither for the [base] of the machine file")
+        beside = {**lengths, **speeds, "turns": turns, "mode": mode, "watchdog": watchdog, "lag_m": lag_m}
+        if given := [name for name, value in beside.items() if value is not None]:
+            raise TypeError(
+                f"base() without wheels is the [base] of the machine file, which decides {', '.join(given)}: change it there, or give "
+                "the whole base, with left and right"
+            )
+        return Base(self, None, period, tolerance)
 
     def supervise(self, file: Optional[File] = None, *, nodes: Sequence[int] = (), own_node: int = 127) -> Supervisor:
         """Boots as :meth:`boot` does, has each drive stop by itself when this program dies, where its model has something for that, and
@@ -321,80 +312,6 @@ class Network:
         True
         """
         return Supervisor(self, path_of(file), nodes, own_node)
-
-    def check(self, file: Optional[File] = None, *, strict: bool = False) -> CheckReport:
-        """Checks the description of a bus as :func:`~ferrodrive.check` does, and holds it against the drives of this one; reads only.
-
-        :param file: a machine file, or a ``bus.yml`` of ros2_canopen; without it the network's machine file
-        :param strict: ``ok`` is False for warnings too
-        :raises MasterError: the file makes no sense
-        :raises ValueError: no file was given, and the network has none
-
-        >>> network.check("base.toml")["errors"] > 0        # node 4 of the file is not on this bus
-        True
-        """
-        path = path_of(file) or self._machine
-        if path is None:
-            raise ValueError("which file? This network has no machine file: check(FILE), or Network(bus, machine=FILE)")
-        return cast(CheckReport, self._finish(_native.check(self._native, path, strict)))
-
-    def plan(
-        self,
-        *,
-        cycle: Optional[float] = None,
-        mode: Optional[str] = None,
-        modes: Optional[Mapping[int, str]] = None,
-        bitrate: Optional[Union[int, str]] = None,
-        jitter: float = 0.0,
-        sdo: float = 0.01,
-        emcy: float = 0.1,
-        heartbeat: float = 0.0,
-        errors: float = 0.0,
-        by_priority: bool = False,
-    ) -> PlanReport:
-        """Whether everything fits the bus: its load, the longest time of each frame, and how many such drives it carries. The group or the base
-        of the machine file is planned as it will run. That it does not fit is in the report, and raises nothing. All times in s.
-
-        :param cycle: period of SYNC; without it that of the file's group or base, or 0.01
-        :param mode: the PDOs that this mode of operation needs, in place of those that are mapped; ``modes`` the same for single nodes
-        :param bitrate: that of the bus; without it the world's or the file's
-        :param jitter: how late this program may be with SYNC and RPDOs
-        :param sdo: shortest time between two SDO requests; 0 for none
-        :param emcy: shortest time between two EMCY of one node; 0 for none
-        :param heartbeat: period of this program's heartbeat; 0 for none
-        :param errors: the bus destroys a frame at most once in this time; 0 for never
-        :param by_priority: the controller sends the most urgent frame first, not in the order given
-        :raises MasterError: a node cannot be moved in this mode, or does not answer
-        :raises ValueError: the bit rate is not known, or a value makes no sense
-
-        >>> network.plan(cycle=0.005, mode="csp")["fits"]
-        True
-        """
-        order = {
-            "cycle": cycle,
-            "mode": mode,
-            "modes": dict(modes or {}),
-            "bitrate": None if bitrate is None else str(bitrate),
-            "jitter": jitter,
-            "sdo": sdo,
-            "emcy": emcy,
-            "heartbeat": heartbeat,
-            "errors": errors,
-            "by_priority": by_priority,
-        }
-        return cast(PlanReport, self._finish(_native.plan(self._native, order)))
-
-    def explain(self, node: int, model: Optional[str] = None, *, watch: float = 1.5) -> ExplainReport:
-        """Why a drive does not move, and why its PDOs are silent. Listens to the bus first, then reads what the drive has; writes nothing.
-
-        :param model: as for :meth:`drive`
-        :param watch: how long to listen, in s: longer than the longest period of what is looked for
-        :raises MasterError: the node answers, and refuses what has to be read
-
-        >>> network.explain(5)["findings"][0]["rule"]
-        'not_enabled'
-        """
-        return cast(ExplainReport, self._finish(_native.explain(self._native, node, model, watch)))
 
     def params(self, node: int, model: Optional[str] = None) -> Parameters:
         """The parameters of a node, to be kept, compared, written as a transaction and checked.
@@ -431,9 +348,12 @@ class Network:
         >>> network.wait_for(5)
         """
         if not self._finish(self._native.wait_for(node, within)):
-            advice = "is it powered, on this bus, at this bit rate?"
-            what = f"nothing was heard of node {node} within {within} s"
-            raise made(f"{what}; {advice}", ("no_answer", what, [], [advice], (node, None, None)))
+            raise _unheard(node, within)
+
+    async def async_wait_for(self, node: int, within: float = 5.0) -> None:
+        """As :meth:`wait_for`."""
+        if not await self._finish_soon(self._native.wait_for(node, within)):
+            raise _unheard(node, within)
 
     def seen(self) -> list[int]:
         """Nodes that were heard of.
@@ -499,6 +419,12 @@ class Network:
         ...     asyncio.run(network.async_download(5, 0x1017, 0, (250).to_bytes(2, "little")))
         """
         await self._finish_soon(self._native.download(node, index, sub_index, data))
+
+
+def _unheard(node: int, within: float) -> MasterError:
+    advice = "is it powered, on this bus, at this bit rate?"
+    what = f"nothing was heard of node {node} within {within} s"
+    return made(f"{what}; {advice}", ("no_answer", what, [], [advice], (node, None, None)))
 
 
 def check(file: File, *, strict: bool = False) -> CheckReport:

@@ -61,7 +61,7 @@ class Parameters:
         >>> parameters.diff("slow.toml")["differences"][0]["object"]
         '6081h:00'
         """
-        return cast(DiffReport, self._do(_native.params_diff(*self._of, _path(file))))
+        return cast(DiffReport, self._do(_native.params_compare(*self._of, _path(file), "diff")))
 
     def plan(self, file: Optional[File] = None, *, address: bool = False) -> ParametersPlan:
         """What :meth:`apply` would write, in its order; nothing is written.
@@ -72,7 +72,8 @@ class Parameters:
         >>> [step["object"] for step in parameters.plan("slow.toml")["steps"]]
         ['6081h:00']
         """
-        return cast(ParametersPlan, self._do(_native.params_plan(*self._of, _path(file), address)))
+        question = "plan with address" if address else "plan"
+        return cast(ParametersPlan, self._do(_native.params_compare(*self._of, _path(file), question)))
 
     def apply(
         self,
@@ -112,7 +113,7 @@ class Parameters:
         >>> parameters.verify("slow.toml")["deviations"][0]["wanted"]["text"]
         '100 inc/s'
         """
-        return cast(VerifyReport, self._do(_native.params_verify(*self._of, _path(file))))
+        return cast(VerifyReport, self._do(_native.params_compare(*self._of, _path(file), "verify")))
 
     def rollback(self, journal: Optional[File] = None) -> RollbackReport:
         """Goes back to how the node was before an :meth:`apply` that was broken off, and deletes the journal.

@@ -6,34 +6,48 @@ drives booted. What they begin with is in a marker::
     @pytest.mark.ferrodrive(drives=["zlac8030l@4"], bitrate=500_000, seed=7)
     def test_wheel(ferrodrive_world): ...
 
-    @pytest.mark.ferrodrive(machine="examples/machine.toml")
+    @pytest.mark.ferrodrive(machine="machine.toml")
     def test_machine(ferrodrive_world): ...
 
-``timing`` is whether the drives take the time that such drives take to boot, to answer and to store: ``device``, as real drives and
-``ferrodrive sim``, is the default of both fixtures, so that a suite that is green in CI is green on the desk; with ``ideal`` none of that
-takes time. A machine file is looked for in pytest's root; its own bit rate, seed and timing count.
+- ``drives``: what is on the bus, each in the words of ``ferrodrive sim --drive``: ``"zlac8030l@4"``, ``"zlac8030l@4,motor=fast"``,
+  ``"vendor.eds@5"``. Without it, and without ``machine``, the bus is empty.
+- ``machine``: a machine file in place of them. Its path is taken from the folder of the test's file, and where it is not there from
+  pytest's root. Its own bit rate, seed and timing count, but for a ``seed`` or ``timing`` that is given beside it.
+- ``bitrate``: in bit/s, 500000 without it. Not beside ``machine``.
+- ``seed``: decides everything random; 1 without it.
+- ``timing``: whether the drives take the time that such drives take to boot, to answer and to store: ``"device"``, as real drives and
+  ``ferrodrive sim``, is the default of both fixtures, so that a suite that is green in CI is green on the desk; with ``"ideal"`` none of
+  that takes time.
+- ``extra``: further words for the command line of ``ferrodrive sim``, such as ``["--clock", "manual"]``: of ``ferrodrive_sim`` alone.
 
-A test that fails shows, of each world among its fixtures, the last frames, the state of the drives, and a plot of the last seconds:
-in the report of pytest-html if there is one, else as an SVG file that the report names.
+A test that fails, or whose fixtures fail, shows of each world among its fixtures (and of each :class:`~ferrodrive.Network` in a world)
+the last frames with what they say, the last events with their remedies, the state of the drives, and a plot of the last seconds: in the
+report of pytest-html if there is one, else as an SVG file that the report names.
 """
 
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import pathlib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, Optional
 
 import pytest
 
+from .master import Network
 from .simulator import Simulator
 from .turns import virtual_time
 from .world import World
 
-#: Frames that a failing test shows.
+#: Frames and events that a failing test shows.
 LAST_FRAMES = 40
+LAST_EVENTS = 20
+
+#: The longest line of them, in characters.
+LONGEST_LINE = 160
 
 #: What the marker may have.
 KNOWN = {"drives", "machine", "timing", "bitrate", "seed", "extra"}
@@ -46,7 +60,8 @@ def pytest_configure(config: pytest.Config) -> None:
     """Makes the marker known."""
     words = (
         "ferrodrive(drives=[], machine=FILE, timing='device', bitrate=500000, seed=1, extra=[]): what ferrodrive_world and "
-        "ferrodrive_sim begin with; timing='ideal' is without the time that real drives take to boot, to answer and to store"
+        "ferrodrive_sim begin with; drives as of `ferrodrive sim --drive`, FILE from the folder of the test, timing='ideal' without the time "
+        "that real drives take to boot, to answer and to store, extra words for the command line of ferrodrive_sim"
     )
     config.addinivalue_line("markers", words)
 
@@ -56,14 +71,15 @@ def ferrodrive_world(request: pytest.FixtureRequest) -> Iterator[World]:
     """A virtual bus with the drives of the marker, its virtual time in use: sleeping and waiting moves it, and nothing else. Its time is 0:
     the drives begin to boot, and the first thing to do is to wait for that, as on the desk."""
     wanted = marked(request)
+    if "extra" in wanted:
+        raise ValueError("extra has words for the command line of ferrodrive sim, which ferrodrive_world does not have: omit it")
     if "machine" in wanted:
         world = World.machine(machine_file(request, wanted), wanted.get("seed"), timing=wanted.get("timing"))
     else:
         world = World(wanted.get("bitrate", 500_000), wanted.get("seed", 1), wanted.get("timing", "device"))
     with virtual_time(world):
-        for place in wanted.get("drives", ()):
-            model, _, node = place.rpartition("@")
-            world.add(model, node=int(node))
+        for words in wanted.get("drives", ()):
+            world.add_described(words)
         yield world
 
 
@@ -95,20 +111,35 @@ def marked(request: pytest.FixtureRequest) -> dict[str, Any]:
 
 
 def machine_file(request: pytest.FixtureRequest, wanted: dict[str, Any]) -> pathlib.Path:
-    """The machine file of the marker, from pytest's root."""
+    """The machine file of the marker, from the folder of the test's file, else from pytest's root."""
     if "bitrate" in wanted:
         raise ValueError("the bit rate is in the machine file: omit bitrate, or change it there")
-    return request.config.rootpath / wanted["machine"]
+    if "drives" in wanted:
+        raise ValueError("the drives are in the machine file: omit drives, or add them there")
+    folders = (request.path.parent, request.config.rootpath)
+    places = [folder / wanted["machine"] for folder in folders]
+    for place in places:
+        if place.exists():
+            return place
+    raise FileNotFoundError(f"no machine file {wanted['machine']}; looked for {' and '.join(map(str, dict.fromkeys(places)))}")
 
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_fixture_setup(fixturedef: Any, request: pytest.FixtureRequest) -> Iterator[None]:
     """Keeps the last seconds of every world that a fixture makes, from there on."""
     outcome: Any = yield
-    if outcome.excinfo is None and isinstance(world := outcome.get_result(), World):
+    if outcome.excinfo is None and (world := world_of(outcome.get_result())) is not None:
         if not world.keeps_trail:  # a fixture may have wanted another length
             world.keep_trail()
+        world.keep_events()
         request.node.stash.setdefault(WORLDS, {})[fixturedef.argname] = world
+
+
+def world_of(made: object) -> Optional[World]:
+    """The world that a fixture gives, itself or with a master in it."""
+    if isinstance(made, Network):
+        return made._world
+    return made if isinstance(made, World) else None
 
 
 def pytest_fixture_post_finalizer(fixturedef: Any, request: pytest.FixtureRequest) -> None:
@@ -128,15 +159,30 @@ def worlds(item: pytest.Item) -> Iterator[tuple[str, World]]:
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[None]:
-    """Attaches the last frames, the state of the drives and a plot to a failing test."""
+    """Attaches the last frames and events, the state of the drives and a plot to a failing test."""
     outcome: Any = yield
     report = outcome.get_result()
-    if call.when != "call" or not report.failed:
+    if call.when == "teardown" or not report.failed:
         return
     for name, world in worlds(item):
-        report.sections.append(("last frames on the bus", "\n".join(world.frames(LAST_FRAMES))))
+        report.sections.append(("last frames on the bus", lines(world.decoded_frames(LAST_FRAMES), "nothing was sent")))
+        report.sections.append(("last events", lines(events(world), "nothing happened")))
         report.sections.append(("drives", f"{world.now} s\n" + "\n".join(state(world))))
         report.sections.append(("plot of the drives", plot(item, report, name, world)))
+
+
+def lines(texts: Iterable[str], otherwise: str) -> str:
+    """The texts, a line each of a bounded length."""
+    cut = (text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + "..." for text in texts)
+    return "\n".join(cut) or otherwise
+
+
+def events(world: World) -> Iterator[str]:
+    """A line on each of the last events."""
+    for event in map(json.loads, world.last_events(LAST_EVENTS)):
+        place = f"node {event['node']}: " if "node" in event else ""
+        remedy = f"; {event['remedy']}" if "remedy" in event else ""
+        yield f"{event['t']:.6f}  {place}{event['text']}{remedy}"
 
 
 def plot(item: pytest.Item, report: Any, name: str, world: World) -> str:

@@ -70,6 +70,15 @@ class BaseState(TypedDict):
     cause: Optional[str]
 
 
+class BaseTwist(TypedDict):
+    """Of :meth:`Base.command` and :meth:`Base.drive`: the twist that the base is driven with, and whether its limits are why that is less
+    than what was asked for."""
+
+    linear_m_s: float
+    angular_rad_s: float
+    limited: bool
+
+
 class Heard(TypedDict):
     """Frames that others sent during a scan, of one kind."""
 

@@ -78,6 +78,8 @@ class VirtualTime:
         self.process = os.getpid()
         #: In use so many times over.
         self.depth = 0
+        #: The test that began it, in pytest's words.
+        self.begun_in = os.environ.get("PYTEST_CURRENT_TEST", "")
         self.closed = False
         self._owner = Participant(threading.current_thread().name)
         self._participants: dict[int, Participant] = {REAL.get_ident(): self._owner}
@@ -369,7 +371,12 @@ def enter(world: World) -> VirtualTime:
         stand_ins.install()
         _active = time
     elif _active.world is not world:
-        raise TimeInUse("the virtual time of another world is in use; one program has one time, so give it one world")
+        since = f" since {_active.begun_in}" if _active.begun_in else ""
+        raise TimeInUse(
+            f"the virtual time of another world, {_active.world!r}, is in use{since}, and a program has one time. Where that was left over "
+            "(by an earlier test), close what uses it there: bus.shutdown() of a can.Bus, network.disconnect() of canopen, or the `with` "
+            "block of virtual_time; the fixture ferrodrive_world does so by itself. Otherwise put all drives into one world"
+        )
     elif _active.current() is None:
         raise TimeInUse("a thread that took no part when the virtual time began cannot use it; open the bus in the thread that began it")
     _active.depth += 1

@@ -334,9 +334,8 @@ def at_channel(channel: object) -> World:
         return world
     if "@" in text:
         world = World(channel=text)
-        for place in text.split():
-            model, _, node = place.rpartition("@")
-            world.add(model, node=int(node))
+        for words in text.split():
+            world.add_described(words)
         return world
     raise ValueError(
         f"{text!r} is not a channel; expected a World, the name of one (World(channel={text!r})), or drives, "

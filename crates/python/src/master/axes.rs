@@ -5,13 +5,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use can::Bitrate;
 use master::base::{Base as MasterBase, BaseError, BaseLimits, BaseState, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
 use master::drive::Drive;
 use master::group::{AxisLimits, AxisSetup, Group as MasterGroup, GroupError, Phase, StreamOptions};
 use master::units::Turns;
-use master::{Exchange, Network as Core};
+use master::{Error, Exchange, Network as Core};
 use pyo3::prelude::*;
+use testbench::failure::Failure;
+use testbench::machine_file::CyclePlan;
 use testbench::words::mode::mode;
 
 use super::job::Trouble;
@@ -21,6 +24,9 @@ use crate::failure::bad_value;
 
 /// Points of a path that are given at once: a tenth of a second at 1 ms.
 const AHEAD: usize = 100;
+
+/// Twists that differ by no more than the rounding of their computation, m/s and rad/s.
+const SAME_TWIST: f64 = 1e-9;
 
 /// An axis of a group, in plain values.
 #[derive(FromPyObject)]
@@ -147,7 +153,11 @@ impl From<GroupError> for Trouble {
     fn from(error: GroupError) -> Self {
         match error {
             GroupError::Drive(error) => Self::Drive(error),
-            error => Self::Said(error.to_string()),
+            GroupError::Period { .. } | GroupError::NoAxis => Failure::usage(error.to_string()).into(),
+            GroupError::Path(_) | GroupError::BeyondDrive { .. } => {
+                Failure::new(error.to_string()).of_kind("out_of_limits").into()
+            }
+            error => Failure::new(error.to_string()).of_kind("group").into(),
         }
     }
 }
@@ -156,8 +166,43 @@ impl From<BaseError> for Trouble {
     fn from(error: BaseError) -> Self {
         match error {
             BaseError::Drive(error) => Self::Drive(error),
-            error => Self::Said(error.to_string()),
+            BaseError::BadLimit { .. } | BaseError::BadLength { .. } | BaseError::BadTwist { .. } => {
+                Failure::usage(error.to_string()).into()
+            }
+            BaseError::BeyondDrive { .. } => Failure::new(error.to_string()).of_kind("out_of_limits").into(),
+            error => Failure::new(error.to_string()).of_kind("base").into(),
         }
+    }
+}
+
+/// Why a group or a base was not opened; `drive` is what a drive said, where that is why.
+fn opening(what: &str, drive: Option<Error>, error: impl Into<Trouble>) -> Trouble {
+    match drive {
+        Some(silence @ Error::NoAnswer { .. }) => not_booted(what, silence.into()).into(),
+        _ => error.into(),
+    }
+}
+
+/// Of a drive that does not answer while something is opened, what to do first.
+fn not_booted(what: &str, failure: Failure) -> Failure {
+    let Some(node) = failure.subject.node.filter(|_| failure.kind == "no_answer") else { return failure };
+    let what = format!("{what} was not opened, and nothing moves: node {node} does not answer");
+    let Failure { kind, subject, what: because, next, .. } = failure;
+    let failure = Failure { kind, subject, ..Failure::new(what) }.because(because);
+    next.into_iter().fold(failure.next("boot its nodes first: network.boot()"), Failure::next)
+}
+
+/// An error where the bus cannot carry the cycle, before anything is written to a drive. Without a known bit rate nothing is refused.
+async fn check_fits(cycle: &CyclePlan, drives: &[&Drive], bitrate: Option<Bitrate>) -> Result<(), Trouble> {
+    let Some(bitrate) = bitrate else { return Ok(()) };
+    match cycle.too_full(drives, bitrate, |read| read).await {
+        Ok(None) => Ok(()),
+        Ok(Some(full)) => {
+            let failure = Failure::new(format!("{} was not opened: {}", cycle.what, full.what)).of_kind("bus_load");
+            let shown = format!("network.plan(cycle={}) shows each frame", cycle.period.as_secs_f64());
+            Err(failure.next(full.next).next(shown).into())
+        }
+        Err(failure) => Err(not_booted(&cycle.what, failure).into()),
     }
 }
 
@@ -257,6 +302,7 @@ impl Group {
 
     /// What the last cycle showed.
     fn state(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.network.get().check_open()?;
         let value = self.slot.with(|group| {
             let state = group.state();
             let axes = group.axes().iter().zip(group.points()).map(|(axis, point)| {
@@ -280,14 +326,19 @@ impl Group {
 
 impl Group {
     fn open_with(&self, py: Python<'_>, axes: Vec<AxisSetup>, period: Duration, tolerance: u32) -> PyResult<Job> {
-        let slot = self.slot.clone();
+        let (slot, bitrate) = (self.slot.clone(), self.network.get().bitrate(py)?);
         let options = CyclicOptions { tolerance, ..CyclicOptions::default() };
+        let nodes = axes.iter().map(|axis| (axis.drive.node().id(), Some(axis.mode))).collect();
+        let cycle = CyclePlan { what: "the group".into(), period, nodes, is_base: false };
         self.network.get().begin_said(py, async move {
-            let mut group = MasterGroup::open(&axes, period, options).await?;
+            let drives: Vec<&Drive> = axes.iter().map(|axis| &axis.drive).collect();
+            check_fits(&cycle, &drives, bitrate).await?;
+            let opened = MasterGroup::open(&axes, period, options).await;
+            let mut group = opened.map_err(|error| opening(&cycle.what, error.of_drive().cloned(), error))?;
             if let Err(error) = group.enable().await {
                 let reason = group.explain_stop().await.map(|reason| format!(". {reason}")).unwrap_or_default();
                 let _ = group.close().await;
-                return Err(Trouble::Said(format!("{error}{reason}")));
+                return Err(Failure::new(format!("{error}{reason}")).of_kind("group").into());
             }
             *slot.lock() = Some(group);
             Ok(Value::None)
@@ -401,9 +452,10 @@ impl Base {
     }
 
     /// The twist from the next cycle on, for as long as the watchdog lets it count.
-    fn command(&self, py: Python<'_>, linear_m_s: f64, angular_rad_s: f64) -> PyResult<()> {
-        let taken = self.slot.with(|base| Ok(base.command(Twist { linear_m_s, angular_rad_s })?));
-        taken.map_err(|trouble| trouble.raised(py, None))
+    fn command(&self, py: Python<'_>, linear_m_s: f64, angular_rad_s: f64) -> PyResult<Py<PyAny>> {
+        self.network.get().check_open()?;
+        let taken = self.slot.with(|base| command(base, Twist { linear_m_s, angular_rad_s }));
+        taken.map_err(|trouble| trouble.raised(py, None))?.into_python(py)
     }
 
     /// The twist for this long, and then to rest.
@@ -411,11 +463,14 @@ impl Base {
         let (slot, core, time) = (self.slot.clone(), self.core.clone(), duration(seconds)?);
         self.network.get().begin_said(py, async move {
             let began = core.now();
+            let twist = Twist { linear_m_s, angular_rad_s };
+            let mut taken = slot.with(|base| command(base, twist))?;
             while core.now() - began < time {
-                slot.with(|base| Ok(base.command(Twist { linear_m_s, angular_rad_s })?))?;
+                taken = slot.with(|base| command(base, twist))?;
                 next(&core).await?;
             }
-            stand(&core, &slot).await
+            stand(&core, &slot).await?;
+            Ok(taken)
         })
     }
 
@@ -438,6 +493,7 @@ impl Base {
 
     /// What the last cycle showed.
     fn state(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.network.get().check_open()?;
         let state = self.slot.with(|base| Ok(base.state())).map_err(|trouble| trouble.raised(py, None))?;
         let BaseState { cause, commanded, pose, .. } = state;
         let record = vec![
@@ -461,14 +517,21 @@ impl Base {
         period: Duration,
         tolerance: u32,
     ) -> PyResult<Job> {
-        let slot = self.slot.clone();
+        let (slot, bitrate) = (self.slot.clone(), self.network.get().bitrate(py)?);
         let options = CyclicOptions { tolerance, ..CyclicOptions::default() };
+        let nodes = wheels.iter().map(|wheel| (wheel.drive.node().id(), Some(wheel.mode))).collect();
+        let cycle = CyclePlan { what: "the base".into(), period, nodes, is_base: true };
         self.network.get().begin_said(py, async move {
             let [left, right] = &wheels;
-            let mut base = MasterBase::open([left, right], geometry, limits, period, options).await?;
+            let drives = [&left.drive, &right.drive];
+            check_fits(&cycle, &drives, bitrate).await?;
+            let opened = MasterBase::open([left, right], geometry, limits, period, options).await;
+            let mut base = opened.map_err(|error| opening(&cycle.what, error.of_drive().cloned(), error))?;
             if let Err(error) = base.enable().await {
+                let reason = base.explain_stop().await.map(|reason| format!(". {reason}")).unwrap_or_default();
                 let _ = base.close().await;
-                return Err(error.into());
+                let failure = Failure::new(format!("{error}{reason}")).of_kind("base");
+                return Err(failure.next("network.explain(NODE) says what keeps a wheel").into());
             }
             *slot.lock() = Some(base);
             Ok(Value::None)
@@ -486,6 +549,19 @@ impl BaseOrder {
         };
         Ok([wheel(&self.wheels[0])?, wheel(&self.wheels[1])?])
     }
+}
+
+/// Has a base drive with a twist; what its limits make of that.
+fn command(base: &mut MasterBase, twist: Twist) -> Result<Value, Trouble> {
+    base.command(twist)?;
+    let Twist { linear_m_s, angular_rad_s } = base.wanted();
+    let limited =
+        (linear_m_s - twist.linear_m_s).abs() > SAME_TWIST || (angular_rad_s - twist.angular_rad_s).abs() > SAME_TWIST;
+    Ok(Value::Record(vec![
+        ("linear_m_s", Value::Real(linear_m_s)),
+        ("angular_rad_s", Value::Real(angular_rad_s)),
+        ("limited", Value::Bool(limited)),
+    ]))
 }
 
 async fn next(core: &Core) -> Result<(), Trouble> {

@@ -13,6 +13,7 @@ use testbench::failure::Failure;
 
 use super::runner::Runner;
 use super::value::Value;
+use super::whole::how_to_say;
 use crate::failure::{master_error, wrong_use};
 use crate::live::Live;
 use crate::world;
@@ -57,8 +58,12 @@ impl Trouble {
     pub(super) fn raised(self, py: Python<'_>, bus: Option<&str>) -> PyErr {
         match self {
             Self::Drive(error) => {
-                let text = error.to_string();
-                master_error(py, &text, &Failure::from(error), bus)
+                let (mut text, advice) = (error.to_string(), how_to_name(&error));
+                if let Some(advice) = &advice {
+                    text = format!("{text}. {advice}");
+                }
+                let failure = advice.into_iter().fold(Failure::from(error), Failure::next);
+                master_error(py, &text, &failure, bus)
             }
             Self::Said(text) => master_error(py, &text, &Failure::new(text.as_str()), bus),
             Self::Failed(failure) => master_error(py, &failure.to_string(), &failure, bus),
@@ -69,6 +74,16 @@ impl Trouble {
             }
         }
     }
+}
+
+/// How a program names the model of a node, where that is what is missing.
+fn how_to_name(error: &Error) -> Option<String> {
+    let (node, fitting) = match error {
+        Error::GuessedModel { node, guess, .. } => (*node, guess.fitting().map(|model| model.name).collect()),
+        Error::UnknownModel { node, .. } => (*node, vec!["MODEL"]),
+        _ => return None,
+    };
+    Some(format!("name its model: {}", how_to_say(node, &fitting)))
 }
 
 #[derive(Default)]

@@ -62,55 +62,43 @@ pub(crate) fn params_backup(
     })
 }
 
-/// In what a node and a file differ.
-#[pyfunction]
-pub(crate) fn params_diff(
-    py: Python<'_>,
-    network: &Bound<'_, Network>,
-    node: u8,
-    model: Option<&str>,
-    file: Option<PathBuf>,
-) -> PyResult<Job> {
-    let asked = Asked::of(network.get(), node, model)?;
-    network.get().begin_said(py, async move {
-        let drive = asked.drive().await?;
-        let (wanted, name) = asked.wanted(file.as_ref(), drive.description())?;
-        Ok(Value::report(&diff_of_node(&drive, &wanted, name).await?))
-    })
+/// What is asked about a node and what it is to have.
+#[derive(Clone, Copy)]
+enum Question {
+    /// In what they differ.
+    Diff,
+    /// What would be written, in its order; with node-ID and bit rate or without.
+    Plan { address: bool },
+    /// Whether the node has it.
+    Verify,
 }
 
-/// What would be written, in its order.
+/// Compares a node with what it is to have, as `question` has it: `diff`, `plan`, `plan with address`, `verify`. Nothing is written.
 #[pyfunction]
-pub(crate) fn params_plan(
+pub(crate) fn params_compare(
     py: Python<'_>,
     network: &Bound<'_, Network>,
     node: u8,
     model: Option<&str>,
     file: Option<PathBuf>,
-    address: bool,
+    question: &str,
 ) -> PyResult<Job> {
+    let question = match question {
+        "diff" => Question::Diff,
+        "plan" => Question::Plan { address: false },
+        "plan with address" => Question::Plan { address: true },
+        "verify" => Question::Verify,
+        other => return Err(bad_value(format!("{other:?} is not asked of parameters"))),
+    };
     let asked = Asked::of(network.get(), node, model)?;
     network.get().begin_said(py, async move {
         let drive = asked.drive().await?;
         let (wanted, name) = asked.wanted(file.as_ref(), drive.description())?;
-        Ok(Value::report(&plan_of(&(), &drive, &wanted, name, address).await?))
-    })
-}
-
-/// Whether a node has what a file has.
-#[pyfunction]
-pub(crate) fn params_verify(
-    py: Python<'_>,
-    network: &Bound<'_, Network>,
-    node: u8,
-    model: Option<&str>,
-    file: Option<PathBuf>,
-) -> PyResult<Job> {
-    let asked = Asked::of(network.get(), node, model)?;
-    network.get().begin_said(py, async move {
-        let drive = asked.drive().await?;
-        let (wanted, name) = asked.wanted(file.as_ref(), drive.description())?;
-        Ok(Value::report(&verify_node(&drive, &wanted, name).await?))
+        Ok(match question {
+            Question::Diff => Value::report(&diff_of_node(&drive, &wanted, name).await?),
+            Question::Plan { address } => Value::report(&plan_of(&(), &drive, &wanted, name, address).await?),
+            Question::Verify => Value::report(&verify_node(&drive, &wanted, name).await?),
+        })
     })
 }
 

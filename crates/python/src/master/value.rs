@@ -3,6 +3,7 @@
 use master::drive::{DriveState, MotionReport};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
+use testbench::words::calls::in_python;
 
 /// A value on its way to Python.
 pub(crate) enum Value {
@@ -61,12 +62,17 @@ fn of_json(py: Python<'_>, json: serde_json::Value) -> PyResult<Py<PyAny>> {
             Some(integer) => Value::Integer(integer),
             None => real(number.as_f64()),
         },
-        Json::String(text) => Value::Text(text),
+        Json::String(text) => Value::Text(in_python(&text).into_owned()),
         Json::Array(items) => Value::List(items.into_iter().map(Value::Report).collect()),
         Json::Object(fields) => {
             let dict = PyDict::new(py);
             for (name, value) in fields {
-                dict.set_item(name, of_json(py, value)?)?;
+                let value = match value {
+                    // A file as the command line writes it, too.
+                    Json::String(text) if name == "parameters" => Value::Text(text).into_python(py)?,
+                    value => of_json(py, value)?,
+                };
+                dict.set_item(name, value)?;
             }
             return Ok(dict.into_any().unbind());
         }

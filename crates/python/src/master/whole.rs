@@ -28,6 +28,7 @@ use testbench::words::mode::mode;
 
 use super::job::Trouble;
 use super::runner::Runner;
+use super::tap::Passed;
 use super::value::Value;
 use super::{Job, Network, duration};
 use crate::failure::{bad_value, raised};
@@ -59,7 +60,7 @@ impl Network {
     }
 
     /// The bit rate, where it is known without being said.
-    fn bitrate(&self, py: Python<'_>) -> PyResult<Option<Bitrate>> {
+    pub(super) fn bitrate(&self, py: Python<'_>) -> PyResult<Option<Bitrate>> {
         match &*self.runner {
             Runner::World(shared) => Ok(Some(shared.lock(py)?.world.bitrate())),
             Runner::Live(_) => Ok(self.machine.as_ref().and_then(|machine| machine.bitrate)),
@@ -114,7 +115,7 @@ pub(crate) fn scan(py: Python<'_>, network: &Bound<'_, Network>) -> PyResult<Job
 }
 
 /// How a program says which model a node is.
-fn how_to_say(node: NodeId, models: &[&str]) -> String {
+pub(super) fn how_to_say(node: NodeId, models: &[&str]) -> String {
     let (first, others) = models.split_first().unwrap_or((&"MODEL", &[]));
     let others = if others.is_empty() { String::new() } else { format!(" (or {})", others.join(", ")) };
     format!("network.drive({node}, {first:?}){others}, or a machine file: Network(bus, machine=FILE)")
@@ -291,8 +292,8 @@ pub(crate) fn explain(
     network.begin_said(py, async move {
         let mut heard = Overheard::from(core.now());
         core.sleep(watch).await;
-        while let Some(BusFrame { at, frame, .. }) = listener.take() {
-            heard.note(&frame, at);
+        while let Some(BusFrame { at, frame, own }) = listener.take() {
+            if own { heard.note_own(&frame, at) } else { heard.note(&frame, at) }
         }
         heard.until(core.now());
         let drive = match drive_at(&core, machine.as_deref(), id, model).await {

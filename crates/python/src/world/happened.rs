@@ -1,0 +1,63 @@
+//! What happened in a world: for the program that asks for it, and the last of it for a report on a test that failed.
+
+use std::collections::VecDeque;
+
+use sim::events::Event;
+
+/// Events that are kept for a report.
+const KEPT: usize = 100;
+
+/// The events of a world. They wait in the world, which bounds them, until someone looks.
+#[derive(Default)]
+pub(super) struct Happened {
+    /// A program asks for them.
+    asked: bool,
+    /// What was looked at for a report, and that program has not taken yet.
+    waiting: Vec<Event>,
+    /// The last ones, whoever asks, where a report may want them.
+    kept: Option<VecDeque<Event>>,
+}
+
+impl Happened {
+    /// A program asks for what happens from now on, or no longer.
+    pub(super) fn watch(&mut self, world: &mut sim::World, on: bool) {
+        self.look(world);
+        self.waiting.clear();
+        self.asked = on;
+        world.watch(on || self.kept.is_some());
+    }
+
+    /// The last events are kept from now on.
+    pub(super) fn keep(&mut self, world: &mut sim::World) {
+        self.kept.get_or_insert_default();
+        world.watch(true);
+    }
+
+    /// What happened since the last call, for the program that asks.
+    pub(super) fn take(&mut self, world: &mut sim::World) -> Vec<Event> {
+        self.look(world);
+        std::mem::take(&mut self.waiting)
+    }
+
+    /// The last events, at most so many, oldest first; the program that asks misses none by that.
+    pub(super) fn last(&mut self, world: &mut sim::World, most: usize) -> impl Iterator<Item = &Event> {
+        self.look(world);
+        let kept = self.kept.iter().flatten();
+        let all = kept.clone().count();
+        kept.skip(all.saturating_sub(most))
+    }
+
+    fn look(&mut self, world: &mut sim::World) {
+        for event in std::iter::from_fn(|| world.poll_event()) {
+            if let Some(kept) = &mut self.kept {
+                if kept.len() == KEPT {
+                    kept.pop_front();
+                }
+                kept.push_back(event.clone());
+            }
+            if self.asked {
+                self.waiting.push(event);
+            }
+        }
+    }
+}
