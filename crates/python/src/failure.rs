@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use canopen::NodeId;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use testbench::failure::{Failure, Subject};
@@ -57,4 +58,11 @@ pub(crate) fn master_error(py: Python<'_>, text: &str, failure: &Failure, bus: O
 /// Why a request was not even tried, or a file is not taken.
 pub(crate) fn raised(py: Python<'_>, failure: &Failure) -> PyErr {
     master_error(py, &failure.to_string(), failure, None)
+}
+
+/// How a program says which model a node is.
+pub(crate) fn how_to_say(node: NodeId, models: &[&str]) -> String {
+    let (first, others) = models.split_first().unwrap_or((&"MODEL", &[]));
+    let others = if others.is_empty() { String::new() } else { format!(" (or {})", others.join(", ")) };
+    format!("network.drive({node}, {first:?}){others}, or a machine file: Network(bus, machine=FILE)")
 }

@@ -312,7 +312,7 @@ impl World {
         Ok(state.happened.take(&mut state.world).iter().map(|event| events::json(event).to_string()).collect())
     }
 
-    /// Has the last events kept for a report, whoever asks for them.
+    /// Has the last events kept for a report, also where a program asks for them.
     fn keep_events(&self, py: Python<'_>) -> PyResult<()> {
         let state = &mut *self.shared.lock(py)?;
         state.happened.keep(&mut state.world);

@@ -96,6 +96,17 @@ def test_what_is_opened_before_the_boot_up_names_the_boot_up(network, what, open
     network.base().close()
 
 
+def test_what_is_closed_is_to_be_opened_again(network):
+    network.boot()
+    base = network.base()
+    base.close()
+    for ask in (base.state, base.stop, lambda: base.command(0.1, 0.0), lambda: base.drive(0.1, 0.0, seconds=1)):
+        with pytest.raises(ferrodrive.MasterError, match=r"it was closed: open it again, network\.group\(\.\.\) or network\.base"):
+            ask()
+    base.close()
+    network.base().close()
+
+
 def test_after_its_network_nothing_is_asked_of_a_base_or_a_drive(world):
     network = ferrodrive.Network(world)
     network.boot()

@@ -97,7 +97,7 @@ class World:
         """Notes what happens in the world from now on, or stops that."""
     def take_events(self) -> list[str]: ...
     def keep_events(self) -> None:
-        """Has the last events kept for a report, whoever asks for them."""
+        """Has the last events kept for a report, also where a program asks for them."""
     def last_events(self, most: int) -> list[str]:
         """The last of them, oldest first, one line of JSON each."""
     def begin_record(self, path: str, period_ns: int) -> None: ...

@@ -122,7 +122,10 @@ impl<T: Stepped> Slot<T> {
 
     /// Does something with what is open.
     fn with<R>(&self, ask: impl FnOnce(&mut T) -> Result<R, Trouble>) -> Result<R, Trouble> {
-        self.lock().as_mut().map_or_else(|| Err(Trouble::Said("it is not open: it was closed".into())), ask)
+        self.lock().as_mut().map_or_else(
+            || Err(Trouble::Said("it was closed: open it again, network.group(..) or network.base(..)".into())),
+            ask,
+        )
     }
 
     fn close(&self) -> Option<T> {

@@ -13,8 +13,7 @@ use testbench::failure::Failure;
 
 use super::runner::Runner;
 use super::value::Value;
-use super::whole::how_to_say;
-use crate::failure::{master_error, wrong_use};
+use crate::failure::{how_to_say, master_error, wrong_use};
 use crate::live::Live;
 use crate::world;
 

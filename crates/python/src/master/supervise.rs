@@ -17,7 +17,7 @@ use testbench::network::boot::BootReport;
 use testbench::network::supervise::WatchedEvent;
 
 use super::job::Trouble;
-use super::tap::{Listener, Passed};
+use super::tap::Listener;
 use super::value::Value;
 use super::whole::{TIMEOUT, node_ids};
 use super::{Job, Network, duration};

@@ -28,10 +28,9 @@ use testbench::words::mode::mode;
 
 use super::job::Trouble;
 use super::runner::Runner;
-use super::tap::Passed;
 use super::value::Value;
 use super::{Job, Network, duration};
-use crate::failure::{bad_value, raised};
+use crate::failure::{bad_value, how_to_say, raised};
 use crate::sheets::{model_of, node_id};
 
 /// Longest wait for an answer, as the default of the command line.
@@ -112,13 +111,6 @@ pub(crate) fn scan(py: Python<'_>, network: &Bound<'_, Network>) -> PyResult<Job
         let nodes = found.iter().map(|found| ScannedNode::new(known.get(&found.node).copied(), found, how_to_say));
         Ok(Value::report(&ScanReport { nodes: nodes.collect(), heard }))
     })
-}
-
-/// How a program says which model a node is.
-pub(super) fn how_to_say(node: NodeId, models: &[&str]) -> String {
-    let (first, others) = models.split_first().unwrap_or((&"MODEL", &[]));
-    let others = if others.is_empty() { String::new() } else { format!(" (or {})", others.join(", ")) };
-    format!("network.drive({node}, {first:?}){others}, or a machine file: Network(bus, machine=FILE)")
 }
 
 /// Boots the nodes of a file, or who is there.

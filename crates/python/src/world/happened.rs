@@ -14,7 +14,7 @@ pub(super) struct Happened {
     asked: bool,
     /// What was looked at for a report, and that program has not taken yet.
     waiting: Vec<Event>,
-    /// The last ones, whoever asks, where a report may want them.
+    /// The last ones, where a report may want them.
     kept: Option<VecDeque<Event>>,
 }
 

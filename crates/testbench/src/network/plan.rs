@@ -81,7 +81,7 @@ impl PlanReport {
         let cycle = plan(nodes, &settings.cycle_alone(), bitrate);
         let mut notes: Vec<String> = all.remarks.iter().map(ToString::to_string).collect();
         if !nodes.iter().any(|node| node.pdos.iter().any(|(config, id)| id.is_valid() && !config.map.0.is_empty())) {
-            notes.push("no PDO carries anything: --mode plans with what a mode of operation needs".into());
+            notes.push("no PDO carries anything: plan for a mode of operation, with the PDOs that it needs".into());
         }
         let fits = all.fits();
         // What is late in the moment of a fault alone does not keep a motion from beginning.
@@ -89,7 +89,7 @@ impl PlanReport {
         if ok && !fits && !all.is_tolerable(&cycle, TOLERANCE) {
             notes.push(format!(
                 "SDO requests and EMCY beside the cycle may keep a PDO away for more than the {TOLERANCE} cycles that are tolerated, and so \
-                 stop the motion: take a longer period, or ask nothing meanwhile (--sdo 0s shows what that gives)"
+                 stop the motion: take a longer period, or ask nothing meanwhile (a plan without SDO requests shows what that gives)"
             ));
         }
         if let Some(full) = too_full(nodes, settings, bitrate, &cycle) {

@@ -173,7 +173,7 @@ mod tests {
             "Switch one off: ferrodrive lss scan, or its switches",
             "look with commands that only listen: ferrodrive dump",
             "ferrodrive eds lint FILE checks a data sheet",
-            "/home/ferrodrive scan",
+            "/srv/ferrodrive scan",
             "what moves it with ferrodrive does so by itself",
             "ferrodrive ",
         ] {

@@ -143,7 +143,7 @@ pub fn read(path: &Path, node: NodeId) -> Result<Journal, Failure> {
         return Err(Failure::new(format!("there is no journal {}", path.display()))
             .of_kind("no_journal")
             .at_node(node)
-            .because("every apply to this node from this folder was completed, or had another --journal")
+            .because("every apply to this node from this folder was completed, or its journal is another file")
             .next("name the journal, or write parameters that were kept: ferrodrive params apply NODE FILE"));
     }
     let unusable = |reason: String| {
