@@ -69,6 +69,7 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["boot", "--node", "9"], "boot"),
     (&["supervise", "--for", "2s"], "supervise"),
     (&["plan", "--mode", "4=pv"], "plan"),
+    (&["plan", "--mode", "pv", "--cycle", "250us"], "plan"),
     (&["dump", "--for", "1s"], "frame"),
     (&["export", "dbc", "4"], "export"),
     (&["gateway"], "failure"),
