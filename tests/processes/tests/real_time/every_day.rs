@@ -83,7 +83,7 @@ fn bytes_go_to_a_file_and_come_from_one() {
     std::fs::write(&path, [3]).unwrap();
     let written = done(&["--json", "write", "4", "6060", "--from", &path]).json();
     assert_eq!((&written["value"], &written["meaning"]), (&json!(3), &json!("profile velocity")));
-    for (content, said) in [(&b""[..], "is empty"), (&[0; (1 << 20) + 1], "longer than")] {
+    for (content, said) in [(&b""[..], "is empty"), (&[0; (1 << 20) + 1], "larger than the limit of 1 MB")] {
         std::fs::write(&path, content).unwrap();
         let refused = ferrodrive(&["write", "4", "6060", "--from", &path]);
         assert!(refused.status == Some(1) && refused.err.contains(said), "{}", refused.err);

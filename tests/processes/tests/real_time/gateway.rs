@@ -327,6 +327,9 @@ fn a_gateway_that_cannot_serve_says_why() {
     let first = Gateway::start(&bus, &[]);
     let second = ferrodrive(&["--bus", &bus, "gateway", "--listen", &first.address]);
     assert!(second.status == Some(1) && second.err.contains("cannot listen at"), "{}", second.err);
-    let nowhere = ferrodrive(&["--bus", &bus, "gateway", "--listen", "here"]);
-    assert!(nowhere.status == Some(1) && nowhere.err.contains("cannot listen at here"), "{}", nowhere.err);
+    // An address of no machine (RFC 5737), and a word that is none.
+    let nowhere = ferrodrive(&["--bus", &bus, "gateway", "--listen", "192.0.2.1:1"]);
+    assert!(nowhere.status == Some(1) && nowhere.err.contains("cannot listen at 192.0.2.1:1"), "{}", nowhere.err);
+    let word = ferrodrive(&["--bus", &bus, "gateway", "--listen", "here"]);
+    assert!(word.status == Some(2) && word.err.contains("expected HOST:PORT"), "{}", word.err);
 }

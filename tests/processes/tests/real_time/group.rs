@@ -215,6 +215,6 @@ fn a_base_stops_when_no_line_comes_and_drives_on_with_the_next() {
     assert_eq!(ended.status.code(), Some(0), "{out}{err}");
     let report: Value = serde_json::from_str(&out).unwrap();
     assert!(report["dead_man_stops"].as_u64().unwrap() >= 1, "{report}");
-    assert!(err.contains("no new twist came for 300 ms; the next line continues"), "{err}");
+    assert_eq!(err, "", "a program has it in the report");
     bench.wait(false);
 }
