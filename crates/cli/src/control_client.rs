@@ -65,7 +65,7 @@ impl ControlArgs {
             Failure::new(format!("cannot reach {place}"))
                 .because(error)
                 .of_kind("control")
-                .next("is a simulator running with --control, and is this what its ready line names?")
+                .next("check that a simulator runs with --control, and that its ready line names this address")
         })?;
         let mut client = ControlClient { reader: BufReader::new(socket), place, asked: 0, nodes: Value::Null };
         client.wait_at_most(Some(PATIENCE))?;

@@ -38,6 +38,19 @@ pub struct Setting {
     pub since_restart: bool,
 }
 
+/// A number that was asked for, as it is shown. A conversion ends at the bounds of 64 bits, and what was asked for is beyond.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Asked(pub(crate) i64);
+
+impl fmt::Display for Asked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            i64::MIN | i64::MAX => f.write_str("a value of more than 64 bits"),
+            number => number.fmt(f),
+        }
+    }
+}
+
 impl Limits {
     /// True if the drive takes this value.
     pub fn take(&self, value: i64) -> bool {

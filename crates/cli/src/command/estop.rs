@@ -175,7 +175,11 @@ impl StopReport {
                 .next(format!("then: ferrodrive state {}", moving[0].node));
             moving
                 .iter()
-                .filter_map(|axis| Some(format!("{}: {}", axis.name(), axis.why.as_ref()?)))
+                .filter_map(|axis| {
+                    let (name, why) = (axis.name(), axis.why.as_ref()?);
+                    // The master's errors name the node.
+                    Some(if why.starts_with(&name) { why.clone() } else { format!("{name}: {why}") })
+                })
                 .fold(failure, Failure::because)
         });
         let error = failure.as_ref().map(FailureBody::from);

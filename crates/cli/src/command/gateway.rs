@@ -181,7 +181,7 @@ async fn see_off(context: &Context, mut parted: mpsc::UnboundedReceiver<Gone>, l
         for Stopped { node, outcome, .. } in context.network.stop_moved(moved).await {
             let text = match outcome {
                 Ok(_) => format!("node {node}: its client has gone; it has been quick-stopped and stands"),
-                Err(error) => format!("node {node}: its client has gone, and it may still be moving: {error}"),
+                Err(error) => format!("node {node} may still be moving, and its client has gone: {error}"),
             };
             context.note(&text);
         }

@@ -215,6 +215,7 @@ fn objects_and_values_are_checked() {
     refused(&["read", "4", "position_actual_vale"], &["did you mean position_actual_value?"]);
     refused(&["read", "4", "zzzz"], &["no object named 'zzzz'", "ferrodrive objects 4 WORD"]);
     refused(&["write", "4", "6040", "65536"], &["0 to 65535"]);
+    refused(&["write", "4", "6040", "99999999999999999999"], &["99999999999999999999 does not fit 6040h:00"]);
     refused(&["write", "4", "6040", "on"], &["expected a number"]);
     refused(&["write", "4", "6060", "profile_velocty"], &["did you mean profile velocity?"]);
     refused(&["write", "4", "60FF", "5A"], &["r/min"]);
@@ -240,6 +241,7 @@ fn quantities_are_checked() {
 #[test]
 fn what_is_beyond_the_drives_limits_is_refused_before_anything_moves() {
     not_taken(&["velocity", "4", "20000rpm"], &["out of range"]);
+    not_taken(&["move", "4", "1e300deg"], &["a value of more than 64 bits is out of range"]);
     not_taken(&["torque", "4", "31A"], &["out of range", "-30000 to 30000"]);
 }
 

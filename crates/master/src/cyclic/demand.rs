@@ -5,7 +5,7 @@ use cia402::{PowerState, Statusword};
 
 use crate::core::CycleLoss;
 use crate::drive::STANDSTILL_RPM;
-use crate::limits::{Limits, Setting};
+use crate::limits::{Asked, Limits, Setting};
 use crate::units::{Amperes, Angle, Rpm, Shown, Turns};
 
 /// What a drive is to do in one cycle.
@@ -128,7 +128,7 @@ impl fmt::Display for Refusal {
                 f.write_str("the set-point is not a number that its object can hold. The drive is held instead")
             }
             Self::OutOfLimits { asked, bound } => {
-                write!(f, "{asked} is out of range for {bound}. The drive is held instead")
+                write!(f, "{} is out of range for {bound}. The drive is held instead", Asked(*asked))
             }
             Self::StepTooLarge { way, longest, bound } => write!(
                 f,

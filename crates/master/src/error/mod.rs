@@ -13,7 +13,7 @@ use devices::AxisId;
 use devices::faults::FaultRow;
 
 use crate::identify::knowledge::{Guess, Identity};
-use crate::limits::{Limits, Setting};
+use crate::limits::{Asked, Limits, Setting};
 use crate::units::{Shown, Volts};
 use hints::advice;
 
@@ -216,8 +216,8 @@ pub enum Error {
         modes: &'static [ModeOfOperation],
     },
     /// A value is outside what the drive takes, or would be held back by another object: it was not sent.
-    #[error("node {node}: {asked} is out of range for {} {}, which takes {limits}. It was not sent",
-        limits.object, limits.name)]
+    #[error("node {node}: {} is out of range for {} {}, which takes {limits}. It was not sent",
+        Asked(*asked), limits.object, limits.name)]
     OutOfLimits {
         /// The node.
         node: NodeId,

@@ -133,7 +133,7 @@ pub enum GroupError {
         shows: String,
     },
     /// An axis did not find its reference. Those that searched beside it were stopped.
-    #[error("axis {axis}, node {node}, did not find its reference: {source}")]
+    #[error("axis {axis} did not find its reference: {source}")]
     Homing {
         /// Which axis, from 1.
         axis: usize,

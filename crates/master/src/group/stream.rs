@@ -275,7 +275,7 @@ mod tests {
         good.check(PERIOD_S).unwrap();
         assert_eq!(
             refused(StreamOptions { grace: 101, ..good }),
-            "a stream's grace of 101 is outside of 0 to 100: nothing is moved. Cycles without a point are bounded by 100 ms, and \
+            "a stream's grace of 101 is out of range, expected 0 to 100: nothing is moved. Cycles without a point are bounded by 100 ms, and \
              points that are waited for by the capacity"
         );
         assert!(

@@ -404,7 +404,7 @@ fn axes_home_together_or_in_sequence_and_one_that_fails_stops_the_others() {
     hopeless[0].options.limit = Duration::from_secs(1);
     let error = block_on(&mut bench.world, home(&hopeless, HomingOrder::Together)).unwrap().unwrap_err();
     assert!(matches!(error, GroupError::Homing { axis: 1, .. }), "{error}");
-    assert!(error.to_string().starts_with("axis 1, node 1, did not find its reference: "), "{error}");
+    assert!(error.to_string().starts_with("axis 1 did not find its reference: node 1: "), "{error}");
     bench.world.run_for(Duration::from_secs(1));
     assert!(bench.rpm(1).abs() < 2.0 && bench.rpm(2).abs() < 2.0, "{} {}", bench.rpm(1), bench.rpm(2));
 

@@ -541,7 +541,7 @@ mod tests {
         }
         for (text, said) in [
             ("", "a condition is missing"),
-            ("4", "what about node 4?"),
+            ("4", "a condition of node 4 is missing"),
             ("four velocity > 5", "NODE SIGNAL"),
             ("4 velocty > 5", "did you mean velocity"),
             ("4 velocity > fast", "'fast' is not a number in r/min"),

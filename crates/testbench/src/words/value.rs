@@ -9,8 +9,12 @@ use super::unit::{Unit, split_number};
 /// limits are for the drive to check.
 pub fn value(row: &Entry, text: &str, resolution: i64) -> Result<i64, String> {
     let (low, high) = row.data_type.range();
+    let beyond = |value: &str| {
+        format!("{value} does not fit {} ({}): expected {low} to {high}", row.mux(), row.data_type.name())
+    };
     let value = match integer(text) {
         Some(value) => value,
+        None if is_decimal(text) => return Err(beyond(text.trim())),
         None => match split_number(text) {
             Some((number, unit)) => with_unit(row, text, number * resolution as f64, unit)?,
             None => word(row, text)?,
@@ -19,7 +23,13 @@ pub fn value(row: &Entry, text: &str, resolution: i64) -> Result<i64, String> {
     if (low..=high).contains(&value) {
         return Ok(value);
     }
-    Err(format!("{value} does not fit {} ({}): expected {low} to {high}", row.mux(), row.data_type.name()))
+    Err(beyond(&value.to_string()))
+}
+
+/// A whole number, of however many digits.
+fn is_decimal(text: &str) -> bool {
+    let digits = text.trim().trim_start_matches(['-', '+']);
+    !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 /// A value as it was typed.
@@ -154,16 +164,23 @@ fn with_unit(row: &Entry, text: &str, number: f64, unit: &str) -> Result<i64, St
     let Some(own) = Unit::of_object(row.unit) else {
         return Err(format!("{} has no unit; expected a whole number, e.g. {}", row.mux(), example(row)));
     };
-    let expected = || format!("expected {} in a unit of {}, or a whole number of them", row.mux(), row.unit);
+    let expected = || {
+        let own = row.unit;
+        format!("expected a whole number in units of {own}, or a number with a unit that converts to {own}")
+    };
     let given = Unit::named(unit).ok_or_else(|| format!("'{text}' is not a value; {}", expected()))?;
     if given.dimension != own.dimension {
         return Err(format!("'{unit}' is not a unit of {}; {}", row.mux(), expected()));
     }
     let counts = number * given.factor / own.factor;
     let whole = counts.round();
-    if (counts - whole).abs() > 1e-6 * counts.abs().max(1.0) || whole.abs() > u32::MAX.into() {
-        let counts = master::units::Shown(counts);
-        return Err(format!("'{text}' is {counts} counts of {}; a whole number of them in range is needed", row.mux()));
+    let said = || format!("'{text}' is {} counts of {}", master::units::Shown(counts), row.mux());
+    if whole.abs() > u32::MAX.into() {
+        let (low, high) = row.data_type.range();
+        return Err(format!("{}; expected {low} to {high}", said()));
+    }
+    if (counts - whole).abs() > 1e-6 * counts.abs().max(1.0) {
+        return Err(format!("{}; expected a whole number of counts", said()));
     }
     Ok(whole as i64)
 }
@@ -253,7 +270,10 @@ mod tests {
     fn values_that_do_not_fit_the_type_are_refused() {
         assert!(value(&WORD, "65536").unwrap_err().contains("0 to 65535"));
         assert!(value(&WORD, "-1").is_err());
-        assert!(value(&SPEED, "99999999999999999999").is_err());
+        let beyond = "expected -2147483648 to 2147483647";
+        let error = value(&SPEED, "99999999999999999999").unwrap_err();
+        assert_eq!(error, format!("99999999999999999999 does not fit 60FFh:00 (INTEGER32): {beyond}"));
+        assert!(value(&SPEED, "1e12rpm").unwrap_err().ends_with(&format!("counts of 60FFh:00; {beyond}")));
         assert!(value(&WORD, "").is_err());
     }
 
