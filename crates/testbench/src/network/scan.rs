@@ -100,16 +100,16 @@ impl ScannedNode {
 
 /// What contradicts the model that is stated for a node.
 fn contradiction(known: &'static Description, found: &Found) -> Option<String> {
-    let said = format!("it is stated to be a {}", known.name);
+    let said = format!("the model given for it is {}", known.name);
     if !found.identity?.matches(&known.identity) {
-        return Some(format!("{said}, but its identity is that of another model: name the right one"));
+        return Some(format!("{said}, but its identity is that of another model: give the right one"));
     }
     let guess = found.knowledge.guess()?;
     let evidence = guess.evidence().filter(|_| guess.fitting().all(|model| model.name != known.name))?;
     // A data sheet that has the object too is not spoken against.
     let evidence = known.row(evidence).is_none().then_some(evidence)?;
     let fitting = guess.description().name;
-    Some(format!("{said}, but has {evidence}, as a {fitting} has: name the right model"))
+    Some(format!("{said}, but it has {evidence}, as a {fitting} has: give the right model"))
 }
 
 /// What is not certain, and what the user can do about it.

@@ -77,8 +77,8 @@ fn a_scan_names_what_it_is_told_and_says_what_speaks_against_it() {
     assert_eq!((&node(&found, 4)["model"], &node(&found, 4)["remark"]), (&json!("zlac8030l"), &Value::Null));
     let found = bench.json(&["--model", "4=zlim42c", "--model", "1=zlim42c", "scan"]);
     assert_eq!(node(&found, 4)["model"], Value::Null);
-    assert!(node(&found, 4)["remark"].as_str().unwrap().contains("has 2029h:00 as a zlac8030l has"), "{found}");
-    assert!(node(&found, 1)["remark"].as_str().unwrap().contains("its identity is another one"), "{found}");
+    assert!(node(&found, 4)["remark"].as_str().unwrap().contains("has 2029h:00, as a zlac8030l has"), "{found}");
+    assert!(node(&found, 1)["remark"].as_str().unwrap().contains("its identity is that of another model"), "{found}");
 }
 
 #[test]

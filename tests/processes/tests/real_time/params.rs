@@ -92,7 +92,11 @@ fn what_cannot_be_written_is_told_with_its_place_and_nothing_is_written() {
     let joint = folder.path("joint.dcf");
     done(&["params", "backup", "1", "-o", &joint]);
     let ended = ferrodrive(&["params", "apply", "4", &joint]);
-    assert!(ended.status == Some(1) && ended.err.contains("another device"), "{}", ended.err);
+    assert!(
+        ended.status == Some(1) && ended.err.contains("not the device that these parameters are for"),
+        "{}",
+        ended.err
+    );
     assert_eq!(ended.err.matches("vendor").count(), 2, "{}", ended.err);
     // Drives with the same identity are distinguished by the model in the file.
     let stepper = folder.path("stepper.toml");
