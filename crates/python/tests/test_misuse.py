@@ -6,6 +6,7 @@ import pathlib
 
 import ferrodrive
 import pytest
+from test_reference import SENSOR
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[3] / "examples"
 
@@ -157,12 +158,25 @@ def test_a_guessed_model_is_moved_and_not_stored():
         named.save()
 
 
-def test_a_node_that_nothing_speaks_for_is_to_be_named(network):
-    network.boot()
-    with pytest.raises(ferrodrive.NoAnswer):
-        network.drive(9)
-    with pytest.raises(ferrodrive.BadRequest, match="node 9 is to be booted"):
+def test_a_node_that_nothing_speaks_for_is_to_be_named(tmp_path):
+    sheet = tmp_path / "sensor.eds"
+    sheet.write_text(SENSOR, encoding="utf-8")
+    world = ferrodrive.World()
+    world.add(eds=sheet, node=7)
+    with ferrodrive.Network(world) as network:
+        network.wait_for(7)
+        with pytest.raises(ferrodrive.MasterError, match="node 7: its identity and objects do not show its model") as raised:
+            network.drive(7)
+        assert raised.value.kind == "unknown_model" and 'network.drive(7, "MODEL")' in raised.value.do[0]
+        # Not a matter of the model.
+        with pytest.raises(ferrodrive.NoAnswer, match="node 9"):
+            network.drive(9)
+
+
+def test_a_boot_up_of_a_node_that_the_file_does_not_have_names_those_that_it_has(network):
+    with pytest.raises(ferrodrive.BadRequest, match="node 9 is to be booted, and the file does not have it") as raised:
         network.boot(nodes=[9])
+    assert raised.value.do == ("its nodes: 4, 5",)
 
 
 def test_a_cycle_that_the_bus_cannot_carry_is_refused_before_anything_is_written():
