@@ -9,18 +9,25 @@
 pub mod alarms;
 pub mod assumptions;
 mod drive;
+mod encoder;
 pub mod gains;
 pub mod hardware;
 pub mod homing;
+mod host_heartbeat;
 pub mod leds;
 mod model;
 pub mod objects;
+mod orders;
+mod origin;
+mod output;
 mod parameters;
 pub mod power_on;
 mod protection;
 pub mod pulses;
+mod rhythm;
 pub mod statusword;
 pub mod storage;
+mod terminals;
 mod turns;
 pub mod variations;
 

@@ -19,6 +19,10 @@ const RAD_S_PER_RPM: f32 = cia402::RAD_S_PER_RPM as f32;
 /// Everything that the control task reads of the dictionary besides its targets.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parameters {
+    /// 2619h as it was at power-on.
+    pub(super) function: Function,
+    /// Amplitude of a phase's current for each ampere of 261Dh and 6078h.
+    pub(super) amplitude: f32,
     /// Highest speed of the motor, counts/s.
     pub(super) max_speed: f64,
     /// Of position moves.
@@ -88,6 +92,8 @@ impl Parameters {
         let (stationary_output, stationary_time_s) = with_seconds(values.get(STATIONARY_OUTPUT));
         let profile_speed = f64::from(values.get(PROFILE_VELOCITY)) * COUNTS_S_PER_RPM;
         Self {
+            function,
+            amplitude,
             max_speed,
             moves: moves(profile_speed),
             pulse_moves: moves(max_speed),

@@ -1,23 +1,20 @@
 //! What a host's writes set in motion.
 
 use can::Instant;
-use canopen::heartbeat::Consumer;
 use canopen::node::Via;
 use canopen::od::{DefaultValue, Slot};
 use cia402::{Controlword, ModeOfOperation};
 
-use super::{HomingState, MJoint, OwnMotion};
-use crate::engine::axis::{Control, Demand, Task};
+use super::{MJoint, OwnMotion};
+use crate::engine::axis::{Control, Demand, HomingState, Task};
 use crate::engine::device::{Application, Device};
-use crate::mjoint::assumptions::{INTERPOLATION_PERIODS, SET_ORIGIN, SUPERVISION_DIVIDER, SUPERVISION_PERIOD_S};
+use crate::mjoint::assumptions::{INTERPOLATION_PERIODS, SUPERVISION_PERIOD_S};
 use crate::mjoint::homing::switches;
 use crate::mjoint::objects::effects::{Effect, effect};
 use crate::mjoint::objects::*;
+use crate::mjoint::origin::Written;
 use crate::mjoint::parameters::TimeBase;
 use crate::mjoint::variations::ORIGIN_AT_EDGE;
-
-/// Bits 1 to 3 of the controlword, without which nothing moves.
-const MAY_MOVE: u16 = Controlword::ENABLE_VOLTAGE | Controlword::QUICK_STOP | Controlword::ENABLE_OPERATION;
 
 /// From one point of an interpolation to the next.
 const INTERPOLATION_PERIOD_S: f64 = INTERPOLATION_PERIODS as f64 * SUPERVISION_PERIOD_S as f64;
@@ -36,7 +33,7 @@ impl Application<Room> for MJoint {
 
     fn restart_communication(&mut self, now: Instant) {
         self.device.restart_communication(now);
-        self.host = Consumer::from_raw(self.values().get(CONSUMER_HEARTBEAT_TIME));
+        self.host.restart_communication(self.values().get(CONSUMER_HEARTBEAT_TIME));
     }
 
     /// Any write may change the status, and the answer to the same frame may carry it.
@@ -88,13 +85,13 @@ impl MJoint {
         if asked.has(Controlword::SWITCH_ON) {
             self.take_from_pulses();
         }
-        self.controlword = Controlword(asked.0 & !Controlword::NEW_SET_POINT);
-        self.device.values_mut().set(CONTROLWORD, self.controlword.0);
+        self.orders.controlword = Controlword(asked.0 & !Controlword::NEW_SET_POINT);
+        self.device.values_mut().set(CONTROLWORD, self.orders.controlword.0);
         self.update_power_stage();
         if !self.may_move() {
-            self.next_point = None;
+            self.orders.next_point = None;
         }
-        if asked.has(Controlword::NEW_SET_POINT) && self.mode == ModeOfOperation::PROFILE_POSITION {
+        if asked.has(Controlword::NEW_SET_POINT) && self.orders.mode == ModeOfOperation::PROFILE_POSITION {
             let target = self.values().get(TARGET_POSITION);
             self.start_move(target);
         }
@@ -102,7 +99,7 @@ impl MJoint {
 
     /// 6060h. An RPDO repeats the mode with whatever it brings, and means a new homing only when the mode is new.
     fn mode_written(&mut self, mode: ModeOfOperation, via: Via) {
-        let repeated = mode == self.mode && matches!(via, Via::Rpdo(_));
+        let repeated = mode == self.orders.mode && matches!(via, Via::Rpdo(_));
         if !repeated {
             self.select_mode(mode);
         }
@@ -115,20 +112,21 @@ impl MJoint {
             if !self.is_homing() {
                 self.begin_homing(mode);
             }
-        } else if mode != self.mode {
-            self.next_point = None;
+        } else if mode != self.orders.mode {
+            self.orders.next_point = None;
             self.rest();
             self.axis.forget_homing();
         }
-        self.mode = mode;
+        self.orders.mode = mode;
         self.update_power_stage();
     }
 
     fn begin_homing(&mut self, mode: ModeOfOperation) {
-        self.mode = mode;
-        self.next_point = None;
-        self.own_motion = OwnMotion::None;
-        let (pu, dir) = (self.inputs.levels() & 1 != 0, self.inputs.levels() & 2 != 0);
+        self.orders.mode = mode;
+        self.orders.next_point = None;
+        self.orders.own_motion = OwnMotion::None;
+        let levels = self.terminals.levels();
+        let (pu, dir) = (levels & 1 != 0, levels & 2 != 0);
         let mut homing = self.parameters.homing;
         self.axis.set_switches(switches(homing.sequence, pu, dir));
         if self.can_be_live() {
@@ -165,8 +163,8 @@ impl MJoint {
     /// 607Ah: with bit 5 each write starts a move, and so does SYNC with the position of RPDO4. Else it waits.
     fn target_written(&mut self, target: i32, via: Via) {
         let with_sync = matches!(via, Via::Rpdo(number) if number.number() == SYNCHRONOUS_RPDO);
-        let immediately = with_sync || self.controlword.has(Controlword::CHANGE_SET_IMMEDIATELY);
-        match self.mode {
+        let immediately = with_sync || self.orders.controlword.has(Controlword::CHANGE_SET_IMMEDIATELY);
+        match self.orders.mode {
             ModeOfOperation::PROFILE_POSITION if immediately => self.start_move(target),
             ModeOfOperation::INTERPOLATED_POSITION if self.may_move() => self.interpolate_to(target),
             _ => {}
@@ -177,17 +175,12 @@ impl MJoint {
     /// takes the point up when it is over. With 255 it begins with SYNC too, and goes on with DIR.
     fn interpolate_to(&mut self, target: i32) {
         if self.parameters.time_base != TimeBase::Own {
-            self.dir_changes = 0;
+            self.terminals.take_dir_changes();
             let at_rest = self.axis.is_resting();
             self.interpolate(target);
-            self.base_periods = 0;
-            // On the way a SYNC that comes a control period early or late does not move the loops. From rest all axes
-            // begin in the next control period, wherever in their own rhythm they are.
-            if at_rest || (1..SUPERVISION_DIVIDER - 1).contains(&self.periods) {
-                self.periods = SUPERVISION_DIVIDER - 1;
-            }
+            self.rhythm.synchronise(at_rest);
         } else {
-            self.next_point = Some(target);
+            self.orders.next_point = Some(target);
         }
     }
 
@@ -202,14 +195,14 @@ impl MJoint {
             return;
         }
         self.refresh_parameters();
-        let relative = self.controlword.has(Controlword::RELATIVE);
+        let relative = self.orders.controlword.has(Controlword::RELATIVE);
         let target = if relative { self.axis.target().wrapping_add(target) } else { target };
         self.axis.begin(Task::Move { target, limits: self.parameters.moves });
     }
 
     /// 260Ch: so many counts more, at once.
     fn increment(&mut self, by: i32) {
-        if self.may_move() && self.mode == ModeOfOperation::PROFILE_POSITION {
+        if self.may_move() && self.orders.mode == ModeOfOperation::PROFILE_POSITION {
             self.refresh_parameters();
             let target = self.axis.target().wrapping_add(by);
             self.axis.begin(Task::Move { target, limits: self.parameters.moves });
@@ -226,7 +219,7 @@ impl MJoint {
 
     /// The motor is the host's: what it did by itself ends where it is.
     fn take_from_pulses(&mut self) {
-        if core::mem::replace(&mut self.own_motion, OwnMotion::None) != OwnMotion::None {
+        if self.orders.end_own_motion() {
             self.rest();
         }
     }
@@ -247,12 +240,11 @@ impl MJoint {
 
     /// 2601h: 0 takes the power stage away, a 1 after it resets alarms.
     fn output_enabled(&mut self, enabled: bool) {
-        let was_enabled = core::mem::replace(&mut self.output_was_enabled, enabled);
-        if enabled && !was_enabled {
+        if self.orders.enable_output(enabled) {
             self.reset_alarms();
         }
         if !enabled {
-            self.own_motion = OwnMotion::None;
+            self.orders.own_motion = OwnMotion::None;
             self.fail_homing();
         }
         self.update_power_stage();
@@ -267,23 +259,21 @@ impl MJoint {
 
     /// 260Ah: 60006 and then 60016 make the present position the origin, and neither stays.
     fn gear_numerator(&mut self, value: u16) {
-        let [first, second] = SET_ORIGIN;
-        let armed = core::mem::replace(&mut self.origin_asked, value == first);
-        if armed && value == second {
-            self.make_origin();
+        match self.origin.write(value) {
+            Written::Numerator => {
+                self.parameters_changed = true;
+                return;
+            }
+            Written::First => {}
+            Written::Second => self.make_origin(),
         }
-        if value == first || (armed && value == second) {
-            let kept = self.gear_numerator;
-            self.device.values_mut().set(GEAR_NUMERATOR, kept);
-        } else {
-            self.gear_numerator = value;
-            self.parameters_changed = true;
-        }
+        let kept = self.origin.gear_numerator();
+        self.device.values_mut().set(GEAR_NUMERATOR, kept);
     }
 
     /// The present position becomes 0 with the next control period; the turns are known again.
     pub(super) fn make_origin(&mut self) {
-        self.set_origin = true;
+        self.origin.make();
         self.protection.origin_set();
         self.alarms.release(crate::mjoint::alarms::row::BATTERY);
         self.publish_alarms();
@@ -291,33 +281,30 @@ impl MJoint {
 
     /// 1016h:01. The watch begins anew with the next heartbeat.
     fn configure_host(&mut self, raw: u32) {
-        self.host = Consumer::from_raw(raw);
-        self.host_lost = false;
+        self.host.configure(raw);
         self.alarms.release(crate::mjoint::alarms::row::COMMUNICATION);
         self.publish_alarms();
     }
 
     /// Pulses are ignored and the host's targets count: bit 0 of the controlword, or 2600h.
     pub(super) fn is_host_in_control(&self) -> bool {
-        self.controlword.has(Controlword::SWITCH_ON) || self.values().get(MODBUS_ENABLE) == 1
+        self.orders.controlword.has(Controlword::SWITCH_ON) || self.values().get(MODBUS_ENABLE) == 1
     }
 
     /// The host's targets may move the motor.
     pub(super) fn may_move(&self) -> bool {
-        self.axis.is_engaged() && self.is_host_in_control() && self.controlword.has(MAY_MOVE)
+        self.axis.is_engaged() && self.is_host_in_control() && self.orders.allow_motion()
     }
 
     /// Nothing forbids the power stage.
     pub(super) fn can_be_live(&self) -> bool {
         let releasing = self.alarms.latched().0 & crate::mjoint::alarms::RELEASING.0;
-        self.awake && self.values().get(OUTPUT_ENABLED) == 1 && releasing == 0
+        self.encoder.is_awake() && self.values().get(OUTPUT_ENABLED) == 1 && releasing == 0
     }
 
     /// The power stage drives the motor: bit 1 of the controlword, homing in mode 6, or the joint's own motion.
     fn wants_to_be_live(&self) -> bool {
-        let homing = self.has_homing_the_motor();
-        let own = matches!(self.own_motion, OwnMotion::Returning | OwnMotion::Following);
-        self.can_be_live() && (self.controlword.has(Controlword::ENABLE_VOLTAGE) || homing || own)
+        self.can_be_live() && (self.orders.want_power() || self.has_homing_the_motor())
     }
 
     /// Takes the shaft over or lets go of it, as it has become right.
@@ -327,8 +314,8 @@ impl MJoint {
             self.engage();
         } else if !live && self.axis.is_engaged() {
             self.axis.release();
-            self.next_point = None;
-            self.demand = Demand::Off;
+            self.orders.next_point = None;
+            self.output.demand = Demand::Off;
         }
     }
 

@@ -12,33 +12,33 @@ mod resting;
 
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::NodeId;
-use canopen::heartbeat::{Consumer, ConsumerEvent};
 use canopen::node::{Node, NodeProfile};
 use canopen::sdo::server::FrameLength;
-use cia402::{Controlword, ModeOfOperation, PowerState};
+use cia402::PowerState;
 use devices::AxisId;
-use motion::field_weakening::FieldWeakening;
-use motion::filter::LowPass;
 
 use super::alarms::{self, ALARM_COUNT, ALARMS, row};
 use super::assumptions::*;
-use super::hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};
+use super::encoder::Encoder;
+use super::hardware::{Actuation, Battery, Brake, Hardware, Sensors};
+use super::host_heartbeat::{HostEvent, HostHeartbeat};
 use super::leds::{LAMP_TEST_MS, leds};
 use super::model::Model;
 use super::objects::*;
+use super::orders::{Orders, OwnMotion};
+use super::origin::Origin;
+use super::output::Output;
 use super::parameters::Parameters;
 use super::power_on::Function;
 use super::protection::Protection;
-use super::pulses::Pulses;
-use super::turns::Turns;
+use super::rhythm::Rhythm;
+use super::terminals::Terminals;
 use super::variations::{self, VARIANT};
 use super::{Values, storage};
 use crate::communication::communication;
-use crate::engine::actuator::servo::Servo;
-use crate::engine::axis::{Axis, Demand, HomingState};
+use crate::engine::axis::{Axis, Demand};
 use crate::engine::device::{Application, Device, ResetTimes};
 use crate::engine::faults::FaultMonitor;
-use crate::engine::inputs::Inputs;
 use crate::engine::storage::StoredImage;
 use crate::{Firmware, Report};
 use devices::variant::Variant;
@@ -67,71 +67,22 @@ pub struct MJoint {
     model: &'static Model,
     device: Device<Room>,
     powered_at: Instant,
-    host: Option<Consumer>,
-    host_lost: bool,
-    /// 2619h as it was at power-on.
-    function: Function,
-    /// Amplitude of a phase's current for each ampere of 261Dh and 6078h.
-    amplitude: f32,
+    host: HostHeartbeat,
     parameters: Parameters,
     parameters_changed: bool,
     /// 2615h, which the identifiers of PDOs follow at once.
     address: u32,
-    /// The position at the last power-off, until the joint has looked where it is now.
-    power_off_position: Option<i32>,
-    /// 260Ah without the two values that set the origin.
-    gear_numerator: u16,
-    /// 60006 has been written to 260Ah.
-    origin_asked: bool,
-    set_origin: bool,
     save_asked: bool,
-    output_was_enabled: bool,
-
-    controlword: Controlword,
-    mode: ModeOfOperation,
-    own_motion: OwnMotion,
-    /// A target of mode 7 that waits for the free-running time base.
-    next_point: Option<i32>,
-
+    origin: Origin,
+    orders: Orders,
     axis: Axis,
-    servo: Servo,
-    weakening: FieldWeakening,
-    demand: Demand,
-    duty: [f32; 3],
+    output: Output,
     alarms: FaultMonitor<ALARM_COUNT>,
     protection: Protection,
-    pulses: Pulses,
-    inputs: Inputs<2>,
+    terminals: Terminals,
     battery: Battery,
-    /// Level of DIR, and how often it has changed since the time base of the interpolation went on.
-    dir: bool,
-    dir_changes: u8,
-
-    /// The sensors have been looked at since the start.
-    awake: bool,
-    angle_count: u16,
-    /// Counts of the shaft, wrapping: the encoder's angle followed over its turns.
-    shaft_count: u16,
-    turns: Turns,
-    position: i32,
-    shown_velocity_rpm: LowPass,
-    shown_current_a: LowPass,
-    periods: u8,
-    /// Supervision periods in the present 2 ms.
-    base_periods: u8,
-}
-
-/// What the joint does without a command over CAN.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum OwnMotion {
-    /// Nothing: it waits for a first pulse, or for a host.
-    None,
-    /// It has to find out where it is, and may then go somewhere (2619h).
-    Starting,
-    /// It goes where 2619h says.
-    Returning,
-    /// It follows pulses, and holds between them.
-    Following,
+    encoder: Encoder,
+    rhythm: Rhythm,
 }
 
 impl MJoint {
@@ -154,46 +105,23 @@ impl MJoint {
         let parameters = Parameters::from(device.values(), model, function, amplitude);
         Self {
             model,
-            gear_numerator: device.values().get(GEAR_NUMERATOR),
+            origin: Origin::new(device.values().get(GEAR_NUMERATOR)),
             address: u32::from(device.values().get(DEVICE_ADDRESS)),
-            servo: Servo::new(&parameters.servo, 0, 0),
-            weakening: FieldWeakening::default(),
-            amplitude,
+            output: Output::new(&parameters),
             device,
             powered_at: Instant::ZERO,
-            host: None,
-            host_lost: false,
-            function,
+            host: HostHeartbeat::default(),
             parameters,
             parameters_changed: false,
-            power_off_position: None,
-            origin_asked: false,
-            set_origin: false,
             save_asked: false,
-            output_was_enabled: true,
-            controlword: Controlword(0),
-            mode: ModeOfOperation::PROFILE_POSITION,
-            own_motion: OwnMotion::None,
-            next_point: None,
+            orders: Orders::new(OwnMotion::None),
             axis: Axis::new(),
-            demand: Demand::Off,
-            duty: [0.0; 3],
             alarms: FaultMonitor::new(&ALARMS, &alarms::DEBOUNCE),
             protection: Protection::default(),
-            pulses: Pulses::default(),
-            inputs: Inputs::default(),
+            terminals: Terminals::default(),
             battery: Battery::Full,
-            dir: false,
-            dir_changes: 0,
-            awake: false,
-            angle_count: 0,
-            shaft_count: 0,
-            turns: Turns::default(),
-            position: 0,
-            shown_velocity_rpm: LowPass::default(),
-            shown_current_a: LowPass::default(),
-            periods: 0,
-            base_periods: 0,
+            encoder: Encoder::default(),
+            rhythm: Rhythm::default(),
         }
     }
 
@@ -214,7 +142,7 @@ impl MJoint {
 
     /// What the control loops are asked for, to look at.
     pub const fn demand(&self) -> &Demand {
-        &self.demand
+        &self.output.demand
     }
 
     /// The communication side, to look at.
@@ -226,29 +154,25 @@ impl MJoint {
     fn start(&mut self, node_id: NodeId, bitrate: Bitrate, now: Instant) {
         self.device.restart(node_id, bitrate, now);
         let started = Self::over(self.model, self.device.clone());
-        let (powered_at, turns, power_off_position) = (self.powered_at, self.turns, self.power_off_position.take());
-        *self = Self { powered_at, turns, power_off_position, own_motion: OwnMotion::Starting, ..started };
+        let (powered_at, encoder) = (self.powered_at, self.encoder.restarted());
+        *self = Self { powered_at, encoder, orders: Orders::new(OwnMotion::Starting), ..started };
         if self.values().get(POSITION_ACTUAL_INTERNAL_VALUE) == NO_RECORD {
             self.device.values_mut().set(POSITION_ACTUAL_INTERNAL_VALUE, 0);
         }
-        let by_host = self.gear_numerator == 0 || self.function == Function::CommunicationControl;
+        let by_host = self.origin.gear_numerator() == 0 || self.parameters.function == Function::CommunicationControl;
         self.device.values_mut().set(MODBUS_ENABLE, u16::from(by_host));
-        self.host = Consumer::from_raw(self.values().get(CONSUMER_HEARTBEAT_TIME));
+        self.host.configure(self.values().get(CONSUMER_HEARTBEAT_TIME));
         self.publish_status();
         self.device.boot(now);
     }
 
-    fn on_heartbeat(&mut self, event: Option<ConsumerEvent>) {
+    fn on_host(&mut self, event: Option<HostEvent>) {
         match event {
-            Some(ConsumerEvent::Lost) => {
-                self.host_lost = true;
+            Some(HostEvent::Lost) => {
                 self.alarms.raise(row::COMMUNICATION);
             }
-            Some(ConsumerEvent::Heard(_)) if self.host_lost => {
-                self.host_lost = false;
-                self.alarms.release(row::COMMUNICATION);
-            }
-            _ => return,
+            Some(HostEvent::Back) => self.alarms.release(row::COMMUNICATION),
+            None => return,
         }
         self.publish_alarms();
         self.publish_status();
@@ -265,7 +189,7 @@ impl MJoint {
 
     /// The last thing that the falling supply voltage lets it do.
     fn record_position(&mut self) {
-        if self.device.is_running() && self.awake {
+        if self.device.is_running() && self.encoder.is_awake() {
             self.device.mark(POSITION_ACTUAL_INTERNAL_VALUE.slot());
             self.device.commit();
         }
@@ -274,13 +198,12 @@ impl MJoint {
     fn actuation(&mut self, now: Instant) -> Actuation {
         let alarm = alarms::code(self.alarms.latched());
         let lit = leds(alarm, self.battery, now.nanos_since(self.powered_at) / 1_000_000);
-        let driven = self.demand != Demand::Off;
         Actuation {
             running: true,
-            power_stage: if driven { PowerStage::Modulate { duty: self.duty } } else { PowerStage::Off },
+            power_stage: self.output.power_stage(),
             brake: self.brake(),
-            set_origin: core::mem::take(&mut self.set_origin),
-            zero_output: self.position < 0,
+            set_origin: self.origin.take(),
+            zero_output: self.encoder.position() < 0,
             alarm_output: (alarm != 0) == self.parameters.alarm_conducts,
             red_led: lit.red,
             green_led: lit.green,
@@ -288,7 +211,7 @@ impl MJoint {
     }
 
     fn brake(&self) -> Brake {
-        match (self.function.has_brake(), self.axis.is_engaged()) {
+        match (self.parameters.function.has_brake(), self.axis.is_engaged()) {
             (false, _) => Brake::Absent,
             (true, true) => Brake::Released,
             (true, false) => Brake::Engaged,
@@ -299,19 +222,19 @@ impl MJoint {
 /// As the others' but for the heartbeat of the host, which the joint listens to by itself.
 impl Station for MJoint {
     fn ignores(&self, frame: &Frame) -> bool {
-        self.device.ignores(frame) && self.host.is_none_or(|host| frame.id() != host.can_id())
+        self.device.ignores(frame) && self.host.ignores(frame)
     }
 
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        let event = self.host.as_mut().and_then(|host| host.handle_frame(frame, now));
-        self.on_heartbeat(event);
+        let event = self.host.handle_frame(frame, now);
+        self.on_host(event);
         self.device.handle_frame(frame, now);
         self.handle_events(now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
-        let event = self.host.as_mut().and_then(|host| host.handle_timeout(now));
-        self.on_heartbeat(event);
+        let event = self.host.handle_timeout(now);
+        self.on_host(event);
         self.device.handle_timeout(now);
         self.finish_reset(now);
         self.handle_events(now);
@@ -325,7 +248,7 @@ impl Station for MJoint {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let host = self.host.and_then(|host| host.poll_timeout()).unwrap_or(Instant::FAR_FUTURE);
+        let host = self.host.poll_timeout().unwrap_or(Instant::FAR_FUTURE);
         self.device.poll_timeout().map(|device| device.min(host))
     }
 
@@ -348,8 +271,7 @@ impl Firmware for MJoint {
         let readable = self.device.is_eeprom_sound();
         let has_brake = Function::from_raw(values.get(MODE_SELECTION)).is_some_and(Function::has_brake);
         let record = Some(values.get(POSITION_ACTUAL_INTERNAL_VALUE)).filter(|record| readable && *record != NO_RECORD);
-        self.turns = Turns::new(record.filter(|_| has_brake));
-        self.power_off_position = record;
+        self.encoder.power_on(record, has_brake);
         let address = u8::try_from(values.get(DEVICE_ADDRESS)).ok().and_then(NodeId::new);
         self.start(address.unwrap_or(NodeId::MIN), hardware.bitrate, now);
     }
@@ -357,9 +279,9 @@ impl Firmware for MJoint {
     fn power_off(&mut self, _now: Instant) {
         self.record_position();
         self.device.power_off();
-        self.host = None;
+        self.host.power_off();
         self.axis = Axis::new();
-        self.demand = Demand::Off;
+        self.output.demand = Demand::Off;
     }
 
     // Inlined by force: a run of a machine that wakes up calls it too, and the frequent caller would not get it.
@@ -371,12 +293,10 @@ impl Firmware for MJoint {
         self.device.set_eeprom_ok(!sensors.eeprom_fails);
         self.sense(sensors);
         self.watch_for_origin(sensors);
-        self.periods += 1;
-        if self.periods >= SUPERVISION_DIVIDER {
-            self.periods = 0;
+        if self.rhythm.is_supervision_due() {
             self.supervise(sensors);
         }
-        self.modulate(sensors);
+        self.output.modulate(&self.parameters, sensors);
         self.actuation(now)
     }
 
@@ -395,11 +315,11 @@ impl Firmware for MJoint {
             bitrate: self.device.bitrate(),
             nmt: self.device.node().state(),
             state: self.power_state(),
-            mode: self.mode,
+            mode: self.orders.mode,
             fault_code: alarms::code(self.alarms.latched()),
-            position_counts: self.position,
-            velocity_rpm: self.servo.velocity_rpm(),
-            current_a: self.shown_current_a.value,
+            position_counts: self.encoder.position(),
+            velocity_rpm: self.output.servo.velocity_rpm(),
+            current_a: self.output.shown_current_a(),
             brake_engaged: self.device.is_running() && self.brake() == Brake::Engaged,
         }
     }

@@ -2,8 +2,8 @@
 
 use cia402::{Controlword, ModeOfOperation};
 
-use super::{HEARTBEAT_ALARM, HomingState, MJoint, OwnMotion};
-use crate::engine::axis::Demand;
+use super::{HEARTBEAT_ALARM, MJoint};
+use crate::engine::axis::HomingState;
 use crate::mjoint::alarms;
 use crate::mjoint::assumptions::{COUNTS_S_PER_RPM, POSITION_REACHED_COUNTS, SPEED_REACHED_RPM, STANDSTILL_RPM};
 use crate::mjoint::hardware::Sensors;
@@ -21,15 +21,16 @@ const LARGEST: f32 = 32767.0;
 
 impl MJoint {
     pub(super) fn publish(&mut self, sensors: &Sensors) {
-        let speed = round(self.shown_velocity_rpm.value * SPEED_COUNTS_PER_RPM).clamp(-30_000.0, 30_000.0) as i16;
-        let current = round(self.shown_current_a.value.abs() * CURRENT_COUNTS_PER_A).min(LARGEST) as u16;
-        let (inputs, pwm) = (self.inputs.levels(), self.output_pwm());
+        let speed = round(self.output.shown_velocity_rpm() * SPEED_COUNTS_PER_RPM).clamp(-30_000.0, 30_000.0) as i16;
+        let current = round(self.output.shown_current_a().abs() * CURRENT_COUNTS_PER_A).min(LARGEST) as u16;
+        let (inputs, pwm) = (self.terminals.levels(), round(self.output.share() * LARGEST) as i16);
         let values = self.device.values_mut();
         // Another width with firmware 1.66.
         values.set_number(VELOCITY_ACTUAL_VALUE, speed);
         values.set(CURRENT_ACTUAL_VALUE, current);
         values.set(DC_LINK_CIRCUIT_VOLTAGE, round(sensors.bus_v * VOLTAGE_COUNTS_PER_V).clamp(0.0, LARGEST) as u16);
         values.set(DRIVER_TEMPERATURE, round(sensors.driver_c).clamp(0.0, 100.0) as u16);
+        // 2613h is signed as the current that is asked for.
         values.set(OUTPUT_PWM, pwm);
         values.set(DIGITAL_INPUTS, inputs);
         self.publish_position();
@@ -37,7 +38,7 @@ impl MJoint {
     }
 
     pub(super) fn publish_position(&mut self) {
-        let position = self.position;
+        let position = self.encoder.position();
         let values = self.device.values_mut();
         values.set(POSITION_ACTUAL_VALUE, position);
         values.set(POSITION_ACTUAL_INTERNAL_VALUE, position);
@@ -55,9 +56,9 @@ impl MJoint {
 
     /// The statusword; also right after a command, for a host that reads back.
     pub(super) fn publish_status(&mut self) {
-        let in_homing = self.mode == ModeOfOperation::HOMING;
+        let in_homing = self.orders.mode == ModeOfOperation::HOMING;
         let condition = Condition {
-            controlword: self.controlword,
+            controlword: self.orders.controlword,
             output_enabled: self.values().get(OUTPUT_ENABLED) == 1,
             alarm: !self.alarms.latched().is_empty(),
             live: self.is_shown_live(),
@@ -71,8 +72,8 @@ impl MJoint {
     /// Bit 4: of a joint that takes pulses it shows nothing until the host asks. 0404h is what 5.10.1 prints for one that
     /// was just switched on, and such a one holds its shaft.
     fn is_shown_live(&self) -> bool {
-        let by_host = self.controlword.has(Controlword::ENABLE_VOLTAGE) || self.has_homing_the_motor();
-        self.axis.is_engaged() && (by_host || !self.function.takes_pulses())
+        let by_host = self.orders.controlword.has(Controlword::ENABLE_VOLTAGE) || self.has_homing_the_motor();
+        self.axis.is_engaged() && (by_host || !self.parameters.function.takes_pulses())
     }
 
     /// Bit 10: nothing is left to be done. An alarm that stops the motor leaves it undone.
@@ -84,15 +85,14 @@ impl MJoint {
         if !self.axis.is_engaged() {
             return true;
         }
-        let halted = self.controlword.has(Controlword::HALT) && self.own_motion == OwnMotion::None;
-        if halted {
-            return self.servo.velocity_rpm().abs() < STANDSTILL_RPM;
+        if self.orders.are_halted() {
+            return self.output.servo.velocity_rpm().abs() < STANDSTILL_RPM;
         }
-        match self.mode {
-            _ if self.own_motion != OwnMotion::None => self.is_there(),
+        match self.orders.mode {
+            _ if !self.orders.are_the_hosts() => self.is_there(),
             ModeOfOperation::HOMING => self.homing() == HomingState::Attained,
             ModeOfOperation::PROFILE_VELOCITY if self.may_move() => self.is_at_speed(),
-            _ => self.is_there() && self.next_point.is_none(),
+            _ => self.is_there() && self.orders.next_point.is_none(),
         }
     }
 
@@ -102,17 +102,7 @@ impl MJoint {
 
     fn is_at_speed(&self) -> bool {
         let target_rpm = self.target_velocity() / COUNTS_S_PER_RPM;
-        (f64::from(self.servo.velocity_rpm()) - target_rpm).abs() <= SPEED_REACHED_RPM
-    }
-
-    /// 2613h: share of the bus voltage between two wires, signed as the current that is asked for.
-    fn output_pwm(&self) -> i16 {
-        if self.demand == Demand::Off {
-            return 0;
-        }
-        let most = self.duty.iter().fold(0.0_f32, |most, duty| most.max(*duty));
-        let least = self.duty.iter().fold(1.0_f32, |least, duty| least.min(*duty));
-        (round((most - least) * LARGEST) as i16).wrapping_mul(if self.servo.setpoint_a() < 0.0 { -1 } else { 1 })
+        (f64::from(self.output.servo.velocity_rpm()) - target_rpm).abs() <= SPEED_REACHED_RPM
     }
 }
 

@@ -14,71 +14,37 @@ impl Resting for MJoint {
             model: _,
             device,
             powered_at,
-            host: _,
-            host_lost,
-            function: _,
-            amplitude: _,
+            host,
             parameters: _,
             parameters_changed,
             address,
-            power_off_position,
-            gear_numerator,
-            origin_asked,
-            set_origin,
             save_asked,
-            output_was_enabled,
-            controlword,
-            mode,
-            own_motion,
-            next_point,
+            origin,
+            orders,
             axis,
-            servo,
-            weakening,
-            demand,
-            duty,
+            output,
             alarms,
             protection,
-            pulses,
-            inputs,
+            terminals,
             battery,
-            dir,
-            dir_changes,
-            awake,
-            angle_count,
-            shaft_count,
-            turns,
-            position,
-            shown_velocity_rpm,
-            shown_current_a,
-            periods,
-            base_periods,
+            encoder,
+            rhythm,
         } = self;
         // The lights go by the time in the lamp test, with an alarm and without a full battery.
         let tested = now.nanos_since(*powered_at) >= LAMP_TEST_MS * 1_000_000;
         let lights_are_steady = tested && alarms.latched().is_empty() && *battery == Battery::Full;
         lights_are_steady
-            && !(*parameters_changed || *save_asked || *set_origin)
-            && (awake, host_lost, output_was_enabled)
-                == (&earlier.awake, &earlier.host_lost, &earlier.output_was_enabled)
-            && (address, power_off_position) == (&earlier.address, &earlier.power_off_position)
-            && (gear_numerator, origin_asked) == (&earlier.gear_numerator, &earlier.origin_asked)
-            && (controlword, mode) == (&earlier.controlword, &earlier.mode)
-            && (own_motion, next_point) == (&earlier.own_motion, &earlier.next_point)
-            && (axis, servo, weakening) == (&earlier.axis, &earlier.servo, &earlier.weakening)
-            && (demand, duty) == (&earlier.demand, &earlier.duty)
+            && !(*parameters_changed || *save_asked || origin.is_due())
+            && (*address, host.is_lost()) == (earlier.address, earlier.host.is_lost())
+            && (origin, orders) == (&earlier.origin, &earlier.orders)
+            && (axis, output) == (&earlier.axis, &earlier.output)
             && (alarms, protection) == (&earlier.alarms, &earlier.protection)
-            && (pulses, inputs) == (&earlier.pulses, &earlier.inputs)
-            && (dir, dir_changes) == (&earlier.dir, &earlier.dir_changes)
-            && (angle_count, shaft_count, turns) == (&earlier.angle_count, &earlier.shaft_count, &earlier.turns)
-            && *position == earlier.position
-            && (shown_velocity_rpm, shown_current_a) == (&earlier.shown_velocity_rpm, &earlier.shown_current_a)
-            && (periods, base_periods) == (&earlier.periods, &earlier.base_periods)
+            && (terminals, encoder, rhythm) == (&earlier.terminals, &earlier.encoder, &earlier.rhythm)
             && device.rests_since(&earlier.device)
     }
 
     fn next_event(&self) -> Option<Instant> {
-        let host = self.host.and_then(|host| host.poll_timeout());
-        self.device.next_event().into_iter().chain(host).min()
+        self.device.next_event().into_iter().chain(self.host.poll_timeout()).min()
     }
 
     fn task_from(&self, at: Instant) -> Option<Instant> {

@@ -1,0 +1,63 @@
+//! How a host makes the present position the origin: two values of 260Ah, one after the other, which never stay there
+//! ("M Robot Joint Motor CanOpen Manual", 5.04).
+
+use super::assumptions::SET_ORIGIN;
+
+/// 260Ah, and what was asked for by it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Origin {
+    /// 260Ah without the two values.
+    gear_numerator: u16,
+    /// The first of them has been written.
+    asked: bool,
+    /// The encoder takes the present position as origin with the next control period.
+    due: bool,
+}
+
+/// What a write to 260Ah was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Written {
+    /// A numerator of the gear.
+    Numerator,
+    /// The first of the two values.
+    First,
+    /// The second, behind the first.
+    Second,
+}
+
+impl Origin {
+    pub(super) const fn new(gear_numerator: u16) -> Self {
+        Self { gear_numerator, asked: false, due: false }
+    }
+
+    /// What stays in 260Ah.
+    pub(super) const fn gear_numerator(&self) -> u16 {
+        self.gear_numerator
+    }
+
+    pub(super) fn write(&mut self, value: u16) -> Written {
+        let [first, second] = SET_ORIGIN;
+        let armed = core::mem::replace(&mut self.asked, value == first);
+        if value == first {
+            return Written::First;
+        }
+        if armed && value == second {
+            return Written::Second;
+        }
+        self.gear_numerator = value;
+        Written::Numerator
+    }
+
+    pub(super) fn make(&mut self) {
+        self.due = true;
+    }
+
+    pub(super) const fn is_due(&self) -> bool {
+        self.due
+    }
+
+    /// The encoder is commanded now, if it is to be.
+    pub(super) fn take(&mut self) -> bool {
+        core::mem::take(&mut self.due)
+    }
+}
