@@ -69,7 +69,7 @@ fn findings() -> Result<Vec<Finding>, String> {
     let mut found = dependencies::directions(&workspace::packages()?, |folder| {
         std::fs::read_to_string(workspace::root().join(folder).join("Cargo.toml")).unwrap_or_default()
     });
-    let mut sources = Vec::new();
+    let (mut sources, mut python) = (Vec::new(), Vec::new());
     for path in tracked_files()? {
         // A file that is listed but deleted, or that is not text, has no style.
         let Ok(text) = std::fs::read_to_string(workspace::root().join(&path)) else { continue };
@@ -80,8 +80,12 @@ fn findings() -> Result<Vec<Finding>, String> {
             SOURCE_RULES.iter().for_each(|rule| found.extend(rule(&source)));
             sources.push(source);
         }
+        if path.ends_with(".py") {
+            python.push((path, text));
+        }
     }
     found.extend(circles::in_crates(&sources));
+    found.extend(circles::in_packages(&python));
     let mut found = exceptions::apply(found, exceptions::EXCEPTIONS);
     found.sort();
     Ok(found)

@@ -1,4 +1,4 @@
-//! Import circles between the modules of one crate.
+//! Import circles between the modules of one crate, or of the Python package.
 //!
 //! A module that needs itself by way of others cannot be read, tested or moved alone. The graph has a node for each file
 //! and an edge from a file to the file that defines what it names: in `use`, or as a path in its code. A strongly connected
@@ -13,6 +13,7 @@
 
 mod graph;
 mod modules;
+mod python;
 mod resolve;
 mod tokens;
 
@@ -38,6 +39,16 @@ pub(super) fn in_crates(sources: &[Source]) -> Vec<Finding> {
         within(circles(folder, &sources), folder, allowed)
     };
     crates.into_iter().flat_map(of_crate).collect()
+}
+
+/// The circles of each Python package: the files of a folder, with their texts.
+pub(super) fn in_packages(files: &[(String, String)]) -> Vec<Finding> {
+    let mut packages: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
+    for (path, text) in files {
+        packages.entry(path.rsplit_once('/').map_or("", |(folder, _)| folder)).or_default().push((path, text));
+    }
+    let graphs = packages.values().map(|files| python::graph(files));
+    graphs.flat_map(|graph| found(&graph)).map(|circle| circle.finding).collect()
 }
 
 /// The findings beyond what is allowed: all of them if there are more files in circles than that.
@@ -66,8 +77,11 @@ struct Circle {
 }
 
 fn circles(folder: &str, sources: &[&Source]) -> Vec<Circle> {
-    let graph = Graph::of(&Tree::of(folder, sources));
-    graph.circles().into_iter().map(|members| circle(&graph, &members)).collect()
+    found(&Graph::of(&Tree::of(folder, sources)))
+}
+
+fn found(graph: &Graph) -> Vec<Circle> {
+    graph.circles().into_iter().map(|members| circle(graph, &members)).collect()
 }
 
 /// Shows the shortest way round, and how many files are in it together.

@@ -14,11 +14,15 @@ import sys
 import threading
 from collections import deque
 from types import ModuleType
-from typing import Any, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
-from . import turns
 from .real_time import REAL
-from .turns import EPOCH_NS, VirtualTime, Wait
+
+if TYPE_CHECKING:
+    from .turns import VirtualTime, Wait
+
+#: What ``time.time()`` begins with: 2001-09-09 01:46:40 UTC. Any moment would do; runs must not differ by it.
+EPOCH_NS = 1_000_000_000 * 1_000_000_000
 
 #: Modules that keep the real clock: those that look at the program from outside, or wait for other processes.
 LEFT_ALONE = (
@@ -27,9 +31,13 @@ LEFT_ALONE = (
 )  # fmt: skip
 
 
+#: The virtual time that the stand-ins go by.
+_time: Optional[VirtualTime] = None
+
+
 def current_time() -> Optional[VirtualTime]:
     """The virtual time in which this thread takes part."""
-    time = turns.active()
+    time = _time
     return None if time is None or time.current() is None else time
 
 
@@ -117,7 +125,7 @@ class Lock:
     def release(self) -> None:
         """As that of a lock."""
         self._lock.release()
-        if self._waits and (time := turns.active()) is not None:
+        if self._waits and (time := _time) is not None:
             time.wake(self._waits.popleft())
 
     def locked(self) -> bool:
@@ -195,8 +203,9 @@ _replaced: list[tuple[ModuleType, str, Any]] = []
 _found: dict[str, tuple[int, int, list[str]]] = {}
 
 
-def install() -> None:
-    """Puts the stand-ins into place."""
+def install(time: VirtualTime) -> None:
+    """Puts the stand-ins into place, which go by `time` from then on."""
+    global _time
     for module_name, module in list(sys.modules.items()):
         if not isinstance(module, ModuleType) or module_name.startswith(LEFT_ALONE):
             continue
@@ -205,10 +214,13 @@ def install() -> None:
             _replaced.append((module, name, real))
             setattr(module, name, stand_in)
     put_methods(start, join, select)
+    _time = time
 
 
 def remove() -> None:
     """Puts everything back."""
+    global _time
+    _time = None
     while _replaced:
         module, name, real = _replaced.pop()
         setattr(module, name, real)

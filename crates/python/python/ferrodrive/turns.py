@@ -21,14 +21,13 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Optional
 
+from . import stand_ins
 from .errors import Stalled, TimeInUse
 from .real_time import REAL
+from .stand_ins import EPOCH_NS as EPOCH_NS
 
 if TYPE_CHECKING:
     from .world import World
-
-#: What ``time.time()`` begins with: 2001-09-09 01:46:40 UTC. Any moment would do; runs must not differ by it.
-EPOCH_NS = 1_000_000_000 * 1_000_000_000
 
 #: How often the clock may be read in a row before reading it takes time: a program that only looks at the clock until it shows
 #: what it waits for would look for ever.
@@ -364,11 +363,9 @@ def taking_part(world: Any = None) -> Optional[VirtualTime]:
 def enter(world: World) -> VirtualTime:
     """Begins the virtual time of a world, or uses the one in use once more. Each needs its :func:`leave`."""
     global _active
-    from . import stand_ins
-
     if _active is None:
         time = VirtualTime(world)
-        stand_ins.install()
+        stand_ins.install(time)
         _active = time
     elif _active.world is not world:
         since = f" since {_active.begun_in}" if _active.begun_in else ""
@@ -386,8 +383,6 @@ def enter(world: World) -> VirtualTime:
 def leave(time: VirtualTime, for_good: bool = False) -> None:
     """Ends one use; after the last, or for good, the clock is the real one again."""
     global _active
-    from . import stand_ins
-
     if time is not _active:
         return
     time.depth -= 1
@@ -428,8 +423,6 @@ def _after_fork_in_child() -> None:
     """The child has one thread and a copy of a world that is not its own: it goes by the real clock."""
     global _active
     if _active is not None:
-        from . import stand_ins
-
         _active.closed = True
         _active = None
         stand_ins.remove()

@@ -22,8 +22,15 @@ pub(super) struct Edge {
 }
 
 impl Graph {
+    /// The first edge of each pair counts.
+    pub(super) fn new(files: Vec<String>, edges: impl IntoIterator<Item = Edge>) -> Self {
+        let mut graph = Self { files, edges: BTreeMap::new() };
+        edges.into_iter().for_each(|edge| graph.join(edge));
+        graph
+    }
+
     pub(super) fn of(tree: &Tree) -> Self {
-        let mut graph = Self { files: tree.files.clone(), edges: BTreeMap::new() };
+        let mut graph = Self::new(tree.files.clone(), []);
         for module in 0..tree.modules.len() {
             graph.add_imports(tree, module);
             for (path, line) in &tree.modules[module].paths {
@@ -62,8 +69,12 @@ impl Graph {
         let Some(Found::Item(owner, name)) = found else { return };
         let (from, to) = (tree.modules[module].file, tree.modules[owner].file);
         if from != to {
-            self.edges.entry((from, to)).or_insert(Edge { from, to, line, name });
+            self.join(Edge { from, to, line, name });
         }
+    }
+
+    fn join(&mut self, edge: Edge) {
+        self.edges.entry((edge.from, edge.to)).or_insert(edge);
     }
 
     pub(super) fn file(&self, place: usize) -> &str {
