@@ -44,5 +44,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(sheets::model_name, module)?)?;
     module.add_function(wrap_pyfunction!(sheets::sheet, module)?)?;
     module.add_function(wrap_pyfunction!(world::stimulus_forms, module)?)?;
+    module.add_function(wrap_pyfunction!(world::stimulus_words, module)?)?;
     Ok(())
 }

@@ -4,6 +4,7 @@ mod happened;
 mod jobs;
 mod record;
 mod report;
+mod stimulus;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -17,7 +18,7 @@ use master::decode::Decoder;
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use sim::command;
 use sim::machine::{TimingMode, order};
 use sim::stimulus::{FORMS, Place};
@@ -45,6 +46,20 @@ const MOST_KEPT: u128 = 100_000;
 #[pyfunction]
 pub(crate) fn stimulus_forms() -> Vec<&'static str> {
     FORMS.to_vec()
+}
+
+/// The words of a world command that says the same as the arguments of a stimulus, without its node.
+#[pyfunction]
+#[pyo3(signature = (name, *values))]
+pub(crate) fn stimulus_words(name: &str, values: &Bound<'_, PyTuple>) -> PyResult<String> {
+    let of_node = || stimulus::of_node(name, values).map(|done| done.to_string());
+    let of_body = || stimulus::of_body(name, values).map(|done| done.to_string());
+    let of_wire = |_| stimulus::of_wire(name, values).map(|done| done.to_string());
+    of_node().or_else(|_| of_body()).or_else(of_wire)
+}
+
+fn place_of(text: &str) -> PyResult<Place> {
+    text.parse().map_err(|()| bad_value(format!("{text:?} is not a node; expected 1 to 127")))
 }
 
 fn timing_mode(timing: &str) -> PyResult<TimingMode> {
@@ -404,10 +419,31 @@ impl World {
         Ok(command::answer(&mut state.world, line).map(|answer| answer.json))
     }
 
+    /// Does something to the node at a place (`4`, or `5.2` for an axis).
+    #[pyo3(signature = (place, name, *values))]
+    fn stimulate(&self, py: Python<'_>, place: &str, name: &str, values: &Bound<'_, PyTuple>) -> PyResult<()> {
+        let (place, stimulus) = (place_of(place)?, stimulus::of_node(name, values)?);
+        command::apply(&mut self.shared.lock(py)?.world, place, &stimulus).map_err(refused)
+    }
+
+    /// Does something to a machine that several drives move.
+    #[pyo3(signature = (body, name, *values))]
+    fn stimulate_body(&self, py: Python<'_>, body: &str, name: &str, values: &Bound<'_, PyTuple>) -> PyResult<()> {
+        let stimulus = stimulus::of_body(name, values)?;
+        command::apply_to_body(&mut self.shared.lock(py)?.world, body, &stimulus).map_err(refused)
+    }
+
+    /// Disturbs the wire.
+    #[pyo3(signature = (name, *values))]
+    fn disturb(&self, py: Python<'_>, name: &str, values: &Bound<'_, PyTuple>) -> PyResult<()> {
+        let fault = stimulus::of_wire(name, values)?;
+        self.shared.lock(py)?.world.disturb(fault);
+        Ok(())
+    }
+
     /// What can be measured at a place (`4`, or `5.2` for an axis) now.
     fn report<'py>(&self, py: Python<'py>, place: &str) -> PyResult<Bound<'py, PyDict>> {
-        let place: Place =
-            place.parse().map_err(|()| bad_value(format!("{place:?} is not a node; expected 1 to 127")))?;
+        let place = place_of(place)?;
         let mut state = self.shared.lock(py)?;
         report::at(py, &mut state.world, place)
     }

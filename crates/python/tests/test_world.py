@@ -8,6 +8,7 @@ import threading
 
 import ferrodrive
 import pytest
+from ferrodrive import _native
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[3] / "examples"
 
@@ -209,7 +210,7 @@ def test_wrong_orders_say_what_would_be_right(world):
         (lambda: world[4].axis(2), "it has 1"),
         (lambda: world[4].set_input("X9", True), "it has X0"),
         (lambda: world[4].set_input("X0 1\n4 power", True), "one word"),
-        (lambda: world[4].set_load_torque(float("nan")), "nan"),
+        (lambda: world[4].set_load_torque(float("nan")), "not NaN"),
         (lambda: world[4].set_battery(False), "no"),
     ):
         with pytest.raises(ValueError, match=re.escape(words)):
@@ -264,14 +265,14 @@ def test_a_record_has_a_row_for_each_sample(world, tmp_path):
 
 
 class Reporting(ferrodrive.VirtualDrive):
-    """Notes the words of each stimulus, and has them understood."""
+    """Notes each stimulus as the words of a command, and has it understood."""
 
     said: list
 
-    def apply(self, words):
-        self.said.append(words)
+    def _do(self, *stimulus):
+        self.said.append(_native.stimulus_words(*stimulus))
         try:
-            super().apply(words)
+            super()._do(*stimulus)
         except ferrodrive.Refused as refusal:
             # Understood, and this model does not have it.
             if "has no" not in str(refusal):
@@ -390,14 +391,14 @@ def test_every_stimulus_has_a_method():
         for call in calls:
             call(drive)
     # A node whose objects are the outer world's needs a file; its words are enough here.
-    drive.apply = said.append
+    drive._do = lambda *stimulus: said.append(_native.stimulus_words(*stimulus))
     drive.set_object(0x6000, 1, 255)
     wire = Wire()
     wire.said = said
     wire.corrupt(0.01)
     wire.destroy(3, 20)
     body = wire.body("base")
-    body.apply = lambda words: said.append(f"body base {words}")
+    body._do = lambda *stimulus: said.append(f"body base {_native.stimulus_words(*stimulus)}")
     body.set_slope(5, 90)
     body.set_grip(None)
     body.set_mass(60)
@@ -409,9 +410,9 @@ def test_every_stimulus_has_a_method():
 class Wire(ferrodrive.World):
     """Notes what is done to the wire, and has it understood."""
 
-    def apply(self, line):
-        self.said.append(line)
-        super().apply(line)
+    def disturb(self, *fault):
+        self.said.append(_native.stimulus_words(*fault))
+        super().disturb(*fault)
 
 
 def every_form():

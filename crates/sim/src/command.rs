@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use crate::stimulus::{BodyStimulus, GET, GET_BODY, Place, Stimulus, StimulusError, WireFault, excerpt};
 use crate::{Refused, World, json};
+pub use answer::{apply, apply_to_body};
 pub use run::{Before, Run};
 
 /// One line, understood.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Optional
 
-from .words import Number, number, word
+from .words import Number, word
 
 if TYPE_CHECKING:
     from .world import World
@@ -35,6 +35,9 @@ class Body:
         """
         return self._world.apply(f"body {self._name} {words}")
 
+    def _do(self, name: str, *values: Any) -> None:
+        self._world.stimulate_body(self._name, name, *values)
+
     def state(self) -> dict[str, Any]:
         """Where it truly is (``body base get``): of a base ``x_m``, ``y_m``, ``heading_deg``, ``speed_m_s`` and the slip of its
         wheels; of an arm ``joints_deg`` and ``tool_m``.
@@ -50,25 +53,25 @@ class Body:
 
         >>> body.set_slope(5, uphill_deg=90)
         """
-        self.apply(f"slope {number(degrees)} {number(uphill_deg)}")
+        self._do("slope", float(degrees), float(uphill_deg))
 
     def set_grip(self, share: Optional[Number]) -> None:
         """The wheels slip beyond this share of the weight on them (``body base grip 0.1``); None: never (``body base grip off``).
 
         >>> body.set_grip(0.1)
         """
-        self.apply("grip off" if share is None else f"grip {number(share)}")
+        self._do("grip", None if share is None else float(share))
 
     def set_mass(self, mass_kg: Number) -> None:
         """Its mass in kg, as when it is loaded (``body base mass 60``).
 
         >>> body.set_mass(60)
         """
-        self.apply(f"mass {number(mass_kg)}")
+        self._do("mass", float(mass_kg))
 
     def set_payload(self, mass_kg: Number) -> None:
         """So many kg hang at the tool of an arm (``body arm payload 2``).
 
         >>> arm.set_payload(2)
         """
-        self.apply(f"payload {number(mass_kg)}")
+        self._do("payload", float(mass_kg))

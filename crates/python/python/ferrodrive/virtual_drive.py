@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Optional, Union
 
-from .words import Number, number, word
+from .words import Number, word
 
 if TYPE_CHECKING:
     from .world import World
@@ -180,7 +180,7 @@ class VirtualDrive:
         """``error-active``, ``error-passive``, ``bus-off``, ``cut`` or ``off`` (no power)."""
         return self.report()["bus"]
 
-    # What the outer world can do. Numbers are written with all their digits, so that they arrive as they are.
+    # What the outer world can do.
 
     def apply(self, words: str) -> None:
         """Does what a world command says, without the node: ``apply("load torque 2.5")``.
@@ -191,12 +191,15 @@ class VirtualDrive:
         """
         self._world.apply(f"{self._place} {words}")
 
+    def _do(self, name: str, *values: Any) -> None:
+        self._world.stimulate(self._place, name, *values)
+
     def power_on(self) -> None:
         """Switches the supply on (``power on``): the firmware boots.
 
         >>> world[5].power_on()
         """
-        self.apply("power on")
+        self._do("power", "on")
 
     def power_off(self) -> None:
         """Switches the supply off (``power off``): the drive lives on until its bus has drained.
@@ -206,14 +209,14 @@ class VirtualDrive:
         >>> world[5].statusword is None
         True
         """
-        self.apply("power off")
+        self._do("power", "off")
 
     def power_cycle(self) -> None:
         """Switches off, and on again when the drive has died of it (``power cycle``).
 
         >>> world[5].power_cycle()
         """
-        self.apply("power cycle")
+        self._do("power", "cycle")
 
     def power_cut(self) -> None:
         """The drive is dead at once, in the middle of whatever it does (``power cut``).
@@ -222,14 +225,14 @@ class VirtualDrive:
         >>> world[5].statusword is None
         True
         """
-        self.apply("power cut")
+        self._do("power", "cut")
 
     def set_input(self, name: str, level: bool) -> None:
         """Level of a digital input (``input X0 1``). Takes a switch away that is tied to it.
 
         >>> wheel.set_input(wheel.inputs[0], True)
         """
-        self.apply(f"input {word(name)} {int(bool(level))}")
+        self._do("input", word(name), bool(level))
 
     def set_switch(self, name: str, low: Optional[int] = None, high: Optional[int] = None) -> None:
         """Ties an input to the position (``switch X0 -5000 max``): active from ``low`` to ``high``, in the drive's counts; None
@@ -237,22 +240,21 @@ class VirtualDrive:
 
         >>> wheel.set_switch(wheel.inputs[0], low=-5000)
         """
-        bounds = ("min" if low is None else int(low), "max" if high is None else int(high))
-        self.apply(f"switch {word(name)} {bounds[0]} {bounds[1]}")
+        self._do("switch", word(name), whole(low), whole(high))
 
     def set_load_torque(self, torque_nm: Number) -> None:
         """Torque at the output shaft in N·m (``load torque 2.5``); positive opposes positive motion, also at standstill.
 
         >>> world[5].set_load_torque(2.5)
         """
-        self.apply(f"load torque {number(torque_nm)}")
+        self._do("load_torque", float(torque_nm))
 
     def set_load_inertia(self, inertia_kg_m2: Number) -> None:
         """Inertia added at the output shaft in kg·m² (``load inertia 0.02``).
 
         >>> world[5].set_load_inertia(0.02)
         """
-        self.apply(f"load inertia {number(inertia_kg_m2)}")
+        self._do("load_inertia", float(inertia_kg_m2))
 
     def set_load_friction(
         self,
@@ -269,12 +271,9 @@ class VirtualDrive:
         >>> world[5].set_load_friction(None)
         """
         if coulomb_nm is None:
-            self.apply("load friction off")
-            return
-        words = ["load friction", number(coulomb_nm), "viscous", number(viscous_nm_s)]
-        words += [] if static_nm is None else ["static", number(static_nm)]
-        words += [] if stribeck_rad_s is None else ["stribeck", number(stribeck_rad_s)]
-        self.apply(" ".join(words))
+            self._do("load_off", "friction")
+        else:
+            self._do("load_friction", float(coulomb_nm), float(viscous_nm_s), real(static_nm), real(stribeck_rad_s))
 
     def set_load_pulley(self, mass_kg: Optional[Number], radius_m: Number = 0.05) -> None:
         """A weight in kg on a drum of this radius in m, lifted by positive motion, lowered with a negative radius
@@ -282,7 +281,10 @@ class VirtualDrive:
 
         >>> world[5].set_load_pulley(2, radius_m=0.05)
         """
-        self.apply("load pulley off" if mass_kg is None else f"load pulley {number(mass_kg)} {number(radius_m)}")
+        if mass_kg is None:
+            self._do("load_off", "pulley")
+        else:
+            self._do("load_pulley", float(mass_kg), float(radius_m))
 
     def set_load_spring(self, stiffness_nm_rad: Optional[Number], rest_deg: Number = 0) -> None:
         """A spring in N·m/rad, at rest so many degrees from where the shaft is now (``load spring 5 90``); None takes it away
@@ -290,8 +292,10 @@ class VirtualDrive:
 
         >>> world[5].set_load_spring(5, rest_deg=90)
         """
-        off = stiffness_nm_rad is None
-        self.apply("load spring off" if off else f"load spring {number(stiffness_nm_rad or 0)} {number(rest_deg)}")
+        if stiffness_nm_rad is None:
+            self._do("load_off", "spring")
+        else:
+            self._do("load_spring", float(stiffness_nm_rad), float(rest_deg))
 
     def set_load_stop(self, low: Optional[int], high: Optional[int]) -> None:
         """End stops at these actual positions in the drive's counts (``load stop -5000 max``); None leaves that side open, and
@@ -300,15 +304,20 @@ class VirtualDrive:
         >>> position = world[5].position
         >>> world[5].set_load_stop(position - 5000, None)
         """
-        bounds = ("min" if low is None else int(low), "max" if high is None else int(high))
-        self.apply("load stop off" if bounds == ("min", "max") else f"load stop {bounds[0]} {bounds[1]}")
+        if low is None and high is None:
+            self._do("load_off", "stop")
+        else:
+            self._do("load_stop", whole(low), whole(high))
 
     def set_load_fan(self, torque_nm: Optional[Number], speed_rpm: Number = 1000) -> None:
         """A fan that takes this torque in N·m at this speed in r/min (``load fan 2 300``); None takes it away (``load fan off``).
 
         >>> world[5].set_load_fan(2, speed_rpm=300)
         """
-        self.apply("load fan off" if torque_nm is None else f"load fan {number(torque_nm)} {number(speed_rpm)}")
+        if torque_nm is None:
+            self._do("load_off", "fan")
+        else:
+            self._do("load_fan", float(torque_nm), float(speed_rpm))
 
     def set_load_gear(self, ratio: Optional[Number], backlash_deg: Number = 0) -> None:
         """All of these hang behind a gear of this ratio with so many degrees of backlash (``load gear 10 0.5``); None takes it away
@@ -316,28 +325,31 @@ class VirtualDrive:
 
         >>> world[5].set_load_gear(10, backlash_deg=0.5)
         """
-        self.apply("load gear off" if ratio is None else f"load gear {number(ratio)} {number(backlash_deg)}")
+        if ratio is None:
+            self._do("load_off", "gear")
+        else:
+            self._do("load_gear", float(ratio), float(backlash_deg))
 
     def clear_loads(self) -> None:
         """Takes all loads away (``load none``).
 
         >>> world[5].clear_loads()
         """
-        self.apply("load none")
+        self._do("load_none")
 
     def lock_rotor(self) -> None:
         """Holds the rotor (``rotor lock``).
 
         >>> world[5].lock_rotor()
         """
-        self.apply("rotor lock")
+        self._do("rotor_lock", True)
 
     def free_rotor(self) -> None:
         """Lets the rotor go (``rotor free``).
 
         >>> world[5].free_rotor()
         """
-        self.apply("rotor free")
+        self._do("rotor_lock", False)
 
     def set_supply(
         self,
@@ -350,11 +362,7 @@ class VirtualDrive:
 
         >>> world[5].set_supply(36, limit_a=10)
         """
-        words = [] if voltage_v is None else [number(voltage_v)]
-        words += [] if limit_a is None else ["limit", number(limit_a)]
-        words += [] if resistance_ohm is None else ["resistance", number(resistance_ohm)]
-        if words:
-            self.apply("supply " + " ".join(words))
+        self._do("supply", real(voltage_v), real(limit_a), real(resistance_ohm))
 
     def hold_temperature(self, sensor: str, celsius: Optional[Number]) -> None:
         """Holds a temperature in °C (``temperature motor 95``), or gives it back to the model with None. The sensor is ``motor``
@@ -362,7 +370,7 @@ class VirtualDrive:
 
         >>> world[5].hold_temperature("motor", 95)
         """
-        self.apply(f"temperature {word(sensor)} {'auto' if celsius is None else number(celsius)}")
+        self._do("temperature", word(sensor), real(celsius))
 
     def set_fault(self, component: str, broken: bool = True) -> None:
         """Breaks or mends a component (``fault hall on``): ``hall``, ``encoder``, ``eeprom``, ``reference``, ``phase``, ``short``,
@@ -370,14 +378,14 @@ class VirtualDrive:
 
         >>> wheel.set_fault("hall")
         """
-        self.apply(f"fault {word(component)} {'on' if broken else 'off'}")
+        self._do("fault", word(component), bool(broken))
 
     def set_battery(self, connected: bool) -> None:
         """The multi-turn battery of a joint (``battery off``).
 
         >>> joint.set_battery(False)
         """
-        self.apply(f"battery {'on' if connected else 'off'}")
+        self._do("battery", bool(connected))
 
     def send_pulses(self, count: int, hz: Number) -> None:
         """Pulses with a direction at the pulse inputs (``pulses 8192 10000``): how many, negative with the direction input
@@ -385,7 +393,7 @@ class VirtualDrive:
 
         >>> joint.send_pulses(8192, hz=10_000)
         """
-        self.apply(f"pulses {int(count)} {number(hz)}")
+        self._do("pulses", int(count), float(hz))
 
     def send_quadrature(self, count: int, hz: Number) -> None:
         """Two channels of an encoder (``quadrature -400 1000``): counts, four a line, negative with the second channel ahead, and
@@ -393,21 +401,21 @@ class VirtualDrive:
 
         >>> joint.send_quadrature(-400, hz=1000)
         """
-        self.apply(f"quadrature {int(count)} {number(hz)}")
+        self._do("quadrature", int(count), float(hz))
 
     def send_duty(self, percent: Number) -> None:
         """A square wave of this duty cycle in per cent (``duty 40``), for ever.
 
         >>> joint.send_duty(40)
         """
-        self.apply(f"duty {number(percent)}")
+        self._do("duty", float(percent))
 
     def send_clock(self, hz: Number) -> None:
         """A level on the second input that changes so many times a second (``clock 10000``), for ever.
 
         >>> joint.send_clock(10_000)
         """
-        self.apply(f"clock {number(hz)}")
+        self._do("clock", float(hz))
 
     def cut_cable(self) -> None:
         """Cuts its bus cable (``cable cut``). It goes on alone.
@@ -416,28 +424,31 @@ class VirtualDrive:
         >>> world[5].bus
         'cut'
         """
-        self.apply("cable cut")
+        self._do("cable_cut", True)
 
     def join_cable(self) -> None:
         """Joins its bus cable (``cable join``).
 
         >>> world[5].join_cable()
         """
-        self.apply("cable join")
+        self._do("cable_cut", False)
 
     def set_bus_silent(self, silent: bool) -> None:
         """It listens to the bus only (``bus silent on``).
 
         >>> world[5].set_bus_silent(True)
         """
-        self.apply(f"bus silent {'on' if silent else 'off'}")
+        self._do("bus_silent", bool(silent))
 
     def set_bus_late(self, min_ms: Optional[Number], max_ms: Optional[Number] = None) -> None:
         """Its frames reach the bus so many ms late (``bus late 5 20``); None ends it (``bus late off``).
 
         >>> world[5].set_bus_late(5, 20)
         """
-        self.apply("bus late off" if min_ms is None else f"bus late {number(min_ms)} {number(min_ms if max_ms is None else max_ms)}")
+        if min_ms is None:
+            self._do("bus_late")
+        else:
+            self._do("bus_late", float(min_ms), float(min_ms if max_ms is None else max_ms))
 
     def set_bus_babble(self, frame: Optional[str], gap_ms: Number = 1) -> None:
         """It sends this frame again so many ms after it went out, for ever (``bus babble 080# 1``); None ends it
@@ -445,7 +456,10 @@ class VirtualDrive:
 
         >>> world[5].set_bus_babble("080#", gap_ms=1)
         """
-        self.apply("bus babble off" if frame is None else f"bus babble {word(frame)} {number(gap_ms)}")
+        if frame is None:
+            self._do("bus_babble")
+        else:
+            self._do("bus_babble", word(frame), float(gap_ms))
 
     def set_bus_overrun(self, frames: Optional[int], service_ms: Number = 1) -> None:
         """It holds so many frames and takes so many ms for each; what comes faster is lost (``bus overrun 2 0.5``); None ends it
@@ -453,7 +467,10 @@ class VirtualDrive:
 
         >>> world[5].set_bus_overrun(2, service_ms=0.5)
         """
-        self.apply("bus overrun off" if frames is None else f"bus overrun {int(frames)} {number(service_ms)}")
+        if frames is None:
+            self._do("bus_overrun")
+        else:
+            self._do("bus_overrun", int(frames), float(service_ms))
 
     def set_bus_corruption(self, probability: Optional[Number]) -> None:
         """Each attempt to send a frame fails with this probability, 0 to 1 (``bus corrupt 0.3``), as with a bad plug at this node;
@@ -461,17 +478,21 @@ class VirtualDrive:
 
         >>> world[5].set_bus_corruption(0.3)
         """
-        self.apply("bus corrupt off" if probability is None else f"bus corrupt {number(probability)}")
+        self._do("bus_corrupt", 0.0 if probability is None else float(probability))
 
     def set_object(self, index: int, sub_index: int, value: Union[int, float, str]) -> None:
         """Value of an object of a node whose objects are the outer world's (``set 6000:01 FFh``): what its sensor measured.
 
         >>> sensor.set_object(0x6000, 1, 0xFF)
         """
-        if isinstance(value, str):
-            text = '"' + value + '"'
-        elif isinstance(value, float):
-            text = number(value)
-        else:
-            text = str(int(value))
-        self.apply(f"set {index:04X}:{sub_index:02X} {text}")
+        self._do("object", index, sub_index, value if isinstance(value, (float, str)) else int(value))
+
+
+def real(value: Optional[Number]) -> Optional[float]:
+    """The number, if there is one."""
+    return None if value is None else float(value)
+
+
+def whole(value: Optional[int]) -> Optional[int]:
+    """The whole number, if there is one."""
+    return None if value is None else int(value)

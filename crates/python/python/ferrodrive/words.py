@@ -1,15 +1,10 @@
-"""Values as words of a world command."""
+"""Values as words."""
 
 from __future__ import annotations
 
 from typing import Union
 
 Number = Union[int, float]
-
-
-def number(value: Number) -> str:
-    """The number with all its digits, as a word of a command."""
-    return repr(float(value))
 
 
 def word(text: str) -> str:

@@ -14,7 +14,6 @@ from .body import Body
 from .errors import Refused
 from .virtual_drive import VirtualDrive
 from .turns import taking_part
-from .words import number
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -300,7 +299,7 @@ class World(_native.World):
 
         >>> world.corrupt(0.01)
         """
-        self.apply(f"bus corrupt {number(probability)}")
+        self.disturb("corrupt", float(probability))
 
     def destroy(self, nth_frame: int, bit: int) -> None:
         """The n-th frame from here on is destroyed at this bit of it, counted from 1 at start of frame (``bus destroy 3 20``).
@@ -309,7 +308,7 @@ class World(_native.World):
 
         >>> world.destroy(3, bit=20)
         """
-        self.apply(f"bus destroy {int(nth_frame)} {int(bit)}")
+        self.disturb("destroy", int(nth_frame), int(bit))
 
     @property
     def bus_load(self) -> float:

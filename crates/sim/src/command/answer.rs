@@ -9,7 +9,7 @@ use plant::FreeRun;
 
 use super::{Before, Command, CommandError, Service};
 use crate::json;
-use crate::stimulus::{FORMS, Place, Stimulus};
+use crate::stimulus::{BodyStimulus, FORMS, Place, Stimulus};
 use crate::{BodyState, Brake, Levels, OutputShaft, PowerPhase, Report, StationId, World};
 
 /// Does what `command` says; returns the line of JSON that answers it.
@@ -30,12 +30,11 @@ pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> 
         }
         Command::GetBody(name) => body(world, name),
         Command::ApplyToBody(name, stimulus) => {
-            world.apply_to_body(name, stimulus).ok_or_else(|| no_such_body(world, name))??;
+            apply_to_body(world, name, stimulus)?;
             Ok(done(world))
         }
         Command::Apply(place, stimulus) => {
-            let applied = world.apply(*place, stimulus).map_err(|_| no_such_drive(world, place.node))?;
-            applied?;
+            apply(world, *place, stimulus)?;
             if let Stimulus::Power(_) = stimulus {
                 return Ok(switched(world, place.node));
             }
@@ -43,6 +42,22 @@ pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> 
             Ok(json::line(&Done { ok: true, t: seconds(world), note }))
         }
     }
+}
+
+/// Does to a node what the outer world may do.
+///
+/// # Errors
+/// No such drive, or what it does not take; nothing is changed then.
+pub fn apply(world: &mut World, place: Place, stimulus: &Stimulus) -> Result<(), CommandError> {
+    Ok(world.apply(place, stimulus).map_err(|_| no_such_drive(world, place.node))??)
+}
+
+/// Does to a machine that several drives move what the outer world may do.
+///
+/// # Errors
+/// No such machine, or what it does not take; nothing is changed then.
+pub fn apply_to_body(world: &mut World, name: &str, stimulus: &BodyStimulus) -> Result<(), CommandError> {
+    Ok(world.apply_to_body(name, stimulus).ok_or_else(|| no_such_body(world, name))??)
 }
 
 fn no_such_drive(world: &World, number: u8) -> CommandError {

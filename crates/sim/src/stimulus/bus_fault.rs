@@ -57,18 +57,15 @@ impl BusFault {
             ["silent", ..] => return Err(StimulusError::Usage(SILENT)),
             ["late", "off"] => Self::Late(None),
             ["late", min, max] => {
-                let (min_ns, max_ns) = (nanos(min, LATE)?, nanos(max, LATE)?);
-                if max_ns < min_ns {
-                    return Err(StimulusError::BadValue { text: (*max).into(), what: "longest delay", usage: LATE });
-                }
-                Self::Late(Some(Delay { min_ns, max_ns }))
+                let bad = |_| StimulusError::BadValue { text: (*max).into(), what: "longest delay", usage: LATE };
+                Self::late(delay(min, LATE)?, delay(max, LATE)?).map_err(bad)?
             }
             ["late", ..] => return Err(StimulusError::Usage(LATE)),
             ["babble", "off"] => Self::Babble(None),
             ["babble", frame, gap] => {
                 let bad = |_| StimulusError::BadValue { text: (*frame).into(), what: "frame", usage: BABBLE };
                 let frame: Frame = frame.parse().map_err(bad)?;
-                Self::Babble(Some(Babble { frame, gap_ns: nanos(gap, BABBLE)? }))
+                Self::babble(frame, delay(gap, BABBLE)?)?
             }
             ["babble", ..] => return Err(StimulusError::Usage(BABBLE)),
             ["overrun", "off"] => Self::Overrun(None),
@@ -76,14 +73,51 @@ impl BusFault {
                 let bad =
                     |_| StimulusError::BadValue { text: (*depth).into(), what: "number of frames", usage: OVERRUN };
                 let depth = depth.parse().map_err(bad)?;
-                Self::Overrun(Some(Overrun { depth, service_ns: nanos(service, OVERRUN)? }))
+                Self::overrun(depth, delay(service, OVERRUN)?)?
             }
             ["overrun", ..] => return Err(StimulusError::Usage(OVERRUN)),
             ["corrupt", "off"] => Self::Corrupt(0.0),
-            ["corrupt", share] => Self::Corrupt(probability(share, CORRUPT)?),
+            ["corrupt", text] => Self::Corrupt(probability(number(text), text, CORRUPT)?),
             ["corrupt", ..] => return Err(StimulusError::Usage(CORRUPT)),
             _ => return Err(StimulusError::Usage(ANY)),
         })
+    }
+
+    /// Its frames reach the bus between `min` and `max` late.
+    ///
+    /// # Errors
+    /// It is more than a day, or the longest is the shortest.
+    pub fn late(min: Duration, max: Duration) -> Result<Self, StimulusError> {
+        let (min_ns, max_ns) = (nanos(min, LATE)?, nanos(max, LATE)?);
+        if max_ns < min_ns {
+            let text = format!("{max:?}");
+            return Err(StimulusError::BadValue { text, what: "longest delay", usage: LATE });
+        }
+        Ok(Self::Late(Some(Delay { min_ns, max_ns })))
+    }
+
+    /// It sends `frame` again and again, each `gap` after the one before went out.
+    ///
+    /// # Errors
+    /// The gap is more than a day.
+    pub fn babble(frame: Frame, gap: Duration) -> Result<Self, StimulusError> {
+        Ok(Self::Babble(Some(Babble { frame, gap_ns: nanos(gap, BABBLE)? })))
+    }
+
+    /// It holds `depth` frames, and takes `service` for each.
+    ///
+    /// # Errors
+    /// That is more than a day.
+    pub fn overrun(depth: u32, service: Duration) -> Result<Self, StimulusError> {
+        Ok(Self::Overrun(Some(Overrun { depth, service_ns: nanos(service, OVERRUN)? })))
+    }
+
+    /// Each attempt to send a frame fails with this probability.
+    ///
+    /// # Errors
+    /// It is not from 0 to 1.
+    pub fn corrupt(share: f64) -> Result<Self, StimulusError> {
+        probability(share, share, CORRUPT).map(Self::Corrupt)
     }
 
     /// Puts it among what is wrong with a node already.
@@ -99,6 +133,27 @@ impl BusFault {
 }
 
 impl WireFault {
+    /// Each frame is destroyed with this probability.
+    ///
+    /// # Errors
+    /// It is not from 0 to 1.
+    pub fn corrupt(share: f64) -> Result<Self, StimulusError> {
+        probability(share, share, WIRE).map(Self::Corrupt)
+    }
+
+    /// The `nth` frame from here on is destroyed at its `bit`-th bit.
+    ///
+    /// # Errors
+    /// One of them is less than 1.
+    pub fn destroy(nth: u32, bit: u32) -> Result<Self, StimulusError> {
+        let bad = |text: u32, what| StimulusError::BadValue { text: text.to_string(), what, usage: WIRE };
+        match (nth, bit) {
+            (0, _) => Err(bad(nth, "number of a frame from 1 on")),
+            (_, 0) => Err(bad(bit, "bit from 1 on")),
+            _ => Ok(Self::Destroy { nth: nth.into(), bit }),
+        }
+    }
+
     /// From the words after `bus`.
     pub(crate) fn parse(words: &[&str]) -> Result<Self, StimulusError> {
         let whole = |text: &str, what| -> Result<u32, StimulusError> {
@@ -107,7 +162,7 @@ impl WireFault {
         };
         match words {
             ["corrupt", "off"] => Ok(Self::Corrupt(0.0)),
-            ["corrupt", share] => Ok(Self::Corrupt(probability(share, WIRE)?)),
+            ["corrupt", text] => Ok(Self::Corrupt(probability(number(text), text, WIRE)?)),
             ["destroy", nth, bit] => Ok(Self::Destroy {
                 nth: whole(nth, "number of a frame from 1 on")?.into(),
                 bit: whole(bit, "bit from 1 on")?,
@@ -117,15 +172,24 @@ impl WireFault {
     }
 }
 
-fn probability(text: &str, usage: &'static str) -> Result<f64, StimulusError> {
-    let value = text.parse().ok().filter(|value| (0.0..=1.0).contains(value));
-    value.ok_or_else(|| StimulusError::BadValue { text: text.into(), what: "probability", usage })
+/// What a word says; not a number where it says none.
+fn number(text: &str) -> f64 {
+    text.parse().unwrap_or(f64::NAN)
 }
 
-fn nanos(text: &str, usage: &'static str) -> Result<u64, StimulusError> {
+fn probability(value: f64, text: impl ToString, usage: &'static str) -> Result<f64, StimulusError> {
+    let bad = || StimulusError::BadValue { text: text.to_string(), what: "probability", usage };
+    (0.0..=1.0).contains(&value).then_some(value).ok_or_else(bad)
+}
+
+fn delay(text: &str, usage: &'static str) -> Result<Duration, StimulusError> {
     let time = can::parse_duration_in("ms", text).ok().filter(|time| *time <= LONGEST);
-    let bad = || StimulusError::BadValue { text: text.into(), what: "time in ms", usage };
-    Ok(time.ok_or_else(bad)?.as_nanos() as u64)
+    time.ok_or_else(|| StimulusError::BadValue { text: text.into(), what: "time in ms", usage })
+}
+
+fn nanos(time: Duration, usage: &'static str) -> Result<u64, StimulusError> {
+    let bad = || StimulusError::BadValue { text: format!("{time:?}"), what: "time in ms", usage };
+    if time <= LONGEST { Ok(time.as_nanos() as u64) } else { Err(bad()) }
 }
 
 /// Milliseconds as they are read back: nanoseconds of a day fit a double.

@@ -225,9 +225,11 @@ impl fmt::Display for LoadPart {
 }
 
 impl LoadKind {
-    pub(super) const ALL: [Self; 6] = [Self::Friction, Self::Pulley, Self::Spring, Self::Stop, Self::Fan, Self::Gear];
+    /// Each of them.
+    pub const ALL: [Self; 6] = [Self::Friction, Self::Pulley, Self::Spring, Self::Stop, Self::Fan, Self::Gear];
 
-    pub(super) const fn word(self) -> &'static str {
+    /// How it is called in a command.
+    pub const fn word(self) -> &'static str {
         match self {
             Self::Friction => "friction",
             Self::Pulley => "pulley",

@@ -54,9 +54,11 @@ impl fmt::Display for ObjectValue {
 }
 
 impl Power {
-    pub(super) const ALL: [Self; 4] = [Self::On, Self::Off, Self::Cycle, Self::Cut];
+    /// Each of them.
+    pub const ALL: [Self; 4] = [Self::On, Self::Off, Self::Cycle, Self::Cut];
 
-    pub(super) const fn word(self) -> &'static str {
+    /// How it is called in a command.
+    pub const fn word(self) -> &'static str {
         match self {
             Self::On => "on",
             Self::Off => "off",
@@ -67,9 +69,11 @@ impl Power {
 }
 
 impl TemperatureSensor {
-    pub(super) const ALL: [Self; 2] = [Self::Motor, Self::Driver];
+    /// Each of them.
+    pub const ALL: [Self; 2] = [Self::Motor, Self::Driver];
 
-    pub(super) const fn word(self) -> &'static str {
+    /// How it is called in a command.
+    pub const fn word(self) -> &'static str {
         match self {
             Self::Motor => "motor",
             Self::Driver => "driver",
@@ -78,7 +82,8 @@ impl TemperatureSensor {
 }
 
 impl Component {
-    pub(super) const ALL: [Self; 8] = [
+    /// Each of them.
+    pub const ALL: [Self; 8] = [
         Self::Hall,
         Self::Encoder,
         Self::Eeprom,
@@ -89,7 +94,8 @@ impl Component {
         Self::Bleeder,
     ];
 
-    pub(super) const fn word(self) -> &'static str {
+    /// How it is called in a command.
+    pub const fn word(self) -> &'static str {
         match self {
             Self::Hall => "hall",
             Self::Encoder => "encoder",

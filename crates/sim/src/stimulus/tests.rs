@@ -1,5 +1,7 @@
 //! Whatever a stimulus is, its words say it: `parse(print(x)) == x`.
 
+use std::time::Duration;
+
 use canopen::Mux;
 
 use super::*;
@@ -172,4 +174,35 @@ fn what_is_wrong_with_a_load_is_said_with_its_own_form() {
     ] {
         assert_eq!(words.parse::<Stimulus>().unwrap_err().to_string(), error, "{words}");
     }
+}
+
+#[test]
+fn faults_of_the_bus_from_numbers_have_the_bounds_of_their_words() {
+    let ms = Duration::from_millis;
+    let day = Duration::from_secs(86_400);
+    let frame: can::Frame = "080#".parse().expect("a frame");
+    for (fault, words) in [
+        (BusFault::late(ms(5), ms(20)), "bus late 5 20"),
+        (BusFault::babble(frame, ms(1)), "bus babble 080# 1"),
+        (BusFault::overrun(2, Duration::from_micros(500)), "bus overrun 2 0.5"),
+        (BusFault::corrupt(0.3), "bus corrupt 0.3"),
+    ] {
+        assert_eq!(fault.map(Stimulus::Bus), words.parse(), "{words}");
+    }
+    for refused in [
+        BusFault::late(ms(5), ms(4)),
+        BusFault::late(ms(5), day + ms(1)),
+        BusFault::babble(frame, day + ms(1)),
+        BusFault::overrun(2, day + ms(1)),
+        BusFault::corrupt(1.1),
+        BusFault::corrupt(-0.1),
+        BusFault::corrupt(f64::NAN),
+    ] {
+        assert!(refused.is_err(), "{refused:?}");
+    }
+    assert_eq!(WireFault::destroy(3, 20), WireFault::parse(&["destroy", "3", "20"]));
+    assert!(
+        WireFault::destroy(0, 20).is_err() && WireFault::destroy(3, 0).is_err() && WireFault::corrupt(2.0).is_err()
+    );
+    assert!(SwitchRange::new(Some(2), Some(1)).is_err() && SwitchRange::new(None, Some(1)).is_ok());
 }

@@ -27,11 +27,7 @@ pub(super) fn value(text: &str, what: &'static str, usage: &'static str) -> Resu
 
 /// A stretch of positions, whose ends may be `min` and `max`.
 pub(super) fn range(low: &str, high: &str, usage: &'static str) -> Result<SwitchRange, StimulusError> {
-    let range = SwitchRange { low: bound(low, "min", usage)?, high: bound(high, "max", usage)? };
-    match range {
-        SwitchRange { low: Some(low), high: Some(high) } if low > high => Err(StimulusError::EmptyRange { low, high }),
-        _ => Ok(range),
-    }
+    SwitchRange::new(bound(low, "min", usage)?, bound(high, "max", usage)?)
 }
 
 fn bound(text: &str, open: &str, usage: &'static str) -> Result<Option<i64>, StimulusError> {
