@@ -55,11 +55,8 @@ const UNITS: &[(Dimension, f64, &[&str])] = &[
     (CurrentRate, 1e-3, &["mA/s"]),
     (Voltage, 1.0, &["V"]),
     (Voltage, 1e-3, &["mV"]),
-    (Time, 1.0, &["s", "sec"]),
-    (Time, 1e-3, &["ms"]),
-    (Time, 1e-6, &["us", "µs"]),
-    (Time, 60.0, &["min"]),
-    (Time, 3600.0, &["h"]),
+    // Beside those of `can::DURATION_UNITS`.
+    (Time, 1.0, &["sec"]),
     (Temperature, 1.0, &["°C", "degC", "C"]),
     (Power, 1.0, &["W"]),
     (Resistance, 1.0, &["ohm", "Ω", "Ohm"]),
@@ -71,6 +68,9 @@ impl Unit {
     /// The unit spelt `text`; exact spelling first (`mA` is not `MA`), then without regard to case.
     pub fn named(text: &str) -> Option<Self> {
         let find = |same: &dyn Fn(&str) -> bool| {
+            if let Some((_, ns)) = can::DURATION_UNITS.iter().find(|(name, _)| same(name)) {
+                return Some(Self { dimension: Time, factor: *ns as f64 / 1e9 });
+            }
             let row = UNITS.iter().find(|(_, _, names)| names.iter().any(|name| same(name)))?;
             Some(Self { dimension: row.0, factor: row.1 })
         };
