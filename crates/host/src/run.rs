@@ -1,5 +1,6 @@
 //! The loop: handles requests, deadlines and ended work, and publishes the state.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
@@ -116,7 +117,7 @@ impl Host {
             number: self.states,
             time_s: (now - Instant::ZERO).as_secs_f64(),
             bus: BusView {
-                name: &self.setting.bus,
+                name: self.setting.bus.clone(),
                 bitrate: self.setting.bitrate.map(Bitrate::bits_per_second),
                 frames_per_s: self.meter.frames_per_s(),
                 load_percent: self.meter.load_percent(),
@@ -135,6 +136,10 @@ impl Host {
         // Only names, numbers and lists: serialising cannot fail.
         let json = serde_json::to_string(&snapshot).unwrap_or_default();
         // There may be no receiver.
-        let _ = self.inbox.states.send(StateUpdate { number: self.states, json: json.into() });
+        let _ = self.inbox.states.send(StateUpdate {
+            number: self.states,
+            json: json.into(),
+            snapshot: Arc::new(snapshot),
+        });
     }
 }

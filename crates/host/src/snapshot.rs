@@ -13,123 +13,177 @@ use crate::wire::Health;
 use crate::session::authority::SessionId;
 
 /// The state of everything at one time.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct Snapshot<'a> {
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Snapshot {
+    /// Always `state`.
     #[serde(rename = "type")]
-    pub(crate) kind: &'static str,
+    pub kind: &'static str,
     /// Counts the states; a gap shows how many a slow reader missed.
-    pub(crate) number: u64,
+    pub number: u64,
     /// Time of the bus.
-    pub(crate) time_s: f64,
-    pub(crate) bus: BusView<'a>,
+    pub time_s: f64,
+    /// The bus.
+    pub bus: BusView,
     /// A scan is under way.
-    pub(crate) scanning: bool,
-    pub(crate) sessions: usize,
+    pub scanning: bool,
+    /// Number of sessions.
+    pub sessions: usize,
     /// The session that has control.
-    pub(crate) controller: Option<SessionId>,
+    pub controller: Option<SessionId>,
     /// The session that asked for it last.
-    pub(crate) asking: Option<SessionId>,
+    pub asking: Option<SessionId>,
     /// The speed limit of the session that has control, in r/min; `null` without a limit.
-    pub(crate) speed_limit_rpm: Option<f64>,
+    pub speed_limit_rpm: Option<f64>,
     /// Rises when there is something new at `/api/faults`.
-    pub(crate) happenings: u64,
+    pub happenings: u64,
     /// How often the trace was saved since the studio started.
-    pub(crate) logs_saved: u64,
+    pub logs_saved: u64,
     /// Number of changes to the world around virtual drives.
-    pub(crate) changes: u64,
-    pub(crate) nodes: Vec<NodeView<'a>>,
+    pub changes: u64,
+    /// The nodes, by node-ID.
+    pub nodes: Vec<NodeView>,
 }
 
 /// The bus.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct BusView<'a> {
-    pub(crate) name: &'a str,
-    pub(crate) bitrate: Option<u32>,
-    pub(crate) frames_per_s: u32,
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct BusView {
+    /// Its name.
+    pub name: String,
+    /// Bit rate in bit/s.
+    pub bitrate: Option<u32>,
+    /// Frames in the last second.
+    pub frames_per_s: u32,
     /// Bus load in per cent; `null` where the bit rate is unknown.
-    pub(crate) load_percent: Option<f64>,
+    pub load_percent: Option<f64>,
     /// Health as reported by the controller and the connection.
-    pub(crate) health: Health,
+    pub health: Health,
 }
 
 /// A node.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct NodeView<'a> {
-    pub(crate) node: u8,
-    pub(crate) model: Option<&'a str>,
-    pub(crate) title: Option<&'a str>,
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct NodeView {
+    /// Node-ID.
+    pub node: u8,
+    /// Name of its model.
+    pub model: Option<&'static str>,
+    /// The model as people call it.
+    pub title: Option<&'static str>,
     /// What is uncertain about its model.
-    pub(crate) remark: Option<&'a str>,
-    pub(crate) device_type: Option<u32>,
-    pub(crate) vendor_id: Option<u32>,
-    pub(crate) product_code: Option<u32>,
-    pub(crate) revision_number: Option<u32>,
-    pub(crate) nmt: Option<String>,
-    pub(crate) heartbeat_age_ms: Option<u64>,
+    pub remark: Option<String>,
+    /// 1000h.
+    pub device_type: Option<u32>,
+    /// 1018h:01.
+    pub vendor_id: Option<u32>,
+    /// 1018h:02.
+    pub product_code: Option<u32>,
+    /// 1018h:03.
+    pub revision_number: Option<u32>,
+    /// NMT state.
+    pub nmt: Option<String>,
+    /// Time since its last heartbeat.
+    pub heartbeat_age_ms: Option<u64>,
     /// Why its values are unknown now.
-    pub(crate) trouble: Option<&'a str>,
+    pub trouble: Option<String>,
     /// The command in progress.
-    pub(crate) doing: Option<&'static str>,
+    pub doing: Option<&'static str>,
     /// This studio has set it in motion.
-    pub(crate) moving: bool,
+    pub moving: bool,
     /// A stop was commanded and it has not been seen at rest since: it may still be moving.
-    pub(crate) stop_unseen: bool,
+    pub stop_unseen: bool,
     /// Writes of parameters that can be rolled back.
-    pub(crate) can_roll_back: usize,
+    pub can_roll_back: usize,
     /// How often it has stored its parameters since the studio started.
-    pub(crate) stored: u32,
+    pub stored: u32,
     /// How often its PDOs were configured since the studio started.
-    pub(crate) mapped: u32,
+    pub mapped: u32,
     /// What it does when this program dies; `null` where that is not yet known.
-    pub(crate) without_us: Option<String>,
+    pub without_us: Option<String>,
     /// Nothing stops it then: it keeps moving.
-    pub(crate) goes_on: bool,
+    pub goes_on: bool,
     /// The session that has control has accepted that it keeps moving then.
-    pub(crate) accepted: bool,
+    pub accepted: bool,
     /// Present if the node is a drive.
-    pub(crate) drive: Option<&'a DriveView>,
+    pub drive: Option<Box<DriveView>>,
 }
 
 /// A drive.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct DriveView {
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct DriveView {
     /// When it was read, in the time of the bus.
-    pub(crate) at_s: f64,
-    pub(crate) state: Option<&'static str>,
+    pub at_s: f64,
+    /// State of the power state machine.
+    pub state: Option<&'static str>,
     /// It has the power state machine of CiA 402; else its state is the closest one.
-    pub(crate) has_state_machine: bool,
-    pub(crate) statusword: u16,
+    pub has_state_machine: bool,
+    /// 6041h.
+    pub statusword: u16,
     /// Its bits that are set, in words.
-    pub(crate) status_bits: Vec<&'static str>,
-    pub(crate) controlword: Option<u16>,
-    pub(crate) control_bits: Vec<&'static str>,
+    pub status_bits: Vec<&'static str>,
+    /// 6040h, if it can be read.
+    pub controlword: Option<u16>,
+    /// Its bits that are set, in words.
+    pub control_bits: Vec<&'static str>,
     /// The steps from here to Operation enabled.
-    pub(crate) way: Vec<Step>,
-    pub(crate) mode: Option<i8>,
-    pub(crate) mode_name: Option<&'static str>,
-    pub(crate) fault_code: u16,
-    pub(crate) faults: Vec<FaultView>,
-    pub(crate) position_counts: Option<i64>,
-    pub(crate) angle_degrees: Option<f64>,
-    pub(crate) velocity_rpm: Option<f64>,
-    pub(crate) current_a: Option<f64>,
-    pub(crate) supply_v: Option<f64>,
-    pub(crate) motor_celsius: Option<f64>,
-    pub(crate) driver_celsius: Option<f64>,
+    pub way: Vec<Step>,
+    /// 6061h.
+    pub mode: Option<i8>,
+    /// The mode of operation in words.
+    pub mode_name: Option<&'static str>,
+    /// 603Fh, or what the drive has in its place.
+    pub fault_code: u16,
+    /// What it reports.
+    pub faults: Vec<FaultView>,
+    /// Position in counts.
+    pub position_counts: Option<i64>,
+    /// Angle of the output.
+    pub angle_degrees: Option<f64>,
+    /// Speed of the output in r/min.
+    pub velocity_rpm: Option<f64>,
+    /// Motor current.
+    pub current_a: Option<f64>,
+    /// Voltage of the supply.
+    pub supply_v: Option<f64>,
+    /// Temperature of the motor.
+    pub motor_celsius: Option<f64>,
+    /// Temperature of the power stage.
+    pub driver_celsius: Option<f64>,
 }
 
 /// One step of the power state machine.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub(crate) struct Step {
-    pub(crate) controlword: u16,
-    pub(crate) to: &'static str,
+pub struct Step {
+    /// What is sent.
+    pub controlword: u16,
+    /// State that it leads to.
+    pub to: &'static str,
 }
 
 /// A fault, with what to do about it.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct FaultView {
-    pub(crate) name: &'static str,
-    pub(crate) remedy: &'static str,
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct FaultView {
+    /// What it is.
+    pub name: &'static str,
+    /// What to do.
+    pub remedy: &'static str,
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "type", rename = "news")]
+pub struct News {
+    /// Time of the bus.
+    pub time_s: f64,
+    /// The node concerned.
+    pub node: Option<u8>,
+    /// In words.
+    pub text: String,
+}
+
+impl Snapshot {
+    /// The node of this node-ID.
+    pub fn node(&self, number: u8) -> Option<&NodeView> {
+        self.nodes.iter().find(|node| node.node == number)
+    }
 }
 
 /// Bits of the controlword with the same meaning in all modes (CiA 402-2, 8.4.1).
@@ -191,6 +245,13 @@ fn way(style: PowerStyle, mut state: PowerState) -> Vec<Step> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn news_are_a_message_of_their_type() {
+        let news = News { time_s: 1.5, node: Some(4), text: "node 4 booted".into() };
+        let json = serde_json::to_value(news).expect("JSON");
+        assert_eq!(json, serde_json::json!({ "type": "news", "time_s": 1.5, "node": 4, "text": "node 4 booted" }));
+    }
 
     #[test]
     fn the_way_to_operation_enabled_is_that_of_the_standard() {

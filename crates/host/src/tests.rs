@@ -504,7 +504,7 @@ fn loss_and_return_of_a_drive_are_reported() {
         assert_eq!(page.ask(to(node(9), drive::Command::Enable)).await.error_kind(), "no_such_drive");
         stage.network.node(ARM).nmt(canopen::NmtCommand::ResetNode);
         stage.sleep(1500).await;
-        let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
+        let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.text).collect();
         assert!(heard.iter().any(|news| news.contains("node 2 booted")), "{heard:?}");
     });
 }

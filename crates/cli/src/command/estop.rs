@@ -284,7 +284,7 @@ mod tests {
             let line = line(&folder, &both, &[]);
             session::run(&line.global, async |context| {
                 let drives = [turn(context, node(5)).await, turn(context, node(2)).await];
-                let report = if by_ramp { stop_all(context).await? } else { Estop {}.run(context).await? };
+                let report = if by_ramp { stop_all(context).await? } else { Estop::default().run(context).await? };
                 let said = json_of(&report);
                 let nodes = said["nodes"].as_array().expect("a list");
                 assert_eq!(nodes.iter().map(|row| &row["node"]).collect::<Vec<_>>(), [2, 5], "{said}");
@@ -304,7 +304,7 @@ mod tests {
         let line = line(&folder, SERVO, &["2=zlim42c"]);
         session::run(&line.global, async |context| {
             turn(context, node(5)).await;
-            let report = Estop {}.run(context).await?;
+            let report = Estop::default().run(context).await?;
             let said = json_of(&report);
             let stands = said["nodes"].as_array().expect("a list").iter().map(|row| (&row["node"], &row["stands"]));
             assert_eq!(stands.collect::<Vec<_>>(), [(&json!(2), &json!(false)), (&json!(5), &json!(true))], "{said}");

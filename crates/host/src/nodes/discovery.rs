@@ -8,11 +8,10 @@ use cia402::object::CONTROLWORD;
 use master::core::Event;
 use master::identify::Found;
 use master::{Drive, Error};
-use serde_json::json;
 
 use crate::answer::Answer;
 use crate::nodes::known_node::KnownNode;
-use crate::snapshot::{DriveView, NodeView};
+use crate::snapshot::{DriveView, News, NodeView};
 use crate::state::Host;
 use crate::work::{Asked, Done, Look, send};
 
@@ -134,7 +133,7 @@ impl Host {
     }
 
     /// A node as it is shown.
-    pub(crate) fn view<'a>(&self, id: NodeId, node: &'a KnownNode, now: Instant) -> NodeView<'a> {
+    pub(crate) fn view(&self, id: NodeId, node: &KnownNode, now: Instant) -> NodeView {
         let facts = self.network.facts(id);
         let description = node.drive.as_ref().and_then(Drive::description);
         let identity = node.identity.unwrap_or_default();
@@ -143,14 +142,14 @@ impl Host {
             node: id.raw(),
             model: description.map(|description| description.name),
             title: description.map(|description| description.title),
-            remark: node.remark.as_deref(),
+            remark: node.remark.clone(),
             device_type: identity.device_type,
             vendor_id: identity.vendor_id,
             product_code: identity.product_code,
             revision_number: identity.revision_number,
             nmt: facts.probable_state(description).map(|state| state.to_string()),
             heartbeat_age_ms: facts.heartbeat_age(now).map(|age| age.as_millis() as u64),
-            trouble: node.trouble.as_deref(),
+            trouble: node.trouble.clone(),
             doing: self.running.get(&id).map(|running| running.what),
             moving: self.network.moved().contains(id),
             stop_unseen: self.unseen_stops.contains_key(&id),
@@ -160,7 +159,7 @@ impl Host {
             without_us: loss.map(|loss| loss.to_string()),
             goes_on: loss.is_some_and(|loss| loss.stops_after().is_none()),
             accepted: self.accepted.contains(&id),
-            drive: node.view.as_deref(),
+            drive: node.view.clone(),
         }
     }
 
@@ -194,9 +193,8 @@ impl Host {
     /// Sends news to every page.
     pub(crate) fn send_news(&self, node: Option<NodeId>, text: &str) {
         let time_s = (self.network.now() - Instant::ZERO).as_secs_f64();
-        let news = json!({ "type": "news", "time_s": time_s, "node": node.map(NodeId::raw), "text": text });
         // There may be no receiver.
-        let _ = self.inbox.news.send(news.to_string().into());
+        let _ = self.inbox.news.send(News { time_s, node: node.map(NodeId::raw), text: text.to_owned() });
     }
 }
 

@@ -11,6 +11,7 @@ use tokio::sync::{broadcast, mpsc, oneshot, watch};
 use crate::answer::Answer;
 use crate::command::Command;
 use crate::session::authority::SessionId;
+use crate::snapshot::{News, Snapshot};
 use crate::timeline::Timeline;
 use crate::trace::Trace;
 
@@ -26,7 +27,7 @@ pub struct HostHandle {
     requests: mpsc::Sender<Request>,
     stops: Arc<watch::Sender<u64>>,
     states: watch::Receiver<StateUpdate>,
-    news: broadcast::Sender<Arc<str>>,
+    news: broadcast::Sender<News>,
     trace: Arc<Trace>,
     timeline: Arc<Timeline>,
 }
@@ -39,21 +40,23 @@ pub struct Inbox {
     pub stops: watch::Receiver<u64>,
     /// The state of everything.
     pub states: watch::Sender<StateUpdate>,
-    /// News, as JSON.
-    pub news: broadcast::Sender<Arc<str>>,
+    /// News.
+    pub news: broadcast::Sender<News>,
     /// The frames of the bus.
     pub trace: Arc<Trace>,
     /// The timeline of the drives.
     pub timeline: Arc<Timeline>,
 }
 
-/// The state of everything, as JSON.
-#[derive(Clone, Debug)]
+/// The state of everything, and the same as JSON.
+#[derive(Clone, Debug, Default)]
 pub struct StateUpdate {
     /// Counts the states.
     pub number: u64,
     /// As JSON.
     pub json: Arc<str>,
+    /// The state.
+    pub snapshot: Arc<Snapshot>,
 }
 
 /// A request to the host.
@@ -84,7 +87,7 @@ pub fn channel(trace: Trace) -> (HostHandle, Inbox) {
     let (trace, timeline) = (Arc::new(trace), Arc::<Timeline>::default());
     let (requests, requested) = mpsc::channel(REQUESTS);
     let (stops, stopped) = watch::channel(0);
-    let (shown, states) = watch::channel(StateUpdate { number: 0, json: "{}".into() });
+    let (shown, states) = watch::channel(StateUpdate { json: "{}".into(), ..StateUpdate::default() });
     let (news, _) = broadcast::channel(NEWS);
     let handle = HostHandle {
         requests,
@@ -137,7 +140,7 @@ impl HostHandle {
     }
 
     /// The news from now on.
-    pub fn news(&self) -> broadcast::Receiver<Arc<str>> {
+    pub fn news(&self) -> broadcast::Receiver<News> {
         self.news.subscribe()
     }
 }

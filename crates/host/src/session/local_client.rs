@@ -8,7 +8,9 @@ use tokio::sync::{broadcast, watch};
 
 use crate::answer::Answer;
 use crate::command::Command;
+use crate::session::authority::SessionId;
 use crate::session::handle::{HostHandle, Session, StateUpdate};
+use crate::snapshot::{News, Snapshot};
 
 /// A session, its states and its news.
 #[derive(Debug)]
@@ -16,16 +18,16 @@ pub struct LocalClient {
     session: Session,
     seq: u64,
     states: watch::Receiver<StateUpdate>,
-    news: broadcast::Receiver<Arc<str>>,
+    news: broadcast::Receiver<News>,
 }
 
 /// An output of the host.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Shown {
-    /// The state of everything, as JSON: `/api/state`.
-    State(Arc<str>),
-    /// Something that happened, as JSON: `{"type":"news","node":4,"text":".."}`.
-    News(Arc<str>),
+    /// The state of everything.
+    State(Arc<Snapshot>),
+    /// Something that happened.
+    News(News),
     /// Number of news that were missed because they were not fetched in time.
     Missed(u64),
     /// The host has ended.
@@ -39,9 +41,9 @@ impl LocalClient {
         Some(Self { session, seq: 0, states: handle.states(), news: handle.news() })
     }
 
-    /// Its number, to be compared with the controller in the state.
-    pub const fn number(&self) -> u64 {
-        self.session.id().0
+    /// Its session, to be compared with the controller in the state.
+    pub const fn id(&self) -> SessionId {
+        self.session.id()
     }
 
     /// Sends a message as a page does, without its number and session: `{"do":"enable","node":4}`. The answer, as JSON, comes
@@ -67,7 +69,7 @@ impl LocalClient {
     pub async fn shown(&mut self) -> Shown {
         tokio::select! {
             changed = self.states.changed() => match changed {
-                Ok(()) => Shown::State(self.states.borrow_and_update().json.clone()),
+                Ok(()) => Shown::State(Arc::clone(&self.states.borrow_and_update().snapshot)),
                 Err(_) => Shown::Over,
             },
             news = self.news.recv() => match news {

@@ -43,7 +43,7 @@ fn a_fault_is_reported_with_its_remedy_and_its_source_until_it_ends() {
         async |stage| {
             stage.sleep(1000).await;
             let mut news = news.take().expect("a listener");
-            let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
+            let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.text).collect();
             assert!(heard.iter().any(|news| news.contains("node 4: emergency 0001h (over-voltage)")), "{heard:?}");
             for kind in ["emcy", "fault"] {
                 let shown = stage.find(WHEEL, kind);

@@ -109,7 +109,7 @@ fn a_stop_that_comes_by_two_channels_is_reported_once() {
         page.must(velocity(WHEEL, 60.0)).await;
         let mut news = stage.handle.news();
         let mut shown = || {
-            let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
+            let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.text).collect();
             heard.iter().filter(|news| news.contains("a press of stop")).count()
         };
         let stops = |stage: &Stage| stage.happened().iter().filter(|entry| entry["kind"] == "stop").count();

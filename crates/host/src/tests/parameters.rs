@@ -230,7 +230,7 @@ fn a_journal_that_cannot_be_deleted_is_news_for_every_page_and_the_write_holds()
             (&done["journal"], stage.has(PROFILE_VELOCITY).await),
             (&"the journal could not be deleted".into(), 60)
         );
-        let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
+        let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.text).collect();
         assert!(heard.iter().any(|news| news.contains("could not be deleted")), "{heard:?}");
     });
 }

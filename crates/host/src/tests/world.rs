@@ -110,8 +110,8 @@ fn changes_of_the_world_are_seen_on_the_bus_and_in_the_news() {
         stage.sleep(3_000).await;
         assert_eq!(node_seen(&seen(&mut page, None).await, "4")["power"], "off");
         let mut shown = Vec::new();
-        while let Ok(text) = news.try_recv() {
-            shown.push(text.to_string());
+        while let Ok(heard) = news.try_recv() {
+            shown.push(heard.text);
         }
         for line in ["world: 2 input x0 1", "world: 4 cable cut", "world: 4 cable join", "world: 4 power off"] {
             assert!(shown.iter().any(|news| news.contains(line)), "{line}: {shown:?}");
@@ -187,7 +187,7 @@ fn the_health_of_the_bus_is_in_the_state_and_its_notes_are_news() {
             stage.sleep(200).await;
             let health = stage.state()["bus"]["health"].clone();
             assert_eq!((&health["state"], &health["transmit_errors"]), (&"error-passive".into(), &136.into()));
-            assert!(news.try_recv().expect("it is shown").contains("no node acknowledges"));
+            assert!(news.try_recv().expect("it is shown").text.contains("no node acknowledges"));
         },
         |_| {},
         async |_| {},

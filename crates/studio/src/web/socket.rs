@@ -112,7 +112,8 @@ async fn write(mut sink: Sink, handle: &HostHandle, welcome: String, mut answers
             biased;
             Some(answer) = answers.recv() => send(&mut sink, answer).await,
             heard = news.recv() => match heard {
-                Ok(text) => send(&mut sink, text.to_string()).await,
+                // Only a time, a number and a text: serialising cannot fail.
+                Ok(news) => send(&mut sink, serde_json::to_string(&news).unwrap_or_default()).await,
                 Err(RecvError::Lagged(missed)) => send(&mut sink, dropped("news", missed)).await,
                 Err(RecvError::Closed) => return,
             },

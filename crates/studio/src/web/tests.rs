@@ -430,7 +430,11 @@ async fn two_hundred_pages_all_get_the_newest_state() {
     for _ in 0..200 {
         pages.push(page(&access).await.0);
     }
-    states.send_replace(StateUpdate { number: 7, json: r#"{"type":"state","number":7}"#.into() });
+    states.send_replace(StateUpdate {
+        number: 7,
+        json: r#"{"type":"state","number":7}"#.into(),
+        ..StateUpdate::default()
+    });
     for socket in &mut pages {
         // States from before the page connected are not missed ones.
         let got = next(socket).await.expect("a state");
@@ -448,7 +452,7 @@ async fn a_page_that_reads_slowly_gets_the_number_of_missed_states_and_costs_no_
     let count = 200;
     for number in 1..=count {
         let json = format!(r#"{{"type":"state","number":{number},"filling":"{filling}"}}"#);
-        states.send_replace(StateUpdate { number, json: json.into() });
+        states.send_replace(StateUpdate { number, json: json.into(), ..StateUpdate::default() });
         tokio::task::yield_now().await;
     }
     assert_eq!(handle.states().borrow().number, count, "the host did not wait for the page");

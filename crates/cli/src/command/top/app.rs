@@ -1,13 +1,15 @@
 //! What is on the screen, and what each key does to it. Without a terminal, a clock or a bus: keys, states and times go in, messages
 //! to the host come out.
 
+use std::sync::Arc;
+
 use can::Instant;
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use host::{News, NodeView, SessionId, Snapshot};
 use serde_json::{Value, json};
 
 use super::hold::{Act, Hold};
 use super::samples::Past;
-use super::seen::{News, Node, State};
 
 /// Columns and lines in which everything fits.
 pub(super) const LEAST: (u16, u16) = (80, 24);
@@ -24,9 +26,9 @@ const MOST_NEWS: usize = 50;
 /// What is shown and chosen.
 #[derive(Debug)]
 pub(super) struct App {
-    /// The host's number for this terminal.
-    number: u64,
-    pub(super) state: State,
+    /// That of this terminal.
+    session: SessionId,
+    pub(super) state: Arc<Snapshot>,
     pub(super) past: Past,
     /// Newest last.
     pub(super) news: Vec<News>,
@@ -54,10 +56,10 @@ pub(super) enum Action {
 }
 
 impl App {
-    pub(super) fn new(number: u64) -> Self {
+    pub(super) fn new(session: SessionId) -> Self {
         Self {
-            number,
-            state: State::default(),
+            session,
+            state: Arc::default(),
             past: Past::default(),
             news: Vec::new(),
             chosen: None,
@@ -72,7 +74,7 @@ impl App {
     }
 
     /// The host has shown something newer.
-    pub(super) fn take(&mut self, state: State) {
+    pub(super) fn take(&mut self, state: Arc<Snapshot>) {
         self.past.note(&state);
         self.state = state;
         let is_there = self.chosen.is_some_and(|node| self.state.node(node).is_some());
@@ -128,7 +130,7 @@ impl App {
     }
 
     /// The node that keys are about.
-    pub(super) fn node(&self) -> Option<&Node> {
+    pub(super) fn node(&self) -> Option<&NodeView> {
         self.state.node(self.chosen?)
     }
 
@@ -144,7 +146,7 @@ impl App {
 
     /// Whether this terminal may move drives.
     pub(super) fn has_control(&self) -> bool {
-        self.state.controller == Some(self.number)
+        self.state.controller == Some(self.session)
     }
 
     /// A key.
@@ -257,7 +259,7 @@ impl App {
     fn jog(&mut self, act: Option<Act>) -> Vec<Action> {
         let Some(act) = act else { return Vec::new() };
         if act == Act::Begin {
-            let asks = |node: &Node| self.has_control() && node.goes_on && !node.accepted;
+            let asks = |node: &NodeView| self.has_control() && node.goes_on && !node.accepted;
             self.question = self.node().filter(|node| asks(node)).map(|node| node.node);
             self.jogged = if self.question.is_some() { None } else { self.chosen };
         }

@@ -7,7 +7,6 @@ mod app;
 mod hold;
 mod samples;
 mod screen;
-mod seen;
 #[cfg(test)]
 mod tests;
 
@@ -142,7 +141,7 @@ async fn show(context: &Context, host: host::HostHandle, format: Format) -> Resu
     let mut screen = Screen::take().map_err(cannot)?;
     let look = Look { colour: format.paint.is_on() };
     let mut events = listen();
-    let mut app = App::new(client.number());
+    let mut app = App::new(client.id());
     let size = screen.terminal.size().map_err(cannot)?;
     app.resize(size.width, size.height, context.network.now());
     let mut answers = JoinSet::new();
@@ -178,14 +177,8 @@ async fn show(context: &Context, host: host::HostHandle, format: Format) -> Resu
             shown = client.shown() => {
                 is_new = true;
                 match shown {
-                    Shown::State(state) => match serde_json::from_str(&state) {
-                        Ok(state) => app.take(state),
-                        Err(error) => app.report(None, format!("cannot read a message of the host: {error}")),
-                    },
-                    Shown::News(news) => match serde_json::from_str(&news) {
-                        Ok(news) => app.note(news),
-                        Err(error) => app.report(None, format!("cannot read a message of the host: {error}")),
-                    },
+                    Shown::State(state) => app.take(state),
+                    Shown::News(news) => app.note(news),
                     Shown::Missed(missed) => app.report(None, format!("{missed} messages came too fast to be shown")),
                     Shown::Over => return Err(gone()),
                 }

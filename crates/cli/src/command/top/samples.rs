@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use super::seen::State;
+use host::Snapshot;
 
 /// How much of the past is kept, s.
 pub(super) const SPAN_S: f64 = 60.0;
@@ -22,7 +22,7 @@ pub(super) struct Past(BTreeMap<u8, [Samples; 3]>);
 
 impl Past {
     /// Keeps what is new in a state. Nodes that are gone are forgotten.
-    pub(super) fn note(&mut self, state: &State) {
+    pub(super) fn note(&mut self, state: &Snapshot) {
         self.0.retain(|node, _| state.node(*node).is_some());
         for (node, drive) in state.nodes.iter().filter_map(|node| Some((node.node, node.drive.as_ref()?))) {
             let kept = self.0.entry(node).or_default();
@@ -62,12 +62,12 @@ pub(super) fn bounds(values: &[(f64, f64)]) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::seen::{Drive, Node};
     use super::*;
+    use host::{DriveView, NodeView};
 
-    fn state(time_s: f64, at_s: f64, velocity_rpm: Option<f64>) -> State {
-        let drive = Drive { at_s, velocity_rpm, ..Drive::default() };
-        State { time_s, nodes: vec![Node { node: 4, drive: Some(drive), ..Node::default() }], ..State::default() }
+    fn state(time_s: f64, at_s: f64, velocity_rpm: Option<f64>) -> Snapshot {
+        let drive = Some(Box::new(DriveView { at_s, velocity_rpm, ..DriveView::default() }));
+        Snapshot { time_s, nodes: vec![NodeView { node: 4, drive, ..NodeView::default() }], ..Snapshot::default() }
     }
 
     #[test]
@@ -82,7 +82,7 @@ mod tests {
         past.note(&state(60.2, 60.2, None));
         past.note(&state(60.3, 60.3, Some(f64::NAN)));
         assert_eq!(past.of(4, 0, 60.3).len(), 2, "what is not known is not a sample");
-        past.note(&State { time_s: 61.0, ..State::default() });
+        past.note(&Snapshot { time_s: 61.0, ..Snapshot::default() });
         assert_eq!(past.of(4, 0, 61.0), []);
     }
 

@@ -1,6 +1,7 @@
 //! The picture: nodes, plots of the chosen one, what it has to say, what has happened, keys. Made for 80 columns and 24 lines; more
 //! room goes to the plots. Nothing is shown by colour alone.
 
+use host::{NodeView, Snapshot};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
@@ -10,7 +11,6 @@ use ratatui::widgets::{Axis, Block, Borders, Chart, Clear, Dataset, GraphType, P
 
 use super::app::{App, LEAST};
 use super::samples::{SIGNALS, SPAN_S, bounds};
-use super::seen::{Node, State};
 
 /// Nodes that are listed at most; further ones are scrolled to.
 const MOST_NODES: u16 = 6;
@@ -95,7 +95,7 @@ fn unseen_stop(app: &App, look: Look) -> Option<Line<'static>> {
 }
 
 fn title_line<'a>(app: &'a App, look: Look) -> Line<'a> {
-    let State { bus, scanning, .. } = &app.state;
+    let Snapshot { bus, scanning, .. } = &*app.state;
     let rate = bus.bitrate.map_or_else(String::new, |rate| format!("  {} kbit/s", rate / 1000));
     let load = bus.load_percent.map_or_else(String::new, |load| format!("  load {load:.1} %"));
     let mut line = vec![
@@ -130,7 +130,7 @@ fn draw_nodes(frame: &mut Frame<'_>, area: Rect, app: &App, look: Look) {
     frame.render_widget(Paragraph::new(lines), area);
 }
 
-fn node_line(node: &Node, is_chosen: bool, look: Look) -> Line<'static> {
+fn node_line(node: &NodeView, is_chosen: bool, look: Look) -> Line<'static> {
     let drive = node.drive.as_ref();
     let number = |value: Option<f64>, decimals: usize| {
         value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
@@ -139,7 +139,7 @@ fn node_line(node: &Node, is_chosen: bool, look: Look) -> Line<'static> {
     let state = match (drive, &node.trouble) {
         (_, Some(_)) => "no answer".to_owned(),
         (Some(drive), _) if faulted => format!("! fault {:04X}h", drive.fault_code),
-        (Some(drive), _) => node.doing.clone().or_else(|| drive.state.clone()).unwrap_or_else(|| "-".to_owned()),
+        (Some(drive), _) => node.doing.or(drive.state).unwrap_or("-").to_owned(),
         (None, _) => "-".to_owned(),
     };
     let heard = node.heartbeat_age_ms.map_or_else(
@@ -151,7 +151,7 @@ fn node_line(node: &Node, is_chosen: bool, look: Look) -> Line<'static> {
     );
     let texts = [
         format!("{} {}", if is_chosen { '>' } else { ' ' }, node.node),
-        node.model.clone().unwrap_or_else(|| "?".to_owned()),
+        node.model.unwrap_or("?").to_owned(),
         node.nmt.clone().unwrap_or_else(|| "-".to_owned()),
         heard,
         state,
@@ -202,7 +202,7 @@ fn chosen_lines<'a>(app: &'a App, look: Look) -> Paragraph<'a> {
     let mut lines = Vec::new();
     if let Some(drive) = &node.drive {
         let parts = [
-            drive.mode_name.clone(),
+            drive.mode_name.map(str::to_owned),
             drive.angle_degrees.map(|angle| format!("{angle:.1} deg")),
             drive.motor_celsius.map(|celsius| format!("motor {celsius:.0} C")),
             drive.driver_celsius.map(|celsius| format!("driver {celsius:.0} C")),
@@ -239,7 +239,7 @@ fn draw_news(frame: &mut Frame<'_>, area: Rect, app: &App) {
 const QUESTION: u16 = 12;
 
 /// That nothing stops a drive, before it is moved for the first time.
-fn draw_question(frame: &mut Frame<'_>, area: Rect, node: Option<&Node>, look: Look) {
+fn draw_question(frame: &mut Frame<'_>, area: Rect, node: Option<&NodeView>, look: Look) {
     let Some(node) = node else { return };
     let width = LEAST.0 - 4;
     let within = Rect {

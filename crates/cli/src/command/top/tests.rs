@@ -4,38 +4,75 @@ mod units;
 
 use can::Instant;
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use host::{BusView, DriveView, FaultView, News, NodeView, SessionId, Snapshot};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use serde_json::{Value, json};
 
 use super::app::{Action, App};
 use super::screen::{Look, draw};
-use super::seen::{News, State};
 
-const NUMBER: u64 = 1;
+const NUMBER: SessionId = SessionId(1);
 
 /// Two drives, as the host shows them: one that turns, one with a fault.
-fn state() -> State {
-    serde_json::from_value(json!({
-        "time_s": 12.5, "scanning": false, "controller": NUMBER, "sessions": 1,
-        "bus": { "name": "can0", "bitrate": 500_000, "frames_per_s": 842, "load_percent": 12.34 },
-        "nodes": [
-            { "node": 1, "model": "m4230e17b50", "nmt": "operational", "heartbeat_age_ms": 318, "without_us":
-              "it stops by itself 2000 ms after the last heartbeat",
-              "drive": { "at_s": 12.5, "state": "Operation enabled", "mode_name": "profile velocity", "fault_code": 0, "faults": [],
-                "angle_degrees": 268.61, "velocity_rpm": -10.04, "current_a": 0.16, "supply_v": 36.2, "driver_celsius": 31.4 } },
-            { "node": 4, "model": "zlac8030l", "nmt": "pre-operational", "heartbeat_age_ms": 35_315,
-              "drive": { "at_s": 12.5, "state": "Fault", "fault_code": 1, "faults": [{ "name": "over-voltage",
-                "remedy": "Lower the supply." }], "velocity_rpm": 0.0, "supply_v": 71.0 } },
-            { "node": 9, "trouble": "no answer within 200 ms" }
-        ],
-    }))
-    .expect("a state as the host shows it")
+fn state() -> Snapshot {
+    let turning = DriveView {
+        at_s: 12.5,
+        state: Some("Operation enabled"),
+        mode_name: Some("profile velocity"),
+        angle_degrees: Some(268.61),
+        velocity_rpm: Some(-10.04),
+        current_a: Some(0.16),
+        supply_v: Some(36.2),
+        driver_celsius: Some(31.4),
+        ..DriveView::default()
+    };
+    let faulted = DriveView {
+        at_s: 12.5,
+        state: Some("Fault"),
+        fault_code: 1,
+        faults: vec![FaultView { name: "over-voltage", remedy: "Lower the supply." }],
+        velocity_rpm: Some(0.0),
+        supply_v: Some(71.0),
+        ..DriveView::default()
+    };
+    let joint = NodeView {
+        node: 1,
+        model: Some("m4230e17b50"),
+        nmt: Some("operational".into()),
+        heartbeat_age_ms: Some(318),
+        without_us: Some("it stops by itself 2000 ms after the last heartbeat".into()),
+        drive: Some(Box::new(turning)),
+        ..NodeView::default()
+    };
+    let wheel = NodeView {
+        node: 4,
+        model: Some("zlac8030l"),
+        nmt: Some("pre-operational".into()),
+        heartbeat_age_ms: Some(35_315),
+        drive: Some(Box::new(faulted)),
+        ..NodeView::default()
+    };
+    let silent = NodeView { node: 9, trouble: Some("no answer within 200 ms".into()), ..NodeView::default() };
+    Snapshot {
+        time_s: 12.5,
+        controller: Some(NUMBER),
+        sessions: 1,
+        bus: BusView {
+            name: "can0".into(),
+            bitrate: Some(500_000),
+            frames_per_s: 842,
+            load_percent: Some(12.34),
+            ..BusView::default()
+        },
+        nodes: vec![joint, wheel, silent],
+        ..Snapshot::default()
+    }
 }
 
 fn app() -> App {
     let mut app = App::new(NUMBER);
-    app.take(state());
+    app.take(state().into());
     app
 }
 
@@ -96,8 +133,8 @@ fn the_chosen_drive_says_its_fault_and_what_to_do() {
 fn more_room_goes_to_the_plots_and_more_nodes_than_lines_are_scrolled_to() {
     let mut app = app();
     let mut many = state();
-    many.nodes = (1..=20).map(|node| super::seen::Node { node, ..Default::default() }).collect();
-    app.take(many);
+    many.nodes = (1..=20).map(|node| NodeView { node, ..NodeView::default() }).collect();
+    app.take(many.into());
     let lines = drawn(&app, 120, 40);
     assert_eq!(lines.len(), 40);
     let listed = |lines: &[String]| lines[2..8].iter().map(|line| line[2..4].trim().to_owned()).collect::<Vec<_>>();
@@ -117,7 +154,7 @@ fn a_plot_shows_the_last_minute() {
         state.time_s = f64::from(step);
         let drive = state.nodes[0].drive.as_mut().expect("a drive");
         (drive.at_s, drive.velocity_rpm) = (f64::from(step), Some(f64::from(step) / 60.0 * 100.0));
-        app.take(state);
+        app.take(state.into());
     }
     let lines = drawn(&app, 80, 24);
     let plot: Vec<Vec<char>> = lines[6..13].iter().map(|line| line.chars().take(26).collect()).collect();
@@ -217,7 +254,7 @@ fn what_nothing_stops_is_asked_about_in_full_before_it_moves() {
     state.nodes[0].goes_on = true;
     state.nodes[0].without_us =
         Some("nothing stops it: this model has no watch over its host and goes on as it was commanded".into());
-    app.take(state.clone());
+    app.take(state.clone().into());
     assert_eq!(held(&mut app, 0), [], "nothing is begun");
     // The key is still held, and so is the question.
     assert_eq!([566, 600, 633].map(|ms| app.key(key(KeyCode::Right), at(ms))).concat(), []);
@@ -241,7 +278,7 @@ fn what_nothing_stops_is_asked_about_in_full_before_it_moves() {
     assert_eq!(app.key(key(KeyCode::Char('y')), at(6600)), [say(json!({ "do": "accept_unguarded", "node": 1 }))]);
     assert_eq!(app.key(key(KeyCode::Right), at(6640)), [], "what was held all the while begins nothing");
     state.nodes[0].accepted = true;
-    app.take(state);
+    app.take(state.into());
     assert_eq!(held(&mut app, 9000), [say(json!({ "do": "jog", "node": 1, "rpm": 10.0 }))], "asked once");
     app.look(at(9900));
     // The host knows it better than the last state.
@@ -260,7 +297,7 @@ fn in_a_terminal_that_is_too_small_keys_stop_and_quit_and_move_nothing() {
         let mut app = app();
         let mut state = state();
         state.nodes[0].goes_on = goes_on;
-        app.take(state);
+        app.take(state.into());
         for (columns, lines) in [(79, 24), (80, 23), (20, 5)] {
             assert_eq!(app.resize(columns, lines, at(0)), []);
             for code in ['e', 'd', 's', 'r', 'x', 'n', 't', 'y', '+', 'j', '?'] {
@@ -291,7 +328,7 @@ fn a_drive_whose_stop_was_not_seen_is_named_on_a_screen_of_any_size() {
     let mut app = app();
     let mut state = state();
     state.nodes[2].stop_unseen = true;
-    app.take(state);
+    app.take(state.into());
     for (columns, lines) in [(80, 24), (200, 60), (40, 6)] {
         let text = drawn(&app, columns, lines).join(" ");
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -1,13 +1,14 @@
 //! `units` of a machine file in the studio and in `top`: the same intent is the same counts as by a command.
 
 use std::pin::pin;
+use std::sync::Arc;
 use std::time::Duration;
 
 use canopen::NodeId;
 use cia402::object::{PROFILE_VELOCITY, TARGET_POSITION, TARGET_VELOCITY};
 use clap::Parser;
 use crossterm::event::KeyCode;
-use host::{Host, LocalClient, Shown};
+use host::{DriveView, Host, LocalClient, Shown, Snapshot};
 use processes::scratch;
 use serde_json::{Value, json};
 
@@ -31,15 +32,19 @@ struct Line {
 }
 
 /// What the host shows, once that is as wanted.
-async fn shown(client: &mut LocalClient, wanted: impl Fn(&Value) -> bool) -> Value {
+async fn shown(client: &mut LocalClient, wanted: impl Fn(&DriveView) -> bool) -> Arc<Snapshot> {
     loop {
-        if let Shown::State(state) = client.shown().await {
-            let state: Value = serde_json::from_str(&state).expect("JSON");
-            if wanted(&state["nodes"][0]) {
-                return state;
-            }
+        if let Shown::State(state) = client.shown().await
+            && drive(&state).is_some_and(&wanted)
+        {
+            return state;
         }
     }
+}
+
+/// The values of the one drive.
+fn drive(state: &Snapshot) -> Option<&DriveView> {
+    state.nodes.first()?.drive.as_deref()
 }
 
 async fn must(client: &mut LocalClient, message: Value) {
@@ -56,20 +61,20 @@ async fn by_both_doors(context: &Context, app: &host::HostHandle) {
     let node = context.network.node(NodeId::new(1).expect("a node-ID"));
     let read = async |mux| node.read::<i32>(mux).await.expect("it answers");
     let mut client = LocalClient::take(app).await.expect("there is room");
-    shown(&mut client, |node| !node["drive"].is_null()).await;
+    shown(&mut client, |_| true).await;
     must(&mut client, json!({ "do": "take_control" })).await;
     must(&mut client, json!({ "do": "accept_unguarded", "node": 1 })).await;
     must(&mut client, json!({ "do": "move", "node": 1, "degrees": 3.6, "rpm": 6 })).await;
     near("an angle", read(TARGET_POSITION).await, 3.6 / 360.0 * COUNTS_PER_TURN);
     near("its speed", read(PROFILE_VELOCITY).await, 6.0 / 60.0 * COUNTS_PER_TURN);
-    let is_there = |node: &Value| node["drive"]["angle_degrees"].as_f64().is_some_and(|at| (at - 3.6).abs() < 0.01);
+    let is_there = |drive: &DriveView| drive.angle_degrees.is_some_and(|at| (at - 3.6).abs() < 0.01);
     let state = shown(&mut client, is_there).await;
     must(&mut client, json!({ "do": "velocity", "node": 1, "rpm": -6 })).await;
     near("a speed", read(TARGET_VELOCITY).await, -6.0 / 60.0 * COUNTS_PER_TURN);
     must(&mut client, json!({ "do": "stop", "node": 1 })).await;
 
-    let mut top = App::new(client.number());
-    top.take(serde_json::from_value(state).expect("a state as the host shows it"));
+    let mut top = App::new(client.id());
+    top.take(state);
     assert_eq!(
         top.node().and_then(|node| node.drive.as_ref()?.angle_degrees).map(|at| (at * 100.0).round()),
         Some(360.0)
@@ -86,8 +91,8 @@ async fn by_both_doors(context: &Context, app: &host::HostHandle) {
     }
     assert!(jogged);
     near("a jog", read(TARGET_VELOCITY).await, top.jog_rpm() / 60.0 * COUNTS_PER_TURN);
-    let state = shown(&mut client, |node| !node["drive"].is_null()).await;
-    let speed = state["nodes"][0]["drive"]["velocity_rpm"].as_f64().expect("a speed");
+    let state = shown(&mut client, |_| true).await;
+    let speed = drive(&state).and_then(|drive| drive.velocity_rpm).expect("a speed");
     assert!((speed - top.jog_rpm()).abs() < 0.5, "{speed} r/min of the output");
 }
 
