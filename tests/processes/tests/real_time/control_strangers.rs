@@ -168,3 +168,40 @@ fn an_empty_token_is_none() {
     assert_eq!(refused.status, Some(2), "{}", refused.err);
     assert!(refused.err.contains("is empty"), "{}", refused.err);
 }
+
+/// A line means the same wherever it is written: typed, sent by a program, or as the line of a request.
+#[test]
+fn a_line_that_is_not_obeyed_has_one_error_on_standard_input_and_on_the_control_connection() {
+    let mut simulator = Simulator::start(&DRIVE);
+    let mut line = Line::connect(&simulator);
+    let long = "4 ".to_owned() + &"x".repeat(5_000);
+    for (words, kind) in [
+        ("fly", "usage"),
+        ("4", "usage"),
+        ("4 fly", "usage"),
+        ("130 get", "usage"),
+        ("9 get", "no_such_node"),
+        ("9 load torque 1", "no_such_node"),
+        ("4.2 get", "refused"),
+        ("4 load torque 1e9", "refused"),
+        ("4 load torque x", "usage"),
+        ("4 input X9 1", "refused"),
+        ("4 battery off", "refused"),
+        ("4 set 6041 5", "refused"),
+        ("body arm get", "no_such_body"),
+        ("bus corrupt 9", "usage"),
+        ("run 20ms", "clock"),
+        ("run x", "usage"),
+        (&long, "too_long"),
+    ] {
+        simulator.send(words);
+        let typed: Value = serde_json::from_str(&simulator.line()).unwrap();
+        let requested = json!({ "request": "world", "line": words }).to_string();
+        for sent in [words, &requested] {
+            let error = line.ask(sent)["error"].clone();
+            assert_eq!(error, typed["error"], "{sent}");
+            assert_eq!(error["kind"], kind, "{sent}");
+            assert!(error["next"].is_string(), "{error}");
+        }
+    }
+}
