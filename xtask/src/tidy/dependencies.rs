@@ -62,6 +62,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "transport",
             "plot",
             "showcase",
+            "host",
             "studio",
             "testbench",
         ],

@@ -4,6 +4,7 @@
 //! It is nested, so that the compiler knows what concerns one node, several drives, parameters, PDOs or the session. A command to a
 //! drive is the master's own ([`master::drive::Command`]).
 
+mod fields;
 mod group;
 mod node;
 mod parameters;
@@ -17,9 +18,11 @@ pub use pdo::{NewEntry, NewPdo, NmtChange, PdoCommand};
 pub use session::{SessionCommand, Topic, WorldCommand};
 
 use canopen::NodeId;
-use serde::de::{DeserializeOwned, Error};
+use serde::de::Error;
 use serde::{Deserialize, Deserializer};
-use serde_json::{Map, Value};
+use serde_json::Value;
+
+use fields::{Fields, whole};
 
 /// A command of a session.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,6 +52,13 @@ impl Command {
     }
 }
 
+impl NodeCommand {
+    /// The same to this node.
+    pub const fn to(self, node: NodeId) -> Command {
+        Command::Node(node, self)
+    }
+}
+
 impl From<SessionCommand> for Command {
     fn from(command: SessionCommand) -> Self {
         Self::Session(command)
@@ -66,9 +76,6 @@ impl From<GroupCommand> for Command {
         Self::Group(command)
     }
 }
-
-/// The fields of a message.
-type Fields = Map<String, Value>;
 
 impl<'de> Deserialize<'de> for Command {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -95,16 +102,14 @@ fn read(mut fields: Fields) -> Result<Command, String> {
     if !NodeCommand::words().any(|known| known == word) {
         return Err(format!("unknown command `{word}`"));
     }
-    let node = node::node_id(fields.remove("node"))?;
+    let node = fields::node_id(&mut fields)?;
     node::read(&word, fields).map(|command| Command::Node(node, command))
-}
-
-fn whole<T: DeserializeOwned>(fields: Fields) -> Result<T, String> {
-    serde_json::from_value(Value::Object(fields)).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]
 mod tests {
+    use serde::de::DeserializeOwned;
+
     use super::*;
 
     /// The variants that serde names when it meets one that it does not know.

@@ -1,12 +1,11 @@
 //! Commands to one node, as JSON.
 
+use super::fields::{Fields, taken, whole};
+use super::parameters::{ParameterChange, ParameterReading};
+use super::pdo::PdoCommand;
 use canopen::NodeId;
 use master::drive::{self, Manner};
 use master::units::{Amperes, Angle, Ramp, Rpm};
-use serde::de::DeserializeOwned;
-use serde_json::{Value, from_value};
-
-use super::{Fields, ParameterChange, ParameterReading, PdoCommand, whole};
 
 /// What one node is to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,22 +76,12 @@ impl NodeCommand {
             Self::Pdos(command) => command.needs_control(),
         }
     }
-
-    /// The same to this node.
-    pub const fn to(self, node: NodeId) -> super::Command {
-        super::Command::Node(node, self)
-    }
 }
 
 impl From<drive::Command> for NodeCommand {
     fn from(command: drive::Command) -> Self {
         Self::Drive(command)
     }
-}
-
-pub(super) fn node_id(value: Option<Value>) -> Result<NodeId, String> {
-    let raw: u8 = field("node", value)?;
-    NodeId::new(raw).ok_or_else(|| format!("expected a node-ID from 1 to 127, got {raw}"))
 }
 
 /// A command of one of the [words](NodeCommand::words).
@@ -153,18 +142,6 @@ fn to_drive(word: &str, fields: &mut Fields) -> Result<drive::Command, String> {
         .into(),
         _ => return Err(format!("unknown command `{word}`")),
     })
-}
-
-/// A field, taken out; one that is omitted is `null`.
-fn taken<T: DeserializeOwned>(fields: &mut Fields, name: &str) -> Result<T, String> {
-    field(name, fields.remove(name))
-}
-
-fn field<T: DeserializeOwned>(name: &str, value: Option<Value>) -> Result<T, String> {
-    match value {
-        Some(value) => from_value(value).map_err(|error| format!("field `{name}`: {error}")),
-        None => from_value(Value::Null).map_err(|_| format!("missing field `{name}`")),
-    }
 }
 
 #[cfg(test)]

@@ -1,3 +1,5 @@
+//! What is read of a drive, checked and set up before it is moved cycle by cycle.
+
 use core::time::Duration;
 
 use canopen::pdo::{Direction, EventTrigger, MappingRecord, PdoId, PdoNumber};
