@@ -149,7 +149,7 @@ pub enum ParseFrameError {
 impl fmt::Display for ParseFrameError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::MissingSeparator => "no '#' between identifier and data; expected e.g. 604#4041600000000000",
+            Self::MissingSeparator => "no '#' between identifier and data",
             Self::BadIdentifier => "identifier must be 3 hexadecimal digits up to 7FF, or 8 up to 1FFFFFFF",
             Self::BadData => "data must be 0 to 8 pairs of hexadecimal digits",
             Self::BadRemoteLength => "a remote frame's length after R must be 0 to 8",

@@ -43,10 +43,10 @@ struct Dbc {
     /// Nodes (default: every node that answers)
     #[arg(value_name = "NODE", value_parser = node)]
     nodes: Vec<NodeId>,
-    /// Write the file here, and say what it has; without it, and as -, the file goes to standard output
+    /// Write to this file and report what it has (default, and -: write to standard output)
     #[arg(long, short, value_name = "FILE.dbc", value_parser = dbc_path)]
     output: Option<PathBuf>,
-    /// Write over a file that is there
+    /// Overwrite an existing file
     #[arg(long, requires = "output")]
     force: bool,
 }

@@ -106,7 +106,7 @@ struct Apply {
     how: Transaction,
 }
 
-/// Check that a node has a file's parameters; status 1 if not
+/// Check that a node has the values of a file (exit status 1 if not)
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 params verify 4 wheel.toml\n  \
     ferrodrive --bus can0 --machine machine.toml params verify 4")]

@@ -33,7 +33,8 @@ pub(crate) struct Plot {
     /// End (default: that of the record)
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     to: Option<f64>,
-    /// Write the picture to this file, NAME.svg or NAME.html, or as - to standard output; without it, it goes beside the record, as NAME.svg
+    /// Write the picture to this file, NAME.svg or NAME.html, or with - to standard output (default: NAME.svg beside
+    /// the record)
     #[arg(long, short, alias = "svg", alias = "html", value_name = "FILE", value_parser = picture_path)]
     output: Vec<PathBuf>,
 }

@@ -49,7 +49,8 @@ pub(crate) struct Record {
     /// Objects: index, index:sub-index or name
     #[arg(value_name = "OBJECT", required = true, value_parser = object)]
     objects: Vec<ObjectArg>,
-    /// The file: NAME.mcap or NAME.csv; a new one, or an empty one, or an earlier record, which is replaced; - is CSV on standard output
+    /// Write to this file, NAME.mcap or NAME.csv: new, empty, or an earlier record, which is replaced; - writes CSV to
+    /// standard output
     #[arg(long = "output", short = 'o', alias = "out", value_name = "FILE", value_parser = record_file)]
     out: (PathBuf, Kind),
     /// Time between two samples

@@ -27,7 +27,8 @@ pub(crate) struct Send {
 }
 
 fn frame(text: &str) -> Result<Frame, String> {
-    text.parse().map_err(|error| format!("{error}; e.g. 604#4041600000000000, 123#R, 1ABCDE00#11.22"))
+    let expected = "expected a frame such as 604#4041600000000000, 123#R or 1ABCDE00#11.22";
+    text.parse().map_err(|error| format!("{error}; {expected}"))
 }
 
 /// What was sent.

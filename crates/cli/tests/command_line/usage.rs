@@ -220,6 +220,8 @@ fn objects_and_values_are_checked() {
     refused(&["write", "4", "6060", "profile_velocty"], &["did you mean profile velocity?"]);
     refused(&["write", "4", "60FF", "5A"], &["r/min"]);
     refused(&["write", "4", "5FFF", "1"], &["u16:15"]);
+    let frame = "no '#' between identifier and data; expected a frame such as 604#4041600000000000,";
+    refused(&["send", "123"], &[frame]);
 }
 
 #[test]

@@ -32,10 +32,10 @@ pub(super) struct SheetArgs {
     /// Adapt the EDS to a program that needs more than the device has
     #[arg(long)]
     variant: Option<Variant>,
-    /// Write the file here, and its name on standard output; without it, and as -, the file goes there
+    /// Write to this file and print its name (default, and -: write to standard output)
     #[arg(long, short, value_name = "FILE.eds", value_parser = eds_path)]
     output: Option<PathBuf>,
-    /// Write over a file that is there
+    /// Overwrite an existing file
     #[arg(long, requires = "output")]
     force: bool,
 }

@@ -22,7 +22,7 @@ use crate::output::Report;
 use crate::plain::plain;
 use crate::session;
 
-/// Write a machine file to begin with, of the drives on a bus or of those that are named
+/// Write a first machine file, from the drives on a bus or those that --drive names
 ///
 /// With --bus it asks all node-IDs who they are, by reads alone, as `scan` does; without one, --drive names the drives. The file has of
 /// each drive its model, node-ID and heartbeat, and as comments what a user adds next: units, load, limits, groups, a base.
@@ -35,13 +35,13 @@ use crate::session;
     ferrodrive --bus can0 init --model 4=zlac8030l -o machine.toml\n  \
     ferrodrive init --drive zlac8030l@4 --drive m4230e17b50@1 -o machine.toml")]
 pub(crate) struct Init {
-    /// A drive and its node-ID, as for `sim`, e.g. zlac8030l@4; may be repeated. In place of a bus
+    /// A drive and its node-ID, as for `sim`, e.g. zlac8030l@4, instead of asking a bus; may be repeated
     #[arg(long = "drive", value_name = "MODEL@NODE[,KEY=VALUE..]", value_parser = named_drive)]
     drives: Vec<NamedDrive>,
-    /// Write the file here; without it, and as -, it goes to standard output
+    /// Write to this file (default, and -: write to standard output)
     #[arg(long, short, value_name = "FILE.toml", value_parser = machine_path)]
     output: Option<PathBuf>,
-    /// Write over a file that is there
+    /// Overwrite an existing file
     #[arg(long, requires = "output")]
     force: bool,
 }

@@ -17,9 +17,8 @@ pub(super) fn wanted(
         return Ok((read(path, model, Some(wanted.node))?, path.display().to_string()));
     }
     let Some(machine) = &context.machine else {
-        return Err(
-            Failure::usage("expected a file of parameters").next("name it, or a machine file with --machine FILE.toml")
-        );
+        return Err(Failure::usage("expected a file of parameters")
+            .next("give its path, or a machine file with --machine FILE.toml"));
     };
     Ok(of_machine(machine, wanted.node)?)
 }
