@@ -201,8 +201,11 @@ mod tests {
     fn every_row_of_every_page_is_found() {
         for (manual, text) in PAGES {
             let numbered = |line: &&str| {
-                let id = line.strip_prefix("| ").and_then(|line| line.get(..4)).unwrap_or_default();
-                id.starts_with(|first: char| first.is_ascii_uppercase()) && id[1..].parse::<u16>().is_ok()
+                // A letter and three digits: a model's name may begin so too.
+                let id = line.strip_prefix("| ").unwrap_or_default().split([' ', ',']).next().unwrap_or_default();
+                id.len() == 4
+                    && id.starts_with(|first: char| first.is_ascii_uppercase())
+                    && id[1..].parse::<u16>().is_ok()
             };
             let rows = text.lines().filter(numbered).count();
             let found = parse(text).iter().filter(|reading| !reading.id.is_empty()).count();

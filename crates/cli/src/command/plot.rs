@@ -20,7 +20,7 @@ use plot::Paint;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive plot run.mcap -o run.svg\n  \
-    ferrodrive plot run.csv --signals velocity,4.current_a --from 1.5s --to 3s -o run.html")]
+    ferrodrive plot run.csv --signals velocity --from 1.5s --to 3s -o run.html")]
 pub(crate) struct Plot {
     /// Record, NAME.mcap or NAME.csv
     file: PathBuf,
