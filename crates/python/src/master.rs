@@ -5,6 +5,7 @@
 pub(crate) mod axes;
 mod from_file;
 mod job;
+mod order;
 pub(crate) mod params;
 mod runner;
 pub(crate) mod supervise;
@@ -20,9 +21,8 @@ use std::time::Duration;
 
 use can::Tap;
 use canopen::{Mux, NmtCommand, NodeId};
-use master::drive::{Drive, HomingOptions, MotionOptions, SwitchedOff};
+use master::drive::Drive;
 use master::identify::Knowledge;
-use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Error, Gear, Network as Core, Node};
 use pyo3::prelude::*;
 use testbench::machine_file::Machine;
@@ -32,6 +32,7 @@ use transport::BusSpec;
 
 pub(crate) use job::Job;
 use job::Trouble;
+use order::Order;
 use runner::Runner;
 use tap::Traffic;
 use value::Value;
@@ -52,58 +53,6 @@ pub(crate) struct Network {
     machine: Option<Arc<Machine>>,
     /// What nodes have shown of their models, of those that were asked for it.
     identified: Arc<Mutex<BTreeMap<NodeId, Knowledge>>>,
-}
-
-/// What a drive is asked to do, in plain values.
-#[derive(FromPyObject)]
-struct Order {
-    #[pyo3(item)]
-    do_: String,
-    #[pyo3(item, default)]
-    value: Option<f64>,
-    #[pyo3(item, default)]
-    counts: Option<i64>,
-    #[pyo3(item, default)]
-    relative: bool,
-    #[pyo3(item, default)]
-    speed_rpm: Option<f64>,
-    #[pyo3(item, default)]
-    acceleration_rpm_s: Option<f64>,
-    #[pyo3(item, default)]
-    deceleration_rpm_s: Option<f64>,
-    #[pyo3(item, default)]
-    wait: bool,
-    #[pyo3(item, default)]
-    limit_s: Option<f64>,
-    #[pyo3(item, default)]
-    gear_ratio: Option<f64>,
-    /// Its model is what the node has shown, and no more than a guess.
-    #[pyo3(item, default)]
-    guessed: bool,
-}
-
-impl Order {
-    fn motion(&self) -> MotionOptions {
-        MotionOptions {
-            speed: self.speed_rpm.map(Rpm),
-            acceleration: self.acceleration_rpm_s.map(Ramp::RpmPerSecond),
-            deceleration: self.deceleration_rpm_s.map(Ramp::RpmPerSecond),
-            wait: self.wait,
-            ..MotionOptions::default()
-        }
-    }
-
-    fn value(&self) -> PyResult<f64> {
-        let value = self.value.filter(|value| value.is_finite());
-        value.ok_or_else(|| bad_value(format!("{} needs a number", self.do_)))
-    }
-
-    fn angle(&self) -> PyResult<Angle> {
-        match self.counts {
-            Some(counts) => Ok(Angle::Counts(counts)),
-            None => self.value().map(|degrees| Angle::Turns(degrees / 360.0)),
-        }
-    }
 }
 
 #[pymethods]
@@ -245,47 +194,12 @@ impl Network {
         };
         let drive = drive.behind(self.gear(node, order.gear_ratio)?);
         match order.do_.as_str() {
-            "enable" => self.begin(py, async move { drive.enable().await.map(|()| Value::None) }),
-            "disable" => self.begin(py, async move { drive.disable().await.map(|()| Value::None) }),
-            "stop" => self.begin(py, async move { drive.stop().await.map(|()| Value::None) }),
-            "quick_stop" => self.begin(py, async move { drive.quick_stop().await.map(|()| Value::None) }),
-            "reset_fault" => self.begin(py, async move { drive.reset_fault().await.map(|()| Value::None) }),
-            "save" => self.begin(py, async move { drive.save().await.map(|()| Value::None) }),
-            "restore" => self.begin(py, async move { drive.restore().await.map(|()| Value::None) }),
             "check_identity" => self.begin(py, async move { drive.check_identity().await.map(|()| Value::None) }),
-            "release_guard" => self.begin(py, async move { drive.release_guard().await.map(|()| Value::None) }),
-            "guard" => self.begin(py, async move {
-                let loss = drive.guard(SwitchedOff::Leave).await?;
-                Ok(Value::Text(loss.to_string()))
-            }),
             "state" => self.begin(py, async move { drive.state().await.map(|state| value::state(&state)) }),
-            "velocity" => {
-                let (speed, options) = (Rpm(order.value()?), order.motion());
-                self.begin(py, async move { drive.velocity(speed, options).await.map(|report| value::motion(&report)) })
+            _ => {
+                let command = order.command()?;
+                self.begin(py, async move { drive.perform(&command).await.map(|report| value::report(&report)) })
             }
-            "torque" => {
-                let current = Amperes(order.value()?);
-                self.begin(py, async move { drive.torque(current).await.map(|report| value::motion(&report)) })
-            }
-            "move" => {
-                let (to, options, relative) = (order.angle()?, order.motion(), order.relative);
-                self.begin(py, async move {
-                    let moved = if relative {
-                        drive.move_relative(to, options).await
-                    } else {
-                        drive.move_absolute(to, options).await
-                    };
-                    moved.map(|report| value::motion(&report))
-                })
-            }
-            "home" => {
-                let method = order.counts.and_then(|method| i8::try_from(method).ok());
-                let method = method.ok_or_else(|| bad_value("a homing method is a number from -128 to 127"))?;
-                let limit = order.limit_s.map_or(Ok(HomingOptions::default().limit), duration)?;
-                let options = HomingOptions { speed: order.speed_rpm.map(Rpm), limit, wait: order.wait };
-                self.begin(py, async move { drive.home(method, options).await.map(|report| value::motion(&report)) })
-            }
-            other => Err(bad_value(format!("a drive cannot {other:?}"))),
         }
     }
 }

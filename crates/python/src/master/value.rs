@@ -1,6 +1,6 @@
 //! What a job gives, as values that are made without the interpreter and become Python's when they are asked for.
 
-use master::drive::{DriveState, MotionReport};
+use master::drive::{DriveState, MotionReport, Report};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use testbench::words::calls::in_python;
@@ -106,8 +106,17 @@ pub(super) fn state(state: &DriveState) -> Value {
     ])
 }
 
+/// What came of a command to a drive.
+pub(super) fn report(report: &Report) -> Value {
+    match report {
+        Report::Done => Value::None,
+        Report::Guarded(loss) => Value::Text(loss.to_string()),
+        Report::Moved(report) => motion(report),
+    }
+}
+
 /// How a motion went.
-pub(super) fn motion(report: &MotionReport) -> Value {
+fn motion(report: &MotionReport) -> Value {
     Value::Record(vec![
         ("reached_after_s", real(report.reached_after.map(|after| after.as_secs_f64()))),
         ("notes", Value::List(report.notes.iter().map(|note| Value::Text(note.to_string())).collect())),
