@@ -8,10 +8,10 @@ use canopen::od::Entry;
 use clap::{Arg, ArgMatches, Command, CommandFactory};
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate};
 use sim::machine::models as all_models;
-use testbench::machine_file;
-use testbench::models::{self, Description};
-use testbench::words::drive::node_model;
-use testbench::words::mode::ABBREVIATIONS;
+
+use words::drive::node_model;
+use words::mode::ABBREVIATIONS;
+use words::models::{self, Description};
 
 use crate::args::Cli;
 use crate::remembered::Remembered;
@@ -93,8 +93,8 @@ impl Line {
         let machine =
             self.values("--machine").last().map(str::to_owned).or_else(|| std::env::var("FERRODRIVE_MACHINE").ok());
         let machine = bus.strip_prefix("sim:").map(str::to_owned).or(machine.filter(|_| bus != "sim"));
-        let of_machine = machine.and_then(|path| machine_file::machine(&path).ok());
-        let of_machine = of_machine.iter().flat_map(machine_file::Machine::models);
+        let of_machine = machine.and_then(|path| machine::file::machine(&path).ok());
+        let of_machine = of_machine.iter().flat_map(machine::file::Machine::models);
         let own = models::embedded().into_iter().filter(|_| bus == "sim");
         let stated = stated.chain(of_machine).chain(own).map(|(node, model)| (node.raw(), Some(model)));
         let remembered = Remembered::for_completion();

@@ -19,8 +19,8 @@ use crate::global::Global;
 use crate::progress::Progress;
 use crate::remembered::Remembered;
 use host::{Wire, WorldDoor};
-use testbench::machine_file::{self, Machine};
-use testbench::models::{self, Description};
+use machine::file::{self, Machine};
+use words::models::{self, Description};
 
 /// Time for a frame without an answer (NMT) to get onto the bus before a command ends.
 const SETTLING_TIME: Duration = Duration::from_millis(50);
@@ -85,7 +85,7 @@ impl Context {
         network.set_models(models::with_files(models.values().map(|stated| stated.description())));
         // The file of an embedded bus has been read once, to make the bus.
         let of_bus = match &global.bus {
-            BusSpec::Sim { file: Some(path) } => machine_file::read(path).ok(),
+            BusSpec::Sim { file: Some(path) } => file::read(path).ok(),
             _ => None,
         };
         Self {

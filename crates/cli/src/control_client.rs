@@ -7,8 +7,8 @@ use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
 use canopen::NodeId;
+use host::control::{ControlAddress, ERROR_KINDS};
 use serde_json::{Value, json};
-use testbench::control::{ControlAddress, ERROR_KINDS};
 
 use crate::failure::Failure;
 use crate::status::Status;

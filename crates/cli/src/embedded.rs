@@ -9,8 +9,8 @@ use sim::machine::Order;
 use sim::{VirtualDrive, World};
 
 use crate::failure::Failure;
-use testbench::machine_file::SEED;
-use testbench::models::{Description, embedded};
+use machine::file::SEED;
+use words::models::{Description, embedded};
 
 /// Every drive boots well within a second.
 const BOOT_PATIENCE: Duration = Duration::from_secs(5);

@@ -9,10 +9,10 @@ use serde::Serialize;
 use crate::plain::short;
 use crate::signals::Signal;
 use crate::status::Status;
-pub(crate) use testbench::failure::FailureBody;
-use testbench::failure::Subject;
-use testbench::models::how_to_say;
-use testbench::words::unresolved::Unresolved;
+pub(crate) use words::failure::FailureBody;
+use words::failure::Subject;
+use words::models::how_to_say;
+use words::unresolved::Unresolved;
 
 /// A reason for people, in up to three parts, and what programs look for in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -183,9 +183,9 @@ impl From<&Failure> for FailureBody {
     }
 }
 
-impl From<testbench::failure::Failure> for Failure {
-    fn from(failure: testbench::failure::Failure) -> Self {
-        let testbench::failure::Failure { kind, what, because, next, subject, is_usage } = failure;
+impl From<words::failure::Failure> for Failure {
+    fn from(failure: words::failure::Failure) -> Self {
+        let words::failure::Failure { kind, what, because, next, subject, is_usage } = failure;
         let status = if is_usage { Status::Usage } else { Status::Failed };
         Self { status, kind, what, because, next, subject, reported: false, partial: false }
     }
@@ -206,7 +206,7 @@ impl From<master::Error> for Failure {
             Error::UnknownModel { node, .. } => Some(format!("name its model: {}", how_to_say(*node, &["MODEL"]))),
             _ => None,
         };
-        advice.into_iter().fold(testbench::failure::Failure::from(error).into(), Self::next)
+        advice.into_iter().fold(words::failure::Failure::from(error).into(), Self::next)
     }
 }
 

@@ -3,8 +3,8 @@
 //! A thread of its own asks and waits. When the simulator has gone, it ends, and requests are answered that there is no world.
 
 use host::WorldDoor;
+use host::around::{Around, Changed, understand};
 use serde_json::{Value, json};
-use testbench::around::{Around, Changed, understand};
 
 use crate::control_client::{ControlArgs, ControlClient};
 use crate::failure::Failure;
@@ -59,10 +59,10 @@ mod tests {
     use std::net::{TcpListener, TcpStream};
 
     use can::Bitrate;
+    use host::control::{Class, Control, LineBuffer, Sink};
     use sim::World;
     use sim::command::Service;
     use sim::machine::zlac8030l;
-    use testbench::control::{Class, Control, LineBuffer, Sink};
 
     use super::*;
 

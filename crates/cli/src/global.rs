@@ -8,9 +8,9 @@ use transport::BusSpec;
 
 use crate::failure::Failure;
 use crate::recording::{LogPath, log_path};
-use testbench::machine_file::Machine;
-use testbench::models::Description;
-use testbench::words::drive::node_model;
+use machine::file::Machine;
+use words::drive::node_model;
+use words::models::Description;
 
 /// A time that is not zero, within which something is to happen.
 pub(crate) fn some_time(text: &str) -> Result<Duration, String> {

@@ -31,7 +31,7 @@
 //! | you want to | begin at |
 //! |---|---|
 //! | test software against virtual drives | [`sim::World`], [`sim::block_on`] |
-//! | describe a machine in a file | [`testbench::machine_file`] |
+//! | describe a machine in a file | [`machine::file`] |
 //! | move drives, virtual or real | [`master::Drive`], [`master::Network`] |
 //! | let several people or programs move drives, each held by what it shows of life | [`host::Host`], [`studio::app`] |
 //! | reach a bus: socketcand, slcan, a log | [`transport::BusSpec`], [`transport::run_station`] |
@@ -50,6 +50,6 @@
 
 #[doc(inline)]
 pub use {
-    can, canopen, cia402, devices, drives, eds, host, master, motion, plant, plot, showcase, sim, studio, testbench,
-    transport,
+    can, canopen, cia402, devices, drives, eds, host, machine, master, motion, plant, plot, recording, scenario,
+    showcase, sim, studio, transport, words,
 };

@@ -1,6 +1,6 @@
 //! Text of others as it may be shown: what would steer a terminal is made visible.
 
-pub(crate) use testbench::words::plain;
+pub(crate) use words::plain;
 
 /// Characters of one argument that are repeated in a message.
 const MOST_REPEATED: usize = 120;

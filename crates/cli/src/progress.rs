@@ -100,7 +100,7 @@ impl Progress {
     }
 }
 
-impl testbench::network::Progress for Progress {
+impl host::network::Progress for Progress {
     fn show(&self, text: String) {
         Self::show(self, text);
     }

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use testbench::models::Description;
+use words::models::Description;
 
 /// The pages by the manuals that they are about.
 const PAGES: [(&str, &str); 3] = [

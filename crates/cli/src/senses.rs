@@ -3,8 +3,8 @@
 
 use clap::Command;
 use master::units::parse_duration;
-use testbench::words::node::{node, nodes};
 use transport::BusSpec;
+use words::node::{node, nodes};
 
 use crate::word_order::{parses, text};
 

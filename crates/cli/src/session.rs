@@ -29,7 +29,7 @@ use crate::recording::{CommandLog, LogPath, Pace, interface_of};
 use crate::signals::asked_to_end;
 use crate::wire;
 use crate::world_bus::WorldBus;
-use testbench::machine_file::Machine;
+use machine::file::Machine;
 
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.
 const VIRTUAL_LIMIT: Duration = Duration::from_secs(24 * 3600);
@@ -72,13 +72,13 @@ pub(crate) fn virtual_world(file: Option<&Path>) -> Result<Embedded, Failure> {
     let machine = read_machine(path)?;
     let world = machine
         .build()
-        .map_err(|bad| testbench::network::unusable(path, bad.named(path.display().to_string()).to_string()))?;
+        .map_err(|bad| host::network::unusable(path, bad.named(path.display().to_string()).to_string()))?;
     Ok((world, machine.models().collect()))
 }
 
 /// The machine file that a command names.
 pub(crate) fn read_machine(path: &Path) -> Result<Machine, Failure> {
-    Ok(testbench::network::read_machine(path)?)
+    Ok(host::network::read_machine(path)?)
 }
 
 fn virtual_bus<R>(

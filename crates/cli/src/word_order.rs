@@ -6,7 +6,7 @@
 use clap::error::ErrorKind;
 use clap::{ArgMatches, Command};
 
-use testbench::words::node::nodes;
+use words::node::nodes;
 
 /// Commands that change nothing on the bus.
 const HARMLESS: [&str; 8] = ["read", "state", "objects", "watch", "pdo", "emcy", "readings", "scan"];

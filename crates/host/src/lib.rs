@@ -15,10 +15,14 @@
 //! ([`trace`]), and a [`timeline`] of the drives.
 
 mod answer;
+pub mod around;
 pub mod command;
 mod commands;
+pub mod control;
+pub mod events;
 mod help;
 mod motion;
+pub mod network;
 mod nodes;
 mod parameters;
 mod pdo;

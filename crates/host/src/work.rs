@@ -14,12 +14,12 @@ use master::plan::NodeTraffic;
 use tokio::sync::oneshot;
 
 use crate::answer::Answer;
+use crate::around::Changed;
 use crate::motion::group_run::GroupOutcome;
 use crate::parameters::transactions::{Refusal, Written};
 use crate::pdo::load::PlannedPdos;
 use crate::snapshot::DriveView;
 use crate::world::door::NoAnswer;
-use testbench::around::Changed;
 
 /// Everything under way.
 pub(crate) type Work = FuturesUnordered<LocalBoxFuture<'static, Done>>;

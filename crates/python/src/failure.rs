@@ -5,8 +5,8 @@ use std::path::Path;
 use canopen::NodeId;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use testbench::failure::{Failure, Subject};
-use testbench::words::calls::in_python;
+use words::calls::in_python;
+use words::failure::{Failure, Subject};
 
 mod classes {
     #![allow(missing_docs, reason = "the classes have their words in ferrodrive/errors.py")]

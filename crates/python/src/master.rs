@@ -21,14 +21,14 @@ use std::time::Duration;
 
 use can::Tap;
 use canopen::{Mux, NmtCommand, NodeId};
+use host::network::read_machine;
+use machine::file::Machine;
 use master::drive::Drive;
 use master::identify::Knowledge;
 use master::{Error, Gear, Network as Core, Node};
 use pyo3::prelude::*;
-use testbench::machine_file::Machine;
-use testbench::models::{Description, with_files};
-use testbench::network::read_machine;
 use transport::BusSpec;
+use words::models::{Description, with_files};
 
 pub(crate) use job::Job;
 use job::Trouble;

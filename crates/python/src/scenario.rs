@@ -8,10 +8,10 @@ use std::sync::{Mutex, PoisonError};
 
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
-use testbench::document::BadFile;
-use testbench::document::reader::Parameters;
-use testbench::scenario::{Outcome, Runner, Scenario};
-use testbench::sweep;
+use scenario::sweep;
+use scenario::{Outcome, Runner, Scenario};
+use words::document::BadFile;
+use words::document::reader::Parameters;
 
 use crate::failure::{bad_value, named};
 

@@ -38,7 +38,7 @@ pub(crate) fn model_name(model: &str) -> PyResult<&'static str> {
 
 /// A model by its name, or by a file that describes it (EDS, DCF).
 pub(crate) fn model_of(name: &str) -> PyResult<&'static Description> {
-    testbench::models::resolve(name).map_err(bad_value)
+    words::models::resolve(name).map_err(bad_value)
 }
 
 /// A node-ID, 1 to 127.

@@ -14,6 +14,8 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::NodeId;
+use host::events;
+use machine::file::{self, Machine};
 use master::decode::Decoder;
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
@@ -24,9 +26,7 @@ use sim::machine::{TimingMode, order};
 use sim::stimulus::{FORMS, Place};
 use sim::wire::{Statistics, WireEvent};
 use sim::{StationId, VirtualDrive};
-use testbench::events;
-use testbench::machine_file::{self, Machine};
-use testbench::words::drive::{DriveSpec, drive_spec};
+use words::drive::{DriveSpec, drive_spec};
 
 use crate::failure::{bad_value, named, refused, wrong_use};
 use crate::frames::{Plain, frame, plain};
@@ -494,7 +494,7 @@ impl World {
         for number in numbers {
             let model = state.world.with_drive(number, |drive, _| drive.model()).map_err(refused)?;
             // The model of a drive by its file is not known by its name.
-            if let (Some(node), Ok(model)) = (NodeId::new(number), testbench::models::resolve(model)) {
+            if let (Some(node), Ok(model)) = (NodeId::new(number), words::models::resolve(model)) {
                 decoder.set_model(node, model);
             }
         }

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use testbench::check::{Checked, of_bus_yml, of_machine};
+use machine::check::{Checked, of_bus_yml, of_machine};
 
 pub(super) const SAMPLES: &[&[u8]] = &[
     b"options: {heartbeat_multiplier: 3.0}\nmaster:\n  node_id: 127\n  sync_period: 20000\n  heartbeat_producer: 100\n  start_all_nodes: true\n\

@@ -5,11 +5,11 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use can::Bitrate;
+use host::control::{Class, Control, LineBuffer, Outbox, Outcome, ReadLine, Sink};
 use serde_json::Value;
 use sim::World;
 use sim::command::Service;
 use sim::machine::zlac8030l;
-use testbench::control::{Class, Control, LineBuffer, Outbox, Outcome, ReadLine, Sink};
 
 /// Lines; what follows a NUL is how many milliseconds pass, in a byte.
 pub(super) const SAMPLES: &[&[u8]] = &[

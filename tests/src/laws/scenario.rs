@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use testbench::document::BadFile;
-use testbench::machine_file::Machine;
-use testbench::scenario::{Runner, Scenario};
+use machine::file::Machine;
+use scenario::{Runner, Scenario};
+use words::document::BadFile;
 
 pub(super) const SAMPLES: &[&[u8]] = &[
     b"title = 'a'\nlimit = '2s'\n[machine]\nbitrate = '500k'\nseed = 3\nrealism = 'full'\n[[machine.drive]]\nmodel = 'zlac8030l'\n\

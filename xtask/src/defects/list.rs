@@ -43,7 +43,7 @@ const SIM: Tests = Tests::of("ferrodrive-sim", "--lib");
 const MASTER: Tests = Tests::of("ferrodrive-master", "--lib");
 const MASTER_IT: Tests = Tests::of("ferrodrive-master", "it");
 const EDS: Tests = Tests::of("ferrodrive-eds", "--lib");
-const TESTBENCH: Tests = Tests::of("ferrodrive-testbench", "--lib");
+const WORDS: Tests = Tests::of("ferrodrive-words", "--lib");
 const TABLES: Tests = Tests { filter: "tables_of_", ..Tests::of("ferrodrive-tests", "it") };
 const WHEEL: Tests = Tests { filter: "zlac8030l", ..Tests::of("ferrodrive-tests", "it") };
 
@@ -272,10 +272,10 @@ pub(super) const DEFECTS: &[Defect] = &[
         noticed_by: EDS,
     },
     Defect {
-        file: "crates/testbench/src/words/suggest.rs",
+        file: "crates/words/src/suggest.rs",
         text: "row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);",
         instead: "row[j + 1] = replaced.min(row[j] + 1);",
-        noticed_by: TESTBENCH,
+        noticed_by: WORDS,
     },
     Defect {
         file: "crates/cia402/src/power.rs",

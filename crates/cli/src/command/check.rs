@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use testbench::check::{LiveNode, Prediction, Severity};
-use testbench::network::check::{CheckReport, read};
-use testbench::words::counted;
+use host::network::check::{CheckReport, read};
+use machine::check::{LiveNode, Prediction, Severity};
+use words::counted;
 
 use crate::failure::Failure;
 use crate::global::Global;

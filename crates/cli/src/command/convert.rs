@@ -12,7 +12,7 @@ use crate::output::Report;
 use crate::plain::plain;
 use crate::recording::{LogPath, log_path};
 use plot::Paint;
-use testbench::words::counted;
+use words::counted;
 
 /// Convert a log file to another format
 ///

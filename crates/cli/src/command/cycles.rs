@@ -2,11 +2,11 @@
 //! what to do where the host was late.
 
 use canopen::NodeId;
+use machine::file::{CyclePlan, Machine, TOLERANCE, TooFull};
 use master::Drive;
 use master::core::CycleLoss;
 use master::cyclic::{CyclicOptions, Refusal};
 use master::plan::NodeTraffic;
-use testbench::machine_file::{CyclePlan, Machine, TOLERANCE, TooFull};
 
 use super::studio::bitrate;
 use crate::context::Context;

@@ -19,9 +19,9 @@ use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
 use plot::Table;
-use testbench::models::Description;
-use testbench::words::counted;
-use testbench::words::node::node;
+use words::counted;
+use words::models::Description;
+use words::node::node;
 
 /// Read a device's parameters into a device configuration file (DCF)
 ///

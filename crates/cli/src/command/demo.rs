@@ -14,7 +14,7 @@ use crate::global::Global;
 use crate::output::Report;
 use crate::progress::Progress;
 use crate::session::exit_on_signal;
-use testbench::models::resolve;
+use words::models::resolve;
 
 /// Run every procedure of the manuals against virtual drives
 ///

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::output::Report;
 use plot::Paint;
 use plot::Table;
-use testbench::models::Description;
+use words::models::Description;
 
 /// All departures of a model.
 #[derive(Debug, Serialize)]

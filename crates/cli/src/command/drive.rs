@@ -13,7 +13,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
-use testbench::words::node::{Nodes, node, nodes};
+use words::node::{Nodes, node, nodes};
 
 /// Show the state of a drive: power state, fault, position, speed, current, supply
 ///

@@ -6,11 +6,11 @@ use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::time::Duration;
 
 use canopen::NodeId;
+use machine::file::{BASE_PERIOD, BasePlan, CyclePlan, speed_mode};
 use master::base::{Base, BaseError, BaseLimits, BaseState, Geometry, StopCause, Twist, WheelSetup};
 use master::units::{Shown, parse_duration};
 use serde::Serialize;
-use testbench::machine_file::{BASE_PERIOD, BasePlan, CyclePlan, speed_mode};
-use testbench::words::counted;
+use words::counted;
 
 use super::cycles::{CycleArgs, refuse_too_full};
 use super::group::{SEE_AXES, end_guards};

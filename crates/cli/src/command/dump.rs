@@ -24,9 +24,9 @@ use crate::plain::plain;
 use crate::recording::{CommandLog, LogPath, Pace, interface_of};
 use crate::session::{bus_failure, enter_real_time, exit_on_signal, runtime, virtual_world};
 use crate::signals::asked_to_end;
+use machine::file::Machine;
 use plot::Paint;
-use testbench::machine_file::Machine;
-use testbench::words::counted;
+use words::counted;
 
 /// Show the traffic of the bus decoded: SDO, PDOs, statuswords in words
 ///

@@ -17,7 +17,7 @@ use crate::failure::Failure;
 use crate::frames::stamp::{Stamps, TimeForm};
 use crate::output::{Format, Report};
 use plot::Paint;
-use testbench::words::node::{Nodes, node, nodes};
+use words::node::{Nodes, node, nodes};
 
 /// Show emergency messages as they arrive, or the errors that a node remembers
 #[derive(Debug, clap::Args)]

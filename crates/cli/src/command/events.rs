@@ -1,7 +1,7 @@
 //! `ferrodrive events`: what happens in a running simulator, as it happens.
 
+use host::events::Filter;
 use serde_json::{Value, json};
-use testbench::events::Filter;
 
 use crate::control_client::ControlArgs;
 use crate::failure::Failure;

@@ -11,10 +11,10 @@ use master::units::parse_duration;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
+use host::network::explain::ExplainReport;
 use plot::Paint;
 use plot::Table;
-use testbench::network::explain::ExplainReport;
-use testbench::words::node::node;
+use words::node::node;
 
 /// Explain why a drive does not move, and why its PDOs are silent
 ///

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use canopen::NodeId;
+use machine::dbc::{self, DbcNode, DbcPdo};
 use master::Drive;
 use serde::Serialize;
-use testbench::dbc::{self, DbcNode, DbcPdo};
-use testbench::words::counted;
-use testbench::words::node::node;
+use words::counted;
+use words::node::node;
 
 use super::dcf::{keep, new_file};
 use crate::context::Context;

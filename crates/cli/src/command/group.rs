@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use cia402::ModeOfOperation;
+use machine::file::{CyclePlan, GROUP_PERIOD, GroupPlan};
 use master::Drive;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase, StopCause};
 use master::units::{Along, Angle, Ramp, Rpm, Shown, Turns, parse_duration};
 use serde::Serialize;
-use testbench::machine_file::{CyclePlan, GROUP_PERIOD, GroupPlan};
-use testbench::words::mode::mode;
-use testbench::words::node::node;
+use words::mode::mode;
+use words::node::node;
 
 use super::cycles::{CycleArgs, ask_why, refuse_too_full};
 use super::motion::speed;

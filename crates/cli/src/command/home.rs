@@ -13,8 +13,8 @@ use crate::failure::Failure;
 use crate::guard::GuardArgs;
 use crate::numbers::whole;
 use devices::AxisDescription;
-use testbench::models::Description;
-use testbench::words::node::node;
+use words::models::Description;
+use words::node::node;
 
 /// Find a drive's reference position
 ///
@@ -92,7 +92,7 @@ mod tests {
             no_wait: false,
             guard: GuardArgs::default(),
         };
-        let model = testbench::models::resolve("zlac8030l").unwrap();
+        let model = words::models::resolve("zlac8030l").unwrap();
         let text = home.refusal(model, &model.axes[0]).to_string();
         assert!(text.contains("6060h takes 1") && text.contains("objects zlac8030l position"), "{text}");
     }

@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
 use plot::Table;
-use testbench::words::node::node;
+use words::node::node;
 
 /// Find devices by their LSS address, and set their node-ID and bit rate (CiA 305)
 #[derive(Debug, clap::Args)]

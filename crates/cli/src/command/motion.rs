@@ -16,8 +16,8 @@ use crate::failure::Failure;
 use crate::guard::{Guard, GuardArgs, GuardReport};
 use crate::output::Report;
 use plot::Paint;
-use testbench::models::is_from_file;
-use testbench::words::node::node;
+use words::models::is_from_file;
+use words::node::node;
 
 /// Turn the motor at a speed
 ///

@@ -14,7 +14,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
-use testbench::words::node::{Nodes, nodes};
+use words::node::{Nodes, nodes};
 
 /// Send a network management command to one node or to all
 #[derive(Debug, clap::Args)]

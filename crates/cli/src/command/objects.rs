@@ -12,10 +12,10 @@ use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
 use plot::Table;
-use testbench::models::{Description, resolve};
-use testbench::words::node::node;
-use testbench::words::object::{ObjectArg, object};
-use testbench::words::unresolved::Unresolved;
+use words::models::{Description, resolve};
+use words::node::node;
+use words::object::{ObjectArg, object};
+use words::unresolved::Unresolved;
 
 /// List the object dictionary of a model or of a node
 #[derive(clap::Args)]
@@ -318,7 +318,7 @@ impl Report for ObjectList {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use testbench::models::embedded;
+    use words::models::embedded;
 
     fn found(words: &[&str]) -> Vec<&'static str> {
         let search = words.iter().map(|word| (*word).into()).collect();

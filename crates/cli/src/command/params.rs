@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
+use machine::parameters::Form;
 use master::units::parse_duration;
-use testbench::parameters::Form;
-use testbench::words::node::node;
+use words::node::node;
 
 use crate::context::Context;
 use crate::failure::Failure;

@@ -21,8 +21,8 @@ use crate::frames::stamp::{Stamps, TimeForm};
 use crate::output::{Format, Report};
 use plot::Paint;
 use plot::Table;
-use testbench::decode::{self, decode};
-use testbench::words::node::node;
+use words::decode::{self, decode};
+use words::node::node;
 
 /// Show, watch and configure the PDOs of a node
 #[derive(Debug, clap::Args)]

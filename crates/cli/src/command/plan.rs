@@ -6,13 +6,13 @@ use std::time::Duration;
 use can::Bitrate;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
+use host::network::plan::{CYCLE, PlanReport, SHORTEST_CYCLE, traffic};
+use machine::file::{CyclePlan, Machine};
 use master::plan::{ErrorRate, HostQueue, NodeTraffic, Settings};
 use master::units::parse_duration;
-use testbench::machine_file::{CyclePlan, Machine};
-use testbench::network::plan::{CYCLE, PlanReport, SHORTEST_CYCLE, traffic};
-use testbench::words::mode::mode;
-use testbench::words::node::node;
 use transport::BusSpec;
+use words::mode::mode;
+use words::node::node;
 
 use crate::context::Context;
 use crate::failure::Failure;

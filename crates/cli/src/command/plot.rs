@@ -3,10 +3,10 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use recording::{Kind, Recorded, picture, read};
 use serde::Serialize;
-use testbench::document::read_bytes;
-use testbench::recording::{Kind, Recorded, picture, read};
-use testbench::words::counted;
+use words::counted;
+use words::document::read_bytes;
 
 use super::dcf::is_stdout;
 use crate::failure::Failure;

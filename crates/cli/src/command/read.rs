@@ -11,9 +11,9 @@ use super::sdo::{ObjectReport, moving_limits, resolve};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::{Format, print};
-use testbench::words::node::node;
-use testbench::words::object::ObjectArg;
-use testbench::words::selection::{Selection, selection};
+use words::node::node;
+use words::object::ObjectArg;
+use words::selection::{Selection, selection};
 
 /// Read objects of a node, decoded with unit and meaning
 #[derive(Debug, clap::Args)]

@@ -7,7 +7,7 @@ use crate::failure::Failure;
 use crate::output::Report;
 use crate::readings::{self, Reading};
 use plot::Paint;
-use testbench::models::{Description, resolve};
+use words::models::{Description, resolve};
 
 /// List where a model's manual is silent or contradicts itself, and what can be chosen
 ///

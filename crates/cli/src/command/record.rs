@@ -13,13 +13,13 @@ use master::decode::{common_name, common_row, common_type};
 use master::pdo::TimerUnits;
 use master::units::parse_duration;
 use master::{Drive, Node};
+use recording::{Column, Kind, Mark, Severity, Subject};
 use serde::Serialize;
 use sim::Place;
-use testbench::recording::{Column, Kind, Mark, Severity, Subject};
-use testbench::words::counted;
-use testbench::words::node::node;
-use testbench::words::object::{ObjectArg, object};
-use testbench::words::unit::split_factor;
+use words::counted;
+use words::node::node;
+use words::object::{ObjectArg, object};
+use words::unit::split_factor;
 
 use super::dcf::is_stdout;
 use super::sdo::resolve;

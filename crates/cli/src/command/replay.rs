@@ -11,9 +11,9 @@ use canopen::connection_set::Service;
 use cia402::object::CONTROLWORD;
 use master::decode::Decoder;
 use serde::Serialize;
-use testbench::models::with_files;
-use testbench::words::counted;
 use transport::log::{Direction, Entry, Record};
+use words::counted;
+use words::models::with_files;
 
 use crate::command::dump::{no_log, open_log, unreadable};
 use crate::context::Context;

@@ -5,12 +5,12 @@ use tokio::sync::broadcast::error::RecvError;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
+use host::network::heard::{Counted, Heard};
+use host::network::scan::{ScanReport, ScannedNode, no_node};
 use master::identify::Found;
 use plot::Paint;
 use plot::Table;
-use testbench::models::how_to_say;
-use testbench::network::heard::{Counted, Heard};
-use testbench::network::scan::{ScanReport, ScannedNode, no_node};
+use words::models::how_to_say;
 
 /// Show the nodes on the bus
 ///

@@ -13,12 +13,12 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
-use testbench::decode::{Decoded, decode};
-use testbench::document::read_bytes;
-use testbench::words::counted;
-use testbench::words::node::node;
-use testbench::words::object::{ObjectArg, object};
-use testbench::words::value::{Typed, typed_alone, typed_for};
+use words::counted;
+use words::decode::{Decoded, decode};
+use words::document::read_bytes;
+use words::node::node;
+use words::object::{ObjectArg, object};
+use words::value::{Typed, typed_alone, typed_for};
 
 /// Write an object of a node
 #[derive(Debug, clap::Args)]

@@ -33,10 +33,10 @@ use crate::serve::store_writer::{StoreWriter, file_name};
 use crate::serve::world::ServedWorld;
 use crate::session::{bus_failure, enter_real_time, not_served, start_clock};
 use described::notes;
-use testbench::document::BadFile;
-use testbench::machine_file::{Machine, Placed};
-use testbench::models::is_from_file;
-use testbench::words::drive::{DriveSpec, drive_spec};
+use machine::file::{Machine, Placed};
+use words::document::BadFile;
+use words::drive::{DriveSpec, drive_spec};
+use words::models::is_from_file;
 
 const WORLD_COMMANDS: &str = "World commands (4 is the node of --drive):\n  \
     4 power off|on|cycle|cut  4 input X0 1              4 switch X0 -5000 max\n  \

@@ -9,7 +9,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
-use testbench::words::node::node;
+use words::node::node;
 
 /// Store a drive's parameters in its own memory
 ///

@@ -11,12 +11,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use can::Bitrate;
 use canopen::NodeId;
 use host::{Host, Journals, Setting};
+use machine::parameters::journal::Journal;
 use serde::Serialize;
 use studio::{Access, AccessError, Password, Token};
-use testbench::document::read_text;
-use testbench::parameters::journal::Journal;
 use tokio::net::TcpListener;
 use transport::BusSpec;
+use words::document::read_text;
 
 use super::gateway::address;
 use super::params::journal::{Kept, default_path, note_kept};

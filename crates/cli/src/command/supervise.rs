@@ -6,13 +6,13 @@ use std::time::Duration;
 
 use can::BusFrame;
 use canopen::NodeId;
+use host::network::boot::BootReport;
+use host::network::supervise::WatchedEvent;
 use master::core::{Event, NodeSet};
 use master::supervise::{EmcyRecord, Supervisor, SupervisorEvent};
 use master::units::parse_duration;
-use testbench::network::boot::BootReport;
-use testbench::network::supervise::WatchedEvent;
-use testbench::words::node::node;
 use tokio::sync::mpsc::{Receiver, channel};
+use words::node::node;
 
 use super::boot::{Planned, announce, global_of, plan_of, planned_by};
 use crate::context::Context;

@@ -18,9 +18,9 @@ use crate::output::{Format, Report};
 use crate::progress::Screen;
 use plot::Paint;
 use plot::Table;
-use testbench::decode::{Decoded, decode};
-use testbench::words::node::node;
-use testbench::words::object::{ObjectArg, object};
+use words::decode::{Decoded, decode};
+use words::node::node;
+use words::object::{ObjectArg, object};
 
 /// Show objects of a node as they change: a live table on a terminal, lines elsewhere
 ///

@@ -6,10 +6,10 @@ use master::decode::{Decoded, Decoder, ServiceKind};
 
 use crate::failure::Failure;
 use devices::names::present;
-use testbench::models::Description;
-use testbench::words::node::node;
-use testbench::words::object::{ObjectArg, object};
-use testbench::words::suggest::{did_you_mean, near};
+use words::models::Description;
+use words::node::node;
+use words::object::{ObjectArg, object};
+use words::suggest::{did_you_mean, near};
 
 /// Frames to show. A frame has to match one value of each option that is given.
 #[derive(Clone, Debug, Default, clap::Args)]

@@ -9,8 +9,8 @@ use canopen::NodeId;
 use master::decode::Decoder;
 
 use crate::global::Global;
-use testbench::machine_file::Machine;
-use testbench::models::{Description, with_files};
+use machine::file::Machine;
+use words::models::{Description, with_files};
 
 /// A decoder that knows the models of the command line and of the machine file, and those of an embedded bus.
 pub(crate) fn decoder(global: &Global, embedded: &[(NodeId, &'static Description)]) -> Decoder {

@@ -5,9 +5,9 @@ use std::io;
 use std::time::Duration;
 
 use can::{Frame, Instant};
+use recording::{Column, Kind, Mark, Record};
 use sim::events::Event;
 use sim::recorder::Recorder;
-use testbench::recording::{Column, Kind, Mark, Record};
 
 use super::background::{Background, Output, Pace, Waiting};
 use crate::failure::Failure;

@@ -5,7 +5,7 @@ use std::io;
 use std::time::Duration;
 
 use can::{Frame, Instant};
-use testbench::recording::{Column, Kind, Mark, Record};
+use recording::{Column, Kind, Mark, Record};
 
 use super::background::{Background, Output, Pace, Waiting};
 use crate::failure::Failure;

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use devices::AxisId;
+use recording::{Column, Kind, columns_of_drives, select};
 use sim::coupling::BodyState;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Place, World};
-use testbench::recording::{Column, Kind, columns_of_drives, select};
 
 use super::background::Pace;
 use super::file::RecordFile;

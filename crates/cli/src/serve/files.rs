@@ -7,7 +7,7 @@ use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, Read};
 use std::path::Path;
 
-use testbench::recording::Kind;
+use recording::Kind;
 use transport::log::Format;
 
 /// What a path names, without following a last symbolic link.

@@ -315,11 +315,11 @@ mod tests {
     use can::{Bitrate, Instant};
     use canopen::NodeId;
     use devices::AxisId;
+    use recording::{Column, Kind};
     use sim::World;
     use sim::machine::{Order, order, zlac8030l};
     use sim::recorder::{Channel, Recorder, Signal};
     use sim::stimulus::Place;
-    use testbench::recording::{Column, Kind};
     use transport::RealTimeWorld;
     use transport::log::{Format, LogWriter};
 
@@ -383,7 +383,7 @@ mod tests {
     fn moved_by_hand_record_and_log_are_the_same_whenever_the_clock_looks_for_them() {
         for kind in [Kind::Csv, Kind::Mcap] {
             let never = written(kind, usize::MAX);
-            let recorded = testbench::recording::read(kind, &never[0]).unwrap();
+            let recorded = recording::read(kind, &never[0]).unwrap();
             assert!(recorded.marks.iter().any(|mark| mark.text.contains("load torque 0.5")), "{:?}", recorded.marks);
             // Boot-up and heartbeats of the joint, by the bus's own time.
             let log = String::from_utf8_lossy(&never[1]);

@@ -13,14 +13,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use can::{Bitrate, Frame, INTERFRAME_SPACE_BITS, Instant};
+use host::control::{ClientNumber, Control, Outcome, Pending};
+use scenario::Execution;
+use scenario::occurrence::Occurrence;
 use sim::command::{Answer, Before, Command, CommandError, Run, Service};
 use sim::events::{Event, EventKind, MAX_WAITING};
 use sim::recorder::Recorder;
 use sim::wire::{ErrorCause, WireEvent};
 use sim::{StationId, World};
-use testbench::control::{ClientNumber, Control, Outcome, Pending};
-use testbench::scenario::Execution;
-use testbench::scenario::occurrence::Occurrence;
 use transport::{ClientId, ErrorFrame, ErrorKind, ErrorKinds, Heard, LeaveReason, ModbusRequest, RealTimeWorld};
 
 use super::control::{ControlMessage, OutboxSender};

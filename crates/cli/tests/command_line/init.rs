@@ -1,5 +1,5 @@
 //! `ferrodrive init`: the machine file to begin with. What a scan leaves open, and what follows for the file, is tested in
-//! `crates/testbench/tests/it/init.rs`.
+//! `crates/host/tests/it/init.rs`.
 
 use processes::{Simulator, command, done, ferrodrive, scratch};
 

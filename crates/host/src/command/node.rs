@@ -3,7 +3,6 @@
 use super::fields::{Fields, taken, whole};
 use super::parameters::{ParameterChange, ParameterReading};
 use super::pdo::PdoCommand;
-use canopen::NodeId;
 use master::drive::{self, Manner};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 

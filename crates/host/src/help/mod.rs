@@ -7,7 +7,7 @@ pub(crate) mod glossary;
 use canopen::NodeId;
 use devices::Description;
 use serde_json::{Value, json};
-use testbench::words::object::object;
+use words::object::object;
 
 use crate::answer::Answer;
 use crate::command::Topic;

@@ -1,7 +1,7 @@
 //! Rollback journals, which outlive this program if it dies during a transaction.
 
 use canopen::NodeId;
-use testbench::parameters::journal::Journal;
+use machine::parameters::journal::Journal;
 
 /// Rollback journals of open transactions, so that the values before are not lost if this program dies.
 pub trait Journals: core::fmt::Debug + Send + Sync {

@@ -14,13 +14,13 @@ use canopen::od::Entry;
 use canopen::{Mux, NodeId};
 use devices::Description;
 use devices::row::is_parameter;
+use machine::parameters::journal::Journal;
+use machine::parameters::{sheet, to_dcf};
 use master::Drive;
 use master::parameters::{ApplyError, Parameters, Plan, PlanError, PlanOptions, default_of, diff};
 use serde_json::{Value, json};
-use testbench::parameters::journal::Journal;
-use testbench::parameters::{sheet, to_dcf};
-use testbench::words::object::object;
-use testbench::words::value::typed_for;
+use words::object::object;
+use words::value::typed_for;
 
 use crate::answer::Answer;
 use crate::command::{FileForm, NewValue, ParameterChange, ParameterReading};

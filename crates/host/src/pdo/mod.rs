@@ -15,14 +15,14 @@ use canopen::od::Entry;
 use canopen::pdo::{EventTrigger, MappingRecord, PdoId};
 use canopen::{CobId, Mux, NmtCommand, NodeId, connection_set};
 use devices::Description;
+use machine::file::pdo_id;
 use master::Drive;
 use master::core::PdoMap;
 use master::parameters::Parameters;
 use master::pdo::{PdoConfig, PdoUnfit, Silence, Situation, TimerUnits, TransmissionType, why_silent};
 use master::plan::NodeTraffic;
 use serde_json::{Value, json};
-use testbench::machine_file::pdo_id;
-use testbench::words::object::{ObjectArg, object};
+use words::object::{ObjectArg, object};
 
 use crate::command::{NewEntry, NewPdo, NmtChange, PdoCommand};
 use crate::parameters::transactions::{Change, Refusal};

@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex};
 
 use canopen::{Mux, NodeId};
 use cia402::object::{PROFILE_ACCELERATION, PROFILE_VELOCITY};
+use machine::parameters::journal::Journal;
 use serde_json::Value;
-use testbench::parameters::journal::Journal;
 
 use master::drive;
 
@@ -125,9 +125,9 @@ fn a_file_is_saved_compared_planned_and_applied_as_a_whole() {
         };
         let file = backed_up(FileForm::Toml).await;
         // The same values, in a format of other tools.
-        let other = testbench::parameters::of_dcf(backed_up(FileForm::Dcf).await.as_bytes(), WHEEL).expect("a DCF");
+        let other = machine::parameters::of_dcf(backed_up(FileForm::Dcf).await.as_bytes(), WHEEL).expect("a DCF");
         let model = &devices::zltech::zlac8030l::ZLAC8030L;
-        assert_eq!(other.values, testbench::parameters::sheet::parse(&file, Some(model)).expect("parameters").values);
+        assert_eq!(other.values, machine::parameters::sheet::parse(&file, Some(model)).expect("parameters").values);
         page.must(SessionCommand::TakeControl {}).await;
         page.knows(setting("2008", "60rpm")).await;
         let compared =

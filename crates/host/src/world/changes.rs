@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 
-use testbench::around::Changed;
+use crate::around::Changed;
 
 /// Number of changes kept; older ones are dropped.
 const KEPT: usize = 200;

@@ -2,8 +2,8 @@
 //!
 //! Bounded: a request that finds no room is refused. Unanswered ones end with the world.
 
+use crate::around::{self, Around, Changed};
 use serde_json::Value;
-use testbench::around::{self, Around, Changed};
 use tokio::sync::{mpsc, oneshot};
 
 /// Queued requests; they are answered every millisecond.

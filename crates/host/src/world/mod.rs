@@ -8,10 +8,10 @@ use canopen::NodeId;
 use serde_json::{Value, json};
 
 use crate::answer::Answer;
+use crate::around::Changed;
 use crate::state::Host;
 use crate::work::{Asked, Done, send};
 use crate::world::door::NoAnswer;
-use testbench::around::Changed;
 
 /// Longest line in bytes: many times the longest useful one.
 const LONGEST_LINE: usize = 400;

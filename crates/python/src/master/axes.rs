@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use can::Bitrate;
+use machine::file::CyclePlan;
 use master::base::{Base as MasterBase, BaseError, BaseLimits, BaseState, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
 use master::drive::Drive;
@@ -13,9 +14,8 @@ use master::group::{AxisLimits, AxisSetup, Group as MasterGroup, GroupError, Pha
 use master::units::Turns;
 use master::{Error, Exchange, Network as Core};
 use pyo3::prelude::*;
-use testbench::failure::Failure;
-use testbench::machine_file::CyclePlan;
-use testbench::words::mode::mode;
+use words::failure::Failure;
+use words::mode::mode;
 
 use super::job::Trouble;
 use super::value::Value;

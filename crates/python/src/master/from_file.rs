@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
+use machine::file::{BASE_PERIOD, BasePlan, GROUP_PERIOD, GroupPlan, Machine, speed_mode};
 use master::base::WheelSetup;
 use master::group::AxisSetup;
 use pyo3::prelude::*;
-use testbench::failure::Failure;
-use testbench::machine_file::{BASE_PERIOD, BasePlan, GROUP_PERIOD, GroupPlan, Machine, speed_mode};
+use words::failure::Failure;
 
 use super::Network;
 use crate::failure::raised;

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use master::Error;
 use pyo3::prelude::*;
-use testbench::failure::Failure;
+use words::failure::Failure;
 
 use super::runner::Runner;
 use super::value::Value;

@@ -4,12 +4,12 @@
 use std::path::PathBuf;
 
 use devices::Description;
+use host::network::params::journal::{default_path, roll_back_by};
+use host::network::params::{Proof, Transaction, back_up, bytes_of, diff_of_node, plan_of, source, verify_node};
+use machine::parameters::{Form, sheet};
 use master::parameters::Parameters;
 use pyo3::prelude::*;
-use testbench::failure::Failure;
-use testbench::network::params::journal::{default_path, roll_back_by};
-use testbench::network::params::{Proof, Transaction, back_up, bytes_of, diff_of_node, plan_of, source, verify_node};
-use testbench::parameters::{Form, sheet};
+use words::failure::Failure;
 
 use super::value::Value;
 use super::whole::Asked;

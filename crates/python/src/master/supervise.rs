@@ -9,12 +9,12 @@ use std::time::Duration;
 
 use can::BusFrame;
 use canopen::NodeId;
+use host::network::boot::BootReport;
+use host::network::supervise::WatchedEvent;
 use master::Network as Core;
 use master::core::NodeSet;
 use master::supervise::Supervisor as MasterSupervisor;
 use pyo3::prelude::*;
-use testbench::network::boot::BootReport;
-use testbench::network::supervise::WatchedEvent;
 
 use super::job::Trouble;
 use super::tap::Listener;

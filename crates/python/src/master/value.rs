@@ -3,7 +3,7 @@
 use master::drive::{DriveState, MotionReport, Report};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
-use testbench::words::calls::in_python;
+use words::calls::in_python;
 
 /// A value on its way to Python.
 pub(crate) enum Value {
@@ -20,7 +20,7 @@ pub(crate) enum Value {
 }
 
 impl Value {
-    /// A report of crate `testbench`.
+    /// A report of crate `host`.
     pub(super) fn report(report: &impl serde::Serialize) -> Self {
         Self::Report(serde_json::to_value(report).unwrap_or_default())
     }

@@ -1,5 +1,5 @@
 //! What is asked of a network as a whole: who is there, its boot-up, its description, its load, and why a drive does not move. The
-//! results are those of the command line (`testbench::network`).
+//! results are those of the command line (`host::network`).
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -9,22 +9,22 @@ use std::time::Duration;
 use can::{Bitrate, BusFrame};
 use canopen::NodeId;
 use cia402::ModeOfOperation;
+use host::network::boot::{BootReport, Planned};
+use host::network::check::CheckReport;
+use host::network::explain::ExplainReport;
+use host::network::heard::Counted;
+use host::network::plan::{CYCLE, PlanReport, SHORTEST_CYCLE, traffic};
+use host::network::scan::{ScanReport, ScannedNode, no_node};
+use machine::file::Machine;
 use master::decode::Decoder;
 use master::drive::Drive;
 use master::explain::Overheard;
 use master::plan::{ErrorRate, HostQueue, NodeTraffic, Settings};
 use master::{Network as Core, boot as booting};
 use pyo3::prelude::*;
-use testbench::failure::Failure;
-use testbench::machine_file::Machine;
-use testbench::models::Description;
-use testbench::network::boot::{BootReport, Planned};
-use testbench::network::check::CheckReport;
-use testbench::network::explain::ExplainReport;
-use testbench::network::heard::Counted;
-use testbench::network::plan::{CYCLE, PlanReport, SHORTEST_CYCLE, traffic};
-use testbench::network::scan::{ScanReport, ScannedNode, no_node};
-use testbench::words::mode::mode;
+use words::failure::Failure;
+use words::mode::mode;
+use words::models::Description;
 
 use super::job::Trouble;
 use super::runner::Runner;
@@ -157,7 +157,7 @@ pub(super) fn node_ids(nodes: Vec<u8>) -> PyResult<Vec<NodeId>> {
 #[pyfunction]
 pub(crate) fn check_file(py: Python<'_>, file: PathBuf, strict: bool) -> PyResult<Py<PyAny>> {
     let report = py.detach(|| {
-        let mut checked = testbench::network::check::read(&file)?;
+        let mut checked = host::network::check::read(&file)?;
         let predicted = checked.predict();
         Ok::<_, Failure>(CheckReport::new(&file, checked, predicted, None, strict))
     });
@@ -170,7 +170,7 @@ pub(crate) fn check(py: Python<'_>, network: &Bound<'_, Network>, file: PathBuf,
     let network = network.get();
     let core = network.core.clone();
     let read = py.detach(|| {
-        let mut checked = testbench::network::check::read(&file)?;
+        let mut checked = host::network::check::read(&file)?;
         let predicted = checked.predict();
         Ok::<_, Failure>((checked, predicted))
     });

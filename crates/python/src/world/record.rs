@@ -8,10 +8,10 @@ use std::time::Duration;
 
 use can::Instant;
 use devices::AxisId;
+use recording::{Column, Kind, Record, Trail, picture};
 use sim::Place;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::wire::WireEvent;
-use testbench::recording::{Column, Kind, Record, Trail, picture};
 
 /// How much virtual time may pass between two looks at what was sampled: less than fills the world's log of frames.
 const WRITE_PERIOD: Duration = Duration::from_millis(100);

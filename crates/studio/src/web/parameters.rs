@@ -9,8 +9,8 @@ use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use canopen::NodeId;
+use machine::parameters::{of_dcf, sheet};
 use serde::Deserialize;
-use testbench::parameters::{of_dcf, sheet};
 use tokio::sync::Semaphore;
 
 use super::answer::trouble;

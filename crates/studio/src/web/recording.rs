@@ -6,7 +6,7 @@ use axum::body::Bytes;
 use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
-use testbench::recording::mcap_of_csv;
+use recording::mcap_of_csv;
 use tokio::sync::Semaphore;
 
 use super::answer::trouble;

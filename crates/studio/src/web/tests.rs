@@ -509,7 +509,7 @@ async fn values_kept_in_a_page_become_mcap() {
     let made = ask(&app, "POST", "/api/recording.mcap", &headers, csv).await;
     assert_eq!(made.status(), StatusCode::OK);
     let file = axum::body::to_bytes(made.into_body(), usize::MAX).await.expect("bytes");
-    let recorded = testbench::recording::read(testbench::recording::Kind::Mcap, &file).expect("MCAP");
+    let recorded = recording::read(recording::Kind::Mcap, &file).expect("MCAP");
     let points = |signal: &str| {
         let series = recorded.series.iter().find(|series| series.column.signal == signal).expect("a series");
         series.points.iter().copied().filter(|(_, value)| !value.is_nan()).collect::<Vec<_>>()

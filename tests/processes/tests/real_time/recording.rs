@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use processes::{Simulator, done, ferrodrive, scratch, wait_for};
-use testbench::recording::{Kind, Recorded, read};
+use recording::{Kind, Recorded, read};
 
 fn recorded(path: &Path) -> Recorded {
     let kind = Kind::of_name(path.to_str().unwrap()).unwrap();

@@ -7,15 +7,15 @@ use std::path::PathBuf;
 
 use canopen::NodeId;
 use master::boot::BootPlan;
-use testbench::words::node::node;
+use words::node::node;
 
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Format;
 use crate::session;
+use host::network::boot::BootReport;
 pub(crate) use planned::{Planned, announce, global_of, plan_of, planned_by};
-use testbench::network::boot::BootReport;
 
 /// Boot the nodes of a network: check their identities, configure and start them
 ///

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use canopen::NodeId;
+pub(crate) use host::network::boot::Planned;
 use master::boot::BootPlan;
-pub(crate) use testbench::network::boot::Planned;
 
 use crate::command::cycles::refuse_too_full_cycles;
 use crate::context::Context;

@@ -1,9 +1,9 @@
 //! What `ferrodrive boot` prints.
 
 use crate::output::Report;
+use host::network::boot::{BootReport, BootedNode};
 use plot::Paint;
 use plot::Table;
-use testbench::network::boot::{BootReport, BootedNode};
 
 impl Report for BootReport {
     fn text(&self, paint: Paint) -> String {

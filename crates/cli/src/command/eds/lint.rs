@@ -11,7 +11,7 @@ use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
 use plot::Table;
-use testbench::words::counted;
+use words::counted;
 
 /// Check EDS and DCF files: report errors with their lines, and what is used instead
 ///

@@ -13,9 +13,9 @@ use crate::failure::Failure;
 use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
-use testbench::models::{Description, resolve};
-use testbench::words::drive::DriveSpec;
-use testbench::words::node::node;
+use words::drive::DriveSpec;
+use words::models::{Description, resolve};
+use words::node::node;
 
 /// Which model's, and what is special about it.
 #[derive(clap::Args)]

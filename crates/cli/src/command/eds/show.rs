@@ -10,7 +10,7 @@ use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
 use plot::Table;
-use testbench::words::object::{ObjectArg, object};
+use words::object::{ObjectArg, object};
 
 /// Show the device and the objects of an EDS or DCF file
 #[derive(clap::Args)]

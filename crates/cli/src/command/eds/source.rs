@@ -6,8 +6,8 @@ use eds::document::Document;
 use eds::{Eds, Reading, Sheet};
 
 use crate::failure::Failure;
-use testbench::data_sheet;
-use testbench::models::resolve;
+use words::data_sheet;
+use words::models::resolve;
 
 /// Reads a file as it stands.
 pub(crate) fn document(path: &Path) -> Result<Document, Failure> {

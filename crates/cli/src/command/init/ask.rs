@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, Write};
 
-use testbench::network::init::InitNode;
+use host::network::init::InitNode;
 
 /// Asks for each node that may be one of several models; the end of the input leaves the rest as it is.
 pub(super) fn all(
@@ -50,7 +50,7 @@ mod tests {
     use master::Network;
     use sim::machine::{Order, order};
     use sim::{World, block_on};
-    use testbench::models::resolve;
+    use words::models::resolve;
 
     use super::*;
 

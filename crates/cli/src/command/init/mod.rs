@@ -7,12 +7,12 @@ use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
 use can::Bitrate;
+use host::network::init::{InitNode, InitReport};
 use plot::Paint;
-use testbench::network::init::{InitNode, InitReport};
-use testbench::words::counted;
-use testbench::words::drive::{DriveSpec, drive_spec};
-use testbench::words::unresolved::Unresolved;
 use transport::BusSpec;
+use words::counted;
+use words::drive::{DriveSpec, drive_spec};
+use words::unresolved::Unresolved;
 
 use super::dcf::{keep, new_file};
 use super::scan::look;

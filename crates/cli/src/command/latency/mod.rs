@@ -9,7 +9,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use plot::{Colour, Figure, Panel, Poster, Style, Trace};
 use serde::Serialize;
-use testbench::words::node::node;
+use words::node::node;
 
 use crate::command::plot::{svg_path, write_svg};
 use crate::context::Context;

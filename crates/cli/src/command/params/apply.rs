@@ -1,10 +1,10 @@
 //! `ferrodrive params apply`.
 
 use canopen::NodeId;
+use host::network::params::{ApplyReport, LeftOut, Proof, Transaction};
 use master::Drive;
 use master::parameters::Parameters;
-use testbench::network::params::{ApplyReport, LeftOut, Proof, Transaction};
-use testbench::words::counted;
+use words::counted;
 
 use super::journal::{default_path, note_kept};
 use super::{Prove, source};

@@ -1,8 +1,8 @@
 //! `ferrodrive params backup`.
 
-use testbench::network::params::{BackupReport, back_up, bytes_of};
-use testbench::parameters::{Form, sheet};
-use testbench::words::counted;
+use host::network::params::{BackupReport, back_up, bytes_of};
+use machine::parameters::{Form, sheet};
+use words::counted;
 
 use crate::command::dcf::{is_stdout, keep, new_file, of_parameters};
 use crate::context::Context;

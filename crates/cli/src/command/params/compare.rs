@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use testbench::network::params::{
+use host::network::params::{
     DiffReport, Shown, VerifyReport, diff_of_files, diff_of_node, source as files, verify_node,
 };
-use testbench::words::counted;
-use testbench::words::node::node;
+use words::counted;
+use words::node::node;
 
 use super::source;
 use crate::context::Context;

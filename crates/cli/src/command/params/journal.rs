@@ -2,9 +2,9 @@
 
 use std::io::Write;
 
-pub(in crate::command) use testbench::network::params::journal::{Kept, default_path};
-use testbench::network::params::journal::{RollbackReport, read, roll_back_by};
-use testbench::words::counted;
+pub(in crate::command) use host::network::params::journal::{Kept, default_path};
+use host::network::params::journal::{RollbackReport, read, roll_back_by};
+use words::counted;
 
 use crate::context::Context;
 use crate::failure::Failure;

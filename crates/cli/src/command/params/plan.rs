@@ -1,8 +1,8 @@
 //! `ferrodrive params plan`.
 
-use testbench::network::params::LeftOut;
-pub(in crate::command) use testbench::network::params::{PlanReport, plan_of};
-use testbench::words::counted;
+use host::network::params::LeftOut;
+pub(in crate::command) use host::network::params::{PlanReport, plan_of};
+use words::counted;
 
 use super::source;
 use crate::context::Context;

@@ -1,8 +1,8 @@
 //! Where parameters come from on the command line.
 
 use devices::Description;
+use host::network::params::source::{of_machine, read};
 use master::parameters::Parameters;
-use testbench::network::params::source::{of_machine, read};
 
 use crate::context::Context;
 use crate::failure::Failure;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use testbench::document::BadFile;
-use testbench::document::reader::Parameters;
-use testbench::scenario::Scenario;
+use scenario::Scenario;
+use words::document::BadFile;
+use words::document::reader::Parameters;
 
 use crate::failure::Failure;
 

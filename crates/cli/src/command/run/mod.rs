@@ -11,7 +11,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use testbench::scenario::{Kept, Outcome, Runner, Scenario};
+use scenario::{Kept, Outcome, Runner, Scenario};
 
 use crate::failure::Failure;
 use crate::numbers::whole;

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use master::units::Shown;
+use scenario::{Outcome, OutcomeReport, Verdict};
 use serde::Serialize;
-use testbench::scenario::{Outcome, OutcomeReport, Verdict};
 
 use crate::failure::{Failure, FailureBody};
 use crate::output::Report;

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use testbench::scenario::{Execution, Outcome, Scenario};
+use scenario::{Execution, Outcome, Scenario};
 use tokio::sync::mpsc;
 use transport::{Hub, HubOptions, ServeSpec, WallClock, run_world};
 

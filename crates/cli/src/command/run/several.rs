@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use scenario::{Outcome, OutcomeReport, Runner, Scenario, Verdict, junit};
 use serde::Serialize;
-use testbench::scenario::{Outcome, OutcomeReport, Runner, Scenario, Verdict, junit};
-use testbench::words::counted;
+use words::counted;
 
 use super::crew::Crew;
 use super::loaded::{Loaded, unbuildable, write};

@@ -4,10 +4,10 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use master::units::Shown;
+use scenario::sweep::{Alike, OfValue, Summary, Sweep, SweepReport, Worst};
+use scenario::{Outcome, Scenario};
 use serde::Serialize;
-use testbench::document::BadFile;
-use testbench::scenario::{Outcome, Scenario};
-use testbench::sweep::{Alike, OfValue, Summary, Sweep, SweepReport, Worst};
+use words::document::BadFile;
 
 use super::crew::Crew;
 use crate::failure::{Failure, FailureBody};

@@ -1,6 +1,6 @@
 //! The sockets of the control connection: one task a client, which moves lines between its socket and the world's loop.
 //!
-//! What the lines mean is `testbench::control`. Nothing here holds up the world: a client that does not read has its newest events
+//! What the lines mean is `host::control`. Nothing here holds up the world: a client that does not read has its newest events
 //! and values kept and the others counted, and is not listened to while many answers wait for it. Where a token is asked for, who has
 //! not given it is a stranger: there are few of them at a time, they come slowly, and they do not stay.
 
@@ -15,7 +15,7 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
-use testbench::control::{Class, ClientNumber, ControlAddress, LineBuffer, ReadLine};
+use host::control::{Class, ClientNumber, ControlAddress, LineBuffer, ReadLine};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, ReadHalf, WriteHalf};
 use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, mpsc};

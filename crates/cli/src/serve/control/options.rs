@@ -1,6 +1,6 @@
 //! `--control` and what goes with it.
 
-use testbench::control::ControlAddress;
+use host::control::ControlAddress;
 use tokio::sync::mpsc;
 
 use super::{ControlMessage, ControlServer, Entry};

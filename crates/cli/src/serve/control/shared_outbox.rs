@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use testbench::control::{Class, Outbox, Sink};
+use host::control::{Class, Outbox, Sink};
 use tokio::sync::{Notify, watch};
 
 /// Lines for one client, and whether more will come.

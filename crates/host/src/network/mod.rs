@@ -1,0 +1,50 @@
+//! What the command line and the Python package do with a network, and the results: the same rows for both, as `docs/json.md` has
+//! them.
+//!
+//! In: a network of crate `master`, which the caller runs. Out: reports that serialise, or a [`Failure`]. How a person reads them is the
+//! command line's.
+
+pub mod boot;
+pub mod check;
+pub mod explain;
+pub mod heard;
+pub mod init;
+pub mod params;
+pub mod plan;
+pub mod scan;
+pub mod supervise;
+
+use std::path::Path;
+
+use machine::file::{self, Machine};
+use words::failure::Failure;
+
+/// Reads a machine file.
+///
+/// # Errors
+/// Everything that is wrong with it.
+pub fn read_machine(path: &Path) -> Result<Machine, Failure> {
+    file::read(path).map_err(|reason| unusable(path, reason))
+}
+
+/// That a machine file makes no sense.
+pub fn unusable(path: &Path, reason: String) -> Failure {
+    Failure::bad_file(format!("cannot use the machine file {}", path.display())).because(reason).next(file::example())
+}
+
+/// Who is kept informed while something takes its time.
+pub trait Progress {
+    /// What is being waited for.
+    fn show(&self, text: String);
+    /// How far something is that may take long.
+    fn count(&self, text: String);
+    /// What a person has to do now.
+    fn note(&self, text: &str);
+}
+
+/// Shows nothing.
+impl Progress for () {
+    fn show(&self, _: String) {}
+    fn count(&self, _: String) {}
+    fn note(&self, _: &str) {}
+}

@@ -1,0 +1,581 @@
+//! Machine files: drives and what is around them, described in TOML, for a virtual bus (`--bus sim:FILE.toml`, `sim --machine
+//! FILE.toml`, `run`), or which models are where on a real bus (`--machine FILE.toml` of every other command).
+//!
+//! Everything about a machine becomes a [`Stimulus`] of `ferrodrive sim` and is done by the same code, so that a file can do
+//! what a world command can, and no more. Each key is described in `docs/machine-file.md`.
+
+mod bodies;
+mod configuration;
+mod cycles;
+mod motion;
+mod surroundings;
+mod units;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use can::{Bitrate, Instant};
+use canopen::{Mux, NodeId};
+use master::Gear;
+use master::identify::Identity;
+use master::parameters::{Parameters, from_any_state};
+use sim::machine::{Realism, TimingMode};
+use sim::{Place, Source, Stimulus, VirtualDrive, World};
+
+use bodies::Joined;
+pub use configuration::{mapped, pdo_id};
+pub use cycles::{BASE_PERIOD, CyclePlan, GROUP_PERIOD, TOLERANCE, TooFull, speed_mode, too_full, too_full_at};
+pub use motion::{AxisPlan, BasePlan, GroupPlan, WATCHDOG};
+use words::document::reader::{self, Field, Parameters as Placeholders, Table};
+use words::document::{BadFile, Located, Problem, read_text};
+use words::drive::DriveSpec;
+use words::models::{Description, resolve_in};
+use words::node::node;
+
+const EXAMPLE: &str =
+    "[[drive]]\n           model = \"zlac8030l\"\n           node = 4\n           load = { torque_nm = 0.5 }";
+
+/// The seed where none is given: runs are repeatable.
+pub const SEED: u64 = 1;
+
+/// Node-IDs that there are.
+const MOST_DRIVES: usize = 127;
+
+/// What a machine file may say of its bus.
+pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "timing", "drive", "body", "group", "base"];
+
+/// What it may say of a drive.
+pub const DRIVE_KEYS: &[&str] = &[
+    "model",
+    "node",
+    "supply_v",
+    "supply",
+    "options",
+    "load",
+    "inputs",
+    "switches",
+    "rotor_locked",
+    "temperatures_c",
+    "faults",
+    "battery",
+    "units",
+    "pdos",
+    "limits",
+    "heartbeat",
+    "start_up",
+];
+
+/// A machine as its file describes it.
+#[derive(Clone, Debug, Default)]
+pub struct Machine {
+    /// The bus's rate, where it says one.
+    pub bitrate: Option<Bitrate>,
+    /// The seed of everything random, where it is given.
+    pub seed: Option<u64>,
+    /// Whether its drives have the noise and the flaws of real ones, where it is given.
+    pub realism: Option<Realism>,
+    /// Whether its drives take the time that such drives take, where it is given; a drive may have its own.
+    pub timing: Option<TimingMode>,
+    /// The drives, each at a node of its own.
+    pub drives: Vec<Placed>,
+    /// Those that a master moves as one.
+    pub groups: Vec<GroupPlan>,
+    /// The base that a master drives.
+    pub base: Option<BasePlan>,
+    /// What they move together.
+    pub(crate) bodies: Vec<Joined>,
+}
+
+/// One drive of a machine and what is around it.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// Which drive, and where.
+    pub spec: DriveSpec,
+    source: Source,
+    /// Where the supply is described.
+    source_at: Option<Located>,
+    /// What is around it, with the places in the file.
+    around: Vec<(Stimulus, Located)>,
+    /// The keys that the file has of it for a simulated machine.
+    keys: Vec<&'static str>,
+    /// What a master writes to it at its start.
+    start_up: BTreeMap<Mux, Vec<u8>>,
+    /// What stands behind its shaft.
+    gear: Gear,
+}
+
+/// The machine that the file at `path` describes. Data sheets that it names are looked for beside it.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn read(path: &Path) -> Result<Machine, String> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    Machine::parse_in(&read_text(path)?, folder).map_err(|bad| bad.named(path.display().to_string()).to_string())
+}
+
+/// The machine of `--machine`.
+///
+/// # Errors
+/// What is wrong with the file, and what one looks like.
+pub fn machine(path: &str) -> Result<Machine, String> {
+    read(Path::new(path)).map_err(|reason| format!("cannot use it:\n{reason}\n{}", example()))
+}
+
+/// What a machine file looks like, for messages.
+pub fn example() -> String {
+    format!("a machine file looks like this:\n           {EXAMPLE}")
+}
+
+impl Machine {
+    /// Reads the text of a machine file; data sheets that it names are looked for in the current folder.
+    ///
+    /// # Errors
+    /// Everything that is wrong, with its place and what is expected there.
+    pub fn parse(text: &str) -> Result<Self, BadFile> {
+        Self::parse_in(text, Path::new(""))
+    }
+
+    /// As [`parse`](Self::parse), with data sheets looked for in `folder`.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn parse_in(text: &str, folder: &Path) -> Result<Self, BadFile> {
+        reader::read(text, &Placeholders::new(), "a machine file", |file| Self::from_table(file, folder))
+            .map_err(|problems| BadFile::new(text, problems))
+    }
+
+    /// Takes a machine out of a table, be it a file of its own or a part of another.
+    ///
+    /// # Errors
+    /// Everything that is wrong.
+    pub fn from_table(file: &Table<'_>, folder: &Path) -> Result<Self, Vec<Problem>> {
+        let mut problems = file.strangers(BUS_KEYS);
+        let bitrate = noted(file.get("bitrate").map(|field| rate(&field)).transpose(), &mut problems);
+        let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose();
+        let seed = noted(seed, &mut problems);
+        let realism = noted(file.get("realism").map(|field| realism(&field)).transpose(), &mut problems);
+        let timing = noted(file.get("timing").map(|field| timing(&field)).transpose(), &mut problems);
+        let mut machine = Self { bitrate, seed, realism, timing, ..Self::default() };
+        let expected = "a table of its own for each drive, begun by [[drive]]";
+        let tables = file.get("drive").map_or(Ok(Vec::new()), |field| field.list(expected));
+        let tables = tables.unwrap_or_else(|problem| {
+            problems.push(problem);
+            Vec::new()
+        });
+        let none = tables.is_empty();
+        if let Some(beyond) = tables.get(MOST_DRIVES) {
+            problems.push(beyond.problem(format!("a bus has at most {MOST_DRIVES} nodes (CiA 301, 7.2.8)")));
+            return Err(problems);
+        }
+        for field in tables {
+            match field
+                .table("a drive", expected)
+                .map_err(|problem| vec![problem])
+                .and_then(|table| Placed::parse(&table, folder))
+            {
+                Err(wrong) => problems.extend(wrong),
+                Ok(drive) if machine.drives.iter().any(|other| other.spec.node == drive.spec.node) => {
+                    problems.push(field.problem(format!("two drives at node {}", drive.spec.node)));
+                }
+                Ok(drive) => machine.drives.push(drive),
+            }
+        }
+        let expected = "a table of its own for each body, begun by [[body]]";
+        let bodies = noted(file.get("body").map_or(Ok(Vec::new()), |field| field.list(expected)), &mut problems);
+        for field in bodies {
+            match Joined::parse(&field) {
+                Ok(joined) => machine.bodies.push(joined),
+                Err(problem) => problems.push(problem),
+            }
+        }
+        let nodes: Vec<_> = machine.drives.iter().map(|drive| drive.spec.node).collect();
+        (machine.groups, machine.base) = motion::read(file, &nodes, &mut problems);
+        if none && problems.is_empty() {
+            problems.push(Problem::new(file.place(), "it has no [[drive]]"));
+        }
+        if problems.is_empty() { Ok(machine) } else { Err(problems) }
+    }
+
+    /// Which models are where.
+    pub fn models(&self) -> impl Iterator<Item = (NodeId, &'static Description)> {
+        let nodes = self.drives.iter().filter(|drive| !drive.spec.unconfigured);
+        nodes.map(|drive| (drive.spec.node, drive.spec.description()))
+    }
+
+    /// What a master shall have a node be set to: `pdos`, `limits`, `heartbeat` and `start_up` of its drive, and the identity of its
+    /// model. `None` for a node that is not in the file.
+    pub fn parameters(&self, node: NodeId) -> Option<Parameters> {
+        let placed = self.drives.iter().find(|drive| drive.spec.node == node)?;
+        let model = placed.spec.description().identity;
+        let known = |number: u32| Some(number).filter(|number| *number != 0);
+        let identity = Identity {
+            device_type: None,
+            vendor_id: known(model.vendor_id),
+            product_code: known(model.product_code),
+            revision_number: known(model.revision_number),
+        };
+        Some(Parameters { identity, node: Some(node), values: placed.start_up.clone() })
+    }
+
+    /// The writes that set a node up so, whatever it has, in the order of CiA 301; none for a node that is not in the file, or
+    /// of which it says nothing.
+    pub fn configuration(&self, node: NodeId) -> Vec<(Mux, Vec<u8>)> {
+        let Some(placed) = self.drives.iter().find(|drive| drive.spec.node == node) else { return Vec::new() };
+        from_any_state(Some(placed.spec.description()), node, &placed.start_up)
+    }
+
+    /// Its bus, still without drives.
+    pub fn world(&self) -> World {
+        World::new(self.bitrate.unwrap_or(Bitrate::K500), self.seed.unwrap_or(SEED))
+    }
+
+    /// Whether a drive of it takes its time: as itself says, or the machine, or else `otherwise`.
+    pub fn timing_of(&self, placed: &Placed, otherwise: TimingMode) -> TimingMode {
+        placed.spec.timing.or(self.timing).unwrap_or(otherwise)
+    }
+
+    /// Makes the drives of its world, which are there already, as real as it says.
+    pub fn make_real(&self, world: &mut World) {
+        for placed in &self.drives {
+            // A drive that is not there has been refused before.
+            let _ = world.set_realism(placed.spec.node.raw(), self.realism.unwrap_or_default());
+        }
+    }
+
+    /// Joins the drives of its world, which are there already, to what they move together.
+    ///
+    /// # Errors
+    /// What is in the way, with its place in the file.
+    pub fn join(&self, world: &mut World) -> Result<(), BadFile> {
+        self.bodies.iter().try_for_each(|body| body.couple(world))
+    }
+
+    /// Its bus with its drives and what is around them, at time zero.
+    ///
+    /// # Errors
+    /// What a drive does not take, with its place in the file.
+    pub fn build(&self) -> Result<World, BadFile> {
+        let mut world = self.world();
+        let mut problems = Vec::new();
+        for placed in &self.drives {
+            let spec = &placed.spec;
+            let order = spec.order(world.bitrate());
+            let mut drive =
+                sim::machine::order(spec.model, &order).map_err(|error| placed.refused(None, &error.to_string()))?;
+            let supplied = placed.supply(drive.as_mut());
+            world.set_timing(self.timing_of(placed, TimingMode::Ideal));
+            let added = world.add_drive(spec.node.raw(), drive);
+            added.map_err(|error| placed.refused(None, &error.to_string()))?;
+            for refused in [supplied, placed.furnish(&mut world)] {
+                problems.extend(refused.err().into_iter().flat_map(|bad| bad.problems));
+            }
+        }
+        BadFile::none_or(problems)?;
+        self.join(&mut world)?;
+        self.make_real(&mut world);
+        Ok(world)
+    }
+
+    /// The names of the machines that its drives move together.
+    pub fn body_names(&self) -> impl Iterator<Item = &str> {
+        self.bodies.iter().map(Joined::name)
+    }
+
+    /// Whether one of them has this name.
+    pub fn has_body(&self, name: &str) -> bool {
+        self.body_names().any(|its| its == name)
+    }
+
+    /// What of the file counts for a simulated machine only, in words: a master on a real bus does not use it. `None` if there
+    /// is nothing.
+    pub fn unused_by_a_master(&self) -> Option<String> {
+        let bodies = self.bodies.first().map(|_| "body");
+        let bus = [
+            self.bitrate.map(|_| "bitrate"),
+            self.seed.map(|_| "seed"),
+            self.realism.map(|_| "realism"),
+            self.timing.map(|_| "timing"),
+            bodies,
+        ];
+        let bus = bus.into_iter().flatten().collect::<Vec<_>>().join(", ");
+        let of_drive = |placed: &Placed| format!("{} of node {}", placed.keys.join(", "), placed.spec.node);
+        let drives = self.drives.iter().filter(|placed| !placed.keys.is_empty()).map(of_drive);
+        let parts: Vec<_> = Some(bus).filter(|bus| !bus.is_empty()).into_iter().chain(drives).collect();
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
+}
+
+/// A drive with nothing around it.
+impl From<DriveSpec> for Placed {
+    fn from(spec: DriveSpec) -> Self {
+        Self {
+            spec,
+            source: Source::default(),
+            source_at: None,
+            around: Vec::new(),
+            keys: Vec::new(),
+            start_up: BTreeMap::new(),
+            gear: Gear::DIRECT,
+        }
+    }
+}
+
+/// The value, or its problem among the others.
+fn noted<T: Default>(value: Result<T, Problem>, problems: &mut Vec<Problem>) -> T {
+    value.unwrap_or_else(|problem| {
+        problems.push(problem);
+        T::default()
+    })
+}
+
+fn rate(field: &Field<'_>) -> Result<Bitrate, Problem> {
+    let expected = "a bit rate as text, e.g. \"500k\"";
+    field.text(expected)?.parse().map_err(|error| field.problem(format!("{error}")))
+}
+
+fn realism(field: &Field<'_>) -> Result<Realism, Problem> {
+    let expected = "\"ideal\" or \"full\"";
+    field.text(expected)?.parse().map_err(|_| field.wrong(expected))
+}
+
+fn timing(field: &Field<'_>) -> Result<TimingMode, Problem> {
+    let expected = "\"device\" or \"ideal\"";
+    field.text(expected)?.parse().map_err(|_| field.wrong(expected))
+}
+
+impl Placed {
+    /// Sets the supply of the drive, before the power comes on: capacitors once charged would hold another voltage for a
+    /// while.
+    ///
+    /// # Errors
+    /// That the drive does not take it.
+    pub fn supply(&self, drive: &mut dyn VirtualDrive) -> Result<(), BadFile> {
+        let set = drive.set_source(self.source, Instant::ZERO);
+        let node = self.spec.node;
+        set.map_err(|refused| self.refused(self.source_at.as_ref(), &format!("supply of node {node}: {refused}")))
+    }
+
+    /// Puts into the world what is around the drive, which is there already.
+    ///
+    /// # Errors
+    /// All that the drive does not take.
+    pub fn furnish(&self, world: &mut World) -> Result<(), BadFile> {
+        let place = Place::node(self.spec.node.raw());
+        let refused = self.around.iter().filter_map(|(stimulus, at)| {
+            let applied = world.apply(place, stimulus).map_err(|error| error.to_string());
+            let reason = applied.and_then(|applied| applied.map_err(|refused| refused.to_string())).err()?;
+            Some(at.saying(format!("'{place} {stimulus}' cannot be done: {reason}")))
+        });
+        BadFile::none_or(refused.collect())
+    }
+
+    /// A refusal, at a place of the file if it has one.
+    fn refused(&self, at: Option<&Located>, what: &str) -> BadFile {
+        let nowhere = Located { line: 1, column: 1, width: 1, shown: String::new(), what: String::new() };
+        BadFile::one(at.unwrap_or(&nowhere).saying(what))
+    }
+
+    fn parse(table: &Table<'_>, folder: &Path) -> Result<Self, Vec<Problem>> {
+        let mut problems = table.strangers(DRIVE_KEYS);
+        let source = surroundings::source(table, &mut problems);
+        let source_at = ["supply", "supply_v"].into_iter().find_map(|name| table.get(name));
+        let source_at = source_at.map(|field| field.problem("").locate(table.text()));
+        let around = surroundings::around(table, &mut problems);
+        let (described, id) = match (model(table, folder), node_id(table)) {
+            (Ok(described), Ok(id)) => (described, id),
+            (described, id) => {
+                problems.extend(described.err().into_iter().chain(id.err()));
+                return Err(problems);
+            }
+        };
+        let mut spec = DriveSpec::new(described, id);
+        for option in
+            noted(surroundings::fields(table, "options", "a table of options, e.g. { 6060 = 3 }"), &mut problems)
+        {
+            let set = option.word("a whole number or a text").and_then(|value| {
+                spec.set(option.name(), &value)
+                    .map_err(|reason| option.problem(format!("options of node {id}: {reason}")))
+            });
+            noted(set, &mut problems);
+        }
+        let start_up = configuration::values(table, spec.description(), id, &mut problems);
+        let gear = noted(units::gear(table), &mut problems);
+        let of_master = |key: &str| key == units::KEY || configuration::KEYS.contains(&key);
+        let of_simulator = |key: &&str| !matches!(*key, "model" | "node") && !of_master(key);
+        let keys = DRIVE_KEYS.iter().copied().filter(|key| of_simulator(key) && table.get(key).is_some());
+        if problems.is_empty() {
+            Ok(Self { spec, source, source_at, around, keys: keys.collect(), start_up, gear })
+        } else {
+            Err(problems)
+        }
+    }
+}
+
+const NODE: &str = "a node-ID from 1 to 127, e.g. 4";
+
+fn node_id(table: &Table<'_>) -> Result<NodeId, Problem> {
+    let number = table.need("node", NODE)?;
+    let id = number.whole::<u8>(NODE)?;
+    node(&id.to_string()).map_err(|reason| number.problem(reason))
+}
+
+fn model(table: &Table<'_>, folder: &Path) -> Result<&'static Description, Problem> {
+    let expected = "the drive's model as text, e.g. \"zlac8030l\", or a data sheet, \"FILE.eds\"";
+    let model = table.need("model", expected)?;
+    resolve_in(&model.words(expected)?, folder).map_err(|reason| model.problem(reason))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(text: &str) -> String {
+        Machine::parse(text).and_then(|machine| machine.build()).map_or_else(|bad| bad.to_string(), |_| String::new())
+    }
+
+    fn parsed(text: &str) -> Machine {
+        Machine::parse(text).unwrap_or_else(|reason| panic!("{reason}"))
+    }
+
+    const DRIVE: &str = "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n";
+
+    #[test]
+    fn a_table_becomes_world_commands() {
+        let text = "[[drive]]\nmodel = 'zlac8030l'\nnode = 7\nload = { torque_nm = 0.5 }\n\
+                    inputs = { X0 = true }\nswitches = { X1 = ['min', -100] }\nfaults = ['hall']\nrotor_locked = true";
+        let around: Vec<_> = parsed(text).drives[0].around.iter().map(|(stimulus, _)| stimulus.to_string()).collect();
+        assert_eq!(around, ["load torque 0.5", "input X0 1", "switch X1 min -100", "rotor lock", "fault hall on"]);
+    }
+
+    #[test]
+    fn a_file_says_which_models_are_where_and_no_node_twice() {
+        let text = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\nload = { torque_nm = 0.5 }\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4";
+        let said: Vec<_> = parsed(text).models().map(|(node, model)| (node.raw(), model.name)).collect();
+        assert_eq!(said, [(2, "zlim42c"), (4, "zlac8030l")]);
+        let twice = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\n[[drive]]\nmodel = 'zlac8030l'\nnode = 2";
+        assert_eq!(refusal(twice), "line 4, column 1: two drives at node 2\n  4 | [[drive]]\n    | ^^^^^^^^^");
+        assert!(machine("/nowhere/machine.toml").is_err_and(|reason| reason.contains("[[drive]]")));
+    }
+
+    #[test]
+    fn what_is_wrong_is_reported_with_its_place_and_what_is_expected() {
+        let with = |line: &str| refusal(&format!("{DRIVE}{line}"));
+        assert!(refusal("").contains("no [[drive]]"));
+        assert_eq!(with("colour = 1").split("; it has").next(), Some("line 4, column 1: a drive has no 'colour'"));
+        assert!(with("suply_v = 1").contains("did you mean supply_v?"));
+        assert!(
+            refusal("[[drive]]\nmodel = 'zlac803'\nnode = 4")
+                .contains("line 2, column 9: 'zlac803' is not a model; did you mean zlac8030l?")
+        );
+        assert!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 200").contains("no node 200"));
+        assert!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 300").contains("'node' is 300; expected a node-ID"));
+        assert!(refusal("[[drive]]\nmodel = 'zlac8030l'").contains("line 1, column 1: a drive needs 'node'"));
+        assert!(refusal("[[drive]]\nmodel = 4\nnode = 4").contains("'model' is 4; expected the drive's model as text"));
+        assert!(with("options = { colour = 'red' }").contains("no 'colour'"));
+        assert_eq!(with("options = { 2014 = 100 }"), "");
+        assert!(with("supply_v = 'high'").contains("'supply_v' is \"high\"; expected a voltage"));
+        assert!(with("supply_v = nan").contains("expected a voltage"));
+        assert_eq!(with("supply = { voltage_v = 36, limit_a = 10, resistance_ohm = 0.2 }"), "");
+        assert!(with("supply = { limit_a = 0 }").contains("0.01 to 1000 A"));
+        assert_eq!(refusal("realism = 'full'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4"), "");
+        assert!(refusal("realism = 'much'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4").contains("ideal"));
+        assert!(with("supply = { voltage_v = 101 }").contains("0 to 100 V"));
+        assert!(with("supply = 48").contains("'supply' is 48; expected a table"));
+        assert!(with("load = 5").contains("'load' is 5; expected a table, e.g. { torque_nm = 0.5 }"));
+        assert!(with("inputs = { X0 = 1 }").contains("'X0' is 1; expected true or false"));
+        assert!(with("rotor_locked = 'yes'").contains("expected true or false"));
+        assert!(with("faults = 'hall'").contains("expected a list of components"));
+        assert!(with("faults = ['gear']").contains("line 4, column 11: 'fault gear on' cannot be done: "));
+        assert!(with("inputs = { 'X0 1\\n4 rotor lock' = true }").contains("is not the name of an"));
+        assert!(refusal("drive = 3").contains("begun by [[drive]]"));
+        assert!(refusal(&format!("bitrate = '7k'\n{DRIVE}")).contains("bit rate must be"));
+        assert!(refusal(&format!("bitrate = 500\n{DRIVE}")).contains("expected a bit rate as text"));
+        assert!(refusal("[[drive]]\nmodel = ").starts_with("line 2, column "));
+    }
+
+    #[test]
+    fn a_switch_has_two_bounds() {
+        let with = |range: &str| refusal(&format!("{DRIVE}switches = {{ X0 = {range} }}"));
+        assert_eq!(with("[-5000, 'max']"), "");
+        assert!(with("[1, 2, 3]").contains("line 4, column 19: 'X0' is a list of 3; expected two bounds, [low, high]"));
+        assert!(with("[1]").contains("expected two bounds"));
+        assert!(with("[1, 'top']").contains("'X0' is \"top\"; expected two bounds"));
+        assert!(with("[1.5, 2]").contains("'X0' is 1.5; expected two bounds"));
+        assert!(with("5").contains("expected two bounds"));
+    }
+
+    /// Words that only a programmer of Rust knows.
+    #[test]
+    fn no_refusal_speaks_of_rust() {
+        let values =
+            ["1", "-1", "1.5", "'a'", "true", "[]", "{}", "[1]", "[[]]", "{ a = 1 }", "2026-11-22", "1e999", "inf"];
+        let names =
+            ["model", "node", "supply_v", "options", "load", "inputs", "switches", "rotor_locked", "faults", "else"];
+        for (name, value) in names.iter().flat_map(|name| values.map(|value| (name, value))) {
+            let drive = if *name == "model" || *name == "node" { "[[drive]]\n" } else { DRIVE };
+            let said = refusal(&format!("{drive}{name} = {value}"));
+            let rust =
+                ["sequence", "map", "variant", "enum", "struct", "f64", "u8", "i64", "string", "boolean", "Some"];
+            let spoken = said.split(|c: char| !c.is_alphanumeric()).find(|word| rust.contains(word));
+            assert_eq!(spoken, None, "{name} = {value}: {said}");
+        }
+    }
+
+    #[test]
+    fn all_that_is_wrong_is_reported_at_once_in_the_order_of_the_file() {
+        let bad = Machine::parse("colour = 1\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nload = { torque_nm = 'much' }\nfaults = ['gear']\n[[drive]]\nmodel = 'x'\nnode = 5\n").err();
+        let lines: Vec<_> = bad.iter().flat_map(|bad| &bad.problems).map(|problem| problem.line).collect();
+        assert_eq!(lines, [1, 5, 6, 8]);
+    }
+
+    fn lines_reported(text: &str) -> Vec<usize> {
+        let bad = Machine::parse(text).and_then(|machine| machine.build()).err();
+        bad.iter().flat_map(|bad| &bad.problems).map(|problem| problem.line).collect()
+    }
+
+    #[test]
+    fn all_that_is_wrong_with_one_drives_table_is_reported() {
+        // In what it says: each number of a part, each entry of a list, a model and a node that there are not.
+        let said = "[[drive]]\nmodel = 'x'\nnode = 200\nsupply_v = 'a'\nbattery = 1\nrotor_locked = 2\n[drive.load]\ntorque_nm = 'b'\n\
+                    inertia_kg_m2 = 'c'\nmass = 1\n[drive.load.gear]\nratio = 'd'\nbacklash_deg = 'e'\n[drive.load.stop]\nrange = 1\n\
+                    damping_nm_s_rad = 3\n[drive.inputs]\nX0 = 1\nX1 = 2\n[drive.temperatures_c]\nmotor = 'hot'\ndriver = 'cold'\n";
+        assert_eq!(lines_reported(said), [2, 3, 4, 5, 6, 8, 9, 10, 12, 13, 14, 15, 18, 19, 21, 22]);
+        // In what the drives refuse, in both of two tables.
+        let drive = |node| format!("[[drive]]\nmodel = 'zlac8030l'\nnode = {node}\nsupply_v = 300\nbattery = false\n");
+        let refused = format!(
+            "{}{}[drive.load]\ntorque_nm = 1e9\npulley = {{ mass_kg = 1e9, radius_m = 1 }}\n",
+            drive(4),
+            drive(5)
+        );
+        assert_eq!(lines_reported(&refused), [4, 5, 9, 10, 12, 13]);
+    }
+
+    #[test]
+    fn what_only_a_machine_refuses_is_reported_at_its_place() {
+        let bad = refusal(&format!("{DRIVE}battery = false"));
+        assert!(
+            bad.starts_with("line 4, column 11: '4 battery off' cannot be done: a zlac8030l has no battery"),
+            "{bad}"
+        );
+        assert!(refusal(&format!("{DRIVE}supply_v = 300")).starts_with("line 4, column 12: supply of node 4"));
+    }
+
+    #[test]
+    fn what_a_master_does_not_use_is_reported() {
+        let text = format!("seed = 3\n{DRIVE}load = {{ torque_nm = 0.5 }}\nfaults = []");
+        assert_eq!(parsed(&text).unused_by_a_master().as_deref(), Some("seed; load, faults of node 4"));
+        assert_eq!(parsed(DRIVE).unused_by_a_master(), None);
+    }
+
+    #[test]
+    fn only_a_file_of_sensible_size_is_read() {
+        let path = std::env::temp_dir().join(format!("ferrodrive-large-{}.toml", std::process::id()));
+        std::fs::write(&path, format!("{DRIVE}# {}", " ".repeat(words::document::LARGEST as usize))).unwrap();
+        let said = machine(path.to_str().unwrap()).err().unwrap_or_default();
+        std::fs::remove_file(&path).unwrap();
+        assert!(said.contains("limit of 1 MB"), "{said}");
+        assert!(machine("/").is_err_and(|said| said.contains("not a regular file")));
+        #[cfg(unix)]
+        assert!(machine("/dev/zero").is_err_and(|said| said.contains("not a regular file")));
+    }
+}

@@ -1,0 +1,3 @@
+//! Machine files and what `check` finds in them. One program: a file each.
+
+mod check;

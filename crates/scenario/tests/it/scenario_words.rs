@@ -1,0 +1,125 @@
+//! What lines of a host and conditions of a scenario mean, seen in what they do to a drive.
+
+use std::path::Path;
+
+use scenario::{Outcome, Runner, Scenario, Verdict};
+
+const MACHINE: &str = "machine = { drive = [{ model = 'zlac8030l', node = 4 }] }\n";
+
+fn run(rest: &str) -> Outcome {
+    let scenario = Scenario::parse(&format!("{MACHINE}{rest}"), Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
+    Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run()
+}
+
+/// Verdict and what was seen of the row that asks this.
+#[track_caller]
+fn row<'a>(outcome: &'a Outcome, asked: &str) -> (Verdict, &'a str) {
+    let row = outcome.rows.iter().find(|row| row.asked.starts_with(asked));
+    row.map(|row| (row.verdict, row.seen.as_str())).unwrap_or_else(|| panic!("no row {asked:?} in {:#?}", outcome.rows))
+}
+
+/// Objects and units: ZLAC8030L CANopen communication of motor drive V1.00: 60FFh in r/min, 606Ch in 0.1 r/min.
+#[test]
+fn process_data_turns_a_wheel_with_each_sync_and_shows_its_speed() {
+    let outcome = run(
+        "[[host]]\ndo = ['4 write 6060 3', '4 nmt pre-operational', '4 pdo map rpdo 1 6040 60FF type 1', \
+         '4 pdo map tpdo 1 6041 606C type 1', '4 nmt start', 'sync 10ms', '4 pdo write 6040 6', 'wait 50ms', \
+         '4 pdo write 6040 7', 'wait 50ms', '4 pdo write 6040 15', 'wait for 4 event state operation-enabled', '4 pdo write 60FF 60', \
+         'wait for 4 event target reached', 'wait 200ms', { do = '4 pdo read 606C', is = 600, tolerance = 20 }, \
+         { do = '4 pdo write 6081 5', fails = 'no RPDO' }, { do = '4 pdo read 6064', fails = 'no TPDO' }]\n\
+         [[expect]]\nthat = '4 velocity = 60 +- 2'\n[[expect]]\nnever = '4 event fault'\n",
+    );
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+}
+
+#[test]
+fn a_pdo_is_taken_as_the_device_has_it_and_what_cannot_be_mapped_is_refused() {
+    let outcome = run(
+        "[[host]]\ndo = ['4 pdo adopt tpdo 1', '4 pdo map tpdo 2 6041 606C', { do = '4 pdo adopt tpdo 2', name = 'mapped' }, { do = '4 pdo map tpdo 1 6064 6064 6064', fails = '64 bits' }, \
+         { do = '4 pdo map tpdo 1 no_such_object', fails = 'no_such_object' }]\n",
+    );
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+    // As delivered its TPDO 1 is empty (ZLAC8030L CANopen communication of motor drive V1.00: 1A00h).
+    assert_eq!(row(&outcome, "4 pdo adopt tpdo 1").1, "TPDO1 carries nothing");
+    assert_eq!(row(&outcome, "4 pdo adopt tpdo 2").1, "TPDO2 carries 6041h:00, 606Ch:00");
+}
+
+#[test]
+fn events_happen_once_each_and_are_reported_with_the_time_at_which_they_do() {
+    let outcome = run("[[step]]\nname = 'low'\nat = '1s'\ndo = '4 supply 12'\n\
+         [[step]]\nname = 'heard'\nwhen = '4 event fault 0x0002'\ndelay = '10ms'\ndo = '4 supply 48'\n\
+         [[expect]]\nthat = 'event stimulus supply'\nafter = 'low'\n\
+         [[expect]]\nthat = '4 event fault 2'\nafter = 'low'\nwithin = '200ms'\n\
+         [[expect]]\nthat = '4 event fault 0x0001'\nafter = 'heard'\nwithin = '100ms'\n\
+         [[expect]]\nnever = '4 event fault'\nafter = 'heard'\nuntil = '2s'\n\
+         [[expect]]\nthat = '4 event boot and 4 powered'\n");
+    // An event before the expectation begins does not count, and a fault that stays does not come again.
+    let failed: Vec<_> = outcome.failures().map(|row| (row.asked.as_str(), row.seen.as_str())).collect();
+    assert_eq!(failed, [("4 event fault 0x0001", "no such event")], "{:#?}", outcome.rows);
+    assert_eq!(row(&outcome, "4 event fault 2"), (Verdict::Passed, "node 4: fault 0002h, under-voltage"));
+}
+
+#[test]
+fn a_world_is_the_same_whether_its_events_are_heard_or_not() {
+    let digest =
+        |expect: &str| run(&format!("end = '2s'\n[[host]]\ndo = ['4 velocity 60rpm']\n[[expect]]\n{expect}\n")).digest;
+    assert_eq!(digest("that = '4 event target reached'"), digest("that = '4 velocity > 5'"));
+}
+
+#[test]
+fn a_body_that_drives_move_is_a_machine_that_steps_act_on() {
+    let machine = "[machine]\ndrive = [{ model = 'zlac8030l', node = 4 }, { model = 'zlac8030l', node = 5 }]\n\
+                   [[machine.body]]\nname = 'base'\nkind = 'differential-drive'\ndrives = [4, 5]\nturns = [1, -1]\n\
+                   mass_kg = 40\nwheel_base_m = 0.5\nwheel_radius_m = 0.08\n";
+    let text = |name: &str| format!("{machine}[[step]]\nat = '1s'\ndo = 'body {name} slope 5'\n");
+    let parse = |text: &str| Scenario::parse(text, Path::new(""));
+    if let Err(bad) = parse(&text("bse")) {
+        assert!(bad.to_string().contains("the machine has no body \"bse\"; it has: base"), "{bad}");
+    } else {
+        panic!("a body that is not there");
+    }
+    for (expect, said) in
+        [("that = 'body bse x_m > 0'", "the machine has no body \"bse\""), ("that = 'body base x > 0'", "has no 'x'")]
+    {
+        let refused = parse(&format!("{}[[expect]]\n{expect}\n", text("base"))).err().map(|bad| bad.to_string());
+        assert!(refused.as_ref().is_some_and(|refused| refused.contains(said)), "{expect}: {refused:?}");
+    }
+    // Down a slope of 5 degrees, uphill being along x, it rolls backwards: nothing holds it.
+    let expects = "[[expect]]\nthat = 'body base x_m < -0.01'\n[figures]\nway = 'last body base x_m'\n";
+    let scenario = parse(&format!("end = '3s'\n{}{expects}", text("base"))).unwrap_or_else(|bad| panic!("{bad}"));
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+}
+
+/// Two free wheels under a base: m g (sin - rolling cos) less the dry friction of both wheels moves its mass and the wheels'.
+#[test]
+fn a_step_that_tilts_the_ground_rolls_a_base_down_and_one_that_levels_it_lets_it_slow_down() {
+    const RADIUS_M: f64 = 0.0865;
+    // The hub motor's rotor inertia in kg·m² and its friction, N·m and as much again at 27.4 rad/s (no-load current of its data sheet).
+    let (weight_n, dry_n, viscous_n_s) =
+        (30.0 * 9.806_65, 2.0 * 0.099 / RADIUS_M, 2.0 * 0.099 / 27.4 / (RADIUS_M * RADIUS_M));
+    let mass_kg = 30.0 + 2.0 * 0.014 / (RADIUS_M * RADIUS_M);
+    // m v' = force - viscous v.
+    let speed = |force_n: f64, from: f64, time_s: f64| {
+        let end = force_n / viscous_n_s;
+        end + (from - end) * (-viscous_n_s / mass_kg * time_s).exp()
+    };
+    let slope = 10_f64.to_radians();
+    let rolled = -speed(weight_n * (slope.sin() - 0.01 * slope.cos()) - dry_n, 0.0, 0.5);
+    let slowed = -speed(-weight_n * 0.01 - dry_n, -rolled, 1.0);
+    let text = format!(
+        "[machine]\ndrive = [{{ model = 'zlac8030l', node = 4 }}, {{ model = 'zlac8030l', node = 5 }}]\n\
+         [[machine.body]]\nname = 'base'\nkind = 'differential-drive'\ndrives = [4, 5]\nturns = [1, -1]\nmass_kg = 30\n\
+         yaw_inertia_kg_m2 = 1.5\nwheel_base_m = 0.5\nwheel_radius_m = {RADIUS_M}\nrolling = 0.01\n\
+         [[step]]\nname = 'tilted'\nat = '1s'\ndo = 'body base slope 10'\n\
+         [[step]]\nat = '1500001us'\ndo = 'body base slope 0'\n\
+         [[expect]]\nat = '999ms'\nthat = 'body base x_m = 0'\n\
+         [[expect]]\nat = '1500ms'\nthat = 'body base speed_m_s = {rolled} +- 0.007'\n\
+         [[expect]]\nat = '2500ms'\nthat = 'body base speed_m_s = {slowed} +- 0.007'\n"
+    );
+    let scenario = Scenario::parse(&text, Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+    let refused = Scenario::parse(&text.replace("slope 0", "slop 0"), Path::new("")).err().map(|bad| bad.to_string());
+    assert!(refused.is_some_and(|said| said.contains("body NAME slope|grip|mass|payload VALUE")));
+}
