@@ -1,4 +1,4 @@
-//! What is read of a drive, checked and set up before it is moved cycle by cycle.
+//! What is read and set up before a drive is moved cycle by cycle: PDOs, units, limits, mode (CiA 402-2).
 
 use core::time::Duration;
 
@@ -99,7 +99,8 @@ fn set_point_of(description: &Description, axis: &AxisDescription, mode: ModeOfO
             Some(SetPointKind::Position(interpolation_data))
         }
         ModeOfOperation::INTERPOLATED_POSITION | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => {
-            Some(SetPointKind::Position(axis.object(TARGET_POSITION)))
+            let target = axis.object(TARGET_POSITION);
+            description.row(target).map(|_| SetPointKind::Position(target))
         }
         ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => {
             axis.units.target_velocity.map(SetPointKind::Quantity)
@@ -478,4 +479,26 @@ fn cadence_of(pdo: &PdoConfig, answers: bool) -> Option<Cadence> {
 
 fn carries(map: &PdoMap, mux: Mux) -> bool {
     map.find(mux).is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use canopen::od::{Entry, Index, Table};
+    use devices::row::{U32, ro};
+    use devices::servo::CIA402;
+
+    use super::*;
+
+    static ROWS: [Entry; 1] = [ro(0x1000, 0, U32, "device_type", "Device type")];
+    static INDEX: Index<1> = Index::of(&ROWS);
+    static TABLE: Table = Table::new(&ROWS, &INDEX);
+    static SPEED_ONLY: Description = Description { dictionary: &TABLE, ..CIA402 };
+
+    #[test]
+    fn a_drive_without_607ah_takes_no_positions_in_cycles() {
+        for mode in [ModeOfOperation::INTERPOLATED_POSITION, ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION] {
+            assert!(set_point_of(&CIA402, &CIA402.axes[0], mode).is_some(), "{mode}");
+            assert!(set_point_of(&SPEED_ONLY, &CIA402.axes[0], mode).is_none(), "{mode}");
+        }
+    }
 }
