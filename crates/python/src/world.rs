@@ -266,7 +266,7 @@ impl World {
 
     /// Becomes the world that a machine file describes; data sheets that it names are looked for beside it.
     fn become_machine(&self, py: Python<'_>, path: PathBuf, seed: Option<u64>, timing: Option<&str>) -> PyResult<()> {
-        let mut machine = machine_file::read(&path).map_err(|reason| bad_value(named(&path, reason)))?;
+        let mut machine = file::read(&path).map_err(|reason| bad_value(named(&path, reason)))?;
         machine.seed = seed.or(machine.seed);
         let said = timing.map(timing_mode).transpose()?;
         // What is green here is to be green on the desk.

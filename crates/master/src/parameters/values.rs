@@ -172,7 +172,7 @@ mod tests {
     fn commands_and_set_points_are_no_parameters_of_any_model() {
         for model in devices::all().iter() {
             let wanted = wanted_of(model);
-            assert!(wanted.len() > 10, "{} has {}", model.name, wanted.len());
+            assert!(!wanted.is_empty(), "{}", model.name);
             for command in [0x6040, 0x607A, 0x60FF, 0x6071, 0x1010, 0x1011] {
                 assert!(wanted.iter().all(|mux| mux.index != command), "{} {command:04X}h", model.name);
             }

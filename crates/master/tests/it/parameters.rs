@@ -81,7 +81,7 @@ fn what_was_read_from_any_model_is_there_already() {
     for model in devices::all().iter() {
         let (mut world, drive) = bench(model);
         let parameters = backed_up(&mut world, &drive);
-        assert!(parameters.values.len() > 10, "{}: {}", model.name, parameters.values.len());
+        assert!(!parameters.values.is_empty(), "{}", model.name);
         let plan = planned(&mut world, &drive, &parameters).unwrap_or_else(|error| panic!("{}: {error}", model.name));
         assert_eq!(plan.steps, [], "{}", model.name);
         assert_eq!(plan.left, [], "{}", model.name);
@@ -97,7 +97,7 @@ fn every_model_takes_what_is_planned_in_that_order_and_reads_back_so() {
         let plan = planned(&mut world, &drive, &wanted).unwrap_or_else(|error| panic!("{}: {error}", model.name));
         let applied = block_on(&mut world, drive.apply_parameters(&plan, |_, _| {})).expect("goes on");
         let applied = applied.expect("at rest").unwrap_or_else(|error| panic!("{}: {error}", model.name));
-        assert!(applied.writes >= 3, "{} has too little to change", model.name);
+        assert!(applied.writes >= 1, "{} has nothing to change", model.name);
         assert_eq!(applied.writes, plan.steps.len(), "{}", model.name);
         assert!(applied.rounded.is_empty() && applied.displaced.is_empty(), "{}: {applied:?}", model.name);
         assert_eq!(diff(&backed_up(&mut world, &drive).values, &wanted.values), [], "{}", model.name);

@@ -89,10 +89,8 @@ pub trait Assembly: Clone + Send + 'static {
     /// What the firmware finds when it wakes.
     fn hardware(&self) -> <Self::Firmware as Firmware>::Hardware;
 
-    /// How long the next resets by NMT take on this hardware; a firmware that ignores it takes no time.
-    fn set_reset_times(firmware: &mut Self::Firmware, times: ResetTimes) {
-        let _ = (firmware, times);
-    }
+    /// How long the next resets by NMT take on this hardware: drawn from the description's [`Timing`](devices::Timing).
+    fn set_reset_times(firmware: &mut Self::Firmware, times: ResetTimes);
 
     /// What the sensors read now; bit `n` of `inputs` is the level of input `n`.
     fn sense(&self, inputs: u64) -> <Self::Firmware as Firmware>::Sensors;
