@@ -17,7 +17,6 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
 use can::Tap;
 use canopen::{Mux, NmtCommand, NodeId};
@@ -32,7 +31,7 @@ use words::models::{Description, with_files};
 
 pub(crate) use job::Job;
 use job::Trouble;
-use order::Order;
+use order::{Order, duration};
 use runner::Runner;
 use tap::Traffic;
 use value::Value;
@@ -327,8 +326,4 @@ fn nmt_command(word: &str) -> PyResult<NmtCommand> {
             "{word:?} is not an NMT command; expected start, stop, pre-operational, reset or reset-communication"
         ))),
     }
-}
-
-fn duration(seconds: f64) -> PyResult<Duration> {
-    Duration::try_from_secs_f64(seconds).map_err(|error| bad_value(format!("{seconds} s: {error}")))
 }

@@ -1,10 +1,11 @@
 //! What a drive is asked to do, as it comes from Python: plain values.
 
+use std::time::Duration;
+
 use master::drive::{Command, Manner, Motion, SwitchedOff};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 use pyo3::prelude::*;
 
-use super::duration;
 use crate::failure::bad_value;
 
 /// What a drive is asked to do, in plain values.
@@ -82,4 +83,9 @@ impl Order {
             None => self.value().map(|degrees| Angle::Turns(degrees / 360.0)),
         }
     }
+}
+
+/// A time that Python gives in seconds.
+pub(super) fn duration(seconds: f64) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(seconds).map_err(|error| bad_value(format!("{seconds} s: {error}")))
 }
