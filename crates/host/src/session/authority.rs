@@ -48,7 +48,7 @@ impl Refusal {
     }
 }
 
-/// See the [module](self).
+/// The sessions, which of them has control, and who asked for it.
 #[derive(Debug, Default)]
 pub struct Authority {
     /// The highest sequence number of each session.
