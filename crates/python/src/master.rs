@@ -8,6 +8,7 @@ mod job;
 mod order;
 pub(crate) mod params;
 mod runner;
+mod slot;
 pub(crate) mod supervise;
 pub(crate) mod tap;
 mod value;

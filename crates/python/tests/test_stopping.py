@@ -216,3 +216,138 @@ def test_an_interrupted_run_of_pytest_stops_what_its_fixtures_moved(pytester):
     (after,) = (line.split() for line in result.outlines if line.startswith("after"))
     assert after[1] == "2"
     assert all(abs(float(speed)) < 1.0 for speed in after[2:])
+
+
+def speed_of(world):
+    """Now: a world that is run by hand keeps what is moved in cycles waiting."""
+    return max(abs(world[node].velocity_rpm) for node in (1, 2))
+
+
+class OpenedWheels:
+    """A base of two hub motors that drives."""
+
+    def __init__(self, **options):
+        self.world = ferrodrive.World()
+        for node in (1, 2):
+            self.world.add("zlac8030l", node=node)
+        self.network = ferrodrive.Network(self.world)
+        self.network.sleep(1)
+        limits = {"linear_m_s": 0.8, "angular_rad_s": 2, "wheel_m_s": 0.8, "wheel_m_s2": 2}
+        sides = (1, "zlac8030l"), (2, "zlac8030l")
+        # Neither the watchdog nor the lag is what stops it.
+        self.base = self.network.base(
+            *sides, wheel_base_m=0.4, wheel_radius_m=0.1, watchdog=60.0, lag_m=1000.0, **limits, **options
+        )
+
+
+class OpenedAxes:
+    """A group of two axes that moves."""
+
+    def __init__(self, following_error_deg=72.0):
+        self.world = ferrodrive.World(bitrate=1_000_000)
+        for node in (1, 2):
+            self.world.add("cia402", node=node)
+        self.network = ferrodrive.Network(self.world)
+        self.network.sleep(1)
+        limits = {"velocity_rpm": 60, "acceleration_rpm_s": 300, "following_error_deg": following_error_deg}
+        axes = [ferrodrive.Axis(node, "cia402", mode="csp", **limits) for node in (1, 2)]
+        self.group = self.network.group(axes, period=0.002)
+
+
+def test_a_stop_of_a_base_ends_when_its_wheels_were_seen_to_stand():
+    wheels = OpenedWheels()
+    with wheels.network, wheels.base as base:
+        for end in (lambda: base.drive(0.5, 0.0, 1.0), lambda: (base.command(0.5, 0.0), wheels.network.sleep(1), base.stop())):
+            end()
+            assert speed_of(wheels.world) < 1.0
+
+
+@pytest.mark.parametrize("end", ["stop", "drive"])
+def test_a_wheel_that_its_load_keeps_turning_is_not_said_to_stand(end):
+    wheels = OpenedWheels()
+    base = wheels.base
+    base.command(0.3, 0.0)
+    wheels.network.sleep(0.5)
+    # More than the motor has.
+    wheels.world.apply("1 load torque 60")
+    with pytest.raises(ferrodrive.MasterError, match="node 1") as raised:
+        base.stop() if end == "stop" else base.drive(0.3, 0.0, 0.2)
+    assert raised.value.kind == "base"
+    assert abs(wheels.world[1].velocity_rpm) > 20.0
+    # It is still there, to be asked and closed.
+    assert base.state() is not None
+    wheels.world[1].lock_rotor()
+    base.close()
+    wheels.network.close()
+    assert speed_of(wheels.world) < 2.0
+
+
+class Interrupts:
+    """Raises KeyboardInterrupt in the calls that wait, as Ctrl-C does, once so much time has passed in the world."""
+
+    def __init__(self, monkeypatch, world, after):
+        end, move = world.now + after, ferrodrive.Network._move_world
+
+        def interrupted(world, job):
+            while not job.ended:
+                if world.now >= end:
+                    monkeypatch.setattr(ferrodrive.Network, "_move_world", staticmethod(move))
+                    raise KeyboardInterrupt
+                world.advance(world.now_ns + 1_000_000, [])
+
+        monkeypatch.setattr(ferrodrive.Network, "_move_world", staticmethod(interrupted))
+
+
+@pytest.mark.parametrize("after", [0.5, 1.1, 1.3])
+def test_an_interrupted_drive_of_a_base_comes_to_rest_and_the_base_is_still_there(monkeypatch, after):
+    wheels = OpenedWheels()
+    with wheels.network:
+        Interrupts(monkeypatch, wheels.world, after)
+        with pytest.raises(KeyboardInterrupt):
+            wheels.base.drive(0.5, 0.0, 1.0)
+        wheels.network.sleep(1.0)
+        assert speed_of(wheels.world) < 1.0
+        # It goes on by the next command.
+        wheels.base.drive(0.2, 0.0, 0.5)
+        wheels.base.close()
+
+
+@pytest.mark.parametrize("after", [0.1, 0.4])
+def test_an_interrupted_close_goes_on_and_the_next_one_waits_for_it(monkeypatch, after):
+    wheels = OpenedWheels()
+    with wheels.network:
+        wheels.base.command(0.5, 0.0)
+        wheels.network.sleep(1)
+        Interrupts(monkeypatch, wheels.world, after)
+        with pytest.raises(KeyboardInterrupt):
+            wheels.base.close()
+        wheels.base.close()
+        assert speed_of(wheels.world) < 1.0
+        assert wheels.network.drive(1, "zlac8030l").state()["power"] != "Operation enabled"
+        with pytest.raises(ferrodrive.MasterError, match="it was closed"):
+            wheels.base.command(0.1, 0.0)
+
+
+def test_an_interrupted_move_of_a_group_comes_to_rest_and_the_group_goes_on(monkeypatch):
+    axes = OpenedAxes()
+    with axes.network:
+        Interrupts(monkeypatch, axes.world, 0.5)
+        with pytest.raises(KeyboardInterrupt):
+            axes.group.move([36000, 36000])
+        axes.network.sleep(1.0)
+        assert speed_of(axes.world) < 1.0
+        assert axes.group.move([0, 0]) > 0.0
+        assert speed_of(axes.world) < 1.0
+        axes.group.close()
+
+
+def test_a_group_has_a_state_while_it_explains_its_stop():
+    axes = OpenedAxes()
+    with axes.network:
+        job = axes.group._native.move_to([360, 360], None)
+        axes.world.apply("2 fault encoder on")
+        while not job.ended:
+            axes.world.advance(axes.world.now_ns + 100_000, [])
+            assert axes.group.state()["phase"]
+        with pytest.raises(ferrodrive.MasterError, match="axis 2, node 2"):
+            job.result()

@@ -4,7 +4,6 @@ use core::fmt;
 use core::time::Duration;
 
 use can::Instant;
-use canopen::NodeId;
 use cia402::ModeOfOperation;
 use cia402::object::CONTROLWORD;
 
@@ -12,7 +11,7 @@ use super::kinematics::{Geometry, Pose, Twist, Wheels};
 use super::limits::{BaseError, BaseLimits};
 use super::state::StopCause;
 use crate::core::NodeSet;
-use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, Refusal};
+use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, Refusal, Standstill};
 
 use crate::drive::{Drive, STANDSTILL_RPM};
 use crate::error::Error;
@@ -77,6 +76,10 @@ pub struct Base {
     sent: Wheels,
     state: BaseState,
     now: Instant,
+    /// It is to come to rest, and no twist came since.
+    is_stopping: bool,
+    /// Cycles for which the wheels have been commanded to no speed since then.
+    still_cycles: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,6 +100,7 @@ struct Wheel {
     /// Lag behind the commanded way, m. A part is forgotten in each cycle: speeds are rounded.
     behind_m: f64,
     shows: Option<CyclicState>,
+    standstill: Standstill,
     _claim: Claim,
 }
 
@@ -137,6 +141,8 @@ impl Base {
             limits,
             period,
             power: Power::Off,
+            is_stopping: false,
+            still_cycles: 0,
             wanted: Twist::default(),
             wanted_at: None,
             sent: Wheels::default(),
@@ -164,6 +170,7 @@ impl Base {
             Some(cause) if cause.wheel().is_some() => return Err(BaseError::Stopped(cause)),
             _ => self.state.cause = None,
         }
+        self.is_stopping = false;
         self.wanted = self.geometry.saturate(twist, &self.limits);
         self.wanted_at = Some(self.network.now());
         Ok(())
@@ -181,7 +188,9 @@ impl Base {
                 Power::Off => Demand::Off,
                 Power::Enabling | Power::On => Demand::Velocity(Rpm(m_s * turns_per_m * wheel.turns * 60.0)),
             };
-            wheel.shows = Some(wheel.drive.step(io, demand));
+            let shown = wheel.drive.step(io, demand);
+            wheel.standstill.look(&shown);
+            wheel.shows = Some(shown);
         }
         let period_s = self.period.as_secs_f64();
         for (wheel, m_s) in self.wheels.iter_mut().zip(sent) {
@@ -196,6 +205,8 @@ impl Base {
             self.power = Power::On;
         }
         self.state.commanded = self.geometry.twist(self.sent);
+        let is_still = self.is_stopping && self.state.commanded == Twist::default();
+        self.still_cycles = if is_still { self.still_cycles + 1 } else { 0 };
         self.state
     }
 
@@ -318,54 +329,73 @@ impl Base {
         Err(BaseError::NotEnabled { limit: POWER_LIMIT, left, right })
     }
 
-    /// Brings the base to rest within its limits, until both wheels were seen to stand; it stays powered.
+    /// Has the base come to rest within its limits, from the next cycle on, until another twist comes. It stays powered.
+    pub fn start_stop(&mut self) {
+        self.wanted = Twist::default();
+        (self.is_stopping, self.still_cycles) = (true, 0);
+    }
+
+    /// True from [`start_stop`](Self::start_stop) on until a twist comes.
+    pub const fn is_stopping(&self) -> bool {
+        self.is_stopping
+    }
+
+    /// What became of [`start_stop`](Self::start_stop): `None` while the wheels come to rest, `Ok` once both were seen to stand.
     ///
     /// # Errors
-    /// As [`cycle`](Self::cycle); [`BaseError::Stopped`], once it has been commanded to speed 0, where a wheel was lost
-    /// before or on the way to rest; [`BaseError::StillTurns`] for a wheel that does not come to rest.
-    pub async fn stop(&mut self) -> Result<(), BaseError> {
-        self.wanted = Twist::default();
-        // From the highest speed, and some cycles.
-        let time = Duration::from_secs_f64((self.limits.wheel_m_s / self.limits.wheel_m_s2).min(3600.0));
-        for _ in 0..self.cycles(time) + 4 {
-            if self.cycle().await?.commanded == Twist::default() {
-                break;
-            }
+    /// [`BaseError::Stopped`], once it has been commanded to speed 0, where a wheel was lost before or on the way to rest;
+    /// [`BaseError::StillTurns`] for a wheel that does not come to rest.
+    pub fn stopped(&self) -> Option<Result<(), BaseError>> {
+        if self.still_cycles == 0 {
+            return None;
         }
-        // A wheel follows its set-point some time later, its speed is a mean, and it may swing through 0.
-        let mut standing = 0;
-        for _ in 0..self.cycles(REST_LIMIT) {
-            if self.lost_wheel().is_some() || standing >= self.cycles(REST_TIME) {
-                break;
-            }
-            self.cycle().await?;
-            standing = if self.turning().is_none() { standing + 1 } else { 0 };
+        if let Some(cause) = self.lost_wheel() {
+            return Some(Err(BaseError::Stopped(cause)));
         }
-        match (self.lost_wheel(), self.turning()) {
-            (Some(cause), _) => Err(BaseError::Stopped(cause)),
-            (None, Some((node, rpm))) => Err(BaseError::StillTurns { node, rpm, limit: REST_LIMIT }),
-            (None, None) => Ok(()),
+        let turning = self.wheels.iter().find(|wheel| !wheel.standstill.stands());
+        match turning {
+            // A wheel that was about to turn had still stood when it was stopped.
+            None if self.wheels.iter().all(|wheel| self.still_cycles >= wheel.standstill.needed()) => Some(Ok(())),
+            Some(wheel) if self.still_cycles >= self.cycles(REST_LIMIT) => Some(Err(BaseError::StillTurns {
+                node: wheel.drive.node(),
+                rpm: wheel.standstill.turned_rpm(),
+                limit: REST_LIMIT,
+            })),
+            _ => None,
         }
     }
 
-    /// A wheel that shows a speed, in r/min.
-    fn turning(&self) -> Option<(NodeId, f64)> {
-        let speed = |wheel: &Wheel| wheel.shows.and_then(|shown| shown.velocity).map_or(0.0, |Rpm(speed)| speed);
-        let turning = self.wheels.iter().find(|wheel| speed(wheel).abs() >= STANDSTILL_RPM)?;
-        Some((turning.drive.node(), speed(turning)))
+    /// Brings the base to rest within its limits, until both wheels were seen to stand; it stays powered.
+    ///
+    /// # Errors
+    /// As [`cycle`](Self::cycle) and [`stopped`](Self::stopped).
+    pub async fn stop(&mut self) -> Result<(), BaseError> {
+        self.start_stop();
+        loop {
+            self.cycle().await?;
+            if let Some(stopped) = self.stopped() {
+                return stopped;
+            }
+        }
     }
 
     /// Asks the wheel that stopped the base what is the matter with it: its fault with its text, or what it is missing. The
     /// cycles go on meanwhile. `None` where no wheel was the cause, or it has nothing to say.
     pub async fn explain_stop(&mut self) -> Option<Error> {
-        let StopCause::Wheel { node, refusal } = self.state.cause? else { return None };
-        let [left, right] = self.drives.clone();
-        let drive = if left.node().id() == node { left } else { right };
+        let question = self.explanation()?;
         let network = self.network.clone();
         let step = |io: &mut Exchange<'_>| {
             self.step(io);
         };
-        network.ask_beside_cycles(drive.explain_refusal(refusal), step).await
+        network.ask_beside_cycles(question, step).await
+    }
+
+    /// The question of [`explain_stop`](Self::explain_stop) alone, for a base that is stepped elsewhere meanwhile.
+    pub fn explanation(&self) -> Option<impl Future<Output = Option<Error>> + Send + use<>> {
+        let StopCause::Wheel { node, refusal } = self.state.cause? else { return None };
+        let [left, right] = &self.drives;
+        let drive = if left.node().id() == node { left } else { right }.clone();
+        Some(async move { drive.explain_refusal(refusal).await })
     }
 
     fn lost_wheel(&self) -> Option<StopCause> {
@@ -447,7 +477,10 @@ impl WheelSetup {
             }
             Some(_) if drive.shows_position() && drive.set_point().is_none() => {
                 self.drive.write_ramps_of_a_cycle(period, rpm_of(limits.wheel_m_s2)).await?;
-                Ok(Wheel { drive, turns: self.turns, counted_turns: None, behind_m: 0.0, shows: None, _claim: claim })
+                let limit_rpm = self.drive.gear().at_output(STANDSTILL_RPM);
+                let standstill = Standstill::new(limit_rpm, REST_TIME, period.as_secs_f64());
+                let (turns, counted_turns, behind_m, shows) = (self.turns, None, 0.0, None);
+                Ok(Wheel { drive, turns, counted_turns, behind_m, shows, standstill, _claim: claim })
             }
             _ => Err(BaseError::NoWheel { node }),
         }

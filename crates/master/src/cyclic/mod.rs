@@ -9,8 +9,10 @@ mod drive;
 mod explain;
 mod open;
 mod sequence;
+mod standstill;
 mod target;
 
 pub use demand::{Bound, CyclicState, Demand, Refusal};
 pub use drive::CyclicDrive;
 pub use open::{CyclicError, CyclicOptions};
+pub(crate) use standstill::Standstill;

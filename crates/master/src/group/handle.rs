@@ -7,7 +7,7 @@ use can::Instant;
 
 use super::error::GroupError;
 use super::limits::PathPoint;
-use super::runner::{Activity, Runner};
+use super::runner::{Activity, POWER_LIMIT, Runner};
 use super::state::{GroupState, Phase, StopCause};
 use super::stream::{Stream, StreamOptions};
 use super::trajectory::Trajectory;
@@ -18,8 +18,8 @@ use crate::error::Error;
 use crate::network::{Exchange, Network};
 use crate::units::Turns;
 
-/// How long drives may take to be enabled, and to be without power again.
-const POWER_LIMIT: Duration = Duration::from_secs(5);
+/// How long after the last set-point an axis may take to show that it stands.
+const REST_LIMIT: Duration = Duration::from_secs(2);
 
 /// Cycles after which a drive that is not heard is not waited for.
 const UNHEARD: u64 = 10;
@@ -114,7 +114,7 @@ impl Group {
     /// # Errors
     /// [`GroupError::Path`], [`GroupError::Stopped`], [`GroupError::Phase`]; then nothing changes.
     pub fn start_move(&mut self, to: &[Turns], within: Option<Duration>) -> Result<Duration, GroupError> {
-        self.check_going()?;
+        self.go_on()?;
         if !matches!(self.runner.activity, Activity::Holding | Activity::Moving { .. }) {
             return Err(self.not_now());
         }
@@ -139,17 +139,35 @@ impl Group {
     /// # Errors
     /// As [`cycle`](Self::cycle); [`GroupError::Stopped`], once all axes rest.
     pub async fn rest(&mut self) -> Result<(), GroupError> {
-        while matches!(self.state().phase, Phase::Moving | Phase::Streaming | Phase::Stopping) {
+        while self.runner.is_under_way() {
             self.cycle().await?;
-            // A quick stop has no end that the group plans: its drives stand when they report it, and the wait is
-            // bounded.
-            if let Activity::QuickStop { cycles } = self.runner.activity
-                && (self.runner.has_quick_stopped() || cycles > self.cycles(POWER_LIMIT))
-            {
-                break;
-            }
         }
         self.check_going()
+    }
+
+    /// Whether the axes stand: `None` while they are on their way or it is not seen yet, `Ok` once all were seen to stand. What
+    /// stopped them is in [`state`](Self::state).
+    ///
+    /// # Errors
+    /// [`GroupError::StillTurns`] for an axis that does not come to rest, [`GroupError::NotSeen`] for one that is not heard.
+    pub fn stands(&self) -> Option<Result<(), GroupError>> {
+        let runner = &self.runner;
+        if runner.is_under_way() {
+            return None;
+        }
+        let mut axes = runner.axes.iter().zip(&runner.states);
+        match axes.find(|(axis, _)| !axis.standstill.stands()) {
+            // An axis that was about to turn had still stood when it was stopped.
+            None if runner.axes.iter().all(|axis| runner.still_cycles >= axis.standstill.needed()) => Some(Ok(())),
+            Some((axis, state)) if runner.still_cycles >= self.cycles(REST_LIMIT) => {
+                let (node, rpm) = (axis.drive.node(), axis.standstill.turned_rpm());
+                Some(Err(match state.statusword {
+                    Some(_) => GroupError::StillTurns { node, rpm, limit: REST_LIMIT },
+                    None => GroupError::NotSeen { node },
+                }))
+            }
+            _ => None,
+        }
     }
 
     /// Begins to take points: one for each cycle.
@@ -157,7 +175,7 @@ impl Group {
     /// # Errors
     /// [`GroupError::Stopped`], [`GroupError::Phase`] for a group that does not hold, [`GroupError::StreamOption`].
     pub fn start_stream(&mut self, options: StreamOptions) -> Result<(), GroupError> {
-        self.check_going()?;
+        self.go_on()?;
         if !matches!(self.runner.activity, Activity::Holding) {
             return Err(self.not_now());
         }
@@ -194,21 +212,26 @@ impl Group {
         if matches!(self.runner.activity, Activity::Moving { .. } | Activity::Streaming(_)) {
             self.runner.stop(StopCause::Asked);
         }
+        self.runner.still_cycles = 0;
     }
 
-    /// Brings all axes to rest and leaves them powered. The group can be moved again.
+    /// Brings all axes to rest, until they were seen to stand, and leaves them powered. The group can be moved again.
     ///
     /// # Errors
-    /// As [`cycle`](Self::cycle); [`GroupError::Stopped`] by another cause.
+    /// As [`cycle`](Self::cycle) and [`stands`](Self::stands); [`GroupError::Stopped`] by another cause.
     pub async fn stop(&mut self) -> Result<(), GroupError> {
         self.start_stop();
-        match self.rest().await {
-            Err(GroupError::Stopped(StopCause::Asked)) => {
-                self.runner.cause = None;
-                Ok(())
+        let stands = loop {
+            self.cycle().await?;
+            if let Some(stands) = self.stands() {
+                break stands;
             }
-            other => other,
+        };
+        if self.runner.cause == Some(StopCause::Asked) {
+            self.runner.cause = None;
         }
+        self.check_going()?;
+        stands
     }
 
     /// Brings all axes to rest and takes their power. The group can be enabled again.
@@ -269,13 +292,27 @@ impl Group {
     /// Asks the drive that stopped the group what is the matter with it: its fault with its text, or what it is missing. The
     /// cycles go on meanwhile. `None` where no drive was the cause, or it has nothing to say.
     pub async fn explain_stop(&mut self) -> Option<Error> {
-        let StopCause::Axis { axis, refusal, .. } = self.runner.cause? else { return None };
-        let drive = self.drives.get(axis.checked_sub(1)?)?;
+        let question = self.explanation()?;
         let runner = &mut self.runner;
         let step = |io: &mut Exchange<'_>| {
             runner.step(io);
         };
-        self.network.ask_beside_cycles(drive.explain_refusal(refusal), step).await
+        self.network.ask_beside_cycles(question, step).await
+    }
+
+    /// The question of [`explain_stop`](Self::explain_stop) alone, for a group that is stepped elsewhere meanwhile.
+    pub fn explanation(&self) -> Option<impl Future<Output = Option<Error>> + Send + use<>> {
+        let StopCause::Axis { axis, refusal, .. } = self.runner.cause? else { return None };
+        let drive = self.drives.get(axis.checked_sub(1)?)?.clone();
+        Some(async move { drive.explain_refusal(refusal).await })
+    }
+
+    /// A stop that was asked for does not outlast the next command.
+    fn go_on(&mut self) -> Result<(), GroupError> {
+        if self.runner.cause == Some(StopCause::Asked) && matches!(self.runner.activity, Activity::Holding) {
+            self.runner.cause = None;
+        }
+        self.check_going()
     }
 
     fn check_going(&self) -> Result<(), GroupError> {
@@ -293,7 +330,7 @@ impl Group {
     }
 
     fn cycles(&self, time: Duration) -> u64 {
-        (time.as_secs_f64() / self.runner.period_s).ceil() as u64
+        self.runner.cycles(time)
     }
 }
 

@@ -1,5 +1,7 @@
 //! What a group does in one cycle: the state machine between its intents and its drives.
 
+use core::time::Duration;
+
 use can::Instant;
 use cia402::{PowerState, Statusword};
 
@@ -11,6 +13,9 @@ use super::trajectory::Trajectory;
 use crate::core::Cycle;
 use crate::cyclic::{CyclicState, Demand, Refusal};
 use crate::network::Exchange;
+
+/// How long drives may take to be enabled, and to be without power again.
+pub(super) const POWER_LIMIT: Duration = Duration::from_secs(5);
 
 /// What the axes are on.
 #[derive(Debug)]
@@ -44,6 +49,8 @@ pub(super) struct Runner {
     pub(super) activity: Activity,
     pub(super) cause: Option<StopCause>,
     pub(super) period_s: f64,
+    /// Cycles for which the axes have had nowhere to go.
+    pub(super) still_cycles: u64,
     seen: Option<Cycle>,
     missed_cycles: u64,
     /// When the last move or stream sent its first set-points.
@@ -72,6 +79,7 @@ impl Runner {
             activity: Activity::Off,
             cause: None,
             period_s,
+            still_cycles: 0,
             seen: None,
             missed_cycles: 0,
             began: None,
@@ -112,7 +120,22 @@ impl Runner {
         {
             self.activity = Activity::Off;
         }
+        self.still_cycles = if self.is_under_way() { 0 } else { self.still_cycles + 1 };
         self.state()
+    }
+
+    /// The axes have somewhere to go, or to come to rest. A quick stop has no end that the group plans: its drives stand when
+    /// they report it, and the wait is bounded.
+    pub(super) fn is_under_way(&self) -> bool {
+        match self.activity {
+            Activity::Off | Activity::Enabling | Activity::Holding => false,
+            Activity::Moving { .. } | Activity::Streaming(_) | Activity::Stopping { .. } => true,
+            Activity::QuickStop { cycles } => !self.has_quick_stopped() && cycles <= self.cycles(POWER_LIMIT),
+        }
+    }
+
+    pub(super) fn cycles(&self, time: Duration) -> u64 {
+        (time.as_secs_f64() / self.period_s).ceil() as u64
     }
 
     /// The points of this cycle. A path goes on by one period a step: cycles that the program missed delay it, since to make
@@ -187,6 +210,7 @@ impl Runner {
                 Some(demand) => axis.drive.step(io, demand),
                 None => axis.follow(io, *point, limits, state),
             };
+            axis.standstill.look(state);
         }
     }
 

@@ -13,6 +13,7 @@ time passes in it. When one faults, is lost or lags, all come to rest, and the c
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from types import TracebackType
@@ -20,6 +21,8 @@ from typing import TYPE_CHECKING, Any, Optional, Union, cast
 
 from ._native import Base as NativeBase
 from ._native import Group as NativeGroup
+from ._native import Job
+from .errors import BusWarning, MasterError
 from .reports import BaseState, BaseTwist, GroupState
 
 if TYPE_CHECKING:
@@ -64,6 +67,7 @@ class _Open:
     def __init__(self, network: Network, native: Any) -> None:
         self.network = network
         self._native = native
+        self._closing: Optional[Job] = None
 
     def _opened(self, job: Any) -> None:
         self.network._finish(job)
@@ -73,13 +77,26 @@ class _Open:
         self.network._finish(self._native.stop())
 
     def close(self) -> None:
-        if not self.network.closed:
-            self.network._finish(self._native.close())
+        if self.network.closed:
+            return
+        # One that was interrupted (Ctrl-C) goes on, and the next call waits for its end.
+        job = self._closing = self._closing or self._native.close()
+        try:
+            self.network._finish(job, keep=True)
+        finally:
+            if job.ended:
+                self._closing = None
 
     def __exit__(
         self, kind: Optional[type[BaseException]], error: Optional[BaseException], traceback: Optional[TracebackType]
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        except MasterError as moving:
+            if error is None:
+                raise
+            # What went wrong first is what is raised; that a drive may still be moving is a warning beside it.
+            warnings.warn(str(moving), BusWarning, stacklevel=2)
 
 
 class Group(_Open):
@@ -102,9 +119,9 @@ class Group(_Open):
         return self
 
     def stop(self) -> None:
-        """Comes to rest within its limits, and keeps its power.
+        """Comes to rest within its limits, until all axes were seen to stand, and keeps its power.
 
-        :raises MasterError: what went wrong before or on the way
+        :raises MasterError: what went wrong before or on the way; an axis still turns (kind ``group``)
 
         >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
         ...     group.stop()
@@ -122,7 +139,8 @@ class Group(_Open):
         super().close()
 
     def move(self, to_deg: Sequence[float], within: Optional[float] = None) -> float:
-        """All axes to these positions, together. Waits until they are there; returns how long the path takes, in s.
+        """All axes to these positions, together. Waits until they were seen to stand there; returns how long the path takes, in s. One that
+        is interrupted (Ctrl-C), or whose coroutine is cancelled, comes to rest within its limits.
 
         :param to_deg: a position of each axis in degrees
         :param within: how long it takes in s; without it the shortest time within the limits
@@ -182,9 +200,9 @@ class Base(_Open):
         return self
 
     def stop(self) -> None:
-        """Comes to rest within its limits, and keeps its power.
+        """Comes to rest within its limits, until both wheels were seen to stand, and keeps its power.
 
-        :raises MasterError: a wheel was lost before or on the way
+        :raises MasterError: a wheel was lost before or on the way, or still turns (kind ``base``)
 
         >>> base.command(0.3, 0.0)["limited"]
         False
@@ -216,9 +234,10 @@ class Base(_Open):
         return cast(BaseTwist, self._native.command(linear_m_s, angular_rad_s))
 
     def drive(self, linear_m_s: float, angular_rad_s: float, seconds: float) -> BaseTwist:
-        """Drives with this twist for so many seconds, and comes to rest. Limits and what is returned are those of :meth:`command`.
+        """Drives with this twist for so many seconds, and comes to rest, until both wheels were seen to stand; also where it is interrupted
+        (Ctrl-C). Limits and what is returned are those of :meth:`command`.
 
-        :raises MasterError: what stopped it on its way
+        :raises MasterError: what stopped it on its way, or a wheel that still turns (kind ``base``)
 
         >>> base.drive(5.0, 0.0, seconds=0.5)       # 0.8 m/s is the most of this base
         {'linear_m_s': 0.8, 'angular_rad_s': 0.0, 'limited': True}

@@ -111,10 +111,12 @@ class Network(Whole):
 
     # Waiting for the master.
 
-    def _finish(self, job: Job) -> Any:
-        """The result of a job, waited for."""
+    def _finish(self, job: Job, keep: bool = False) -> Any:
+        """The result of a job, waited for. One that is interrupted is given up, unless it is to be kept."""
         try:
-            if self._world is None:
+            if job.ended:
+                pass
+            elif self._world is None:
                 job.wait()
             elif (time := taking_part(self._world)) is not None:
                 wait = time.begin("waits for the master")
@@ -123,7 +125,8 @@ class Network(Whole):
             else:
                 self._move_world(self._world, job)
         except BaseException:
-            job.cancel()
+            if not keep:
+                job.cancel()
             raise
         return self._result(job)
 

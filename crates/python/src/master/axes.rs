@@ -1,8 +1,6 @@
 //! Groups and bases for Python: opened and enabled by one job, stepped in each cycle of SYNC by another one for as long as they are
 //! there, so that the drives are kept while the program does something else, and sent where they are to go by further ones.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use can::Bitrate;
@@ -10,14 +8,15 @@ use machine::file::CyclePlan;
 use master::base::{Base as MasterBase, BaseError, BaseLimits, BaseState, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
 use master::drive::Drive;
-use master::group::{AxisLimits, AxisSetup, Group as MasterGroup, GroupError, Phase, StreamOptions};
+use master::group::{AxisLimits, AxisSetup, Group as MasterGroup, GroupError, StopCause, StreamOptions};
 use master::units::Turns;
-use master::{Error, Exchange, Network as Core};
+use master::{Error, Network as Core};
 use pyo3::prelude::*;
 use words::failure::Failure;
 use words::mode::mode;
 
 use super::job::Trouble;
+use super::slot::Slot;
 use super::value::Value;
 use super::{Job, Network, duration};
 use crate::failure::bad_value;
@@ -75,73 +74,6 @@ pub(crate) struct BaseOrder {
     watchdog_s: f64,
     #[pyo3(item)]
     lag_m: Option<f64>,
-}
-
-/// What is stepped in each cycle.
-trait Stepped: Send + 'static {
-    fn step_once(&mut self, io: &mut Exchange<'_>);
-}
-
-impl Stepped for MasterGroup {
-    fn step_once(&mut self, io: &mut Exchange<'_>) {
-        self.step(io);
-    }
-}
-
-impl Stepped for MasterBase {
-    fn step_once(&mut self, io: &mut Exchange<'_>) {
-        self.step(io);
-    }
-}
-
-/// A group or a base, as the jobs share it.
-struct Slot<T> {
-    inner: Arc<Inner<T>>,
-}
-
-struct Inner<T> {
-    /// Empty before it was opened, and while a job has it.
-    open: Mutex<Option<T>>,
-    closed: AtomicBool,
-}
-
-impl<T> Clone for Slot<T> {
-    fn clone(&self) -> Self {
-        Self { inner: Arc::clone(&self.inner) }
-    }
-}
-
-impl<T: Stepped> Slot<T> {
-    fn empty() -> Self {
-        Self { inner: Arc::new(Inner { open: Mutex::new(None), closed: AtomicBool::new(false) }) }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Option<T>> {
-        self.inner.open.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Does something with what is open.
-    fn with<R>(&self, ask: impl FnOnce(&mut T) -> Result<R, Trouble>) -> Result<R, Trouble> {
-        self.lock().as_mut().map_or_else(
-            || Err(Trouble::Said("it was closed: open it again, network.group(..) or network.base(..)".into())),
-            ask,
-        )
-    }
-
-    fn close(&self) -> Option<T> {
-        self.inner.closed.store(true, Ordering::Relaxed);
-        self.lock().take()
-    }
-
-    /// One cycle after the other, until it is closed or SYNC ends: then the master has stopped the drives.
-    async fn keep(self, core: Core) -> Result<Value, Trouble> {
-        while core.next_sync().await.is_ok() && !self.inner.closed.load(Ordering::Relaxed) {
-            if let Some(open) = self.lock().as_mut() {
-                core.exchange(|io| open.step_once(io));
-            }
-        }
-        Ok(Value::None)
-    }
 }
 
 /// Several axes that move as one; `ferrodrive.Group` is what users have.
@@ -250,6 +182,7 @@ impl Group {
         let within = within_s.map(duration).transpose()?;
         self.network.get().begin_said(py, async move {
             let time = slot.with(|group| Ok(group.start_move(&turns(&to_deg), within)?))?;
+            let _brake = slot.brake();
             rest(&core, &slot, |_| Ok(())).await?;
             Ok(Value::Real(time.as_secs_f64()))
         })
@@ -262,8 +195,9 @@ impl Group {
             let options =
                 StreamOptions { capacity: 2 * AHEAD, prefill: AHEAD.min(points_deg.len()), ..StreamOptions::default() };
             slot.with(|group| Ok(group.start_stream(options)?))?;
+            let _brake = slot.brake();
             let mut left = points_deg.iter();
-            rest(&core, &slot, |group| {
+            let moved = rest(&core, &slot, |group| {
                 while group.stream().is_some_and(|stream| stream.room() > 0) {
                     match left.next() {
                         // A point that breaks a limit ends the path: what was given before it is moved, and the group rests.
@@ -275,8 +209,9 @@ impl Group {
                     }
                 }
                 Ok(())
-            })
-            .await
+            });
+            moved.await?;
+            Ok(Value::None)
         })
     }
 
@@ -288,7 +223,10 @@ impl Group {
                 group.start_stop();
                 Ok(())
             })?;
-            rest(&core, &slot, |_| Ok(())).await
+            match rest(&core, &slot, |_| Ok(())).await {
+                Err(Stopped(Some(StopCause::Asked), _)) | Ok(()) => Ok(Value::None),
+                Err(Stopped(_, trouble)) => Err(trouble),
+            }
         })
     }
 
@@ -343,7 +281,7 @@ impl Group {
                 let _ = group.close().await;
                 return Err(Failure::new(format!("{error}{reason}")).of_kind("group").into());
             }
-            *slot.lock() = Some(group);
+            slot.fill(group);
             Ok(Value::None)
         })
     }
@@ -365,37 +303,48 @@ impl AxisOrder {
     }
 }
 
-/// Cycles until the group has come to rest; what stopped it, in the words of its drive.
+/// Why a group rests before its end, and how that is reported.
+struct Stopped(Option<StopCause>, Trouble);
+
+impl From<Trouble> for Stopped {
+    fn from(trouble: Trouble) -> Self {
+        Self(None, trouble)
+    }
+}
+
+impl From<Stopped> for Trouble {
+    fn from(Stopped(_, trouble): Stopped) -> Self {
+        trouble
+    }
+}
+
+/// Cycles until the axes of the group were seen to stand; what stopped it, in the words of its drive.
 async fn rest(
     core: &Core,
     slot: &Slot<MasterGroup>,
     mut each: impl FnMut(&mut MasterGroup) -> Result<(), Trouble>,
-) -> Result<Value, Trouble> {
-    loop {
-        let state = slot.with(|group| {
+) -> Result<(), Stopped> {
+    let (stands, cause, question) = loop {
+        let (stands, cause, question) = slot.with(|group| {
             each(group)?;
-            Ok(group.state())
+            Ok((group.stands(), group.state().cause, group.explanation()))
         })?;
-        let moves = matches!(state.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
-        match state.cause {
-            Some(master::group::StopCause::Asked) if !moves => return Ok(Value::None),
-            Some(cause) if !moves => return Err(explained(slot, cause.to_string()).await),
-            None if !moves => return Ok(Value::None),
-            _ => {}
+        if let Some(stands) = stands {
+            break (stands, cause, question);
         }
         next(core).await?;
-    }
-}
-
-/// What stopped the group, and what the drive says of it. The group is stepped by the question meanwhile.
-async fn explained(slot: &Slot<MasterGroup>, cause: String) -> Trouble {
-    let Some(mut group) = slot.lock().take() else { return Trouble::Said(cause) };
-    let reason = group.explain_stop().await;
-    *slot.lock() = Some(group);
-    Trouble::Said(match reason {
-        Some(reason) => format!("{cause}. {reason}"),
-        None => cause,
-    })
+    };
+    let Some(cause) = cause else { return Ok(stands.map_err(Trouble::from)?) };
+    // It is stepped in the background meanwhile.
+    let reason = match question {
+        Some(question) => question.await.map(|reason| reason.to_string()),
+        None => None,
+    };
+    // A stop that was asked for is none where an axis was not seen to stand.
+    let asked = Some(cause).filter(|_| stands.is_ok());
+    let sentences = [Some(cause.to_string()), reason, stands.err().map(|moving| moving.to_string())];
+    let text = sentences.into_iter().flatten().collect::<Vec<_>>().join(". ");
+    Err(Stopped(asked, Failure::new(text).of_kind("group").into()))
 }
 
 fn turns(degrees: &[f64]) -> Vec<Turns> {
@@ -468,12 +417,23 @@ impl Base {
             let began = core.now();
             let twist = Twist { linear_m_s, angular_rad_s };
             let mut taken = slot.with(|base| command(base, twist))?;
-            while core.now() - began < time {
-                taken = slot.with(|base| command(base, twist))?;
+            let _brake = slot.brake();
+            let mut is_stopped = false;
+            while core.now() - began < time && !is_stopped {
                 next(&core).await?;
+                is_stopped = slot.with(|base| {
+                    // A stop that another thread has asked for counts more than this twist.
+                    if !base.is_stopping() {
+                        taken = command(base, twist)?;
+                    }
+                    Ok(base.is_stopping())
+                })?;
             }
             stand(&core, &slot).await?;
-            Ok(taken)
+            match is_stopped {
+                true => Err(Failure::new("the base was stopped on its way, by command").of_kind("base").into()),
+                false => Ok(taken),
+            }
         })
     }
 
@@ -536,7 +496,7 @@ impl Base {
                 let failure = Failure::new(format!("{error}{reason}")).of_kind("base");
                 return Err(failure.next("network.explain(NODE) says what keeps a wheel").into());
             }
-            *slot.lock() = Some(base);
+            slot.fill(base);
             Ok(Value::None)
         })
     }
@@ -571,21 +531,25 @@ async fn next(core: &Core) -> Result<(), Trouble> {
     core.next_sync().await.map(drop).map_err(|error| Trouble::Said(error.to_string()))
 }
 
-/// Until the set speed of the wheels is 0; a wheel that was lost before or meanwhile is reported.
+/// Brings the base to rest, until both wheels were seen to stand; a wheel that was lost before or meanwhile is reported.
 async fn stand(core: &Core, slot: &Slot<MasterBase>) -> Result<Value, Trouble> {
+    let start = |base: &mut MasterBase| {
+        base.start_stop();
+        Ok(())
+    };
+    slot.with(start)?;
+    let _brake = slot.brake();
     loop {
-        let state = slot.with(|base| {
-            if base.state().cause.and_then(|cause| cause.wheel()).is_none() {
-                base.command(Twist::default())?;
-            }
-            Ok(base.state())
-        })?;
-        if state.commanded == Twist::default() {
-            return match state.cause {
-                Some(cause) if cause.wheel().is_some() => Err(Trouble::Said(cause.to_string())),
-                _ => Ok(Value::None),
-            };
-        }
         next(core).await?;
+        let stopped = slot.with(|base| {
+            // A twist of another thread does not take the stop back.
+            if !base.is_stopping() {
+                base.start_stop();
+            }
+            Ok(base.stopped())
+        })?;
+        if let Some(stopped) = stopped {
+            return Ok(stopped.map(|()| Value::None)?);
+        }
     }
 }
