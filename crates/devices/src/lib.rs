@@ -13,7 +13,7 @@
 //!
 //! let object = Mux::new(0x2009, 0);
 //! assert_eq!(servo.row(object).unwrap().name, "register_parameter_setting");
-//! assert_eq!(stepper.row(object).unwrap().name, "can_baud_rate");
+//! assert_eq!(stepper.row(object).unwrap().name, "can_custom_communication_baud_rate");
 //!
 //! // What a program written to the standard has to know beside that.
 //! for departure in servo.departures(devices::all()) {

@@ -1,10 +1,11 @@
-//! Names of the objects of CiA 301 and CiA 402-2: one table for every model, every file and every name to type.
+//! Names of objects: one for every file and every place where a name is typed.
 //!
-//! An object of 1000h to 1FFFh or 6000h to 67FFh has one name, whatever its maker prints: as an EDS has it ("Target
-//! velocity") and in snake case, to type (`target_velocity`), which is derived from it. A row of a device's table names its
-//! place only: [`row::cia`](crate::row::cia).
+//! A name has two forms: as an EDS has it ("Target velocity") and in snake case, to type (`target_velocity`), which is derived
+//! from it ([`name!`](crate::name)).
 //!
-//! Objects that share a name in the standard, as those of the PDOs do, are numbered.
+//! An object of 1000h to 1FFFh or 6000h to 67FFh has the name of CiA 301 or CiA 402-2, whatever its maker prints: they are the
+//! table here, and a row of a device's table names its place only ([`row::cia`](crate::row::cia)). Objects that share a name in
+//! the standard, as those of the PDOs do, are numbered. An object of the maker has the maker's name, in the row of its device.
 
 use canopen::Mux;
 
@@ -51,9 +52,11 @@ pub const fn standard_object(index: u16) -> Option<Name> {
     }
 }
 
-/// The name to type of what was called otherwise before all names were those of the standards; any other name as it is.
-pub fn present(name: &str) -> &str {
-    FORMER.iter().find(|(former, _)| *former == name).map_or(name, |(_, present)| present)
+/// True if an object that is called `name` was called `former` in an earlier version.
+///
+/// Two makers' objects may have had one name: look in the table of one model, and for its present names first.
+pub fn is_former(former: &str, name: &str) -> bool {
+    FORMER.contains(&(former, name))
 }
 
 const fn find(index: u16) -> Option<&'static Object> {
@@ -72,8 +75,9 @@ const fn find(index: u16) -> Option<&'static Object> {
     None
 }
 
-/// Letters and digits in lower case, and one `_` for all that is between them.
-const fn snake<const N: usize>(title: &str) -> ([u8; N], usize) {
+/// Letters and digits in lower case, and one `_` for all that is between them: the bytes, and how many of them count.
+#[doc(hidden)]
+pub const fn snake<const N: usize>(title: &str) -> ([u8; N], usize) {
     let (title, mut name, mut length, mut i) = (title.as_bytes(), [0; N], 0, 0);
     while i < title.len() {
         if title[i].is_ascii_alphanumeric() {
@@ -91,21 +95,35 @@ const fn snake<const N: usize>(title: &str) -> ([u8; N], usize) {
     (name, length)
 }
 
-const fn text(bytes: &'static [u8], length: usize) -> &'static str {
+/// The first `length` of `bytes`.
+///
+/// # Panics
+/// If they are not ASCII, at compile time in a `const`.
+#[doc(hidden)]
+pub const fn text(bytes: &'static [u8], length: usize) -> &'static str {
     match core::str::from_utf8(bytes.split_at(length).0) {
         Ok(text) => text,
         Err(_) => panic!("a name is ASCII"),
     }
 }
 
-/// A title, and the name to type that comes of it or of more words.
+/// A [`Name`]: a title, and the name to type that comes of it or, where it alone would not say what it is of, of other words.
+///
+/// ```
+/// let name = devices::name!("X0/X1 input filter time");
+/// assert_eq!(name.name, "x0_x1_input_filter_time");
+///
+/// let count = devices::name!("Number of sub-indexes", "Bleed resistor");
+/// assert_eq!((count.title, count.name), ("Number of sub-indexes", "bleed_resistor"));
+/// ```
+#[macro_export]
 macro_rules! name {
     ($title:expr) => {
-        name!($title, $title)
+        $crate::name!($title, $title)
     };
     ($title:expr, $words:expr) => {{
-        const SNAKE: ([u8; $words.len()], usize) = snake($words);
-        Name { title: $title, name: text(&SNAKE.0, SNAKE.1) }
+        const SNAKE: ([u8; $words.len()], usize) = $crate::names::snake($words);
+        $crate::names::Name { title: $title, name: $crate::names::text(&SNAKE.0, SNAKE.1) }
     }};
 }
 
@@ -299,7 +317,7 @@ const OBJECTS: &[Object] = &[
     object!(0x6502, "Supported drive modes"),
 ];
 
-/// Names to type of earlier versions that meant one object on every model, and what it is called now.
+/// Names to type of earlier versions, and what the object is called now.
 #[rustfmt::skip]
 const FORMER: &[(&str, &str)] = &[
     ("cob_id_sync", "cob_id_sync_message"),
@@ -327,6 +345,75 @@ const FORMER: &[(&str, &str)] = &[
     ("velocity_loop", "velocity_control_parameter_set"),
     ("position_loop", "position_control_parameter_set"),
     ("output_bit_mask", "digital_outputs_bit_mask"),
+    // The makers'.
+    ("alarm_pwm", "alarm_pwm_processing_method"),
+    ("bleeder", "bleed_resistor"),
+    ("bleeder_enable", "bleed_resistor_function_control"),
+    ("bleeder_off_voltage", "bleed_resistor_turns_off_voltage"),
+    ("bleeder_on_voltage", "bleed_resistor_turns_on_voltage"),
+    ("bleeder_power", "bleed_resistor_power"),
+    ("bleeder_resistance", "bleed_resistor_value"),
+    ("brake_b0", "output_terminal_b0_function_selection"),
+    ("can_baud_rate", "can_custom_communication_baud_rate"),
+    ("can_node_id", "can_custom_driver_node_number"),
+    ("current_ki", "current_loop_integral_gain"),
+    ("current_kp", "current_loop_proportional_coefficient"),
+    ("custom_node_id", "custom_drive_node_number"),
+    ("driver_temperature", "system_temperature"),
+    ("driver_temperature_threshold", "driver_temperature_protection_threshold"),
+    ("fault_reset", "fault_reset_command"),
+    ("feedforward_smoothing", "feedforward_output_smoothing_coefficient"),
+    ("hall_offset_angle", "offset_angle_of_motor_and_hall"),
+    ("hall_status", "hall_input_status"),
+    ("input_polarity", "input_terminal_effective_level"),
+    ("input_status", "input_signal_status"),
+    ("input_x0_function", "input_terminal_x0_function_selection"),
+    ("input_x1_function", "input_terminal_x1_function_selection"),
+    ("input_x2_function", "input_terminal_x2_function_selection"),
+    ("input_x2_function", "input_terminal_x2_nc"),
+    ("input_x3_function", "input_terminal_x3_function_selection"),
+    ("input_x3_function", "input_terminal_x3_nc"),
+    ("io_stop_processing", "io_emergency_stop_processing_method"),
+    ("max_allowable_current", "maximum_allowable_current"),
+    ("max_current", "maximum_current"),
+    ("max_motor_speed", "maximum_speed_of_motor"),
+    ("motor_direction", "motor_default_rotation_direction"),
+    ("motor_speed", "motor_running_speed"),
+    ("motor_status", "motor_status_register"),
+    ("motor_temperature_threshold", "motor_temperature_protection_threshold"),
+    ("node_id", "drive_node_number"),
+    ("out_of_tolerance_threshold", "out_of_tolerance_alarm_threshold"),
+    ("output_enabled", "drive_output_enabled"),
+    ("output_polarity", "output_terminal_effective_level"),
+    ("output_pwm", "pwm_of_system_output"),
+    ("output_status", "output_signal_status"),
+    ("output_y0_function", "output_terminal_y0_function_selection"),
+    ("output_y1_function", "output_terminal_y1_function_selection"),
+    ("overload_processing", "overload_processing_method"),
+    ("overload_time", "overload_protection_time"),
+    ("position_kf", "position_feedforward_gain_kf"),
+    ("position_kp", "position_proportional_gain_kp"),
+    ("position_kp", "proportional_coefficient_of_position_ring"),
+    ("rs485_baud_rate", "rs485_custom_communication_baud_rate"),
+    ("rs485_node_id", "rs485_custom_driver_node_number"),
+    ("shaft_lock_when_disabled", "shaft_lock_method_when_power_on"),
+    ("stationary_max_output", "stationary_maximum_allowable_output"),
+    ("synchronous_control_word", "can_communication_synchronous_control_word"),
+    ("torque_smoothing", "torque_output_smoothing_factor"),
+    ("velocity_feed_forward", "rate_feed_forward"),
+    ("velocity_integral_time", "velocity_loop_integration_time"),
+    ("velocity_kf", "speed_feedforward_gain_kf"),
+    ("velocity_ki", "speed_integral_gain_ki"),
+    ("velocity_kp", "speed_proportional_gain_kp"),
+    ("velocity_kp", "velocity_ring_proportionality_coefficient"),
+    ("velocity_observer_1", "speed_observer_coefficient_1"),
+    ("velocity_observer_2", "speed_observer_coefficient_2"),
+    ("velocity_observer_3", "speed_observer_coefficient_3"),
+    ("velocity_observer_4", "speed_observer_coefficient_4"),
+    ("velocity_resolution", "set_speed_resolution"),
+    ("velocity_smoothing", "velocity_smoothing_factor"),
+    ("x0_x1_filter_time", "x0_x1_input_filter_time"),
+    ("x2_x3_filter_time", "x2_x3_input_filter_time"),
 ];
 
 #[cfg(test)]
@@ -342,6 +429,12 @@ mod tests {
             let subs: Vec<u8> = if object.parts.is_empty() { std::vec![0] } else { subs.collect() };
             subs.into_iter().map(|sub| Mux::new(object.index, sub)).map(|mux| (mux, standard(mux).expect("a name")))
         })
+    }
+
+    /// Every model, and every edition of one.
+    fn models() -> impl Iterator<Item = &'static crate::Description> {
+        let editions = crate::all().iter().flat_map(|model| model.editions.iter().map(|edition| edition.description));
+        crate::all().iter().chain(editions)
     }
 
     #[test]
@@ -389,23 +482,47 @@ mod tests {
     }
 
     #[test]
-    fn a_former_name_is_understood_and_is_not_the_name_of_anything_now() {
-        let names: BTreeSet<&str> = all().map(|(_, name)| name.name).collect();
-        for (former, now) in FORMER {
-            assert!(names.contains(now), "{now}");
-            assert!(!names.contains(former), "{former}");
-            let of_a_maker =
-                crate::all().iter().flat_map(|model| model.dictionary.rows()).find(|row| row.name == *former);
-            assert!(of_a_maker.is_none(), "{former}");
+    fn a_former_name_is_of_one_object_of_a_model_and_is_not_the_name_of_anything_else_there() {
+        let mut current = BTreeSet::new();
+        for model in models() {
+            let names: BTreeSet<&str> = model.dictionary.rows().iter().map(|row| row.name).collect();
+            for (former, _) in FORMER {
+                let now = names.iter().filter(|name| is_former(former, name)).count();
+                assert!(now + usize::from(names.contains(former)) <= 1, "{}: {former}", model.name);
+            }
+            current.extend(names);
         }
-        assert_eq!(present("homing_speed_switch"), "speed_during_search_for_switch");
-        assert_eq!(present("statusword"), "statusword");
+        current.extend(all().map(|(_, name)| name.name));
+        for (_, now) in FORMER {
+            assert!(current.contains(now), "{now}");
+        }
+        assert!(is_former("homing_speed_switch", "speed_during_search_for_switch"));
+        assert!(!is_former("statusword", "statusword"));
+    }
+
+    #[test]
+    fn the_name_of_a_makers_object_is_its_title_in_snake_case() {
+        let mut checked = 0;
+        for model in models() {
+            let rows = model.dictionary.rows();
+            for row in rows.iter().filter(|row| standard(row.mux()).is_none()) {
+                // Sub-index 00h of a record is typed as the record is called.
+                let is_count =
+                    row.sub_index == 0 && rows.iter().any(|other| other.index == row.index && other.sub_index > 0);
+                let (name, length) = snake::<100>(row.title);
+                let derived = core::str::from_utf8(&name[..length]).expect("ASCII");
+                assert!(is_count || derived == row.name, "{} {} {}", model.name, row.mux(), row.title);
+                checked += 1;
+            }
+            let names: BTreeSet<&str> = rows.iter().map(|row| row.name).collect();
+            assert_eq!(names.len(), rows.len(), "{}: two rows are typed alike", model.name);
+        }
+        assert!(checked > 200);
     }
 
     #[test]
     fn every_model_and_edition_has_the_names_of_the_standards() {
-        let editions = crate::all().iter().flat_map(|model| model.editions.iter().map(|edition| edition.description));
-        for model in crate::all().iter().chain(editions) {
+        for model in models() {
             let rows = model.dictionary.rows().iter();
             let of_standards = rows.filter(|row| matches!(row.index, 0x1000..=0x1FFF | 0x6000..=0x67FF));
             let mut checked = 0;

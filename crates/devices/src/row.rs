@@ -2,6 +2,8 @@
 
 use canopen::od::{Access, DataType, Entry};
 
+use crate::names::Name;
+
 /// UNSIGNED8.
 pub const U8: DataType = DataType::Unsigned8;
 /// UNSIGNED16.
@@ -19,23 +21,23 @@ pub const I32: DataType = DataType::Integer32;
 pub type Values = &'static [(i64, &'static str)];
 
 /// Attribute RO.
-pub const fn ro(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
-    Entry::new(index, sub, data_type, Access::ReadOnly, name, title)
+pub const fn ro(index: u16, sub: u8, data_type: DataType, name: Name) -> Entry {
+    Entry::new(index, sub, data_type, Access::ReadOnly, name.name, name.title)
 }
 
 /// Attribute RW.
-pub const fn rw(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
-    Entry::new(index, sub, data_type, Access::ReadWrite, name, title)
+pub const fn rw(index: u16, sub: u8, data_type: DataType, name: Name) -> Entry {
+    Entry::new(index, sub, data_type, Access::ReadWrite, name.name, name.title)
 }
 
 /// Attribute WO.
-pub const fn wo(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
-    Entry::new(index, sub, data_type, Access::WriteOnly, name, title)
+pub const fn wo(index: u16, sub: u8, data_type: DataType, name: Name) -> Entry {
+    Entry::new(index, sub, data_type, Access::WriteOnly, name.name, name.title)
 }
 
 /// Attribute RW/S: kept in the EEPROM.
-pub const fn rws(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
-    rw(index, sub, data_type, name, title).stored()
+pub const fn rws(index: u16, sub: u8, data_type: DataType, name: Name) -> Entry {
+    rw(index, sub, data_type, name).stored()
 }
 
 /// Rows of objects of the standards: CiA's names come from [`names`](crate::names), so that no table repeats them.
@@ -91,12 +93,14 @@ pub const fn is_parameter(row: &Entry) -> bool {
     matches!(row.access, Access::ReadWrite) && !command && !row.command
 }
 
+const EMPTY: Entry = ro(0, 0, U8, Name { title: "", name: "" });
+
 /// The rows of all `parts`, in order.
 ///
 /// # Panics
 /// If they are not `N` rows, at compile time in a `const`.
 pub const fn join<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
-    let mut rows = [ro(0, 0, U8, "", ""); N];
+    let mut rows = [EMPTY; N];
     let (mut part, mut at) = (0, 0);
     while part < parts.len() {
         let mut i = 0;
@@ -117,7 +121,7 @@ pub const fn join<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
 /// # Panics
 /// If they are not `N` different rows, at compile time in a `const`.
 pub const fn merge<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
-    let mut rows = [ro(0, 0, U8, "", ""); N];
+    let mut rows = [EMPTY; N];
     let (mut count, mut part) = (0, 0);
     while part < parts.len() {
         let mut i = 0;
@@ -154,7 +158,7 @@ pub const fn merge<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
 /// # Panics
 /// If they are not `N` rows, at compile time in a `const`.
 pub const fn amend<const N: usize>(base: &[Entry], changes: &[Entry]) -> [Entry; N] {
-    let mut rows = [ro(0, 0, U8, "", ""); N];
+    let mut rows = [EMPTY; N];
     let (mut count, mut i) = (base.len(), 0);
     while i < base.len() {
         rows[i] = base[i];
@@ -177,15 +181,15 @@ pub const fn amend<const N: usize>(base: &[Entry], changes: &[Entry]) -> [Entry;
     rows
 }
 
-/// Rows of a table, and a typed constant for each that is named behind its row (`=> NAME`): each stands once.
+/// Rows of a table, each of the maker with its [`name!`](crate::name), and a typed constant for each that is named behind its row (`=> NAME`): each stands once.
 ///
 /// The rows come out as the constant array in the head. The constants come out where the macro in the head is called, beside
 /// the `TABLE` that they are places of: it lies above the rows.
 macro_rules! rows {
     ($vis:vis const $rows:ident: [Entry; $count:literal], $objects:ident:
-        $($make:ident($index:literal, $sub:literal, $type:ident $(, $text:expr)*)
+        $($make:ident($index:literal, $sub:literal, $type:ident $(, $title:literal $(, $words:literal)?)?)
             $(.$set:ident($($value:expr),*))* $(=> $object:ident)?;)*) => {
-        $vis const $rows: [Entry; $count] = [$($make($index, $sub, $type $(, $text)*)$(.$set($($value),*))*),*];
+        $vis const $rows: [Entry; $count] = [$($make($index, $sub, $type $(, $crate::name!($title $(, $words)?))?)$(.$set($($value),*))*),*];
 
         macro_rules! $objects {
             () => {

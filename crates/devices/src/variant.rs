@@ -277,6 +277,7 @@ const fn is_same(a: &str, b: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::name;
     use crate::row::{U16, rw, rws};
     use canopen::od::{Fixed, Index};
 
@@ -304,7 +305,7 @@ mod tests {
     ];
     const RIGHT: Pick = Pick::of(VARIATIONS, "X001", "right");
     static ROWS: [Entry; 2] =
-        [rws(0x2000, 0, U16, "a", "").default(7).range(0, 100), rw(0x2001, 0, U16, "b", "").default(8)];
+        [rws(0x2000, 0, U16, name!("a")).default(7).range(0, 100), rw(0x2001, 0, U16, name!("b")).default(8)];
     static INDEX: Index<2> = Index::of(&ROWS);
     static TABLE: Table = Table::new(&ROWS, &INDEX);
 

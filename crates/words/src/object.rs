@@ -2,7 +2,7 @@
 
 use canopen::Mux;
 use canopen::od::{Entry, Table};
-use devices::names::present;
+use devices::names::is_former;
 
 use super::suggest::{did_you_mean, near};
 
@@ -63,8 +63,9 @@ fn row(table: &'static Table, mux: Mux) -> Option<&'static Entry> {
 }
 
 fn by_name(table: &'static Table, name: &str) -> Result<&'static Entry, String> {
-    let present = present(name);
-    let mut rows = table.rows().iter().filter(|row| row.name == name || row.name == present);
+    let is_named = table.rows().iter().any(|row| row.name == name);
+    let matches = |row: &&Entry| if is_named { row.name == name } else { is_former(name, row.name) };
+    let mut rows = table.rows().iter().filter(matches);
     match (rows.next(), rows.next()) {
         (Some(row), None) => Ok(row),
         (Some(first), Some(second)) => Err(format!(
@@ -118,12 +119,18 @@ mod tests {
     }
 
     #[test]
-    fn a_former_name_of_the_standards_is_understood() {
-        let table = devices::model("zlim42c").expect("a model").dictionary;
-        let find = |text: &str| object(text).unwrap().resolve(Some(table)).map(|found| found.0);
+    fn a_former_name_is_understood() {
+        let table_of = |model| devices::model(model).expect("a model").dictionary;
+        let find_in = |model, text: &str| object(text).unwrap().resolve(Some(table_of(model))).map(|found| found.0);
+        let find = |text| find_in("zlim42c", text);
         assert_eq!(find("homing_speed_switch"), Ok(Mux::new(0x6099, 1)));
         assert_eq!(find("speed_during_search_for_switch"), Ok(Mux::new(0x6099, 1)));
         assert_eq!(find("software_version"), Ok(Mux::new(0x100A, 0)));
+        // What two makers' objects were called, and what another model has by this name of the standard.
+        assert_eq!(find_in("zlac8030l", "velocity_kp"), Ok(Mux::new(0x201D, 0)));
+        assert_eq!(find_in("m4230e17b50", "velocity_kp"), Ok(Mux::new(0x60F9, 1)));
+        assert_eq!(find_in("zlac8030l", "max_motor_speed"), Ok(Mux::new(0x200A, 0)));
+        assert_eq!(find_in("cia402", "max_motor_speed"), Ok(Mux::new(0x6080, 0)));
     }
 
     #[test]

@@ -250,7 +250,7 @@ async fn commissioning(node: &Node, model: Option<&'static Description>, name: &
 
 /// In kbit/s, by the object that chooses it; of a model without one, that of the model.
 async fn bit_rate(node: &Node, model: &Description) -> Option<u16> {
-    let Some(row) = model.dictionary.rows().iter().find(|row| row.name == "can_baud_rate") else {
+    let Some(row) = model.dictionary.rows().iter().find(|row| row.name == "can_custom_communication_baud_rate") else {
         return model.bitrate.map(|rate| (rate.bits_per_second() / 1_000) as u16);
     };
     let value = node.read::<u16>(row.mux()).await.ok()?;

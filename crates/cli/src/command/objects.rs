@@ -332,7 +332,7 @@ mod tests {
         assert_eq!(found(&["6064"]), ["position_actual_value"]);
         assert_eq!(found(&["2026:01"]), ["motor_temperature"]);
         assert!(found(&["2026"]).len() == 3);
-        assert!(found(&["temperature", "threshold"]).contains(&"motor_temperature_threshold"));
+        assert!(found(&["temperature", "threshold"]).contains(&"motor_temperature_protection_threshold"));
         assert!(found(&["profile torque"]).contains(&"modes_of_operation"));
         assert!(found(&["zebra"]).is_empty());
     }

@@ -5,7 +5,7 @@ use canopen::{Mux, NodeId};
 use master::decode::{Decoded, Decoder, ServiceKind};
 
 use crate::failure::Failure;
-use devices::names::present;
+use devices::names::is_former;
 use words::models::Description;
 use words::node::node;
 use words::object::{ObjectArg, object};
@@ -46,8 +46,13 @@ fn wanted(text: &str) -> Result<Wanted, String> {
     Ok(match object(text)? {
         ObjectArg::Mux(mux) if text.contains(':') => Wanted::Mux(mux),
         ObjectArg::Mux(mux) => Wanted::Index(mux.index),
-        ObjectArg::Name(name) => Wanted::Name(present(&name).to_owned()),
+        ObjectArg::Name(name) => Wanted::Name(name),
     })
+}
+
+/// Of the present or an earlier version.
+fn is_name(typed: &str, name: &str) -> bool {
+    typed == name || is_former(typed, name)
 }
 
 impl Filter {
@@ -56,7 +61,7 @@ impl Filter {
         let names = || models.iter().flat_map(|model| model.dictionary.rows().iter().map(|row| row.name));
         for wanted in &self.objects {
             let Wanted::Name(name) = wanted else { continue };
-            if !names().any(|known| known == name) {
+            if !names().any(|known| is_name(name, known)) {
                 let mut close = near(name, names());
                 close.dedup();
                 return Err(Failure::usage(format!("no model has an object named '{name}'{}", did_you_mean(&close)))
@@ -81,7 +86,7 @@ impl Filter {
                 Wanted::Index(index) => mux.index == *index,
                 Wanted::Mux(exactly) => mux == *exactly,
                 Wanted::Name(name) => {
-                    decoded.node().and_then(|node| decoder.name(node, mux)).is_some_and(|known| known == name)
+                    decoded.node().and_then(|node| decoder.name(node, mux)).is_some_and(|known| is_name(name, known))
                 }
             })
         };

@@ -156,7 +156,7 @@ fn a_factory_value_is_a_number_and_what_the_node_id_is_added_to_is_said_apart() 
     assert_eq!(default("1400:01"), json!({ "plus_node_id": 0x200 }));
     let saved = done(&["--json", "save", "4"]).json();
     let after = saved["effective_after_restart"].as_array().unwrap();
-    assert!(after.contains(&json!({ "object": "200Dh:00", "name": "can_node_id" })), "{saved}");
+    assert!(after.contains(&json!({ "object": "200Dh:00", "name": "can_custom_driver_node_number" })), "{saved}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use canopen::Mux;
 use canopen::od::{Entry, Index, Table};
 use cia402::ModeOfOperation;
+use devices::name;
 use devices::row::{I8, I16, I32, U16, U32, ro, rw};
 use devices::servo::{CIA402, axis};
 use devices::{AxisDescription, CountsPerTurn, Description, Placement, Quantity, Ramps, Units};
@@ -33,28 +34,28 @@ const AXIS: AxisDescription = AxisDescription {
 
 /// CiA 402: the second axis is 800h further on; the supply is the device's.
 static BY_INDEX_ROWS: [Entry; 22] = [
-    ro(0x1000, 0, U32, "device_type", "Device type").default(0x0002_0192),
-    ro(0x2035, 0, U16, "bus_voltage", "Bus voltage").unit("0.01 V"),
-    rw(0x6040, 0, U16, "controlword", "Controlword"),
-    ro(0x6041, 0, U16, "statusword", "Statusword"),
-    rw(0x6060, 0, I8, "modes_of_operation", "Modes of operation"),
-    ro(0x6061, 0, I8, "modes_of_operation_display", "Modes of operation display"),
-    ro(0x606C, 0, I32, "velocity_actual_value", "Velocity actual value").unit("0.1 r/min"),
-    ro(0x6077, 0, I16, "torque_actual_value", "Torque actual value").unit("0.1 A"),
-    rw(0x6083, 0, U32, "profile_acceleration", "Acceleration time").unit("ms"),
-    rw(0x6084, 0, U32, "profile_deceleration", "Deceleration time").unit("ms"),
-    rw(0x6085, 0, U32, "quick_stop_deceleration", "Quick stop time").unit("ms"),
-    rw(0x60FF, 0, I32, "target_velocity", "Target velocity").unit("r/min"),
-    rw(0x6840, 0, U16, "controlword_2", "Controlword"),
-    ro(0x6841, 0, U16, "statusword_2", "Statusword"),
-    rw(0x6860, 0, I8, "modes_of_operation_2", "Modes of operation"),
-    ro(0x6861, 0, I8, "modes_of_operation_display_2", "Modes of operation display"),
-    ro(0x686C, 0, I32, "velocity_actual_value_2", "Velocity actual value").unit("0.1 r/min"),
-    ro(0x6877, 0, I16, "torque_actual_value_2", "Torque actual value").unit("0.1 A"),
-    rw(0x6883, 0, U32, "profile_acceleration_2", "Acceleration time").unit("ms"),
-    rw(0x6884, 0, U32, "profile_deceleration_2", "Deceleration time").unit("ms"),
-    rw(0x6885, 0, U32, "quick_stop_deceleration_2", "Quick stop time").unit("ms"),
-    rw(0x68FF, 0, I32, "target_velocity_2", "Target velocity").unit("r/min"),
+    ro(0x1000, 0, U32, name!("Device type")).default(0x0002_0192),
+    ro(0x2035, 0, U16, name!("Bus voltage")).unit("0.01 V"),
+    rw(0x6040, 0, U16, name!("Controlword")),
+    ro(0x6041, 0, U16, name!("Statusword")),
+    rw(0x6060, 0, I8, name!("Modes of operation")),
+    ro(0x6061, 0, I8, name!("Modes of operation display")),
+    ro(0x606C, 0, I32, name!("Velocity actual value")).unit("0.1 r/min"),
+    ro(0x6077, 0, I16, name!("Torque actual value")).unit("0.1 A"),
+    rw(0x6083, 0, U32, name!("Acceleration time", "profile acceleration")).unit("ms"),
+    rw(0x6084, 0, U32, name!("Deceleration time", "profile deceleration")).unit("ms"),
+    rw(0x6085, 0, U32, name!("Quick stop time", "quick stop deceleration")).unit("ms"),
+    rw(0x60FF, 0, I32, name!("Target velocity")).unit("r/min"),
+    rw(0x6840, 0, U16, name!("Controlword", "controlword 2")),
+    ro(0x6841, 0, U16, name!("Statusword", "statusword 2")),
+    rw(0x6860, 0, I8, name!("Modes of operation", "modes of operation 2")),
+    ro(0x6861, 0, I8, name!("Modes of operation display", "modes of operation display 2")),
+    ro(0x686C, 0, I32, name!("Velocity actual value", "velocity actual value 2")).unit("0.1 r/min"),
+    ro(0x6877, 0, I16, name!("Torque actual value", "torque actual value 2")).unit("0.1 A"),
+    rw(0x6883, 0, U32, name!("Acceleration time", "profile acceleration 2")).unit("ms"),
+    rw(0x6884, 0, U32, name!("Deceleration time", "profile deceleration 2")).unit("ms"),
+    rw(0x6885, 0, U32, name!("Quick stop time", "quick stop deceleration 2")).unit("ms"),
+    rw(0x68FF, 0, I32, name!("Target velocity", "target velocity 2")).unit("r/min"),
 ];
 static BY_INDEX_INDEX: Index<22> = Index::of(&BY_INDEX_ROWS);
 static BY_INDEX_TABLE: Table = Table::new(&BY_INDEX_ROWS, &BY_INDEX_INDEX);
@@ -68,24 +69,24 @@ static BY_INDEX: Description = Description {
 /// A maker's way: left at sub-index 01h and right at 02h, one controlword, statusword and mode for both.
 const SHARED: &[u16] = &[0x6040, 0x6041, 0x6060, 0x6061];
 static BY_SUB_INDEX_ROWS: [Entry; 18] = [
-    ro(0x1000, 0, U32, "device_type", "Device type").default(0x0002_0192),
-    ro(0x2035, 0, U16, "bus_voltage", "Bus voltage").unit("0.01 V"),
-    rw(0x6040, 0, U16, "controlword", "Controlword"),
-    ro(0x6041, 0, U16, "statusword", "Statusword"),
-    rw(0x6060, 0, I8, "modes_of_operation", "Modes of operation"),
-    ro(0x6061, 0, I8, "modes_of_operation_display", "Modes of operation display"),
-    ro(0x606C, 1, I32, "velocity_actual_value_left", "Velocity actual value").unit("0.1 r/min"),
-    ro(0x606C, 2, I32, "velocity_actual_value_right", "Velocity actual value").unit("0.1 r/min"),
-    ro(0x6077, 1, I16, "torque_actual_value_left", "Torque actual value").unit("0.1 A"),
-    ro(0x6077, 2, I16, "torque_actual_value_right", "Torque actual value").unit("0.1 A"),
-    rw(0x6083, 1, U32, "profile_acceleration_left", "Acceleration time").unit("ms"),
-    rw(0x6083, 2, U32, "profile_acceleration_right", "Acceleration time").unit("ms"),
-    rw(0x6084, 1, U32, "profile_deceleration_left", "Deceleration time").unit("ms"),
-    rw(0x6084, 2, U32, "profile_deceleration_right", "Deceleration time").unit("ms"),
-    rw(0x6085, 1, U32, "quick_stop_deceleration_left", "Quick stop time").unit("ms"),
-    rw(0x6085, 2, U32, "quick_stop_deceleration_right", "Quick stop time").unit("ms"),
-    rw(0x60FF, 1, I32, "target_velocity_left", "Target velocity").unit("r/min"),
-    rw(0x60FF, 2, I32, "target_velocity_right", "Target velocity").unit("r/min"),
+    ro(0x1000, 0, U32, name!("Device type")).default(0x0002_0192),
+    ro(0x2035, 0, U16, name!("Bus voltage")).unit("0.01 V"),
+    rw(0x6040, 0, U16, name!("Controlword")),
+    ro(0x6041, 0, U16, name!("Statusword")),
+    rw(0x6060, 0, I8, name!("Modes of operation")),
+    ro(0x6061, 0, I8, name!("Modes of operation display")),
+    ro(0x606C, 1, I32, name!("Velocity actual value", "velocity actual value left")).unit("0.1 r/min"),
+    ro(0x606C, 2, I32, name!("Velocity actual value", "velocity actual value right")).unit("0.1 r/min"),
+    ro(0x6077, 1, I16, name!("Torque actual value", "torque actual value left")).unit("0.1 A"),
+    ro(0x6077, 2, I16, name!("Torque actual value", "torque actual value right")).unit("0.1 A"),
+    rw(0x6083, 1, U32, name!("Acceleration time", "profile acceleration left")).unit("ms"),
+    rw(0x6083, 2, U32, name!("Acceleration time", "profile acceleration right")).unit("ms"),
+    rw(0x6084, 1, U32, name!("Deceleration time", "profile deceleration left")).unit("ms"),
+    rw(0x6084, 2, U32, name!("Deceleration time", "profile deceleration right")).unit("ms"),
+    rw(0x6085, 1, U32, name!("Quick stop time", "quick stop deceleration left")).unit("ms"),
+    rw(0x6085, 2, U32, name!("Quick stop time", "quick stop deceleration right")).unit("ms"),
+    rw(0x60FF, 1, I32, name!("Target velocity", "target velocity left")).unit("r/min"),
+    rw(0x60FF, 2, I32, name!("Target velocity", "target velocity right")).unit("r/min"),
 ];
 static BY_SUB_INDEX_INDEX: Index<18> = Index::of(&BY_SUB_INDEX_ROWS);
 static BY_SUB_INDEX_TABLE: Table = Table::new(&BY_SUB_INDEX_ROWS, &BY_SUB_INDEX_INDEX);

@@ -238,7 +238,7 @@ fn vendor(of: &Description) -> &str {
 /// Bit rates that the object of the bit rate lists, else the one as delivered; all of them where nothing is said.
 fn bit_rates(of: &Description) -> Vec<u16> {
     let rate = |meaning: &str| meaning.strip_suffix(" kbit/s")?.parse::<u16>().ok();
-    let rows = of.dictionary.rows().iter().filter(|row| row.name == "can_baud_rate");
+    let rows = of.dictionary.rows().iter().filter(|row| row.name == "can_custom_communication_baud_rate");
     let mut rates: Vec<u16> = rows.flat_map(|row| row.values).filter_map(|(_, meaning)| rate(meaning)).collect();
     rates.extend(of.bitrate.map(|rate| (rate.bits_per_second() / 1_000) as u16));
     if rates.is_empty() {

@@ -122,6 +122,25 @@ fn a_name_that_two_objects_of_a_file_share_is_numbered_in_its_sheet() {
     assert_eq!(eds.variable(0x6841, 0).map(|variable| variable.name.as_str()), Some("Statusword 2"));
 }
 
+#[test]
+fn what_is_typed_is_the_name_of_the_file_in_snake_case() {
+    let editions = devices::all().iter().flat_map(|model| model.editions.iter().map(|edition| edition.description));
+    for model in devices::all().iter().chain(editions) {
+        let eds = Sheet::of(model).eds();
+        for row in model.dictionary.rows() {
+            let place = format!("{} {}", model.name, row.mux());
+            let object = eds.objects.iter().find(|object| object.index == row.index).expect("it is in the sheet");
+            let shown = &eds.variable(row.index, row.sub_index).expect("it is in the sheet").name;
+            let is_whole = row.sub_index == 0 && object.object_type.has_sub_objects();
+            let name = names::name(if is_whole { &object.name } else { shown });
+            // Of the standard's records the name to type of some parts has the record's in front.
+            let of_standard = devices::names::standard(row.mux()).is_some();
+            let in_record = of_standard && row.name == names::name(&format!("{} {shown}", object.name));
+            assert!(row.name == name || in_record, "{place}: {shown:?} is typed {}", row.name);
+        }
+    }
+}
+
 fn same_row(model: &Description, row: &Entry, read: &Entry) {
     let place = format!("{} {} {}", model.name, row.mux(), row.name);
     assert_eq!(read.mux(), row.mux(), "{place}");

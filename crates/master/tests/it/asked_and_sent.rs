@@ -71,7 +71,7 @@ fn what_would_come_to_nothing_is_refused_with_the_worth_of_a_count_and_what_make
         error.contains("0.4 r/min is too little for 60FFh:00 target_velocity: one count of it is 1 r/min"),
         "{error}"
     );
-    assert!(error.contains("by 202Fh:05 velocity_resolution = 1"), "{error}");
+    assert!(error.contains("by 202Fh:05 set_speed_resolution = 1"), "{error}");
 }
 
 #[test]
@@ -159,22 +159,22 @@ fn a_refusal_names_the_limit_in_force_and_where_it_comes_from() {
     // 60FFh: -1000 to 1000 r/min on the one, -3000 to 3000 on the other.
     let text = said(&mut world, &servo, 9999.0);
     assert!(text.contains("60FFh:00 target_velocity, which takes -1000 to 1000 in units of r/min"), "{text}");
-    assert!(text.contains("by 202Fh:05 velocity_resolution = 1"), "{text}");
+    assert!(text.contains("by 202Fh:05 set_speed_resolution = 1"), "{text}");
     assert!(said(&mut world, &stepper, 9999.0).contains("takes -3000 to 3000"));
 
     // 200Ah, the motor's largest speed, is taken by the drive and held to: said before anything moves.
     block_on(&mut world, servo.node().write(mux(0x200A, 0), 500_u16)).unwrap().unwrap();
     let text = said(&mut world, &servo, -800.0);
-    assert!(text.contains("acts up to 500, by 200Ah:00 max_motor_speed = 500"), "{text}");
+    assert!(text.contains("acts up to 500, by 200Ah:00 maximum_speed_of_motor = 500"), "{text}");
     block_on(&mut world, servo.velocity(Rpm(500.0), no_wait())).unwrap().unwrap();
     let fast = MotionOptions { speed: Some(Rpm(501.0)), ..no_wait() };
     let error = block_on(&mut world, servo.move_absolute(Turns(1.0), fast)).unwrap().unwrap_err().to_string();
-    assert!(error.contains("6081h:00") && error.contains("max_motor_speed = 500"), "{error}");
+    assert!(error.contains("6081h:00") && error.contains("maximum_speed_of_motor = 500"), "{error}");
     // 2015h in 0.1 A holds 6071h in mA.
     block_on(&mut world, servo.disable()).unwrap().unwrap();
     block_on(&mut world, servo.node().write(mux(0x2015, 0), 100_u16)).unwrap().unwrap();
     let error = block_on(&mut world, servo.torque(Amperes(10.1))).unwrap().unwrap_err().to_string();
-    assert!(error.contains("acts up to 10000, by 2015h:00 max_current = 100"), "{error}");
+    assert!(error.contains("acts up to 10000, by 2015h:00 maximum_current = 100"), "{error}");
     block_on(&mut world, servo.torque(Amperes(10.0))).unwrap().unwrap();
 }
 

@@ -91,7 +91,7 @@ class World(_native.World):
         :param eds: instead of a model, an EDS or DCF file: a servo with its objects, or, if it describes no drive, a node with them
         :param node: node-ID at the first start, 1 to 127; the drive keeps this number in the world
         :param options: what is special about this one, in the words of ``ferrodrive sim --drive``: ``motor="fast"``,
-            ``firmware="2.01"``, ``max_current=100``; an object by its index as ``**{"6060": 3}``
+            ``firmware="2.01"``, ``maximum_current=100``; an object by its index as ``**{"6060": 3}``
         :raises ValueError: the model, the file or an option is not one
         :raises Refused: the number is in use, or the drive does not take an option
 

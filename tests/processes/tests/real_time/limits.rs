@@ -50,7 +50,7 @@ fn the_limit_in_force_and_what_it_follows_from_are_named() {
     // "ZLAC8030L quick start guide V1.00", chapter 9: -1000 to 1000 r/min; 5.3: times the resolution.
     let ended = ferrodrive(&["write", "4", "60FF", "1001"]);
     assert_eq!(ended.status, Some(1));
-    let takes = "60FFh:00 target_velocity takes -1000 to 1000 in units of r/min, by 202Fh:05 velocity_resolution = 1";
+    let takes = "60FFh:00 target_velocity takes -1000 to 1000 in units of r/min, by 202Fh:05 set_speed_resolution = 1";
     assert!(ended.err.contains(takes), "{}", ended.err);
     let ended = ferrodrive(&["velocity", "4", "9999rpm"]);
     assert_eq!(ended.status, Some(1));
@@ -61,7 +61,7 @@ fn the_limit_in_force_and_what_it_follows_from_are_named() {
         rows.lines().last().unwrap().split_once("r/min  ").unwrap().1.to_owned()
     };
     assert_eq!(accepts("zlac8030l"), "-1000 to 1000, times 202Fh:05; acts up to 200Ah:00");
-    assert!(accepts("4").starts_with("-1000 to 1000 in units of r/min, by 202Fh:05 velocity_resolution = 1"));
+    assert!(accepts("4").starts_with("-1000 to 1000 in units of r/min, by 202Fh:05 set_speed_resolution = 1"));
     assert_eq!(accepts("zlim42c"), "-3000 to 3000");
 }
 
@@ -77,12 +77,12 @@ fn limits_follow_what_is_written_to_the_objects_that_move_them() {
     assert_eq!((&now["limits"], &now["acts_up_to"]), (&json!([-1000, 1000]), &json!(500)), "{now}");
     assert_eq!(
         (&by[1]["object"], &by[1]["name"], &by[1]["value"]),
-        (&json!("200Ah:00"), &json!("max_motor_speed"), &json!(500))
+        (&json!("200Ah:00"), &json!("maximum_speed_of_motor"), &json!(500))
     );
     let error = on_bus(&["velocity", "4", "800rpm"]).err;
-    assert!(error.contains("acts up to 500, by 200Ah:00 max_motor_speed = 500"), "{error}");
+    assert!(error.contains("acts up to 500, by 200Ah:00 maximum_speed_of_motor = 500"), "{error}");
     let written = on_bus(&["write", "4", "60FF", "800"]).out;
-    assert!(written.contains("the drive limits it to 500, by 200Ah:00 max_motor_speed = 500"), "{written}");
+    assert!(written.contains("the drive limits it to 500, by 200Ah:00 maximum_speed_of_motor = 500"), "{written}");
 
     // A new resolution acts from the next restart on (5.3), and so do the limits.
     let written = on_bus(&["write", "4", "202F:05", "10"]).out;

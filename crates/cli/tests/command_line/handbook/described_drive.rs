@@ -3,6 +3,7 @@ use std::time::Duration;
 use ferrodrive::can::Bitrate;
 use ferrodrive::canopen::od::{Entry, Index, Table};
 use ferrodrive::canopen::{Mux, NodeId};
+use ferrodrive::devices::name;
 use ferrodrive::devices::row::{U16, U32, merge, ro, rw};
 use ferrodrive::devices::servo::{CIA402, objects};
 use ferrodrive::devices::{Description, Identity};
@@ -14,10 +15,10 @@ use ferrodrive::sim::{World, block_on};
 /// What the maker has beyond the standard's rows, or otherwise, as its manual prints it.
 #[rustfmt::skip]
 static OWN: [Entry; 4] = [
-    ro(0x1018, 1, U32, "vendor_id", "Vendor-ID").default(0x0ACE_0000),
-    ro(0x1018, 2, U32, "product_code", "Product code").default(1),
-    rw(0x2000, 0, U16, "brake_delay", "Time until the brake holds").range(0, 500).default(40).unit("ms").saved(),
-    ro(0x2001, 0, U16, "operating_hours", "Operating hours").unit("h").mappable(),
+    ro(0x1018, 1, U32, name!("Vendor-ID")).default(0x0ACE_0000),
+    ro(0x1018, 2, U32, name!("Product code")).default(1),
+    rw(0x2000, 0, U16, name!("Brake delay")).range(0, 500).default(40).unit("ms").saved(),
+    ro(0x2001, 0, U16, name!("Operating hours")).unit("h").mappable(),
 ];
 
 /// Two of them are new; the other two replace rows.

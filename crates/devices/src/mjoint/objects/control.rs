@@ -8,6 +8,7 @@ use canopen::od::Entry;
 
 use super::values::{self, MODES, OFF_ON};
 use crate::mjoint::assumptions::*;
+use crate::name;
 use crate::row::cia::{ro as cia_ro, rw as cia_rw, rws as cia_rws};
 use crate::row::{I8, I16, I32, U8, U16, U32, join, ro, rw, rws};
 
@@ -15,37 +16,38 @@ pub(super) const ROWS: [Entry; 36] = join(&[&MANUFACTURER, &PROFILE]);
 
 /// What firmware 1.66 has otherwise. That 606Ch counts 0.1 r/min there too is a guess.
 pub(super) const CHANGES_OF_1_66: [Entry; 3] = [
-    ro(0x260C, 0, I32, "incremental_position", "The incremental position").unit("counts"),
-    ro(0x260E, 0, U16, "alarm_code", "Alarm code"),
+    ro(0x260C, 0, I32, name!("Incremental position")).unit("counts"),
+    ro(0x260E, 0, U16, name!("Alarm code")),
     cia_ro(0x606C, 0, I32).described("Motor actual speed").range(-30000, 30000).unit("0.1 r/min").mappable(),
 ];
 
 crate::row::rows! { const MANUFACTURER: [Entry; 17], manufacturer_objects:
-    rw(0x2600, 0, U16, "modbus_enable", "Modbus enable").values(OFF_ON) => MODBUS_ENABLE;
+    rw(0x2600, 0, U16, "Modbus enable").values(OFF_ON) => MODBUS_ENABLE;
     // 1 from power-on: bit 2 of the statusword 0404h that 5.10.1 prints before anything is enabled.
-    rw(0x2601, 0, U16, "output_enabled", "Drive output enabled").values(OFF_ON).default(1).command() => OUTPUT_ENABLED;
+    rw(0x2601, 0, U16, "Drive output enabled").values(OFF_ON).default(1).command() => OUTPUT_ENABLED;
     // Printed 0 to 306 r/min; the AIM servos' manual has 0 to 200 and tenths of a degree.
-    rws(0x2604, 0, U16, "weak_magnetic_angle", "Weak magnetic Angle")
+    rws(0x2604, 0, U16, "Weak magnetic angle")
         .range(0, 200).default(WEAK_MAGNETIC_ANGLE).unit("0.1 deg") => WEAK_MAGNETIC;
-    rws(0x2609, 0, U16, "dir_polarity", "DIR polarity").values(values::DIR_POLARITY) => DIR_POLARITY;
-    rws(0x260A, 0, U16, "electronic_gear_numerator", "Electronic gear molecule").default(32768) => GEAR_NUMERATOR;
-    rws(0x260B, 0, U16, "electronic_gear_denominator", "Electronic gear denominator")
+    rws(0x2609, 0, U16, "DIR polarity").values(values::DIR_POLARITY) => DIR_POLARITY;
+    // Printed "Electronic gear molecule".
+    rws(0x260A, 0, U16, "Electronic gear numerator").default(32768) => GEAR_NUMERATOR;
+    rws(0x260B, 0, U16, "Electronic gear denominator")
         .range(1, 65535).default(8192) => GEAR_DENOMINATOR;
-    rw(0x260C, 0, I32, "incremental_position", "The incremental position").unit("counts").command() => INCREMENTAL_POSITION;
-    rw(0x260E, 0, U16, "alarm_code", "Alarm code").command() => ALARM_CODE;
-    ro(0x2612, 0, U16, "driver_temperature", "System temperature").range(0, 100).unit("1 degC") => DRIVER_TEMPERATURE;
-    ro(0x2613, 0, I16, "output_pwm", "PWM of system output").unit("100/32768 %") => OUTPUT_PWM;
+    rw(0x260C, 0, I32, "Incremental position").unit("counts").command() => INCREMENTAL_POSITION;
+    rw(0x260E, 0, U16, "Alarm code").command() => ALARM_CODE;
+    ro(0x2612, 0, U16, "System temperature").range(0, 100).unit("1 degC") => DRIVER_TEMPERATURE;
+    ro(0x2613, 0, I16, "PWM of system output").unit("100/32768 %") => OUTPUT_PWM;
     // Reads 2 when all is stored, which is outside the printed range.
-    rw(0x2614, 0, U16, "data_save_flag", "Data save flag").range(0, 1).command() => DATA_SAVE_FLAG;
-    // Printed 0 to 255; node-IDs are 1 to 127.
-    rws(0x2615, 0, U16, "device_address", "Device location").range(1, 127).default(1) => DEVICE_ADDRESS;
-    rws(0x2618, 0, U16, "stationary_max_output", "Stationary maximum allowable output")
+    rw(0x2614, 0, U16, "Data save flag").range(0, 1).command() => DATA_SAVE_FLAG;
+    // Printed "Device location" with the meaning "Device address", and 0 to 255; node-IDs are 1 to 127.
+    rws(0x2615, 0, U16, "Device address").range(1, 127).default(1) => DEVICE_ADDRESS;
+    rws(0x2618, 0, U16, "Stationary maximum allowable output")
         .range(0, 609).default(STATIONARY_MAX_OUTPUT) => STATIONARY_OUTPUT;
     // Printed 0 to 100, with angles from 30 to 32768.
-    rws(0x2619, 0, U16, "mode_selection", "Mode selection").range(0, 32768) => MODE_SELECTION;
-    rws(0x261C, 0, U16, "synchronous_control_word", "CAN communication synchronous control word")
+    rws(0x2619, 0, U16, "Mode selection").range(0, 32768) => MODE_SELECTION;
+    rws(0x261C, 0, U16, "CAN communication synchronous control word")
         => SYNCHRONOUS_CONTROL_WORD;
-    rws(0x261D, 0, U16, "max_allowable_current", "maximum allowable current")
+    rws(0x261D, 0, U16, "Maximum allowable current")
         .range(0, 10009).default(MAX_ALLOWABLE_CURRENT).unit("mA") => ALLOWABLE_CURRENT;
     cia_rw(0x6040, 0, U16).mappable() => CONTROLWORD;
 }
@@ -72,14 +74,14 @@ crate::row::rows! { const PROFILE: [Entry; 19], profile_objects:
     // Printed 17 to 21 here, 17 to 22 in 5.09.
     cia_rws(0x6098, 0, I8).described("Return to origin method").range(17, 22).default(17) => HOMING_METHOD;
     cia_ro(0x60F9, 0, U8).default(2);
-    rws(0x60F9, 1, U16, "velocity_kp", "Velocity ring proportionality coefficient")
+    rws(0x60F9, 1, U16, "Velocity ring proportionality coefficient")
         .range(0, 10000).default(VELOCITY_KP).unit("0.001") => VELOCITY_PROPORTIONAL;
-    rws(0x60F9, 2, U16, "velocity_integral_time", "Velocity loop integration time")
+    rws(0x60F9, 2, U16, "Velocity loop integration time")
         .range(2, 2000).default(VELOCITY_INTEGRAL_TIME_MS).unit("ms") => VELOCITY_INTEGRAL_TIME;
     cia_ro(0x60FB, 0, U8).default(2);
-    rws(0x60FB, 1, U16, "position_kp", "Proportional coefficient of position ring")
+    rws(0x60FB, 1, U16, "Proportional coefficient of position ring")
         .range(60, 30000).default(POSITION_KP) => POSITION_PROPORTIONAL;
-    rws(0x60FB, 2, U16, "velocity_feed_forward", "Rate feed-forward")
+    rws(0x60FB, 2, U16, "Rate feed-forward")
         .range(0, 3924).unit("1/327 V/(1000 r/min)") => VELOCITY_FEED_FORWARD;
     cia_ro(0x60FD, 0, U16).described("Input port state").mappable() => DIGITAL_INPUTS;
     cia_rw(0x60FF, 0, I32).described("Speed mode speed").range(-3000, 3000).unit("r/min").mappable()

@@ -3,14 +3,15 @@
 use super::*;
 use crate::engine::faults::{FaultMonitor, FaultRow, error_register};
 use canopen::od::{Fixed, Index, Object, Table};
+use devices::name;
 use devices::row::{U8, U16, ro, rws};
 
 const PERIOD_NS: u64 = 500_000;
 
 static ROWS: [Entry; 3] = [
-    ro(0x1001, 0, U8, "error_register", ""),
-    rws(0x1017, 0, U16, "producer_heartbeat_time", "").default(100),
-    rws(0x2000, 0, U16, "parameter", "").default(7),
+    ro(0x1001, 0, U8, name!("error_register")),
+    rws(0x1017, 0, U16, name!("producer_heartbeat_time")).default(100),
+    rws(0x2000, 0, U16, name!("parameter")).default(7),
 ];
 static INDEX: Index<3> = Index::of(&ROWS);
 static TABLE: Table = Table::new(&ROWS, &INDEX);
