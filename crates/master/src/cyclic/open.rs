@@ -489,7 +489,7 @@ mod tests {
 
     use super::*;
 
-    static ROWS: [Entry; 1] = [ro(0x1000, 0, U32, "device_type", "Device type")];
+    static ROWS: [Entry; 1] = [ro(0x1000, 0, U32, devices::name!("Device type"))];
     static INDEX: Index<1> = Index::of(&ROWS);
     static TABLE: Table = Table::new(&ROWS, &INDEX);
     static SPEED_ONLY: Description = Description { dictionary: &TABLE, ..CIA402 };
