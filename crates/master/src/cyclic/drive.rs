@@ -1,3 +1,5 @@
+use core::time::Duration;
+
 use can::Instant;
 use canopen::pdo::PdoNumber;
 use canopen::{Mux, NodeId};
@@ -67,7 +69,12 @@ pub(super) struct Progress {
     /// What keeps the drive from its demand until it is switched off.
     latched: Option<Refusal>,
     odd_step: bool,
+    /// It has been seen at standstill without power in each step since.
+    stood_since: Option<Instant>,
 }
+
+/// How long a shaft without power has to stand until it is taken to do so: a load that drives it has turned it by then.
+const STANDS_WITHOUT_POWER: Duration = Duration::from_millis(50);
 
 impl CyclicDrive {
     /// Its node.
@@ -117,6 +124,15 @@ impl CyclicDrive {
         self.host_loss
     }
 
+    /// What is held by its motor stands until the power goes: the load may turn it from then on.
+    fn see_it_stand_without_power(&mut self, io: &mut Exchange<'_>, seen: &CyclicState) {
+        let since = seen.stands_without_power().then(|| *self.progress.stood_since.get_or_insert(io.now()));
+        self.progress.stood_since = since;
+        if since.is_some_and(|since| io.now() - since >= STANDS_WITHOUT_POWER) {
+            io.note_stands(&self.axis);
+        }
+    }
+
     /// Looks at the drive and has it do what is wanted in this cycle. A demand that is refused stops the drive as
     /// [`Demand::Hold`] does, for as long as it is refused, and the state says why. Allocates nothing.
     ///
@@ -133,9 +149,7 @@ impl CyclicDrive {
             self.progress.latched = None;
             self.progress.followed = false;
             io.forget_loss(self.watch);
-            if seen.stands_without_power() {
-                io.note_stands(&self.axis);
-            }
+            self.see_it_stand_without_power(io, &seen);
         } else if let Some(loss) = io.cycle_loss(self.watch) {
             self.progress.latched = Some(Refusal::Stopped(loss));
         }

@@ -36,7 +36,12 @@ struct Bench {
 }
 
 impl Bench {
-    fn new() -> Self {
+    /// Two wheels that nothing joins.
+    fn apart() -> Self {
+        Self::with(|_| {})
+    }
+
+    fn with(join: impl FnOnce(&mut World)) -> Self {
         let mut world = World::new(Bitrate::K500, 7);
         let network = Network::new();
         world.add_station(network.clone());
@@ -47,21 +52,28 @@ impl Bench {
             let drive = Drive::new(network.node(id), model);
             WheelSetup { drive, mode: ModeOfOperation::PROFILE_VELOCITY, turns }
         });
-        let body = DifferentialDriveModel {
-            mass_kg: 40.0,
-            yaw_inertia_kg_m2: 1.5,
-            wheel_base_m: GEOMETRY.wheel_base_m,
-            wheel_radius_m: GEOMETRY.wheel_radius_m,
-            rolling: 0.015,
-            grip: None,
-            weight_share: 0.7,
-            slope_rad: 0.0,
-            uphill_rad: 0.0,
-        };
-        let shafts = [CoupledShaft::direct(Place::node(LEFT)), CoupledShaft::reversed(Place::node(RIGHT))];
-        world.couple("base", &Coupling::DifferentialDrive(body), &shafts).unwrap();
+        join(&mut world);
         world.run_until(Instant::from_secs(1));
         Self { world, wheels }
+    }
+
+    /// The wheels of a body on the ground.
+    fn new() -> Self {
+        Self::with(|world| {
+            let body = DifferentialDriveModel {
+                mass_kg: 40.0,
+                yaw_inertia_kg_m2: 1.5,
+                wheel_base_m: GEOMETRY.wheel_base_m,
+                wheel_radius_m: GEOMETRY.wheel_radius_m,
+                rolling: 0.015,
+                grip: None,
+                weight_share: 0.7,
+                slope_rad: 0.0,
+                uphill_rad: 0.0,
+            };
+            let shafts = [CoupledShaft::direct(Place::node(LEFT)), CoupledShaft::reversed(Place::node(RIGHT))];
+            world.couple("base", &Coupling::DifferentialDrive(body), &shafts).unwrap();
+        })
     }
 
     fn try_open(&mut self, limits: BaseLimits) -> Result<Base, BaseError> {
@@ -295,6 +307,21 @@ fn closing_a_base_with_a_wheel_behind_a_cut_cable_is_an_error() {
     assert!(bench.world.report(RIGHT).unwrap().velocity_rpm.abs() < 2.0, "the wheel in reach stands");
     // Its watch over its host (2000h) acts a second after the last frame: whether it has by then is not seen.
     assert!(matches!(&closed, Err(error) if error.to_string().contains("node 1")), "{closed:?}");
+}
+
+#[test]
+fn closing_a_base_with_a_wheel_that_its_load_turns_without_power_is_an_error() {
+    let mut bench = Bench::apart();
+    let mut base = bench.open();
+    bench.drive(&mut base, 0.3, 0.0, 1.0);
+    // The motor holds against it, and nothing does without its power.
+    let load = "load torque 16".parse::<Stimulus>().unwrap();
+    bench.world.apply(Place::node(LEFT), &load).unwrap().unwrap();
+    bench.drive(&mut base, 0.0, 0.0, 1.0);
+    let closed = block_on(&mut bench.world, base.close()).unwrap();
+    let rpm = bench.world.report(LEFT).unwrap().velocity_rpm;
+    assert!(rpm.abs() > 50.0, "the load turns it, at {rpm} r/min");
+    assert!(closed.is_err_and(|error| error.to_string().contains("node 1")), "said to be closed at {rpm} r/min");
 }
 
 #[test]
