@@ -315,7 +315,10 @@ fn limits(model: &'static Description, node: u8) -> Option<String> {
 
 /// An example for a limit that only this model has, with its value as delivered.
 fn own_limit(model: &'static Description, node: u8) -> Option<String> {
-    let rows = model.dictionary.rows().iter().filter(|row| row.name.starts_with("max_") && row.access.is_writable());
+    let rows =
+        model.dictionary.rows().iter().filter(|row| {
+            (row.name.starts_with("max_") || row.name.starts_with("maximum_")) && row.access.is_writable()
+        });
     let mut lines = rows.filter_map(|row| match row.default {
         DefaultValue::Value(value) => Some(format!("{} = {value}", row.name)),
         _ => None,
