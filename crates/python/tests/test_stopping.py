@@ -1,6 +1,7 @@
 """Whatever a program forgets, or however it ends: what it has set in motion stops, and the bus is silent after it."""
 
 import asyncio
+import pathlib
 import subprocess
 import sys
 
@@ -351,3 +352,11 @@ def test_a_group_has_a_state_while_it_explains_its_stop():
             assert axes.group.state()["phase"]
         with pytest.raises(ferrodrive.MasterError, match="axis 2, node 2"):
             job.result()
+
+
+def test_closing_twice_is_closing_once():
+    with ferrodrive.Network(ferrodrive.World.machine(pathlib.Path(__file__).resolve().parents[3] / "examples" / "base.toml")) as network:
+        network.boot()
+        with network.base() as base:
+            base.close()
+            base.close()

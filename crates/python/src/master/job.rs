@@ -94,10 +94,18 @@ struct Outcome {
 #[derive(Default)]
 struct State {
     result: Option<Result<Value, Trouble>>,
+    /// There is a result, or there was one until it was taken.
+    reported: bool,
     /// The result is not wanted any more, or will never come.
     given_up: bool,
     /// Called when it has ended.
     callback: Option<Py<PyAny>>,
+}
+
+impl State {
+    const fn has_ended(&self) -> bool {
+        self.reported || self.given_up
+    }
 }
 
 impl Outcome {
@@ -118,6 +126,7 @@ impl Reporter {
         let callback = {
             let mut state = self.0.lock();
             state.given_up = state.given_up || result.is_none();
+            state.reported = true;
             state.result = result;
             state.callback.take()
         };
@@ -134,11 +143,8 @@ impl Reporter {
 
 impl Drop for Reporter {
     fn drop(&mut self) {
-        let untold = {
-            let state = self.0.lock();
-            state.result.is_none() && !state.given_up
-        };
-        if untold {
+        let has_ended = self.0.lock().has_ended();
+        if !has_ended {
             self.report(None);
         }
     }
@@ -181,8 +187,7 @@ impl Job {
     /// True when it has ended, one way or the other.
     #[getter]
     fn ended(&self) -> bool {
-        let state = self.outcome.lock();
-        state.result.is_some() || state.given_up
+        self.outcome.lock().has_ended()
     }
 
     /// Waits for its end on a real bus.
@@ -190,7 +195,7 @@ impl Job {
         while !self.ended() {
             py.detach(|| {
                 let state = self.outcome.lock();
-                if state.result.is_none() && !state.given_up {
+                if !state.has_ended() {
                     drop(self.outcome.ended.wait_timeout(state, NAP));
                 }
             });
@@ -203,7 +208,7 @@ impl Job {
     fn on_end(&self, py: Python<'_>, callback: Py<PyAny>) -> PyResult<()> {
         {
             let mut state = self.outcome.lock();
-            if state.result.is_none() && !state.given_up {
+            if !state.has_ended() {
                 state.callback = Some(callback);
                 return Ok(());
             }
