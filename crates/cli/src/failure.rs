@@ -4,6 +4,8 @@ use std::fmt;
 
 use canopen::{Mux, NodeId};
 use clap::error::{ContextKind, ErrorKind};
+use master::base::BaseError;
+use master::group::GroupError;
 use serde::Serialize;
 
 use crate::plain::short;
@@ -188,6 +190,24 @@ impl From<words::failure::Failure> for Failure {
         let words::failure::Failure { kind, what, because, next, subject, is_usage } = failure;
         let status = if is_usage { Status::Usage } else { Status::Failed };
         Self { status, kind, what, because, next, subject, reported: false, partial: false }
+    }
+}
+
+impl From<GroupError> for Failure {
+    fn from(error: GroupError) -> Self {
+        match error {
+            GroupError::Drive(error) => error.into(),
+            error => words::failure::Failure::from(error).into(),
+        }
+    }
+}
+
+impl From<BaseError> for Failure {
+    fn from(error: BaseError) -> Self {
+        match error {
+            BaseError::Drive(error) => error.into(),
+            error => words::failure::Failure::from(error).into(),
+        }
     }
 }
 

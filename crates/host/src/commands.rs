@@ -285,7 +285,7 @@ const fn doing(command: &drive::Command) -> (&'static str, bool) {
         Command::Disable => ("disabling", true),
         Command::Stop | Command::QuickStop => (STOPPING, true),
         Command::ResetFault => ("resetting", false),
-        Command::Save => ("storing", false),
+        Command::Save => (STORING, false),
         Command::Restore => ("restoring", false),
         Command::Guard(_) | Command::ReleaseGuard => ("guarding", false),
         Command::Motion(Motion::Velocity(..)) => ("turning", true),

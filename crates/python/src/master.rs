@@ -173,13 +173,12 @@ impl Network {
         Ok(self.described(node_id(node)?).map(|model| model.name))
     }
 
-    /// Which model a node is by its identity and objects: its name, and whether that is a guess by an object that others of this identity
-    /// lack; `None` if nothing speaks for one.
+    /// Which model a node is by its identity and objects: its name, and whether others fit as well; `None` if nothing speaks for one.
     fn identify(&self, py: Python<'_>, node: u8) -> PyResult<Job> {
         let (node, identified) = (self.node(node)?, Arc::clone(&self.identified));
         self.begin(py, async move {
             let knowledge = master::identify::knowledge(&node).await?;
-            let guessed = knowledge.guess().is_some_and(|guess| guess.evidence().is_some());
+            let guessed = knowledge.guess().is_some();
             let known = knowledge.description().map(|model| Value::Text(model.name.to_owned()));
             identified.lock().unwrap_or_else(PoisonError::into_inner).insert(node.id(), knowledge);
             Ok(known.map_or(Value::None, |name| Value::List(vec![name, Value::Bool(guessed)])))
@@ -188,9 +187,15 @@ impl Network {
 
     /// Does what an order says with a drive of a model.
     fn drive(&self, py: Python<'_>, node: u8, model: &str, order: Order) -> PyResult<Job> {
-        let drive = match self.guess(node, model).filter(|_| order.guessed) {
-            Some(knowledge) => Drive::known_as(self.node(node)?, knowledge),
-            None => Drive::new(self.node(node)?, self.model(node, model)?),
+        let drive = if order.guessed {
+            let unknown = || {
+                wrong_use(format!(
+                    "node {node} has not shown to be a {model}: call network.drive({node}) again, or name its model"
+                ))
+            };
+            Drive::known_as(self.node(node)?, self.guess(node, model).ok_or_else(unknown)?)
+        } else {
+            Drive::new(self.node(node)?, self.model(node, model)?)
         };
         let drive = drive.behind(self.gear(node, order.gear_ratio)?);
         match order.do_.as_str() {

@@ -158,6 +158,42 @@ def test_a_guessed_model_is_moved_and_not_stored():
         named.save()
 
 
+def test_of_models_with_the_same_objects_none_is_taken_for_sure():
+    # The joints have one identity and the same objects.
+    world = ferrodrive.World()
+    world.add("m4230e17b50", node=1)
+    world.wait_until_booted()
+    with ferrodrive.Network(world) as network:
+        drive = network.drive(1)
+        assert drive.guessed
+        with pytest.raises(ferrodrive.MasterError) as raised:
+            drive.save()
+        assert raised.value.kind == "guessed_model"
+        named = network.drive(1, "m4230e17b50")
+        assert not named.guessed
+        named.save()
+    # One that another network has guessed says nothing here.
+    with ferrodrive.Network(world) as network:
+        with pytest.raises(RuntimeError, match="network.drive\\(1\\) again"):
+            ferrodrive.Drive(network, 1, "m4230e17b50", guessed=True).enable()
+
+
+@pytest.mark.parametrize(
+    "do",
+    [
+        lambda drive: drive.set_object(0x10000, 0, 1),
+        lambda drive: drive.set_object(0x6000, 256, 1),
+        lambda drive: drive.send_pulses(2**200, 1.0),
+    ],
+    ids=["index", "sub-index", "pulses"],
+)
+def test_a_whole_number_out_of_range_is_refused_with_what_it_is(do):
+    world = ferrodrive.World()
+    drive = world.add("m4230e17b50", node=1)
+    with pytest.raises(ferrodrive.Refused, match="out of range for"):
+        do(drive)
+
+
 def test_a_node_that_nothing_speaks_for_is_to_be_named(tmp_path):
     sheet = tmp_path / "sensor.eds"
     sheet.write_text(SENSOR, encoding="utf-8")

@@ -55,7 +55,7 @@ mod tests {
     use host::command::NodeCommand;
 
     #[test]
-    fn a_message_is_its_number_its_session_and_a_deed() {
+    fn a_message_is_its_number_its_session_and_a_command() {
         let message = Message::parse(r#"{"seq":7,"session":"w","do":"jog","node":4,"rpm":-60}"#).expect("whole");
         let node = NodeId::new(4).expect("a node-ID");
         assert_eq!(message, Message { seq: 7, word: "w".into(), command: NodeCommand::Jog { rpm: -60.0 }.to(node) });

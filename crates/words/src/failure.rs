@@ -5,6 +5,8 @@
 use std::fmt;
 
 use canopen::{AbortCode, Mux, NodeId};
+use master::base::BaseError;
+use master::group::GroupError;
 use serde::Serialize;
 
 /// A reason in up to three parts, and what it is about.
@@ -162,6 +164,56 @@ impl From<master::Error> for Failure {
         match remedy(&error) {
             Some(remedy) if failure.next.is_empty() => failure.next(remedy),
             _ => failure,
+        }
+    }
+}
+
+/// Where an error of several drives names no remedy of its own: what shows why one of them does not follow.
+pub const SEE_DRIVES: &str = "ferrodrive state NODE shows where each stands, ferrodrive explain NODE what keeps it";
+
+const MODES: &str = "name a mode that the model has: csp, ip, csv or pv; ferrodrive objects NODE 6060 shows them";
+
+impl From<GroupError> for Failure {
+    /// What a drive said is that drive's failure.
+    fn from(error: GroupError) -> Self {
+        let what = error.to_string();
+        let group = || Self::new(what.as_str()).of_kind("group");
+        match error {
+            GroupError::Drive(error) => error.into(),
+            GroupError::Period { .. } => Self::usage(what).next("give a period within that, e.g. 5ms"),
+            GroupError::NoAxis => Self::usage(what).next("name the axes that are to move as one"),
+            GroupError::Path(_) | GroupError::BeyondDrive { .. } => Self::new(what)
+                .of_kind("out_of_limits")
+                .next("give a position, velocity, acceleration or rounding within what the axes may do"),
+            GroupError::NoMode { node } => group().at_node(node).next(MODES),
+            GroupError::NotEnabled { node, .. } => group().at_node(node).next(format!(
+                "ferrodrive explain {node} says what keeps it; `ferrodrive plan` whether the bus carries such a cycle"
+            )),
+            GroupError::Cyclic(_) => group().next(MODES),
+            GroupError::StillTurns { node, .. } | GroupError::NotSeen { node } => {
+                group().at_node(node).next(SEE_DRIVES)
+            }
+            _ => group().next(SEE_DRIVES),
+        }
+    }
+}
+
+impl From<BaseError> for Failure {
+    /// What a drive said is that drive's failure.
+    fn from(error: BaseError) -> Self {
+        let what = error.to_string();
+        let base = || Self::new(what.as_str()).of_kind("base");
+        match error {
+            BaseError::Drive(error) => error.into(),
+            BaseError::BadLimit { .. } | BaseError::BadLength { .. } | BaseError::BadTwist { .. } => {
+                Self::usage(what).next("give finite numbers, and lengths, limits and times above 0")
+            }
+            BaseError::BeyondDrive { .. } => {
+                Self::new(what).of_kind("out_of_limits").next("lower the limits of the base")
+            }
+            BaseError::NotEnabled { .. } => base().next("ferrodrive explain NODE says what keeps each of them"),
+            BaseError::StillTurns { node, .. } | BaseError::NotSeen { node } => base().at_node(node).next(SEE_DRIVES),
+            _ => base().next(SEE_DRIVES),
         }
     }
 }

@@ -1,7 +1,6 @@
 //! What commands that move drives cycle by cycle have in common: how late a host may be, whether the bus carries the cycle, and
 //! what to do where the host was late.
 
-use canopen::NodeId;
 use machine::file::{CyclePlan, Machine, TOLERANCE, TooFull};
 use master::Drive;
 use master::core::CycleLoss;
@@ -77,11 +76,6 @@ async fn too_full(
 fn refusal(cycle: &CyclePlan, what: String, next: String) -> Failure {
     let shown = format!("ferrodrive plan --cycle {}us shows each frame", cycle.period.as_micros());
     Failure::new(what).of_kind("bus_load").next(next).next(shown)
-}
-
-/// How a drive that did not become enabled is asked why.
-pub(super) fn ask_why(node: NodeId) -> String {
-    format!("ferrodrive explain {node} says what keeps it; `ferrodrive plan` whether the bus carries such a cycle")
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use serde::Serialize;
 use words::counted;
 
 use super::cycles::{CycleArgs, refuse_too_full};
-use super::group::{SEE_AXES, end_guards};
+use super::group::end_guards;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -21,6 +21,7 @@ use crate::guard::{GuardArgs, GuardReport};
 use crate::output::{Format, Report};
 use crate::session;
 use plot::Paint;
+use words::failure::SEE_DRIVES;
 
 /// How long a line counts on the virtual bus of this command alone, where no time passes between two lines.
 const VIRTUAL_LINE: Duration = Duration::from_millis(100);
@@ -195,22 +196,22 @@ impl DriveBase {
         for wheel in &wheels {
             guards.push(self.guard.begin(context, &wheel.drive).await?);
         }
-        let [left, right] = &wheels[..] else { return Err(Failure::new("a base has two wheels").next(SEE_AXES)) };
+        let [left, right] = &wheels[..] else { return Err(Failure::new("a base has two wheels").next(SEE_DRIVES)) };
         let options = self.cycles.options();
         let period = plan.period.unwrap_or(BASE_PERIOD);
         let driven = match Base::open([left, right], plan.geometry, limits, period, options).await {
             Ok(mut base) => {
                 let driven = self.carry_out(context, &mut base, Bounds { geometry: plan.geometry, limits }).await;
                 let state = base.state();
-                let closed = base.close().await.map_err(failure);
+                let closed = base.close().await.map_err(Failure::from);
                 driven.and_then(|seen| closed.map(|()| (seen, state)))
             }
-            Err(error) => Err(failure(error)),
+            Err(error) => Err(error.into()),
         };
         let reports = end_guards(context, guards, [&left.drive, &right.drive].into_iter()).await;
         let (seen, state) = driven?;
         let reports: [GuardReport; 2] =
-            reports?.try_into().map_err(|_| Failure::new("a wheel was not released").next(SEE_AXES))?;
+            reports?.try_into().map_err(|_| Failure::new("a wheel was not released").next(SEE_DRIVES))?;
         Ok(BaseDriven::new(&seen, &state, limits, [left, right], reports))
     }
 
@@ -220,7 +221,7 @@ impl DriveBase {
             Err(error) => {
                 let cause = if let BaseError::Stopped(cause) = error { Some(cause) } else { None };
                 let reason = if cause.is_some() { base.explain_stop().await } else { None };
-                let failure = reason.into_iter().fold(failure(error), Failure::because);
+                let failure = reason.into_iter().fold(Failure::from(error), Failure::because);
                 Err(match cause {
                     Some(StopCause::Wheel { refusal, .. }) => self.cycles.advised(failure, refusal),
                     _ => failure,
@@ -268,7 +269,7 @@ impl DriveBase {
 /// A twist on the command line is meant as it stands: one that the base would slow down is refused. Lines of a controller are held
 /// to the limits as they come.
 fn within_limits(asked: Twist, plan: &BasePlan, limits: &BaseLimits) -> Result<(), Failure> {
-    limits.check().map_err(failure)?;
+    limits.check()?;
     let driven = plan.geometry.saturate(asked, limits);
     if driven == asked {
         return Ok(());
@@ -415,23 +416,6 @@ fn twist_of(context: &Context, line: &str, seen: &mut Seen) -> Option<Twist> {
         context.note(&format!("expected a twist of two numbers, m/s and rad/s, e.g. 0.3 -0.1, got '{shown}'"));
     }
     twist
-}
-
-fn failure(error: BaseError) -> Failure {
-    match error {
-        BaseError::Drive(error) => error.into(),
-        BaseError::BadLimit { .. } | BaseError::BadTwist { .. } => {
-            Failure::usage(error.to_string()).next("give finite numbers, and a --dead-man above 0")
-        }
-        BaseError::BeyondDrive { .. } => {
-            Failure::new(error.to_string()).of_kind("out_of_limits").next("lower the limits in [base]")
-        }
-        BaseError::NotEnabled { limit, left, right } => {
-            let what = format!("the wheels were not enabled within {} s: {left}; {right}", limit.as_secs());
-            Failure::new(what).of_kind("base").next("ferrodrive explain NODE says what keeps each of them")
-        }
-        error => Failure::new(error.to_string()).of_kind("base").next(SEE_AXES),
-    }
 }
 
 impl BaseDriven {

@@ -415,7 +415,7 @@ pub(crate) fn open_log(path: &Path) -> Result<AnyLogReader, Failure> {
     })
 }
 
-/// A file in which there is no frame, and something that is not one.
+/// A file without a frame that holds something else.
 pub(crate) fn no_log(path: &Path, form: LogFormat) -> Failure {
     without_frames(format!("no frame in {}: it is not a {form} log", path.display()))
 }

@@ -13,7 +13,7 @@ use serde::Serialize;
 use words::mode::mode;
 use words::node::node;
 
-use super::cycles::{CycleArgs, ask_why, refuse_too_full};
+use super::cycles::{CycleArgs, refuse_too_full};
 use super::motion::speed;
 use super::repeat::period;
 use crate::context::Context;
@@ -256,10 +256,10 @@ impl Move {
         let moved = match opened {
             Ok(mut group) => {
                 let moved = self.carry_out(context, &mut group, &planned).await;
-                let closed = group.close().await.map_err(failure);
+                let closed = group.close().await.map_err(Failure::from);
                 moved.and_then(|seen| closed.map(|()| seen))
             }
-            Err(error) => Err(failure(error)),
+            Err(error) => Err(error.into()),
         };
         let guards = end_guards(context, guards, planned.axes.iter().map(|axis| &axis.drive)).await;
         Ok(GroupMoved::new(&planned, moved?, guards?))
@@ -291,7 +291,7 @@ impl Move {
             let drive = context.known_drive(node).await?;
             let said = plan.map(|plan| &plan.axes[index]);
             let mode = self.mode.or(said.and_then(|axis| axis.mode));
-            let mode = mode.map_or_else(|| AxisSetup::best_mode(&drive).map_err(failure), Ok)?;
+            let mode = mode.map_or_else(|| AxisSetup::best_mode(&drive).map_err(Failure::from), Ok)?;
             let limits = self.limits(&drive, said.map(|axis| &axis.limits)).await?;
             let target = targets.iter().find(|(other, _)| *other == node);
             planned.targets.push(match target {
@@ -371,7 +371,7 @@ impl Move {
             Err(error) => {
                 let cause = if let GroupError::Stopped(cause) = error { Some(cause) } else { None };
                 let reason = if cause.is_some() { group.explain_stop().await } else { None };
-                let failure = reason.into_iter().fold(failure(error), Failure::because);
+                let failure = reason.into_iter().fold(Failure::from(error), Failure::because);
                 Err(match cause {
                     Some(StopCause::Axis { refusal, .. }) => self.cycles.advised(failure, refusal),
                     _ => failure,
@@ -439,32 +439,6 @@ async fn turns_of(drive: &Drive, angle: Angle) -> Result<Turns, Failure> {
         Angle::Counts(counts) => Ok(Turns(counts as f64 / drive.counts_per_turn().await?)),
     }
 }
-
-/// What a group has to say, for people and programs.
-fn failure(error: GroupError) -> Failure {
-    match error {
-        GroupError::Drive(error) => error.into(),
-        GroupError::NoMode { node } => Failure::new(error.to_string()).at_node(node).next(GROUP_MODES),
-        GroupError::NotEnabled { node, .. } => {
-            Failure::new(error.to_string()).of_kind("group").at_node(node).next(ask_why(node))
-        }
-        GroupError::Period { .. } => Failure::usage(error.to_string()).next("give a --period within that, e.g. 5ms"),
-        // The path is beyond what the axes may do, or one of them takes.
-        GroupError::Path(_) | GroupError::BeyondDrive { .. } => {
-            let failure = Failure::new(error.to_string()).of_kind("out_of_limits");
-            failure.next("give a position, --velocity, --acceleration or --rounding within what the axes may do")
-        }
-        GroupError::Cyclic(_) => Failure::new(error.to_string()).of_kind("group").next(GROUP_MODES),
-        error => Failure::new(error.to_string()).of_kind("group").next(SEE_AXES),
-    }
-}
-
-const GROUP_MODES: &str =
-    "give a --mode that the model has: csp, ip, csv or pv; ferrodrive objects NODE 6060 shows them";
-
-/// What shows why an axis or a wheel does not follow.
-pub(super) const SEE_AXES: &str =
-    "ferrodrive state NODE shows where each stands, ferrodrive explain NODE what keeps it";
 
 impl GroupMoved {
     fn new(planned: &Planned, seen: Seen, guards: Vec<GuardReport>) -> Self {

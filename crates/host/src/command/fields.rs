@@ -5,10 +5,10 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, from_value};
 
 /// The fields of a message.
-pub(super) type Fields = Map<String, Value>;
+pub(crate) type Fields = Map<String, Value>;
 
 /// All of them as one value, which refuses those that it does not have.
-pub(super) fn whole<T: DeserializeOwned>(fields: Fields) -> Result<T, String> {
+pub(crate) fn whole<T: DeserializeOwned>(fields: Fields) -> Result<T, String> {
     from_value(Value::Object(fields)).map_err(|error| error.to_string())
 }
 

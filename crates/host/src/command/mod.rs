@@ -4,7 +4,7 @@
 //! It is nested, so that the compiler knows what concerns one node, several drives, parameters, PDOs or the session. A command to a
 //! drive is the master's own ([`master::drive::Command`]).
 
-mod fields;
+pub(crate) mod fields;
 mod group;
 mod node;
 mod parameters;
@@ -100,7 +100,9 @@ fn read(mut fields: Fields) -> Result<Command, String> {
         return whole(fields).map(Command::Group);
     }
     if !NodeCommand::words().any(|known| known == word) {
-        return Err(format!("unknown command `{word}`"));
+        let known = [SessionCommand::WORDS, WorldCommand::WORDS, GroupCommand::WORDS].into_iter().flatten().copied();
+        let known: Vec<_> = known.chain(NodeCommand::words()).collect();
+        return Err(format!("unknown command `{word}`, expected one of {}", known.join(", ")));
     }
     let node = fields::node_id(&mut fields)?;
     node::read(&word, fields).map(|command| Command::Node(node, command))

@@ -106,7 +106,7 @@ pub(super) fn read(word: &str, mut fields: Fields) -> Result<NodeCommand, String
         _ => NodeCommand::Drive(to_drive(word, &mut fields)?),
     };
     match fields.keys().next() {
-        Some(name) => Err(format!("unknown field `{name}`")),
+        Some(name) => Err(format!("unknown field `{name}`: `{word}` does not have it")),
         None => Ok(command),
     }
 }
@@ -156,8 +156,8 @@ mod tests {
             let refused = loop {
                 match read(word, fields.clone()) {
                     Ok(_) => break None,
-                    Err(error) => match error.strip_prefix("unknown field `").and_then(|rest| rest.strip_suffix('`')) {
-                        Some(name) => fields.remove(name),
+                    Err(error) => match error.strip_prefix("unknown field `").and_then(|rest| rest.split_once('`')) {
+                        Some((name, _)) => fields.remove(name),
                         None => break Some(error),
                     },
                 };

@@ -10,6 +10,7 @@ use sim::stimulus::Place;
 use super::answer::{ControlError, HELP};
 use super::id::Id;
 use super::subscription::{Channel, Values};
+use crate::command::fields::whole;
 use crate::events::Filter;
 use words::suggest::{did_you_mean, near};
 
@@ -214,14 +215,14 @@ impl Request {
 }
 
 fn read<T: DeserializeOwned>(fields: Map<String, Value>) -> Result<T, ControlError> {
-    serde_json::from_value(Value::Object(fields)).map_err(|error| ControlError::usage(error.to_string()))
+    whole(fields).map_err(ControlError::usage)
 }
 
 fn place(node: u8, axis: Option<u8>) -> Result<Place, ControlError> {
     let text = format!("{node}.{}", axis.unwrap_or(1));
     text.parse().map_err(|()| {
         ControlError::usage(format!(
-            "there is no node {node}, axis {}; expected a node from 1 to 127, and an axis from 1",
+            "expected a node from 1 to 127 and an axis from 1, got node {node}, axis {}",
             axis.unwrap_or(1)
         ))
     })

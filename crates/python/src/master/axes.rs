@@ -16,7 +16,7 @@ use words::failure::Failure;
 use words::mode::mode;
 
 use super::job::Trouble;
-use super::slot::Slot;
+use super::slot::{Slot, Stepped};
 use super::value::Value;
 use super::{Job, Network, duration};
 use crate::failure::bad_value;
@@ -88,11 +88,7 @@ impl From<GroupError> for Trouble {
     fn from(error: GroupError) -> Self {
         match error {
             GroupError::Drive(error) => Self::Drive(error),
-            GroupError::Period { .. } | GroupError::NoAxis => Failure::usage(error.to_string()).into(),
-            GroupError::Path(_) | GroupError::BeyondDrive { .. } => {
-                Failure::new(error.to_string()).of_kind("out_of_limits").into()
-            }
-            error => Failure::new(error.to_string()).of_kind("group").into(),
+            error => Failure::from(error).into(),
         }
     }
 }
@@ -101,13 +97,14 @@ impl From<BaseError> for Trouble {
     fn from(error: BaseError) -> Self {
         match error {
             BaseError::Drive(error) => Self::Drive(error),
-            BaseError::BadLimit { .. } | BaseError::BadLength { .. } | BaseError::BadTwist { .. } => {
-                Failure::usage(error.to_string()).into()
-            }
-            BaseError::BeyondDrive { .. } => Failure::new(error.to_string()).of_kind("out_of_limits").into(),
-            error => Failure::new(error.to_string()).of_kind("base").into(),
+            error => Failure::from(error).into(),
         }
     }
+}
+
+/// Why a group or a base does not move, with what the drive says that keeps it.
+fn with_reason(error: impl Into<Failure>, reason: Option<Error>) -> Trouble {
+    reason.into_iter().fold(error.into(), |failure, reason| failure.because(reason.to_string())).into()
 }
 
 /// Why a group or a base was not opened; `drive` is what a drive said, where that is why.
@@ -182,7 +179,7 @@ impl Group {
         let within = within_s.map(duration).transpose()?;
         self.network.get().begin_said(py, async move {
             let time = slot.with(|group| Ok(group.start_move(&turns(&to_deg), within)?))?;
-            let _brake = slot.brake();
+            let _stop = slot.stop_on_drop();
             rest(&core, &slot, |_| Ok(())).await?;
             Ok(Value::Real(time.as_secs_f64()))
         })
@@ -195,7 +192,7 @@ impl Group {
             let options =
                 StreamOptions { capacity: 2 * AHEAD, prefill: AHEAD.min(points_deg.len()), ..StreamOptions::default() };
             slot.with(|group| Ok(group.start_stream(options)?))?;
-            let _brake = slot.brake();
+            let _stop = slot.stop_on_drop();
             let mut left = points_deg.iter();
             let moved = rest(&core, &slot, |group| {
                 while group.stream().is_some_and(|stream| stream.room() > 0) {
@@ -224,8 +221,8 @@ impl Group {
                 Ok(())
             })?;
             match rest(&core, &slot, |_| Ok(())).await {
-                Err(Stopped(Some(StopCause::Asked), _)) | Ok(()) => Ok(Value::None),
-                Err(Stopped(_, trouble)) => Err(trouble),
+                Err(Stopped { cause: Some(StopCause::Asked), .. }) | Ok(()) => Ok(Value::None),
+                Err(stopped) => Err(stopped.into()),
             }
         })
     }
@@ -277,9 +274,9 @@ impl Group {
             let opened = MasterGroup::open(&axes, period, options).await;
             let mut group = opened.map_err(|error| opening(&cycle.what, error.of_drive().cloned(), error))?;
             if let Err(error) = group.enable().await {
-                let reason = group.explain_stop().await.map(|reason| format!(". {reason}")).unwrap_or_default();
+                let reason = group.explain_stop().await;
                 let _ = group.close().await;
-                return Err(Failure::new(format!("{error}{reason}")).of_kind("group").into());
+                return Err(with_reason(error, reason));
             }
             slot.fill(group);
             Ok(Value::None)
@@ -303,18 +300,23 @@ impl AxisOrder {
     }
 }
 
-/// Why a group rests before its end, and how that is reported.
-struct Stopped(Option<StopCause>, Trouble);
+/// Why a group does not go on.
+struct Stopped {
+    /// What stopped it, where all axes were seen to stand.
+    cause: Option<StopCause>,
+    /// How it is reported.
+    trouble: Trouble,
+}
 
 impl From<Trouble> for Stopped {
     fn from(trouble: Trouble) -> Self {
-        Self(None, trouble)
+        Self { cause: None, trouble }
     }
 }
 
 impl From<Stopped> for Trouble {
-    fn from(Stopped(_, trouble): Stopped) -> Self {
-        trouble
+    fn from(stopped: Stopped) -> Self {
+        stopped.trouble
     }
 }
 
@@ -340,11 +342,10 @@ async fn rest(
         Some(question) => question.await.map(|reason| reason.to_string()),
         None => None,
     };
-    // A stop that was asked for is none where an axis was not seen to stand.
-    let asked = Some(cause).filter(|_| stands.is_ok());
+    let seen = stands.is_ok();
     let sentences = [Some(cause.to_string()), reason, stands.err().map(|moving| moving.to_string())];
     let text = sentences.into_iter().flatten().collect::<Vec<_>>().join(". ");
-    Err(Stopped(asked, Failure::new(text).of_kind("group").into()))
+    Err(Stopped { cause: seen.then_some(cause), trouble: Failure::new(text).of_kind("group").into() })
 }
 
 fn turns(degrees: &[f64]) -> Vec<Turns> {
@@ -417,16 +418,17 @@ impl Base {
             let began = core.now();
             let twist = Twist { linear_m_s, angular_rad_s };
             let mut taken = slot.with(|base| command(base, twist))?;
-            let _brake = slot.brake();
+            let _stop = slot.stop_on_drop();
             let mut is_stopped = false;
             while core.now() - began < time && !is_stopped {
                 next(&core).await?;
                 is_stopped = slot.with(|base| {
-                    // A stop that another thread has asked for counts more than this twist.
-                    if !base.is_stopping() {
+                    // A stop that another thread has asked for counts more than this twist; a lost wheel takes none.
+                    if !base.is_stopping() && base.state().cause.is_none_or(|cause| cause.wheel().is_none()) {
                         taken = command(base, twist)?;
+                        return Ok(false);
                     }
-                    Ok(base.is_stopping())
+                    Ok(true)
                 })?;
             }
             stand(&core, &slot).await?;
@@ -491,10 +493,9 @@ impl Base {
             let opened = MasterBase::open([left, right], geometry, limits, period, options).await;
             let mut base = opened.map_err(|error| opening(&cycle.what, error.of_drive().cloned(), error))?;
             if let Err(error) = base.enable().await {
-                let reason = base.explain_stop().await.map(|reason| format!(". {reason}")).unwrap_or_default();
+                let reason = base.explain_stop().await;
                 let _ = base.close().await;
-                let failure = Failure::new(format!("{error}{reason}")).of_kind("base");
-                return Err(failure.next("network.explain(NODE) says what keeps a wheel").into());
+                return Err(with_reason(error, reason));
             }
             slot.fill(base);
             Ok(Value::None)
@@ -531,25 +532,30 @@ async fn next(core: &Core) -> Result<(), Trouble> {
     core.next_sync().await.map(drop).map_err(|error| Trouble::Said(error.to_string()))
 }
 
-/// Brings the base to rest, until both wheels were seen to stand; a wheel that was lost before or meanwhile is reported.
+/// Brings the base to rest, until both wheels were seen to stand; a wheel that was lost before or meanwhile is reported, in the words
+/// of its drive.
 async fn stand(core: &Core, slot: &Slot<MasterBase>) -> Result<Value, Trouble> {
-    let start = |base: &mut MasterBase| {
+    slot.with(|base| {
         base.start_stop();
         Ok(())
-    };
-    slot.with(start)?;
-    let _brake = slot.brake();
-    loop {
+    })?;
+    let _stop = slot.stop_on_drop();
+    let (stopped, question) = loop {
         next(core).await?;
-        let stopped = slot.with(|base| {
+        let (stopped, question) = slot.with(|base| {
             // A twist of another thread does not take the stop back.
-            if !base.is_stopping() {
-                base.start_stop();
-            }
-            Ok(base.stopped())
+            Stepped::stop(base);
+            Ok((base.stopped(), base.explanation()))
         })?;
         if let Some(stopped) = stopped {
-            return Ok(stopped.map(|()| Value::None)?);
+            break (stopped, question);
         }
-    }
+    };
+    let Err(error) = stopped else { return Ok(Value::None) };
+    // It is stepped in the background meanwhile.
+    let reason = match question {
+        Some(question) => question.await,
+        None => None,
+    };
+    Err(with_reason(error, reason))
 }

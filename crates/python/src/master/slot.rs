@@ -15,7 +15,7 @@ pub(super) trait Stepped: Send + 'static {
     fn step_once(&mut self, io: &mut Exchange<'_>);
 
     /// Has it come to rest, from the next cycle on.
-    fn brake(&mut self);
+    fn stop(&mut self);
 }
 
 impl Stepped for Group {
@@ -23,7 +23,7 @@ impl Stepped for Group {
         self.step(io);
     }
 
-    fn brake(&mut self) {
+    fn stop(&mut self) {
         self.start_stop();
     }
 }
@@ -33,7 +33,7 @@ impl Stepped for Base {
         self.step(io);
     }
 
-    fn brake(&mut self) {
+    fn stop(&mut self) {
         if !self.is_stopping() {
             self.start_stop();
         }
@@ -80,8 +80,8 @@ impl<T: Stepped> Slot<T> {
     }
 
     /// Has it come to rest when this is dropped: however a job ends that moves it, done, failed or given up.
-    pub(super) fn brake(&self) -> Brake<'_, T> {
-        Brake(self)
+    pub(super) fn stop_on_drop(&self) -> StopOnDrop<'_, T> {
+        StopOnDrop(self)
     }
 
     pub(super) fn close(&self) -> Option<T> {
@@ -100,13 +100,13 @@ impl<T: Stepped> Slot<T> {
     }
 }
 
-/// Made by [`Slot::brake`].
-pub(super) struct Brake<'a, T: Stepped>(&'a Slot<T>);
+/// Made by [`Slot::stop_on_drop`].
+pub(super) struct StopOnDrop<'a, T: Stepped>(&'a Slot<T>);
 
-impl<T: Stepped> Drop for Brake<'_, T> {
+impl<T: Stepped> Drop for StopOnDrop<'_, T> {
     fn drop(&mut self) {
         if let Some(open) = self.0.lock().as_mut() {
-            open.brake();
+            open.stop();
         }
     }
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use can::Frame;
 use canopen::Mux;
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use sim::stimulus::{
@@ -49,7 +50,7 @@ pub(super) fn of_node(name: &str, values: Values<'_, '_>) -> PyResult<Stimulus> 
         }
         "battery" => Stimulus::Battery(flag()?),
         "pulses" | "quadrature" => {
-            let (count, hz) = values.extract()?;
+            let (count, hz) = (whole(values, 0, "a number of pulses")?, values.get_item(1)?.extract()?);
             let is_pulses = name == "pulses";
             Stimulus::Pulses(if is_pulses {
                 PulseTrain::Pulses { count, hz }
@@ -61,8 +62,8 @@ pub(super) fn of_node(name: &str, values: Values<'_, '_>) -> PyResult<Stimulus> 
         "clock" => Stimulus::Pulses(PulseTrain::Clock(one()?)),
         "cable_cut" => Stimulus::CableCut(flag()?),
         "object" => {
-            let (index, sub_index): (u16, u8) = (values.get_item(0)?.extract()?, values.get_item(1)?.extract()?);
-            Stimulus::Object { mux: Mux::new(index, sub_index), value: object_value(&values.get_item(2)?)? }
+            let mux = Mux::new(whole(values, 0, "an index")?, whole(values, 1, "a sub-index")?);
+            Stimulus::Object { mux, value: object_value(values, 2)? }
         }
         _ => match (load(name, values)?, bus(name, values)?) {
             (Some(part), _) => Stimulus::Load(part),
@@ -118,11 +119,7 @@ fn bus(name: &str, values: Values<'_, '_>) -> PyResult<Option<BusFault>> {
             let frame: Frame = frame.parse().map_err(|error| refused(format!("{frame:?} is not a frame: {error}")))?;
             BusFault::babble(frame, time(values, 1)?)
         }
-        "bus_overrun" => {
-            let depth: i64 = values.get_item(0)?.extract()?;
-            let depth = u32::try_from(depth).map_err(|_| refused(format!("{depth} is not a number of frames")))?;
-            BusFault::overrun(depth, time(values, 1)?)
-        }
+        "bus_overrun" => BusFault::overrun(whole(values, 0, "a number of frames")?, time(values, 1)?),
         "bus_corrupt" => BusFault::corrupt(values.get_item(0)?.extract()?),
         _ => return Ok(None),
     };
@@ -148,10 +145,7 @@ pub(super) fn of_wire(name: &str, values: Values<'_, '_>) -> PyResult<WireFault>
     match name {
         "corrupt" => WireFault::corrupt(values.get_item(0)?.extract()?),
         "destroy" => {
-            let (nth, bit): (i64, i64) = values.extract()?;
-            // What is less than 1 is refused as 0 is.
-            let whole = |number: i64| u32::try_from(number.max(0)).unwrap_or(u32::MAX);
-            WireFault::destroy(whole(nth), whole(bit))
+            WireFault::destroy(whole(values, 0, "a number of a frame")?, whole(values, 1, "a number of a bit")?)
         }
         _ => return Err(bad_value(format!("{name:?} is not a disturbance of the wire"))),
     }
@@ -173,12 +167,24 @@ fn time(values: Values<'_, '_>, nth: usize) -> PyResult<Duration> {
     Duration::try_from_secs_f64(ms / 1e3).map_err(|_| refused(format!("invalid time in ms {ms}")))
 }
 
-fn object_value(value: &Bound<'_, PyAny>) -> PyResult<ObjectValue> {
+/// A whole number that fits; one of any size is refused as the simulator refuses it, not by an `OverflowError`.
+fn whole<T: TryFrom<i128>>(values: Values<'_, '_>, nth: usize, what: &str) -> PyResult<T> {
+    let value = values.get_item(nth)?;
+    let out_of_range = || refused(format!("{value} is out of range for {what}"));
+    match value.extract::<i128>() {
+        Ok(number) => T::try_from(number).map_err(|_| out_of_range()),
+        Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => Err(out_of_range()),
+        Err(error) => Err(error),
+    }
+}
+
+fn object_value(values: Values<'_, '_>, nth: usize) -> PyResult<ObjectValue> {
+    let value = values.get_item(nth)?;
     if let Ok(text) = value.extract() {
         return Ok(ObjectValue::Text(text));
     }
     if value.is_instance_of::<pyo3::types::PyFloat>() {
         return value.extract().map(ObjectValue::Real);
     }
-    value.extract().map(ObjectValue::Integer)
+    whole(values, nth, "the value of an object").map(ObjectValue::Integer)
 }

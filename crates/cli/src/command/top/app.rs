@@ -272,12 +272,12 @@ impl App {
         vec![Action::Say(message)]
     }
 
-    fn say(&mut self, deed: &str) -> Vec<Action> {
+    fn say(&mut self, command: &str) -> Vec<Action> {
         let Some(node) = self.chosen else {
             self.report(None, "no node has been heard: n scans the bus");
             return Vec::new();
         };
-        vec![Action::Say(json!({ "do": deed, "node": node }))]
+        vec![Action::Say(json!({ "do": command, "node": node }))]
     }
 
     fn choose(&mut self, by: isize) -> Vec<Action> {
