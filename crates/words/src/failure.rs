@@ -190,9 +190,7 @@ impl From<GroupError> for Failure {
                 "ferrodrive explain {node} says what keeps it; `ferrodrive plan` whether the bus carries such a cycle"
             )),
             GroupError::Cyclic(_) => group().next(MODES),
-            GroupError::StillTurns { node, .. } | GroupError::NotSeen { node } => {
-                group().at_node(node).next(SEE_DRIVES)
-            }
+            GroupError::NotAtRest(why) => group().at_node(why.node()).next(SEE_DRIVES),
             _ => group().next(SEE_DRIVES),
         }
     }
@@ -212,7 +210,7 @@ impl From<BaseError> for Failure {
                 Self::new(what).of_kind("out_of_limits").next("lower the limits of the base")
             }
             BaseError::NotEnabled { .. } => base().next("ferrodrive explain NODE says what keeps each of them"),
-            BaseError::StillTurns { node, .. } | BaseError::NotSeen { node } => base().at_node(node).next(SEE_DRIVES),
+            BaseError::NotAtRest(why) => base().at_node(why.node()).next(SEE_DRIVES),
             _ => base().next(SEE_DRIVES),
         }
     }

@@ -11,9 +11,8 @@ use super::kinematics::{Geometry, Pose, Twist, Wheels};
 use super::limits::{BaseError, BaseLimits};
 use super::state::StopCause;
 use crate::core::NodeSet;
-use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, Refusal, Standstill};
-
-use crate::drive::{Drive, STANDSTILL_RPM};
+use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, NotAtRest, Refusal, at_rest};
+use crate::drive::Drive;
 use crate::error::Error;
 use crate::network::{Claim, Exchange, Network};
 use crate::units::{Rpm, Turns};
@@ -21,11 +20,8 @@ use crate::units::{Rpm, Turns};
 /// How long drives may take to be enabled, and to be without power again.
 const POWER_LIMIT: Duration = Duration::from_secs(5);
 
-/// How long both wheels are seen to stand before that is reported.
+/// How long both wheels are seen to stand before that is reported: no position loop holds them.
 const REST_TIME: Duration = Duration::from_millis(200);
-
-/// How long after the last set-point a wheel may take to show that it stands.
-const REST_LIMIT: Duration = Duration::from_secs(2);
 
 /// How long a wheel that is behind stays so, s: its speed is rounded to what its object counts, and that adds up.
 const LAG_MEMORY_S: f64 = 5.0;
@@ -100,7 +96,6 @@ struct Wheel {
     /// Lag behind the commanded way, m. A part is forgotten in each cycle: speeds are rounded.
     behind_m: f64,
     shows: Option<CyclicState>,
-    standstill: Standstill,
     _claim: Claim,
 }
 
@@ -188,9 +183,7 @@ impl Base {
                 Power::Off => Demand::Off,
                 Power::Enabling | Power::On => Demand::Velocity(Rpm(m_s * turns_per_m * wheel.turns * 60.0)),
             };
-            let shown = wheel.drive.step(io, demand);
-            wheel.standstill.look(&shown);
-            wheel.shows = Some(shown);
+            wheel.shows = Some(wheel.drive.step(io, demand));
         }
         let period_s = self.period.as_secs_f64();
         for (wheel, m_s) in self.wheels.iter_mut().zip(sent) {
@@ -206,6 +199,10 @@ impl Base {
         }
         self.state.commanded = self.geometry.twist(self.sent);
         let is_still = self.is_stopping && self.state.commanded == Twist::default();
+        if is_still && self.still_cycles == 0 {
+            // One that was about to turn had still stood.
+            self.wheels.iter_mut().for_each(|wheel| wheel.drive.begin_rest());
+        }
         self.still_cycles = if is_still { self.still_cycles + 1 } else { 0 };
         self.state
     }
@@ -343,26 +340,22 @@ impl Base {
     /// What became of [`start_stop`](Self::start_stop): `None` while the wheels come to rest, `Ok` once both were seen to stand.
     ///
     /// # Errors
-    /// [`BaseError::Stopped`], once it has been commanded to speed 0, where a wheel was lost before or on the way to rest;
-    /// [`BaseError::StillTurns`] for a wheel that does not come to rest.
+    /// [`BaseError::NotAtRest`] for a wheel that does not come to rest; [`BaseError::Stopped`] where a wheel was lost before or on the
+    /// way to rest, once those that are heard stand.
     pub fn stopped(&self) -> Option<Result<(), BaseError>> {
         if self.still_cycles == 0 {
             return None;
         }
-        if let Some(cause) = self.lost_wheel() {
-            return Some(Err(BaseError::Stopped(cause)));
-        }
-        let turning = self.wheels.iter().find(|wheel| !wheel.standstill.stands());
-        match turning {
-            // A wheel that was about to turn had still stood when it was stopped.
-            None if self.wheels.iter().all(|wheel| self.still_cycles >= wheel.standstill.needed()) => Some(Ok(())),
-            Some(wheel) if self.still_cycles >= self.cycles(REST_LIMIT) => Some(Err(BaseError::StillTurns {
-                node: wheel.drive.node(),
-                rpm: wheel.standstill.turned_rpm(),
-                limit: REST_LIMIT,
-            })),
-            _ => None,
-        }
+        let waited = self.period * u32::try_from(self.still_cycles).unwrap_or(u32::MAX);
+        // A wheel that is not heard is the lost one, or is stopped by its own watch.
+        let lost = self.lost_wheel();
+        let wheels = self.wheels.iter().filter(|wheel| lost.is_none() || wheel.is_heard());
+        let rest = at_rest(wheels.map(|wheel| &wheel.drive), waited)?;
+        Some(match (rest, lost) {
+            (Err(why), _) => Err(why.into()),
+            (Ok(()), Some(cause)) => Err(BaseError::Stopped(cause)),
+            (Ok(()), None) => Ok(()),
+        })
     }
 
     /// Brings the base to rest within its limits, until both wheels were seen to stand; it stays powered.
@@ -409,18 +402,20 @@ impl Base {
     /// As [`cycle`](Self::cycle), and those of the requests; [`BaseError::Stopped`] for a wheel that was lost on the way to rest.
     pub async fn close(mut self) -> Result<(), BaseError> {
         let known = self.lost_wheel().is_some();
-        let stopped = match self.stop().await {
-            Err(BaseError::Stopped(_)) if known => Ok(()),
-            stopped => stopped,
+        // One that has come to rest need not do so again.
+        let stopped = match self.stopped() {
+            Some(stopped) => stopped,
+            None => self.stop().await,
         };
+        let stopped =
+            stopped.or_else(|error| if known && matches!(error, BaseError::Stopped(_)) { Ok(()) } else { Err(error) });
         // Without SYNC there are no cycles, and the master has stopped the drives.
         let off = if matches!(stopped, Err(BaseError::NoCycle(_))) { Ok(()) } else { self.switch_off().await };
         self.network.sync(None);
         let nodes: NodeSet = self.drives.iter().map(|drive| drive.node().id()).collect();
         // One that is not heard is not asked again, which would take its time; that it was not seen to stand is the error.
-        let is_heard = |wheel: &&Wheel| wheel.shows.is_some_and(|shown| shown.statusword.is_some());
-        let (heard, unseen): (Vec<_>, Vec<_>) = self.wheels.iter().partition(is_heard);
-        let unseen = unseen.first().map(|wheel| BaseError::NotSeen { node: wheel.drive.node() });
+        let (heard, unseen): (Vec<_>, Vec<_>) = self.wheels.iter().partition(|wheel| wheel.is_heard());
+        let unseen = unseen.first().map(|wheel| NotAtRest::NotSeen { node: wheel.drive.node() });
         let coasting = self.network.stop_moved(heard.iter().map(|wheel| wheel.drive.node()).collect()).await;
         let released = self.network.release_guards(nodes).await;
         stopped.and(off)?;
@@ -436,7 +431,7 @@ impl Base {
             self.cycle().await?;
             // One that is not heard is not waited for: nothing is known of it, and nothing it does can be seen.
             let settled =
-                |shown: CyclicState| shown.stands_without_power() || cycle > UNHEARD && shown.statusword.is_none();
+                |shown: CyclicState| shown.is_without_power() || cycle > UNHEARD && shown.statusword.is_none();
             if self.wheels.iter().all(|wheel| wheel.shows.is_some_and(settled)) {
                 break;
             }
@@ -446,6 +441,13 @@ impl Base {
 
     fn cycles(&self, time: Duration) -> u64 {
         (time.as_secs_f64() / self.period.as_secs_f64()).ceil() as u64
+    }
+}
+
+impl Wheel {
+    /// Its drive's TPDO comes.
+    fn is_heard(&self) -> bool {
+        self.shows.is_some_and(|shown| shown.statusword.is_some())
     }
 }
 
@@ -468,7 +470,8 @@ impl WheelSetup {
             return Err(BaseError::BadLimit { what: "turns of the drive for a turn of the wheel", value: self.turns });
         }
         self.drive.configure_cyclic_with_position(self.mode).await?;
-        let drive = self.drive.cyclic(self.mode, options).await?;
+        let mut drive = self.drive.cyclic(self.mode, options).await?;
+        drive.stands_after(REST_TIME);
         let rpm_of = |m: f64| m * geometry.turns_per_m() * self.turns.abs() * 60.0;
         let needed_rpm = rpm_of(limits.wheel_m_s);
         match drive.highest_speed() {
@@ -477,10 +480,8 @@ impl WheelSetup {
             }
             Some(_) if drive.shows_position() && drive.set_point().is_none() => {
                 self.drive.write_ramps_of_a_cycle(period, rpm_of(limits.wheel_m_s2)).await?;
-                let limit_rpm = self.drive.gear().at_output(STANDSTILL_RPM);
-                let standstill = Standstill::new(limit_rpm, REST_TIME, period.as_secs_f64());
                 let (turns, counted_turns, behind_m, shows) = (self.turns, None, 0.0, None);
-                Ok(Wheel { drive, turns, counted_turns, behind_m, shows, standstill, _claim: claim })
+                Ok(Wheel { drive, turns, counted_turns, behind_m, shows, _claim: claim })
             }
             _ => Err(BaseError::NoWheel { node }),
         }

@@ -5,7 +5,7 @@ use core::time::Duration;
 use canopen::{Mux, NodeId};
 
 use super::state::StopCause;
-use crate::cyclic::{Bound, CyclicError};
+use crate::cyclic::{Bound, CyclicError, NotAtRest};
 use crate::error::Error;
 use crate::network::NoCycle;
 use crate::units::Shown;
@@ -95,28 +95,9 @@ pub enum BaseError {
         /// What was given.
         angular_rad_s: f64,
     },
-    /// A wheel does not come to rest.
-    #[error(
-        "node {node} still turns at {} r/min, {limit:?} after it was commanded to speed 0: its load drives it, or it does not follow. \
-         Take its power by the emergency stop if it must not move", Shown(*rpm)
-    )]
-    StillTurns {
-        /// The node.
-        node: NodeId,
-        /// Its speed.
-        rpm: f64,
-        /// How long it was waited for.
-        limit: core::time::Duration,
-    },
-    /// A drive is not heard, so that it was not seen to stand.
-    #[error(
-        "node {node} is not heard and was not seen to stand: it may still be moving. It stops by its own watch over its host, if it \
-         has one; take its power by the emergency stop if it must not move"
-    )]
-    NotSeen {
-        /// The node.
-        node: NodeId,
-    },
+    /// A wheel was not seen to come to rest.
+    #[error(transparent)]
+    NotAtRest(#[from] NotAtRest),
     /// Two networks.
     #[error("both wheels have to be on one network, with one SYNC")]
     OtherNetwork,

@@ -4,7 +4,6 @@ use canopen::Mux;
 use cia402::{PowerState, Statusword};
 
 use crate::core::CycleLoss;
-use crate::drive::STANDSTILL_RPM;
 use crate::limits::{Asked, Limits, Setting};
 use crate::units::{Amperes, Angle, Rpm, Shown, Turns};
 
@@ -170,11 +169,6 @@ impl CyclicState {
     /// True if the drive is heard, and shows that its power stage is off.
     pub const fn is_without_power(&self) -> bool {
         self.statusword.is_some() && !self.has_power()
-    }
-
-    /// True if it shows that its power stage is off and, where it shows its speed, that the shaft stands.
-    pub fn stands_without_power(&self) -> bool {
-        self.is_without_power() && self.velocity.is_none_or(|Rpm(speed)| speed.abs() < STANDSTILL_RPM)
     }
 }
 

@@ -8,6 +8,7 @@ use devices::PowerStyle;
 
 use super::demand::{Bound, CyclicState, Demand, Refusal};
 use super::sequence::controlword;
+use super::standstill::Standstill;
 use super::target::{Kind, Target};
 use crate::core::{Cadence, SetPoint, Signal, WatchId};
 use crate::drive::STOP;
@@ -60,7 +61,7 @@ pub(super) enum ControlwordPath {
 }
 
 /// What one step leaves for the next.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Progress {
     /// The drive has been heard since it was opened, or was sent a demand that does not want power.
     spoken: bool,
@@ -69,12 +70,18 @@ pub(super) struct Progress {
     /// What keeps the drive from its demand until it is switched off.
     latched: Option<Refusal>,
     odd_step: bool,
-    /// It has been seen at standstill without power in each step since.
-    stood_since: Option<Instant>,
+    /// Its power stage was on in the step before.
+    had_power: bool,
+    pub(super) standstill: Standstill,
 }
 
-/// How long a shaft without power has to stand until it is taken to do so: a load that drives it has turned it by then.
-const STANDS_WITHOUT_POWER: Duration = Duration::from_millis(50);
+impl Progress {
+    /// Of a shaft that stands below this speed, in r/min of the output.
+    pub(super) const fn new(standstill_rpm: f64) -> Self {
+        let standstill = Standstill::new(standstill_rpm);
+        Self { spoken: false, followed: false, latched: None, odd_step: false, had_power: true, standstill }
+    }
+}
 
 impl CyclicDrive {
     /// Its node.
@@ -124,11 +131,24 @@ impl CyclicDrive {
         self.host_loss
     }
 
-    /// What is held by its motor stands until the power goes: the load may turn it from then on.
-    fn see_it_stand_without_power(&mut self, io: &mut Exchange<'_>, seen: &CyclicState) {
-        let since = seen.stands_without_power().then(|| *self.progress.stood_since.get_or_insert(io.now()));
-        self.progress.stood_since = since;
-        if since.is_some_and(|since| io.now() - since >= STANDS_WITHOUT_POWER) {
+    /// How long its shaft has to stand until it is taken to.
+    pub(crate) const fn stands_after(&mut self, time: Duration) {
+        self.progress.standstill.time = time;
+    }
+
+    /// Whether its shaft stands is to be seen from here on. See [`at_rest`](super::at_rest).
+    pub(crate) const fn begin_rest(&mut self) {
+        self.progress.standstill.begin();
+    }
+
+    fn look_for_rest(&mut self, io: &mut Exchange<'_>, seen: &CyclicState) {
+        let had_power = core::mem::replace(&mut self.progress.had_power, !seen.is_without_power());
+        if had_power && seen.is_without_power() {
+            // What its motor has held stands until then: the load may turn it from here on.
+            self.begin_rest();
+        }
+        self.progress.standstill.look(seen, io.now());
+        if seen.is_without_power() && self.progress.standstill.stands() {
             io.note_stands(&self.axis);
         }
     }
@@ -141,6 +161,7 @@ impl CyclicDrive {
     pub fn step(&mut self, io: &mut Exchange<'_>, demand: Demand) -> CyclicState {
         self.progress.odd_step ^= true;
         let mut seen = self.look(io);
+        self.look_for_rest(io, &seen);
         if demand.wants_power() && seen.statusword.is_none() && !self.progress.spoken {
             return self.await_drive(io, seen);
         }
@@ -149,7 +170,6 @@ impl CyclicDrive {
             self.progress.latched = None;
             self.progress.followed = false;
             io.forget_loss(self.watch);
-            self.see_it_stand_without_power(io, &seen);
         } else if let Some(loss) = io.cycle_loss(self.watch) {
             self.progress.latched = Some(Refusal::Stopped(loss));
         }

@@ -15,4 +15,5 @@ mod target;
 pub use demand::{Bound, CyclicState, Demand, Refusal};
 pub use drive::CyclicDrive;
 pub use open::{CyclicError, CyclicOptions};
-pub(crate) use standstill::Standstill;
+pub use standstill::NotAtRest;
+pub(crate) use standstill::at_rest;

@@ -15,7 +15,7 @@ use super::demand::Bound;
 use super::drive::{ControlwordPath, CyclicDrive, Progress};
 use super::target::{Kind, Target};
 use crate::core::{Cadence, CycleRules, NumberForm, PdoMap, Sample, Signal};
-use crate::drive::{Drive, STOP, SwitchedOff};
+use crate::drive::{Drive, STANDSTILL_RPM, STOP, SwitchedOff};
 use crate::error::Error;
 use crate::host_loss::HostLoss;
 use crate::pdo::{PdoConfig, PdoError, SignalError, TimerUnits, TransmissionType};
@@ -177,7 +177,7 @@ impl Drive {
             tolerance: options.tolerance,
             host_loss,
             watch: self.node().network().with_core(|core| core.watch_cycles(rules)),
-            progress: Progress::default(),
+            progress: Progress::new(self.gear().at_output(STANDSTILL_RPM)),
         })
     }
 

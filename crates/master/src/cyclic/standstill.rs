@@ -1,78 +1,135 @@
-//! Whether a shaft stands, by what its drive shows in each cycle.
+//! Whether a shaft stands, by what its drive shows in each cycle; and what is said of several that were to come to rest.
 
 use core::time::Duration;
 
-use super::demand::CyclicState;
-use crate::units::{Rpm, Turns};
+use can::Instant;
+use canopen::NodeId;
 
-/// Whether a shaft stands: by its speed where that is mapped, else by how far it goes. It stands once it has stood for some time,
-/// since a speed is a mean, and a shaft may swing through 0.
+use super::demand::CyclicState;
+use super::drive::CyclicDrive;
+use crate::units::{Rpm, Shown, Turns};
+
+/// How long a shaft has to stand until it is taken to, where nothing else is said: a speed is a mean, and a shaft may swing through 0.
+const STANDS_FOR: Duration = Duration::from_millis(50);
+
+/// How long after its last set-point a shaft may take to show that it stands.
+const REST_LIMIT: Duration = Duration::from_secs(2);
+
+/// Whether a shaft stands: by its speed where that is mapped, else by how far it goes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Standstill {
-    /// Slower than this it stands, r/min.
+pub(super) struct Standstill {
+    /// Slower than this it stands, r/min of the output.
     limit_rpm: f64,
-    period_s: f64,
-    /// Cycles in a row in which it has to stand.
-    needed: u64,
-    stood: u64,
-    /// Where it was when they began, in turns.
-    from_turns: Option<f64>,
+    /// How long it has to stand.
+    pub(super) time: Duration,
+    /// The newest look.
+    now: Instant,
+    stood_since: Option<Instant>,
+    /// Where it was then, in turns.
+    from_turns: f64,
     /// How fast it was when it was last seen to turn, r/min.
-    turned_rpm: f64,
+    turned_rpm: Option<f64>,
 }
 
 impl Standstill {
-    /// Of a shaft that stands below this speed, after this time.
-    pub(crate) fn new(limit_rpm: f64, time: Duration, period_s: f64) -> Self {
-        let needed = (time.as_secs_f64() / period_s).ceil().max(1.0) as u64;
-        Self { limit_rpm, period_s, needed, stood: 0, from_turns: None, turned_rpm: 0.0 }
+    /// Of a shaft that stands below this speed.
+    pub(super) const fn new(limit_rpm: f64) -> Self {
+        let (now, stood_since) = (Instant::ZERO, None);
+        Self { limit_rpm, time: STANDS_FOR, now, stood_since, from_turns: 0.0, turned_rpm: None }
     }
 
-    /// What its drive shows in this cycle.
-    pub(crate) fn look(&mut self, shown: &CyclicState) {
-        let speed_rpm = match (shown.velocity, shown.position, self.from_turns) {
+    /// It has to stand from here on: that it stood before says nothing of what comes.
+    pub(super) const fn begin(&mut self) {
+        (self.stood_since, self.turned_rpm) = (None, None);
+    }
+
+    /// What its drive shows now.
+    pub(super) fn look(&mut self, shown: &CyclicState, now: Instant) {
+        self.now = now;
+        let position = shown.position.map(|Turns(turns)| turns);
+        let speed_rpm = match (shown.velocity, position, self.stood_since) {
             (Some(Rpm(rpm)), _, _) => rpm,
-            // Further away than it may go in the whole time; the speed that brought it there is a mean.
-            (None, Some(Turns(at)), Some(from)) => {
-                let cycles = if (at - from).abs() * 60.0 < self.limit_rpm * self.needed as f64 * self.period_s {
-                    self.needed
-                } else {
-                    (self.stood + 1).min(self.needed)
-                };
-                (at - from) * 60.0 / (cycles as f64 * self.period_s)
+            (None, Some(turns), Some(since)) => {
+                let gone = turns - self.from_turns;
+                // Further than it may go in the whole time: the speed that brought it there is a mean.
+                if (gone * 60.0).abs() < self.limit_rpm * self.time.as_secs_f64() {
+                    return;
+                }
+                gone * 60.0 / (now - since).as_secs_f64().min(self.time.as_secs_f64())
             }
-            (None, Some(Turns(at)), None) => {
-                self.from_turns = Some(at);
-                return;
-            }
+            (None, Some(_), None) => 0.0,
             (None, None, _) => {
-                (self.stood, self.from_turns) = (0, None);
+                self.stood_since = None;
                 return;
             }
         };
         if speed_rpm.abs() < self.limit_rpm {
-            self.stood += 1;
+            if self.stood_since.is_none() {
+                (self.stood_since, self.from_turns) = (Some(now), position.unwrap_or_default());
+            }
         } else {
-            self.stood = 0;
-            self.from_turns = shown.position.map(|Turns(at)| at);
-            self.turned_rpm = speed_rpm;
+            self.turned_rpm = Some(speed_rpm);
+            // By the position alone a look has to be compared with one before.
+            self.stood_since = shown.velocity.is_none().then_some(now);
+            self.from_turns = position.unwrap_or_default();
         }
     }
 
     /// It was seen to stand, for as long as that takes.
-    pub(crate) const fn stands(&self) -> bool {
-        self.stood >= self.needed
+    pub(super) fn stands(&self) -> bool {
+        self.stood_since.is_some_and(|since| self.now - since >= self.time)
     }
+}
 
-    /// How fast it was when it was last seen to turn, in r/min.
-    pub(crate) const fn turned_rpm(&self) -> f64 {
-        self.turned_rpm
-    }
+/// Why a drive that was to come to rest was not seen to stand.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NotAtRest {
+    /// It turns.
+    #[error(
+        "node {node} still turns at {} r/min, {limit:?} after it was to stand: its load drives it, or it does not follow. Take its power by \
+         the emergency stop if it must not move", Shown(*rpm)
+    )]
+    StillTurns {
+        /// The node.
+        node: NodeId,
+        /// Its speed, in r/min of the output.
+        rpm: f64,
+        /// How long it was waited for.
+        limit: Duration,
+    },
+    /// Its drive is not heard, or shows neither speed nor position.
+    #[error(
+        "node {node} was not seen to stand: it may still be moving. It stops by its own watch over its host, if it has one; take its power \
+         by the emergency stop if it must not move"
+    )]
+    NotSeen {
+        /// The node.
+        node: NodeId,
+    },
+}
 
-    /// How many cycles it takes to see that it stands.
-    pub(crate) const fn needed(&self) -> u64 {
-        self.needed
+impl NotAtRest {
+    /// Which node it is about.
+    pub const fn node(&self) -> NodeId {
+        match self {
+            Self::StillTurns { node, .. } | Self::NotSeen { node } => *node,
+        }
     }
+}
+
+/// What became of drives that were to stand so long ago: `None` while it is not known, `Ok` once all were seen to stand.
+pub(crate) fn at_rest<'a>(
+    drives: impl IntoIterator<Item = &'a CyclicDrive>,
+    waited: Duration,
+) -> Option<Result<(), NotAtRest>> {
+    let Some(drive) = drives.into_iter().find(|drive| !drive.progress.standstill.stands()) else { return Some(Ok(())) };
+    let node = drive.node();
+    (waited >= REST_LIMIT).then(|| {
+        Err(match drive.progress.standstill.turned_rpm {
+            Some(rpm) => NotAtRest::StillTurns { node, rpm, limit: REST_LIMIT },
+            None => NotAtRest::NotSeen { node },
+        })
+    })
 }
 
 #[cfg(test)]
@@ -92,18 +149,18 @@ mod tests {
         }
     }
 
-    /// Cycles of 10 ms, one a row, until it stands.
-    fn stands_after(looks: impl IntoIterator<Item = CyclicState>) -> Option<usize> {
-        let mut shaft = Standstill::new(1.0, Duration::from_millis(50), 0.01);
-        looks.into_iter().position(|look| {
-            shaft.look(&look);
-            shaft.stands()
+    /// Looks each 10 ms, until it stands; how long that took, in ms.
+    fn stands_after(looks: impl IntoIterator<Item = CyclicState>) -> Option<u64> {
+        let mut shaft = Standstill::new(1.0);
+        (0..).step_by(10).zip(looks).find_map(|(ms, look)| {
+            shaft.look(&look, Instant::from_millis(ms));
+            shaft.stands().then_some(ms)
         })
     }
 
     #[test]
     fn a_shaft_stands_once_it_has_stood_for_its_time() {
-        assert_eq!(stands_after((0..20).map(|_| shown(Some(0.2), None))), Some(4));
+        assert_eq!(stands_after((0..20).map(|_| shown(Some(0.2), None))), Some(50));
         // It swings through 0 every third cycle.
         assert_eq!(stands_after((0..90).map(|n| shown(Some(if n % 3 == 0 { 0.0 } else { 4.0 }), None))), None);
         assert_eq!(stands_after((0..20).map(|_| shown(None, None))), None, "it was not seen");
@@ -112,13 +169,13 @@ mod tests {
     #[test]
     fn without_a_speed_it_is_seen_by_where_the_shaft_is() {
         let turning = |rpm: f64| (0..90).map(move |n| shown(None, Some(rpm / 60.0 * 0.01 * f64::from(n))));
-        assert_eq!(stands_after(turning(0.0)), Some(5));
+        assert_eq!(stands_after(turning(0.0)), Some(50));
         assert_eq!(stands_after(turning(1.5)), None);
         assert_eq!(stands_after(turning(-30.0)), None);
         // One count of a coarse encoder, back and forth: 1/2048 turn a cycle would be 2.9 r/min.
-        assert_eq!(stands_after((0..20).map(|n| shown(None, Some(f64::from(n % 2) / 2048.0)))), Some(5));
-        let mut shaft = Standstill::new(1.0, Duration::from_millis(50), 0.01);
-        turning(30.0).for_each(|look| shaft.look(&look));
-        assert!((shaft.turned_rpm() - 30.0).abs() < 1e-6, "{shaft:?}");
+        assert_eq!(stands_after((0..20).map(|n| shown(None, Some(f64::from(n % 2) / 2048.0)))), Some(50));
+        let mut shaft = Standstill::new(1.0);
+        (0..).step_by(10).zip(turning(30.0)).for_each(|(ms, look)| shaft.look(&look, Instant::from_millis(ms)));
+        assert!(shaft.turned_rpm.is_some_and(|rpm| (rpm - 30.0).abs() < 1e-6), "{shaft:?}");
     }
 }

@@ -1,6 +1,6 @@
 //! One axis of a group: from a point of its path to the set-point of its drive in a cycle, and how far behind it is.
 
-use crate::cyclic::{CyclicDrive, CyclicState, Demand, Standstill};
+use crate::cyclic::{CyclicDrive, CyclicState, Demand};
 use crate::network::{Claim, Exchange};
 use crate::units::{Angle, Rpm, Turns};
 
@@ -25,7 +25,6 @@ pub(super) struct Axis {
     asked: [f64; KEPT],
     /// How far the shaft was from its set-point in the last cycle, in turns.
     pub(super) error_turns: Option<f64>,
-    pub(super) standstill: Standstill,
     /// The axis belongs to this group.
     _claim: Claim,
 }
@@ -40,9 +39,9 @@ enum Following {
 }
 
 impl Axis {
-    pub(super) fn new(drive: CyclicDrive, standstill: Standstill, claim: Claim) -> Self {
+    pub(super) fn new(drive: CyclicDrive, claim: Claim) -> Self {
         let following = if drive.set_point().is_some() { Following::Positions } else { Following::Speeds };
-        Self { drive, following, asked: [0.0; KEPT], error_turns: None, standstill, _claim: claim }
+        Self { drive, following, asked: [0.0; KEPT], error_turns: None, _claim: claim }
     }
 
     /// It rests here: what a path begins with.

@@ -7,7 +7,7 @@ use cia402::ModeOfOperation;
 
 use super::limits::PathError;
 use super::state::{Phase, StopCause};
-use crate::cyclic::{Bound, CyclicError};
+use crate::cyclic::{Bound, CyclicError, NotAtRest};
 use crate::error::Error;
 use crate::network::NoCycle;
 use crate::units::Shown;
@@ -18,28 +18,9 @@ pub(super) const PERIODS: core::ops::RangeInclusive<Duration> = Duration::from_m
 /// Why a group cannot be made, or did not do what it should.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum GroupError {
-    /// An axis does not come to rest.
-    #[error(
-        "node {node} still turns at {} r/min, {limit:?} after its last set-point: its load drives it, or it does not follow. Take its \
-         power by the emergency stop if it must not move", Shown(*rpm)
-    )]
-    StillTurns {
-        /// The node.
-        node: NodeId,
-        /// Its speed.
-        rpm: f64,
-        /// How long it was waited for.
-        limit: Duration,
-    },
-    /// A drive is not heard, so that it was not seen to stand.
-    #[error(
-        "node {node} is not heard and was not seen to stand: it may still be moving. It stops by its own watch over its host, if it \
-         has one; take its power by the emergency stop if it must not move"
-    )]
-    NotSeen {
-        /// The node.
-        node: NodeId,
-    },
+    /// An axis was not seen to come to rest.
+    #[error(transparent)]
+    NotAtRest(#[from] NotAtRest),
     /// A group without axes.
     #[error("a group needs at least one axis")]
     NoAxis,

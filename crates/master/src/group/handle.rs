@@ -12,14 +12,11 @@ use super::state::{GroupState, Phase, StopCause};
 use super::stream::{Stream, StreamOptions};
 use super::trajectory::Trajectory;
 use crate::core::NodeSet;
-use crate::cyclic::CyclicState;
+use crate::cyclic::{CyclicState, NotAtRest, at_rest};
 use crate::drive::Drive;
 use crate::error::Error;
 use crate::network::{Exchange, Network};
 use crate::units::Turns;
-
-/// How long after the last set-point an axis may take to show that it stands.
-const REST_LIMIT: Duration = Duration::from_secs(2);
 
 /// Cycles after which a drive that is not heard is not waited for.
 const UNHEARD: u64 = 10;
@@ -149,25 +146,18 @@ impl Group {
     /// stopped them is in [`state`](Self::state).
     ///
     /// # Errors
-    /// [`GroupError::StillTurns`] for an axis that does not come to rest, [`GroupError::NotSeen`] for one that is not heard.
-    pub fn stands(&self) -> Option<Result<(), GroupError>> {
+    /// Of an axis that does not come to rest, or is not seen.
+    pub fn stands(&self) -> Option<Result<(), NotAtRest>> {
         let runner = &self.runner;
-        if runner.is_under_way() {
+        if runner.still_cycles == 0 {
             return None;
         }
-        let mut axes = runner.axes.iter().zip(&runner.states);
-        match axes.find(|(axis, _)| !axis.standstill.stands()) {
-            // An axis that was about to turn had still stood when it was stopped.
-            None if runner.axes.iter().all(|axis| runner.still_cycles >= axis.standstill.needed()) => Some(Ok(())),
-            Some((axis, state)) if runner.still_cycles >= self.cycles(REST_LIMIT) => {
-                let (node, rpm) = (axis.drive.node(), axis.standstill.turned_rpm());
-                Some(Err(match state.statusword {
-                    Some(_) => GroupError::StillTurns { node, rpm, limit: REST_LIMIT },
-                    None => GroupError::NotSeen { node },
-                }))
-            }
-            _ => None,
-        }
+        let waited = Duration::from_secs_f64(runner.still_cycles as f64 * runner.period_s);
+        // One that is not heard where something has stopped the group is that, or is stopped by its own watch.
+        let is_stopped = runner.cause.is_some_and(|cause| cause != StopCause::Asked);
+        let axes = runner.axes.iter().zip(&runner.states);
+        let axes = axes.filter(|(_, state)| !is_stopped || state.statusword.is_some()).map(|(axis, _)| &axis.drive);
+        at_rest(axes, waited)
     }
 
     /// Begins to take points: one for each cycle.
@@ -230,8 +220,8 @@ impl Group {
         if self.runner.cause == Some(StopCause::Asked) {
             self.runner.cause = None;
         }
-        self.check_going()?;
-        stands
+        stands?;
+        self.check_going()
     }
 
     /// Brings all axes to rest and takes their power. The group can be enabled again.
@@ -260,7 +250,7 @@ impl Group {
             self.cycle().await?;
             // One that is not heard is not waited for: nothing is known of it, and nothing it does can be seen.
             let settled =
-                |state: &CyclicState| state.stands_without_power() || cycle > UNHEARD && state.statusword.is_none();
+                |state: &CyclicState| state.is_without_power() || cycle > UNHEARD && state.statusword.is_none();
             if self.runner.states.iter().all(settled) {
                 break;
             }
@@ -280,7 +270,7 @@ impl Group {
         // One that is not heard is not asked again, which would take its time; that it was not seen to stand is the error.
         let axes = self.runner.axes.iter().zip(&self.runner.states);
         let (heard, unseen): (Vec<_>, Vec<_>) = axes.partition(|(_, state)| state.statusword.is_some());
-        let unseen = unseen.first().map(|(axis, _)| GroupError::NotSeen { node: axis.drive.node() });
+        let unseen = unseen.first().map(|(axis, _)| NotAtRest::NotSeen { node: axis.drive.node() });
         let coasting = self.network.stop_moved(heard.iter().map(|(axis, _)| axis.drive.node()).collect()).await;
         let released = self.network.release_guards(nodes).await;
         disabled?;

@@ -11,15 +11,12 @@ use super::error::{GroupError, PERIODS};
 use super::handle::Group;
 use super::limits::AxisLimits;
 use super::runner::Runner;
-use crate::cyclic::{CyclicDrive, CyclicOptions, Standstill};
-use crate::drive::{Drive, STANDSTILL_RPM};
+use crate::cyclic::{CyclicDrive, CyclicOptions};
+use crate::drive::Drive;
 use crate::units::Rpm;
 
 /// The interpolation time period (CiA 402-2, 12.3.4): value, and its power of ten in seconds.
 const INTERPOLATION_TIME: [Mux; 2] = [INTERPOLATION_TIME_PERIOD_VALUE, INTERPOLATION_TIME_INDEX];
-
-/// How long an axis is seen to stand before that is reported. A position loop holds it there: it does not roll as a wheel does.
-const REST_TIME: Duration = Duration::from_millis(50);
 
 /// A future axis, and how it is moved.
 #[derive(Clone, Debug)]
@@ -61,9 +58,7 @@ impl Group {
         let mut opened = Vec::new();
         for ((number, setup), claim) in (1..).zip(axes).zip(claims) {
             let drive = setup.open(number, period, options).await?;
-            let limit_rpm = setup.drive.gear().at_output(STANDSTILL_RPM);
-            let standstill = Standstill::new(limit_rpm, REST_TIME, period.as_secs_f64());
-            opened.push(Axis::new(drive, standstill, claim));
+            opened.push(Axis::new(drive, claim));
         }
         network.sync(Some(period));
         let limits = axes.iter().map(|axis| axis.limits.clone()).collect();

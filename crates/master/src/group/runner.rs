@@ -120,7 +120,12 @@ impl Runner {
         {
             self.activity = Activity::Off;
         }
-        self.still_cycles = if self.is_under_way() { 0 } else { self.still_cycles + 1 };
+        let is_still = !self.is_under_way();
+        if is_still && self.still_cycles == 0 {
+            // One that was about to turn had still stood.
+            self.axes.iter_mut().for_each(|axis| axis.drive.begin_rest());
+        }
+        self.still_cycles = if is_still { self.still_cycles + 1 } else { 0 };
         self.state()
     }
 
@@ -210,7 +215,6 @@ impl Runner {
                 Some(demand) => axis.drive.step(io, demand),
                 None => axis.follow(io, *point, limits, state),
             };
-            axis.standstill.look(state);
         }
     }
 

@@ -14,7 +14,7 @@ use master::group::{
     AxisHoming, AxisLimits, AxisSetup, Group, GroupError, HomingOrder, PathError, Phase, StopCause, StreamOptions, home,
 };
 use master::units::Turns;
-use master::{Drive, Network};
+use master::{Drive, Gear, Network};
 use sim::machine::{Order, order};
 use sim::{Place, Stimulus, SwitchRange, World, block_on};
 
@@ -299,6 +299,25 @@ fn an_axis_that_is_lost_while_the_group_stops_by_request_is_reported() {
         // It is on its way to rest, along its path, whatever became of the other one.
         assert!(bench.rpm(1).abs() < 2.0);
     }
+}
+
+/// Its PDOs carry no speed, and behind a gear of 50 an r/min of the output is 50 of the motor.
+#[test]
+fn an_axis_that_its_load_turns_once_its_power_is_off_is_not_closed_as_one_that_stands() {
+    let mut bench = Bench::servos(1);
+    bench.setups[0].drive = bench.setups[0].drive.clone().behind(Gear::new(50.0).unwrap());
+    bench.setups[0].limits.velocity_turns_s = 0.1;
+    let mut group = bench.open();
+    // Less than the motor holds.
+    bench.world.apply(Place::node(1), &Stimulus::LoadTorque(0.5)).unwrap().unwrap();
+    bench.world.run_for(Duration::from_millis(1));
+    block_on(&mut bench.world, group.disable()).unwrap().unwrap();
+    for _ in 0..100 {
+        bench.cycle(&mut group);
+    }
+    assert!(bench.rpm(1).abs() > 5.0, "the load turns it, at {} r/min", bench.rpm(1));
+    let closed = block_on(&mut bench.world, group.close()).unwrap();
+    assert!(closed.is_err(), "said to be closed at {} r/min", bench.rpm(1));
 }
 
 #[test]
