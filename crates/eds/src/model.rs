@@ -383,9 +383,24 @@ impl Hash for Object {
 
 impl Hash for Variable {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        let Self { line: _, sub_index, name, is_domain, data_type, access, pdo_mapping, flags, .. } = self;
+        let Self {
+            line: _,
+            sub_index,
+            name,
+            is_domain,
+            data_type,
+            access,
+            pdo_mapping,
+            flags,
+            default,
+            low,
+            high,
+            value,
+            denotation,
+            upload_file,
+            download_file,
+        } = self;
         (sub_index, name, is_domain, data_type, access, pdo_mapping, flags).hash(state);
-        let Self { default, low, high, value, denotation, upload_file, download_file, .. } = self;
         (default, low, high, value, denotation, upload_file, download_file).hash(state);
     }
 }

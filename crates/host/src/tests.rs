@@ -21,7 +21,7 @@ use canopen::NodeId;
 use cia402::object::{CONTROLWORD, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE, STATUSWORD, TARGET_VELOCITY};
 use master::Network;
 use master::drive::{self, Manner, Motion};
-use master::units::{Amperes, Angle, Rpm};
+use master::units::{Along, Amperes, Angle, Rpm};
 use serde_json::Value;
 use sim::World;
 use sim::machine::{TimingMode, zlac8030l, zlim42c};
@@ -55,13 +55,13 @@ fn velocity(node: NodeId, rpm: f64) -> Command {
     to(node, Motion::Velocity(Rpm(rpm).into(), Manner::default()).into())
 }
 
-fn at(rpm: Option<f64>) -> Manner {
-    Manner { speed: rpm.map(|rpm| Rpm(rpm).into()), ..Manner::default() }
+fn at(rpm: Option<f64>) -> Option<Along<Rpm>> {
+    rpm.map(|rpm| Rpm(rpm).into())
 }
 
 fn move_by(node: NodeId, degrees: f64, rpm: Option<f64>) -> Command {
     let by = Angle::Turns(degrees / 360.0).into();
-    to(node, Motion::Move { to: by, relative: true, manner: at(rpm) }.into())
+    to(node, Motion::Move { to: by, relative: true, speed: at(rpm), manner: Manner::default() }.into())
 }
 
 fn torque(node: NodeId, amperes: f64) -> Command {
@@ -69,7 +69,7 @@ fn torque(node: NodeId, amperes: f64) -> Command {
 }
 
 fn home(node: NodeId, method: i8, rpm: Option<f64>) -> Command {
-    to(node, Motion::Home { method, manner: at(rpm) }.into())
+    to(node, Motion::Home { method, speed: at(rpm), wait: true, within: None }.into())
 }
 
 /// A studio on a bus with two drives, for pages.

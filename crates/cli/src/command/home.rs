@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use cia402::ModeOfOperation;
-use master::drive::{Manner, Motion};
+use master::drive::Motion;
 use master::units::{Along, Rpm, parse_duration};
 
 use super::motion::{MotionOutcome, Then, outcome, perform, speed};
@@ -52,13 +52,8 @@ impl Home {
             return Err(self.refusal(model, axis));
         }
         let doing = format!("node {}: searching for its reference", self.node);
-        let manner = Manner {
-            speed: self.profile_velocity,
-            within: Some(self.within),
-            wait: !self.no_wait,
-            ..Manner::default()
-        };
-        let command = Motion::Home { method: self.method, manner };
+        let (speed, within) = (self.profile_velocity, Some(self.within));
+        let command = Motion::Home { method: self.method, speed, wait: !self.no_wait, within };
         let (motion, guard) = perform(context, &drive, &doing, &self.guard, &command).await?;
         let then = Then::goes_on_if(motion.reached_after.is_none());
         outcome(context, &drive, ("home with method", &self.method), motion, then, guard).await

@@ -174,7 +174,7 @@ impl Velocity {
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
         let doing = format!("node {}: to {}", self.node, self.speed);
-        let command = master::drive::Motion::Velocity(self.speed, self.ramps.manner(None));
+        let command = master::drive::Motion::Velocity(self.speed, self.ramps.manner());
         let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &command).await?;
         let then = self.duration.map_or(Then::goes_on_if(!stands_at(&self.speed)), Then::StopAfter);
         outcome(context, &drive, ("turn at", &self.speed), motion, then, guard).await
@@ -187,8 +187,8 @@ impl Move {
         let drive = context.known_drive(self.node).await?;
         let verb = if self.relative { "move by" } else { "move to" };
         let doing = format!("node {}: {verb} {}", self.node, self.position);
-        let manner = self.ramps.manner(self.profile_velocity);
-        let command = master::drive::Motion::Move { to: self.position, relative: self.relative, manner };
+        let (speed, manner) = (self.profile_velocity, self.ramps.manner());
+        let command = master::drive::Motion::Move { to: self.position, relative: self.relative, speed, manner };
         let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &command).await?;
         let then = Then::goes_on_if(motion.reached_after.is_none());
         outcome(context, &drive, (verb, &self.position), motion, then, guard).await
@@ -208,9 +208,8 @@ impl Torque {
 }
 
 impl RampArgs {
-    fn manner(&self, speed: Option<Along<Rpm>>) -> Manner {
+    fn manner(&self) -> Manner {
         Manner {
-            speed,
             acceleration: self.acceleration,
             deceleration: self.deceleration,
             wait: !self.no_wait,

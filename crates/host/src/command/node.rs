@@ -129,16 +129,14 @@ fn to_drive(word: &str, fields: &mut Fields) -> Result<drive::Command, String> {
         "move" => {
             let degrees: f64 = taken(fields, "degrees")?;
             let relative: Option<bool> = taken(fields, "relative")?;
-            let manner = Manner { speed: speed(fields)?, ..Manner::default() };
             let to = Angle::Turns(degrees / 360.0).into();
-            Motion::Move { to, relative: relative.unwrap_or_default(), manner }.into()
+            let (speed, manner) = (speed(fields)?, Manner::default());
+            Motion::Move { to, relative: relative.unwrap_or_default(), speed, manner }.into()
         }
         "torque" => Motion::Torque(Amperes(taken(fields, "amperes")?)).into(),
-        "home" => Motion::Home {
-            method: taken(fields, "method")?,
-            manner: Manner { speed: speed(fields)?, ..Manner::default() },
+        "home" => {
+            Motion::Home { method: taken(fields, "method")?, speed: speed(fields)?, wait: true, within: None }.into()
         }
-        .into(),
         _ => return Err(format!("unknown command `{word}`")),
     })
 }

@@ -91,7 +91,7 @@ fn of_motion(motion: &Motion) -> Speed {
     };
     match motion {
         Motion::Velocity(speed, _) => of(speed),
-        Motion::Move { manner, .. } | Motion::Home { manner, .. } => manner.speed.as_ref().map_or(Speed::AsSet, of),
+        Motion::Move { speed, .. } | Motion::Home { speed, .. } => speed.as_ref().map_or(Speed::AsSet, of),
         Motion::Torque(_) => Speed::UpToTheLoad,
     }
 }

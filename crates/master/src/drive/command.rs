@@ -51,6 +51,8 @@ pub enum Motion {
         to: Along<Angle>,
         /// By so much from the last target.
         relative: bool,
+        /// Largest speed on the way; as the drive has it with `None`.
+        speed: Option<Along<Rpm>>,
         /// How.
         manner: Manner,
     },
@@ -60,8 +62,12 @@ pub enum Motion {
     Home {
         /// The method of CiA 402.
         method: i8,
-        /// How; a homing has no ramps of its own.
-        manner: Manner,
+        /// Speed of the search, where the model has an object for it; else, and with `None`, as the drive has it.
+        speed: Option<Along<Rpm>>,
+        /// Wait until it is found, and watch the drive meanwhile.
+        wait: bool,
+        /// Longest time that it may take; [the default](HomingOptions) with `None`.
+        within: Option<Duration>,
     },
 }
 
@@ -71,12 +77,10 @@ impl From<Motion> for Command {
     }
 }
 
-/// How a motion is to be made. `None` leaves a setting as the drive has it. Speeds and ramps may be along the way of what is moved:
+/// How a motion is to be made. `None` leaves a setting as the drive has it. Ramps may be along the way of what is moved:
 /// the [gear](Drive::gear) of a drive makes a rotation of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Manner {
-    /// Largest speed on the way.
-    pub speed: Option<Along<Rpm>>,
     /// How fast the speed may rise.
     pub acceleration: Option<Along<Ramp>>,
     /// How fast the speed may fall.
@@ -89,7 +93,7 @@ pub struct Manner {
 
 impl Default for Manner {
     fn default() -> Self {
-        Self { speed: None, acceleration: None, deceleration: None, wait: true, within: None }
+        Self { acceleration: None, deceleration: None, wait: true, within: None }
     }
 }
 
@@ -131,15 +135,20 @@ impl Drive {
     /// Those of [`check_motion`](Self::check_motion) and of the method of the same name.
     pub async fn make(&self, motion: &Motion) -> Result<MotionReport, Error> {
         match motion {
-            Motion::Velocity(speed, manner) => self.velocity(self.turning(*speed)?, manner.motion(self)?).await,
-            Motion::Move { to, relative: true, manner } => {
-                self.move_relative(self.turning(*to)?, manner.motion(self)?).await
-            }
-            Motion::Move { to, relative: false, manner } => {
-                self.move_absolute(self.turning(*to)?, manner.motion(self)?).await
+            Motion::Velocity(speed, manner) => self.velocity(self.turning(*speed)?, manner.options(self, None)?).await,
+            Motion::Move { to, relative, speed, manner } => {
+                let (to, options) = (self.turning(*to)?, manner.options(self, *speed)?);
+                match relative {
+                    true => self.move_relative(to, options).await,
+                    false => self.move_absolute(to, options).await,
+                }
             }
             Motion::Torque(current) => self.torque(*current).await,
-            Motion::Home { method, manner } => self.home(*method, manner.homing(self)?).await,
+            Motion::Home { method, speed, wait, within } => {
+                let speed = speed.map(|speed| self.turning(speed)).transpose()?;
+                let limit = within.unwrap_or(HomingOptions::default().limit);
+                self.home(*method, HomingOptions { speed, limit, wait: *wait }).await
+            }
         }
     }
 
@@ -149,37 +158,34 @@ impl Drive {
     /// [`Error::NoFeed`] for a way, where the [gear](Self::gear) has no feed.
     pub fn check_motion(&self, motion: &Motion) -> Result<(), Error> {
         match motion {
-            Motion::Velocity(speed, manner) => self.turning(*speed).and_then(|_| manner.motion(self)).map(drop),
-            Motion::Move { to, manner, .. } => self.turning(*to).and_then(|_| manner.motion(self)).map(drop),
+            Motion::Velocity(speed, manner) => self.turning(*speed).and_then(|_| manner.options(self, None)).map(drop),
+            Motion::Move { to, speed, manner, .. } => {
+                self.turning(*to).and_then(|_| manner.options(self, *speed)).map(drop)
+            }
             Motion::Torque(_) => Ok(()),
-            Motion::Home { manner, .. } => manner.homing(self).map(drop),
+            Motion::Home { speed, .. } => speed.map_or(Ok(()), |speed| self.turning(speed).map(drop)),
         }
     }
 }
 
 impl Manner {
-    /// The same for this drive.
-    fn motion(&self, drive: &Drive) -> Result<MotionOptions, Error> {
+    /// The same for this drive, with this largest speed.
+    fn options(&self, drive: &Drive, speed: Option<Along<Rpm>>) -> Result<MotionOptions, Error> {
         let ramp = |ramp: Option<Along<Ramp>>| ramp.map(|ramp| drive.turning(ramp)).transpose();
         Ok(MotionOptions {
-            speed: self.speed.map(|speed| drive.turning(speed)).transpose()?,
+            speed: speed.map(|speed| drive.turning(speed)).transpose()?,
             acceleration: ramp(self.acceleration)?,
             deceleration: ramp(self.deceleration)?,
             wait: self.wait,
             within: self.within,
         })
     }
-
-    fn homing(&self, drive: &Drive) -> Result<HomingOptions, Error> {
-        let MotionOptions { speed, wait, within, .. } = self.motion(drive)?;
-        Ok(HomingOptions { speed, wait, limit: within.unwrap_or(HomingOptions::default().limit) })
-    }
 }
 
 impl Command {
     /// Every form of it as text.
     pub const FORMS: &[&str] = &[
-        "enable|disable|stop|quick-stop|reset|save|restore|guard|release",
+        "enable|disable|stop|quick-stop|reset|save|restore|guard [leave]|release",
         "velocity SPEED [acceleration RAMP] [deceleration RAMP] [within TIME] [no-wait]",
         "move [by] POSITION [at SPEED] [acceleration RAMP] [deceleration RAMP] [within TIME] [no-wait]",
         "torque CURRENT",
@@ -187,7 +193,7 @@ impl Command {
     ];
 
     /// The words of the commands that have no value.
-    const PLAIN: [(&str, Self); 9] = [
+    const PLAIN: [(&str, Self); 10] = [
         ("enable", Self::Enable),
         ("disable", Self::Disable),
         ("stop", Self::Stop),
@@ -196,6 +202,7 @@ impl Command {
         ("save", Self::Save),
         ("restore", Self::Restore),
         ("guard", Self::Guard(SwitchedOff::SwitchOn)),
+        ("guard leave", Self::Guard(SwitchedOff::Leave)),
         ("release", Self::ReleaseGuard),
     ];
 }
@@ -240,23 +247,18 @@ impl FromStr for Command {
 
     fn from_str(text: &str) -> Result<Self, ParseCommandError> {
         let words: Vec<&str> = text.split_whitespace().collect();
-        if let [word] = *words
-            && let Some((_, command)) = Self::PLAIN.iter().find(|(name, _)| *name == word)
-        {
+        if let Some((_, command)) = Self::PLAIN.iter().find(|(plain, _)| plain.split(' ').eq(words.iter().copied())) {
             return Ok(*command);
         }
         match *words {
-            ["velocity", speed, ref rest @ ..] => Ok(Motion::Velocity(speed.parse()?, manner(&VELOCITY, rest)?)),
-            ["move", "by", to, ref rest @ ..] => {
-                Ok(Motion::Move { to: to.parse()?, relative: true, manner: manner(&MOVE, rest)? })
-            }
-            ["move", to, ref rest @ ..] if to != "by" => {
-                Ok(Motion::Move { to: to.parse()?, relative: false, manner: manner(&MOVE, rest)? })
-            }
+            ["velocity", speed, ref rest @ ..] => Ok(Motion::Velocity(speed.parse()?, manner(&VELOCITY, rest)?.1)),
+            ["move", "by", to, ref rest @ ..] => movement(to, true, rest),
+            ["move", to, ref rest @ ..] if to != "by" => movement(to, false, rest),
             ["torque", current] => Ok(Motion::Torque(current.parse()?)),
             ["home", method, ref rest @ ..] => {
                 let number = method.parse().map_err(|_| ParseCommandError::Method(method.to_owned()))?;
-                Ok(Motion::Home { method: number, manner: manner(&HOME, rest)? })
+                let (speed, Manner { wait, within, .. }) = manner(&HOME, rest)?;
+                Ok(Motion::Home { method: number, speed, wait, within })
             }
             _ => Err(ParseCommandError::Form(words.join(" "))),
         }
@@ -279,9 +281,17 @@ const MOVE: Options = (
 );
 const HOME: Options = ("home", &["at", "within", "no-wait"], "at SPEED, within TIME or no-wait");
 
-/// What stands behind the target of a motion.
-fn manner((motion, known, options): &Options, mut words: &[&str]) -> Result<Manner, ParseCommandError> {
-    let mut manner = Manner::default();
+fn movement(to: &str, relative: bool, rest: &[&str]) -> Result<Motion, ParseCommandError> {
+    let (speed, manner) = manner(&MOVE, rest)?;
+    Ok(Motion::Move { to: to.parse()?, relative, speed, manner })
+}
+
+/// What stands behind the target of a motion: its speed and how it is made.
+fn manner(
+    (motion, known, options): &Options,
+    mut words: &[&str],
+) -> Result<(Option<Along<Rpm>>, Manner), ParseCommandError> {
+    let (mut speed, mut manner) = (None, Manner::default());
     while let Some((&word, rest)) = words.split_first() {
         if !known.contains(&word) {
             return Err(ParseCommandError::Option { word: word.to_owned(), motion, options });
@@ -296,13 +306,13 @@ fn manner((motion, known, options): &Options, mut words: &[&str]) -> Result<Mann
         };
         words = rest;
         match word {
-            "at" => manner.speed = Some(value.parse()?),
+            "at" => speed = Some(value.parse()?),
             "acceleration" => manner.acceleration = Some(value.parse()?),
             "deceleration" => manner.deceleration = Some(value.parse()?),
             _ => manner.within = Some(parse_duration(value)?),
         }
     }
-    Ok(manner)
+    Ok((speed, manner))
 }
 
 impl fmt::Display for Command {
@@ -310,7 +320,6 @@ impl fmt::Display for Command {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Motion(motion) => motion.fmt(f),
-            Self::Guard(_) => f.write_str("guard"),
             plain => {
                 let word = Self::PLAIN.iter().find(|(_, command)| command == plain);
                 f.write_str(word.map_or("", |(word, _)| word))
@@ -323,20 +332,21 @@ impl fmt::Display for Motion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Velocity(speed, manner) => write!(f, "velocity {}{manner}", typed(speed, rotation_speed)),
-            Self::Move { to, relative, manner } => {
-                write!(f, "move {}{}{manner}", if *relative { "by " } else { "" }, typed(to, rotation))
+            Self::Move { to, relative, speed, manner } => {
+                let by = if *relative { "by " } else { "" };
+                write!(f, "move {by}{}{}{manner}", typed(to, rotation), at(speed))
             }
             Self::Torque(Amperes(current)) => write!(f, "torque {current}A"),
-            Self::Home { method, manner } => write!(f, "home {method}{manner}"),
+            Self::Home { method, speed, wait, within } => {
+                let manner = Manner { wait: *wait, within: *within, ..Manner::default() };
+                write!(f, "home {method}{}{manner}", at(speed))
+            }
         }
     }
 }
 
 impl fmt::Display for Manner {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(speed) = &self.speed {
-            write!(f, " at {}", typed(speed, rotation_speed))?;
-        }
         for (option, ramp) in [("acceleration", &self.acceleration), ("deceleration", &self.deceleration)] {
             if let Some(ramp) = ramp {
                 write!(f, " {option} {}", typed(ramp, rotation_ramp))?;
@@ -347,6 +357,10 @@ impl fmt::Display for Manner {
         }
         f.write_str(if self.wait { "" } else { " no-wait" })
     }
+}
+
+fn at(speed: &Option<Along<Rpm>>) -> String {
+    speed.as_ref().map_or_else(String::new, |speed| format!(" at {}", typed(speed, rotation_speed)))
 }
 
 /// A quantity with all of its digits, unlike its [`Display`](fmt::Display) for people.
@@ -402,34 +416,24 @@ mod tests {
         ]
     }
 
+    fn within() -> impl Strategy<Value = Option<Duration>> {
+        prop::option::of((0u64..1_000_000).prop_map(Duration::from_millis))
+    }
+
     fn any_manner() -> impl Strategy<Value = Manner> {
-        let within = prop::option::of((0u64..1_000_000).prop_map(Duration::from_millis));
-        (prop::option::of(speed()), prop::option::of(ramp()), prop::option::of(ramp()), any::<bool>(), within).prop_map(
-            |(speed, acceleration, deceleration, wait, within)| Manner {
-                speed,
-                acceleration,
-                deceleration,
-                wait,
-                within,
-            },
-        )
+        (prop::option::of(ramp()), prop::option::of(ramp()), any::<bool>(), within())
+            .prop_map(|(acceleration, deceleration, wait, within)| Manner { acceleration, deceleration, wait, within })
     }
 
     fn command() -> impl Strategy<Value = Command> {
         let plain = prop::sample::select(Command::PLAIN.map(|(_, command)| command).to_vec());
         let motion = prop_oneof![
-            (speed(), any_manner())
-                .prop_map(|(speed, manner)| Motion::Velocity(speed, Manner { speed: None, ..manner })),
-            (angle(), any::<bool>(), any_manner()).prop_map(|(to, relative, manner)| Motion::Move {
-                to,
-                relative,
-                manner
-            }),
+            (speed(), any_manner()).prop_map(|(speed, manner)| Motion::Velocity(speed, manner)),
+            (angle(), any::<bool>(), prop::option::of(speed()), any_manner())
+                .prop_map(|(to, relative, speed, manner)| Motion::Move { to, relative, speed, manner }),
             (-1e3..1e3f64).prop_map(|amperes| Motion::Torque(Amperes(amperes))),
-            (any::<i8>(), any_manner()).prop_map(|(method, manner)| {
-                let manner = Manner { acceleration: None, deceleration: None, ..manner };
-                Motion::Home { method, manner }
-            }),
+            (any::<i8>(), prop::option::of(speed()), any::<bool>(), within())
+                .prop_map(|(method, speed, wait, within)| Motion::Home { method, speed, wait, within }),
         ];
         prop_oneof![plain, motion.prop_map(Command::Motion)]
     }

@@ -6,7 +6,7 @@ use canopen::{AbortCode, Mux, NmtState, NodeId};
 use devices::Description;
 
 use super::knowledge::{Guess, Identity, Knowledge, names};
-use crate::core::{Payload, Twins};
+use crate::core::{NodeSet, Payload, Twins};
 use crate::error::Error;
 use crate::models::Models;
 use crate::network::{Network, Node, join_all};
@@ -176,21 +176,28 @@ impl Network {
             asked += window.len();
             progress(asked);
         }
-        self.ask_late_comers(&mut found, timeout).await;
+        self.ask_late_comers(&mut found, began, timeout).await;
         self.hear_heartbeats(&mut found, began).await;
         found
     }
 
-    /// Asks those that were first heard after they had been asked, a drive that booted meanwhile. Each is asked once, so that this ends.
-    async fn ask_late_comers(&self, found: &mut Vec<Found>, timeout: Duration) {
+    /// Asks those that have booted or were first heard after they had been asked, and have not answered. Each is asked once more, so
+    /// that this ends.
+    async fn ask_late_comers(&self, found: &mut Vec<Found>, began: Instant, timeout: Duration) {
+        let mut asked_again = NodeSet::EMPTY;
         loop {
-            let is_new = |id: &NodeId| found.iter().all(|found| found.node != *id);
-            let late: Vec<_> = NodeId::all().filter(|id| self.facts(*id).seen_at.is_some()).filter(is_new).collect();
-            let asking: Vec<_> = late.iter().map(|id| self.look_at(*id, timeout)).collect();
-            let answers: Vec<_> = join_all(asking).await.into_iter().flatten().collect();
-            if answers.is_empty() {
+            let is_late = |id: &NodeId| match found.iter().find(|found| found.node == *id) {
+                Some(found) => found.identity.is_none() && self.facts(*id).boot_up.is_some_and(|(at, _)| at > began),
+                None => true,
+            };
+            let late: Vec<_> = self.seen().iter().filter(|id| is_late(id) && !asked_again.contains(*id)).collect();
+            if late.is_empty() {
                 break;
             }
+            late.iter().for_each(|id| asked_again.insert(*id));
+            let asking: Vec<_> = late.iter().map(|id| self.look_at(*id, timeout)).collect();
+            let answers: Vec<_> = join_all(asking).await.into_iter().flatten().collect();
+            found.retain(|found| answers.iter().all(|answer| answer.node != found.node));
             found.extend(answers);
         }
         found.sort_by_key(|found| found.node);

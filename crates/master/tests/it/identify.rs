@@ -222,6 +222,10 @@ fn a_node_that_boots_during_a_scan_is_asked_once_it_has() {
     let nodes: Vec<_> = found.iter().map(|found| found.node.raw()).collect();
     assert_eq!(nodes, [STEPPER, SERVO]);
     assert!(found.iter().all(|found| found.identity.is_some()), "{found:?}");
+    // One that was known before, and boots again.
+    network.node(node(SERVO)).nmt(canopen::NmtCommand::ResetNode);
+    let found = block_on(&mut world, network.scan(Duration::from_millis(500), |_| {})).unwrap();
+    assert!(found.len() == 2 && found.iter().all(|found| found.identity.is_some()), "{found:?}");
 }
 
 /// CiA 301, 7.2.4.3: one SDO channel has one client. Where there are two masters all the same, the answers to both mix.

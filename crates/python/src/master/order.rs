@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use master::drive::{Command, Manner, Motion, SwitchedOff};
-use master::units::{Amperes, Angle, Ramp, Rpm};
+use master::units::{Along, Amperes, Angle, Ramp, Rpm};
 use pyo3::prelude::*;
 
 use crate::failure::bad_value;
@@ -51,20 +51,30 @@ impl Order {
             "release_guard" => Command::ReleaseGuard,
             "velocity" => Motion::Velocity(Rpm(self.value()?).into(), self.manner()?).into(),
             "torque" => Motion::Torque(Amperes(self.value()?)).into(),
-            "move" => Motion::Move { to: self.angle()?.into(), relative: self.relative, manner: self.manner()? }.into(),
+            "move" => Motion::Move {
+                to: self.angle()?.into(),
+                relative: self.relative,
+                speed: self.speed(),
+                manner: self.manner()?,
+            }
+            .into(),
             "home" => {
                 let method = self.counts.and_then(|method| i8::try_from(method).ok());
                 let method = method.ok_or_else(|| bad_value("a homing method is a number from -128 to 127"))?;
-                Motion::Home { method, manner: self.manner()? }.into()
+                let Manner { wait, within, .. } = self.manner()?;
+                Motion::Home { method, speed: self.speed(), wait, within }.into()
             }
             other => return Err(bad_value(format!("a drive cannot {other:?}"))),
         })
     }
 
+    fn speed(&self) -> Option<Along<Rpm>> {
+        self.speed_rpm.map(|speed| Rpm(speed).into())
+    }
+
     fn manner(&self) -> PyResult<Manner> {
         let ramp = |rate: Option<f64>| rate.map(|rate| Ramp::RpmPerSecond(rate).into());
         Ok(Manner {
-            speed: self.speed_rpm.map(|speed| Rpm(speed).into()),
             acceleration: ramp(self.acceleration_rpm_s),
             deceleration: ramp(self.deceleration_rpm_s),
             wait: self.wait,

@@ -37,9 +37,9 @@ fn to_angle(degrees: f64) -> Along<Angle> {
     Along::Turning(Angle::from(Degrees(degrees)))
 }
 
-fn manner(speed: Option<Rpm>) -> Manner {
+fn manner() -> Manner {
     let ramp = Some(Ramp::RpmPerSecond(RAMP_RPM_S).into());
-    Manner { speed: speed.map(Along::from), acceleration: ramp, deceleration: ramp, ..Manner::default() }
+    Manner { acceleration: ramp, deceleration: ramp, ..Manner::default() }
 }
 
 /// The master's drives.
@@ -130,7 +130,7 @@ impl Fleet {
     }
 
     fn turn(&self, bench: &mut Bench, before_rpm: f64, rpm: f64) {
-        let turn = Motion::Velocity(Rpm(rpm).into(), manner(None));
+        let turn = Motion::Velocity(Rpm(rpm).into(), manner());
         self.rows(bench, &format!("turn at {rpm:.0} r/min"), turn, |bench, place, after_s| {
             let seen = report(bench, place).velocity_rpm;
             bench.moved(format!("{seen:+.1} r/min"));
@@ -163,7 +163,7 @@ impl Fleet {
 
     fn go_by(&self, bench: &mut Bench, angle: f64) {
         let from: Vec<f64> = (0..self.drives.len()).map(|place| angle_deg(bench, place)).collect();
-        let by = Motion::Move { to: to_angle(angle), relative: true, manner: manner(Some(SPEED)) };
+        let by = Motion::Move { to: to_angle(angle), relative: true, speed: Some(SPEED.into()), manner: manner() };
         self.rows(bench, &format!("move by {angle:.0}°"), by, |bench, place, after_s| {
             let seen = angle_deg(bench, place) - from[place];
             bench.moved(format!("{seen:+.1}°"));
@@ -174,7 +174,7 @@ impl Fleet {
 
     fn go_to(&self, bench: &mut Bench, angle: f64) {
         let from: Vec<f64> = (0..self.drives.len()).map(|place| angle_deg(bench, place)).collect();
-        let to = Motion::Move { to: to_angle(angle), relative: false, manner: manner(Some(SPEED)) };
+        let to = Motion::Move { to: to_angle(angle), relative: false, speed: Some(SPEED.into()), manner: manner() };
         self.rows(bench, &format!("move to {angle:.0}°"), to, |bench, place, after_s| {
             let seen = angle_deg(bench, place);
             bench.moved(format!("{:+.1}°", seen - from[place]));
