@@ -11,9 +11,11 @@ pub(crate) fn whole<T: Copy + Into<i128> + TryFrom<i128>>(text: &str, within: Ra
     // Of more digits than any bound has, the value does not matter.
     let number = text.parse::<i128>().ok().filter(|number| (low..=high).contains(number));
     number.and_then(|number| T::try_from(number).ok()).ok_or_else(|| {
-        let is_number = text.strip_prefix(['-', '+']).unwrap_or(text).bytes().all(|byte| byte.is_ascii_digit());
-        let of = if is_number && !text.is_empty() { "" } else { "a whole number, " };
-        let bounds = if high == i128::from(u64::MAX) && text.len() < 20 {
+        let digits = text.strip_prefix(['-', '+']).unwrap_or(text);
+        let is_number = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
+        let of = if is_number { "" } else { "a whole number, " };
+        let is_below = text.parse::<i128>().is_ok_and(|number| number < low);
+        let bounds = if high == i128::from(u64::MAX) && is_below {
             format!("{low} or more")
         } else {
             format!("{low} to {high}")
@@ -41,6 +43,7 @@ mod tests {
             ("two", "expected a whole number, 2 to 240, got 'two'"),
             ("2.5", "expected a whole number, 2 to 240, got '2.5'"),
             ("", "expected a whole number, 2 to 240, got ''"),
+            ("-", "expected a whole number, 2 to 240, got '-'"),
         ] {
             assert_eq!(whole(text, 2..=240_u8), Err(said.to_owned()));
         }

@@ -44,6 +44,12 @@ impl Format {
         printed.map_err(Failure::of_stdout)
     }
 
+    /// As [`print_failed`](Self::print_failed), and then fails with it: for programs the report has said it.
+    pub(crate) fn print_judged(self, report: &impl Report, failure: Option<Failure>) -> Result<(), Failure> {
+        self.print_failed(report, failure.as_ref())?;
+        failure.map_or(Ok(()), |failure| Err(Failure { reported: self.json, ..failure }))
+    }
+
     /// Prints one line of JSON about something that was done.
     pub(crate) fn print_json(self, value: &impl Serialize) -> io::Result<()> {
         print_line(&json(value)?)

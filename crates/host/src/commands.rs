@@ -246,8 +246,8 @@ impl Host {
         }
         let Some(running) = self.running.remove(&node) else { return };
         match &outcome {
-            // It follows commands: it is at rest, or under control again.
-            Some(Ok(_)) => drop(self.unseen_stops.remove(&node)),
+            // It was seen at rest, or is under control again. What moves nothing (a reset, a store) has seen neither.
+            Some(Ok(_)) if running.what == STOPPING || running.moves => drop(self.unseen_stops.remove(&node)),
             Some(Err(_)) if running.what == STOPPING => drop(self.unseen_stops.insert(node, 0)),
             _ => {}
         }

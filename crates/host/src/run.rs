@@ -1,6 +1,5 @@
 //! The loop: handles requests, deadlines and ended work, and publishes the state.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
@@ -113,7 +112,6 @@ impl Host {
     fn show(&mut self, now: Instant) {
         self.states += 1;
         let snapshot = Snapshot {
-            kind: "state",
             number: self.states,
             time_s: (now - Instant::ZERO).as_secs_f64(),
             bus: BusView {
@@ -133,13 +131,7 @@ impl Host {
             changes: self.changes.count(),
             nodes: self.nodes.iter().map(|(id, node)| self.view(*id, node, now)).collect(),
         };
-        // Only names, numbers and lists: serialising cannot fail.
-        let json = serde_json::to_string(&snapshot).unwrap_or_default();
         // There may be no receiver.
-        let _ = self.inbox.states.send(StateUpdate {
-            number: self.states,
-            json: json.into(),
-            snapshot: Arc::new(snapshot),
-        });
+        let _ = self.inbox.states.send(StateUpdate::from(snapshot));
     }
 }

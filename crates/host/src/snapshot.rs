@@ -14,10 +14,8 @@ use crate::session::authority::SessionId;
 
 /// The state of everything at one time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[serde(tag = "type", rename = "state")]
 pub struct Snapshot {
-    /// Always `state`.
-    #[serde(rename = "type")]
-    pub kind: &'static str,
     /// Counts the states; a gap shows how many a slow reader missed.
     pub number: u64,
     /// Time of the bus.

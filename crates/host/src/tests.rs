@@ -114,7 +114,7 @@ impl Stage {
     }
 
     fn state(&self) -> Value {
-        serde_json::from_str(&self.handle.states().borrow().json).expect("JSON")
+        serde_json::from_str(&self.handle.states().borrow().json()).expect("JSON")
     }
 
     /// The speed of a shaft by its 606Ch, in r/min of the motor.

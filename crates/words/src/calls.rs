@@ -62,6 +62,9 @@ impl<'a> Words<'a> {
 
     /// A path, which ends the text.
     fn path(&mut self) -> Option<String> {
+        if let Some(placeholder) = self.take(|word| word == "FILE") {
+            return Some(format!("{placeholder:?}"));
+        }
         let path = self.rest.strip_prefix(' ')?;
         self.rest = "";
         Some(format!("{path:?}"))
@@ -100,8 +103,14 @@ fn call(text: &str) -> Option<(String, &str)> {
         "sync" => format!("network.sync({})", seconds(words.option("--every")?)?),
         "read" => {
             let (node, object) = (words.node(), words.take(|_| true)?);
-            while words.take(|_| true).is_some() {}
-            format!("network.upload({node}, 0x{object})")
+            // Of a name, of several objects or of a range there is no such call.
+            let (index, sub_index) = object.split_once(':').unwrap_or((object, "0"));
+            let number = |text| u16::from_str_radix(text, 16).ok();
+            let (index, sub_index) = number(index).zip(number(sub_index))?;
+            if words.take(|_| true).is_some() {
+                return None;
+            }
+            format!("network.upload({node}, 0x{index:04X}, {sub_index})")
         }
         "params" => parameters(&mut words)?,
         "check" => format!("ferrodrive.check({:?})", words.take(|_| true)?),
@@ -137,7 +146,12 @@ mod tests {
             ("ferrodrive scan shows more", "network.scan() shows more"),
             (
                 "Check it: ferrodrive scan, ferrodrive read NODE 1000 1018:*",
-                "Check it: network.scan(), network.upload(NODE, 0x1000)",
+                "Check it: network.scan(), ferrodrive read NODE 1000 1018:*",
+            ),
+            ("its identity: ferrodrive read 4 1018:01", "its identity: network.upload(4, 0x1018, 1)"),
+            (
+                "ferrodrive params apply NODE FILE, or boot by a machine file",
+                "network.params(NODE).apply(\"FILE\"), or boot by a machine file",
             ),
             ("`ferrodrive explain 4` says it", "`network.explain(4)` says it"),
             ("ferrodrive explain says what the drive shows", "network.explain(NODE) says what the drive shows"),

@@ -192,10 +192,7 @@ impl Params {
             What::Rollback(rollback) => format.print(&rollback.run(context).await?),
             What::Verify(verify) => {
                 let report = verify.run(context).await?;
-                let failure = report.failure().map(Failure::from);
-                format.print_failed(&report, failure.as_ref())?;
-                // For programs the report has it.
-                return failure.map_or(Ok(()), |failure| Err(Failure { reported: format.json, ..failure }));
+                return format.print_judged(&report, report.failure().map(Failure::from));
             }
         };
         printed.map_err(Failure::not_printed)

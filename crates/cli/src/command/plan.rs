@@ -98,8 +98,7 @@ impl Plan {
             let failure = Failure::new("some frames are late").of_kind("bus_load");
             failure.next("take a longer --cycle, a higher --bitrate or fewer drives")
         });
-        format.print_failed(&report, failure.as_ref())?;
-        failure.map_or(Ok(()), |failure| Err(Failure { reported: true, ..failure }))
+        format.print_judged(&report, failure)
     }
 
     fn bitrate_of(&self, bus: &BusSpec) -> Result<Bitrate, Failure> {

@@ -19,7 +19,7 @@ const INTERVAL: Duration = Duration::from_millis(100);
 /// Frames that may wait for the disk: some 10 s of a full bus at 1 Mbit/s.
 const MOST_WAITING: usize = 1 << 17;
 
-/// A log under way; the clones write the same file. Without a file nothing is log.
+/// A log under way; the clones write the same file. Without a file nothing is kept.
 #[derive(Clone, Default)]
 pub(crate) struct CommandLog(Option<Log>);
 

@@ -1,9 +1,7 @@
 //! Data of the homing wizard: the methods of a drive and what each does (CiA 402-2, clause 11, or the drive's own),
-//! its homing settings, the levels of its switches, and the progress of a run. Reads only; the run is [`Command::Home`].
+//! its homing settings, the levels of its switches, and the progress of a run. Reads only; the run is [`Motion::Home`](master::drive::Motion::Home).
 //!
 //! The sequence of a method is in the description ([`HomingRules::sequence`]); the page draws it from this data.
-//!
-//! [`Command::Home`]: crate::command::Command::Home
 
 use canopen::{Mux, NodeId};
 use cia402::object::{

@@ -4,7 +4,7 @@
 //! not fetched is replaced, and news that were not fetched are counted. A stop has its own channel, which is never full.
 
 use std::convert::Infallible;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use tokio::sync::{broadcast, mpsc, oneshot, watch};
 
@@ -48,15 +48,31 @@ pub struct Inbox {
     pub timeline: Arc<Timeline>,
 }
 
-/// The state of everything, and the same as JSON.
+/// The state of everything; as JSON for those who ask for it, made once.
 #[derive(Clone, Debug, Default)]
 pub struct StateUpdate {
-    /// Counts the states.
-    pub number: u64,
-    /// As JSON.
-    pub json: Arc<str>,
+    snapshot: Arc<Snapshot>,
+    json: Arc<OnceLock<Arc<str>>>,
+}
+
+impl From<Snapshot> for StateUpdate {
+    fn from(snapshot: Snapshot) -> Self {
+        Self { snapshot: Arc::new(snapshot), json: Arc::default() }
+    }
+}
+
+impl StateUpdate {
     /// The state.
-    pub snapshot: Arc<Snapshot>,
+    pub fn snapshot(&self) -> Arc<Snapshot> {
+        Arc::clone(&self.snapshot)
+    }
+
+    /// The state as JSON: `/api/state`.
+    pub fn json(&self) -> Arc<str> {
+        // Only names, numbers and lists: serialising cannot fail.
+        let made = || serde_json::to_string(&*self.snapshot).unwrap_or_default().into();
+        Arc::clone(self.json.get_or_init(made))
+    }
 }
 
 /// A request to the host.
@@ -87,7 +103,7 @@ pub fn channel(trace: Trace) -> (HostHandle, Inbox) {
     let (trace, timeline) = (Arc::new(trace), Arc::<Timeline>::default());
     let (requests, requested) = mpsc::channel(REQUESTS);
     let (stops, stopped) = watch::channel(0);
-    let (shown, states) = watch::channel(StateUpdate { json: "{}".into(), ..StateUpdate::default() });
+    let (shown, states) = watch::channel(StateUpdate::default());
     let (news, _) = broadcast::channel(NEWS);
     let handle = HostHandle {
         requests,

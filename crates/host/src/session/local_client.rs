@@ -69,7 +69,7 @@ impl LocalClient {
     pub async fn shown(&mut self) -> Shown {
         tokio::select! {
             changed = self.states.changed() => match changed {
-                Ok(()) => Shown::State(Arc::clone(&self.states.borrow_and_update().snapshot)),
+                Ok(()) => Shown::State(self.states.borrow_and_update().snapshot()),
                 Err(_) => Shown::Over,
             },
             news = self.news.recv() => match news {

@@ -3,10 +3,11 @@
 use std::cell::RefCell;
 
 use cia402::PowerState;
+use master::drive;
 use serde_json::Value;
 
 use super::faults::change;
-use super::{ARM, Page, Stage, WHEEL, home, move_by, play, play_acts, torque, velocity};
+use super::{ARM, Page, Stage, WHEEL, home, move_by, play, play_acts, to, torque, velocity};
 use crate::command::{AxisSpeed, AxisTarget, Command, GroupCommand, GroupMove, NodeCommand, SessionCommand};
 
 impl Stage {
@@ -158,6 +159,9 @@ fn a_drive_that_a_stop_does_not_reach_is_shown_until_it_is_seen_at_rest() {
         },
         async |stage| {
             let mut mine = page.take().expect("it stays open");
+            // There is nothing to be reset, and that it was reset does not show it at rest.
+            let reset = mine.ask(to(ARM, drive::Command::ResetFault)).await;
+            assert!(!reset.is_ok() || unseen(stage)[0], "{}", stage.state());
             // It still turns, and is stopped as soon as it answers, without another press.
             let mut turned = 0.0_f64;
             for _ in 0..30 {

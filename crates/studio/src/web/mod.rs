@@ -215,7 +215,7 @@ fn refuse(access: &Access, request: &Request) -> Option<Refusal> {
 }
 
 async fn state(State(web): State<Web>) -> Response {
-    let json = web.handle.states().borrow().json.to_string();
+    let json = web.handle.states().borrow().json().to_string();
     json_text(json)
 }
 

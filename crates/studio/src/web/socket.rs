@@ -4,7 +4,6 @@
 //! state, and the number of states that it missed; its answers and news are bounded. A page that reads nothing at all is disconnected,
 //! and what it moved is stopped, as with any end of a connection.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use axum::extract::ws::{CloseFrame, Message as Frame, Utf8Bytes, WebSocket, close_code};
@@ -103,7 +102,7 @@ fn take(text: &str, session: &Session, word: &str, is_full: bool) -> Result<ones
 /// Sends states, news and answers to the page. Ends when sending fails.
 async fn write(mut sink: Sink, handle: &HostHandle, welcome: String, mut answers: mpsc::Receiver<String>) {
     let (mut states, mut news) = (handle.states(), handle.news());
-    let mut last = states.borrow_and_update().number;
+    let mut last = states.borrow_and_update().snapshot().number;
     if !send(&mut sink, welcome).await {
         return;
     }
@@ -122,10 +121,11 @@ async fn write(mut sink: Sink, handle: &HostHandle, welcome: String, mut answers
                     return;
                 }
                 let state = states.borrow_and_update().clone();
-                let missed = state.number.saturating_sub(last + 1);
-                last = state.number;
+                let number = state.snapshot().number;
+                let missed = number.saturating_sub(last + 1);
+                last = number;
                 let sent = missed == 0 || send(&mut sink, dropped("pictures", missed)).await;
-                sent && send(&mut sink, Arc::clone(&state.json).to_string()).await
+                sent && send(&mut sink, state.json().to_string()).await
             }
         };
         if !sent {

@@ -25,6 +25,7 @@ use host::Answer;
 use host::session::Authority;
 use host::session::{HostHandle, Inbox, Request as HostRequest, StateUpdate, channel};
 use host::trace::{Origin, Trace};
+use host::{BusView, Snapshot};
 
 /// A watchdog against hangs.
 const PATIENCE: Duration = Duration::from_secs(600);
@@ -430,11 +431,7 @@ async fn two_hundred_pages_all_get_the_newest_state() {
     for _ in 0..200 {
         pages.push(page(&access).await.0);
     }
-    states.send_replace(StateUpdate {
-        number: 7,
-        json: r#"{"type":"state","number":7}"#.into(),
-        ..StateUpdate::default()
-    });
+    states.send_replace(Snapshot { number: 7, ..Snapshot::default() }.into());
     for socket in &mut pages {
         // States from before the page connected are not missed ones.
         let got = next(socket).await.expect("a state");
@@ -451,11 +448,11 @@ async fn a_page_that_reads_slowly_gets_the_number_of_missed_states_and_costs_no_
     let filling = "x".repeat(256 << 10);
     let count = 200;
     for number in 1..=count {
-        let json = format!(r#"{{"type":"state","number":{number},"filling":"{filling}"}}"#);
-        states.send_replace(StateUpdate { number, json: json.into(), ..StateUpdate::default() });
+        let bus = BusView { name: filling.clone(), ..BusView::default() };
+        states.send_replace(Snapshot { number, bus, ..Snapshot::default() }.into());
         tokio::task::yield_now().await;
     }
-    assert_eq!(handle.states().borrow().number, count, "the host did not wait for the page");
+    assert_eq!(handle.states().borrow().snapshot().number, count, "the host did not wait for the page");
     let (mut shown, mut missed) = (0, 0);
     loop {
         let got = next(&mut socket).await.expect("a state, or how many were missed");

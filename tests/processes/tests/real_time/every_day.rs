@@ -265,3 +265,23 @@ fn pdos_that_come_are_shown_with_their_objects() {
     let low = u8::from_str_radix(&bytes[..2], 16).unwrap();
     assert_eq!(low & 0x4F, 0x40, "{bytes}");
 }
+
+/// Whatever this machine does beside it: of what cannot be heard it is never said that it stands.
+#[test]
+fn an_emergency_stop_that_was_not_seen_ends_with_1() {
+    let mut simulator = Simulator::start(&["--drive", "cia402@5", "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = format!("socketcand://{}/can0", simulator.address("socketcand"));
+    simulator.send("5 cable cut");
+    assert!(simulator.line().starts_with(r#"{"ok":true"#));
+    for command in [&["estop"][..], &["estop", "all"], &["quick-stop", "all"], &["stop", "all"]] {
+        for (known, kind) in [(&[][..], "no_node"), (&["--model", "5=cia402"], "not_stopped")] {
+            let ended = ferrodrive(&[&["--json", "--bus", &bus][..], known, command].concat());
+            assert_eq!(
+                (ended.status, &ended.json()["error"]["kind"]),
+                (Some(1), &json!(kind)),
+                "{command:?}: {}",
+                ended.out
+            );
+        }
+    }
+}

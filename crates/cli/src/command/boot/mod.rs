@@ -52,9 +52,7 @@ impl Boot {
         let planned = planned_by(self.file.as_deref(), global)?;
         let global = global_of(&planned, global)?;
         let report = session::run(&global, async |context| self.boot(context, &planned).await)?;
-        let failure = report.failure().map(Failure::from);
-        format.print_failed(&report, failure.as_ref())?;
-        failure.map_or(Ok(()), |failure| Err(Failure { reported: true, ..failure }))
+        format.print_judged(&report, report.failure().map(Failure::from))
     }
 
     async fn boot(&self, context: &Context, planned: &Planned) -> Result<BootReport, Failure> {
