@@ -280,10 +280,18 @@ fn with_typed(command: &Command, before: &[String], tip: &str, typed: &[String])
     let missing = named.get(typed_named.len()..).unwrap_or_default();
     let of_node = typed_named.first().filter(|word| node(word).is_ok() && !named.is_empty());
     let of_node: Vec<String> = of_node.into_iter().chain(named.iter().skip(1)).cloned().collect();
+    // A file that was typed is the one that is read.
+    let typed_file = typed_named.iter().skip(1).find(|word| word.contains('.'));
+    let mut with_file = options.to_vec();
+    if let ([.., option, file], Some(typed)) = (&mut with_file[..], typed_file)
+        && option == "--from"
+    {
+        file.clone_from(typed);
+    }
     let lines = [
         [typed_named, missing, typed_options, options].concat(),
         [typed_named, missing, typed_options].concat(),
-        [&of_node[..], options].concat(),
+        [of_node, with_file].concat(),
         arguments.to_vec(),
     ];
     let lines = lines.iter().map(|line| [before, &bus, path, line].concat());
@@ -516,7 +524,7 @@ mod tests {
             ("--bus can0 fault 7", 2, "--bus can0 explain 7"),
             ("--bus sim fault 7", 2, "--bus sim explain 7"),
             ("canplayer mine.log", 0, "replay mine.log --skip-motion"),
-            ("flash 5 fw.bin", 0, "write 5 1F50:01 --from firmware.bin"),
+            ("flash 5 fw.bin", 0, "write 5 1F50:01 --from fw.bin"),
             // What makes no sense there is left out.
             ("get it", 0, "read 4 6064"),
         ] {

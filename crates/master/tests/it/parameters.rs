@@ -78,18 +78,22 @@ fn changed(model: &Description, parameters: &Parameters) -> Parameters {
 
 #[test]
 fn what_was_read_from_any_model_is_there_already() {
+    let mut all = 0;
     for model in devices::all().iter() {
         let (mut world, drive) = bench(model);
         let parameters = backed_up(&mut world, &drive);
         assert!(!parameters.values.is_empty(), "{}", model.name);
+        all += parameters.values.len();
         let plan = planned(&mut world, &drive, &parameters).unwrap_or_else(|error| panic!("{}: {error}", model.name));
         assert_eq!(plan.steps, [], "{}", model.name);
         assert_eq!(plan.left, [], "{}", model.name);
     }
+    assert!(all > 10 * devices::all().iter().count(), "{all}");
 }
 
 #[test]
 fn every_model_takes_what_is_planned_in_that_order_and_reads_back_so() {
+    let mut writes = 0;
     for model in devices::all().iter() {
         let (mut world, drive) = bench(model);
         let before = backed_up(&mut world, &drive);
@@ -98,12 +102,14 @@ fn every_model_takes_what_is_planned_in_that_order_and_reads_back_so() {
         let applied = block_on(&mut world, drive.apply_parameters(&plan, |_, _| {})).expect("goes on");
         let applied = applied.expect("at rest").unwrap_or_else(|error| panic!("{}: {error}", model.name));
         assert!(applied.writes >= 1, "{} has nothing to change", model.name);
+        writes += applied.writes;
         assert_eq!(applied.writes, plan.steps.len(), "{}", model.name);
         assert!(applied.rounded.is_empty() && applied.displaced.is_empty(), "{}: {applied:?}", model.name);
         assert_eq!(diff(&backed_up(&mut world, &drive).values, &wanted.values), [], "{}", model.name);
         let deviations = block_on(&mut world, verify(drive.node(), &before.values)).expect("goes on").expect("answers");
         assert_eq!(deviations.is_empty(), plan.steps.is_empty(), "{}", model.name);
     }
+    assert!(writes >= 3 * devices::all().iter().count(), "{writes}");
 }
 
 /// A program may die between any two writes; what it kept of its plan leads back from there.

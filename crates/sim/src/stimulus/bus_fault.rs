@@ -86,7 +86,7 @@ impl BusFault {
     /// Its frames reach the bus between `min` and `max` late.
     ///
     /// # Errors
-    /// It is more than a day, or the longest is the shortest.
+    /// It is more than a day, or `max` is less than `min`.
     pub fn late(min: Duration, max: Duration) -> Result<Self, StimulusError> {
         let (min_ns, max_ns) = (nanos(min, LATE)?, nanos(max, LATE)?);
         if max_ns < min_ns {
@@ -183,8 +183,11 @@ fn probability(value: f64, text: impl ToString, usage: &'static str) -> Result<f
 }
 
 fn delay(text: &str, usage: &'static str) -> Result<Duration, StimulusError> {
-    let time = can::parse_duration_in("ms", text).ok().filter(|time| *time <= LONGEST);
-    time.ok_or_else(|| StimulusError::BadValue { text: text.into(), what: "time in ms", usage })
+    can::parse_duration_in("ms", text).map_err(|_| StimulusError::BadValue {
+        text: text.into(),
+        what: "time in ms",
+        usage,
+    })
 }
 
 fn nanos(time: Duration, usage: &'static str) -> Result<u64, StimulusError> {
