@@ -343,7 +343,7 @@ impl Base {
     /// [`BaseError::NotAtRest`] for a wheel that does not come to rest; [`BaseError::Stopped`] where a wheel was lost before or on the
     /// way to rest, once those that are heard stand.
     pub fn stopped(&self) -> Option<Result<(), BaseError>> {
-        if self.still_cycles == 0 {
+        if !self.is_stopping || self.still_cycles == 0 {
             return None;
         }
         let waited = self.period * u32::try_from(self.still_cycles).unwrap_or(u32::MAX);

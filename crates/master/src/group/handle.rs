@@ -149,7 +149,8 @@ impl Group {
     /// Of an axis that does not come to rest, or is not seen.
     pub fn stands(&self) -> Option<Result<(), NotAtRest>> {
         let runner = &self.runner;
-        if runner.still_cycles == 0 {
+        // What it has begun counts from its first cycle on.
+        if runner.is_under_way() || runner.still_cycles == 0 {
             return None;
         }
         let waited = Duration::from_secs_f64(runner.still_cycles as f64 * runner.period_s);

@@ -336,7 +336,7 @@ async fn rest(
         }
         next(core).await?;
     };
-    let Some(cause) = cause else { return Ok(stands.map_err(Trouble::from)?) };
+    let Some(cause) = cause else { return Ok(stands.map_err(GroupError::from).map_err(Trouble::from)?) };
     // It is stepped in the background meanwhile.
     let reason = match question {
         Some(question) => question.await.map(|reason| reason.to_string()),

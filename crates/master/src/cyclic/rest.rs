@@ -1,0 +1,61 @@
+//! What is said of drives that were to come to rest.
+
+use core::time::Duration;
+
+use canopen::NodeId;
+
+use super::drive::CyclicDrive;
+use crate::units::Shown;
+
+/// How long after its last set-point a shaft may take to show that it stands.
+const REST_LIMIT: Duration = Duration::from_secs(2);
+
+/// Why a drive that was to come to rest was not seen to stand.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NotAtRest {
+    /// It turns.
+    #[error(
+        "node {node} still turns at {} r/min, {limit:?} after it was to stand: its load drives it, or it does not follow. Take its power by \
+         the emergency stop if it must not move", Shown(*rpm)
+    )]
+    StillTurns {
+        /// The node.
+        node: NodeId,
+        /// Its speed, in r/min of the output.
+        rpm: f64,
+        /// How long it was waited for.
+        limit: Duration,
+    },
+    /// Its drive is not heard, or shows neither speed nor position.
+    #[error(
+        "node {node} was not seen to stand: it may still be moving. It stops by its own watch over its host, if it has one; take its power \
+         by the emergency stop if it must not move"
+    )]
+    NotSeen {
+        /// The node.
+        node: NodeId,
+    },
+}
+
+impl NotAtRest {
+    /// Which node it is about.
+    pub const fn node(&self) -> NodeId {
+        match self {
+            Self::StillTurns { node, .. } | Self::NotSeen { node } => *node,
+        }
+    }
+}
+
+/// What became of drives that were to stand so long ago: `None` while it is not known, `Ok` once all were seen to stand.
+pub(crate) fn at_rest<'a>(
+    drives: impl IntoIterator<Item = &'a CyclicDrive>,
+    waited: Duration,
+) -> Option<Result<(), NotAtRest>> {
+    let Some(drive) = drives.into_iter().find(|drive| !drive.progress.standstill.stands()) else { return Some(Ok(())) };
+    let node = drive.node();
+    let why = match drive.progress.standstill.turned_rpm {
+        Some(rpm) => NotAtRest::StillTurns { node, rpm, limit: REST_LIMIT },
+        None => NotAtRest::NotSeen { node },
+    };
+    (waited >= REST_LIMIT).then_some(Err(why))
+}
