@@ -4,6 +4,7 @@
 //! style. Nothing here is part of what users get.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a chore talks to a terminal")]
 
+mod bare_metal;
 mod browser;
 mod debian;
 mod defects;

@@ -6,7 +6,10 @@
 use crate::say::say;
 use crate::tally::Tally;
 use crate::test_programs::{self, How, REAL_TIME, SCHEMA_AND_BROWSER};
-use crate::{browser, dist, examples, libtest, packages, page, peers, process, program, python, tidy, vcan, workspace};
+use crate::{
+    bare_metal, browser, dist, examples, libtest, packages, page, peers, process, program, python, tidy, vcan,
+    workspace,
+};
 
 /// One step: its name for `--only`, what it does for the progress line, when it runs, and the function that does it.
 pub(crate) struct Step {
@@ -46,7 +49,12 @@ pub(crate) const STEPS: &[Step] = &[
     Step { name: "clippy", does: "lints of every target, warnings are errors", when: When::Busy, run: clippy },
     Step { name: "docs", does: "the documentation builds and its links work", when: When::Busy, run: docs },
     Step { name: "packages", does: "every crate packs, as cargo publish would", when: When::Busy, run: packages::run },
-    Step { name: "no_std", does: "the core crates build for a Cortex-M4", when: When::Busy, run: no_std },
+    Step {
+        name: "no_std",
+        does: "the core crates build for a Cortex-M4F, and what they take of it",
+        when: When::Busy,
+        run: bare_metal::step,
+    },
     Step {
         name: "python",
         does: "the Python package: its wheel builds, and its tests pass against the installed wheel",
@@ -107,9 +115,6 @@ const COMPUTING: How<'_> = How { programs: 2, threads: 2, arguments: &[] };
 /// Tests that wait.
 const WAITING: How<'_> = How { programs: 1, threads: 6, arguments: &[] };
 
-/// The target of the `no_std` step: a Cortex-M4F microcontroller, which has no operating system to lean on.
-const BARE_TARGET: &str = "thumbv7em-none-eabihf";
-
 fn fmt() -> Tally {
     if !process::works("cargo", &["fmt", "--version"]) {
         return Tally::skipped("rustfmt is not installed: rustup component add rustfmt");
@@ -155,22 +160,6 @@ fn doctests() -> Tally {
 fn docs() -> Tally {
     let words = [&["doc", "--workspace"], &EXCEPT_PYTHON[..], &["--no-deps", "--quiet"]];
     cargo(&words.concat(), &[("RUSTDOCFLAGS", "-D warnings")], "a documentation link or example is broken")
-}
-
-fn no_std() -> Tally {
-    let installed = process::output(std::process::Command::new("rustc").args([
-        "--print",
-        "target-libdir",
-        "--target",
-        BARE_TARGET,
-    ]));
-    if !installed.is_ok_and(|folder| std::path::Path::new(folder.trim()).is_dir()) {
-        return Tally::skipped(format!("the target is not installed: rustup target add {BARE_TARGET}"));
-    }
-    let mut words = vec!["check", "--quiet", "--target", BARE_TARGET];
-    let packages: Vec<String> = tidy::NO_STD.iter().map(|name| format!("ferrodrive-{name}")).collect();
-    packages.iter().for_each(|package| words.extend(["--package", package]));
-    cargo(&words, &[], "a core crate needs an operating system")
 }
 
 fn cargo(words: &[&str], environment: &[(&str, &str)], note_when_failed: &str) -> Tally {
