@@ -35,7 +35,7 @@ BASE_PERIOD = 0.01
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis to be, how it is moved, and what it may do. Angles are those of the output shaft, from the drive's own zero on.
+    """An axis to be, how it is moved, and what it may do. Angles are those behind its gear, from the drive's own zero on.
 
     >>> ferrodrive.Axis(5, "cia402", mode="csp", velocity_rpm=60).following_error_deg
     72.0
