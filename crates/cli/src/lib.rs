@@ -35,6 +35,7 @@
 //! | move drives, virtual or real | [`master::Drive`], [`master::Network`] |
 //! | let several people or programs move drives, each held by what it shows of life | [`host::Host`], [`studio::app`] |
 //! | reach a bus: socketcand, slcan, a log | [`transport::BusSpec`], [`transport::run_station`] |
+//! | read and write log files | [`canlog::LogReader`], [`canlog::LogWriter`] |
 //! | serve a virtual bus to other programs | [`transport::Hub`], [`transport::run_world`] |
 //! | know what a device is: objects, units, faults | [`devices::Description`] |
 //! | read, check and write EDS and DCF files | [`eds::Eds`] |
@@ -50,6 +51,6 @@
 
 #[doc(inline)]
 pub use {
-    can, canopen, cia402, devices, drives, eds, host, machine, master, motion, plant, plot, recording, scenario,
-    showcase, sim, studio, transport, words,
+    can, canlog, canopen, cia402, devices, drives, eds, host, machine, master, motion, plant, plot, recording,
+    scenario, showcase, sim, studio, transport, words,
 };

@@ -5,7 +5,7 @@ use can::{CanId, Frame, Instant};
 use crate::Received;
 use crate::bus::{AsyncBus, BusError};
 use crate::cannelloni::CannelloniBus;
-use crate::log::LogBus;
+use crate::log_bus::LogBus;
 use crate::reconnect::Reconnecting;
 use crate::slcan::SlcanBus;
 use crate::socketcand::SocketcandBus;

@@ -5,9 +5,9 @@ use std::io;
 use std::net::SocketAddr;
 
 use can::Instant;
+use canlog::{Finding, Place};
 use tokio::net::UdpSocket;
 
-use crate::log::{Finding, Place};
 use crate::note::Note;
 use crate::{BusError, Received, WallClock};
 

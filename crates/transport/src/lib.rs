@@ -1,11 +1,11 @@
-//! CAN over sockets, serial lines and log files, client and server side, and the loops that run stations on them.
+//! CAN over sockets and serial lines, client and server side, and the loops that run stations on them.
 //!
 //! - [`AsyncBus`] is a bus that is somewhere else; [`BusSpec`] opens one from a text such as `socketcand://HOST:PORT/can0`.
 //! - A bus gives frames and [`Note`]s: the state of its controller, errors on the wire, a connection that went away.
 //! - [`Hub`] serves a bus to other programs over socketcand and slcan.
 //! - [`ModbusServer`] serves registers over Modbus TCP or RTU.
 //! - [`run_station`] drives a passive [`can::Station`] on a bus, [`run_world`] a virtual world behind a hub.
-//! - [`socketcand`], [`slcan`], [`cannelloni`], [`udp_multicast`] and [`log`] are the wire formats, as pure codecs that any other program may use.
+//! - [`socketcand`], [`slcan`], [`cannelloni`] and [`udp_multicast`] are the wire formats, as pure codecs that any other program may use.
 //!
 //! This crate holds the only clock ([`WallClock`]) and the only sockets of the project. Everything else is sans-IO.
 //!
@@ -54,7 +54,7 @@ mod clock;
 mod datagrams;
 mod hub;
 mod link;
-pub mod log;
+mod log_bus;
 pub mod modbus;
 mod note;
 mod raw_id;
@@ -67,7 +67,6 @@ pub mod socketcand;
 mod tcp;
 #[cfg(test)]
 mod testing;
-mod text;
 pub mod udp_multicast;
 mod vitals;
 
@@ -77,7 +76,7 @@ pub use bus_spec::{BusSpec, ParseBusError, Protocol, ServeSpec};
 pub use cannelloni::CannelloniBus;
 pub use clock::{Sleep, WallClock};
 pub use hub::{ClientId, Hub, HubError, HubEvent, HubOptions, LeaveReason, Listener};
-pub use log::LogBus;
+pub use log_bus::LogBus;
 pub use modbus::{
     ModbusError, ModbusException, ModbusInquiry, ModbusMedium, ModbusRequest, ModbusServer, ModbusSession, ModbusSpec,
     RegisterAccess, RegisterAnswer,

@@ -6,7 +6,7 @@
 use std::io::Cursor;
 
 use can::Instant;
-use transport::log::{Content, Entry, Format, LogReader, LogWriter, Record};
+use canlog::{Content, Entry, Format, LogReader, LogWriter, Record};
 
 pub(super) const ASC_SAMPLES: &[&[u8]] = &[
     b"date Sat Sep 30 15:06:13.191 2017\nbase hex  timestamps absolute\ninternal events logged\n   2.501000 1  64  Rx   d 2 00 01\n",

@@ -5,7 +5,7 @@
 use std::fmt::Debug;
 
 use can::Instant;
-use transport::{log, slcan, socketcand};
+use transport::{slcan, socketcand};
 
 pub(super) const CANDUMP_SAMPLES: &[&[u8]] = &[
     b"(1700000000.123456) can0 604#4041600000000000",
@@ -29,14 +29,14 @@ pub(super) const SLCAN_SAMPLES: &[&[u8]] = &[
 /// A log line: what was read can be written and reads the same.
 pub(super) fn candump_line(data: &[u8]) {
     let Ok(line) = str::from_utf8(data) else { return };
-    let Ok(Some(record)) = log::parse_line(line) else { return };
+    let Ok(Some(record)) = canlog::parse_line(line) else { return };
     let mut written = Vec::new();
-    log::emit_line(&record, &mut written);
+    canlog::emit_line(&record, &mut written);
     let written = String::from_utf8(written).expect("a log is text");
-    let again = log::parse_line(&written).expect("what was written can be read");
+    let again = canlog::parse_line(&written).expect("what was written can be read");
     // The data of a CAN FD frame is not kept: it is written as a comment.
-    let kept = (!matches!(record.content, log::Content::FdFrame { .. })).then_some(record);
-    let said = |record: &log::Record| (record.content, record.interface, record.direction);
+    let kept = (!matches!(record.content, canlog::Content::FdFrame { .. })).then_some(record);
+    let said = |record: &canlog::Record| (record.content, record.interface, record.direction);
     assert_eq!(again.as_ref().map(said), kept.as_ref().map(said), "{line:?} written as {written:?}");
 }
 

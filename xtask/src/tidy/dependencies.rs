@@ -20,7 +20,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("drives", &["can", "canopen", "cia402", "motion", "devices"]),
     ("sim", &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives"]),
     ("master", &["can", "canopen", "cia402", "devices"]),
-    ("transport", &["can"]),
+    ("canlog", &["can"]),
+    ("transport", &["can", "canlog"]),
     ("plot", &[]),
     (
         "showcase",
@@ -77,6 +78,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "sim",
             "master",
             "transport",
+            "canlog",
             "plot",
             "showcase",
             "host",

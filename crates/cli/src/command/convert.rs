@@ -3,8 +3,8 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use canlog::{Content, Entry};
 use serde::Serialize;
-use transport::log::{Content, Entry};
 
 use crate::command::dump::{no_log, open_log, unreadable};
 use crate::failure::Failure;

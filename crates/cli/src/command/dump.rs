@@ -6,11 +6,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use can::{CanId, Frame, Instant};
+use canlog::{AnyLogReader, Content, Direction, Entry, Finding, Format as LogFormat, Place, Record};
 use canopen::NodeId;
 use master::decode::{Decoder, ServiceKind};
 use serde::Serialize;
 use sim::wire::WireEvent;
-use transport::log::{AnyLogReader, Content, Direction, Entry, Finding, Format as LogFormat, Place, Record};
 use transport::{AnyBus, AsyncBus, BusError, BusSpec, Note, Received, WallClock};
 
 use crate::failure::Failure;
@@ -295,7 +295,7 @@ impl Sink {
                 let sent = record.direction.map(|direction| direction == Direction::Transmitted);
                 self.show(at, frame, interface, sent)
             }
-            Content::Error(error) => error.notes().try_for_each(|note| self.note(at, &note)),
+            Content::Error(error) => Note::of_error(*error).try_for_each(|note| self.note(at, &note)),
             Content::FdFrame { id, length } => {
                 self.fd_frames += 1;
                 self.note(at, &Note::FdFrame { id: *id, length: *length })

@@ -6,12 +6,12 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use can::{Frame, Instant};
+use canlog::{Direction, Entry, Record};
 use canopen::NodeId;
 use canopen::connection_set::Service;
 use cia402::object::CONTROLWORD;
 use master::decode::Decoder;
 use serde::Serialize;
-use transport::log::{Direction, Entry, Record};
 use words::counted;
 use words::models::with_files;
 
@@ -145,7 +145,7 @@ pub(crate) struct ReplayReport {
 
 /// The log, frame by frame, with why each may move a drive.
 struct Frames<'a> {
-    reader: transport::log::AnyLogReader,
+    reader: canlog::AnyLogReader,
     decoder: Decoder,
     only: &'a [Which],
     path: &'a Path,

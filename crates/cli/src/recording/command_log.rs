@@ -7,7 +7,7 @@ use std::io;
 use std::time::Duration;
 
 use can::{BusFrame, Frame, Instant, Listen};
-use transport::log::{Content, Direction, Interface, Record};
+use canlog::{Content, Direction, Interface, Record};
 
 use super::background::{Background, Output, Pace, Waiting};
 use super::log_options::NewLog;

@@ -4,7 +4,7 @@ use std::io::{self, Seek, Write};
 use std::time::Duration;
 
 use can::{Frame, Instant};
-use transport::log::{LogWriter, Record};
+use canlog::{LogWriter, Record};
 
 use super::background::{Background, Output, Pace, Waiting};
 use crate::failure::Failure;
@@ -67,8 +67,8 @@ impl FrameLog {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use canlog::Format;
     use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
-    use transport::log::Format;
 
     const SOON: Duration = Duration::from_secs(600);
     const ROOM: usize = Pace::RealTime.room();

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+use canlog::{Format, Interface, LogWriter};
 use transport::BusSpec;
-use transport::log::{Format, Interface, LogWriter};
 
 use crate::failure::Failure;
 use crate::output::file_path;

@@ -7,8 +7,8 @@ use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, Read};
 use std::path::Path;
 
+use canlog::Format;
 use recording::Kind;
-use transport::log::Format;
 
 /// What a path names, without following a last symbolic link.
 ///

@@ -313,6 +313,7 @@ mod tests {
     use std::io::BufWriter;
 
     use can::{Bitrate, Instant};
+    use canlog::{Format, LogWriter};
     use canopen::NodeId;
     use devices::AxisId;
     use recording::{Column, Kind};
@@ -321,7 +322,6 @@ mod tests {
     use sim::recorder::{Channel, Recorder, Signal};
     use sim::stimulus::Place;
     use transport::RealTimeWorld;
-    use transport::log::{Format, LogWriter};
 
     use super::super::files::{create_log, create_record};
     use super::super::pacer::{Clock, Pacer, Speed};

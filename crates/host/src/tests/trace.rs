@@ -202,18 +202,18 @@ fn the_log_reads_back_frame_by_frame() {
             log
         };
         let read = |log: &str| -> Vec<_> {
-            let records = log.lines().map(|line| transport::log::parse_line(line).expect("it is read"));
+            let records = log.lines().map(|line| canlog::parse_line(line).expect("it is read"));
             records.map(|record| record.expect("no comment")).collect()
         };
         let records = read(&log(json!({})));
         assert_eq!(records.len() as u64, held.next() - held.oldest());
         let lines = stage.lines(json!({ "before": held.next(), "count": 2000 }));
         for (record, line) in records.iter().rev().zip(lines.iter().rev()) {
-            let transport::log::Content::Frame(frame) = &record.content else { panic!("{record:?}") };
+            let canlog::Content::Frame(frame) = &record.content else { panic!("{record:?}") };
             assert_eq!(frame.id().to_string(), line["id"].as_str().expect("an identifier"));
             let since = record.at.expect("a time").as_secs_f64() - 1_700_000_000.0;
             assert!((since - line["at_s"].as_f64().expect("a time")).abs() < 2e-6);
-            let sent = record.direction == Some(transport::log::Direction::Transmitted);
+            let sent = record.direction == Some(canlog::Direction::Transmitted);
             assert_eq!(sent, line["from"] == "studio");
         }
         let of_arm = read(&log(json!({ "node": "2", "kind": "sdo" })));

@@ -10,8 +10,7 @@ mod suspicion;
 use std::fmt;
 
 use can::{CanId, Frame};
-
-use crate::log::Finding;
+use canlog::Finding;
 
 pub use bus_notes::BusNotes;
 pub use error_frame::{ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds};

@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant};
+use canlog::{Finding, Place};
 
 use super::codec::{Answer, Command, Decoder, Line, Malformed, bitrate_code};
 use super::status;
 use crate::link::{Link, within};
-use crate::log::{Finding, Place};
 use crate::note::{ControllerState, Note};
 use crate::reconnect::Reopen;
 use crate::{AsyncBus, BusError, Received, WallClock};

@@ -6,8 +6,7 @@
 use std::marker::PhantomData;
 
 use can::{Bitrate, CanId, Frame, MAX_DATA_LENGTH};
-
-use crate::text::{self, push_decimal, push_hex};
+use canlog::text::{self, push_decimal, push_hex};
 
 /// Longest line without its CR, in bytes. The longest of the protocol is an extended frame with a time stamp: 30.
 pub const MAX_LINE_LENGTH: usize = 64;

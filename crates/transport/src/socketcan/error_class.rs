@@ -3,6 +3,8 @@
 //! Source: the kernel's `include/uapi/linux/can/error.h`. A driver fills in what its controller reports; one message may say
 //! several things, and a server of socketcand passes on the class alone.
 
+use canlog::RawErrorFrame;
+
 use crate::note::{ControllerState, ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds, Note};
 
 /// Bits of the class, which stands in the identifier (`CAN_ERR_*`).
@@ -45,6 +47,13 @@ mod location {
     pub(super) const CRC_DELIMITER: u8 = 0x18;
     pub(super) const ACK_SLOT: u8 = 0x19;
     pub(super) const ACK_DELIMITER: u8 = 0x1B;
+}
+
+impl Note {
+    /// What an error frame of a log says: at least one note.
+    pub fn of_error(error: RawErrorFrame) -> impl Iterator<Item = Self> {
+        notes_of(error.class, error.data)
+    }
 }
 
 /// What an error message says: `class` is its identifier without the flags, `data` the bytes behind it (zero where unknown).

@@ -4,13 +4,14 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use can::{Frame, Instant};
+use canlog::text;
 
 use super::codec::{Decoder, Message, Reply, Request};
 use crate::link::{Link, within};
 use crate::note::Suspicions;
 use crate::reconnect::Reopen;
 use crate::socketcan::notes_of;
-use crate::{AsyncBus, BusError, Note, Received, WallClock, text};
+use crate::{AsyncBus, BusError, Note, Received, WallClock};
 
 /// How long the server may take for one step of the greeting.
 const PATIENCE: Duration = Duration::from_secs(5);

@@ -6,8 +6,7 @@
 use std::marker::PhantomData;
 
 use can::{CanId, Frame, Instant, MAX_DATA_LENGTH};
-
-use crate::text::{self, push_decimal, push_hex, push_hex_id, push_seconds};
+use canlog::text::{self, push_decimal, push_hex, push_hex_id, push_seconds};
 
 /// Longest message between `<` and `>`, in bytes. The longest that raw mode needs is 60; socketcand's open-ended ones
 /// (`muxfilter`, `sendpdu`) are not served here.

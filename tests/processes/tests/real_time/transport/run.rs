@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use super::{Raw, frame, heard, hub, socketcand, socketcand_port, soon};
 use can::{CanId, Frame, Instant, Station};
+use canlog::Place;
 use tokio::sync::{Notify, mpsc};
-use transport::log::Place;
 use transport::{
     AsyncBus, BusError, BusSpec, ClientId, Heard, LeaveReason, Note, RealTimeWorld, Received, WallClock, run_station,
     run_world,

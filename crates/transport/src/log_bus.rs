@@ -4,9 +4,8 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use can::{Frame, Instant};
+use canlog::{AnyLogReader, Content, Entry};
 
-use super::reader::AnyLogReader;
-use super::record::Entry;
 use crate::{AsyncBus, BusError, Note, Received};
 
 /// A log replayed as fast as it is read, each frame with its logged time; read only.
@@ -44,11 +43,21 @@ impl AsyncBus for LogBus {
                 return Ok((self.reader.last_time(), received));
             }
             match self.reader.next_entry() {
-                Ok(Some(Entry::Record(record))) => self.more.extend(record.content.received()),
+                Ok(Some(Entry::Record(record))) => self.more.extend(received(record.content)),
                 Ok(Some(Entry::Finding(finding))) => self.more.push_back(Note::TornRecord(finding).into()),
                 Ok(None) => return Err(BusError::EndOfLog { path: self.path.clone() }),
                 Err(source) => return Err(BusError::Log { path: self.path.clone(), source }),
             }
         }
     }
+}
+
+/// What a bus would have given at that moment: mostly one thing, of an error frame all that it says.
+fn received(content: Content) -> impl Iterator<Item = Received> {
+    let (one, error) = match content {
+        Content::Frame(frame) => (Some(frame.into()), None),
+        Content::FdFrame { id, length } => (Some(Note::FdFrame { id, length }.into()), None),
+        Content::Error(error) => (None, Some(error)),
+    };
+    one.into_iter().chain(error.into_iter().flat_map(Note::of_error).map(Received::from))
 }

@@ -3,7 +3,7 @@
 
 use can::{CanId, Frame, MAX_DATA_LENGTH};
 
-use super::record::{Content, Direction, RawErrorFrame};
+use crate::record::{Content, Direction, RawErrorFrame};
 
 /// CAN frames as Linux has them, with the identifier in network byte order.
 pub(super) const CAN_SOCKETCAN: u32 = 227;

@@ -8,8 +8,8 @@ use std::io::{self, Write};
 
 use can::{CanId, Frame, Instant, MAX_DATA_LENGTH};
 
-use super::calendar::{parse_date, print_date};
-use super::record::{Content, Direction, Interface, RawErrorFrame, Record};
+use crate::calendar::{parse_date, print_date};
+use crate::record::{Content, Direction, Interface, RawErrorFrame, Record};
 use crate::text::{self, push_decimal, push_hex, push_seconds};
 
 /// Bit of the flags of a `CANFD` line that says that the frame is one of CAN FD; without it the line is a classical frame.

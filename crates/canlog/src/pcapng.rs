@@ -8,10 +8,10 @@ use std::io::{self, Read, Write};
 
 use can::Instant;
 
-use super::bytes::Source;
-use super::finding::{Finding, Place};
-use super::packet::{self, CAN_SOCKETCAN};
-use super::record::{Content, Direction, Entry, Interface, Record};
+use crate::bytes::Source;
+use crate::finding::{Finding, Place};
+use crate::packet::{self, CAN_SOCKETCAN};
+use crate::record::{Content, Direction, Entry, Interface, Record};
 
 const SECTION: u32 = 0x0A0D_0D0A;
 const INTERFACE: u32 = 1;

@@ -3,7 +3,7 @@
 use std::io::{Cursor, Seek, Write};
 
 use can::{CanId, Frame, Instant};
-use transport::log::{
+use canlog::{
     Content, Direction, Entry, Finding, Format, Interface, LogReader, LogWriter, Place, RawErrorFrame, Record,
 };
 

@@ -11,10 +11,10 @@ use std::io::{self, Read};
 use can::{CanId, Frame, Instant, MAX_DATA_LENGTH};
 use flate2::read::ZlibDecoder;
 
-use super::bytes::{Source, u16_at, u32_at, u64_at};
-use super::calendar::of_system_time;
-use super::finding::{Finding, Place};
-use super::record::{Content, Direction, Entry, Interface, RawErrorFrame, Record};
+use crate::bytes::{Source, u16_at, u32_at, u64_at};
+use crate::calendar::of_system_time;
+use crate::finding::{Finding, Place};
+use crate::record::{Content, Direction, Entry, Interface, RawErrorFrame, Record};
 
 pub(super) const FILE_SIGNATURE: [u8; 4] = *b"LOGG";
 pub(super) const OBJECT_SIGNATURE: [u8; 4] = *b"LOBJ";
@@ -34,14 +34,14 @@ pub(super) const NANOSECONDS: u32 = 2;
 
 /// Types of objects.
 pub(super) mod kind {
-    pub(in super::super) const MESSAGE: u32 = 1;
-    pub(in super::super) const ERROR: u32 = 2;
-    pub(in super::super) const CONTAINER: u32 = 10;
-    pub(in super::super) const ERROR_EXT: u32 = 73;
-    pub(in super::super) const MESSAGE2: u32 = 86;
-    pub(in super::super) const FD_MESSAGE: u32 = 100;
-    pub(in super::super) const FD_MESSAGE_64: u32 = 101;
-    pub(in super::super) const FD_ERROR_64: u32 = 104;
+    pub(crate) const MESSAGE: u32 = 1;
+    pub(crate) const ERROR: u32 = 2;
+    pub(crate) const CONTAINER: u32 = 10;
+    pub(crate) const ERROR_EXT: u32 = 73;
+    pub(crate) const MESSAGE2: u32 = 86;
+    pub(crate) const FD_MESSAGE: u32 = 100;
+    pub(crate) const FD_MESSAGE_64: u32 = 101;
+    pub(crate) const FD_ERROR_64: u32 = 104;
 }
 
 /// Objects that say nothing about frames and are in every log: overload, statistics, triggers, environment variables, texts,

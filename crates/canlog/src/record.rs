@@ -4,8 +4,7 @@ use std::fmt;
 
 use can::{CanId, Frame, Instant};
 
-use super::finding::Finding;
-use crate::{Note, Received, socketcan};
+use crate::finding::Finding;
 
 /// What stands in a log at one moment.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,23 +63,6 @@ pub struct RawErrorFrame {
 impl RawErrorFrame {
     /// What a log means that says "error frame" and no more: class `CAN_ERR_BUSERROR`.
     pub const UNSPECIFIED: Self = Self { class: 0x80, data: [0; 8] };
-
-    /// What it says.
-    pub fn notes(self) -> impl Iterator<Item = Note> {
-        socketcan::notes_of(self.class, self.data)
-    }
-}
-
-impl Content {
-    /// What a bus would have given at that moment: mostly one thing, of an error frame all that it says.
-    pub fn received(self) -> impl Iterator<Item = Received> {
-        let (one, error) = match self {
-            Self::Frame(frame) => (Some(frame.into()), None),
-            Self::FdFrame { id, length } => (Some(Note::FdFrame { id, length }.into()), None),
-            Self::Error(error) => (None, Some(error)),
-        };
-        one.into_iter().chain(error.into_iter().flat_map(RawErrorFrame::notes).map(Received::from))
-    }
 }
 
 /// Which way a frame went, seen from the program that wrote the log.

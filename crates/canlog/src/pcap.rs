@@ -6,10 +6,10 @@ use std::io::{self, Read};
 
 use can::Instant;
 
-use super::bytes::Source;
-use super::finding::{Finding, Place};
-use super::packet::{self, MAX_PACKET};
-use super::record::{Entry, Interface, Record};
+use crate::bytes::Source;
+use crate::finding::{Finding, Place};
+use crate::packet::{self, MAX_PACKET};
+use crate::record::{Entry, Interface, Record};
 
 /// The magic numbers, read in the byte order of the file.
 const MICROSECONDS: u32 = 0xA1B2_C3D4;

@@ -1,16 +1,17 @@
-//! Numbers as text, both ways, for the line protocols: no allocation on the way of a frame.
+//! Numbers as text, both ways, for logs and line protocols of CAN: no allocation on the way of a frame.
 
 use can::{CanId, Instant};
 
 /// Longest piece of foreign text that an error repeats.
 const SHOWN_LENGTH: usize = 60;
 
-pub(crate) fn hex_digit(byte: u8) -> Option<u8> {
+/// The value of a hexadecimal digit in ASCII, of either case.
+pub fn hex_digit(byte: u8) -> Option<u8> {
     (byte as char).to_digit(16).map(|digit| digit as u8)
 }
 
 /// 1 to `max_digits` (at most 8) hexadecimal digits and nothing else.
-pub(crate) fn parse_hex(word: &str, max_digits: usize) -> Option<u32> {
+pub fn parse_hex(word: &str, max_digits: usize) -> Option<u32> {
     if word.is_empty() || word.len() > max_digits {
         return None;
     }
@@ -18,7 +19,7 @@ pub(crate) fn parse_hex(word: &str, max_digits: usize) -> Option<u32> {
 }
 
 /// `23.424242`: whole seconds and up to nine decimals.
-pub(crate) fn parse_seconds(word: &str) -> Option<Instant> {
+pub fn parse_seconds(word: &str) -> Option<Instant> {
     let (whole, decimals) = word.split_once('.').unwrap_or((word, ""));
     let all_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
     if whole.is_empty() || decimals.len() > 9 || !all_digits(whole) || !all_digits(decimals) {
@@ -29,30 +30,32 @@ pub(crate) fn parse_seconds(word: &str) -> Option<Instant> {
     whole.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nanos).map(Instant::from_nanos)
 }
 
-pub(crate) fn push_hex(out: &mut Vec<u8>, value: u32, digits: u32) {
+/// The lowest `digits` (at most 8) hexadecimal digits of `value`, in capitals.
+pub fn push_hex(out: &mut Vec<u8>, value: u32, digits: u32) {
     for place in (0..digits).rev() {
         out.push(b"0123456789ABCDEF"[(value >> (4 * place)) as usize & 0xF]);
     }
 }
 
 /// 3 digits, or 8 for an extended identifier.
-pub(crate) fn push_hex_id(out: &mut Vec<u8>, id: CanId) {
+pub fn push_hex_id(out: &mut Vec<u8>, id: CanId) {
     push_hex(out, id.raw(), if id.is_extended() { 8 } else { 3 });
 }
 
-pub(crate) fn push_decimal(out: &mut Vec<u8>, value: u64) {
+/// Decimal, as many digits as it takes.
+pub fn push_decimal(out: &mut Vec<u8>, value: u64) {
     push_padded(out, value, 1);
 }
 
 /// `23.424242`: microseconds, what is below them cut off.
-pub(crate) fn push_seconds(out: &mut Vec<u8>, at: Instant) {
+pub fn push_seconds(out: &mut Vec<u8>, at: Instant) {
     push_decimal(out, at.as_nanos() / 1_000_000_000);
     out.push(b'.');
     push_padded(out, at.as_nanos() % 1_000_000_000 / 1_000, 6);
 }
 
 /// Decimal with at least `width` (at most 20) digits.
-pub(crate) fn push_padded(out: &mut Vec<u8>, mut value: u64, width: usize) {
+pub fn push_padded(out: &mut Vec<u8>, mut value: u64, width: usize) {
     let mut digits = [b'0'; 20];
     let mut used = 0;
     while value > 0 {
@@ -64,7 +67,7 @@ pub(crate) fn push_padded(out: &mut Vec<u8>, mut value: u64, width: usize) {
 }
 
 /// Foreign text as an error may repeat it: short and without control characters.
-pub(crate) fn shown(text: &str) -> String {
+pub fn shown(text: &str) -> String {
     let mut shown: String = text.trim().chars().take(SHOWN_LENGTH).flat_map(char::escape_debug).collect();
     if text.trim().chars().nth(SHOWN_LENGTH).is_some() {
         shown.push_str("..");
@@ -73,7 +76,7 @@ pub(crate) fn shown(text: &str) -> String {
 }
 
 /// [`shown`] for bytes that may be no text at all.
-pub(crate) fn shown_bytes(bytes: &[u8]) -> String {
+pub fn shown_bytes(bytes: &[u8]) -> String {
     shown(&String::from_utf8_lossy(bytes))
 }
 

@@ -6,8 +6,8 @@
 
 use can::{CanId, Frame, Instant, MAX_DATA_LENGTH};
 
-use super::calendar::of_automation_date;
-use super::record::{Content, Direction, Interface, RawErrorFrame, Record};
+use crate::calendar::of_automation_date;
+use crate::record::{Content, Direction, Interface, RawErrorFrame, Record};
 use crate::text;
 
 /// What stands in a column.

@@ -7,15 +7,15 @@ use std::path::Path;
 
 use can::Instant;
 
-use super::blf::BlfReader;
-use super::finding::{Finding, Place};
-use super::format::{ENOUGH_TO_TELL, Format};
-use super::lines::Lines;
-use super::pcap::PcapReader;
-use super::pcapng::PcapngReader;
-use super::record::Entry;
-use super::{asc, candump, trc};
+use crate::blf::BlfReader;
+use crate::finding::{Finding, Place};
+use crate::format::{ENOUGH_TO_TELL, Format};
+use crate::lines::Lines;
+use crate::pcap::PcapReader;
+use crate::pcapng::PcapngReader;
+use crate::record::{Entry, Record};
 use crate::text;
+use crate::{asc, candump, trc};
 
 /// Reads a log: records, and findings where something is passed over. After a finding reading goes on; memory is bounded
 /// whatever the file says.
@@ -134,7 +134,7 @@ impl<R: BufRead> Iterator for LogReader<R> {
 
 fn next_of_lines<R: BufRead>(
     lines: &mut Lines<R>,
-    mut parse: impl FnMut(&str) -> Result<Option<super::Record>, String>,
+    mut parse: impl FnMut(&str) -> Result<Option<Record>, String>,
 ) -> io::Result<Option<Entry>> {
     while let Some((line, text)) = lines.next()? {
         match parse(&text) {

@@ -2,11 +2,11 @@
 
 use std::io::{self, Seek, Write};
 
-use super::blf_writer::BlfWriter;
-use super::format::Format;
-use super::pcapng::PcapngWriter;
-use super::record::Record;
-use super::{asc, candump};
+use crate::blf_writer::BlfWriter;
+use crate::format::Format;
+use crate::pcapng::PcapngWriter;
+use crate::record::Record;
+use crate::{asc, candump};
 
 /// Writes a log. What was written before a [`flush`](Self::flush) can be read, whatever happens to the program behind it.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use super::lines::BYTE_ORDER_MARK;
+use crate::lines::BYTE_ORDER_MARK;
 
 /// A form of log files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -91,7 +91,7 @@ impl Format {
         self.row().begin.is_some()
     }
 
-    /// What the files of this form that [`LogWriter`](super::LogWriter) writes begin with; `None` if it writes none.
+    /// What the files of this form that [`LogWriter`](crate::LogWriter) writes begin with; `None` if it writes none.
     pub fn written_begin(self) -> Option<&'static [u8]> {
         self.row().begin
     }

@@ -7,7 +7,7 @@
 
 use can::{CanId, Frame, Instant, MAX_DATA_LENGTH, ParseFrameError};
 
-use super::record::{Content, Direction, Interface, RawErrorFrame, Record};
+use crate::record::{Content, Direction, Interface, RawErrorFrame, Record};
 use crate::text::{self, push_hex, push_hex_id, push_padded};
 
 /// SocketCAN marks error frames with bit 29 of the identifier (CAN_ERR_FLAG).
@@ -181,8 +181,9 @@ fn error_class(id: &str) -> Option<u32> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
-    use crate::testing::Random;
 
     fn directed(direction: Direction, record: Record) -> Record {
         Record { direction: Some(direction), ..record }
@@ -257,27 +258,39 @@ mod tests {
         }
     }
 
-    #[test]
-    fn reads_what_it_writes() {
-        let mut random = Random::new(0x5EED_0005);
-        for _ in 0..2_000 {
-            let direction = [None, Some(Direction::Received), Some(Direction::Transmitted)][random.below(3)];
-            let at = Instant::from_micros(random.next() >> 12);
-            let interface = Interface::named("vcan0");
-            let record = Record { direction, interface, ..Record::of_frame(at, random.frame()) };
-            let mut out = Vec::new();
-            emit_line(&record, &mut out);
-            assert_eq!(parse_line(str::from_utf8(&out).unwrap()), Ok(Some(record)));
-        }
+    fn frame() -> impl Strategy<Value = Frame> {
+        let id = prop_oneof![
+            (0..=CanId::MAX_STANDARD).prop_map(CanId::standard),
+            (0..=CanId::MAX_EXTENDED).prop_map(CanId::extended),
+        ];
+        let data = prop_oneof![
+            (0..=8_u8).prop_map(Err),
+            prop::collection::vec(any::<u8>(), 0..=MAX_DATA_LENGTH).prop_map(Ok),
+        ];
+        (id, data).prop_map(|(id, data)| match data {
+            Ok(data) => Frame::new(id, &data),
+            Err(length) => Frame::remote(id, length),
+        })
     }
 
-    #[test]
-    fn random_lines_never_panic() {
-        let words =
-            [&b"("[..], b")", b"1.5", b" ", b"can0", b"604", b"#", b"11", b"[2]", b"R", b"RX", b"-", b"20000000", b"'"];
-        let mut random = Random::new(0x5EED_0006);
-        for _ in 0..5_000 {
-            let _ = parse_line(&String::from_utf8_lossy(&random.salad(&words, 12)));
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn reads_what_it_writes(frame in frame(), us in 0..1_u64 << 52, way in 0..3_usize) {
+            let direction = [None, Some(Direction::Received), Some(Direction::Transmitted)][way];
+            let interface = Interface::named("vcan0");
+            let record = Record { direction, interface, ..Record::of_frame(Instant::from_micros(us), frame) };
+            let mut out = Vec::new();
+            emit_line(&record, &mut out);
+            prop_assert_eq!(parse_line(str::from_utf8(&out).unwrap()), Ok(Some(record)));
+        }
+
+        #[test]
+        fn no_line_causes_a_panic(
+            line in r"(\(|\)|1\.5| |can0|604|#|11|\[2\]|R|RX|-|20000000|'|.){0,12}",
+        ) {
+            let _ = parse_line(&line);
         }
     }
 }

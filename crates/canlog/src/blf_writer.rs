@@ -1,4 +1,4 @@
-//! Vector's binary logging format (BLF), written: see [`super::blf`] for what stands where.
+//! Vector's binary logging format (BLF), written: see [`crate::blf`] for what stands where.
 //!
 //! What was handed on is whole containers, and the head counts them, so that a file whose writer was killed can be read.
 
@@ -8,12 +8,12 @@ use can::{CanId, Instant};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
-use super::blf::{
+use crate::blf::{
     BASE_HEAD, BEGIN_OF_MEASUREMENT, CONTAINER_HEAD, FILE_HEAD, FILE_SIGNATURE, FLAG_REMOTE, FLAG_TRANSMITTED,
     ID_EXTENDED, NANOSECONDS, OBJECT_SIGNATURE, TIMED_HEAD, ZLIB, kind,
 };
-use super::calendar::to_system_time;
-use super::record::{Content, Direction, Record};
+use crate::calendar::to_system_time;
+use crate::record::{Content, Direction, Record};
 
 /// A container is written when it holds so much; Vector's own hold 128 KiB.
 const CONTAINER_SIZE: usize = 128 << 10;
