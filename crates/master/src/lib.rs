@@ -86,29 +86,27 @@
 //! heartbeat that this master then produces), and reports what it lacks. While its runner runs, a guarded drive is kept
 //! content, whatever the tasks wait for.
 
+mod analysis;
 pub mod base;
 pub mod boot;
 pub mod core;
 pub mod cyclic;
-pub mod decode;
 pub mod drive;
 mod error;
-pub mod explain;
 pub mod gateway;
 mod gear;
 pub mod group;
 mod host_loss;
 pub mod identify;
-pub mod latency;
 mod limits;
 mod models;
 mod network;
 pub mod parameters;
 pub mod pdo;
-pub mod plan;
 pub mod supervise;
 pub mod units;
 
+pub use analysis::{decode, explain, latency, plan};
 pub use drive::{Drive, MotionOptions};
 pub use error::{Access, Error, Hints};
 pub use gear::{Gear, GearError};

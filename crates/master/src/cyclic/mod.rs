@@ -12,6 +12,7 @@ mod rest;
 mod sequence;
 mod standstill;
 mod target;
+mod traffic;
 
 pub use demand::{Bound, CyclicState, Demand, Refusal};
 pub use drive::CyclicDrive;

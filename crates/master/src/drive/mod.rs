@@ -17,6 +17,7 @@ mod homing;
 mod limits;
 mod mode;
 mod motion;
+mod observe;
 mod position;
 mod power;
 mod safety;

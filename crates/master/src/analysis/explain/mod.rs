@@ -22,8 +22,6 @@ use canopen::{NmtState, NodeId};
 use cia402::{ModeOfOperation, PowerState};
 use std::time::Duration;
 
-use crate::drive::Drive;
-use crate::gear::Gear;
 pub use finding::{Finding, Topic, Weight};
 pub use observed::Observed;
 pub use overheard::{HeardFrames, Overheard};
@@ -60,16 +58,6 @@ type Rule = fn(&Observed, &mut Vec<Finding>);
 /// In the order of the findings. The load comes last of what concerns motion: it looks at what the others leave unexplained.
 const RULES: [Rule; 7] =
     [communication::look, terminals::look, power::look, mode::look, set_point::look, load::look, pdos::look];
-
-impl Drive {
-    /// Looks for what keeps this drive from moving and its PDOs from being exchanged. Reads some thirty objects and writes
-    /// none; `heard` is what others sent in the time before.
-    pub async fn explain(&self, heard: &Overheard) -> Explained {
-        // What the rules compare are objects, whatever stands behind the shaft.
-        let seen = Observed::of(&self.clone().behind(Gear::DIRECT), heard).await;
-        seen.explained()
-    }
-}
 
 impl Observed {
     /// What follows from this.

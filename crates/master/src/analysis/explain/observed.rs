@@ -1,7 +1,9 @@
+//! What the rules of the explanation look at: read by `drive/observe.rs`.
+
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use canopen::object::{DEVICE_TYPE, PRODUCER_HEARTBEAT_TIME};
+use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use canopen::od::Entry;
 use canopen::{CobId, Mux, NmtState, NodeId};
 use cia402::object::{
@@ -12,12 +14,12 @@ use cia402::object::{
 };
 use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
 use devices::faults::FaultRow;
-use devices::{AxisDescription, Description, HostWatch, Meaning, PowerStyle, Quantity, Scale, Terminals};
+use devices::{AxisDescription, Description, HostWatch, Meaning, PowerStyle, Terminals};
 
 use super::overheard::Overheard;
 use crate::core::Twins;
 use crate::decode::common_row;
-use crate::drive::{Drive, STANDSTILL_RPM, faults_in};
+use crate::drive::STANDSTILL_RPM;
 use crate::error::Error;
 use crate::pdo::PdoConfig;
 
@@ -41,12 +43,6 @@ const OF_AXIS: [Mux; 17] = [
     POSITIVE_TORQUE_LIMIT_VALUE,
     NEGATIVE_TORQUE_LIMIT_VALUE,
 ];
-
-/// Limits in thousandths of what is rated (CiA 402-2, torque profile).
-const CURRENT_LIMITS: [Mux; 4] = [MAX_TORQUE, MAX_CURRENT, POSITIVE_TORQUE_LIMIT_VALUE, NEGATIVE_TORQUE_LIMIT_VALUE];
-
-/// Between the two looks at the speed: a shaft that starts has moved on, one that is held has not.
-const BETWEEN_LOOKS: Duration = Duration::from_millis(100);
 
 /// Everything that the rules look at.
 #[derive(Clone, Debug)]
@@ -95,96 +91,19 @@ pub struct Observed {
     pub twins: Option<Twins>,
     /// What others sent.
     pub heard: Overheard,
-    values: BTreeMap<Mux, i64>,
+    /// What the objects have.
+    pub(crate) values: BTreeMap<Mux, i64>,
 }
 
 impl Observed {
     /// How often it sends a heartbeat by its own word, if it does.
-    pub(super) fn heartbeat_period(&self) -> Option<Duration> {
+    pub(crate) fn heartbeat_period(&self) -> Option<Duration> {
         let ms = u64::try_from(self.value(PRODUCER_HEARTBEAT_TIME)?).ok().filter(|ms| *ms > 0)?;
         Some(Duration::from_millis(ms))
     }
 
-    /// Reads what the rules need. A refused object is left out; silence ends the reading and is reported.
-    pub async fn of(drive: &Drive, heard: &Overheard) -> Self {
-        let (facts, now) = (drive.node().facts(), drive.node().network().now());
-        let mut seen = Self {
-            node: drive.node().id(),
-            description: drive.description(),
-            axis: drive.axis_description(),
-            silence: None,
-            nmt: facts.probable_state(drive.description()),
-            statusword: None,
-            power: None,
-            style: drive.power_style(),
-            mode: None,
-            fault: None,
-            speed_rpm: None,
-            target_rpm: None,
-            speed_change_rpm: None,
-            speed_limit_rpm: None,
-            current_a: None,
-            current_limit_a: None,
-            supply_v: None,
-            rates_of_zero: Vec::new(),
-            pdos: Vec::new(),
-            talked_to: facts.talked_to_at.map(|at| now - at),
-            twins: facts.twins,
-            heard: heard.clone(),
-            values: BTreeMap::new(),
-        };
-        seen.silence = seen.read(drive).await.err();
-        if let Some(period) = seen.heartbeat_period() {
-            drive.node().look_for_twins(period).await;
-            seen.twins = drive.node().facts().twins;
-        }
-        seen
-    }
-
-    async fn read(&mut self, drive: &Drive) -> Result<(), Error> {
-        let units = self.axis.map(|axis| &axis.units);
-        // Every node answers this one: the first request shows whether one is there.
-        answered(drive.node().upload(DEVICE_TYPE).await)?;
-        if let Some(statusword) = answered(drive.statusword().await)? {
-            (self.statusword, self.power) = (Some(statusword), drive.power_state(statusword));
-        }
-        let speed = units.and_then(|units| units.actual_velocity);
-        let first = measure(drive, speed).await?;
-        for mux in self.wanted() {
-            self.read_value(drive, mux).await?;
-        }
-        self.mode = self.axis_value(self.mode_object()).and_then(|raw| i8::try_from(raw).ok()).map(ModeOfOperation);
-        let code = answered(drive.node().upload(drive.fault_code()).await)?.map(|payload| payload.raw() as u16);
-        self.fault = code.map(|code| (code, self.description.map(|model| faults_in(model, code)).unwrap_or_default()));
-        self.target_rpm = measure(drive, units.and_then(|units| units.target_velocity)).await?;
-        self.current_a = measure(drive, units.and_then(|units| units.actual_current)).await?;
-        self.supply_v = measure(drive, units.and_then(|units| units.bus_voltage)).await?;
-        self.speed_limit_rpm = self.held_to(drive, units.and_then(|units| units.target_velocity), &[]).await?;
-        let current = units.and_then(|units| units.target_current);
-        self.current_limit_a = self.held_to(drive, current, &CURRENT_LIMITS).await?;
-        self.rates_of_zero = drive.rates_of_zero().await;
-        self.pdos = drive.pdos().await?;
-        drive.node().network().sleep(BETWEEN_LOOKS).await;
-        let second = measure(drive, speed).await?;
-        self.speed_change_rpm = first.zip(second).map(|(first, second)| second - first);
-        self.speed_rpm = first.into_iter().chain(second).max_by(|a, b| a.abs().total_cmp(&b.abs()));
-        Ok(())
-    }
-
-    /// The least of what holds a target: the object that its row names, and of a share of something rated those that are shares of
-    /// the same.
-    async fn held_to(&self, drive: &Drive, target: Option<Quantity>, shares: &[Mux]) -> Result<Option<f64>, Error> {
-        let Some(target) = target else { return Ok(None) };
-        let named = self.row(target.object).and_then(|row| row.held_to);
-        let named = named.and_then(|held| Some(self.value(held.object)? * held.counts));
-        let is_share = matches!(target.scale, Scale::Rated { .. });
-        let shares = shares.iter().filter(|_| is_share).filter_map(|mux| self.axis_value(*mux));
-        let Some(least) = named.into_iter().chain(shares).min() else { return Ok(None) };
-        Ok(answered(drive.step_of(target).await)?.map(|step| least as f64 * step))
-    }
-
     /// The objects to read, those that the model's units and limits name among them.
-    fn wanted(&self) -> Vec<Mux> {
+    pub(crate) fn wanted(&self) -> Vec<Mux> {
         let mut wanted: Vec<Mux> = OF_AXIS.iter().map(|mux| self.place(*mux)).collect();
         wanted.extend([PRODUCER_HEARTBEAT_TIME, self.mode_object()]);
         if let Some(units) = self.axis.map(|axis| &axis.units) {
@@ -217,18 +136,8 @@ impl Observed {
         levels.into_iter().chain(polarity).chain(functions).chain(brake).map(|mux| self.place(mux)).collect()
     }
 
-    async fn read_value(&mut self, drive: &Drive, mux: Mux) -> Result<(), Error> {
-        let Some(row) = self.row(mux) else { return Ok(()) };
-        if let Some(payload) = answered(drive.node().upload(mux).await)?
-            && payload.as_bytes().len() == row.data_type.size()
-        {
-            self.values.insert(mux, row.data_type.value(payload.raw()));
-        }
-        Ok(())
-    }
-
     /// The model's row of an object, or the one on which all models agree.
-    pub(super) fn row(&self, mux: Mux) -> Option<&'static Entry> {
+    pub(crate) fn row(&self, mux: Mux) -> Option<&'static Entry> {
         self.description.map_or_else(|| common_row(mux), |description| description.row(mux))
     }
 
@@ -238,17 +147,17 @@ impl Observed {
     }
 
     /// Where the mode is shown.
-    pub(super) fn mode_object(&self) -> Mux {
+    pub(crate) fn mode_object(&self) -> Mux {
         self.axis.map_or(MODES_OF_OPERATION_DISPLAY, |axis| axis.mode_display)
     }
 
     /// What an object has, where it is the drive's.
-    pub(super) fn value(&self, mux: Mux) -> Option<i64> {
+    pub(crate) fn value(&self, mux: Mux) -> Option<i64> {
         self.values.get(&mux).copied()
     }
 
     /// What an object of the standard has, of this axis.
-    pub(super) fn axis_value(&self, mux: Mux) -> Option<i64> {
+    pub(crate) fn axis_value(&self, mux: Mux) -> Option<i64> {
         self.value(self.place(mux))
     }
 
@@ -276,21 +185,5 @@ impl Observed {
     /// `60FFh:00 target_velocity`.
     pub(super) fn named(&self, mux: Mux) -> String {
         self.row(mux).map_or_else(|| mux.to_string(), |row| format!("{mux} {}", row.name))
-    }
-}
-
-async fn measure(drive: &Drive, quantity: Option<Quantity>) -> Result<Option<f64>, Error> {
-    match quantity {
-        Some(quantity) => answered(drive.read_quantity(quantity).await),
-        None => Ok(None),
-    }
-}
-
-/// What is refused, or comes in another form, says nothing; silence is handed on.
-fn answered<T>(result: Result<T, Error>) -> Result<Option<T>, Error> {
-    match result {
-        Ok(value) => Ok(Some(value)),
-        Err(error @ Error::NoAnswer { .. }) => Err(error),
-        Err(_) => Ok(None),
     }
 }

@@ -8,11 +8,11 @@ use canopen::pdo::{Direction, EventTrigger};
 use cia402::ModeOfOperation;
 use devices::Timing;
 
-use super::traffic::NodeTraffic;
-use crate::cyclic::CyclicError;
+use super::open::CyclicError;
 use crate::drive::Drive;
 use crate::error::Error;
 use crate::pdo::{PdoConfig, SignalError};
+use crate::plan::NodeTraffic;
 
 impl NodeTraffic {
     /// Reads the heartbeat and the PDOs of a node; writes nothing. How fast it answers is what its model says.

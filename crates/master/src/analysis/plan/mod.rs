@@ -27,7 +27,6 @@
 
 mod in_step;
 mod queued;
-mod read;
 mod response_time;
 mod traffic;
 
