@@ -17,7 +17,7 @@ use crate::workspace::{self, Package};
 const BESIDE: [&str; 2] = ["ferrodrive-tests", "ferrodrive-examples"];
 
 /// The packages in which some files are one drive's alone, by their folders.
-const DRIVES_IN: [&str; 3] = ["crates/devices/", "crates/drives/", "crates/sim/src/machine/"];
+const DRIVES_IN: [&str; 3] = ["crates/devices/", "crates/drives/", "crates/sim/src/machine/models/"];
 
 /// A drive: its name in tests, and the words in the paths of its files.
 const DRIVES: [(&str, &[&str]); 4] =
@@ -145,7 +145,7 @@ mod tests {
         let left_out = |files: &[&str]| other_drives(&files.iter().map(|file| (*file).to_owned()).collect::<Vec<_>>());
         let wheel = "crates/drives/src/zlac8030l/mod.rs";
         assert_eq!(left_out(&[wheel, "docs/drives/zlac8030l.md"]), ["zlim42c", "mjoint", "cia402"]);
-        assert_eq!(left_out(&["crates/sim/src/machine/servo.rs"]), ["zlac8030l", "zlim42c", "mjoint"]);
+        assert_eq!(left_out(&["crates/sim/src/machine/models/servo.rs"]), ["zlac8030l", "zlim42c", "mjoint"]);
         assert_eq!(left_out(&["crates/devices/src/mjoint/rows.rs", wheel]), [""; 0]);
         for shared in ["crates/drives/src/engine/axis/mod.rs", "crates/drives/Cargo.toml", "tests/src/zlac8030l.rs"] {
             assert_eq!(left_out(&[wheel, shared]), [""; 0], "{shared}");

@@ -29,12 +29,12 @@ impl std::str::FromStr for Realism {
 }
 
 /// Converter of 12 bits over 100 V, what such drives have: 24 mV a step.
-pub(super) const VOLTAGE_STEP_V: f32 = 100.0 / 4096.0;
+pub(crate) const VOLTAGE_STEP_V: f32 = 100.0 / 4096.0;
 /// The same over -60 to 60 A and over -10 to 10 A.
-pub(super) const LARGE_CURRENT_STEP_A: f32 = 120.0 / 4096.0;
-pub(super) const SMALL_CURRENT_STEP_A: f32 = 20.0 / 4096.0;
+pub(crate) const LARGE_CURRENT_STEP_A: f32 = 120.0 / 4096.0;
+pub(crate) const SMALL_CURRENT_STEP_A: f32 = 20.0 / 4096.0;
 /// Assumed: a thermistor behind the same converter.
-pub(super) const TEMPERATURE_STEP_C: f32 = 0.1;
+pub(crate) const TEMPERATURE_STEP_C: f32 = 0.1;
 
 /// Guess: an edge of an encoder's disc is up to this share of a count off its place. Its electronics have hysteresis: an
 /// edge does not chatter.
@@ -46,9 +46,9 @@ const DEAD_TIME_SHARE: f64 = 1e-6 * 16e3;
 const DEAD_TIME_FULL_FROM_A: f64 = 0.5;
 
 /// Guess: 30 magnets over 27 teeth, a combination that cogs little: a third of a hundredth of the wheel motor's 6 N·m.
-pub(super) const HUB_COGGING: Cogging = Cogging { amplitude_nm: 0.02, per_turn: 270 };
+pub(crate) const HUB_COGGING: Cogging = Cogging { amplitude_nm: 0.02, per_turn: 270 };
 /// Guess: the same share of the joint motors' 1 N·m; 20 magnets over 24 teeth.
-pub(super) const JOINT_COGGING: Cogging = Cogging { amplitude_nm: 0.003, per_turn: 120 };
+pub(crate) const JOINT_COGGING: Cogging = Cogging { amplitude_nm: 0.003, per_turn: 120 };
 
 /// The noise of one machine.
 #[derive(Clone, Debug)]
@@ -59,18 +59,18 @@ pub struct Noise {
 }
 
 impl Noise {
-    pub(super) fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         let mut prng = Prng::new(seed);
         Self { disc: prng.next_u64(), prng }
     }
 
     /// What a converter with steps of `step` makes of `value`, off by up to one step more.
-    pub(super) fn flicker(&mut self, value: f32, step: f32) -> f32 {
+    pub(crate) fn flicker(&mut self, value: f32, step: f32) -> f32 {
         (value / step + self.share()).round() * step
     }
 
     /// A count too many or too few, where an edge of `counts_per_turn` is near that stands off its place.
-    pub(super) fn misplaced_edge(&self, angle: Angle, counts_per_turn: u32) -> i16 {
+    pub(crate) fn misplaced_edge(&self, angle: Angle, counts_per_turn: u32) -> i16 {
         let counts = angle.fraction() * f64::from(counts_per_turn);
         let nearest = (counts + 0.5).floor();
         let past = counts - nearest;
@@ -86,7 +86,7 @@ impl Noise {
 }
 
 /// Duty cycles as they arrive at the motor: the pause takes voltage from where current flows out of the bridge.
-pub(super) fn with_dead_time<const N: usize>(duty: [f64; N], current_a: [f64; N]) -> [f64; N] {
+pub(crate) fn with_dead_time<const N: usize>(duty: [f64; N], current_a: [f64; N]) -> [f64; N] {
     std::array::from_fn(|n| duty[n] - DEAD_TIME_SHARE * (current_a[n] / DEAD_TIME_FULL_FROM_A).clamp(-1.0, 1.0))
 }
 

@@ -2,7 +2,7 @@
 
 use drives::mjoint::pulses::PulseInput;
 
-use super::quantity::Quantity;
+use crate::machine::kernel::quantity::Quantity;
 use crate::{PulseTrain, Refused};
 
 /// Highest input frequency ("Maximum input pulse frequency 500 KHz").

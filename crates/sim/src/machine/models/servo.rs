@@ -26,15 +26,15 @@ use plant::rig::{Rig, RigModel};
 use plant::shaft::Motion;
 use plant::supply::SupplyData;
 
-use super::Machine;
-use super::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
 use super::boxed::Boxed;
 use super::order::{Order, OrderError};
-use super::quantity::Quantity;
-use super::realism::{
+use super::{kept, order};
+use crate::machine::kernel::Machine;
+use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
+use crate::machine::kernel::quantity::Quantity;
+use crate::machine::kernel::realism::{
     HUB_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
 };
-use super::{kept, order};
 use crate::{Brake, Component, Levels, Refused, Report, VirtualDrive};
 
 const WITH_BRAKE: Pick = Pick::of(VARIATIONS, "motor", "sgmah-04a-brake");

@@ -29,10 +29,10 @@ use plant::rig::{Rig, RigModel};
 use plant::shaft::Motion;
 use plant::supply::SupplyData;
 
-use super::Machine;
-use super::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
 use super::order::{Order, OrderError, baud_rate};
-use super::realism::{
+use crate::machine::kernel::Machine;
+use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
+use crate::machine::kernel::realism::{
     HUB_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
 };
 use crate::{Brake, Component, Levels, Refused, Report, VirtualDrive};

@@ -42,11 +42,11 @@ const MAILBOXES: usize = 16;
 
 /// Frames on their way to a firmware, and its memory chip.
 #[derive(Clone, Debug)]
-pub(super) struct OwnTime {
+pub(crate) struct OwnTime {
     timing: Timing,
     prng: Prng,
     waiting: VecDeque<Waiting>,
-    pub(super) chip: Chip,
+    pub(crate) chip: Chip,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -68,18 +68,18 @@ enum Kind {
 
 impl OwnTime {
     /// Nothing waits; the chip holds `image`.
-    pub(super) fn new(timing: Timing, seed: u64, image: &[u8], generation: u64) -> Self {
+    pub(crate) fn new(timing: Timing, seed: u64, image: &[u8], generation: u64) -> Self {
         Self { timing, prng: Prng::new(seed), waiting: VecDeque::new(), chip: Chip::new(image, generation) }
     }
 
     /// How long this boot takes.
-    pub(super) fn boot_ns(&mut self) -> u64 {
+    pub(crate) fn boot_ns(&mut self) -> u64 {
         let boot = self.timing.boot;
         self.draw(&boot)
     }
 
     /// How long the next resets take.
-    pub(super) fn reset_times(&mut self) -> ResetTimes {
+    pub(crate) fn reset_times(&mut self) -> ResetTimes {
         let Timing { reset_node, reset_communication, .. } = self.timing;
         ResetTimes { node_ns: self.draw(&reset_node), communication_ns: self.draw(&reset_communication) }
     }
@@ -91,7 +91,7 @@ impl OwnTime {
     }
 
     /// A frame has come; the firmware gets it now, or it waits.
-    pub(super) fn take_in(&mut self, frame: &Frame, now: Instant) -> Option<Frame> {
+    pub(crate) fn take_in(&mut self, frame: &Frame, now: Instant) -> Option<Frame> {
         let kind = kind(frame);
         let span = match kind {
             Kind::Management => return Some(*frame),
@@ -110,7 +110,7 @@ impl OwnTime {
     }
 
     /// The frame that the firmware gets at `now` or should have had before.
-    pub(super) fn take_out(&mut self, now: Instant) -> Option<Frame> {
+    pub(crate) fn take_out(&mut self, now: Instant) -> Option<Frame> {
         let next = self.next()?;
         if next.1 > now {
             return None;
@@ -119,13 +119,13 @@ impl OwnTime {
     }
 
     /// When a frame or the chip is due.
-    pub(super) fn next_due(&self) -> Option<Instant> {
+    pub(crate) fn next_due(&self) -> Option<Instant> {
         let frame = self.next().map(|(_, due)| due);
         frame.into_iter().chain(self.chip.next_due()).min()
     }
 
     /// The firmware has stored: the chip takes its time for it.
-    pub(super) fn store(&mut self, image: &[u8], generation: u64, now: Instant) {
+    pub(crate) fn store(&mut self, image: &[u8], generation: u64, now: Instant) {
         if self.chip.is_new(generation) {
             let takes_ns = self.store_ns();
             self.chip.write(image, generation, takes_ns, now);
@@ -133,7 +133,7 @@ impl OwnTime {
     }
 
     /// The supply is gone, and with it what waited.
-    pub(super) fn power_off(&mut self) {
+    pub(crate) fn power_off(&mut self) {
         self.waiting.clear();
     }
 

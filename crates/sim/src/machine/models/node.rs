@@ -6,11 +6,11 @@ use canopen::od::{DataType, Entry, Kind, Value};
 use devices::{AxisId, Description};
 use drives::node::{DescribedNode, Memory, conditions};
 
-use super::NMT;
 use super::boxed::Boxed;
 use super::kept;
 use super::order::{self, Order, OrderError};
-use super::timing::{OwnTime, TimingMode};
+use crate::machine::kernel::NMT;
+use crate::machine::kernel::timing::{OwnTime, TimingMode};
 use crate::stimulus::{ObjectValue, Power, Stimulus};
 use crate::{PowerPhase, Refused, Report, Source, VirtualDrive};
 

@@ -27,11 +27,11 @@ use plant::shaft::Motion;
 use plant::supply::SupplyData;
 use plant::{Angle, FreeRun, Inverter, JointMotor, JointMotorModel, Rig, joint_motor};
 
-use super::Machine;
-use super::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
 use super::order::{Order, OrderError};
 use super::pulse_source::PulseSource;
-use super::realism::{
+use crate::machine::kernel::Machine;
+use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
+use crate::machine::kernel::realism::{
     JOINT_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
 };
 use crate::{Component, Levels, OutputShaft, PulseTrain, Refused, Report, VirtualDrive};

@@ -12,7 +12,7 @@ const MAX_HELD: usize = 8;
 
 /// See the [module](self).
 #[derive(Clone, Debug)]
-pub(super) struct Chip {
+pub(crate) struct Chip {
     contents: Vec<u8>,
     /// Which store the contents are.
     generation: u64,
@@ -31,33 +31,33 @@ struct Store {
 }
 
 impl Chip {
-    pub(super) fn new(image: &[u8], generation: u64) -> Self {
+    pub(crate) fn new(image: &[u8], generation: u64) -> Self {
         Self { contents: image.to_vec(), generation, writing: None, next: None, held: VecDeque::new() }
     }
 
     /// What is in it, whatever happens next.
-    pub(super) fn contents(&self) -> &[u8] {
+    pub(crate) fn contents(&self) -> &[u8] {
         &self.contents
     }
 
     /// Which store that is.
-    pub(super) const fn generation(&self) -> u64 {
+    pub(crate) const fn generation(&self) -> u64 {
         self.generation
     }
 
-    pub(super) const fn is_writing(&self) -> bool {
+    pub(crate) const fn is_writing(&self) -> bool {
         self.writing.is_some()
     }
 
     /// No store of this number is in it, nor on its way.
-    pub(super) fn is_new(&self, generation: u64) -> bool {
+    pub(crate) fn is_new(&self, generation: u64) -> bool {
         let last = self.next.as_ref().map(|(store, _)| store).or(self.writing.as_ref().map(|(store, _)| store));
         generation != last.map_or(self.generation, |store| store.generation)
     }
 
     /// A store that takes `takes_ns`, once the chip is free. What waits for that already is overwritten: its values are in
     /// the newer one too.
-    pub(super) fn write(&mut self, image: &[u8], generation: u64, takes_ns: u64, now: Instant) {
+    pub(crate) fn write(&mut self, image: &[u8], generation: u64, takes_ns: u64, now: Instant) {
         let store = Store { image: image.to_vec(), generation };
         if self.writing.is_some() {
             self.next = Some((store, takes_ns));
@@ -67,12 +67,12 @@ impl Chip {
     }
 
     /// When the present store is in.
-    pub(super) fn next_due(&self) -> Option<Instant> {
+    pub(crate) fn next_due(&self) -> Option<Instant> {
         self.writing.as_ref().map(|(_, due)| *due)
     }
 
     /// Time has reached `now`.
-    pub(super) fn advance(&mut self, now: Instant) {
+    pub(crate) fn advance(&mut self, now: Instant) {
         while let Some((store, due)) = self.writing.take_if(|(_, due)| *due <= now) {
             self.contents = store.image;
             self.generation = store.generation;
@@ -82,7 +82,7 @@ impl Chip {
 
     /// The supply is gone: a store that was under way has not been. `image` is what the firmware has written with the last
     /// of its voltage, if it has.
-    pub(super) fn power_off(&mut self, image: Option<&[u8]>, generation: u64) {
+    pub(crate) fn power_off(&mut self, image: Option<&[u8]>, generation: u64) {
         if let Some(image) = image {
             self.contents = image.to_vec();
         }
@@ -90,18 +90,18 @@ impl Chip {
     }
 
     /// The firmware resets its communication: what it had answered before is never sent.
-    pub(super) fn forget_answers(&mut self) {
+    pub(crate) fn forget_answers(&mut self) {
         self.held.clear();
     }
 
     /// Other contents, put in without power.
-    pub(super) fn replace(&mut self, image: &[u8]) {
+    pub(crate) fn replace(&mut self, image: &[u8]) {
         self.contents = image.to_vec();
     }
 
     /// The next frame that may go out. An SDO answer waits until the store is in that it stands for: `needed` is the one that
     /// an answer given now does, and the last that there will be.
-    pub(super) fn next_frame(&mut self, needed: u64, mut poll: impl FnMut() -> Option<Frame>) -> Option<Frame> {
+    pub(crate) fn next_frame(&mut self, needed: u64, mut poll: impl FnMut() -> Option<Frame>) -> Option<Frame> {
         if self.held.front().is_some_and(|(_, needs)| (*needs).min(needed) <= self.generation) {
             return self.held.pop_front().map(|(frame, _)| frame);
         }

@@ -137,7 +137,7 @@ mod tests {
 
     use super::*;
     use crate::VirtualDrive;
-    use crate::machine::{Order, mjoint, servo, zlac8030l, zlim42c};
+    use crate::machine::{Order, ServoMachine, mjoint, servo, zlac8030l, zlim42c};
 
     /// When a machine that is switched on, and that is not used, is first found at rest within `limit_s`.
     fn rests_after<A: Assembly>(mut machine: Machine<A>, limit_s: u64) -> Option<f64> {
@@ -153,9 +153,9 @@ mod tests {
         machine.rest.is_resting().then_some(now.as_nanos() as f64 * 1e-9)
     }
 
-    fn cia402() -> servo::ServoMachine {
+    fn cia402() -> ServoMachine {
         let order = Order::new(&CIA402, NodeId::MIN, Bitrate::M1);
-        servo::servo(&CIA402, &order).expect("the standard's own servo")
+        servo(&CIA402, &order).expect("the standard's own servo")
     }
 
     #[test]

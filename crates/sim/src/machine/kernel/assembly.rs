@@ -17,7 +17,7 @@ use super::realism::{Noise, Realism};
 use crate::{Component, PulseTrain, Refused, Report, Source, TemperatureSensor};
 
 /// Temperature of the surroundings.
-pub(super) const AMBIENT_C: f64 = 25.0;
+pub(crate) const AMBIENT_C: f64 = 25.0;
 
 /// From what a bench supply can be turned down to, to what a traction battery gives into a short circuit.
 const SUPPLY_LIMIT: Quantity =
@@ -261,7 +261,7 @@ pub trait Assembly: Clone + Send + 'static {
 }
 
 /// `report` with the set-points of the control loops; `rpm` turns the velocity of a set-point into r/min.
-pub(super) fn with_demand(demand: &Demand, rpm: impl Fn(f64) -> f64, report: Report) -> Report {
+pub(crate) fn with_demand(demand: &Demand, rpm: impl Fn(f64) -> f64, report: Report) -> Report {
     match *demand {
         Demand::Off => report,
         Demand::Position(point) => Report {

@@ -29,11 +29,11 @@ use plant::stepper::{Bridges, Phase};
 use plant::stepper_motor::{StepperMotor, StepperMotorModel};
 use plant::supply::SupplyData;
 
-use super::Machine;
-use super::assembly::{AMBIENT_C, Assembly, ShaftFacts};
 use super::order::{Order, OrderError, baud_rate};
-use super::quantity::Quantity;
-use super::realism::{Noise, Realism, SMALL_CURRENT_STEP_A, VOLTAGE_STEP_V, with_dead_time};
+use crate::machine::kernel::Machine;
+use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, ShaftFacts};
+use crate::machine::kernel::quantity::Quantity;
+use crate::machine::kernel::realism::{Noise, Realism, SMALL_CURRENT_STEP_A, VOLTAGE_STEP_V, with_dead_time};
 use crate::{Component, Levels, Refused, Report, TemperatureSensor, VirtualDrive};
 
 const OUTPUTS: &[&str] = &["Y0", "Y1", "RED", "GREEN"];
