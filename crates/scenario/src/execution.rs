@@ -5,12 +5,11 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::pin::Pin;
 use std::rc::Rc;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::task::{Context, Poll, Wake, Waker};
+use std::task::Waker;
 
 use can::Instant;
 use master::Network;
+use sim::task::Task;
 use sim::wire::WireEvent;
 use sim::{StationId, World};
 
@@ -36,27 +35,13 @@ pub struct Execution {
     scenario: Scenario,
     seed: u64,
     host: StationId,
-    tasks: Vec<Task>,
+    /// The hosts at work; `None` for one that is through.
+    tasks: Vec<Option<Task<Pin<Box<dyn Future<Output = ()>>>>>>,
     shared: Rc<RefCell<Shared>>,
     script: Script,
     next_sample: Instant,
     frames: VecDeque<(Instant, can::Frame)>,
     finished: bool,
-}
-
-/// One host at work.
-struct Task {
-    future: Option<Pin<Box<dyn Future<Output = ()>>>>,
-    woken: Arc<Woken>,
-}
-
-/// Remembers that the waker was called.
-struct Woken(AtomicBool);
-
-impl Wake for Woken {
-    fn wake(self: Arc<Self>) {
-        self.0.store(true, Ordering::Release);
-    }
 }
 
 impl Execution {
@@ -81,8 +66,8 @@ impl Execution {
         let tasks = scenario.hosts.iter().enumerate().map(|(number, it)| {
             let (machine, shared) = (Rc::clone(&machine), Rc::clone(&shared));
             let task = HostTask { number, name: it.name.clone(), network: network.clone(), machine, shared };
-            let future = run(task, it.start, it.lines.clone());
-            Task { future: Some(Box::pin(future)), woken: Arc::new(Woken(AtomicBool::new(true))) }
+            let future: Pin<Box<dyn Future<Output = ()>>> = Box::pin(run(task, it.start, it.lines.clone()));
+            Some(Task::new(future))
         });
         let tasks = tasks.collect();
         world.refresh();
@@ -219,7 +204,7 @@ impl Execution {
     }
 
     fn is_through(&self) -> bool {
-        let hosts = self.script.host_died || self.tasks.iter().all(|task| task.future.is_none());
+        let hosts = self.script.host_died || self.tasks.iter().all(Option::is_none);
         self.scenario.end.is_none() && hosts && self.script.is_through(&self.scenario)
     }
 
@@ -231,15 +216,12 @@ impl Execution {
         }
         let mut polled = true;
         while std::mem::take(&mut polled) {
-            for task in &mut self.tasks {
-                let Some(future) = &mut task.future else { continue };
-                if task.woken.0.swap(false, Ordering::AcqRel) {
-                    let waker = Waker::from(Arc::clone(&task.woken));
-                    if let Poll::Ready(()) = future.as_mut().poll(&mut Context::from_waker(&waker)) {
-                        task.future = None;
-                    }
-                    polled = true;
+            for host in &mut self.tasks {
+                let Some(outcome) = host.as_mut().and_then(Task::poll_if_woken) else { continue };
+                if outcome.is_ready() {
+                    *host = None;
                 }
+                polled = true;
             }
             if polled {
                 world.refresh();

@@ -4,13 +4,12 @@
 
 use core::time::Duration;
 use std::pin::pin;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::task::{Context, Poll, Wake, Waker};
+use std::task::Poll;
 
 use can::Instant;
 
 use crate::World;
+use crate::task::Task;
 
 /// Why a future did not finish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -51,19 +50,16 @@ pub fn block_on_for<F: Future>(world: &mut World, limit: Duration, future: F) ->
 }
 
 fn block_on_until<F: Future>(world: &mut World, end: Instant, future: F) -> Result<F::Output, BlockOnError> {
-    let mut future = pin!(future);
-    let woken = Arc::new(Woken(AtomicBool::new(true)));
-    let waker = Waker::from(Arc::clone(&woken));
-    let mut context = Context::from_waker(&waker);
+    let future = pin!(future);
+    let mut task = Task::new(future);
     world.refresh();
     loop {
-        if woken.0.swap(false, Ordering::AcqRel) {
-            if let Poll::Ready(output) = future.as_mut().poll(&mut context) {
-                world.refresh();
-                return Ok(output);
-            }
+        if let Some(polled) = task.poll_if_woken() {
             world.refresh();
-            continue;
+            match polled {
+                Poll::Ready(output) => return Ok(output),
+                Poll::Pending => continue,
+            }
         }
         match world.next_event() {
             Some(at) if at <= end => world.step(),
@@ -73,18 +69,5 @@ fn block_on_until<F: Future>(world: &mut World, end: Instant, future: F) -> Resu
             }
             None => return Err(BlockOnError::Stalled { at: world.now() }),
         };
-    }
-}
-
-/// Remembers that the waker was called.
-struct Woken(AtomicBool);
-
-impl Wake for Woken {
-    fn wake(self: Arc<Self>) {
-        self.0.store(true, Ordering::Release);
-    }
-
-    fn wake_by_ref(self: &Arc<Self>) {
-        self.0.store(true, Ordering::Release);
     }
 }

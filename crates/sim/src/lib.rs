@@ -48,6 +48,7 @@ mod prng;
 pub mod recorder;
 mod refused;
 pub mod stimulus;
+pub mod task;
 pub mod wire;
 mod world;
 

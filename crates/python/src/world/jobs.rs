@@ -1,11 +1,9 @@
 //! What the master does in a world: futures that are polled while the world moves.
 
 use std::pin::Pin;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::task::{Context, Wake, Waker};
 
 use pyo3::PyResult;
+use sim::task::Task;
 
 use crate::failure::wrong_use;
 
@@ -25,8 +23,7 @@ struct Running {
     number: u64,
     /// Whose it is.
     owner: usize,
-    job: Job,
-    woken: Arc<Woken>,
+    task: Task<Job>,
 }
 
 impl Jobs {
@@ -38,7 +35,7 @@ impl Jobs {
     /// Begins a job of this owner; returns its number.
     pub(crate) fn begin(&mut self, owner: usize, job: Job) -> u64 {
         self.begun += 1;
-        self.running.push(Running { number: self.begun, owner, job, woken: Arc::new(Woken(AtomicBool::new(true))) });
+        self.running.push(Running { number: self.begun, owner, task: Task::new(job) });
         self.begun
     }
 
@@ -54,12 +51,12 @@ impl Jobs {
 
     /// Polls every job that was woken, until none is; returns the first that has ended.
     pub(super) fn poll(&mut self, world: &mut sim::World) -> Option<u64> {
-        while let Some(at) = self.running.iter().position(|running| running.woken.0.swap(false, Ordering::AcqRel)) {
-            let running = &mut self.running[at];
-            let waker = Waker::from(Arc::clone(&running.woken));
-            let ended = running.job.as_mut().poll(&mut Context::from_waker(&waker)).is_ready();
+        while let Some((at, polled)) = self.running.iter_mut().enumerate().find_map(|(at, running)| {
+            let polled = running.task.poll_if_woken()?;
+            Some((at, polled))
+        }) {
             world.refresh();
-            if ended {
+            if polled.is_ready() {
                 return Some(self.running.remove(at).number);
             }
         }
@@ -75,14 +72,5 @@ impl Jobs {
             "a world with a master in it cannot be copied or restored: the master would be in both; \
              take the snapshot before Network(world)",
         ))
-    }
-}
-
-/// Remembers that the waker was called.
-struct Woken(AtomicBool);
-
-impl Wake for Woken {
-    fn wake(self: Arc<Self>) {
-        self.0.store(true, Ordering::Release);
     }
 }
