@@ -416,7 +416,7 @@ impl Base {
         // One that is not heard is not asked again, which would take its time; that it was not seen to stand is the error.
         let (heard, unseen): (Vec<_>, Vec<_>) = self.wheels.iter().partition(|wheel| wheel.is_heard());
         let unseen = unseen.first().map(|wheel| NotAtRest::NotSeen { node: wheel.drive.node() });
-        let coasting = self.network.stop_moved(heard.iter().map(|wheel| wheel.drive.node()).collect()).await;
+        let coasting = self.network.stop_once(heard.iter().map(|wheel| wheel.drive.node()).collect()).await;
         let released = self.network.release_guards(nodes).await;
         stopped.and(off)?;
         coasting.into_iter().try_for_each(|stopped| stopped.outcome.map(drop))?;

@@ -9,7 +9,7 @@ use cia402::object::{CONTROLWORD, STATUSWORD};
 use devices::{AxisId, Description, PowerStyle};
 
 use super::handle::Drive;
-use super::safety::{ANSWER, STOP};
+use super::safety::{ANSWER, SILENCE, STOP};
 use crate::core::NodeSet;
 use crate::error::Error;
 use crate::gear::Gear;
@@ -158,7 +158,7 @@ impl Drive {
     }
 
     async fn brought_to_rest(&self) -> StoppedAxis {
-        let outcome = match self.come_to_rest().await {
+        let outcome = match self.come_to_rest(SILENCE).await {
             Ok(after) => self.statusword().await.map(|statusword| (after, self.way_of(statusword))),
             Err(error) => Err(error),
         };

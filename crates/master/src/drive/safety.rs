@@ -5,6 +5,7 @@
 
 use std::time::Duration;
 
+use can::Instant;
 use canopen::{Mux, NodeId};
 use cia402::object::{CONTROLWORD, POSITION_ACTUAL_VALUE, STATUSWORD};
 use cia402::{Controlword, PowerCommand, PowerState, Statusword};
@@ -16,6 +17,7 @@ use super::power::{STANDSTILL_LOOKS, STANDSTILL_RPM};
 use crate::core::{Command, Core, NodeSet, Payload, Request, Transfer};
 use crate::error::Error;
 use crate::gear::Gear;
+use crate::host_loss::HostLoss;
 use crate::network::{DEFAULT_TIMEOUT, MovedAxis, Network, join_all};
 
 /// Quick stop, with the halt bit for drives that look for their reference whatever the quick stop bit says; where there is
@@ -29,8 +31,11 @@ pub(crate) const ANSWER: Duration = Duration::from_millis(150);
 /// How long the state of a drive is asked for that must not be stopped without knowing it.
 const GLANCE: Duration = Duration::from_millis(50);
 
+/// How long one answer is awaited when a drive is stopped once more that has answered nothing.
+const LAST_ANSWER: Duration = Duration::from_millis(100);
+
 /// How long a drive may leave everything unanswered before its stop counts as not seen.
-const SILENCE: Duration = Duration::from_millis(300);
+pub(super) const SILENCE: Duration = Duration::from_millis(300);
 
 /// How long a drive may go on in Operation enabled before the stop is sent again: another master may have enabled it
 /// since.
@@ -54,37 +59,72 @@ pub struct Stopped {
     /// How long after the command it was seen to stand, by its statusword and its speed (or its position, where it does not
     /// show a speed); or why that was not seen: then it may still be moving.
     pub outcome: Result<Duration, Error>,
+    /// What it does without this program, if it was guarded when it was to stop.
+    pub loss: Option<HostLoss>,
 }
 
 /// Stopping what this program has set in motion, and only that.
+///
+/// This is what every way to let go of drives comes to: a signal, a failure, a page or a client that has gone, a network that is
+/// closed.
 impl Network {
     /// Quick-stops every axis that this program has set in motion, all at the same time, and says how each came to rest. What
     /// else this program asks of these drives has to have ended: a future that goes on enabling one would undo this.
     ///
     /// Ends when each was seen to stand, or within the time of the drive's own ramps, or a third of a second after a drive has
-    /// fallen silent.
+    /// fallen silent; what was not seen to stand by then is stopped once more.
     pub async fn stop_all_moved(&self) -> Vec<Stopped> {
         self.stop_moved(self.moved()).await
     }
 
     /// The same for the axes of these nodes.
     pub async fn stop_moved(&self, nodes: NodeSet) -> Vec<Stopped> {
+        let began = self.now();
+        let stopped = self.stop_once(nodes).await;
+        self.stop_again(stopped, began).await
+    }
+
+    /// The same without a second try, for a caller that has one to come.
+    pub(crate) async fn stop_once(&self, nodes: NodeSet) -> Vec<Stopped> {
+        self.stop_within(nodes, ANSWER, SILENCE).await
+    }
+
+    async fn stop_within(&self, nodes: NodeSet, answer: Duration, silence: Duration) -> Vec<Stopped> {
         let axes: Vec<_> = self.moved_axes().into_iter().filter(|axis| nodes.contains(axis.node)).collect();
         self.overrule(&axes);
         let stops = axes.into_iter().map(|moved| async move {
-            let outcome = self.drive_of(&moved).come_to_rest().await;
-            Stopped { node: moved.node, controlword: moved.controlword, outcome }
+            let loss = self.guarded(moved.node);
+            let outcome = self.drive_of(&moved, answer).come_to_rest(silence).await;
+            Stopped { node: moved.node, controlword: moved.controlword, outcome, loss }
         });
         join_all(stops.collect::<Vec<_>>()).await
+    }
+
+    /// Stops once more what was not seen to stand: its connection may have come back. What stands is reported with the time since
+    /// `began`.
+    async fn stop_again(&self, mut stopped: Vec<Stopped>, began: Instant) -> Vec<Stopped> {
+        let unseen: NodeSet = stopped.iter().filter(|axis| axis.outcome.is_err()).map(|axis| axis.node).collect();
+        if unseen.is_empty() {
+            return stopped;
+        }
+        let waited = self.now() - began;
+        for again in self.stop_within(unseen, LAST_ANSWER, LAST_ANSWER).await {
+            let same = |axis: &&mut Stopped| (axis.node, axis.controlword) == (again.node, again.controlword);
+            if let Some(before) = stopped.iter_mut().find(same) {
+                before.outcome = again.outcome.map(|time| waited + time);
+            }
+        }
+        stopped
     }
 
     /// [`stop_all_moved`](Self::stop_all_moved), and gives back the guards of the drives that stand. The watch of one that may
     /// still be moving is not taken from it, and it is no longer kept content: it stops by itself, if it can.
     pub async fn stop_and_release(&self) -> Vec<Stopped> {
-        let stopped = self.stop_all_moved().await;
+        let began = self.now();
+        let stopped = self.stop_once(self.moved()).await;
         // A drive that stands and does not answer keeps its watch, which then stops nothing.
         let _ = self.release_guards(NodeSet::ALL).await;
-        stopped
+        self.stop_again(stopped, began).await
     }
 
     /// Queues the same quick stops without waiting; the runner has to be kept going until the frames are out. Whether they stop
@@ -118,8 +158,8 @@ impl Network {
         self.with_core(|core| axes.iter().for_each(|axis| core.stop_axis(axis.node, axis.controlword, STOP.0)));
     }
 
-    fn drive_of(&self, moved: &MovedAxis) -> Drive {
-        let node = self.node(moved.node).with_timeout(ANSWER);
+    fn drive_of(&self, moved: &MovedAxis, answer: Duration) -> Drive {
+        let node = self.node(moved.node).with_timeout(answer);
         Drive { node, axis: moved.axis, description: moved.description, guess: None, gear: Gear::DIRECT }
     }
 }
@@ -147,12 +187,12 @@ impl Drive {
         self.node.network().note_stopped(self.node.id(), self.place(CONTROLWORD));
     }
 
-    /// Stops the drive and waits until it is seen to stand; how long that took.
-    pub(super) async fn come_to_rest(&self) -> Result<Duration, Error> {
+    /// Stops the drive and waits until it is seen to stand; how long that took. `silence` is how long it may be silent at first.
+    pub(super) async fn come_to_rest(&self, silence: Duration) -> Result<Duration, Error> {
         const INTENT: &str = "bring it to rest";
         let network = self.node.network();
         let began = network.now();
-        let (mut stop_sent, mut heard) = (None, began);
+        let (mut stop_sent, mut heard, mut silence) = (None, began, silence);
         let mut limit = None;
         let mut rest = Rest { looks: 0, position: None };
         loop {
@@ -161,7 +201,7 @@ impl Drive {
                     self.note_stopped();
                     return Ok(network.now() - began);
                 }
-                Ok(false) => heard = network.now(),
+                Ok(false) => (heard, silence) = (network.now(), SILENCE),
                 // Not a drive: nothing of it can move.
                 Err(Error::Aborted { code, .. })
                     if stop_sent.is_none() && code == canopen::AbortCode::NO_SUCH_OBJECT =>
@@ -169,7 +209,7 @@ impl Drive {
                     self.note_stopped();
                     return Ok(network.now() - began);
                 }
-                Err(error) if network.now() - heard >= SILENCE => return self.answered(INTENT, Err(error)).await,
+                Err(error) if network.now() - heard >= silence => return self.answered(INTENT, Err(error)).await,
                 Err(_) => {}
             }
             let limit = match (limit, stop_sent) {
@@ -190,7 +230,7 @@ impl Drive {
 
     /// Sends the stop if it has not been sent, or the drive goes on nevertheless; true once it was seen to stand for a
     /// while.
-    async fn look_at_rest(&self, stop_sent: &mut Option<can::Instant>, rest: &mut Rest) -> Result<bool, Error> {
+    async fn look_at_rest(&self, stop_sent: &mut Option<Instant>, rest: &mut Rest) -> Result<bool, Error> {
         let network = self.node.network();
         if stop_sent.is_none() {
             // One without power would energise its motor to hold it; it may coast.

@@ -272,7 +272,7 @@ impl Group {
         let axes = self.runner.axes.iter().zip(&self.runner.states);
         let (heard, unseen): (Vec<_>, Vec<_>) = axes.partition(|(_, state)| state.statusword.is_some());
         let unseen = unseen.first().map(|(axis, _)| NotAtRest::NotSeen { node: axis.drive.node() });
-        let coasting = self.network.stop_moved(heard.iter().map(|(axis, _)| axis.drive.node()).collect()).await;
+        let coasting = self.network.stop_once(heard.iter().map(|(axis, _)| axis.drive.node()).collect()).await;
         let released = self.network.release_guards(nodes).await;
         disabled?;
         coasting.into_iter().try_for_each(|stopped| stopped.outcome.map(drop))?;
