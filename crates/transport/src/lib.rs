@@ -82,7 +82,7 @@ pub use modbus::{
     RegisterAccess, RegisterAnswer,
 };
 pub use note::{BusNotes, ControllerState, ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds, Note, Received};
-pub use run::{BusThread, BusThreadError, Heard, RealTimeWorld, run_station, run_world};
+pub use run::{BusThread, BusThreadError, Heard, RealTimeWorld, run_station, run_world, waker_of};
 pub use slcan::SlcanBus;
 #[cfg(target_os = "linux")]
 pub use socketcan::SocketCanBus;

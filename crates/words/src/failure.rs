@@ -2,6 +2,7 @@
 //!
 //! The command line prints it and its `--json`, the Python package raises it.
 
+use std::error::Error;
 use std::fmt;
 
 use canopen::{AbortCode, Mux, NodeId};
@@ -107,6 +108,16 @@ impl Failure {
         self.next.push(advice.to_string());
         self
     }
+}
+
+/// What has caused an error, the nearest first.
+pub fn causes(error: &dyn Error) -> impl Iterator<Item = &dyn Error> {
+    std::iter::successors(error.source(), |&cause| cause.source())
+}
+
+/// An error with what has caused it, in one line.
+pub fn with_causes(error: &dyn Error) -> String {
+    causes(error).fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
 /// The same for programs: the `error` of a line of `--json`.
@@ -266,5 +277,25 @@ mod tests {
         let text = "cannot read 6064h:00 of node 9\n  because: no answer\n  next:    ferrodrive scan";
         assert_eq!(failure.to_string(), text);
         assert!(Failure::usage("x").is_usage && !failure.is_usage);
+    }
+
+    #[test]
+    fn an_error_is_reported_with_all_that_has_caused_it() {
+        #[derive(Debug)]
+        struct Lost(Option<Box<Lost>>, &'static str);
+        impl fmt::Display for Lost {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(self.1)
+            }
+        }
+        impl Error for Lost {
+            fn source(&self) -> Option<&(dyn Error + 'static)> {
+                self.0.as_deref().map(|cause| cause as _)
+            }
+        }
+        let reset = Lost(None, "connection reset");
+        let error = Lost(Some(Box::new(Lost(Some(Box::new(reset)), "cannot read"))), "the bus is lost");
+        assert_eq!(with_causes(&error), "the bus is lost: cannot read: connection reset");
+        assert_eq!(causes(&error).map(ToString::to_string).collect::<Vec<_>>(), ["cannot read", "connection reset"]);
     }
 }

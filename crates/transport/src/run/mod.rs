@@ -5,6 +5,6 @@ mod station;
 mod thread;
 mod world;
 
-pub use station::run_station;
+pub use station::{run_station, waker_of};
 pub use thread::{BusThread, BusThreadError};
 pub use world::{Heard, RealTimeWorld, run_world};

@@ -2,7 +2,8 @@
 
 use std::future::{Future, poll_fn};
 use std::pin::pin;
-use std::task::Poll;
+use std::sync::Arc;
+use std::task::{Poll, Wake, Waker};
 use std::time::Duration;
 
 use can::{Frame, Instant, Station};
@@ -72,6 +73,20 @@ where
             Event::Woken => station.handle_timeout(clock.now()),
         }
     }
+}
+
+/// A waker that has [`run_station`] look at its station again, for a station whose handles call one when they ask for something
+/// from another task or thread.
+pub fn waker_of(wakeup: Arc<Notify>) -> Waker {
+    struct Wakes(Arc<Notify>);
+
+    impl Wake for Wakes {
+        fn wake(self: Arc<Self>) {
+            self.0.notify_one();
+        }
+    }
+
+    Waker::from(Arc::new(Wakes(wakeup)))
 }
 
 enum Event {
