@@ -5,17 +5,17 @@ use std::cell::RefCell;
 use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
-use std::task::{Wake, Waker};
 use std::time::Duration;
 
 use can::{Instant, Station, Tap};
-use canopen::NodeId;
+use host::stopping::{Account, make_sure};
 use host::{Wire, WorldDoor};
 use master::Network;
-use master::drive::{HostLoss, Stopped};
 use tokio::sync::Notify;
 use transport::realtime::{self, RealTimeError};
-use transport::{AnyBus, BusError, BusNotes, BusSpec, BusThread, BusThreadError, Note, WallClock, run_station};
+use transport::{
+    AnyBus, BusError, BusNotes, BusSpec, BusThread, BusThreadError, Note, WallClock, run_station, waker_of,
+};
 
 use crate::context::Context;
 use crate::embedded::{self, Embedded, EmbeddedDrives};
@@ -30,6 +30,7 @@ use crate::signals::asked_to_end;
 use crate::wire;
 use crate::world_bus::WorldBus;
 use machine::file::Machine;
+use words::failure::causes;
 
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.
 const VIRTUAL_LIMIT: Duration = Duration::from_secs(24 * 3600);
@@ -168,19 +169,10 @@ impl Runner {
             Self::Here(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, report).await,
             Self::World(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, report).await,
             Self::Thread(thread) => {
-                network.on_activity(Waker::from(Arc::new(Wakes(Arc::clone(&wakeup)))));
+                network.on_activity(waker_of(Arc::clone(&wakeup)));
                 thread.run(station, wakeup, until, report).await
             }
         }
-    }
-}
-
-/// Has the thread of the bus look at the master when a command has asked it for something.
-struct Wakes(Arc<Notify>);
-
-impl Wake for Wakes {
-    fn wake(self: Arc<Self>) {
-        self.0.notify_one();
     }
 }
 
@@ -241,11 +233,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     }
     ended.map_err(|error| {
         let failure = bus_failure(global, &error);
-        let moved = network.moved();
-        let failure = moved.iter().fold(failure, |failure, node| {
-            let failure = failure.because(format!("node {node} was moving, and cannot be reached any more"));
-            without_this_command(network.guarded(node), failure).next(make_sure(node))
-        });
+        let failure = Account::of_lost_bus(&network, THIS).iter().fold(failure, with_account);
         failure.next(format!("find out why {} was lost, and restart it", global.bus))
     })?
 }
@@ -272,13 +260,11 @@ fn no_real_time(error: &RealTimeError) -> Failure {
 
 /// Adds what to do where a command ended without its bus: what it moved may move still.
 fn without_bus(context: &Context, failure: Failure) -> Failure {
-    let moved = context.network.moved();
-    moved.iter().fold(failure, |failure, node| failure.next(make_sure(node)))
+    context.network.moved().iter().map(make_sure).fold(failure, Failure::next)
 }
 
-fn make_sure(node: NodeId) -> String {
-    format!("make sure that it stands still (emergency stop); then: ferrodrive state {node}")
-}
+/// Who lets go of drives here.
+const THIS: &str = "this command";
 
 /// Ends the process on Ctrl-C and its like from here on: on an embedded bus there is no motor to stop.
 pub(crate) fn exit_on_signal() {
@@ -291,31 +277,18 @@ pub(crate) fn exit_on_signal() {
 }
 
 /// Stops every node that this command has set in motion; the failure then says what was seen of that.
-async fn stop_what_moves(context: &Context, mut failure: Failure) -> Failure {
-    let guarded = context.network.moved().iter().map(|node| (node, context.network.guarded(node))).collect::<Vec<_>>();
-    for Stopped { node, outcome, .. } in context.network.stop_and_release().await {
-        failure = match outcome {
-            Ok(after) => failure.because(format!(
-                "node {node} was moving and has been quick-stopped: it was seen to stand after {:.2} s",
-                after.as_secs_f64()
-            )),
-            Err(error) => {
-                let failure =
-                    failure.because(format!("node {node} may still be moving: {error}")).next(make_sure(node));
-                let loss = guarded.iter().find(|(other, _)| *other == node).and_then(|(_, loss)| *loss);
-                without_this_command(loss, failure)
-            }
-        };
-    }
-    failure
+async fn stop_what_moves(context: &Context, failure: Failure) -> Failure {
+    let stopped = context.network.stop_and_release().await;
+    stopped
+        .iter()
+        .map(|stopped| Account::of_stop(stopped, THIS))
+        .fold(failure, |failure, account| with_account(failure, &account))
 }
 
-/// Adds what a drive that cannot be reached any more does by itself.
-fn without_this_command(loss: Option<HostLoss>, failure: Failure) -> Failure {
-    match loss {
-        Some(loss) => failure.because(format!("without this command {loss}")),
-        None => failure,
-    }
+/// Adds what was seen of a drive that was moving.
+fn with_account(failure: Failure, account: &Account) -> Failure {
+    let failure = account.because.iter().fold(failure, Failure::because);
+    account.next().into_iter().fold(failure, Failure::next)
 }
 
 /// A failure of the bus itself, with every cause that is known.
@@ -338,11 +311,5 @@ pub(crate) fn not_served(error: &dyn Error) -> Failure {
 
 /// An error with every cause that is known.
 pub(crate) fn failure_of(error: &dyn Error) -> Failure {
-    let mut failure = Failure::new(error.to_string());
-    let mut source = error.source();
-    while let Some(cause) = source {
-        failure = failure.because(cause);
-        source = cause.source();
-    }
-    failure
+    causes(error).fold(Failure::new(error.to_string()), Failure::because)
 }

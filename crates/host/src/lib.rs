@@ -16,6 +16,7 @@
 
 mod answer;
 pub mod around;
+pub mod clients;
 pub mod command;
 mod commands;
 pub mod control;
@@ -30,6 +31,7 @@ mod run;
 pub mod session;
 mod snapshot;
 mod state;
+pub mod stopping;
 #[cfg(test)]
 mod tests;
 pub mod timeline;

@@ -4,6 +4,7 @@
 //! motion is quick-stopped, and the guards of those that stand are released.
 
 use can::Tap;
+use host::stopping::{Account, still_moving};
 use master::Network;
 use master::drive::Stopped;
 use std::collections::VecDeque;
@@ -11,7 +12,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use tokio::sync::{Notify, mpsc};
 use tokio::task::{JoinSet, LocalSet};
-use transport::{BusNotes, BusSpec, Note, WallClock, run_station};
+use transport::{BusNotes, BusSpec, Note, WallClock, run_station, waker_of};
+use words::failure::with_causes;
 
 use crate::master::tap::Traffic;
 use crate::world::Job;
@@ -152,10 +154,9 @@ fn run(
         match ended.await {
             Ok(moving) => said.lock().moving = moving,
             Err(error) => {
-                let lost =
-                    network.moved().iter().map(|node| format!("node {node} may still be moving: the bus is lost"));
+                let moving = still_moving(Account::of_lost_bus(&network, THIS));
                 let mut words = said.lock();
-                (words.moving, words.ended) = (lost.collect(), Some(with_causes(&error)));
+                (words.moving, words.ended) = (moving, Some(with_causes(&error)));
             }
         }
     }));
@@ -167,8 +168,7 @@ async fn work_through(
     mut incoming: mpsc::UnboundedReceiver<Job>,
     wakeup: Arc<Notify>,
 ) -> Vec<String> {
-    let waking = std::task::Waker::from(Arc::new(Wakes(wakeup)));
-    network.on_activity(waking);
+    network.on_activity(waker_of(wakeup));
     let mut running = JoinSet::new();
     loop {
         tokio::select! {
@@ -181,30 +181,13 @@ async fn work_through(
         }
     }
     running.shutdown().await;
-    still_moving(network.stop_and_release().await)
+    not_seen_to_stand(&network.stop_and_release().await)
 }
+
+/// Who lets go of drives here.
+const THIS: &str = "this program";
 
 /// What was not seen to stand, in words.
-pub(crate) fn still_moving(stopped: Vec<Stopped>) -> Vec<String> {
-    let failed = stopped.into_iter().filter_map(|stopped| Some((stopped.node, stopped.outcome.err()?)));
-    failed.map(|(node, error)| format!("node {node} may still be moving: {error}")).collect()
-}
-
-/// Has the runner look at the master again when a job has asked it for something.
-struct Wakes(Arc<Notify>);
-
-impl std::task::Wake for Wakes {
-    fn wake(self: Arc<Self>) {
-        self.0.notify_one();
-    }
-}
-
-fn with_causes(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        text = format!("{text}: {cause}");
-        source = cause.source();
-    }
-    text
+pub(crate) fn not_seen_to_stand(stopped: &[Stopped]) -> Vec<String> {
+    still_moving(stopped.iter().map(|stopped| Account::of_stop(stopped, THIS)))
 }

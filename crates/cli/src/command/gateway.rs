@@ -1,25 +1,21 @@
 //! `ferrodrive gateway`: the ASCII protocol of CiA 309-3 over TCP.
 
 mod client;
-mod guards;
 mod places;
-mod request;
 
 use std::cell::Cell;
 use std::net::SocketAddr;
 use std::time::Duration;
 
 use canopen::NodeId;
-use master::core::{Event, NodeSet};
-use master::drive::{Stopped, SwitchedOff};
+use host::clients::Clients;
+use master::core::Event;
 use serde::Serialize;
 use tokio::net::TcpListener;
-use tokio::sync::{broadcast, mpsc};
+use tokio::sync::broadcast;
 
 use client::Handle;
-use guards::Guards;
 use places::{MAX_CLIENTS, Places};
-use request::{Gone, Guard};
 
 use crate::context::Context;
 use crate::failure::Failure;
@@ -55,9 +51,6 @@ const EVENT_INTERVAL: Duration = Duration::from_millis(20);
 /// Pause after a failed accept (out of file descriptors): the clients that are there go on.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Requests of clients that may wait.
-const REQUESTS: usize = 64;
-
 /// Events that may wait for a client; a slower one misses the oldest.
 const EVENTS: usize = 256;
 
@@ -92,27 +85,18 @@ impl Gateway {
             context.note(&format!("there is no password: anyone who can reach {address} can move the drives"));
         }
         format.print(&Ready { listen: address }).map_err(Failure::of_stdout)?;
-        let (guard, guards) = mpsc::channel(REQUESTS);
-        // Unbounded in type only: each client goes once.
-        let (gone, parted) = mpsc::unbounded_channel();
-        let (left, unguarded) = mpsc::unbounded_channel();
-        // Neither who comes nor who is to be stopped waits for a drive that does not answer.
+        let drive = async |node: NodeId| context.drive_to_stop(node).await.map_err(|failure| failure.what);
+        let (clients, serving) = Clients::of(&context.network, "this gateway", drive, |text| context.note(text));
         tokio::select! {
-            () = accept_clients(context, &listener, guard, gone) => {}
-            () = see_off(context, parted, left) => {}
-            () = see_guarded(context, guards, unguarded) => {}
+            () = accept_clients(context, &listener, clients) => {}
+            () = serving => {}
         }
         Ok(())
     }
 }
 
 /// Accepts clients, and sends all of them the events of the network.
-async fn accept_clients(
-    context: &Context,
-    listener: &TcpListener,
-    guards: mpsc::Sender<Guard>,
-    gone: mpsc::UnboundedSender<Gone>,
-) {
+async fn accept_clients(context: &Context, listener: &TcpListener, clients: Clients) {
     let (events, _) = broadcast::channel::<Event>(EVENTS);
     let mut places = Places::default();
     let is_noted = Cell::new(false);
@@ -133,8 +117,7 @@ async fn accept_clients(
                 let handle = Handle {
                     frames: context.traffic.of_others(),
                     events: events.subscribe(),
-                    guards: guards.clone(),
-                    gone: gone.clone(),
+                    client: clients.join(),
                 };
                 tokio::spawn(client::serve(stream, context.network.clone(), handle, place));
             }
@@ -146,53 +129,4 @@ async fn accept_clients(
             }
         }
     }
-}
-
-/// Guards what is about to be moved, and gives the guards back that no client needs any more; one at a time, so that no guard is given
-/// back while another client asks for it.
-async fn see_guarded(context: &Context, mut asked: mpsc::Receiver<Guard>, mut left: mpsc::UnboundedReceiver<NodeSet>) {
-    let mut guards = Guards::default();
-    loop {
-        tokio::select! {
-            biased;
-            // A client asks before it goes.
-            Some(Guard(nodes, done)) = asked.recv() => {
-                for node in guards.take(nodes).iter() {
-                    match guard(context, node).await {
-                        Ok(()) => guards.note(node),
-                        Err(why) => context.note(&format!("node {node}: nothing stops it when this gateway dies: {why}")),
-                    }
-                }
-                // The client may have gone.
-                let _ = done.send(());
-            }
-            Some(nodes) = left.recv() => {
-                // What has a watch and was not seen to stand is left to it.
-                let _ = context.network.release_guards(guards.give(nodes)).await;
-            }
-            else => return,
-        }
-    }
-}
-
-/// Stops what a client that has gone has moved.
-async fn see_off(context: &Context, mut parted: mpsc::UnboundedReceiver<Gone>, left: mpsc::UnboundedSender<NodeSet>) {
-    while let Some(Gone { moved, guarded }) = parted.recv().await {
-        for Stopped { node, outcome, .. } in context.network.stop_moved(moved).await {
-            let text = match outcome {
-                Ok(_) => format!("node {node}: its client has gone; it has been quick-stopped and stands"),
-                Err(error) => format!("node {node} may still be moving, and its client has gone: {error}"),
-            };
-            context.note(&text);
-        }
-        // It ends with this.
-        let _ = left.send(guarded);
-    }
-}
-
-/// Makes the drive stop by itself without this program, or returns why it cannot.
-async fn guard(context: &Context, node: NodeId) -> Result<(), String> {
-    let drive = context.drive_to_stop(node).await.map_err(|failure| failure.what)?;
-    let loss = drive.guard(SwitchedOff::Leave).await.map_err(|error| error.to_string())?;
-    if loss.stops_after().is_none() { Err(loss.to_string()) } else { Ok(()) }
 }

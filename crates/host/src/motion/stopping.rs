@@ -91,9 +91,15 @@ impl Host {
         for other in self.leave_group(id) {
             self.quick_stop_one(other, why, None);
         }
-        let node = self.network.node(id).with_timeout(self.setting.timeout);
+        let network = self.network.clone();
+        let node = network.node(id).with_timeout(self.setting.timeout);
         let drive = self.nodes.get(&id).and_then(|node| node.drive.clone());
         self.begin(id, STOPPING, false, answer, async move {
+            if network.moved().contains(id) {
+                let stopped = network.stop_moved([id].into_iter().collect()).await;
+                return quietly(stopped.into_iter().try_for_each(|axis| axis.outcome.map(drop)));
+            }
+            // Another program has moved it.
             match drive {
                 Some(drive) => quietly(drive.quick_stop().await),
                 None => quietly(node.write(CONTROLWORD, PowerCommand::QuickStop.controlword().0).await),

@@ -4,18 +4,18 @@ use std::io;
 use std::time::Duration;
 
 use can::BusFrame;
+use host::clients::Client;
 use master::Network;
-use master::core::{Event, NodeSet};
+use master::core::Event;
 use master::gateway::{MAX_LINE, Session};
 use tokio::io::{AsyncBufRead, AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
 use tokio::net::tcp::OwnedWriteHalf;
+use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
-use tokio::sync::{broadcast, mpsc, oneshot};
 use transport::Vitals;
 
 use super::places::Place;
-use super::request::{Gone, Guard};
 
 /// How long a client may take to read what it is sent; one that never reads is disconnected.
 const READER_PATIENCE: Duration = Duration::from_secs(10);
@@ -24,31 +24,21 @@ const READER_PATIENCE: Duration = Duration::from_secs(10);
 pub(super) struct Handle {
     pub(super) frames: broadcast::Receiver<BusFrame>,
     pub(super) events: broadcast::Receiver<Event>,
-    pub(super) guards: mpsc::Sender<Guard>,
-    pub(super) gone: mpsc::UnboundedSender<Gone>,
+    pub(super) client: Client,
 }
 
 /// Serves a client until its connection ends or another needs its place, then has stopped what it moved.
 pub(super) async fn serve(stream: TcpStream, network: Network, mut handle: Handle, place: Place) {
     let mut session = Session::new(network);
-    let mut guarded = NodeSet::EMPTY;
     tokio::select! {
         // Whatever ended it, what it moved is stopped.
-        _ = converse(stream, &mut session, &mut handle, &place.vitals, &mut guarded) => {}
+        _ = converse(stream, &mut session, &mut handle, &place.vitals) => {}
         _ = place.stay => {}
     }
-    if !session.moved().is_empty() || !guarded.is_empty() {
-        let _ = handle.gone.send(Gone { moved: session.moved(), guarded });
-    }
+    handle.client.let_go(session.moved());
 }
 
-async fn converse(
-    stream: TcpStream,
-    session: &mut Session,
-    handle: &mut Handle,
-    vitals: &Vitals,
-    guarded: &mut NodeSet,
-) -> io::Result<()> {
+async fn converse(stream: TcpStream, session: &mut Session, handle: &mut Handle, vitals: &Vitals) -> io::Result<()> {
     // Answers are small and waited for.
     stream.set_nodelay(true)?;
     let (input, mut output) = stream.into_split();
@@ -62,7 +52,7 @@ async fn converse(
                     Read::End => return Ok(()),
                     Read::Unreadable => Some(Session::unreadable()),
                     Read::Line(text) => {
-                        guard(session, &text, guarded, &handle.guards).await;
+                        handle.client.guard(session.about_to_move(&text)).await;
                         let answer = session.answer(&text).await;
                         vitals.set_engaged(!session.moved().is_empty());
                         answer
@@ -84,20 +74,6 @@ async fn converse(
             say(&mut output, &said).await?;
         }
     }
-}
-
-/// Has what a line is about to move guarded first.
-async fn guard(session: &Session, line: &str, guarded: &mut NodeSet, guards: &mpsc::Sender<Guard>) {
-    let nodes: NodeSet = session.about_to_move(line).iter().filter(|node| !guarded.contains(*node)).collect();
-    if nodes.is_empty() {
-        return;
-    }
-    let (done, answered) = oneshot::channel();
-    // What was asked for is given back when the client goes, which may be before the answer.
-    let Ok(permit) = guards.reserve().await else { return };
-    nodes.iter().for_each(|node| guarded.insert(node));
-    permit.send(Guard(nodes, done));
-    let _ = answered.await;
 }
 
 async fn say(output: &mut OwnedWriteHalf, text: &str) -> io::Result<()> {

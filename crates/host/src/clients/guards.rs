@@ -1,4 +1,4 @@
-//! Which drives are guarded for the clients of a gateway: each for as long as one of them is there that has moved it.
+//! Which drives are guarded for clients that share a network: each for as long as one of them is there that has moved it.
 
 use std::collections::BTreeMap;
 
