@@ -11,6 +11,7 @@ mod decode;
 mod drive;
 mod explain;
 mod explain_states;
+mod gateway;
 mod gear;
 mod group;
 mod group_trouble;

@@ -125,3 +125,44 @@ impl Line {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use tokio::io::AsyncReadExt;
+
+    use super::*;
+    use crate::session::runtime;
+
+    /// What comes of `first` and then `rest`: a line, or `None` for one that is unreadable.
+    fn lines(first: &[u8], rest: &[u8]) -> Vec<Option<String>> {
+        let mut input = BufReader::with_capacity(64, first.chain(rest));
+        let mut line = Line::default();
+        let mut lines = Vec::new();
+        runtime().unwrap().block_on(async {
+            loop {
+                match line.read(&mut input).await.unwrap() {
+                    Read::End => return,
+                    Read::Line(text) => lines.push(Some(text)),
+                    Read::Unreadable => lines.push(None),
+                }
+            }
+        });
+        lines
+    }
+
+    #[test]
+    fn lines_come_whole_and_what_is_unreadable_does_not_take_the_next_with_it() {
+        let whole = |text: &str| Some(text.to_owned());
+        assert_eq!(
+            lines(b"[77] 4 r 0x", b"6083 0 u32\r\n[78]\n"),
+            [whole("[77] 4 r 0x6083 0 u32\r\n"), whole("[78]\n")]
+        );
+        assert_eq!(lines(b"[9] \xFF\xFE\n", b"[10]\n"), [None, whole("[10]\n")]);
+        let long = [&b"1".repeat(100_000)[..], b"\n"].concat();
+        assert_eq!(lines(&long, b"[10]\n"), [None, whole("[10]\n")]);
+        let just = [&b"1".repeat(MAX_LINE - 1)[..], b"\n"].concat();
+        assert_eq!(lines(&just, b"").iter().flatten().map(String::len).collect::<Vec<_>>(), [MAX_LINE]);
+        // Half a command.
+        assert_eq!(lines(b"[1] 4 stop\n[2] 4 sto", b"p"), [whole("[1] 4 stop\n")]);
+    }
+}
