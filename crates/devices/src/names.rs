@@ -304,6 +304,18 @@ const OBJECTS: &[Object] = &[
     object!(0x60C6, "Max deceleration"),
     object!(0x60E0, "Positive torque limit value"),
     object!(0x60E1, "Negative torque limit value"),
+    object!(0x60E3, "Supported homing methods";
+        0 HIGHEST, 1 "Supported homing method 1", 2 "Supported homing method 2", 3 "Supported homing method 3",
+        4 "Supported homing method 4", 5 "Supported homing method 5", 6 "Supported homing method 6",
+        7 "Supported homing method 7", 8 "Supported homing method 8", 9 "Supported homing method 9",
+        10 "Supported homing method 10", 11 "Supported homing method 11", 12 "Supported homing method 12",
+        13 "Supported homing method 13", 14 "Supported homing method 14", 15 "Supported homing method 15",
+        16 "Supported homing method 16", 17 "Supported homing method 17", 18 "Supported homing method 18",
+        19 "Supported homing method 19", 20 "Supported homing method 20", 21 "Supported homing method 21",
+        22 "Supported homing method 22", 23 "Supported homing method 23", 24 "Supported homing method 24",
+        25 "Supported homing method 25", 26 "Supported homing method 26", 27 "Supported homing method 27",
+        28 "Supported homing method 28", 29 "Supported homing method 29", 30 "Supported homing method 30",
+        31 "Supported homing method 31", 32 "Supported homing method 32"),
     object!(0x60F4, "Following error actual value"),
     // What stands in these two is the maker's.
     object!(0x60F9, "Velocity control parameter set"; 0 HIGHEST),
@@ -315,6 +327,7 @@ const OBJECTS: &[Object] = &[
     object!(0x60FF, "Target velocity"),
     object!(0x6402, "Motor type"),
     object!(0x6502, "Supported drive modes"),
+    object!(0x67FE, "Version number"),
 ];
 
 /// Names to type of earlier versions, and what the object is called now.

@@ -24,8 +24,8 @@ pub use motor::{CONTROL_PERIOD_NS, Motor};
 use canopen::object::COMMUNICATION_CYCLE_PERIOD;
 use canopen::od::{Condition, Dictionary, Slot, Storage, Table, View};
 use canopen::{AbortCode, Mux};
-use cia402::object::{INTERPOLATION_DATA_RECORD_1ST_SET_POINT, MODES_OF_OPERATION};
-use cia402::{ModeOfOperation, SupportedModes};
+use cia402::object::{HOMING_METHOD, INTERPOLATION_DATA_RECORD_1ST_SET_POINT, MODES_OF_OPERATION};
+use cia402::{HomingMethod, ModeOfOperation, SupportedModes};
 use devices::{Description, Placement};
 
 use crate::node;
@@ -64,7 +64,8 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
         of_axis && matches!(row.sub_index, 1 | 2)
     });
     let factors = factors.map(|(slot, _)| (slot, Condition::Check(is_not_zero)));
-    modes.chain(set_points).chain(factors).chain(node::conditions(table))
+    let methods = description.axes.iter().filter_map(move |axis| of_axis(axis.placement, HOMING_METHOD, METHOD_CHECKS));
+    modes.chain(set_points).chain(methods).chain(factors).chain(node::conditions(table))
 }
 
 type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
@@ -90,6 +91,18 @@ macro_rules! by_axis {
 
 const MODE_CHECKS: &[(u16, Check)] = by_axis!(mode_is_supported, 0x6060);
 const SET_POINT_CHECKS: &[(u16, Check)] = by_axis!(buffer_has_room, 0x60C1);
+const METHOD_CHECKS: &[(u16, Check)] = by_axis!(method_is_supported, 0x6098);
+
+/// 6098h: a method that this firmware has, and that 60E3h lists where the axis has 60E3h with a list in it; or none.
+fn method_is_supported<const OFFSET: u16>(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    let method = HomingMethod(raw as i8);
+    let listed = |sub_index| values.value(Mux::new(0x60E3 + OFFSET, sub_index)).unwrap_or(0) as i8;
+    let mut list =
+        (1..=u8::MAX - 1).take(usize::from(listed(0) as u8)).map(listed).filter(|method| *method != 0).peekable();
+    let is_listed = list.peek().is_none() || list.any(|listed| listed == method.0);
+    let is_supported = method == HomingMethod::NONE || (method.sequence().is_some() && is_listed);
+    if is_supported { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
+}
 
 /// 6060h: a mode that 6502h has, where the axis has 6502h.
 fn mode_is_supported<const OFFSET: u16>(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {

@@ -116,6 +116,7 @@ slots! {
         positive_torque_limit: 0x60E0 0,
         negative_torque_limit: 0x60E1 0,
         following_error: 0x60F4 0,
+        control_effort: 0x60FA 0,
         position_demand_internal: 0x60FC 0,
         digital_inputs: 0x60FD 0,
         physical_outputs: 0x60FE 1,

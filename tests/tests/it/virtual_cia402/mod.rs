@@ -8,6 +8,7 @@ mod connection;
 mod homing;
 mod limits;
 mod modes;
+mod profile_objects;
 mod services;
 mod stops;
 mod units;

@@ -1,12 +1,11 @@
 //! Units that are coarser or finer than the increments of the encoder: whatever 607Dh, 608Fh, 6091h and 6092h say, the shaft
 //! turns in the commanded direction, and stands with "target reached" only at its target.
 
-use canopen::od::{Entry, FREE_PLACES, RowFacts, Table};
 use devices::Description;
-use devices::servo::{CIA402, objects};
+use devices::servo::objects;
 use ferrodrive_tests::seeded::Seeded;
 
-use crate::virtual_cia402::bench::{Bench, TURN};
+use crate::virtual_cia402::bench::{Bench, TURN, changed};
 
 /// Increments within which friction holds a shaft near its target.
 const NEAR: i64 = 150;
@@ -18,14 +17,10 @@ const NO_LIMITS: [[i64; 2]; 5] =
 
 /// The standard's servo with an encoder of so many increments in so many turns in 608Fh.
 fn with_encoder(resolution: [u32; 2]) -> &'static Description {
-    let rows = CIA402.dictionary.rows().iter().map(|row| match (row.index, row.sub_index) {
+    changed(|row| match (row.index, row.sub_index) {
         (0x608F, sub @ 1..=2) => row.default(i64::from(resolution[usize::from(sub) - 1])),
-        _ => *row,
-    });
-    let rows: &'static [Entry] = rows.collect::<Vec<_>>().leak();
-    let (facts, places) = (vec![RowFacts::NONE; rows.len()].leak(), vec![FREE_PLACES; rows.len()].leak());
-    let table = Table::at_run_time(rows, facts, places).expect("no object twice");
-    Box::leak(Box::new(Description { dictionary: Box::leak(Box::new(table)), ..CIA402 }))
+        _ => row,
+    })
 }
 
 /// Units of one drive: increments of its motor in a unit, as a fraction.

@@ -1,4 +1,4 @@
-//! Profile objects, 6007h to 6502h (CiA 402-2). Where the standard leaves a default to the maker it is chosen for the
+//! Profile objects, 6007h to 67FEh (CiA 402-2). Where the standard leaves a default to the maker it is chosen for the
 //! motor below, and for position units that are encoder increments.
 
 use canopen::od::Entry;
@@ -21,7 +21,7 @@ const INC_S2: &str = "inc/s^2";
 const PER_MILLE: &str = "0.1 %";
 
 /// Number of rows.
-pub(super) const ROW_COUNT: usize = 103;
+pub(super) const ROW_COUNT: usize = 138;
 
 #[rustfmt::skip]
 pub(super) static ROWS: [Entry; ROW_COUNT] = [
@@ -121,7 +121,42 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x60C6, 0, U32).default(u32::MAX as i64).unit(INC_S2).mappable().saved(),
     rw(0x60E0, 0, U16).described("Torque limit towards larger positions").default(3000).unit(PER_MILLE).mappable().saved(),
     rw(0x60E1, 0, U16).described("Torque limit towards smaller positions").default(3000).unit(PER_MILLE).mappable().saved(),
+    // INTEGER8 as 6098h is; makers' files have UNSIGNED8 too, which is the same for these.
+    ro(0x60E3, 0, U8).default(32),
+    ro(0x60E3, 1, I8).default(1),
+    ro(0x60E3, 2, I8).default(2),
+    ro(0x60E3, 3, I8).default(3),
+    ro(0x60E3, 4, I8).default(4),
+    ro(0x60E3, 5, I8).default(5),
+    ro(0x60E3, 6, I8).default(6),
+    ro(0x60E3, 7, I8).default(7),
+    ro(0x60E3, 8, I8).default(8),
+    ro(0x60E3, 9, I8).default(9),
+    ro(0x60E3, 10, I8).default(10),
+    ro(0x60E3, 11, I8).default(11),
+    ro(0x60E3, 12, I8).default(12),
+    ro(0x60E3, 13, I8).default(13),
+    ro(0x60E3, 14, I8).default(14),
+    ro(0x60E3, 15, I8).default(17),
+    ro(0x60E3, 16, I8).default(18),
+    ro(0x60E3, 17, I8).default(19),
+    ro(0x60E3, 18, I8).default(20),
+    ro(0x60E3, 19, I8).default(21),
+    ro(0x60E3, 20, I8).default(22),
+    ro(0x60E3, 21, I8).default(23),
+    ro(0x60E3, 22, I8).default(24),
+    ro(0x60E3, 23, I8).default(25),
+    ro(0x60E3, 24, I8).default(26),
+    ro(0x60E3, 25, I8).default(27),
+    ro(0x60E3, 26, I8).default(28),
+    ro(0x60E3, 27, I8).default(29),
+    ro(0x60E3, 28, I8).default(30),
+    ro(0x60E3, 29, I8).default(33),
+    ro(0x60E3, 30, I8).default(34),
+    ro(0x60E3, 31, I8).default(35),
+    ro(0x60E3, 32, I8).default(37),
     ro(0x60F4, 0, I32).unit(INC).mappable(),
+    ro(0x60FA, 0, I32).described("Velocity that the position loop asks for").unit(INC_S).mappable(),
     ro(0x60FC, 0, I32).described("Position demand by the encoder").unit(INC).mappable(),
     ro(0x60FD, 0, U32).described("Bit 0: negative limit, 1: positive limit, 2: home switch").mappable(),
     ro(0x60FE, 0, U8).default(2),
@@ -132,4 +167,6 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     ro(0x6402, 0, U16).default(10),
     // pp, pv, tq, hm, ip, csp, csv, cst.
     ro(0x6502, 0, U32).default(0x03ED),
+    // Of the profile: 4.0. Read as major, minor and revision in bits 16 to 23, 8 to 15 and 0 to 7.
+    ro(0x67FE, 0, U32).default(0x0004_0000),
 ];

@@ -56,6 +56,17 @@ impl Shaft {
         let error = self.error().unwrap_or(0);
         let error = i32::try_from(error).unwrap_or(if error < 0 { i32::MIN } else { i32::MAX });
         write(values, slots.following_error, scales.position(error));
+        write(values, slots.control_effort, scales.velocity(self.control_effort()));
+    }
+
+    /// What the position loop asks of the velocity loop, increments/s; 0 while no position is controlled.
+    fn control_effort(&self) -> f64 {
+        let (Demand::Position(point), Some(error)) = (&self.demand, self.error()) else { return 0.0 };
+        let gains = &self.gains.cascade;
+        let fed_forward = f64::from(gains.velocity_feed_forward) * point.velocity;
+        let wanted = f64::from(gains.position_per_s) * (error as f64 + point.fraction) + fed_forward;
+        let most = f64::from(gains.velocity_limit_rad_s / self.model.rad_per_count());
+        wanted.clamp(-most, most)
     }
 
     /// Statusword and mode display; also right after a command, for a host that reads back.
