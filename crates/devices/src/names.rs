@@ -284,6 +284,9 @@ const OBJECTS: &[Object] = &[
     object!(0x6099, "Homing speeds";
         0 HIGHEST, 1 "Speed during search for switch", 2 "Speed during search for zero"),
     object!(0x609A, "Homing acceleration"),
+    object!(0x60A3, "Profile jerk use"),
+    object!(0x60A4, "Profile jerk";
+        0 HIGHEST, 1 "Profile jerk 1", 2 "Profile jerk 2", 3 "Profile jerk 3", 4 "Profile jerk 4"),
     object!(0x60B0, "Position offset"),
     object!(0x60B1, "Velocity offset"),
     object!(0x60B2, "Torque offset"),

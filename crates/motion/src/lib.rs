@@ -37,6 +37,7 @@ pub mod filter;
 pub mod foc;
 pub mod frames;
 pub mod interpolate;
+pub mod jerk;
 pub mod limits;
 pub mod observer;
 pub mod pid;

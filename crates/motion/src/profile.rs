@@ -1,7 +1,7 @@
-//! A planned motion: up to four stretches of changing or constant velocity, evaluated at any time.
+//! A planned motion: up to four stretches of changing or constant velocity, or some of constant jerk, evaluated at any time.
 //!
-//! [`scurve`](crate::scurve) and [`trapezoid`](crate::trapezoid) plan; both use the move solver here, because the two
-//! shapes cover the same distance: either way the mean velocity of a change is the mean of its two ends.
+//! [`scurve`](crate::scurve), [`trapezoid`](crate::trapezoid) and [`jerk`](crate::jerk) plan; the first two use the move solver here,
+//! because the two shapes cover the same distance: either way the mean velocity of a change is the mean of its two ends.
 //! Position unit: the caller's (counts, turns, radians); `f64` resolves 2^31 counts to 5e-7 of a count.
 
 /// Where a motion is at one time.
@@ -34,18 +34,41 @@ struct Stretch {
 
 const MAX_STRETCHES: usize = 4;
 
+/// One stretch of constant jerk.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Jerk {
+    pub(crate) duration_s: f64,
+    /// Units per second cubed.
+    pub(crate) jerk: f64,
+}
+
+/// To rest: an acceleration that falls, and three; then to the peak three, the plateau, and to the end three.
+pub(crate) const MAX_JERKS: usize = 11;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Course {
+    Stretches(Shape, [Stretch; MAX_STRETCHES]),
+    Jerks(Point, [Jerk; MAX_JERKS]),
+}
+
 /// A planned motion. Before its start it rests at zero, after its end at [`Profile::end`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Profile {
-    shape: Shape,
-    stretches: [Stretch; MAX_STRETCHES],
+    course: Course,
     end: Point,
     duration_s: f64,
 }
 
 impl Profile {
     fn new(shape: Shape) -> Self {
-        Profile { shape, stretches: Default::default(), end: Point::default(), duration_s: 0.0 }
+        let course = Course::Stretches(shape, Default::default());
+        Profile { course, end: Point::default(), duration_s: 0.0 }
+    }
+
+    /// Stretches of constant jerk from `start`, which come to `end`.
+    pub(crate) fn of_jerks(start: Point, jerks: [Jerk; MAX_JERKS], end: Point) -> Self {
+        let duration_s = jerks.iter().map(|jerk| jerk.duration_s).sum();
+        Profile { course: Course::Jerks(start, jerks), end, duration_s }
     }
 
     /// Time from start to end.
@@ -59,6 +82,17 @@ impl Profile {
         self.end
     }
 
+    /// The same motion, which goes on past its end with the velocity that it arrives with, at most `velocity` (signed).
+    ///
+    /// A plan that turns round on its way arrives from the other side, and comes to rest.
+    #[must_use]
+    pub fn ending_at(mut self, velocity: f64) -> Self {
+        let arrival = self.at(self.duration_s * (1.0 - 1e-12)).velocity;
+        let goes_on = self.duration_s > 0.0 && arrival * velocity > 0.0;
+        self.end.velocity = if goes_on { arrival.abs().min(velocity.abs()).copysign(velocity) } else { 0.0 };
+        self
+    }
+
     /// The point at a time after the start.
     pub fn at(&self, time_s: f64) -> Point {
         if time_s >= self.duration_s {
@@ -66,27 +100,63 @@ impl Profile {
             return Point { position, ..self.end };
         }
         let mut time_s = time_s.max(0.0);
-        let mut position = 0.0;
-        for stretch in &self.stretches {
-            if time_s < stretch.duration_s {
-                return stretch.at(self.shape, time_s).moved_by(position);
+        match &self.course {
+            Course::Stretches(shape, stretches) => {
+                let mut position = 0.0;
+                for stretch in stretches {
+                    if time_s < stretch.duration_s {
+                        return stretch.at(*shape, time_s).moved_by(position);
+                    }
+                    time_s -= stretch.duration_s;
+                    position += stretch.distance();
+                }
             }
-            time_s -= stretch.duration_s;
-            position += stretch.distance();
+            Course::Jerks(start, jerks) => {
+                let mut from = *start;
+                for jerk in jerks {
+                    if time_s < jerk.duration_s {
+                        return jerk.at(from, time_s);
+                    }
+                    time_s -= jerk.duration_s;
+                    from = jerk.at(from, jerk.duration_s);
+                }
+            }
         }
         self.end
     }
 
     /// Joins one more stretch; one without duration leaves only its step of velocity.
     fn push(&mut self, index: usize, duration_s: f64, from: f64, to: f64) {
-        self.stretches[index] = Stretch { duration_s, from, to };
-        self.duration_s += duration_s;
+        if let Course::Stretches(_, stretches) = &mut self.course {
+            stretches[index] = Stretch { duration_s, from, to };
+            self.duration_s += duration_s;
+        }
+    }
+
+    fn travelled(&self) -> f64 {
+        match &self.course {
+            Course::Stretches(_, stretches) => stretches.iter().map(Stretch::distance).sum(),
+            Course::Jerks(..) => self.end.position,
+        }
     }
 }
 
 impl Point {
     fn moved_by(self, distance: f64) -> Point {
         Point { position: self.position + distance, ..self }
+    }
+}
+
+impl Jerk {
+    /// The point `time_s` after `from`.
+    pub(crate) fn at(self, from: Point, time_s: f64) -> Point {
+        let Point { position, velocity, acceleration } = from;
+        let (t, jerk) = (time_s, self.jerk);
+        Point {
+            position: position + t * (velocity + t * (0.5 * acceleration + t * jerk / 6.0)),
+            velocity: velocity + t * (acceleration + 0.5 * t * jerk),
+            acceleration: acceleration + t * jerk,
+        }
     }
 }
 
@@ -147,7 +217,7 @@ pub(crate) fn sane_time(time_s: f64) -> f64 {
 pub(crate) fn velocity_change(shape: Shape, from: f64, to: f64, duration_s: f64) -> Profile {
     let mut profile = Profile::new(shape);
     profile.push(0, duration_s, from, to);
-    profile.end = Point { position: profile.stretches[0].distance(), velocity: to, acceleration: 0.0 };
+    profile.end = Point { position: profile.travelled(), velocity: to, acceleration: 0.0 };
     profile
 }
 
@@ -219,12 +289,6 @@ fn tolerance(distance: f64) -> f64 {
 fn stopping_distance(speed: f64, limits: &MoveLimits) -> f64 {
     let end = limits.end_speed.min(speed);
     0.5 * (speed * speed - end * end) * limits.deceleration_pace
-}
-
-impl Profile {
-    fn travelled(&self) -> f64 {
-        self.stretches.iter().map(Stretch::distance).sum()
-    }
 }
 
 /// Speed up, run, slow down: the last three stretches. `speed` is the present one, towards the target.

@@ -65,10 +65,15 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
     });
     let factors = factors.map(|(slot, _)| (slot, Condition::Check(is_not_zero)));
     let methods = description.axes.iter().filter_map(move |axis| of_axis(axis.placement, HOMING_METHOD, METHOD_CHECKS));
-    modes.chain(set_points).chain(methods).chain(factors).chain(node::conditions(table))
+    let types =
+        description.axes.iter().filter_map(move |axis| of_axis(axis.placement, MOTION_PROFILE_TYPE, TYPE_CHECKS));
+    modes.chain(set_points).chain(methods).chain(types).chain(factors).chain(node::conditions(table))
 }
 
 type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
+
+/// How ramps look.
+const MOTION_PROFILE_TYPE: Mux = Mux::new(0x6086, 0);
 
 /// Velocity factor 1: numerator at sub-index 1, divisor at 2.
 const VELOCITY_FACTOR_1: u16 = 0x6095;
@@ -102,6 +107,14 @@ fn method_is_supported<const OFFSET: u16>(values: &View<'_>, raw: u32) -> Result
     let is_listed = list.peek().is_none() || list.any(|listed| listed == method.0);
     let is_supported = method == HomingMethod::NONE || (method.sequence().is_some() && is_listed);
     if is_supported { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
+}
+
+const TYPE_CHECKS: &[(u16, Check)] = by_axis!(profile_type_is_supported, 0x6086);
+
+/// 6086h: linear, or jerk-limited where the axis has a jerk (60A4h).
+fn profile_type_is_supported<const OFFSET: u16>(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    let has_jerk = values.value(Mux::new(0x60A4 + OFFSET, 1)).is_ok();
+    if raw as i16 == 0 || (raw as i16 == 3 && has_jerk) { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
 }
 
 /// 6060h: a mode that 6502h has, where the axis has 6502h.

@@ -6,6 +6,7 @@ use cia402::{
     AbortConnectionOption, DisableOperationOption, FaultReactionOption, HaltOption, HomingMethod, InterpolationPeriod,
     InterpolationSubMode, QuickStopOption, ShutdownOption, StopRamp, Window,
 };
+use motion::jerk::JerkRamp;
 use motion::set_points::{Following, Interpolation};
 use motion::travel::{Bounds, Travel};
 
@@ -31,6 +32,11 @@ const WINDOW_TIME_MS: i64 = 10;
 const VELOCITY_WINDOW_SHARE: f64 = 0.005;
 const STANDSTILL_SHARE: f64 = 0.001;
 const TORQUE_WINDOW_SHARE: f32 = 0.05;
+
+/// 6086h.
+const JERK_LIMITED: i64 = 3;
+/// A jerk that does not limit, increments/s³: a thousand times what stops any motor within a control period.
+const ANY_JERK: f64 = 1e15;
 
 /// A position that does not limit, increments: finite, so that its product with 0 is a number.
 const FAR: f64 = 1e18;
@@ -142,8 +148,9 @@ impl<S: Storage> Reader<'_, S> {
             Some(_) => self.scales.speed(self.read(slots.profile_velocity, 0)).min(bounds.speed),
             None => bounds.speed,
         };
-        let acceleration = Ramp::Rate(self.rate(slots.acceleration, bounds.acceleration).min(bounds.acceleration));
-        let deceleration = Ramp::Rate(self.rate(slots.deceleration, bounds.deceleration).min(bounds.deceleration));
+        let acceleration = self.rate(slots.acceleration, bounds.acceleration).min(bounds.acceleration);
+        let deceleration = self.rate(slots.deceleration, bounds.deceleration).min(bounds.deceleration);
+        let [acceleration, deceleration] = self.ramps(acceleration, deceleration);
         let ramps = VelocityRamps { start_speed: 0.0, max_speed: bounds.speed, acceleration, deceleration };
         let per_mille_a = rated_torque_nm * 1e-3 / self.motor.torque_constant_nm_a();
         power::Parameters {
@@ -151,6 +158,7 @@ impl<S: Storage> Reader<'_, S> {
                 start_speed: 0.0,
                 max_speed: profile_speed,
                 end_speed: 0.0,
+                passes: false,
                 acceleration,
                 deceleration,
             },
@@ -173,6 +181,28 @@ impl<S: Storage> Reader<'_, S> {
                 current_a: TORQUE_WINDOW_SHARE * self.motor.rated_current_a,
             },
         }
+    }
+
+    /// Straight, or by 6086h = 3 with the jerks of 60A4h as 60A3h names them (CiA 402-2, 60A3h: 1 for all, 2 for either ramp,
+    /// 4 for either end of either ramp). A jerk of 0 does not limit.
+    fn ramps(&self, acceleration: f64, deceleration: f64) -> [Ramp; 2] {
+        let slots = self.slots;
+        let type_of_ramps = self.read(slots.motion_profile_type, 0);
+        let jerks = [slots.jerk_1, slots.jerk_2, slots.jerk_3, slots.jerk_4];
+        if type_of_ramps != JERK_LIMITED || slots.jerk_1.is_none() {
+            return [Ramp::Rate(acceleration), Ramp::Rate(deceleration)];
+        }
+        let places = match self.read(slots.jerk_use, 1) {
+            2 => [0, 0, 1, 1],
+            4 => [0, 1, 2, 3],
+            _ => [0; 4],
+        };
+        let [up_begin, up_end, down_begin, down_end] = places.map(|place: usize| match self.magnitude(jerks[place]) {
+            0 => ANY_JERK,
+            jerk => self.scales.rate(jerk),
+        });
+        let ramp = |rate, begin, end| Ramp::Jerk(JerkRamp { rate, begin, end });
+        [ramp(acceleration, up_begin, up_end), ramp(deceleration, down_begin, down_end)]
     }
 
     fn homing(&self, bounds: &Bounds) -> HomingParameters {

@@ -26,7 +26,7 @@ use super::touch_probes::TouchProbes;
 use crate::engine::actuator::overload::{Overload, OverloadLimits};
 use crate::engine::actuator::servo::{Servo, ServoGains, ServoLimits, ServoModel};
 use crate::engine::axis::{Demand, Feedback, Switches};
-use crate::engine::cia402::{PowerDrive, Targets};
+use crate::engine::cia402::{self as power, PowerDrive, Targets};
 use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis};
 
 /// How long a motor may carry how much more than its rated current. Assumed: the usual class of servo drives.
@@ -87,6 +87,8 @@ pub(super) struct Shaft {
     following_error: bool,
     /// A limit holds a target back.
     limited: bool,
+    /// A software limit holds a velocity back: it goes before the jerk.
+    travel_holds: bool,
     target_hold: TargetHold,
     probes: TouchProbes,
 }
@@ -128,6 +130,7 @@ impl Shaft {
             outside: Dwell::default(),
             following_error: false,
             limited: false,
+            travel_holds: false,
             target_hold: TargetHold::None,
             probes: TouchProbes::default(),
         }
@@ -263,7 +266,13 @@ impl Shaft {
         });
         self.read_targets(values, &feedback);
         let dt_s = f64::from(SUPERVISION_PERIOD_S);
-        let demand = self.power.update(feedback, &self.targets, &self.parameters.power, dt_s);
+        let demand = if self.travel_holds {
+            let velocity = self.parameters.power.velocity.without_jerk();
+            let parameters = power::Parameters { velocity, ..self.parameters.power };
+            self.power.update(feedback, &self.targets, &parameters, dt_s)
+        } else {
+            self.power.update(feedback, &self.targets, &self.parameters.power, dt_s)
+        };
         self.demand = match demand {
             Some(demand) => demand,
             None => self.power.idle(None, dt_s),
@@ -365,6 +374,7 @@ impl Shaft {
             outside,
             following_error,
             limited,
+            travel_holds: _,
             target_hold,
             probes,
         } = self;

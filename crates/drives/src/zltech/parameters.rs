@@ -53,6 +53,7 @@ impl ProfileObjects {
                 start_speed,
                 max_speed: speed(f64::from(values.get(self.profile_velocity))),
                 end_speed: speed(f64::from(values.get(self.end_velocity))),
+                passes: false,
                 acceleration,
                 deceleration,
             },

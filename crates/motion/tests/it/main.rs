@@ -2,5 +2,6 @@
 
 mod closed_loop;
 mod control;
+mod jerk;
 mod planners;
 mod rig;

@@ -6,6 +6,7 @@ mod axes;
 mod bench;
 mod connection;
 mod homing;
+mod jerk;
 mod limits;
 mod modes;
 mod profile_objects;

@@ -3,7 +3,9 @@
 
 use canopen::od::Entry;
 
-use super::values::{ABORT_CONNECTION, FAULT_REACTION, HALT, HOMING_METHODS, MODES, QUICK_STOP, SHUTDOWN};
+use super::values::{
+    ABORT_CONNECTION, FAULT_REACTION, HALT, HOMING_METHODS, JERK_USES, MODES, PROFILE_TYPES, QUICK_STOP, SHUTDOWN,
+};
 use crate::row::cia::{ro, rw, wo};
 use crate::row::{I8, I16, I32, U8, U16, U32};
 
@@ -18,10 +20,11 @@ const TURN: i64 = INCREMENTS_PER_TURN;
 const INC: &str = "inc";
 const INC_S: &str = "inc/s";
 const INC_S2: &str = "inc/s^2";
+const INC_S3: &str = "inc/s^3";
 const PER_MILLE: &str = "0.1 %";
 
 /// Number of rows.
-pub(super) const ROW_COUNT: usize = 138;
+pub(super) const ROW_COUNT: usize = 144;
 
 #[rustfmt::skip]
 pub(super) static ROWS: [Entry; ROW_COUNT] = [
@@ -72,7 +75,7 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x6083, 0, U32).default(200 * TURN).unit(INC_S2).mappable().saved(),
     rw(0x6084, 0, U32).default(200 * TURN).unit(INC_S2).mappable().saved(),
     rw(0x6085, 0, U32).default(1000 * TURN).unit(INC_S2).mappable().saved(),
-    rw(0x6086, 0, I16).described("Shape of ramps").values(&[(0, "linear")]).mappable().saved(),
+    rw(0x6086, 0, I16).described("Shape of ramps").values(PROFILE_TYPES).mappable().saved(),
     rw(0x6087, 0, U32).default(10_000).unit("0.1 %/s").mappable().saved(),
     rw(0x6088, 0, I16).described("Shape of torque ramps").values(&[(0, "linear")]).mappable().saved(),
     ro(0x608F, 0, U8).default(2),
@@ -95,6 +98,12 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x6099, 1, U32).described("Velocity of the search for a switch").default(5 * TURN).unit(INC_S).mappable().saved(),
     rw(0x6099, 2, U32).described("Velocity of the search for the home position").default(TURN / 2).unit(INC_S).mappable().saved(),
     rw(0x609A, 0, U32).described("Acceleration and deceleration of homing").default(200 * TURN).unit(INC_S2).mappable().saved(),
+    rw(0x60A3, 0, U8).described("Which jerks 60A4h has").values(JERK_USES).default(1).mappable().saved(),
+    ro(0x60A4, 0, U8).default(4),
+    rw(0x60A4, 1, U32).default(10_000 * TURN).unit(INC_S3).mappable().saved(),
+    rw(0x60A4, 2, U32).default(10_000 * TURN).unit(INC_S3).mappable().saved(),
+    rw(0x60A4, 3, U32).default(10_000 * TURN).unit(INC_S3).mappable().saved(),
+    rw(0x60A4, 4, U32).default(10_000 * TURN).unit(INC_S3).mappable().saved(),
     rw(0x60B0, 0, I32).described("Added to the target position").unit(INC).mappable(),
     rw(0x60B1, 0, I32).described("Added to the velocity demand").unit(INC_S).mappable(),
     rw(0x60B2, 0, I16).described("Added to the torque demand").unit(PER_MILLE).mappable(),

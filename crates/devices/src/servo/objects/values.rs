@@ -33,6 +33,14 @@ pub(super) const HALT: Values = &[(1, "slow down"), (2, "quick stop"), (3, "curr
 pub(super) const FAULT_REACTION: Values =
     &[(0, "off at once"), (1, "slow down"), (2, "quick stop"), (3, "current limit")];
 
+pub(super) const PROFILE_TYPES: Values = &[(0, "linear"), (3, "jerk-limited")];
+
+pub(super) const JERK_USES: Values = &[
+    (1, "jerk 1 for all"),
+    (2, "jerk 1 to speed up, jerk 2 to slow down"),
+    (4, "jerks 1 and 2 at beginning and end of speeding up, 3 and 4 of slowing down"),
+];
+
 pub(super) const HOMING_METHODS: Values = &[
     (0, "no method"),
     (1, "negative limit switch, then index pulse"),

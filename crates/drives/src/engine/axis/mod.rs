@@ -248,6 +248,16 @@ impl Axis {
         }
     }
 
+    /// A move has come to its target, from which it may go on; of other tasks: [`is_resting`](Self::is_resting).
+    pub fn has_arrived(&self) -> bool {
+        if matches!(self.task, Task::Move { .. }) { self.trajectory.is_done() } else { self.is_resting() }
+    }
+
+    /// A move has passed its target and goes on.
+    pub fn runs_on(&self) -> bool {
+        matches!(self.task, Task::Move { .. }) && self.has_arrived() && self.trajectory.point().velocity != 0.0
+    }
+
     /// The shaft is planned to stand, and has been for a period.
     pub fn is_resting(&self) -> bool {
         match self.task {

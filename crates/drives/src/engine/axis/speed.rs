@@ -16,6 +16,14 @@ pub struct VelocityRamps {
     pub deceleration: Ramp,
 }
 
+impl VelocityRamps {
+    /// The same without limits of the jerk.
+    #[must_use]
+    pub const fn without_jerk(self) -> Self {
+        Self { acceleration: self.acceleration.without_jerk(), deceleration: self.deceleration.without_jerk(), ..self }
+    }
+}
+
 /// What the trajectory leads to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Speed {
@@ -37,7 +45,8 @@ impl Speed {
     fn plan(&mut self, target: f64, trajectory: &mut Trajectory, ramps: &VelocityRamps) {
         let now = trajectory.point();
         // One rate for both ways is one straight line through zero.
-        let straight = ramps.acceleration == ramps.deceleration && matches!(ramps.acceleration, Ramp::Rate(_));
+        let straight =
+            ramps.acceleration == ramps.deceleration && matches!(ramps.acceleration, Ramp::Rate(_) | Ramp::Jerk(_));
         let reverses = now.velocity * target < 0.0 && !straight;
         let next = if reverses { 0.0 } else { target };
         if self.heading_for == Some(next) && !(trajectory.is_done() && now.velocity != next) {

@@ -8,8 +8,14 @@ const DT_S: f64 = 0.5e-3;
 /// Counts/s².
 const RATE: f64 = 2000.0;
 const RAMP: Ramp = Ramp::Rate(RATE);
-const LIMITS: MoveLimits =
-    MoveLimits { start_speed: 0.0, max_speed: 1000.0, end_speed: 0.0, acceleration: RAMP, deceleration: RAMP };
+const LIMITS: MoveLimits = MoveLimits {
+    start_speed: 0.0,
+    max_speed: 1000.0,
+    end_speed: 0.0,
+    passes: false,
+    acceleration: RAMP,
+    deceleration: RAMP,
+};
 const SPEEDS: VelocityRamps =
     VelocityRamps { start_speed: 0.0, max_speed: 1000.0, acceleration: RAMP, deceleration: RAMP };
 const HOLD: Task = Task::Hold { control: Control::Position, ramp: RAMP };

@@ -3,7 +3,7 @@
 //! Units are counts and counts/s. The anchor is a wrapping 32-bit position, so a shaft may turn for ever; the
 //! way since the anchor is in double precision, so a move over 2^31 counts ends exactly.
 
-use motion::{Profile, scurve, trapezoid};
+use motion::{Profile, jerk, scurve, trapezoid};
 
 use super::ramp::Ramp;
 
@@ -50,6 +50,8 @@ pub struct MoveLimits {
     pub max_speed: f64,
     /// Speed that the motion ends from.
     pub end_speed: f64,
+    /// It goes on with that speed past its target, in place of a step to rest.
+    pub passes: bool,
     /// From the present speed to the plateau.
     pub acceleration: Ramp,
     /// From the plateau to the end speed.
@@ -84,6 +86,10 @@ impl Trajectory {
                 deceleration_time_s,
             }
             .plan(),
+            (Ramp::Jerk(up), Ramp::Jerk(down)) => {
+                let acceleration = from.acceleration;
+                jerk::PositionMove { distance, velocity, acceleration, max_speed, end_speed, up, down }.plan()
+            }
             (up, down) => trapezoid::PositionMove {
                 distance,
                 velocity,
@@ -95,6 +101,7 @@ impl Trajectory {
             }
             .plan(),
         };
+        let profile = if limits.passes { profile.ending_at(end_speed.copysign(distance)) } else { profile };
         Self { origin: from.position, fraction: from.fraction, profile, elapsed_s: 0.0 }
     }
 
@@ -104,11 +111,12 @@ impl Trajectory {
     /// longer one that passes `from` with its acceleration. A host that sends a new target every 20 ms is followed smoothly
     /// so, where ever new beginnings of the S would hardly move. From rest it is the plain S of the time.
     pub fn change_velocity(from: TrajectoryPoint, velocity: f64, ramp: Ramp) -> Self {
+        let beginning_here = |profile| Self { origin: from.position, fraction: from.fraction, profile, elapsed_s: 0.0 };
         let time_s = match ramp {
             Ramp::Time(time_s) => time_s,
-            Ramp::Rate(rate) => {
-                let profile = trapezoid::velocity_change(from.velocity, velocity, rate);
-                return Self { origin: from.position, fraction: from.fraction, profile, elapsed_s: 0.0 };
+            Ramp::Rate(rate) => return beginning_here(trapezoid::velocity_change(from.velocity, velocity, rate)),
+            Ramp::Jerk(ref ramp) => {
+                return beginning_here(jerk::velocity_change(from.velocity, from.acceleration, velocity, ramp));
             }
         };
         let (change, elapsed_s) = passing(velocity - from.velocity, from.acceleration, time_s);

@@ -37,7 +37,7 @@ impl PowerDrive {
                 self.rest(Control::Position, slow_down);
                 let demand = self.axis.update(dt_s);
                 let new_set_point = self.power.controlword().has(Controlword::NEW_SET_POINT);
-                if self.set_points.update(new_set_point, self.axis.is_resting()) {
+                if self.set_points.update(new_set_point, self.axis.has_arrived()) {
                     self.set_off(parameters);
                     return Demand::Position(self.axis.point());
                 }

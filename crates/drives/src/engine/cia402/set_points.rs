@@ -44,13 +44,13 @@ impl SetPoints {
         at_once
     }
 
-    /// One period, after the shaft has moved on: a set-point that waits follows one that has ended (`at_rest`), and the
+    /// One period, after the shaft has moved on: a set-point that waits follows one that has ended (`arrived`), and the
     /// acknowledge bit falls once bit 4 (`new_set_point`) is down and the queue has room. True if the move to
     /// [`target`](Self::target) begins now.
     #[must_use]
-    pub fn update(&mut self, new_set_point: bool, at_rest: bool) -> bool {
+    pub fn update(&mut self, new_set_point: bool, arrived: bool) -> bool {
         let mut begins = false;
-        if self.under_way && at_rest {
+        if self.under_way && arrived {
             self.under_way = false;
             if let Some(next) = self.waiting.take() {
                 self.aim(next);
@@ -118,6 +118,7 @@ mod tests {
         start_speed: 0.0,
         max_speed: 1000.0,
         end_speed: 0.0,
+        passes: false,
         acceleration: Ramp::Time(0.1),
         deceleration: Ramp::Time(0.1),
     };

@@ -6,7 +6,7 @@ use super::modes::is_cyclic;
 use super::parameters::{Parameters, Targets};
 use super::power_drive::{HERE, PowerDrive};
 use super::stop::{ExternalStop, StopCause, of_halt, of_quick_stop, or_emergency};
-use crate::engine::axis::{Braking, Cyclic, Demand, Stop, StopEnd};
+use crate::engine::axis::{Braking, Cyclic, Demand, MoveLimits, Stop, StopEnd, Task};
 
 /// A stop is over when the motor stands, or this long after its ramp: a load that drives the motor may never let it.
 const STANDSTILL_PATIENCE_S: f64 = 1.0;
@@ -116,6 +116,9 @@ impl PowerDrive {
     fn resume(&mut self, parameters: &Parameters) {
         if self.set_points.is_under_way() {
             self.set_off(parameters);
+        } else if matches!(self.axis.task(), Task::Move { limits: MoveLimits { passes: true, .. }, .. }) {
+            // It had passed its target: there is none to go back to.
+            self.axis.begin(HERE);
         }
         self.stop = None;
         self.axis.set_stop(None);

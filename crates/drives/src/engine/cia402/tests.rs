@@ -16,8 +16,14 @@ const SLOW: Ramp = Ramp::Rate(1000.0);
 const QUICK: Ramp = Ramp::Rate(4000.0);
 
 fn parameters() -> Parameters {
-    let limits =
-        MoveLimits { start_speed: 0.0, max_speed: 1000.0, end_speed: 0.0, acceleration: SLOW, deceleration: SLOW };
+    let limits = MoveLimits {
+        start_speed: 0.0,
+        max_speed: 1000.0,
+        end_speed: 0.0,
+        passes: false,
+        acceleration: SLOW,
+        deceleration: SLOW,
+    };
     Parameters {
         moves: limits,
         velocity: VelocityRamps { start_speed: 0.0, max_speed: 1000.0, acceleration: SLOW, deceleration: SLOW },

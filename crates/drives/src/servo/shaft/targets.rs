@@ -17,6 +17,7 @@ impl Shaft {
     /// Targets from the objects, held to the limits.
     pub(super) fn read_targets(&mut self, values: &mut Dictionary<impl Storage>, feedback: &Feedback) {
         self.limited = false;
+        self.travel_holds = false;
         let position = f64::from(feedback.position);
         let mode = self.power.mode();
         let cyclic = match mode {
@@ -182,7 +183,9 @@ impl Shaft {
         let bounds = self.parameters.bounds;
         let mut held = wanted.clamp(-bounds.speed, bounds.speed);
         if let Some(travel) = self.parameters.travel {
-            held = travel.hold_velocity(position, held, self.parameters.following.deceleration);
+            let stoppable = travel.hold_velocity(position, held, self.parameters.following.deceleration);
+            self.travel_holds = stoppable != held;
+            held = stoppable;
         }
         self.limited |= held != wanted;
         held
