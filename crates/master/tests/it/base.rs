@@ -5,9 +5,10 @@ use std::time::Duration;
 
 use crate::support::node;
 use can::{Bitrate, Instant};
+use canopen::Mux;
 use cia402::ModeOfOperation;
 use master::base::{Base, BaseError, BaseLimits, Geometry, Pose, StopCause, Twist, WheelSetup};
-use master::cyclic::{CyclicOptions, Refusal};
+use master::cyclic::{CyclicOptions, NotAtRest, Refusal};
 use master::drive::MotionOptions;
 use master::units::Rpm;
 use master::{Drive, Error, Network};
@@ -342,4 +343,22 @@ fn bad_input_is_refused() {
     let fast = bench.try_open(BaseLimits { wheel_m_s: 50.0, ..LIMITS }).unwrap_err();
     assert!(matches!(fast, BaseError::BeyondDrive { .. }), "{fast}");
     bench.open();
+}
+
+#[test]
+fn a_wheel_that_its_load_drives_was_not_brought_to_rest() {
+    let mut bench = Bench::apart();
+    // 5 A at most (2015h, in 0.1 A), 3.8 N·m: its load is stronger, and it goes on.
+    let right = bench.wheels[1].drive.node().clone();
+    block_on(&mut bench.world, right.write(Mux::new(0x2015, 0), 50_u16)).unwrap().unwrap();
+    let mut base = bench.open();
+    bench.drive(&mut base, 0.2, 0.0, 0.5);
+    bench.world.apply(Place::node(RIGHT), &Stimulus::LoadTorque(4.5)).unwrap().unwrap();
+    let stopped = block_on(&mut bench.world, base.stop()).unwrap();
+    let Err(BaseError::NotAtRest(why)) = &stopped else { panic!("{stopped:?}") };
+    let NotAtRest::StillTurns { node: turning, rpm, .. } = why else { panic!("{why:?}") };
+    assert_eq!(*turning, node(RIGHT));
+    let true_rpm = f64::from(bench.world.report(RIGHT).unwrap().velocity_rpm);
+    assert!(rpm.abs() > 2.0 && (rpm.abs() - true_rpm.abs()).abs() < 0.2 * true_rpm.abs(), "{rpm} for {true_rpm} r/min");
+    assert!(why.to_string().contains("node 2 still turns at"), "{why}");
 }
