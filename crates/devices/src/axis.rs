@@ -1,3 +1,5 @@
+use core::time::Duration;
+
 use canopen::Mux;
 use cia402::{HomingMethod, HomingRow, HomingSequence, ModeOfOperation, PowerState, Statusword};
 
@@ -23,6 +25,9 @@ pub struct AxisDescription {
     pub new_set_point: NewSetPoint,
     /// Bits of the statusword that mean something of this model's own, in words.
     pub statusword_bits: &'static [(u16, &'static str)],
+    /// How long it takes from one point of an interpolated position to the next, where that does not follow a period that is
+    /// set (60C2h).
+    pub interpolation: Option<Duration>,
     /// How it finds its reference position, where it does.
     pub homing: Option<HomingRules>,
     /// Its inputs and its brake, as a drive of one axis has them: [`object`](Self::object) says where this axis has them.

@@ -10,6 +10,8 @@ pub mod objects;
 pub mod statusword;
 pub mod variations;
 
+use core::time::Duration;
+
 use can::Bitrate;
 use canopen::od::DataType;
 use canopen::pdo::{EventTrigger, MappingRules, TpdoForm};
@@ -107,6 +109,8 @@ const AXIS: AxisDescription = AxisDescription {
     power: PowerStyle::EchoesControlword { following: 0b10_0111, live: LIVE, alarm: Statusword::FAULT },
     new_set_point: NewSetPoint::ClearsItself,
     statusword_bits: STATUSWORD_BITS,
+    // "The interpolation cycle is completed every 2ms" (5.10.3).
+    interpolation: Some(Duration::from_millis(2)),
     homing: Some(HOMING),
     terminals: Terminals::NONE,
     units: UNITS,

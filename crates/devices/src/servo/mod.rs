@@ -74,6 +74,7 @@ pub const fn axis(placement: Placement, modes: &'static [ModeOfOperation]) -> Ax
         power: PowerStyle::Cia402,
         new_set_point: NewSetPoint::Handshake,
         statusword_bits: &[],
+        interpolation: None,
         homing: Some(HOMING),
         terminals: Terminals::CIA402,
         units: UNITS,

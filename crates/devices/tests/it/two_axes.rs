@@ -12,6 +12,7 @@ const MODES: &[ModeOfOperation] = &[ModeOfOperation::PROFILE_VELOCITY];
 
 /// What both kinds have at each of their axes.
 const AXIS: AxisDescription = AxisDescription {
+    interpolation: None,
     homing: None,
     units: Units {
         counts_per_turn: CountsPerTurn::Fixed(4096),

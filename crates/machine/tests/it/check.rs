@@ -447,3 +447,24 @@ fn each_trap_of_a_machine_file_is_at_its_line() {
     let limited = format!("{servo}limits = {{ position = [-5000, 5000] }}\n");
     assert!(!placed(&of(&limited)).iter().any(|found| found.0 == "limits"), "{:#?}", of(&limited).findings);
 }
+
+#[test]
+fn a_joint_that_interpolates_over_its_own_time_wants_that_cycle() {
+    let group = |mode: &str, period: &str| {
+        let axis = "velocity_deg_s = 60\nacceleration_deg_s2 = 60\njerk_deg_s3 = 600\nfollowing_error_deg = 5\n";
+        let text = format!(
+            "[[drive]]\nmodel = \"m4230e17b50\"\nnode = 1\n[[group]]\nname = \"arm\"\nperiod = \"{period}\"\n[[group.axis]]\nnode = 1\n\
+             {mode}{axis}"
+        );
+        of_machine(&text, &PathBuf::new()).unwrap().findings
+    };
+    let about = |findings: Vec<Finding>| findings.into_iter().find(|finding| finding.rule == "interpolation");
+    // M Robot Joint Motor CanOpen Manual, 5.10.3: an interpolation cycle each 2 ms.
+    for mode in ["mode = \"ip\"\n", ""] {
+        let found = about(group(mode, "10ms")).expect("it stands four fifths of the time");
+        assert_eq!((found.severity, found.node, found.at.line), (Severity::Warning, Some(1), 6));
+        assert_eq!(found.next, "set `period = \"2ms\"`");
+        assert_eq!(about(group(mode, "2ms")), None);
+    }
+    assert_eq!(about(group("mode = \"pv\"\n", "10ms")), None, "by speeds it does not interpolate");
+}

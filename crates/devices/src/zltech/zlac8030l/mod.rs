@@ -77,6 +77,7 @@ const AXIS: AxisDescription = AxisDescription {
     power: PowerStyle::Cia402,
     new_set_point: NewSetPoint::Handshake,
     statusword_bits: &[(IN_POSITION, "in position"), (RUNNING, "running"), (EXTERNAL_STOP, "external stop")],
+    interpolation: None,
     homing: None,
     terminals: TERMINALS,
     units: Units {

@@ -70,6 +70,7 @@ const AXIS: AxisDescription = AxisDescription {
     power: PowerStyle::Cia402,
     new_set_point: NewSetPoint::Handshake,
     statusword_bits: STATUSWORD_BITS,
+    interpolation: None,
     homing: Some(HOMING),
     terminals: TERMINALS,
     units: UNITS,
