@@ -7,7 +7,7 @@ use can::{Frame, Instant, Station};
 use canopen::NodeId;
 use canopen::node::Node;
 use drives::Firmware;
-use drives::zlac8030l::objects::Room;
+use drives::zlac8030l::objects::TableStorage;
 use drives::zlac8030l::{Hardware, NODE_PROFILE, Zlac8030l};
 
 /// All happens at once: no deadline is reached while the same frame comes again and again.
@@ -59,7 +59,7 @@ fn set_up(station: &mut impl Station) {
 }
 
 /// The drive's communication without the drive.
-pub(crate) fn node() -> Node<Room> {
+pub(crate) fn node() -> Node<TableStorage> {
     let mut node = Node::new(&NODE_PROFILE, NodeId::new(4).expect("4 is a node-ID"));
     node.boot(Instant::ZERO);
     set_up(&mut node);
@@ -76,7 +76,7 @@ pub(crate) fn firmware() -> Zlac8030l {
 }
 
 /// A frame to the node and all its consequences.
-pub(crate) fn exchange_with_node(node: &mut Node<Room>, frame: &Frame) -> u64 {
+pub(crate) fn exchange_with_node(node: &mut Node<TableStorage>, frame: &Frame) -> u64 {
     node.handle_frame(black_box(frame), NOW);
     let sum = drain(node);
     while let Some(event) = node.poll_event() {
@@ -92,7 +92,7 @@ pub(crate) fn exchange_with_firmware(drive: &mut Zlac8030l, frame: &Frame) -> u6
 }
 
 /// A call when nothing is due.
-pub(crate) fn idle(node: &mut Node<Room>) -> (bool, bool, Option<Instant>) {
+pub(crate) fn idle(node: &mut Node<TableStorage>) -> (bool, bool, Option<Instant>) {
     node.handle_timeout(black_box(NOW));
     (node.poll_transmit().is_some(), node.poll_event().is_some(), node.poll_timeout())
 }

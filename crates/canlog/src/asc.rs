@@ -73,7 +73,7 @@ impl Parser {
         ["internal events", "no internal events", "end triggerblock"].iter().any(|known| lower.starts_with(known))
     }
 
-    fn classical(&self, channel: &str, words: &[&str]) -> Result<Option<Found>, &'static str> {
+    fn classical(&self, channel: &str, words: &[&str]) -> Result<Option<Parsed>, &'static str> {
         let interface = interface(channel)?;
         let (id, way, rest) = match words {
             [error, ..] if error.eq_ignore_ascii_case("ErrorFrame") => {
@@ -95,7 +95,7 @@ impl Parser {
     }
 
     /// `CANFD 1 Rx 123 [name] BRS ESI DLC LENGTH data.. duration bits flags ..`
-    fn fd(&self, channel: &str, words: &[&str]) -> Result<Option<Found>, &'static str> {
+    fn fd(&self, channel: &str, words: &[&str]) -> Result<Option<Parsed>, &'static str> {
         const FORM: &str = "expected CANFD, channel, Rx or Tx, identifier, BRS, ESI, DLC, length and so many bytes";
         let interface = interface(channel)?;
         let (way, rest) = words.split_first().ok_or(FORM)?;
@@ -156,7 +156,7 @@ impl Parser {
     }
 }
 
-type Found = (Interface, Option<Direction>, Content);
+type Parsed = (Interface, Option<Direction>, Content);
 
 fn interface(channel: &str) -> Result<Interface, &'static str> {
     channel.parse().map(Interface::numbered).map_err(|_| "the channel is not a number")
@@ -172,13 +172,13 @@ fn direction(word: &str) -> Result<Direction, &'static str> {
 
 /// Writes the lines of a file; the head comes with the first record, whose time it has.
 #[derive(Debug, Default)]
-pub(super) struct Writer {
+pub(super) struct AscWriter {
     begin: Option<Instant>,
     last: Instant,
     line: Vec<u8>,
 }
 
-impl Writer {
+impl AscWriter {
     pub(super) fn write(&mut self, output: &mut impl Write, record: &Record) -> io::Result<()> {
         let begin = self.head(output, record.at)?;
         // Time does not go back in such a file.

@@ -11,7 +11,7 @@ use std::io::{self, Read};
 use can::{CanId, Frame, Instant, MAX_DATA_LENGTH};
 use flate2::read::ZlibDecoder;
 
-use crate::bytes::{Source, u16_at, u32_at, u64_at};
+use crate::bytes::{ByteSource, u16_at, u32_at, u64_at};
 use crate::calendar::of_system_time;
 use crate::finding::{Finding, Place};
 use crate::record::{Content, Direction, Entry, Interface, RawErrorFrame, Record};
@@ -63,7 +63,7 @@ const MAX_TOLD: usize = 64;
 
 #[derive(Debug)]
 pub(super) struct BlfReader<R> {
-    source: Source<R>,
+    source: ByteSource<R>,
     begin: Instant,
     stage: Stage,
     /// What came out of containers and is not used up.
@@ -83,7 +83,7 @@ enum Stage {
 
 impl<R: Read> BlfReader<R> {
     pub(super) fn new(input: R) -> Self {
-        let source = Source::new(input);
+        let source = ByteSource::new(input);
         let (plain, reported) = (Vec::new(), BTreeSet::new());
         Self { source, begin: Instant::ZERO, stage: Stage::Head, plain, used: 0, before: 0, reported }
     }

@@ -19,14 +19,14 @@ pub(super) fn u64_at(bytes: &[u8], place: usize) -> u64 {
 
 /// Reads, and knows where it is.
 #[derive(Debug)]
-pub(super) struct Source<R> {
+pub(super) struct ByteSource<R> {
     input: R,
     /// Bytes that were read too far.
     again: Vec<u8>,
     offset: u64,
 }
 
-impl<R: Read> Source<R> {
+impl<R: Read> ByteSource<R> {
     pub(super) const fn new(input: R) -> Self {
         Self { input, again: Vec::new(), offset: 0 }
     }
@@ -114,7 +114,7 @@ mod tests {
         for gap in [0, 1, 4090, 4093, 4096, 9000] {
             let mut bytes = vec![b'x'; 8 + gap];
             bytes.extend_from_slice(b"LOBJ and more");
-            let mut source = Source::new(&bytes[..]);
+            let mut source = ByteSource::new(&bytes[..]);
             let mut begun = [0; 8];
             source.read_up_to(&mut begun).unwrap();
             source.find(b"LOBJ", &begun).unwrap();
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn what_is_not_there_is_not_asked_for_memory() {
         let mut out = Vec::new();
-        assert!(!Source::new(&b"abc"[..]).read_exactly(1_000_000_000, &mut out).unwrap());
+        assert!(!ByteSource::new(&b"abc"[..]).read_exactly(1_000_000_000, &mut out).unwrap());
         assert_eq!((out.as_slice(), out.capacity() < 10_000), (&b"abc"[..], true));
     }
 }

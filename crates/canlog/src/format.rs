@@ -23,7 +23,7 @@ pub enum Format {
 }
 
 /// One row of the table of formats.
-struct Row {
+struct FormatRow {
     format: Format,
     name: &'static str,
     extensions: &'static [&'static str],
@@ -31,13 +31,18 @@ struct Row {
     begin: Option<&'static [u8]>,
 }
 
-const ROWS: [Row; 6] = [
-    Row { format: Format::Candump, name: "candump", extensions: &["log", "candump", "txt"], begin: Some(b"(") },
-    Row { format: Format::Asc, name: "ASC", extensions: &["asc"], begin: Some(b"date ") },
-    Row { format: Format::Blf, name: "BLF", extensions: &["blf"], begin: Some(b"LOGG") },
-    Row { format: Format::Trc, name: "TRC", extensions: &["trc"], begin: None },
-    Row { format: Format::Pcap, name: "pcap", extensions: &["pcap", "cap"], begin: None },
-    Row { format: Format::Pcapng, name: "pcapng", extensions: &["pcapng", "ntar"], begin: Some(b"\x0A\x0D\x0D\x0A") },
+const ROWS: [FormatRow; 6] = [
+    FormatRow { format: Format::Candump, name: "candump", extensions: &["log", "candump", "txt"], begin: Some(b"(") },
+    FormatRow { format: Format::Asc, name: "ASC", extensions: &["asc"], begin: Some(b"date ") },
+    FormatRow { format: Format::Blf, name: "BLF", extensions: &["blf"], begin: Some(b"LOGG") },
+    FormatRow { format: Format::Trc, name: "TRC", extensions: &["trc"], begin: None },
+    FormatRow { format: Format::Pcap, name: "pcap", extensions: &["pcap", "cap"], begin: None },
+    FormatRow {
+        format: Format::Pcapng,
+        name: "pcapng",
+        extensions: &["pcapng", "ntar"],
+        begin: Some(b"\x0A\x0D\x0D\x0A"),
+    },
 ];
 
 /// So many bytes of a file's begin are enough for [`Format::of_content`].
@@ -49,14 +54,14 @@ impl Format {
         ROWS.iter().map(|row| row.format)
     }
 
-    fn row(self) -> &'static Row {
+    fn row(self) -> &'static FormatRow {
         ROWS.iter().find(|row| row.format == self).unwrap_or(&ROWS[0])
     }
 
     /// The one of a file's extension, in any case.
     pub fn of_name(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?;
-        let is_its = |row: &&Row| row.extensions.iter().any(|known| extension.eq_ignore_ascii_case(known));
+        let is_its = |row: &&FormatRow| row.extensions.iter().any(|known| extension.eq_ignore_ascii_case(known));
         ROWS.iter().find(is_its).map(|row| row.format)
     }
 

@@ -6,7 +6,7 @@ use std::io::{self, Read};
 
 use can::Instant;
 
-use crate::bytes::Source;
+use crate::bytes::ByteSource;
 use crate::finding::{Finding, Place};
 use crate::packet::{self, MAX_PACKET};
 use crate::record::{Entry, Interface, Record};
@@ -20,12 +20,12 @@ const MAX_DECLARED: u32 = 256 << 10;
 
 #[derive(Debug)]
 pub(super) struct PcapReader<R> {
-    source: Source<R>,
-    state: State,
+    source: ByteSource<R>,
+    state: ReadState,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum State {
+enum ReadState {
     Head,
     Packets { swapped: bool, nanos: bool, link: u32 },
     End,
@@ -33,21 +33,21 @@ enum State {
 
 impl<R: Read> PcapReader<R> {
     pub(super) fn new(input: R) -> Self {
-        Self { source: Source::new(input), state: State::Head }
+        Self { source: ByteSource::new(input), state: ReadState::Head }
     }
 
     pub(super) fn next_entry(&mut self) -> io::Result<Option<Entry>> {
         loop {
             let result = match self.state {
-                State::End => return Ok(None),
-                State::Head => self.head()?.map(|()| None),
-                State::Packets { swapped, nanos, link } => self.packet(swapped, nanos, link)?,
+                ReadState::End => return Ok(None),
+                ReadState::Head => self.head()?.map(|()| None),
+                ReadState::Packets { swapped, nanos, link } => self.packet(swapped, nanos, link)?,
             };
             match result {
                 Ok(Some(entry)) => return Ok(Some(entry)),
                 Ok(None) => {}
                 Err(finding) => {
-                    self.state = State::End;
+                    self.state = ReadState::End;
                     return Ok(Some(Entry::Finding(finding)));
                 }
             }
@@ -70,7 +70,7 @@ impl<R: Read> PcapReader<R> {
             };
             // The upper bits are about frame check sequences, which CAN does not have.
             let link = number(swapped, 20) & 0x0FFF_FFFF;
-            self.state = State::Packets { swapped, nanos, link };
+            self.state = ReadState::Packets { swapped, nanos, link };
             return Ok(packet::refused_link(link).map_or(Ok(()), |reason| Err(found(20, reason))));
         }
         Ok(Err(found(
@@ -85,7 +85,7 @@ impl<R: Read> PcapReader<R> {
         let mut head = [0; 16];
         match self.source.read_up_to(&mut head)? {
             0 => {
-                self.state = State::End;
+                self.state = ReadState::End;
                 return Ok(Ok(None));
             }
             16 => {}

@@ -8,7 +8,7 @@ use std::io::{self, Read, Write};
 
 use can::Instant;
 
-use crate::bytes::Source;
+use crate::bytes::ByteSource;
 use crate::finding::{Finding, Place};
 use crate::packet::{self, CAN_SOCKETCAN};
 use crate::record::{Content, Direction, Entry, Interface, Record};
@@ -32,14 +32,14 @@ const MAX_INTERFACES: usize = 256;
 
 #[derive(Debug)]
 pub(super) struct PcapngReader<R> {
-    source: Source<R>,
+    source: ByteSource<R>,
     swapped: bool,
     interfaces: Vec<Link>,
-    state: State,
+    state: ReadState,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
+enum ReadState {
     /// Before the first section.
     Begin,
     Blocks,
@@ -71,18 +71,18 @@ impl From<&'static str> for Bad {
 
 impl<R: Read> PcapngReader<R> {
     pub(super) fn new(input: R) -> Self {
-        Self { source: Source::new(input), swapped: false, interfaces: Vec::new(), state: State::Begin }
+        Self { source: ByteSource::new(input), swapped: false, interfaces: Vec::new(), state: ReadState::Begin }
     }
 
     pub(super) fn next_entry(&mut self) -> io::Result<Option<Entry>> {
-        while self.state != State::End {
+        while self.state != ReadState::End {
             let place = self.source.offset();
             match self.block()? {
                 Ok(Some(record)) => return Ok(Some(Entry::Record(record))),
                 Ok(None) => {}
                 Err(Bad { reason, fatal }) => {
                     if fatal {
-                        self.state = State::End;
+                        self.state = ReadState::End;
                     }
                     return Ok(Some(Entry::Finding(Finding {
                         place: Place::Byte(place),
@@ -100,8 +100,8 @@ impl<R: Read> PcapngReader<R> {
         let mut head = [0; 8];
         match self.source.read_up_to(&mut head)? {
             8 => {}
-            0 if self.state == State::Blocks => {
-                self.state = State::End;
+            0 if self.state == ReadState::Blocks => {
+                self.state = ReadState::End;
                 return Ok(Ok(None));
             }
             _ => return fatal("the log ends within the head of a block"),
@@ -119,7 +119,7 @@ impl<R: Read> PcapngReader<R> {
                 other if other.swap_bytes() == BYTE_ORDER => true,
                 _ => return fatal("a section has no byte order of pcapng, 1A2B3C4Dh"),
             };
-        } else if self.state == State::Begin {
+        } else if self.state == ReadState::Begin {
             return fatal("this is not a pcapng file: it does not begin with a section header, 0A0D0D0Ah");
         }
         let kind = if is_section { SECTION } else { self.number(&head, 0) };
@@ -143,7 +143,7 @@ impl<R: Read> PcapngReader<R> {
         Ok(match kind {
             SECTION => {
                 self.interfaces.clear();
-                self.state = State::Blocks;
+                self.state = ReadState::Blocks;
                 Ok(None)
             }
             INTERFACE => self.interface(&body).map(|()| None),

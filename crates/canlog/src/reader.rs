@@ -20,7 +20,7 @@ use crate::{asc, candump, trc};
 /// Reads a log: records, and findings where something is passed over. After a finding reading goes on; memory is bounded
 /// whatever the file says.
 pub struct LogReader<R> {
-    form: Form<R>,
+    form: FormReader<R>,
     format: Format,
     last: Instant,
 }
@@ -31,7 +31,7 @@ impl<R> fmt::Debug for LogReader<R> {
     }
 }
 
-enum Form<R> {
+enum FormReader<R> {
     Candump(Lines<R>),
     Asc(Lines<R>, asc::Parser),
     Trc(Lines<R>, trc::Parser),
@@ -81,12 +81,12 @@ impl<R: BufRead> LogReader<R> {
     /// A reader of `input`, which has this form.
     pub fn new(input: R, format: Format) -> Self {
         let form = match format {
-            Format::Candump => Form::Candump(Lines::new(input)),
-            Format::Asc => Form::Asc(Lines::new(input), asc::Parser::default()),
-            Format::Trc => Form::Trc(Lines::new(input), trc::Parser::default()),
-            Format::Blf => Form::Blf(BlfReader::new(input)),
-            Format::Pcap => Form::Pcap(PcapReader::new(input)),
-            Format::Pcapng => Form::Pcapng(PcapngReader::new(input)),
+            Format::Candump => FormReader::Candump(Lines::new(input)),
+            Format::Asc => FormReader::Asc(Lines::new(input), asc::Parser::default()),
+            Format::Trc => FormReader::Trc(Lines::new(input), trc::Parser::default()),
+            Format::Blf => FormReader::Blf(BlfReader::new(input)),
+            Format::Pcap => FormReader::Pcap(PcapReader::new(input)),
+            Format::Pcapng => FormReader::Pcapng(PcapngReader::new(input)),
         };
         Self { form, format, last: Instant::ZERO }
     }
@@ -107,14 +107,14 @@ impl<R: BufRead> LogReader<R> {
     /// That of reading the file.
     pub fn next_entry(&mut self) -> io::Result<Option<Entry>> {
         let entry = match &mut self.form {
-            Form::Candump(lines) => {
+            FormReader::Candump(lines) => {
                 next_of_lines(lines, |line| candump::parse_line(line).map_err(|error| error.to_string()))
             }
-            Form::Asc(lines, parser) => next_of_lines(lines, |line| parser.line(line).map_err(str::to_owned)),
-            Form::Trc(lines, parser) => next_of_lines(lines, |line| parser.line(line).map_err(str::to_owned)),
-            Form::Blf(reader) => reader.next_entry(),
-            Form::Pcap(reader) => reader.next_entry(),
-            Form::Pcapng(reader) => reader.next_entry(),
+            FormReader::Asc(lines, parser) => next_of_lines(lines, |line| parser.line(line).map_err(str::to_owned)),
+            FormReader::Trc(lines, parser) => next_of_lines(lines, |line| parser.line(line).map_err(str::to_owned)),
+            FormReader::Blf(reader) => reader.next_entry(),
+            FormReader::Pcap(reader) => reader.next_entry(),
+            FormReader::Pcapng(reader) => reader.next_entry(),
         };
         let mut entry = entry?;
         if let Some(Entry::Record(record)) = &mut entry {

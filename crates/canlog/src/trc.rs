@@ -12,7 +12,7 @@ use crate::text;
 
 /// What stands in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Column {
+enum TrcColumn {
     /// Message number, a word that says nothing here.
     Number,
     /// Milliseconds since the start.
@@ -35,10 +35,10 @@ enum Column {
     Data,
 }
 
-use Column::{Bus, Data, Direction as Way, Dlc, Id, Kind, Length, Number, Reserved, Time};
+use TrcColumn::{Bus, Data, Direction as Way, Dlc, Id, Kind, Length, Number, Reserved, Time};
 
 /// The columns of the versions whose files do not name them, "PEAK CAN TRC File Format", 1.0 to 1.3.
-const VERSIONS: [(&str, &[Column]); 4] = [
+const VERSIONS: [(&str, &[TrcColumn]); 4] = [
     ("1.0", &[Number, Time, Id, Length, Data]),
     ("1.1", &[Number, Time, Way, Id, Length, Data]),
     ("1.2", &[Number, Time, Bus, Way, Id, Length, Data]),
@@ -55,7 +55,7 @@ const MAX_COLUMNS: usize = 16;
 #[derive(Debug)]
 pub(super) struct Parser {
     start: Instant,
-    columns: Vec<Column>,
+    columns: Vec<TrcColumn>,
 }
 
 impl Default for Parser {
@@ -130,7 +130,7 @@ impl Parser {
                 self.start = days.ok_or("the start time is not a number of days since 1899-12-30")?;
             }
             "COLUMNS" => {
-                let columns: Option<Vec<Column>> =
+                let columns: Option<Vec<TrcColumn>> =
                     value.split(',').take(MAX_COLUMNS).map(|name| column(name.trim())).collect();
                 self.columns = columns.ok_or("the columns are none of N, O, T, B, I, d, R, l, L, D")?;
             }
@@ -176,7 +176,7 @@ impl Parser {
     }
 }
 
-fn column(name: &str) -> Option<Column> {
+fn column(name: &str) -> Option<TrcColumn> {
     Some(match name {
         "N" => Number,
         "O" => Time,

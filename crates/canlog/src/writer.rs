@@ -12,14 +12,14 @@ use crate::{asc, candump};
 #[derive(Debug)]
 pub struct LogWriter<W> {
     output: W,
-    form: Form,
+    form: FormWriter,
     line: Vec<u8>,
 }
 
 #[derive(Debug)]
-enum Form {
+enum FormWriter {
     Candump,
-    Asc(asc::Writer),
+    Asc(asc::AscWriter),
     Blf(BlfWriter),
     Pcapng(PcapngWriter),
 }
@@ -39,10 +39,10 @@ impl<W: Write + Seek> LogWriter<W> {
     /// [`NotWritten`] of a format that is only read.
     pub fn new(output: W, format: Format) -> Result<Self, NotWritten> {
         let form = match format {
-            Format::Candump => Form::Candump,
-            Format::Asc => Form::Asc(asc::Writer::default()),
-            Format::Blf => Form::Blf(BlfWriter::default()),
-            Format::Pcapng => Form::Pcapng(PcapngWriter::default()),
+            Format::Candump => FormWriter::Candump,
+            Format::Asc => FormWriter::Asc(asc::AscWriter::default()),
+            Format::Blf => FormWriter::Blf(BlfWriter::default()),
+            Format::Pcapng => FormWriter::Pcapng(PcapngWriter::default()),
             Format::Trc | Format::Pcap => return Err(NotWritten { format }),
         };
         Ok(Self { output, form, line: Vec::new() })
@@ -54,14 +54,14 @@ impl<W: Write + Seek> LogWriter<W> {
     /// That of the output.
     pub fn write(&mut self, record: &Record) -> io::Result<()> {
         match &mut self.form {
-            Form::Candump => {
+            FormWriter::Candump => {
                 self.line.clear();
                 candump::emit_line(record, &mut self.line);
                 self.output.write_all(&self.line)
             }
-            Form::Asc(writer) => writer.write(&mut self.output, record),
-            Form::Blf(writer) => writer.write(&mut self.output, record),
-            Form::Pcapng(writer) => writer.write(&mut self.output, record),
+            FormWriter::Asc(writer) => writer.write(&mut self.output, record),
+            FormWriter::Blf(writer) => writer.write(&mut self.output, record),
+            FormWriter::Pcapng(writer) => writer.write(&mut self.output, record),
         }
     }
 
@@ -70,7 +70,7 @@ impl<W: Write + Seek> LogWriter<W> {
     /// # Errors
     /// That of the output.
     pub fn flush(&mut self) -> io::Result<()> {
-        if let Form::Blf(writer) = &mut self.form {
+        if let FormWriter::Blf(writer) = &mut self.form {
             writer.flush(&mut self.output)?;
         }
         self.output.flush()
@@ -82,10 +82,10 @@ impl<W: Write + Seek> LogWriter<W> {
     /// That of the output.
     pub fn finish(mut self) -> io::Result<W> {
         match &mut self.form {
-            Form::Candump => {}
-            Form::Asc(writer) => writer.finish(&mut self.output)?,
-            Form::Blf(writer) => writer.finish(&mut self.output)?,
-            Form::Pcapng(writer) => writer.begin(&mut self.output)?,
+            FormWriter::Candump => {}
+            FormWriter::Asc(writer) => writer.finish(&mut self.output)?,
+            FormWriter::Blf(writer) => writer.finish(&mut self.output)?,
+            FormWriter::Pcapng(writer) => writer.begin(&mut self.output)?,
         }
         self.output.flush()?;
         Ok(self.output)

@@ -16,7 +16,7 @@ use words::models::{self, Description};
 use crate::args::Cli;
 use crate::remembered::Remembered;
 
-type Completer = fn(&Line, &str) -> Vec<CompletionCandidate>;
+type Completer = fn(&TypedLine, &str) -> Vec<CompletionCandidate>;
 
 /// By the names that help gives to values.
 const COMPLETERS: [(&str, Completer); 12] = [
@@ -45,7 +45,7 @@ fn with_completer(arg: Arg) -> Arg {
         Some((_, completer)) => {
             let complete = |current: &OsStr| {
                 let current = current.to_string_lossy();
-                let all = completer(&Line::typed(), &current);
+                let all = completer(&TypedLine::typed(), &current);
                 all.into_iter().filter(|one| one.get_value().to_string_lossy().starts_with(&*current)).collect()
             };
             arg.add(ArgValueCompleter::new(complete))
@@ -55,11 +55,11 @@ fn with_completer(arg: Arg) -> Arg {
 }
 
 /// The line that is being typed.
-struct Line {
+struct TypedLine {
     words: Vec<String>,
 }
 
-impl Line {
+impl TypedLine {
     /// The engine hands the words to this program behind `--`; the first is its name.
     fn typed() -> Self {
         let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
@@ -128,7 +128,7 @@ fn candidate(value: impl Into<String>, help: impl Into<String>) -> CompletionCan
     CompletionCandidate::new(value.into()).help(Some(help.into().into()))
 }
 
-fn buses(_: &Line, _: &str) -> Vec<CompletionCandidate> {
+fn buses(_: &TypedLine, _: &str) -> Vec<CompletionCandidate> {
     let of_machine =
         transport::can_interfaces().into_iter().map(|name| candidate(name, "CAN interface of this machine"));
     let remembered = Remembered::for_completion();
@@ -140,26 +140,26 @@ fn buses(_: &Line, _: &str) -> Vec<CompletionCandidate> {
     all
 }
 
-fn nodes(line: &Line, _: &str) -> Vec<CompletionCandidate> {
+fn nodes(line: &TypedLine, _: &str) -> Vec<CompletionCandidate> {
     let title = |model: Option<&Description>| model.map_or("heard before", |model| model.name).to_owned();
     line.nodes().into_iter().map(|(node, model)| candidate(node.to_string(), title(model))).collect()
 }
 
-fn models(_: &Line, _: &str) -> Vec<CompletionCandidate> {
+fn models(_: &TypedLine, _: &str) -> Vec<CompletionCandidate> {
     all_models().map(|model| candidate(model.name, model.title)).collect()
 }
 
-fn models_and_nodes(line: &Line, current: &str) -> Vec<CompletionCandidate> {
+fn models_and_nodes(line: &TypedLine, current: &str) -> Vec<CompletionCandidate> {
     models(line, current).into_iter().chain(nodes(line, current)).collect()
 }
 
-fn models_of_nodes(line: &Line, _: &str) -> Vec<CompletionCandidate> {
+fn models_of_nodes(line: &TypedLine, _: &str) -> Vec<CompletionCandidate> {
     let of_node = |node: u8| all_models().map(move |model| candidate(format!("{node}={}", model.name), model.title));
     line.nodes().into_iter().flat_map(|(node, _)| of_node(node)).collect()
 }
 
 /// Names; indices where a digit is typed.
-fn objects(line: &Line, current: &str) -> Vec<CompletionCandidate> {
+fn objects(line: &TypedLine, current: &str) -> Vec<CompletionCandidate> {
     let node = line.node().map(NodeId::raw);
     let model = line.nodes().into_iter().find(|(known, _)| Some(*known) == node).and_then(|(_, model)| model);
     // A node of which nothing is known may have what CiA 301 and 402 have.
@@ -177,6 +177,6 @@ fn objects(line: &Line, current: &str) -> Vec<CompletionCandidate> {
     model.dictionary.rows().iter().map(one).collect()
 }
 
-fn modes(_: &Line, _: &str) -> Vec<CompletionCandidate> {
+fn modes(_: &TypedLine, _: &str) -> Vec<CompletionCandidate> {
     ABBREVIATIONS.iter().map(|(short, mode)| candidate(*short, mode.name().unwrap_or_default())).collect()
 }

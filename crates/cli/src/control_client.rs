@@ -29,14 +29,14 @@ pub(crate) struct ControlArgs {
 
 /// A connection.
 pub(crate) struct ControlClient {
-    reader: BufReader<Socket>,
+    reader: BufReader<ControlSocket>,
     place: ControlAddress,
     asked: u64,
     /// The drives of the simulator, as reported at the start.
     nodes: Value,
 }
 
-enum Socket {
+enum ControlSocket {
     Tcp(TcpStream),
     #[cfg(unix)]
     Unix(UnixStream),
@@ -61,7 +61,7 @@ impl ControlArgs {
                 .because("world commands and events go through the control connection of a running simulator")
                 .next("start it with `ferrodrive sim --control 127.0.0.1:0 ..`, and give what its ready line names: --control HOST:PORT, or FERRODRIVE_CONTROL")
         })?;
-        let socket = Socket::connect(&place).map_err(|error| {
+        let socket = ControlSocket::connect(&place).map_err(|error| {
             Failure::new(format!("cannot reach {place}"))
                 .because(error)
                 .of_kind("control")
@@ -144,7 +144,7 @@ fn refusal(error: &Value) -> Failure {
     node.into_iter().fold(failure, Failure::at_node)
 }
 
-impl Socket {
+impl ControlSocket {
     fn connect(place: &ControlAddress) -> io::Result<Self> {
         match place {
             ControlAddress::Tcp(address) => {
@@ -168,7 +168,7 @@ impl Socket {
     }
 }
 
-impl Read for Socket {
+impl Read for ControlSocket {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         match self {
             Self::Tcp(stream) => stream.read(bytes),
@@ -178,7 +178,7 @@ impl Read for Socket {
     }
 }
 
-impl Write for Socket {
+impl Write for ControlSocket {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
             Self::Tcp(stream) => stream.write(bytes),

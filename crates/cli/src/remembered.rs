@@ -24,7 +24,7 @@ const MAX_BYTES: u64 = 1 << 20;
 pub(crate) struct Remembered {
     /// By the bus's name, the one that was used last at the end.
     #[serde(default)]
-    buses: Vec<Bus>,
+    buses: Vec<RememberedBus>,
     /// Keys of messages, the last at the end.
     #[serde(default)]
     said: Vec<String>,
@@ -33,7 +33,7 @@ pub(crate) struct Remembered {
 }
 
 #[derive(Debug, Default, Serialize, Deserialize)]
-struct Bus {
+struct RememberedBus {
     name: String,
     /// Nodes, and their models as far as they are certain.
     nodes: BTreeMap<u8, Option<String>>,
@@ -77,7 +77,7 @@ impl Remembered {
         let place = self.buses.iter().position(|known| known.name == bus);
         let mut known = match place {
             Some(place) => self.buses.remove(place),
-            None => Bus { name: bus.to_owned(), ..Bus::default() },
+            None => RememberedBus { name: bus.to_owned(), ..RememberedBus::default() },
         };
         for (node, model) in nodes {
             let entry = known.nodes.entry(node.raw()).or_default();

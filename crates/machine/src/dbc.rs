@@ -62,7 +62,7 @@ struct Tail {
 }
 
 /// A signal of a message.
-struct Signal {
+struct DbcSignal {
     name: String,
     at: u32,
     bits: u32,
@@ -87,7 +87,7 @@ pub fn print(nodes: &[DbcNode]) -> String {
     let mut tail = Tail::default();
     let all_nodes: Vec<String> = nodes.iter().map(DbcNode::name).collect();
     let all_nodes = all_nodes.join(",");
-    let nmt = [Signal::plain("command", 0, 8).valued(&NMT_COMMANDS), Signal::plain("node", 8, 8)];
+    let nmt = [DbcSignal::plain("command", 0, 8).valued(&NMT_COMMANDS), DbcSignal::plain("node", 8, 8)];
     message(&mut out, &mut tail, Head { id: 0, name: "NMT", length: 2, sender: MASTER, receiver: &all_nodes }, &nmt);
     message(&mut out, &mut tail, Head { id: 0x80, name: "SYNC", length: 0, sender: MASTER, receiver: &all_nodes }, &[]);
     for node in nodes {
@@ -109,13 +109,13 @@ struct Head<'a> {
     receiver: &'a str,
 }
 
-fn message(out: &mut String, tail: &mut Tail, head: Head<'_>, signals: &[Signal]) {
+fn message(out: &mut String, tail: &mut Tail, head: Head<'_>, signals: &[DbcSignal]) {
     let Head { id, name, length, sender, receiver } = head;
     let receiver = if receiver.is_empty() { "Vector__XXX" } else { receiver };
     // Writing to a String does not fail.
     let _ = writeln!(out, "BO_ {id} {name}: {length} {sender}");
     for signal in signals {
-        let Signal { name, at, bits, factor, unit, comment, .. } = signal;
+        let DbcSignal { name, at, bits, factor, unit, comment, .. } = signal;
         let sign = if signal.signed { '-' } else { '+' };
         let _ = writeln!(out, " SG_ {name} : {at}|{bits}@1{sign} ({factor},0) [0|0] \"{unit}\" {receiver}");
         if !comment.is_empty() {
@@ -154,15 +154,15 @@ impl DbcNode {
         let own = self.id;
         let id = |id: can::CanId| id.as_standard().unwrap_or_default();
         let emcy = [
-            Signal::plain("error_code", 0, 16),
-            Signal::plain("error_register", 16, 8),
-            Signal::plain("manufacturer", 24, 40),
+            DbcSignal::plain("error_code", 0, 16),
+            DbcSignal::plain("error_register", 16, 8),
+            DbcSignal::plain("manufacturer", 24, 40),
         ];
         let title = format!("EMCY_{own}");
         let head = Head { id: id(connection_set::emcy(own)), name: &title, length: 8, sender: &name, receiver: MASTER };
         message(out, tail, head, &emcy);
         // The highest bit toggles in answers to node guarding.
-        let heartbeat = [Signal::plain("nmt_state", 0, 7).valued(&NMT_STATES)];
+        let heartbeat = [DbcSignal::plain("nmt_state", 0, 7).valued(&NMT_STATES)];
         let title = format!("heartbeat_{own}");
         let head =
             Head { id: id(connection_set::heartbeat(own)), name: &title, length: 1, sender: &name, receiver: MASTER };
@@ -170,7 +170,7 @@ impl DbcNode {
     }
 
     /// A signal for each object that is mapped and fits into a frame; dummy entries (CiA 301, 7.4.7.1) are gaps.
-    fn signals(&self, pdo: &DbcPdo) -> Vec<Signal> {
+    fn signals(&self, pdo: &DbcPdo) -> Vec<DbcSignal> {
         let mut names = BTreeSet::new();
         let fields =
             pdo.map.fields().filter(|(object, bits)| object.mux.index >= 8 && bits.end <= 64 && !bits.is_empty());
@@ -190,7 +190,7 @@ impl DbcNode {
             .collect()
     }
 
-    fn signal(&self, direction: Direction, object: &MappingRecord, at: u32) -> Signal {
+    fn signal(&self, direction: Direction, object: &MappingRecord, at: u32) -> DbcSignal {
         let mux = object.mux;
         let row = self.model.and_then(|model| model.row(mux));
         let form =
@@ -213,7 +213,7 @@ impl DbcNode {
             _ => 0,
         };
         let values = row.map(|row| row.values).unwrap_or_default();
-        Signal {
+        DbcSignal {
             name: symbol(&name),
             at,
             bits: u32::from(object.bits),
@@ -227,7 +227,7 @@ impl DbcNode {
     }
 }
 
-impl Signal {
+impl DbcSignal {
     fn plain(name: &str, at: u32, bits: u32) -> Self {
         Self {
             name: name.to_owned(),

@@ -40,9 +40,9 @@ pub struct Setting {
 
 /// A number that was asked for, as it is shown. A conversion ends at the bounds of 64 bits, and what was asked for is beyond.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Asked(pub(crate) i64);
+pub(crate) struct AskedNumber(pub(crate) i64);
 
-impl fmt::Display for Asked {
+impl fmt::Display for AskedNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             i64::MIN | i64::MAX => f.write_str("a value of more than 64 bits"),

@@ -16,7 +16,7 @@ use crate::mechanics::{RotorData, RotorModel};
 use crate::pmsm::{Dq, Phase, PmsmData, PmsmInput, PmsmModel, Terminals};
 use crate::rest::Rest;
 use crate::rig::{Rig, RigModel};
-use crate::shaft::{Motion, Pending, Turned};
+use crate::shaft::{Motion, PendingStep, Turned};
 use crate::thermal::reading_c;
 
 /// Assumed: two motor wires that touch have 0.05 ohm with their contact and the cable up to it.
@@ -216,7 +216,7 @@ impl HubMotor {
         let mut flows = motor.flows(0.0, 0.0);
         flows.bus_w += beside_w;
         flows.arc_j += beside_w * dt_s;
-        let pending = Pending { flows, motor_nm, dt_s, bleeder_on: actuation.bleeder_on };
+        let pending = PendingStep { flows, motor_nm, dt_s, bleeder_on: actuation.bleeder_on };
         if self.rig.is_coupled() {
             self.rig.push_directly((&model.rotor, &self.rotor), pending, brake_nm);
         } else {
@@ -225,8 +225,8 @@ impl HubMotor {
         }
     }
 
-    fn finish_joined(&mut self, pending: Pending, turned: &Turned) {
-        let Pending { mut flows, motor_nm, dt_s, bleeder_on } = pending;
+    fn finish_joined(&mut self, pending: PendingStep, turned: &Turned) {
+        let PendingStep { mut flows, motor_nm, dt_s, bleeder_on } = pending;
         let turn_rad = dt_s * f64::from(self.model.pmsm.pole_pairs) * turned.mean_rad_s;
         self.axis = self.axis.turned_by(Axis::at_small_rad(turn_rad));
         self.model.encoder.step(&mut self.encoder, self.rotor.angle);

@@ -6,7 +6,7 @@ use crate::angle::Angle;
 use crate::attachment::Attachment;
 use crate::mechanics::{Load, RotorData, RotorModel};
 use crate::rig::Rig;
-use crate::shaft::{Attached, Coupled, HELD_NM, Motion, Pending, Push, Turned};
+use crate::shaft::{Attached, Coupled, HELD_NM, Motion, PendingStep, Push, Turned};
 
 impl Rig {
     /// What is attached, if anything is.
@@ -89,7 +89,7 @@ impl Rig {
     }
 
     /// What a coupled shaft without a gear does to its machine.
-    pub(crate) fn push_directly(&mut self, rotor: (&RotorModel, &RotorData), pending: Pending, brake_nm: f64) {
+    pub(crate) fn push_directly(&mut self, rotor: (&RotorModel, &RotorData), pending: PendingStep, brake_nm: f64) {
         let (model, data) = rotor;
         let load = self.expected_load(data.angle, data.velocity_rad_s, pending.dt_s);
         let held_nm = if load.locked { HELD_NM } else { 0.0 };
@@ -104,7 +104,7 @@ impl Rig {
     }
 
     /// Moves a coupled shaft as its machine did, and says what became of the motor's work. `None` if it does not wait.
-    pub(crate) fn follow(&mut self, rotor: &mut RotorData, motion: &Motion) -> Option<(Pending, Turned)> {
+    pub(crate) fn follow(&mut self, rotor: &mut RotorData, motion: &Motion) -> Option<(PendingStep, Turned)> {
         let Coupled { push, pending } = self.coupled?;
         let way_rad = motion.mean_rad_s * pending.dt_s;
         let before = push.velocity_rad_s;

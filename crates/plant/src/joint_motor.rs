@@ -17,7 +17,7 @@ use crate::mechanics::{Load, RotorData, RotorModel};
 use crate::pmsm::{Phase, PmsmData, PmsmInput, PmsmModel};
 use crate::rest::Rest;
 use crate::rig::{Rig, RigModel};
-use crate::shaft::{Coupled, HELD_NM, Motion, Pending, Push, Turned};
+use crate::shaft::{Coupled, HELD_NM, Motion, PendingStep, Push, Turned};
 use crate::thermal::reading_c;
 
 /// Assumed: what a seized bearing holds against, far more than the motor or the load through the gear gives.
@@ -155,7 +155,7 @@ impl JointMotor {
         flows.bus_w += clamp_w;
         flows.arc_j += clamp_w * dt_s;
         self.torque_nm = motor_nm;
-        let pending = Pending { flows, motor_nm, dt_s, bleeder_on: self.is_discharging() };
+        let pending = PendingStep { flows, motor_nm, dt_s, bleeder_on: self.is_discharging() };
         if self.rig.is_joined() {
             self.step_joined(pending, brake_nm);
         } else {
@@ -171,8 +171,8 @@ impl JointMotor {
 
     /// Bus, energies and the magnets' direction, and now and then the slow things.
     #[inline(always)]
-    fn finish(&mut self, pending: Pending, turned: &Turned) {
-        let Pending { mut flows, dt_s, bleeder_on, .. } = pending;
+    fn finish(&mut self, pending: PendingStep, turned: &Turned) {
+        let PendingStep { mut flows, dt_s, bleeder_on, .. } = pending;
         let turn_rad = dt_s * f64::from(self.model.pmsm.pole_pairs) * turned.mean_rad_s;
         self.axis = self.axis.turned_by(Axis::at_small_rad(turn_rad));
         (flows.friction_j, flows.load_j) = (turned.friction_j, turned.load_j);
@@ -184,7 +184,7 @@ impl JointMotor {
     /// The mechanical half of a step of an output that is not a plain one.
     #[cold]
     #[inline(never)]
-    fn step_joined(&mut self, pending: Pending, brake_nm: f64) {
+    fn step_joined(&mut self, pending: PendingStep, brake_nm: f64) {
         let JointMotorModel { gear: gear_model, rotor: rotor_model, .. } = &self.model;
         let angle = gear_model.output_angle(&self.gear, self.rotor.angle);
         if self.rig.is_coupled() {
@@ -207,7 +207,7 @@ impl JointMotor {
     }
 
     /// What a coupled joint does to its machine. Its gear is taken as stiff there: what is wound up in it stays.
-    fn push(&self, pending: &Pending, angle: Angle, brake_nm: f64) -> Push {
+    fn push(&self, pending: &PendingStep, angle: Angle, brake_nm: f64) -> Push {
         let JointMotorModel { gear, rotor, .. } = &self.model;
         let ratio = gear.ratio;
         let load = self.rig.expected_load(angle, self.rotor.velocity_rad_s / ratio, pending.dt_s);

@@ -53,12 +53,12 @@ pub struct Attached {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Coupled {
     pub(crate) push: Push,
-    pub(crate) pending: Pending,
+    pub(crate) pending: PendingStep,
 }
 
 /// What a motor's step has already done when it waits for its motion.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Pending {
+pub(crate) struct PendingStep {
     pub(crate) flows: Flows,
     pub(crate) motor_nm: f64,
     pub(crate) dt_s: f64,

@@ -20,7 +20,7 @@ use crate::flows::Flows;
 use crate::mechanics::{RotorData, RotorModel};
 use crate::rest::Rest;
 use crate::rig::{Rig, RigModel};
-use crate::shaft::{Motion, Pending, Turned};
+use crate::shaft::{Motion, PendingStep, Turned};
 use crate::stepper::{Bridges, Phase, StepperData, StepperInput, StepperModel, Turn};
 use crate::thermal::reading_c;
 
@@ -162,7 +162,7 @@ impl StepperMotor {
         let velocity_rad_s = self.rotor.velocity_rad_s + 0.5 * self.rotor.velocity_change_rad_s;
         let turn = Turn::new(self.axis, 0.5 * dt_s * f64::from(self.model.stepper.teeth) * velocity_rad_s);
         let (motor_nm, flows) = self.drive(dt_s, bridges, turn);
-        let pending = Pending { flows, motor_nm, dt_s, bleeder_on: false };
+        let pending = PendingStep { flows, motor_nm, dt_s, bleeder_on: false };
         let model = &self.model;
         if self.rig.is_coupled() {
             self.rig.push_directly((&model.rotor, &self.rotor), pending, 0.0);
@@ -172,8 +172,8 @@ impl StepperMotor {
         }
     }
 
-    fn finish_joined(&mut self, pending: Pending, turned: &Turned) {
-        let Pending { mut flows, dt_s, .. } = pending;
+    fn finish_joined(&mut self, pending: PendingStep, turned: &Turned) {
+        let PendingStep { mut flows, dt_s, .. } = pending;
         let turn_rad = dt_s * f64::from(self.model.stepper.teeth) * turned.mean_rad_s;
         self.axis = self.axis.turned_by(Axis::at_small_rad(turn_rad));
         (flows.friction_j, flows.load_j) = (turned.friction_j, turned.load_j);

@@ -3,12 +3,12 @@
 /// Points in pixels, thinned to at most two for each column of one pixel width. `points` ascend in x.
 pub(crate) fn thin(points: impl IntoIterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut thinned = Vec::new();
-    let mut column: Option<Column> = None;
+    let mut column: Option<PixelColumn> = None;
     for point in points {
         match &mut column {
             Some(open) if open.number == point.0.floor() as i64 => open.add(point),
             _ => {
-                if let Some(done) = column.replace(Column::new(point)) {
+                if let Some(done) = column.replace(PixelColumn::new(point)) {
                     done.emit(&mut thinned);
                 }
             }
@@ -20,13 +20,13 @@ pub(crate) fn thin(points: impl IntoIterator<Item = (f64, f64)>) -> Vec<(f64, f6
     thinned
 }
 
-struct Column {
+struct PixelColumn {
     number: i64,
     lowest: (f64, f64),
     highest: (f64, f64),
 }
 
-impl Column {
+impl PixelColumn {
     fn new(point: (f64, f64)) -> Self {
         Self { number: point.0.floor() as i64, lowest: point, highest: point }
     }

@@ -76,11 +76,11 @@ pub(crate) struct World {
 pub(crate) struct Shared {
     /// A child of `fork` has the worlds of its parent in its memory, and perhaps the lock of one held for ever.
     process: u32,
-    state: Mutex<State>,
+    state: Mutex<WorldState>,
 }
 
 /// The world and what waits for it.
-pub(crate) struct State {
+pub(crate) struct WorldState {
     pub(crate) world: sim::World,
     pub(crate) jobs: Jobs,
     /// In the order in which Python numbers them.
@@ -107,7 +107,7 @@ enum Came {
 
 impl Shared {
     /// The state, for this process alone.
-    pub(crate) fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, State>> {
+    pub(crate) fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, WorldState>> {
         self.check_process()?;
         Ok(self.state.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner))
     }
@@ -122,13 +122,13 @@ impl Shared {
     }
 
     /// Works with the state while other Python threads run.
-    fn detached<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut State) -> T + Send) -> PyResult<T> {
+    fn detached<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut WorldState) -> T + Send) -> PyResult<T> {
         self.check_process()?;
         Ok(py.detach(|| work(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))))
     }
 }
 
-impl State {
+impl WorldState {
     fn new(world: sim::World) -> Self {
         let (recordings, happened) = (Recordings::default(), Happened::default());
         Self { world, jobs: Jobs::default(), probes: Vec::new(), recordings, happened, machine: None }
@@ -201,7 +201,7 @@ impl World {
     }
 
     fn holding(world: sim::World) -> Self {
-        let state = Mutex::new(State::new(world));
+        let state = Mutex::new(WorldState::new(world));
         Self { shared: Arc::new(Shared { process: process::id(), state }) }
     }
 
@@ -272,7 +272,7 @@ impl World {
         // What is green here is to be green on the desk.
         machine.timing = said.or(machine.timing).or(Some(TimingMode::Device));
         let world = machine.build().map_err(|bad| bad_value(bad.named(path.display().to_string())))?;
-        *self.shared.lock(py)? = State { machine: Some(Arc::new(machine)), ..State::new(world) };
+        *self.shared.lock(py)? = WorldState { machine: Some(Arc::new(machine)), ..WorldState::new(world) };
         Ok(())
     }
 

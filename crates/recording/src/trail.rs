@@ -28,12 +28,12 @@ pub struct Trail {
     period: Duration,
     next_at: Instant,
     times: VecDeque<Instant>,
-    lines: Vec<Line>,
+    lines: Vec<SignalTrail>,
 }
 
 /// One signal: a value for each time, not a number where there is none.
 #[derive(Clone, Debug)]
-struct Line {
+struct SignalTrail {
     column: Column,
     values: VecDeque<f64>,
 }
@@ -93,7 +93,7 @@ impl Trail {
         let known = self.lines.iter().position(|line| line.column == *column);
         Some(known.unwrap_or_else(|| {
             let values = std::iter::repeat_n(f64::NAN, self.times.len()).collect();
-            self.lines.push(Line { column: column.clone(), values });
+            self.lines.push(SignalTrail { column: column.clone(), values });
             self.lines.len() - 1
         }))
     }
@@ -115,7 +115,7 @@ impl Trail {
         }
     }
 
-    fn series(&self, line: &Line) -> Series {
+    fn series(&self, line: &SignalTrail) -> Series {
         let points = self.times.iter().zip(&line.values).map(|(at, value)| (at.as_secs_f64(), *value));
         Series { column: line.column.clone(), points: points.collect() }
     }

@@ -7,7 +7,9 @@ use sim::command::Command as WorldCommand;
 
 use super::command::{Command, PdoCommand};
 use super::condition::{Condition, signal};
-use super::plan::{Act, Base, Expect, Figure, Host, HostLine, Law, Measure, Statistic, Step, Until, Wanted};
+use super::plan::{
+    Act, Base, Expect, Figure, Host, HostLine, Law, Measure, ScenarioStep, Statistic, Until, WantedResult,
+};
 use words::document::Problem;
 use words::document::reader::{Field, Table};
 
@@ -110,7 +112,7 @@ fn texts<'a>(table: &Table<'a>, expected: &str) -> Result<Vec<Field<'a>>, Proble
     if field.is_list() { field.list(expected).and_then(bounded_list) } else { Ok(vec![field]) }
 }
 
-pub(super) fn step(table: &Table<'_>) -> Many<Step> {
+pub(super) fn step(table: &Table<'_>) -> Many<ScenarioStep> {
     const EXPECTED: &str = "a world command or a list of them, e.g. \"4 supply 20\"";
     let mut problems = table.strangers(STEP_KEYS);
     let parts = (|| {
@@ -146,8 +148,16 @@ pub(super) fn step(table: &Table<'_>) -> Many<Step> {
         }
     }
     let place = fields.first().map_or(Problem::new(table.place(), ""), |field| field.problem("")).locate(table.text());
-    let step =
-        Step { name, base, when, within, delay: delay.unwrap_or_default(), acts, asked: asked.join("; "), place };
+    let step = ScenarioStep {
+        name,
+        base,
+        when,
+        within,
+        delay: delay.unwrap_or_default(),
+        acts,
+        asked: asked.join("; "),
+        place,
+    };
     if problems.is_empty() { Ok(step) } else { Err(problems) }
 }
 
@@ -190,7 +200,7 @@ fn line(field: &Field<'_>) -> Result<HostLine, Problem> {
     if !field.is_table() {
         let (asked, command) = command(field)?;
         let place = field.problem("").locate(field.source_text());
-        return Ok(HostLine { command, name: None, wanted: Wanted::default(), asked, place });
+        return Ok(HostLine { command, name: None, wanted: WantedResult::default(), asked, place });
     }
     let table = field.table("a line of a host", EXPECTED)?;
     table.takes_only(LINE_KEYS)?;
@@ -202,7 +212,7 @@ fn line(field: &Field<'_>) -> Result<HostLine, Problem> {
         return Err(is.problem("'is' needs something that is read: NODE read OBJECT, or NODE pdo read OBJECT"));
     }
     let fails = table.get("fails").map(|field| field.words("a part of the reason as text; \"\" for any reason"));
-    let wanted = Wanted {
+    let wanted = WantedResult {
         fails: fails.transpose()?,
         value,
         tolerance: tolerance.unwrap_or_default().abs(),

@@ -16,7 +16,7 @@ use sim::{StationId, World};
 use super::command::Command;
 use super::condition::{Condition, View};
 use super::file::Scenario;
-use super::host::{HostTask, Shared, run};
+use super::host::{HostBoard, HostTask, run};
 use super::occurrence::Occurrence;
 use super::outcome::{Outcome, Row, RowKind, Verdict};
 use super::script::Script;
@@ -37,7 +37,7 @@ pub struct Execution {
     host: StationId,
     /// The hosts at work; `None` for one that is through.
     tasks: Vec<Option<Task<Pin<Box<dyn Future<Output = ()>>>>>>,
-    shared: Rc<RefCell<Shared>>,
+    shared: Rc<RefCell<HostBoard>>,
     script: Script,
     next_sample: Instant,
     frames: VecDeque<(Instant, can::Frame)>,
@@ -61,7 +61,7 @@ impl Execution {
         let network = Network::new();
         network.set_models(with_files(scenario.machine.models().map(|(_, model)| model)));
         let host = world.add_station(network.clone());
-        let shared = Rc::new(RefCell::new(Shared::default()));
+        let shared = Rc::new(RefCell::new(HostBoard::default()));
         let machine = Rc::new(scenario.machine.clone());
         let tasks = scenario.hosts.iter().enumerate().map(|(number, it)| {
             let (machine, shared) = (Rc::clone(&machine), Rc::clone(&shared));

@@ -8,8 +8,8 @@ use sim::Place;
 use super::command::Command;
 use super::condition::Condition;
 use super::entries::{MOST, Many, bounded, entries, expect, figures, host, kept, single, step};
-use super::plan::{Act, Base, Expect, Figure, Host, Measure, Step};
-use crate::sweep::file::{Axis, axes};
+use super::plan::{Act, Base, Expect, Figure, Host, Measure, ScenarioStep};
+use crate::sweep::file::{SweepAxis, axes};
 use machine::file::Machine;
 use words::document::reader::{self, Parameters, Table};
 use words::document::{BadFile, Located, Problem, read_text};
@@ -52,11 +52,11 @@ pub struct Scenario {
     /// The parameters and their values.
     pub parameters: Parameters,
     /// What a sweep goes through.
-    pub sweep: Vec<Axis>,
+    pub sweep: Vec<SweepAxis>,
     pub(super) limit: Duration,
     pub(super) end: Option<Duration>,
     pub(super) sample: Duration,
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Vec<ScenarioStep>,
     pub(super) hosts: Vec<Host>,
     pub(super) expects: Vec<Expect>,
     pub(super) figures: Vec<Figure>,

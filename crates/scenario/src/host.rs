@@ -1,6 +1,6 @@
 //! The host of a scenario at work: its lines, one after the other, as one future over a [`Network`].
 //!
-//! What it waits for beyond the bus (a condition, a time) it asks of the [`Shared`], which the stepper of the world
+//! What it waits for beyond the bus (a condition, a time) it asks of the [`HostBoard`], which the stepper of the world
 //! looks at.
 
 use std::cell::RefCell;
@@ -23,7 +23,7 @@ use sim::Place;
 
 use super::command::{Command, PdoCommand};
 use super::outcome::{Row, RowKind, Verdict};
-use super::plan::{HostLine, Wanted};
+use super::plan::{HostLine, WantedResult};
 use machine::file::Machine;
 use words::object::ObjectArg;
 use words::value::{typed_value, value};
@@ -36,9 +36,9 @@ const SETTLING_TIME: Duration = Duration::from_millis(200);
 
 /// What hosts and the stepper of the world exchange.
 #[derive(Default)]
-pub(super) struct Shared {
+pub(super) struct HostBoard {
     /// What hosts wait for.
-    pub(super) waits: Vec<Waiting>,
+    pub(super) waits: Vec<AwaitedCondition>,
     /// What hosts have done.
     pub(super) rows: Vec<Row>,
     /// Hosts that are through.
@@ -46,7 +46,7 @@ pub(super) struct Shared {
 }
 
 /// A condition that a host waits for.
-pub(super) struct Waiting {
+pub(super) struct AwaitedCondition {
     pub(super) line: (usize, usize),
     /// Set when it was so.
     pub(super) so: bool,
@@ -60,7 +60,7 @@ pub(super) struct HostTask {
     pub(super) name: String,
     pub(super) network: Network,
     pub(super) machine: Rc<Machine>,
-    pub(super) shared: Rc<RefCell<Shared>>,
+    pub(super) shared: Rc<RefCell<HostBoard>>,
 }
 
 /// Runs the lines of a host; gives up at the first that does not go as the scenario says.
@@ -99,7 +99,7 @@ pub(super) async fn run(task: HostTask, start: Option<Duration>, lines: Vec<Host
 /// The result of a line: what was seen, with a number if it is one; or why it did not go.
 type Done = Result<(String, Option<f64>), String>;
 
-impl Wanted {
+impl WantedResult {
     fn judge(&self, done: Done, began: Instant, now: Instant) -> (Verdict, String) {
         if let Some(within) = self.within
             && now - began > within
@@ -266,7 +266,7 @@ impl HostTask {
     /// Waits until the one who steps the world says that the condition of this line was so.
     async fn wait_for(&self, line: usize, within: Duration) -> Done {
         let key = (self.number, line);
-        self.shared.borrow_mut().waits.push(Waiting { line: key, so: false, waker: None });
+        self.shared.borrow_mut().waits.push(AwaitedCondition { line: key, so: false, waker: None });
         let mut patience = std::pin::pin!(self.network.sleep(within));
         let so = poll_fn(|context| {
             let mut shared = self.shared.borrow_mut();

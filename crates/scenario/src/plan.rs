@@ -12,7 +12,7 @@ use words::document::Located;
 
 /// What the outer world does.
 #[derive(Clone, Debug)]
-pub(super) struct Step {
+pub(super) struct ScenarioStep {
     pub(super) name: Option<String>,
     pub(super) base: Base,
     pub(super) when: Option<Condition>,
@@ -59,14 +59,14 @@ pub(super) struct Host {
 pub(super) struct HostLine {
     pub(super) command: Command,
     pub(super) name: Option<String>,
-    pub(super) wanted: Wanted,
+    pub(super) wanted: WantedResult,
     pub(super) asked: String,
     pub(super) place: Located,
 }
 
 /// What is to come of a line.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Wanted {
+pub(super) struct WantedResult {
     /// It fails, and the reason has this in it.
     pub(super) fails: Option<String>,
     /// A number that is read.

@@ -10,11 +10,11 @@ use super::condition::{View, of_body};
 use super::file::Scenario;
 use super::occurrence::Occurrence;
 use super::outcome::{Row, RowKind, Verdict};
-use super::plan::{Act, Base, Expect, Figure, Law, Measure, Statistic, Step, Until};
+use super::plan::{Act, Base, Expect, Figure, Law, Measure, ScenarioStep, Statistic, Until};
 
 /// The state of everything that is not a host.
 pub(super) struct Script {
-    steps: Vec<Progress>,
+    steps: Vec<StepProgress>,
     expects: Vec<Option<Verdict>>,
     figures: Vec<Tally>,
     pub(super) rows: Vec<Row>,
@@ -28,7 +28,7 @@ pub(super) struct Script {
 
 /// How far a step is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Progress {
+enum StepProgress {
     Waiting,
     Due(Instant),
     Done,
@@ -70,7 +70,7 @@ fn instant(time: Duration) -> Instant {
 impl Script {
     pub(super) fn new(scenario: &Scenario) -> Self {
         Self {
-            steps: vec![Progress::Waiting; scenario.steps.len()],
+            steps: vec![StepProgress::Waiting; scenario.steps.len()],
             expects: vec![None; scenario.expects.len()],
             figures: vec![Tally::NOTHING; scenario.figures.len()],
             rows: Vec::new(),
@@ -114,7 +114,7 @@ impl Script {
     pub(super) fn samples(&self, scenario: &Scenario) -> bool {
         let signals = scenario.figures.iter().any(|figure| !matches!(figure.of, Measure::Time(_)));
         let steps = scenario.steps.iter().zip(&self.steps).any(|(step, progress)| {
-            *progress == Progress::Waiting && step.when.as_ref().is_some_and(|when| !when.is_event())
+            *progress == StepProgress::Waiting && step.when.as_ref().is_some_and(|when| !when.is_event())
         });
         let expects = scenario.expects.iter().zip(&self.expects);
         signals
@@ -125,9 +125,9 @@ impl Script {
     /// The next time at which something begins, is due or ends, and at which values have not been looked at.
     pub(super) fn next_time(&self, scenario: &Scenario) -> Option<Instant> {
         let steps = scenario.steps.iter().zip(&self.steps).flat_map(|(step, progress)| match progress {
-            Progress::Due(at) => [Some(*at), None],
-            Progress::Done => [None, None],
-            Progress::Waiting => {
+            StepProgress::Due(at) => [Some(*at), None],
+            StepProgress::Done => [None, None],
+            StepProgress::Waiting => {
                 let begin = self.begin(&step.base);
                 let limit = begin.zip(step.within).map(|(begin, within)| begin + within);
                 [begin.map(|begin| if step.when.is_none() { begin + step.delay } else { begin }), limit]
@@ -165,11 +165,11 @@ impl Script {
         let now = world.now();
         let mut changed = false;
         for (n, step) in scenario.steps.iter().enumerate() {
-            if self.steps[n] == Progress::Waiting {
+            if self.steps[n] == StepProgress::Waiting {
                 self.arm(n, step, world, occurrence);
             }
-            if matches!(self.steps[n], Progress::Due(at) if at <= now) {
-                self.steps[n] = Progress::Done;
+            if matches!(self.steps[n], StepProgress::Due(at) if at <= now) {
+                self.steps[n] = StepProgress::Done;
                 let refused = self.act(step, world, host);
                 let verdict = if refused.is_none() { Verdict::Passed } else { Verdict::Failed };
                 self.row_of_step(step, Some(now), verdict, refused.unwrap_or_else(|| "done".into()));
@@ -183,30 +183,30 @@ impl Script {
     }
 
     /// Decides whether a step that waits is due, and when; or that it has waited too long.
-    fn arm(&mut self, n: usize, step: &Step, world: &mut World, occurrence: Option<Occurrence<'_>>) {
+    fn arm(&mut self, n: usize, step: &ScenarioStep, world: &mut World, occurrence: Option<Occurrence<'_>>) {
         let now = world.now();
         let Some(begin) = self.begin(&step.base).filter(|begin| *begin <= now) else { return };
         let Some(when) = &step.when else {
-            self.steps[n] = Progress::Due(begin + step.delay);
+            self.steps[n] = StepProgress::Due(begin + step.delay);
             return;
         };
         if when.is_event() == occurrence.is_some() {
             let done = |name: &str| self.is_done(name);
             if when.holds(&mut View { world, occurrence, done: &done }) {
-                self.steps[n] = Progress::Due(now + step.delay);
+                self.steps[n] = StepProgress::Due(now + step.delay);
                 return;
             }
         }
         if step.within.is_some_and(|within| now >= begin + within) {
             let done = |name: &str| self.is_done(name);
             let seen = when.seen(&mut View { world, occurrence: None, done: &done });
-            self.steps[n] = Progress::Done;
+            self.steps[n] = StepProgress::Done;
             self.row_of_step(step, Some(now), Verdict::Failed, format!("its condition did not hold in time: {seen}"));
         }
     }
 
     /// Does what a step says; the first refusal ends it.
-    fn act(&mut self, step: &Step, world: &mut World, host: StationId) -> Option<String> {
+    fn act(&mut self, step: &ScenarioStep, world: &mut World, host: StationId) -> Option<String> {
         for act in &step.acts {
             match act {
                 Act::World(place, stimulus) => {
@@ -234,7 +234,7 @@ impl Script {
         None
     }
 
-    fn row_of_step(&mut self, step: &Step, at: Option<Instant>, verdict: Verdict, seen: String) {
+    fn row_of_step(&mut self, step: &ScenarioStep, at: Option<Instant>, verdict: Verdict, seen: String) {
         let (name, asked) = (step.name.clone().unwrap_or_default(), step.asked.clone());
         self.rows.push(Row { kind: RowKind::Step, name, asked, at, seen, verdict, place: step.place.line });
     }
@@ -306,7 +306,7 @@ impl Script {
 
     /// True if nothing is left to be done or decided, but for what counts to the end of the run.
     pub(super) fn is_through(&self, scenario: &Scenario) -> bool {
-        let steps = self.steps.iter().all(|progress| *progress == Progress::Done);
+        let steps = self.steps.iter().all(|progress| *progress == StepProgress::Done);
         let mut expects = scenario.expects.iter().zip(&self.expects);
         steps
             && expects.all(|(expect, verdict)| {
@@ -318,7 +318,7 @@ impl Script {
     /// Decides what is still open at the end of the run.
     pub(super) fn conclude(&mut self, scenario: &Scenario, world: &mut World) {
         for (n, step) in scenario.steps.iter().enumerate() {
-            if self.steps[n] != Progress::Done {
+            if self.steps[n] != StepProgress::Done {
                 let done = |name: &str| self.is_done(name);
                 let mut view = View { world, occurrence: None, done: &done };
                 let seen = step.when.as_ref().map(|when| format!(": {}", when.seen(&mut view))).unwrap_or_default();

@@ -33,7 +33,7 @@ use due::DueTimes;
 use ledger::Ledger;
 use member::{Member, Vacant};
 use probe::Probe;
-use watch::Watch;
+use watch::WorldWatch;
 
 /// Distinguishes the seeds of a drive's timing from those of its noise.
 const TIMING_SEED: u64 = 0x7469_6D69_6E67;
@@ -57,7 +57,7 @@ pub struct World {
     recorder: Option<Recorder>,
     /// By station, while stores are guarded.
     ledgers: Vec<Option<Ledger>>,
-    watch: Option<Box<Watch>>,
+    watch: Option<Box<WorldWatch>>,
     /// What several drives move together.
     bodies: Vec<CoupledBody>,
 }

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 /// A message of a page.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Message {
+pub(crate) struct PageMessage {
     /// Sequence number, above all before.
     pub(crate) seq: u64,
     /// The session word of the welcome message.
@@ -19,17 +19,17 @@ pub(crate) struct Message {
 
 /// A malformed message.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Malformed {
+pub(crate) struct MalformedMessage {
     /// Its number, if readable.
     pub(crate) seq: Option<u64>,
     /// What is wrong with it.
     pub(crate) why: String,
 }
 
-impl Message {
+impl PageMessage {
     /// Parses a message.
-    pub(crate) fn parse(text: &str) -> Result<Self, Malformed> {
-        let malformed = |seq, why: String| Malformed { seq, why };
+    pub(crate) fn parse(text: &str) -> Result<Self, MalformedMessage> {
+        let malformed = |seq, why: String| MalformedMessage { seq, why };
         let value: Value = serde_json::from_str(text).map_err(|error| malformed(None, error.to_string()))?;
         let Value::Object(mut fields) = value else {
             return Err(malformed(None, r#"expected an object such as {"seq":1,"session":"..","do":"alive"}"#.into()));
@@ -56,11 +56,14 @@ mod tests {
 
     #[test]
     fn a_message_is_its_number_its_session_and_a_command() {
-        let message = Message::parse(r#"{"seq":7,"session":"w","do":"jog","node":4,"rpm":-60}"#).expect("whole");
+        let message = PageMessage::parse(r#"{"seq":7,"session":"w","do":"jog","node":4,"rpm":-60}"#).expect("whole");
         let node = NodeId::new(4).expect("a node-ID");
-        assert_eq!(message, Message { seq: 7, word: "w".into(), command: NodeCommand::Jog { rpm: -60.0 }.to(node) });
+        assert_eq!(
+            message,
+            PageMessage { seq: 7, word: "w".into(), command: NodeCommand::Jog { rpm: -60.0 }.to(node) }
+        );
         assert!(message.command.needs_control());
-        let stop = Message::parse(r#"{"seq":8,"session":"w","do":"stop_all"}"#).expect("whole");
+        let stop = PageMessage::parse(r#"{"seq":8,"session":"w","do":"stop_all"}"#).expect("whole");
         assert!(!stop.command.needs_control());
     }
 
@@ -95,7 +98,7 @@ mod tests {
             ),
             (r#"{"seq":1,"session":"w","do":"nmt","node":4,"command":"reset"}"#, Some(1), "pre_operational"),
         ] {
-            let malformed = Message::parse(text).expect_err(text);
+            let malformed = PageMessage::parse(text).expect_err(text);
             assert_eq!(malformed.seq, seq, "{text}");
             assert!(malformed.why.contains(why), "{text}: {}", malformed.why);
         }

@@ -13,11 +13,11 @@ use crate::udp_multicast::UdpMulticastBus;
 
 /// Any bus that [`crate::BusSpec::open`] opens. A connection that is lost is made again.
 #[derive(Debug)]
-pub struct AnyBus(pub(crate) Kind);
+pub struct AnyBus(pub(crate) BusKind);
 
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "a program has one or two of them, and keeps them where they are")]
-pub(crate) enum Kind {
+pub(crate) enum BusKind {
     Socketcand(Reconnecting<SocketcandBus>),
     Slcan(Reconnecting<SlcanBus>),
     Cannelloni(CannelloniBus),
@@ -37,7 +37,7 @@ impl AnyBus {
     pub fn hear_only(&mut self, ids: &[CanId]) -> Result<bool, BusError> {
         match &mut self.0 {
             #[cfg(target_os = "linux")]
-            Kind::SocketCan(bus) => bus.hear_only(ids),
+            BusKind::SocketCan(bus) => bus.hear_only(ids),
             _ => Ok(false),
         }
     }
@@ -45,7 +45,7 @@ impl AnyBus {
     /// Takes leave: an slcan adapter's channel is closed, so that it stops acknowledging frames on the bus. Dropping does
     /// for the others.
     pub async fn close(self) -> Result<(), BusError> {
-        let Kind::Slcan(bus) = self.0 else { return Ok(()) };
+        let BusKind::Slcan(bus) = self.0 else { return Ok(()) };
         match bus.into_inner() {
             Some(bus) => bus.close().await,
             None => Ok(()),
@@ -56,25 +56,25 @@ impl AnyBus {
 impl AsyncBus for AnyBus {
     async fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         match &mut self.0 {
-            Kind::Socketcand(bus) => bus.send(frame).await,
-            Kind::Slcan(bus) => bus.send(frame).await,
-            Kind::Cannelloni(bus) => bus.send(frame).await,
-            Kind::UdpMulticast(bus) => bus.send(frame).await,
+            BusKind::Socketcand(bus) => bus.send(frame).await,
+            BusKind::Slcan(bus) => bus.send(frame).await,
+            BusKind::Cannelloni(bus) => bus.send(frame).await,
+            BusKind::UdpMulticast(bus) => bus.send(frame).await,
             #[cfg(target_os = "linux")]
-            Kind::SocketCan(bus) => bus.send(frame).await,
-            Kind::Log(bus) => bus.send(frame).await,
+            BusKind::SocketCan(bus) => bus.send(frame).await,
+            BusKind::Log(bus) => bus.send(frame).await,
         }
     }
 
     async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
         match &mut self.0 {
-            Kind::Socketcand(bus) => bus.recv().await,
-            Kind::Slcan(bus) => bus.recv().await,
-            Kind::Cannelloni(bus) => bus.recv().await,
-            Kind::UdpMulticast(bus) => bus.recv().await,
+            BusKind::Socketcand(bus) => bus.recv().await,
+            BusKind::Slcan(bus) => bus.recv().await,
+            BusKind::Cannelloni(bus) => bus.recv().await,
+            BusKind::UdpMulticast(bus) => bus.recv().await,
             #[cfg(target_os = "linux")]
-            Kind::SocketCan(bus) => bus.recv().await,
-            Kind::Log(bus) => bus.recv().await,
+            BusKind::SocketCan(bus) => bus.recv().await,
+            BusKind::Log(bus) => bus.recv().await,
         }
     }
 }

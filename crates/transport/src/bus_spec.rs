@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use can::Bitrate;
 
-use crate::any_bus::{AnyBus, Kind};
+use crate::any_bus::{AnyBus, BusKind};
 use crate::reconnect::Reconnecting;
 use crate::slcan::SlcanPlace;
 use crate::{BusError, CannelloniBus, LogBus, UdpMulticastBus, WallClock, socketcand, udp_multicast};
@@ -86,30 +86,30 @@ impl BusSpec {
         Ok(AnyBus(match self {
             Self::Sim { .. } => return Err(BusError::Simulated),
             #[cfg(target_os = "linux")]
-            Self::SocketCan { interface } => Kind::SocketCan(crate::SocketCanBus::open(interface, clock)?),
+            Self::SocketCan { interface } => BusKind::SocketCan(crate::SocketCanBus::open(interface, clock)?),
             #[cfg(not(target_os = "linux"))]
             Self::SocketCan { interface } => {
                 let problem = crate::InterfaceProblem::NotLinux { name: interface.clone() };
                 return Err(BusError::Interface(problem));
             }
             Self::Socketcand { address, bus } => {
-                Kind::Socketcand(Reconnecting::open((address.clone(), bus.clone()), clock).await?)
+                BusKind::Socketcand(Reconnecting::open((address.clone(), bus.clone()), clock).await?)
             }
             Self::SlcanSerial { path, bitrate, baud } => {
                 let place = SlcanPlace { address: path.clone(), baud: Some(*baud), bitrate: *bitrate };
-                Kind::Slcan(Reconnecting::open(place, clock).await?)
+                BusKind::Slcan(Reconnecting::open(place, clock).await?)
             }
             Self::SlcanTcp { address, bitrate } => {
                 let place = SlcanPlace { address: address.clone(), baud: None, bitrate: *bitrate };
-                Kind::Slcan(Reconnecting::open(place, clock).await?)
+                BusKind::Slcan(Reconnecting::open(place, clock).await?)
             }
             Self::Cannelloni { address, local_port } => {
-                Kind::Cannelloni(CannelloniBus::open(address, *local_port, clock).await?)
+                BusKind::Cannelloni(CannelloniBus::open(address, *local_port, clock).await?)
             }
             Self::UdpMulticast { group, port, hops } => {
-                Kind::UdpMulticast(UdpMulticastBus::open(*group, *port, *hops, clock)?)
+                BusKind::UdpMulticast(UdpMulticastBus::open(*group, *port, *hops, clock)?)
             }
-            Self::Log { path } => Kind::Log(LogBus::open(path)?),
+            Self::Log { path } => BusKind::Log(LogBus::open(path)?),
         }))
     }
 }

@@ -4,7 +4,7 @@ use cia402::Controlword;
 use devices::model;
 use drives::mjoint::objects::TABLE;
 use drives::mjoint::objects::modbus::REGISTERS;
-use drives::mjoint::statusword::{Condition, statusword};
+use drives::mjoint::statusword::{StatusCondition, statusword};
 use ferrodrive_tests::bench::mjoint::figure;
 use ferrodrive_tests::mjoint::{MODELS, Situation, objects, situations};
 
@@ -29,8 +29,8 @@ fn the_statusword_mirrors_the_controlword_in_every_situation() {
     }
 }
 
-fn condition(situation: &Situation) -> Condition {
-    Condition {
+fn condition(situation: &Situation) -> StatusCondition {
+    StatusCondition {
         controlword: Controlword(situation.controlword),
         output_enabled: situation.output_enabled,
         alarm: situation.alarm != 0,

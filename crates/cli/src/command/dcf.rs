@@ -67,13 +67,13 @@ pub(crate) struct DcfReport {
     /// Values in the file.
     values: usize,
     /// Objects that could not be read.
-    refused: Vec<Refused>,
+    refused: Vec<RefusedValue>,
     /// Commands and set-points.
     left_out: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
-struct Refused {
+struct RefusedValue {
     object: String,
     name: String,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -133,7 +133,7 @@ impl Dcf {
         context: &Context,
         node: &Node,
         made: &mut Configuration,
-    ) -> Result<(usize, usize, Vec<Refused>), Failure> {
+    ) -> Result<(usize, usize, Vec<RefusedValue>), Failure> {
         let wanted = made.wanted();
         let (mut values, mut read, mut refused) = (0, 0, Vec::new());
         for (number, place) in wanted.iter().enumerate() {
@@ -141,7 +141,7 @@ impl Dcf {
             let name = made.eds().variable(place.index, place.sub_index).map(|variable| variable.name.clone());
             let name = name.unwrap_or_default();
             let mut refuse = |why: String, abort: Option<u32>| {
-                refused.push(Refused { object: place.to_string(), name: name.clone(), abort, why });
+                refused.push(RefusedValue { object: place.to_string(), name: name.clone(), abort, why });
             };
             match node.upload(*place).await {
                 Ok(payload) => {
@@ -167,12 +167,12 @@ impl Dcf {
         &self,
         context: &Context,
         made: &mut Configuration,
-    ) -> Result<(usize, usize, Vec<Refused>), Failure> {
+    ) -> Result<(usize, usize, Vec<RefusedValue>), Failure> {
         let drive = context.known_drive(self.node).await?;
         let show = |number, of, object| context.progress.count(format!("{number} of {of}: {object}"));
         let backup = drive.back_up(show).await?;
         put(made, &backup.parameters)?;
-        let refused = backup.refused.iter().map(|(object, error)| Refused {
+        let refused = backup.refused.iter().map(|(object, error)| RefusedValue {
             object: object.to_string(),
             name: made.eds().variable(object.index, object.sub_index).map(|row| row.name.clone()).unwrap_or_default(),
             abort: error.abort().map(|code| code.0),

@@ -15,11 +15,11 @@ pub(crate) struct DepartureList {
     #[serde(skip_serializing_if = "Option::is_none")]
     guess: Option<&'static str>,
     title: String,
-    departures: Vec<Row>,
+    departures: Vec<DepartureRow>,
 }
 
 #[derive(Debug, Serialize)]
-struct Row {
+struct DepartureRow {
     /// Its name for programs.
     departure: &'static str,
     /// The object that it is about; `None` for what is about none.
@@ -32,7 +32,7 @@ struct Row {
 impl DepartureList {
     /// Those of `model`.
     pub(crate) fn of(model: &'static Description, guess: Option<&'static str>) -> Self {
-        let departures = model.departures(devices::all()).map(|departure| Row {
+        let departures = model.departures(devices::all()).map(|departure| DepartureRow {
             departure: departure.key(),
             object: departure.object().map(|object| object.to_string()),
             what: departure.to_string(),

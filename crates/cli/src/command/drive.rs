@@ -141,7 +141,7 @@ pub(crate) struct StateReport {
     fault_code: u16,
     faults: Vec<FaultReport>,
     #[serde(flatten)]
-    pub(crate) motion: Motion,
+    pub(crate) motion: ShaftMotion,
     supply_v: Option<f64>,
     motor_c: Option<f64>,
     driver_c: Option<f64>,
@@ -162,7 +162,7 @@ struct GearReport {
 
 /// Where a shaft is and what it does; what is not known is left out of the text.
 #[derive(Debug, Serialize)]
-pub(crate) struct Motion {
+pub(crate) struct ShaftMotion {
     position: Option<i64>,
     angle_deg: Option<f64>,
     velocity_rpm: Option<f64>,
@@ -257,7 +257,7 @@ impl StateReport {
             bits,
             fault_code: state.fault_code,
             faults: faults.collect(),
-            motion: Motion {
+            motion: ShaftMotion {
                 position: state.position.map(|counts| counts.0),
                 angle_deg: state.angle.map(|angle| angle.0),
                 velocity_rpm: state.velocity.map(|speed| speed.0),
@@ -301,7 +301,7 @@ impl StateReport {
     }
 }
 
-impl Motion {
+impl ShaftMotion {
     /// In one line.
     pub(crate) fn text(&self) -> String {
         // A tenth of an r/min of the output may be many of a shaft behind a gear.

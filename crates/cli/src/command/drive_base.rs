@@ -86,7 +86,7 @@ pub(crate) struct BaseDriven {
     bad_lines: u32,
     /// Cycles in which a wheel's position did not come.
     unseen_cycles: u64,
-    limits: Limits,
+    limits: BaseLimitValues,
     wheels: [WheelReport; 2],
 }
 
@@ -98,7 +98,7 @@ struct PoseReport {
 }
 
 #[derive(Debug, Serialize)]
-struct Limits {
+struct BaseLimitValues {
     linear_m_s: f64,
     angular_rad_s: f64,
     wheel_m_s: f64,
@@ -115,14 +115,14 @@ struct WheelReport {
 }
 
 /// Where twists come from.
-enum Source {
+enum TwistSource {
     For(Twist, Duration),
     Lines(Receiver<String>),
 }
 
 /// What happened while it was driven.
 #[derive(Debug, Default)]
-struct Seen {
+struct BaseRun {
     time: Duration,
     dead_man_stops: u32,
     bad_lines: u32,
@@ -132,14 +132,14 @@ struct Seen {
 
 /// What the base can do, for what is asked of it beyond that.
 #[derive(Clone, Copy)]
-struct Bounds {
+struct BaseBounds {
     geometry: Geometry,
     limits: BaseLimits,
 }
 
-impl Bounds {
+impl BaseBounds {
     /// Says once of twists beyond the limits, one after the other, what is driven instead.
-    fn say(&self, context: &Context, twist: Twist, seen: &mut Seen) {
+    fn say(&self, context: &Context, twist: Twist, seen: &mut BaseRun) {
         let driven = self.geometry.saturate(twist, &self.limits);
         let beyond = driven != twist;
         if beyond && !seen.beyond {
@@ -201,7 +201,7 @@ impl DriveBase {
         let period = plan.period.unwrap_or(BASE_PERIOD);
         let driven = match Base::open([left, right], plan.geometry, limits, period, options).await {
             Ok(mut base) => {
-                let driven = self.carry_out(context, &mut base, Bounds { geometry: plan.geometry, limits }).await;
+                let driven = self.carry_out(context, &mut base, BaseBounds { geometry: plan.geometry, limits }).await;
                 let state = base.state();
                 let closed = base.close().await.map_err(Failure::from);
                 driven.and_then(|seen| closed.map(|()| (seen, state)))
@@ -215,7 +215,7 @@ impl DriveBase {
         Ok(BaseDriven::new(&seen, &state, limits, [left, right], reports))
     }
 
-    async fn carry_out(&self, context: &Context, base: &mut Base, bounds: Bounds) -> Result<Seen, Failure> {
+    async fn carry_out(&self, context: &Context, base: &mut Base, bounds: BaseBounds) -> Result<BaseRun, Failure> {
         match self.follow(context, base, bounds).await {
             Ok(seen) => Ok(seen),
             Err(error) => {
@@ -230,23 +230,23 @@ impl DriveBase {
         }
     }
 
-    async fn follow(&self, context: &Context, base: &mut Base, bounds: Bounds) -> Result<Seen, BaseError> {
+    async fn follow(&self, context: &Context, base: &mut Base, bounds: BaseBounds) -> Result<BaseRun, BaseError> {
         context.progress.show("enabling both wheels");
         base.enable().await?;
-        let mut seen = Seen::default();
+        let mut seen = BaseRun::default();
         let began = context.network.now();
         match self.source() {
-            Source::For(twist, duration) => {
+            TwistSource::For(twist, duration) => {
                 while context.network.now() - began < duration {
                     bounds.say(context, twist, &mut seen);
                     base.command(twist)?;
                     cycle(context, base, began).await?;
                 }
             }
-            Source::Lines(lines) if context.is_embedded() => {
+            TwistSource::Lines(lines) if context.is_embedded() => {
                 follow_virtually(context, (base, bounds), &lines, &mut seen).await?
             }
-            Source::Lines(lines) => follow_lines(context, (base, bounds), &lines, &mut seen).await?,
+            TwistSource::Lines(lines) => follow_lines(context, (base, bounds), &lines, &mut seen).await?,
         }
         base.stop().await?;
         let settled = context.network.now() + SETTLING;
@@ -257,8 +257,9 @@ impl DriveBase {
         Ok(seen)
     }
 
-    fn source(&self) -> Source {
-        self.duration.map_or_else(|| Source::Lines(lines_of_input()), |duration| Source::For(self.twist(), duration))
+    fn source(&self) -> TwistSource {
+        self.duration
+            .map_or_else(|| TwistSource::Lines(lines_of_input()), |duration| TwistSource::For(self.twist(), duration))
     }
 
     fn twist(&self) -> Twist {
@@ -334,9 +335,9 @@ fn place(state: &BaseState) -> String {
 /// The newest line of each cycle, until the input ends. Where none comes in time, the base's watchdog stops it.
 async fn follow_lines(
     context: &Context,
-    (base, bounds): (&mut Base, Bounds),
+    (base, bounds): (&mut Base, BaseBounds),
     lines: &Receiver<String>,
-    seen: &mut Seen,
+    seen: &mut BaseRun,
 ) -> Result<(), BaseError> {
     let began = context.network.now();
     let mut was_late = false;
@@ -368,9 +369,9 @@ async fn follow_lines(
 /// Each line for the same virtual time, so that a run is the same whenever its lines come.
 async fn follow_virtually(
     context: &Context,
-    (base, bounds): (&mut Base, Bounds),
+    (base, bounds): (&mut Base, BaseBounds),
     lines: &Receiver<String>,
-    seen: &mut Seen,
+    seen: &mut BaseRun,
 ) -> Result<(), BaseError> {
     let began = context.network.now();
     while let Ok(line) = lines.recv() {
@@ -387,9 +388,9 @@ async fn follow_virtually(
 /// A twist that is not a number is a bad line; any other error ends the command.
 fn take(
     context: &Context,
-    (base, bounds): (&mut Base, Bounds),
+    (base, bounds): (&mut Base, BaseBounds),
     twist: Twist,
-    seen: &mut Seen,
+    seen: &mut BaseRun,
 ) -> Result<(), BaseError> {
     bounds.say(context, twist, seen);
     match base.command(twist) {
@@ -403,7 +404,7 @@ fn take(
 }
 
 /// The twist of a line. Any other line is reported and ignored: if no valid one follows, the dead man stops the base.
-fn twist_of(context: &Context, line: &str, seen: &mut Seen) -> Option<Twist> {
+fn twist_of(context: &Context, line: &str, seen: &mut BaseRun) -> Option<Twist> {
     let mut words = line.split_whitespace().map(|word| word.parse::<f64>().ok().filter(|number| number.is_finite()));
     let twist = match (words.next(), words.next(), words.next()) {
         (None, None, None) => return None,
@@ -420,7 +421,7 @@ fn twist_of(context: &Context, line: &str, seen: &mut Seen) -> Option<Twist> {
 
 impl BaseDriven {
     fn new(
-        seen: &Seen,
+        seen: &BaseRun,
         state: &BaseState,
         limits: BaseLimits,
         wheels: [&WheelSetup; 2],
@@ -444,7 +445,7 @@ impl BaseDriven {
             dead_man_stops: seen.dead_man_stops,
             bad_lines: seen.bad_lines,
             unseen_cycles: state.unseen_cycles,
-            limits: Limits { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, dead_man_ms, lag_m },
+            limits: BaseLimitValues { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, dead_man_ms, lag_m },
             wheels: [report(wheels[0], left), report(wheels[1], right)],
         }
     }
@@ -454,7 +455,7 @@ impl Report for BaseDriven {
     fn text(&self, paint: Paint) -> String {
         let PoseReport { x_m, y_m, heading_deg } = self.pose;
         let head = format!("the base stands after {:.2} s; its drives are without power", self.time_s);
-        let Limits { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, dead_man_ms, lag_m } = self.limits;
+        let BaseLimitValues { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, dead_man_ms, lag_m } = self.limits;
         let [linear, angular, wheel, ramp] = [linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2].map(Shown);
         let mut lines = vec![
             paint.good(&head),

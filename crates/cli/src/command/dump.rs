@@ -55,7 +55,7 @@ const EMBEDDED_DURATION: Duration = Duration::from_secs(2);
 
 /// A frame in words.
 #[derive(Debug, Serialize)]
-struct Line {
+struct FrameLine {
     t: f64,
     frame: String,
     text: String,
@@ -73,7 +73,7 @@ struct Line {
     sent: Option<bool>,
 }
 
-impl Report for Line {
+impl Report for FrameLine {
     fn text(&self, paint: Paint) -> String {
         format!("{} {:<20}  {}", paint.dim(&self.stamp), self.frame, self.text)
     }
@@ -112,7 +112,7 @@ struct Skipped {
 
 /// What came of a log with parts that are not read.
 #[derive(Debug, Serialize)]
-struct Summary {
+struct LogSummary {
     frames: u64,
     lines_skipped: u64,
     fd_frames: u64,
@@ -322,7 +322,7 @@ impl Sink {
         if !wanted {
             return Ok(());
         }
-        let line = Line {
+        let line = FrameLine {
             t: at.as_secs_f64(),
             frame: frame.to_string(),
             text: decoded.to_string(),
@@ -382,7 +382,7 @@ impl Sink {
             )));
         }
         if self.format.json {
-            let summary = Summary { frames, lines_skipped, fd_frames };
+            let summary = LogSummary { frames, lines_skipped, fd_frames };
             return self.format.print_json(&summary).map_err(|error| not_printed(&error));
         }
         let _ = writeln!(

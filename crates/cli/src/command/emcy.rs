@@ -25,20 +25,20 @@ use words::node::{Nodes, node, nodes};
     ferrodrive emcy watch 4 --for 10s\n  ferrodrive emcy show 4")]
 pub(crate) struct Emcy {
     #[command(subcommand)]
-    what: What,
+    what: EmcyCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
+enum EmcyCommand {
     /// Show emergency messages as they arrive, with fault and remedy
-    Watch(Watch),
+    Watch(WatchEmcy),
     /// Show the errors that a node remembers (1003h), newest first
     Show(Show),
 }
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 emcy watch\n  ferrodrive --bus can0 emcy watch 4 --for 10s")]
-struct Watch {
+struct WatchEmcy {
     /// Node-ID, or all
     #[arg(value_name = "NODE|all", value_parser = nodes, default_value = "all")]
     nodes: Nodes,
@@ -94,13 +94,13 @@ impl Emcy {
     /// Shows them.
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         match &self.what {
-            What::Watch(watch) => watch.run(context, format).await,
-            What::Show(show) => format.print(&show.run(context).await?).map_err(Failure::not_printed),
+            EmcyCommand::Watch(watch) => watch.run(context, format).await,
+            EmcyCommand::Show(show) => format.print(&show.run(context).await?).map_err(Failure::not_printed),
         }
     }
 }
 
-impl Watch {
+impl WatchEmcy {
     async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         let mut decoder = context.decoder();
         let mut stamps = Stamps::new(self.time, context.traffic.unix_zero());

@@ -231,18 +231,18 @@ mod tests {
     use crate::session;
 
     #[derive(Parser)]
-    struct Line {
+    struct GlobalArguments {
         #[command(flatten)]
         global: Global,
     }
 
     /// A bus with these drives, and the models of all that should be there.
-    fn line(folder: &Scratch, there: &str, named: &[&str]) -> Line {
+    fn line(folder: &Scratch, there: &str, named: &[&str]) -> GlobalArguments {
         let path = folder.join("bus.toml");
         std::fs::write(&path, there).expect("written");
         let bus = format!("sim:{}", path.display());
         let models = named.iter().flat_map(|model| ["--model", model]);
-        Line::parse_from(["ferrodrive", "--bus", &bus].into_iter().chain(models))
+        GlobalArguments::parse_from(["ferrodrive", "--bus", &bus].into_iter().chain(models))
     }
 
     const SERVO: &str = "[[drive]]\nmodel = 'cia402'\nnode = 5\n";

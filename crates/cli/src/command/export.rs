@@ -22,11 +22,11 @@ use plot::Paint;
     ferrodrive --bus sim:base.toml export dbc     # as delivered")]
 pub(crate) struct Export {
     #[command(subcommand)]
-    form: Form,
+    form: ExportForm,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum Form {
+enum ExportForm {
     Dbc(Dbc),
 }
 
@@ -88,7 +88,7 @@ impl Report for ExportReport {
 impl Export {
     /// Reads what there is.
     pub(crate) async fn run(&self, context: &Context) -> Result<ExportReport, Failure> {
-        let Form::Dbc(dbc) = &self.form;
+        let ExportForm::Dbc(dbc) = &self.form;
         let output = new_file(dbc.output.as_deref(), dbc.force)?;
         let mut ids = dbc.nodes.clone();
         if ids.is_empty() {

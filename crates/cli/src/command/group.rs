@@ -42,11 +42,11 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
     ferrodrive --bus can0 group move machine.toml --relative 1=10deg 2=10deg")]
 pub(crate) struct GroupCommand {
     #[command(subcommand)]
-    what: What,
+    what: GroupAction,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
+enum GroupAction {
     Move(Move),
 }
 
@@ -162,12 +162,12 @@ struct AxisMoved {
     at_deg: f64,
     /// On the way.
     largest_following_error_deg: f64,
-    limits: Limits,
+    limits: AxisLimitValues,
     guard: GuardReport,
 }
 
 #[derive(Debug, Serialize)]
-struct Limits {
+struct AxisLimitValues {
     /// `null` for an axis without software limits.
     range_deg: Option<[f64; 2]>,
     velocity_rpm: f64,
@@ -176,7 +176,7 @@ struct Limits {
     following_error_deg: f64,
 }
 
-impl From<&AxisLimits> for Limits {
+impl From<&AxisLimits> for AxisLimitValues {
     fn from(limits: &AxisLimits) -> Self {
         Self {
             range_deg: limits.range_turns.as_ref().map(|range| [range.start() * 360.0, range.end() * 360.0]),
@@ -208,7 +208,7 @@ impl Planned {
 }
 
 /// What was seen on the way.
-struct Seen {
+struct GroupRun {
     time: Duration,
     from: Vec<f64>,
     to: Vec<f64>,
@@ -220,7 +220,7 @@ struct Seen {
 impl GroupCommand {
     /// Does what is asked for, and prints it.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
-        let What::Move(command) = &self.what;
+        let GroupAction::Move(command) = &self.what;
         let report = session::run(&command.global(global)?, async |context| command.run(context).await)?;
         format.print(&report).map_err(Failure::of_stdout)
     }
@@ -365,7 +365,7 @@ impl Move {
     }
 
     /// Enables, moves and lets the shafts settle. What stops it is reported in the words of its drive.
-    async fn carry_out(&self, context: &Context, group: &mut Group, planned: &Planned) -> Result<Seen, Failure> {
+    async fn carry_out(&self, context: &Context, group: &mut Group, planned: &Planned) -> Result<GroupRun, Failure> {
         match self.follow(context, group, planned).await {
             Ok(seen) => Ok(seen),
             Err(error) => {
@@ -380,7 +380,7 @@ impl Move {
         }
     }
 
-    async fn follow(&self, context: &Context, group: &mut Group, planned: &Planned) -> Result<Seen, GroupError> {
+    async fn follow(&self, context: &Context, group: &mut Group, planned: &Planned) -> Result<GroupRun, GroupError> {
         context.progress.show(format!("enabling {} axes", planned.axes.len()));
         group.enable().await?;
         let from: Vec<_> = group.points().iter().map(|point| point.position_turns).collect();
@@ -416,7 +416,7 @@ impl Move {
         }
         group.rest().await?;
         let at = group.axes().iter().zip(&to).map(|(state, to)| state.position.map_or(*to, |Turns(at)| at)).collect();
-        Ok(Seen { time, from, to, at, largest_turns, missed_cycles: group.state().missed_cycles })
+        Ok(GroupRun { time, from, to, at, largest_turns, missed_cycles: group.state().missed_cycles })
     }
 }
 
@@ -441,7 +441,7 @@ async fn turns_of(drive: &Drive, angle: Angle) -> Result<Turns, Failure> {
 }
 
 impl GroupMoved {
-    fn new(planned: &Planned, seen: Seen, guards: Vec<GuardReport>) -> Self {
+    fn new(planned: &Planned, seen: GroupRun, guards: Vec<GuardReport>) -> Self {
         let axes = planned.axes.iter().zip(guards).enumerate().map(|(index, (axis, guard))| AxisMoved {
             node: axis.drive.node().id().raw(),
             mode: axis.mode.name().unwrap_or("manufacturer-specific").to_owned(),
@@ -475,7 +475,7 @@ impl Report for GroupMoved {
         let mut table = Table::new(&["node", "mode", "from", "to", "at", "largest lag", "limits"]);
         for axis in &self.axes {
             let deg = |value: f64| format!("{} deg", Shown(value));
-            let Limits { range_deg, velocity_rpm, acceleration_rpm_s, .. } = axis.limits;
+            let AxisLimitValues { range_deg, velocity_rpm, acceleration_rpm_s, .. } = axis.limits;
             let range =
                 range_deg.map_or(String::new(), |[low, high]| format!(", {} to {} deg", Shown(low), Shown(high)));
             let limits = format!("{} r/min, {} (r/min)/s{range}", Shown(velocity_rpm), Shown(acceleration_rpm_s));

@@ -26,14 +26,14 @@ use words::node::node;
     ferrodrive --bus can0 lss set only --bitrate 250k --store --activate 500ms")]
 pub(crate) struct Lss {
     #[command(subcommand)]
-    what: What,
+    what: LssCommand,
     /// Longest wait for each answer
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "50ms", global = true)]
     within: Duration,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
+enum LssCommand {
     /// Find every device that has no node-ID (fastscan): some seconds for each
     #[command(after_help = "Example:\n  ferrodrive --bus can0 lss scan")]
     Scan,
@@ -64,7 +64,7 @@ enum What {
 struct DeviceArg {
     /// VENDOR:PRODUCT:REVISION:SERIAL (1018h:01 to 04) in hexadecimal, or only: the one device on the bus
     #[arg(value_name = "ADDRESS|only", value_parser = device)]
-    device: Device,
+    device: MeantDevice,
 }
 
 #[derive(Debug, clap::Args)]
@@ -76,7 +76,7 @@ struct Set {
     device: DeviceArg,
     /// New node-ID, in effect from the next NMT reset communication on; none removes it
     #[arg(long, value_name = "NODE|none", value_parser = node_or_none, required_unless_present_any = ["bitrate", "store"])]
-    node_id: Option<Wanted>,
+    node_id: Option<NodeIdArg>,
     /// New bit rate: 10k, 20k, 50k, 125k, 250k, 500k, 800k, 1M
     #[arg(long, value_name = "RATE", value_parser = bit_rate)]
     bitrate: Option<u8>,
@@ -93,7 +93,7 @@ struct Set {
 
 /// The device that is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Device {
+enum MeantDevice {
     At(Address),
     Only,
 }
@@ -108,7 +108,7 @@ struct Make {
 
 /// A node-ID that is to be set, 255 for none.
 #[derive(Clone, Copy, Debug)]
-struct Wanted(u8);
+struct NodeIdArg(u8);
 
 /// Devices found on one bus at the most.
 const MOST: usize = 127;
@@ -116,12 +116,12 @@ const MOST: usize = 127;
 /// How long a device may take to boot with its new node-ID, as `nmt` waits.
 const BOOT_PATIENCE: Duration = Duration::from_secs(5);
 
-fn device(text: &str) -> Result<Device, String> {
+fn device(text: &str) -> Result<MeantDevice, String> {
     if text.eq_ignore_ascii_case("only") {
-        return Ok(Device::Only);
+        return Ok(MeantDevice::Only);
     }
     let numbers: Option<[u32; 4]> = hexadecimals(text);
-    numbers.map(|numbers| Device::At(Address { numbers })).ok_or_else(|| {
+    numbers.map(|numbers| MeantDevice::At(Address { numbers })).ok_or_else(|| {
         format!(
             "expected an LSS address (vendor, product code, revision and serial number in hexadecimal, e.g. 100:1:0:2A), or \
              the word only, got '{text}'"
@@ -153,11 +153,11 @@ fn hexadecimals<const N: usize>(text: &str) -> Option<[u32; N]> {
     numbers?.try_into().ok()
 }
 
-fn node_or_none(text: &str) -> Result<Wanted, String> {
+fn node_or_none(text: &str) -> Result<NodeIdArg, String> {
     if text.eq_ignore_ascii_case("none") {
-        return Ok(Wanted(UNCONFIGURED));
+        return Ok(NodeIdArg(UNCONFIGURED));
     }
-    node(text).map(|node| Wanted(node.raw())).map_err(|error| format!("{error}, or the word none"))
+    node(text).map(|node| NodeIdArg(node.raw())).map_err(|error| format!("{error}, or the word none"))
 }
 
 /// The index in the table of CiA 305.
@@ -177,7 +177,7 @@ fn silence(text: &str) -> Result<Duration, String> {
 /// What was found or done.
 #[derive(Debug, Serialize)]
 pub(crate) struct LssReport {
-    devices: Vec<Found>,
+    devices: Vec<FoundDevice>,
     /// What was set, in words.
     done: Vec<String>,
     /// When it takes effect, and how, where it has not yet.
@@ -189,7 +189,7 @@ pub(crate) struct LssReport {
 
 /// A device, as far as it is known.
 #[derive(Debug, Serialize)]
-struct Found {
+struct FoundDevice {
     /// As `lss set` takes it.
     address: String,
     vendor_id: u32,
@@ -212,15 +212,15 @@ impl Lss {
         context.traffic.listen();
         let mut master = LssMaster { context, client: Client::new(self.within) };
         let done = match &self.what {
-            What::Scan => master.scan().await,
-            What::Identify { make } => master.identify(*make).await,
-            What::Inquire { device } => master.inquire(device.device).await,
-            What::Set(set) => master.set(set).await,
+            LssCommand::Scan => master.scan().await,
+            LssCommand::Identify { make } => master.identify(*make).await,
+            LssCommand::Inquire { device } => master.inquire(device.device).await,
+            LssCommand::Set(set) => master.set(set).await,
         };
         master.ask(Request::SwitchGlobal(false)).await;
         context.settle().await;
         let mut done = done?;
-        if let (What::Set(set), Some((old, new))) = (&self.what, done.change) {
+        if let (LssCommand::Set(set), Some((old, new))) = (&self.what, done.change) {
             done.pending = set.take_effect(context, old, new).await?;
         }
         Ok(done)
@@ -292,7 +292,7 @@ impl LssMaster<'_> {
                 self.context.progress.count(format!("found {}; question {asked} of 133", devices.len()));
             }
             match scan.found() {
-                Some(address) => devices.push(Found::new(address, None)),
+                Some(address) => devices.push(FoundDevice::new(address, None)),
                 None if asked > 1 => {
                     return Err(went_away());
                 }
@@ -338,21 +338,21 @@ impl LssMaster<'_> {
         }
         let mut devices = Vec::new();
         for address in addresses {
-            self.select(Device::At(address)).await?;
+            self.select(MeantDevice::At(address)).await?;
             // Optional for a device.
             let node = match self.ask(Request::InquireNodeId).await {
                 Some(Reply::NodeId(node)) => NodeId::new(node),
                 _ => None,
             };
-            devices.push(Found::new(address, node));
+            devices.push(FoundDevice::new(address, node));
         }
         Ok(LssReport { devices, done: Vec::new(), pending: None, change: None })
     }
 
     /// Lets the device that is meant be configured, and no other.
-    async fn select(&mut self, device: Device) -> Result<(), Failure> {
+    async fn select(&mut self, device: MeantDevice) -> Result<(), Failure> {
         self.ask(Request::SwitchGlobal(false)).await;
-        let Device::At(address) = device else {
+        let MeantDevice::At(address) = device else {
             self.ask(Request::SwitchGlobal(true)).await;
             return Ok(());
         };
@@ -373,7 +373,7 @@ impl LssMaster<'_> {
         }
     }
 
-    async fn inquire(&mut self, device: Device) -> Result<LssReport, Failure> {
+    async fn inquire(&mut self, device: MeantDevice) -> Result<LssReport, Failure> {
         self.select(device).await?;
         let mut address = Address::default();
         for (part, number) in Part::ALL.into_iter().zip(&mut address.numbers) {
@@ -383,7 +383,7 @@ impl LssMaster<'_> {
             return Err(no_answer("the device"));
         };
         Ok(LssReport {
-            devices: vec![Found::new(address, NodeId::new(node))],
+            devices: vec![FoundDevice::new(address, NodeId::new(node))],
             done: Vec::new(),
             pending: None,
             change: None,
@@ -398,7 +398,7 @@ impl LssMaster<'_> {
             Some(Reply::NodeId(node)) => Some(NodeId::new(node)),
             _ => None,
         };
-        if let Some(Wanted(node)) = set.node_id {
+        if let Some(NodeIdArg(node)) = set.node_id {
             let what = if node == UNCONFIGURED { "no node-ID".to_owned() } else { format!("node-ID {node}") };
             let answer = self.ask(Request::ConfigureNodeId(node)).await;
             done.push(checked(&what, answer, "the device does not accept it")?);
@@ -416,7 +416,7 @@ impl LssMaster<'_> {
             self.ask(Request::ActivateBitRate(silence.as_millis() as u16)).await;
             done.push(format!("new bit rate from {} ms on", silence.as_millis()));
         }
-        let wanted = set.node_id.map(|Wanted(node)| NodeId::new(node));
+        let wanted = set.node_id.map(|NodeIdArg(node)| NodeId::new(node));
         let change = before.flatten().zip(wanted).filter(|(old, new)| Some(*old) != *new);
         Ok(LssReport { devices: Vec::new(), done, pending: None, change })
     }
@@ -459,7 +459,7 @@ fn checked(what: &str, answer: Option<Reply>, refused: &str) -> Result<String, F
     }
 }
 
-impl Found {
+impl FoundDevice {
     fn new(address: Address, node_id: Option<NodeId>) -> Self {
         let [vendor_id, product_code, revision_number, serial_number] = address.numbers;
         Self {
@@ -493,10 +493,10 @@ mod tests {
 
     #[test]
     fn addresses_are_four_hexadecimal_numbers() {
-        let at = |numbers| Ok(Device::At(Address { numbers }));
+        let at = |numbers| Ok(MeantDevice::At(Address { numbers }));
         assert_eq!(device("100:1:0:2A"), at([0x100, 1, 0, 0x2A]));
         assert_eq!(device("0x100:1h:0:FFFFFFFF"), at([0x100, 1, 0, u32::MAX]));
-        assert_eq!(device("only"), Ok(Device::Only));
+        assert_eq!(device("only"), Ok(MeantDevice::Only));
         assert_eq!(make("100:1"), Ok(Make { vendor_id: 0x100, product_code: 1, revision: None }));
         assert_eq!(make("100:1:FFFFFFFF").map(|make| make.revision), Ok(Some(u32::MAX)));
         assert!(make("100").is_err() && make("100:1:2:3").is_err() && make("").is_err());

@@ -10,7 +10,7 @@ use master::drive::{Commanded, Drive, Manner, MotionReport, Note};
 use master::units::{Along, Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
 use serde::Serialize;
 
-use super::drive::{Motion, StateReport};
+use super::drive::{ShaftMotion, StateReport};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::{Guard, GuardArgs, GuardReport};
@@ -127,8 +127,8 @@ pub(crate) struct MotionOutcome {
     stopped: bool,
     /// How it turned or pushed before it was stopped again.
     #[serde(skip_serializing_if = "Option::is_none")]
-    before_stop: Option<Motion>,
-    limits: Limits,
+    before_stop: Option<ShaftMotion>,
+    limits: ProfileLimits,
     guard: GuardReport,
     #[serde(flatten)]
     state: StateReport,
@@ -160,7 +160,7 @@ impl From<&Commanded> for Sent {
 
 /// The limits that the drive keeps to.
 #[derive(Debug, Default, Serialize)]
-struct Limits {
+struct ProfileLimits {
     profile_velocity_rpm: Option<f64>,
     acceleration_ms: Option<f64>,
     deceleration_ms: Option<f64>,
@@ -333,30 +333,30 @@ pub(super) async fn outcome(
 }
 
 /// What limits a motion, as far as the drive has objects for it.
-async fn limits(drive: &Drive) -> Limits {
-    let Some(axis) = drive.axis_description() else { return Limits::default() };
+async fn limits(drive: &Drive) -> ProfileLimits {
+    let Some(axis) = drive.axis_description() else { return ProfileLimits::default() };
     let profile_velocity_rpm = match axis.units.profile_velocity {
         Some(quantity) => drive.read_quantity(quantity).await.ok(),
         None => None,
     };
-    let limits = Limits { profile_velocity_rpm, ..Limits::default() };
+    let limits = ProfileLimits { profile_velocity_rpm, ..ProfileLimits::default() };
     let number = async |object, scale| drive.read_quantity(Quantity { object, scale }).await.ok();
     let ms = Scale::PerCount(1.0);
     match axis.units.ramps {
-        Some(Ramps::Times { acceleration, deceleration, quick_stop }) => Limits {
+        Some(Ramps::Times { acceleration, deceleration, quick_stop }) => ProfileLimits {
             acceleration_ms: number(acceleration, ms).await,
             deceleration_ms: number(deceleration, ms).await,
             quick_stop_ms: number(quick_stop, ms).await,
             ..limits
         },
         Some(Ramps::Rates { acceleration, scale, .. }) => {
-            Limits { acceleration_rpm_s: number(acceleration, scale).await, ..limits }
+            ProfileLimits { acceleration_rpm_s: number(acceleration, scale).await, ..limits }
         }
         None => limits,
     }
 }
 
-impl Limits {
+impl ProfileLimits {
     fn text(&self) -> String {
         let parts = [
             self.profile_velocity_rpm.map(|rpm| format!("profile velocity {} r/min", Shown(rpm))),

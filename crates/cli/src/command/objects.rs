@@ -58,11 +58,11 @@ pub(crate) struct ObjectList {
     #[serde(skip_serializing_if = "Option::is_none")]
     guess: Option<&'static str>,
     title: String,
-    objects: Vec<Row>,
+    objects: Vec<TableRow>,
 }
 
 #[derive(Debug, Serialize)]
-struct Row {
+struct TableRow {
     object: String,
     #[serde(skip)]
     mux: Mux,
@@ -77,7 +77,7 @@ struct Row {
     mappable: bool,
     default: Factory,
     /// Smallest and largest value, if narrower than the type.
-    limits: Option<Bounds>,
+    limits: Option<NumberBounds>,
     /// The object that multiplies them, and divides the unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     limits_times: Option<String>,
@@ -106,7 +106,7 @@ enum Factory {
 /// Limits as programs read them: two numbers.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
-enum Bounds {
+enum NumberBounds {
     Integer((i64, i64)),
     Unsigned((u64, u64)),
     Real((f64, f64)),
@@ -179,7 +179,7 @@ impl Objects {
     pub(crate) fn list(&self, model: &'static Description) -> Result<ObjectList, Failure> {
         let rows = model.dictionary.rows();
         let wanted = |row: &&Entry| self.search.iter().all(|word| matches(row, word));
-        let objects: Vec<Row> = rows.iter().filter(wanted).map(Row::new).collect();
+        let objects: Vec<TableRow> = rows.iter().filter(wanted).map(TableRow::new).collect();
         if objects.is_empty() {
             let words = self.search.join(" ");
             return Err(Failure::new(format!("no object of the {} matches '{words}'", model.name)).next(format!(
@@ -210,7 +210,7 @@ fn matches(row: &Entry, word: &str) -> bool {
     texts.into_iter().any(|text| text.to_lowercase().contains(&word))
 }
 
-impl Row {
+impl TableRow {
     fn new(row: &Entry) -> Self {
         Self {
             object: row.mux().to_string(),
@@ -223,7 +223,7 @@ impl Row {
             stored: row.stored,
             mappable: row.pdo.is_allowed(),
             default: Factory::of(row),
-            limits: row.limits.map(Bounds::of),
+            limits: row.limits.map(NumberBounds::of),
             limits_times: row.resolution.map(|object| object.to_string()),
             acts_up_to: row.held_to.map(|held_to| held_to.object.to_string()),
             now: None,
@@ -237,7 +237,7 @@ impl Row {
             return now.text.clone();
         }
         if self.values.is_empty() {
-            let limits = self.limits.as_ref().map(Bounds::text).unwrap_or_default();
+            let limits = self.limits.as_ref().map(NumberBounds::text).unwrap_or_default();
             let times = self.limits_times.as_ref().map(|object| format!(", times {object}")).unwrap_or_default();
             let held = self.acts_up_to.as_ref().map(|object| format!("; acts up to {object}")).unwrap_or_default();
             return limits + &times + &held;
@@ -279,7 +279,7 @@ impl Factory {
     }
 }
 
-impl Bounds {
+impl NumberBounds {
     const fn of(limits: ValueRange) -> Self {
         match limits {
             ValueRange::Integer(low, high) => Self::Integer((low, high)),

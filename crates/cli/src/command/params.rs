@@ -33,11 +33,11 @@ pub(super) use plan::{PlanReport, plan_of};
     ferrodrive --bus can0 params rollback 4\n  ferrodrive --bus can0 --machine machine.toml params apply 4")]
 pub(crate) struct Params {
     #[command(subcommand)]
-    what: What,
+    what: ParamsCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
+enum ParamsCommand {
     Backup(Backup),
     Diff(Diff),
     Plan(PlanArguments),
@@ -81,7 +81,7 @@ struct Diff {
     ferrodrive --bus can0 --machine machine.toml params plan 4")]
 struct PlanArguments {
     #[command(flatten)]
-    wanted: Wanted,
+    wanted: NodeAndFile,
     /// Include node-ID and bit rate, which are written last
     #[arg(long)]
     address: bool,
@@ -98,7 +98,7 @@ struct PlanArguments {
     ferrodrive --bus can0 --machine machine.toml params apply 4")]
 struct Apply {
     #[command(flatten)]
-    wanted: Wanted,
+    wanted: NodeAndFile,
     /// Include node-ID and bit rate, which are written last
     #[arg(long, conflicts_with = "prove")]
     address: bool,
@@ -112,7 +112,7 @@ struct Apply {
     ferrodrive --bus can0 --machine machine.toml params verify 4")]
 struct Verify {
     #[command(flatten)]
-    wanted: Wanted,
+    wanted: NodeAndFile,
 }
 
 /// Restore a node to how it was before an interrupted `apply`
@@ -151,7 +151,7 @@ pub(super) struct Transaction {
 
 /// Which node shall have what.
 #[derive(Debug, clap::Args)]
-struct Wanted {
+struct NodeAndFile {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
@@ -185,12 +185,12 @@ impl Params {
     /// Does what was asked for, and prints it.
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         let printed = match &self.what {
-            What::Backup(backup) => format.print(&backup.run(context).await?),
-            What::Diff(diff) => format.print(&diff.run(context).await?),
-            What::Plan(plan) => format.print(&plan.run(context).await?),
-            What::Apply(apply) => format.print(&apply.run(context).await?),
-            What::Rollback(rollback) => format.print(&rollback.run(context).await?),
-            What::Verify(verify) => {
+            ParamsCommand::Backup(backup) => format.print(&backup.run(context).await?),
+            ParamsCommand::Diff(diff) => format.print(&diff.run(context).await?),
+            ParamsCommand::Plan(plan) => format.print(&plan.run(context).await?),
+            ParamsCommand::Apply(apply) => format.print(&apply.run(context).await?),
+            ParamsCommand::Rollback(rollback) => format.print(&rollback.run(context).await?),
+            ParamsCommand::Verify(verify) => {
                 let report = verify.run(context).await?;
                 return format.print_judged(&report, report.failure().map(Failure::from));
             }

@@ -33,15 +33,15 @@ use words::node::node;
     ferrodrive pdo apply 4 tpdo1=statusword,6064 tpdo2=off --type 1 --save")]
 pub(crate) struct Pdo {
     #[command(subcommand)]
-    what: What,
+    what: PdoCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
+enum PdoCommand {
     /// Show identifier, transmission type, timers and mapping of each PDO, and why one is silent
     Show(Show),
     /// Show the values in the PDOs of a node as they arrive, by its own mapping
-    Watch(Watch),
+    Watch(WatchPdo),
     Plan(setup::PlanPdos),
     Apply(setup::ApplyPdos),
 }
@@ -57,7 +57,7 @@ struct Show {
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 pdo watch 4\n  \
     ferrodrive --bus can0 pdo watch 4 --for 10s --time delta")]
-struct Watch {
+struct WatchPdo {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
@@ -81,12 +81,12 @@ struct PdoList {
 #[derive(Debug, Serialize)]
 struct OfNode {
     node: u8,
-    pdos: Vec<Row>,
+    pdos: Vec<PdoRow>,
 }
 
 /// How one PDO is configured.
 #[derive(Debug, Serialize)]
-struct Row {
+struct PdoRow {
     /// `TPDO1`, counted from 1 as by CiA 301.
     pdo: String,
     /// The identifier.
@@ -112,7 +112,7 @@ struct Mapped {
 
 /// A PDO that came.
 #[derive(Debug, Serialize)]
-struct Line {
+struct PdoLine {
     t: f64,
     node: u8,
     pdo: String,
@@ -136,10 +136,10 @@ impl Pdo {
     /// Shows them.
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         match &self.what {
-            What::Show(show) => format.print(&show.run(context).await?).map_err(Failure::not_printed),
-            What::Watch(watch) => watch.run(context, format).await,
-            What::Plan(plan) => format.print(&plan.run(context).await?).map_err(Failure::not_printed),
-            What::Apply(apply) => format.print(&apply.run(context).await?).map_err(Failure::not_printed),
+            PdoCommand::Show(show) => format.print(&show.run(context).await?).map_err(Failure::not_printed),
+            PdoCommand::Watch(watch) => watch.run(context, format).await,
+            PdoCommand::Plan(plan) => format.print(&plan.run(context).await?).map_err(Failure::not_printed),
+            PdoCommand::Apply(apply) => format.print(&apply.run(context).await?).map_err(Failure::not_printed),
         }
     }
 }
@@ -152,7 +152,7 @@ impl Show {
             nodes.extend(context.network.scan(context.timeout(), asked).await.iter().map(|found| found.node));
         }
         let mut list = Vec::new();
-        let mut heard = silent::Heard::listen(context);
+        let mut heard = silent::HeardIds::listen(context);
         heard.long_enough(context).await;
         for node in nodes {
             context.progress.show(format!("node {node}: reading its PDOs"));
@@ -160,7 +160,7 @@ impl Show {
             let pdos = drive.pdos().await?;
             heard.take();
             let row = |(config, cob_id): &(PdoConfig, CobId)| {
-                Row::new(&drive, config, *cob_id, heard.why(context, &drive, config, *cob_id))
+                PdoRow::new(&drive, config, *cob_id, heard.why(context, &drive, config, *cob_id))
             };
             list.push(OfNode { node: node.raw(), pdos: pdos.iter().map(row).collect() });
         }
@@ -171,7 +171,7 @@ impl Show {
     }
 }
 
-impl Watch {
+impl WatchPdo {
     async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         let drive = context.drive(self.node).await?;
         let mut decoder = context.decoder();
@@ -194,7 +194,7 @@ impl Watch {
                 let BusFrame { at, frame, .. } = context.traffic.next().await;
                 let Decoded::Pdo(pdo) = decoder.decode(&frame) else { continue };
                 if pdo.node == self.node {
-                    let line = Line::new(&decoder, drive.description(), &pdo, at.as_secs_f64(), stamps.text(at));
+                    let line = PdoLine::new(&decoder, drive.description(), &pdo, at.as_secs_f64(), stamps.text(at));
                     format.print(&line).map_err(Failure::not_printed)?;
                 }
             }
@@ -214,7 +214,7 @@ impl Watch {
     }
 }
 
-impl Row {
+impl PdoRow {
     fn new(drive: &Drive, config: &PdoConfig, cob_id: CobId, silent: Vec<Silence>) -> Self {
         let ms = |time: Option<Duration>| time.map(|time| time.as_secs_f64() * 1e3);
         let mapped = config.map.0.iter().map(|record| Mapped {
@@ -239,7 +239,7 @@ impl Row {
     }
 }
 
-impl Line {
+impl PdoLine {
     fn new(
         decoder: &Decoder,
         model: Option<&'static Description>,
@@ -320,7 +320,7 @@ impl OfNode {
     }
 }
 
-impl Report for Line {
+impl Report for PdoLine {
     fn text(&self, paint: Paint) -> String {
         let values = self.values.iter().map(|field| {
             let name = field.name.unwrap_or(&field.object);

@@ -35,7 +35,7 @@ pub(crate) struct Readings {
 pub(crate) struct ReadingList {
     model: &'static str,
     manual: &'static str,
-    readings: Vec<Row>,
+    readings: Vec<ReadingRow>,
     /// What can be chosen besides readings: firmware, factory values, motor.
     options: Vec<Options>,
     #[serde(skip)]
@@ -43,7 +43,7 @@ pub(crate) struct ReadingList {
 }
 
 #[derive(Debug, Serialize)]
-struct Row {
+struct ReadingRow {
     #[serde(flatten)]
     reading: Reading,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -100,12 +100,12 @@ impl Readings {
         let guesses = all.iter().filter(|reading| reading.is_guess()).count();
         let rows = all.into_iter().map(|reading| {
             let variation = variations.iter().find(|variation| reading.is_of(variation.key));
-            Row { choose: variation.map(Options::of), reading }
+            ReadingRow { choose: variation.map(Options::of), reading }
         });
-        let wanted = |row: &Row| {
+        let wanted = |row: &ReadingRow| {
             (!self.choices || row.choose.is_some()) && (!self.guesses || row.reading.is_guess()) && self.matches(row)
         };
-        let readings: Vec<Row> = rows.filter(wanted).collect();
+        let readings: Vec<ReadingRow> = rows.filter(wanted).collect();
         let builds = variations.iter().filter(|variation| variation.kind == VariationKind::Build);
         let options: Vec<_> = builds.filter(|_| self.search.is_empty() && !self.guesses).map(Options::of).collect();
         if readings.is_empty() && options.is_empty() {
@@ -115,7 +115,7 @@ impl Readings {
         Ok(ReadingList { model: self.model.name, manual: self.model.manual, readings, options, guesses })
     }
 
-    fn matches(&self, row: &Row) -> bool {
+    fn matches(&self, row: &ReadingRow) -> bool {
         let Reading { id, section, manual, here, why, sure } = &row.reading;
         let text = [id, section, manual, here, why, sure].map(|part| part.to_lowercase()).join("\n");
         let number = |word: &str| row.reading.is_of(&word.to_uppercase());
@@ -133,7 +133,7 @@ impl Report for ReadingList {
             self.guesses
         )];
         let mut section = "";
-        for Row { reading, choose } in &self.readings {
+        for ReadingRow { reading, choose } in &self.readings {
             if reading.section != section {
                 section = &reading.section;
                 lines.extend([String::new(), paint.strong(section)]);

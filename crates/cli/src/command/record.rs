@@ -103,7 +103,7 @@ const PDO_FRESH: Duration = Duration::from_secs(1);
 const TPDOS: u16 = 4;
 
 /// An object that is recorded.
-struct Source {
+struct RecordedObject {
     mux: Mux,
     row: Option<&'static Entry>,
     /// Its form in TPDOs, where that is another.
@@ -136,7 +136,8 @@ impl Record {
                 .next("give --output NAME.csv, or omit --json"));
         }
         let drive = context.drive(self.node).await?;
-        let sources = self.objects.iter().map(|object| Source::new(&drive, object)).collect::<Result<Vec<_>, _>>()?;
+        let sources =
+            self.objects.iter().map(|object| RecordedObject::new(&drive, object)).collect::<Result<Vec<_>, _>>()?;
         let node = context.node(self.node);
         // Each has to answer once, before there is a file.
         for source in &sources {
@@ -175,7 +176,7 @@ impl Record {
         &self,
         context: &Context,
         node: &Node,
-        sources: &[Source],
+        sources: &[RecordedObject],
         file: &mut ObjectRecord,
         report: &mut RecordReport,
     ) {
@@ -218,7 +219,7 @@ impl Record {
     }
 }
 
-impl Source {
+impl RecordedObject {
     fn new(drive: &Drive, object: &ObjectArg) -> Result<Self, Failure> {
         let id = drive.node().id();
         let (mux, row) = resolve(drive, object)?;

@@ -49,15 +49,15 @@ pub(crate) struct Watch {
 
 /// One look.
 #[derive(Debug, Serialize)]
-struct Look {
+struct WatchedLook {
     t: f64,
     node: u8,
-    values: Vec<Seen>,
+    values: Vec<SeenValue>,
 }
 
 /// What an object had at one look.
 #[derive(Clone, Debug, Serialize)]
-struct Seen {
+struct SeenValue {
     object: String,
     name: Option<&'static str>,
     #[serde(flatten)]
@@ -115,7 +115,13 @@ impl Watch {
     }
 
     /// Reads every object once. What is missing for good ends the command at its first look, silence does not later on.
-    async fn look(&self, context: &Context, drive: &Drive, watched: &[Watched], first: bool) -> Result<Look, Failure> {
+    async fn look(
+        &self,
+        context: &Context,
+        drive: &Drive,
+        watched: &[Watched],
+        first: bool,
+    ) -> Result<WatchedLook, Failure> {
         let mut values = Vec::with_capacity(watched.len());
         let t = context.network.now().as_secs_f64();
         for object in watched {
@@ -126,7 +132,7 @@ impl Watch {
             };
             values.push(seen);
         }
-        Ok(Look { t, node: self.node.raw(), values })
+        Ok(WatchedLook { t, node: self.node.raw(), values })
     }
 }
 
@@ -143,26 +149,26 @@ impl Watched {
         Ok(Self { mux, name, row, counts_per_unit, lowest: None, highest: None })
     }
 
-    fn seen(&self, drive: &Drive, bytes: &[u8]) -> Seen {
+    fn seen(&self, drive: &Drive, bytes: &[u8]) -> SeenValue {
         let value = decode(drive.description(), self.row, bytes).at_resolution(self.counts_per_unit);
-        Seen { value: Some(value), ..self.blank() }
+        SeenValue { value: Some(value), ..self.blank() }
     }
 
-    fn unseen(&self, error: &Error) -> Seen {
+    fn unseen(&self, error: &Error) -> SeenValue {
         let why = match error {
             Error::NoAnswer { .. } => "no answer".to_owned(),
             Error::Aborted { code: AbortCode(code), .. } => format!("refused: {}", AbortCode(*code)),
             other => other.to_string(),
         };
-        Seen { error: Some(why), ..self.blank() }
+        SeenValue { error: Some(why), ..self.blank() }
     }
 
-    fn blank(&self) -> Seen {
-        Seen { object: self.mux.to_string(), name: self.name, value: None, error: None }
+    fn blank(&self) -> SeenValue {
+        SeenValue { object: self.mux.to_string(), name: self.name, value: None, error: None }
     }
 
     /// Keeps the extremes of what is measured; of states and texts there are none.
-    fn note(&mut self, seen: &Seen) {
+    fn note(&mut self, seen: &SeenValue) {
         let Some(value) = seen.value.as_ref().filter(|value| value.quantity.is_some() && value.meaning.is_none())
         else {
             return;
@@ -178,7 +184,7 @@ impl Watched {
     }
 }
 
-impl Seen {
+impl SeenValue {
     fn text(&self, paint: Paint) -> String {
         match (&self.value, &self.error) {
             (Some(value), _) => value.text(paint),
@@ -188,7 +194,7 @@ impl Seen {
     }
 }
 
-fn table(watched: &[Watched], look: &Look, paint: Paint) -> String {
+fn table(watched: &[Watched], look: &WatchedLook, paint: Paint) -> String {
     let mut table = Table::new(&["object", "name", "value", "lowest", "highest"]);
     for (object, seen) in watched.iter().zip(&look.values) {
         let extreme =
@@ -207,7 +213,7 @@ fn table(watched: &[Watched], look: &Look, paint: Paint) -> String {
     format!("{}\n{}", paint.dim(&heading), table.plain(paint))
 }
 
-impl Report for Look {
+impl Report for WatchedLook {
     fn text(&self, paint: Paint) -> String {
         let values = self.values.iter().map(|seen| {
             let name = seen.name.unwrap_or(&seen.object);

@@ -29,9 +29,9 @@ pub(crate) struct World {
 /// The simulator's answer.
 #[derive(Serialize)]
 #[serde(transparent)]
-pub(crate) struct Answer(Value);
+pub(crate) struct WorldAnswer(Value);
 
-impl Report for Answer {
+impl Report for WorldAnswer {
     fn text(&self, _: Paint) -> String {
         let fields = self.0.as_object().into_iter().flatten();
         let lines = fields.map(|(name, value)| match value {
@@ -48,7 +48,7 @@ impl Report for Answer {
 
 impl World {
     /// Sends the command and hands back the answer.
-    pub(crate) fn run(&self) -> Result<Answer, Failure> {
+    pub(crate) fn run(&self) -> Result<WorldAnswer, Failure> {
         exit_on_signal();
         let line = self.words.join(" ");
         let command = line
@@ -62,6 +62,6 @@ impl World {
         let mut answer = client.ask(json!({ "request": "world", "line": line }))?;
         // Every answer has "ok": it is omitted here.
         answer.as_object_mut().and_then(|fields| fields.remove("ok"));
-        Ok(Answer(answer))
+        Ok(WorldAnswer(answer))
     }
 }

@@ -23,12 +23,12 @@ pub(crate) struct Filter {
     services: Vec<ServiceKind>,
     /// Show only SDO and PDO with these objects: 6041, 6041:00 or a name
     #[arg(long = "object", value_name = "OBJECT", value_parser = wanted, value_delimiter = ',')]
-    objects: Vec<Wanted>,
+    objects: Vec<WantedObject>,
 }
 
 /// An object, all sub-indices of one, or all of a name.
 #[derive(Clone, Debug)]
-enum Wanted {
+enum WantedObject {
     Index(u16),
     Mux(Mux),
     Name(String),
@@ -42,11 +42,11 @@ fn service(text: &str) -> Result<ServiceKind, String> {
     })
 }
 
-fn wanted(text: &str) -> Result<Wanted, String> {
+fn wanted(text: &str) -> Result<WantedObject, String> {
     Ok(match object(text)? {
-        ObjectArg::Mux(mux) if text.contains(':') => Wanted::Mux(mux),
-        ObjectArg::Mux(mux) => Wanted::Index(mux.index),
-        ObjectArg::Name(name) => Wanted::Name(name),
+        ObjectArg::Mux(mux) if text.contains(':') => WantedObject::Mux(mux),
+        ObjectArg::Mux(mux) => WantedObject::Index(mux.index),
+        ObjectArg::Name(name) => WantedObject::Name(name),
     })
 }
 
@@ -60,7 +60,7 @@ impl Filter {
     pub(crate) fn check(&self, models: &[&Description]) -> Result<(), Failure> {
         let names = || models.iter().flat_map(|model| model.dictionary.rows().iter().map(|row| row.name));
         for wanted in &self.objects {
-            let Wanted::Name(name) = wanted else { continue };
+            let WantedObject::Name(name) = wanted else { continue };
             if !names().any(|known| is_name(name, known)) {
                 let mut close = near(name, names());
                 close.dedup();
@@ -83,9 +83,9 @@ impl Filter {
     pub(crate) fn takes(&self, decoder: &Decoder, decoded: &Decoded) -> bool {
         let is_wanted = |mux: Mux| {
             self.objects.iter().any(|wanted| match wanted {
-                Wanted::Index(index) => mux.index == *index,
-                Wanted::Mux(exactly) => mux == *exactly,
-                Wanted::Name(name) => {
+                WantedObject::Index(index) => mux.index == *index,
+                WantedObject::Mux(exactly) => mux == *exactly,
+                WantedObject::Name(name) => {
                     decoded.node().and_then(|node| decoder.name(node, mux)).is_some_and(|known| is_name(name, known))
                 }
             })

@@ -31,12 +31,12 @@ pub(crate) struct Traffic {
 struct Passing {
     /// Unix time of the bus's zero.
     unix_zero: Duration,
-    shown: Option<Shown>,
-    heard: Option<Heard>,
+    shown: Option<ShownFrames>,
+    heard: Option<HeardFrames>,
 }
 
 /// Where frames are shown.
-struct Shown {
+struct ShownFrames {
     decoder: Decoder,
     stamps: Stamps,
     progress: Progress,
@@ -44,7 +44,7 @@ struct Shown {
 
 /// Frames for a command.
 #[derive(Default)]
-struct Heard {
+struct HeardFrames {
     frames: VecDeque<BusFrame>,
     waker: Option<Waker>,
 }
@@ -70,7 +70,7 @@ impl Traffic {
 
     /// Shows each frame in words on standard error from now on.
     pub(crate) fn show(&self, decoder: Decoder, stamps: Stamps, progress: Progress) {
-        self.lock().shown = Some(Shown { decoder, stamps, progress });
+        self.lock().shown = Some(ShownFrames { decoder, stamps, progress });
     }
 
     /// The frames that others send from now on, with their times.
@@ -106,7 +106,7 @@ impl Traffic {
 
     fn note(&self, passed: BusFrame) {
         let mut passing = self.lock();
-        if let Some(Shown { decoder, stamps, progress }) = &mut passing.shown {
+        if let Some(ShownFrames { decoder, stamps, progress }) = &mut passing.shown {
             let paint = Paint::for_stream(&std::io::stderr());
             let BusFrame { at, frame, .. } = passed;
             let text = decoder.decode(&frame).to_string();

@@ -50,7 +50,7 @@ pub(super) trait Output<B>: Send + 'static {
 
 /// How batches wait.
 #[derive(Clone, Copy)]
-pub(super) struct Waiting {
+pub(super) struct WaitingRules {
     pub(super) pace: Pace,
     /// So many find room.
     pub(super) room: usize,
@@ -58,7 +58,7 @@ pub(super) struct Waiting {
     pub(super) gathers: Duration,
 }
 
-impl Waiting {
+impl WaitingRules {
     /// Each batch is written as soon as it comes.
     pub(super) const fn of(pace: Pace) -> Self {
         Self { pace, room: pace.room(), gathers: Duration::ZERO }
@@ -66,7 +66,7 @@ impl Waiting {
 }
 
 /// A file under way; the clones hand batches to the same one.
-pub(super) struct Background<B>(Arc<Shared<B>>);
+pub(super) struct Background<B>(Arc<SharedQueue<B>>);
 
 impl<B> Clone for Background<B> {
     fn clone(&self) -> Self {
@@ -74,17 +74,17 @@ impl<B> Clone for Background<B> {
     }
 }
 
-struct Shared<B> {
-    queue: Mutex<Queue<B>>,
+struct SharedQueue<B> {
+    queue: Mutex<BatchQueue<B>>,
     /// Notified when a first batch waits, when there is room again, when nothing more comes, and when the file has ended.
     changed: Condvar,
-    waiting: Waiting,
+    waiting: WaitingRules,
     file: &'static str,
     pieces: &'static str,
     messages: Option<Messages>,
 }
 
-struct Queue<B> {
+struct BatchQueue<B> {
     batches: VecDeque<B>,
     /// Nothing more comes.
     over: bool,
@@ -97,10 +97,10 @@ struct Queue<B> {
 
 impl<B: Send + 'static> Background<B> {
     /// Hands batches to `output` until it fails or all are written. Errors are reported to `messages`, if there are any.
-    pub(super) fn start<O: Output<B>>(output: O, waiting: Waiting, messages: Option<Messages>) -> Self {
-        let queue = Queue { batches: VecDeque::new(), over: false, ended: None, missing: 0, lost: 0 };
+    pub(super) fn start<O: Output<B>>(output: O, waiting: WaitingRules, messages: Option<Messages>) -> Self {
+        let queue = BatchQueue { batches: VecDeque::new(), over: false, ended: None, missing: 0, lost: 0 };
         let (queue, changed) = (Mutex::new(queue), Condvar::new());
-        let shared = Arc::new(Shared { queue, changed, waiting, file: O::FILE, pieces: O::PIECES, messages });
+        let shared = Arc::new(SharedQueue { queue, changed, waiting, file: O::FILE, pieces: O::PIECES, messages });
         let mut ending = Ending(Arc::clone(&shared), Err("its writer has failed".to_owned()));
         std::thread::spawn(move || ending.come(output));
         Self(shared)
@@ -108,8 +108,8 @@ impl<B: Send + 'static> Background<B> {
 
     /// Takes a batch of so many pieces; one that the disk has no time for is left out and reported, or waited for, by the pace.
     pub(super) fn write(&self, batch: B, pieces: u64) {
-        let Shared { changed, waiting: Waiting { pace, room, .. }, file, pieces: what, .. } = &*self.0;
-        let is_full = |queue: &mut Queue<B>| queue.ended.is_none() && queue.batches.len() >= *room;
+        let SharedQueue { changed, waiting: WaitingRules { pace, room, .. }, file, pieces: what, .. } = &*self.0;
+        let is_full = |queue: &mut BatchQueue<B>| queue.ended.is_none() && queue.batches.len() >= *room;
         let mut queue = self.0.lock();
         if *pace == Pace::Free {
             queue = changed.wait_while(queue, is_full).unwrap_or_else(PoisonError::into_inner);
@@ -148,7 +148,7 @@ impl<B: Send + 'static> Background<B> {
     /// # Errors
     /// The file is not whole.
     pub(super) fn finish(self, patience: Duration) -> Result<(), Failure> {
-        let Shared { changed, file, pieces, .. } = &*self.0;
+        let SharedQueue { changed, file, pieces, .. } = &*self.0;
         let mut queue = self.0.lock();
         queue.over = true;
         changed.notify_all();
@@ -169,8 +169,8 @@ impl<B: Send + 'static> Background<B> {
     }
 }
 
-impl<B> Shared<B> {
-    fn lock(&self) -> MutexGuard<'_, Queue<B>> {
+impl<B> SharedQueue<B> {
+    fn lock(&self) -> MutexGuard<'_, BatchQueue<B>> {
         // Nothing is half done between two batches, whichever thread panicked.
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -181,14 +181,14 @@ impl<B> Shared<B> {
 
     /// Writes what comes until nothing more does.
     fn write_all(&self, mut output: impl Output<B>) -> io::Result<()> {
-        let Waiting { room, gathers, .. } = self.waiting;
+        let WaitingRules { room, gathers, .. } = self.waiting;
         loop {
-            let idle = |queue: &mut Queue<B>| queue.batches.is_empty() && !queue.over;
+            let idle = |queue: &mut BatchQueue<B>| queue.batches.is_empty() && !queue.over;
             let queue = self.changed.wait_while(self.lock(), idle).unwrap_or_else(PoisonError::into_inner);
             if queue.batches.is_empty() {
                 return output.end();
             }
-            let gathering = |queue: &mut Queue<B>| !queue.over && queue.batches.len() < room;
+            let gathering = |queue: &mut BatchQueue<B>| !queue.over && queue.batches.len() < room;
             drop(self.changed.wait_timeout_while(queue, gathers, gathering));
             while let Some(batch) = self.next() {
                 output.write(batch)?;
@@ -210,7 +210,7 @@ impl<B> Shared<B> {
 }
 
 /// How the file ends: said when the thread that writes it does, by a panic too.
-struct Ending<B>(Arc<Shared<B>>, Result<(), String>);
+struct Ending<B>(Arc<SharedQueue<B>>, Result<(), String>);
 
 impl<B> Ending<B> {
     fn come(&mut self, output: impl Output<B>) {
@@ -268,7 +268,7 @@ mod tests {
 
     fn log(pace: Pace, room: usize, gathers: Duration) -> (Background<u8>, Receiver<Did>) {
         let (paper, did) = channel();
-        (Background::start(Paper(paper), Waiting { pace, room, gathers }, None), did)
+        (Background::start(Paper(paper), WaitingRules { pace, room, gathers }, None), did)
     }
 
     #[test]

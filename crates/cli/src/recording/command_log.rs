@@ -9,7 +9,7 @@ use std::time::Duration;
 use can::{BusFrame, Frame, Instant, Listen};
 use canlog::{Content, Direction, Interface, Record};
 
-use super::background::{Background, Output, Pace, Waiting};
+use super::background::{Background, Output, Pace, WaitingRules};
 use super::log_options::NewLog;
 use crate::failure::Failure;
 
@@ -59,7 +59,7 @@ impl CommandLog {
         unix_zero: Duration,
         pace: Pace,
     ) -> (Self, Writing) {
-        let waiting = Waiting { pace, room: MOST_WAITING, gathers: INTERVAL };
+        let waiting = WaitingRules { pace, room: MOST_WAITING, gathers: INTERVAL };
         let file = file.map(|file| Background::start(file, waiting, None));
         (Self(file.clone().map(|file| Log { file, interface, unix_zero })), Writing(file))
     }

@@ -9,7 +9,7 @@ use recording::{Column, Kind, Mark, Record};
 use sim::events::Event;
 use sim::recorder::Recorder;
 
-use super::background::{Background, Output, Pace, Waiting};
+use super::background::{Background, Output, Pace, WaitingRules};
 use crate::failure::Failure;
 use crate::serve::messages::Messages;
 
@@ -40,7 +40,7 @@ impl RecordFile {
         messages: Messages,
     ) -> io::Result<Self> {
         let record = Record::begin(kind, Box::new(file), columns)?;
-        Ok(Self(Background::start(record, Waiting::of(pace), Some(messages))))
+        Ok(Self(Background::start(record, WaitingRules::of(pace), Some(messages))))
     }
 
     /// Takes a batch.

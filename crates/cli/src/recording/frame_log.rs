@@ -6,7 +6,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use canlog::{LogWriter, Record};
 
-use super::background::{Background, Output, Pace, Waiting};
+use super::background::{Background, Output, Pace, WaitingRules};
 use crate::failure::Failure;
 use crate::serve::messages::Messages;
 
@@ -44,7 +44,7 @@ impl FrameLog {
         pace: Pace,
         messages: Messages,
     ) -> Self {
-        Self(Background::start(Timed { log, unix_zero }, Waiting::of(pace), Some(messages)))
+        Self(Background::start(Timed { log, unix_zero }, WaitingRules::of(pace), Some(messages)))
     }
 
     /// Takes frames that were carried.

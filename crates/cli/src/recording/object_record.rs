@@ -7,7 +7,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use recording::{Column, Kind, Mark, Record};
 
-use super::background::{Background, Output, Pace, Waiting};
+use super::background::{Background, Output, Pace, WaitingRules};
 use crate::failure::Failure;
 use crate::serve::messages::Messages;
 
@@ -32,7 +32,7 @@ impl ObjectRecord {
     /// That of writing the begin.
     pub(crate) fn start(kind: Kind, file: File, columns: &[Column], messages: Messages) -> io::Result<Self> {
         let record = Record::begin(kind, Box::new(file), columns)?;
-        Ok(Self(Background::start(record, Waiting::of(Pace::RealTime), Some(messages))))
+        Ok(Self(Background::start(record, WaitingRules::of(Pace::RealTime), Some(messages))))
     }
 
     /// Takes a batch; one that the disk has no time for is left out and reported.

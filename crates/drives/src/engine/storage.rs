@@ -52,7 +52,7 @@ pub struct Unreadable;
 
 /// Which rows are waiting to be stored: as many as a bank can hold.
 #[derive(Clone, Copy, Debug)]
-struct Pending {
+struct PendingRows {
     slots: [Option<Slot>; CAPACITY],
     count: u8,
 }
@@ -62,7 +62,7 @@ struct Pending {
 pub struct Store {
     image: StoredImage,
     active: Option<Bank>,
-    pending: Pending,
+    pending: PendingRows,
     generation: u32,
 }
 
@@ -75,7 +75,7 @@ struct Bank {
 impl Store {
     /// A store over what is found at power-on.
     pub fn new(image: StoredImage) -> Self {
-        Self { image, active: newest_bank(&image), pending: Pending::NONE, generation: 0 }
+        Self { image, active: newest_bank(&image), pending: PendingRows::NONE, generation: 0 }
     }
 
     /// The same EEPROM at the next power-on: what waited to be written is lost, the generation goes on.
@@ -140,13 +140,13 @@ impl Store {
     /// only [`format`](Self::format) makes it readable again.
     pub fn commit<S: Storage>(&mut self, dictionary: &Dictionary<S>) {
         let Some(bank) = self.active else {
-            self.pending = Pending::NONE;
+            self.pending = PendingRows::NONE;
             return;
         };
         if self.pending.is_empty() {
             return;
         }
-        let pending = core::mem::replace(&mut self.pending, Pending::NONE);
+        let pending = core::mem::replace(&mut self.pending, PendingRows::NONE);
         let old = bank.number * BANK_SIZE;
         let mut bytes = [0; BANK_SIZE];
         bytes.copy_from_slice(&self.image.0[old..][..BANK_SIZE]);
@@ -179,7 +179,7 @@ impl Store {
             put_word(&mut bytes, record, row.mux().key());
             put_word(&mut bytes, record + 4, dictionary.raw(slot));
         }
-        self.pending = Pending::NONE;
+        self.pending = PendingRows::NONE;
         self.write(bank, bytes, dictionary.table());
     }
 
@@ -231,7 +231,7 @@ pub const fn stored_rows(table: &Table) -> usize {
     count
 }
 
-impl Pending {
+impl PendingRows {
     const NONE: Self = Self { slots: [None; CAPACITY], count: 0 };
 
     fn insert(&mut self, slot: Slot) {

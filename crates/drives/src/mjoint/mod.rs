@@ -36,4 +36,4 @@ pub use hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};
 pub use model::Model;
 
 /// The values of the drive's objects.
-pub type Values = canopen::od::Dictionary<objects::Room>;
+pub type Values = canopen::od::Dictionary<objects::TableStorage>;

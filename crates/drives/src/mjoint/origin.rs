@@ -16,7 +16,7 @@ pub(super) struct Origin {
 
 /// What a write to 260Ah was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Written {
+pub(super) enum OriginWrite {
     /// A numerator of the gear.
     Numerator,
     /// The first of the two values.
@@ -35,17 +35,17 @@ impl Origin {
         self.gear_numerator
     }
 
-    pub(super) fn write(&mut self, value: u16) -> Written {
+    pub(super) fn write(&mut self, value: u16) -> OriginWrite {
         let [first, second] = SET_ORIGIN;
         let armed = core::mem::replace(&mut self.asked, value == first);
         if value == first {
-            return Written::First;
+            return OriginWrite::First;
         }
         if armed && value == second {
-            return Written::Second;
+            return OriginWrite::Second;
         }
         self.gear_numerator = value;
-        Written::Numerator
+        OriginWrite::Numerator
     }
 
     pub(super) fn make(&mut self) {

@@ -22,7 +22,7 @@ pub(super) struct Protection {
 }
 
 /// What the causes are judged by, besides the sensors.
-pub(super) struct Situation<'a> {
+pub(super) struct FaultSituation<'a> {
     pub(super) servo: &'a Servo,
     pub(super) live: bool,
     /// Amplitude of the current, over some supervision periods: a gear that swings makes it dip.
@@ -37,7 +37,7 @@ pub(super) struct Situation<'a> {
 }
 
 impl Protection {
-    pub(super) fn causes(&mut self, parameters: &Parameters, sensors: &Sensors, now: &Situation<'_>) -> FaultSet {
+    pub(super) fn causes(&mut self, parameters: &Parameters, sensors: &Sensors, now: &FaultSituation<'_>) -> FaultSet {
         self.watch_battery(sensors, now);
         FaultSet::NONE
             .with(row::OVER_VOLTAGE, over_voltage(sensors.bus_v, now))
@@ -60,7 +60,7 @@ impl Protection {
     }
 
     /// Reported once each time: a battery that stays away does not bring the alarm back after an origin was set.
-    fn watch_battery(&mut self, sensors: &Sensors, now: &Situation<'_>) {
+    fn watch_battery(&mut self, sensors: &Sensors, now: &FaultSituation<'_>) {
         let missing = sensors.battery == Battery::Missing && !now.has_brake;
         self.battery_lost |= missing && !self.battery_was_missing;
         self.battery_lost |= !now.turns_known && !self.turns_were_lost;
@@ -69,7 +69,7 @@ impl Protection {
     }
 
     /// The current stays at the limit of 261Dh.
-    fn locked_rotor(&mut self, parameters: &Parameters, now: &Situation<'_>) -> bool {
+    fn locked_rotor(&mut self, parameters: &Parameters, now: &FaultSituation<'_>) -> bool {
         let limit_a = parameters.limits.current_a;
         let at_limit = now.live && limit_a > 0.0 && now.current_a >= AT_CURRENT_LIMIT_SHARE * limit_a;
         lasts(&mut self.at_current_limit_s, at_limit, parameters.current_time_s)
@@ -91,7 +91,7 @@ impl Protection {
     }
 
     /// The output stays at the limit of 2618h and the motor does not turn.
-    fn stall(&mut self, parameters: &Parameters, now: &Situation<'_>) -> bool {
+    fn stall(&mut self, parameters: &Parameters, now: &FaultSituation<'_>) -> bool {
         let at_limit = now.live && now.servo.is_saturated() && now.velocity_rpm.abs() < STATIONARY_RPM;
         lasts(&mut self.at_output_limit_s, at_limit, parameters.stationary_time_s)
     }
@@ -103,6 +103,6 @@ fn lasts(lasted_s: &mut f32, present: bool, limit_s: f32) -> bool {
     limit_s > 0.0 && *lasted_s >= limit_s
 }
 
-fn over_voltage(bus_v: f32, now: &Situation<'_>) -> bool {
+fn over_voltage(bus_v: f32, now: &FaultSituation<'_>) -> bool {
     exceeds_with_hysteresis(bus_v, OVER_VOLTAGE_V, VOLTAGE_HYSTERESIS_V, now.latched.has(row::OVER_VOLTAGE))
 }

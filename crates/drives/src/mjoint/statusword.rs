@@ -9,7 +9,7 @@ use cia402::{Controlword, Statusword};
 
 /// What the statusword is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Condition {
+pub struct StatusCondition {
     /// 6040h as the drive holds it.
     pub controlword: Controlword,
     /// 2601h.
@@ -27,7 +27,7 @@ pub struct Condition {
 }
 
 /// The value of 6041h.
-pub fn statusword(condition: &Condition) -> Statusword {
+pub fn statusword(condition: &StatusCondition) -> Statusword {
     let bit = |mask: u16, set: bool| if set { mask } else { 0 };
     let controlword = condition.controlword;
     Statusword(

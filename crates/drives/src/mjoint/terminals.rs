@@ -7,7 +7,7 @@ use crate::engine::inputs::Inputs;
 
 /// What is remembered of the two.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Terminals {
+pub(super) struct InputTerminals {
     pulses: Pulses,
     inputs: Inputs<2>,
     /// Level of DIR, and how often it has changed since the time base of the interpolation went on.
@@ -15,7 +15,7 @@ pub(super) struct Terminals {
     dir_changes: u8,
 }
 
-impl Terminals {
+impl InputTerminals {
     /// The first look since the start.
     pub(super) fn wake(&mut self, sensors: &Sensors) {
         self.dir = sensors.dir;

@@ -21,4 +21,4 @@ pub use drive::{NODE_PROFILE, Zlac8030l};
 pub use hardware::{Actuation, Hardware, PowerStage, Sensors};
 
 /// The values of the drive's objects.
-pub type Values = canopen::od::Dictionary<objects::Room>;
+pub type Values = canopen::od::Dictionary<objects::TableStorage>;

@@ -72,7 +72,7 @@ impl WireWatch {
 }
 
 /// What the causes are judged by, besides the sensors.
-pub(super) struct Situation<'a> {
+pub(super) struct FaultSituation<'a> {
     pub(super) servo: &'a Servo,
     pub(super) demand: &'a Demand,
     pub(super) position: i32,
@@ -84,7 +84,7 @@ pub(super) struct Situation<'a> {
 }
 
 impl Protection {
-    pub(super) fn causes(&mut self, parameters: &Parameters, sensors: &Sensors, now: &Situation<'_>) -> FaultSet {
+    pub(super) fn causes(&mut self, parameters: &Parameters, sensors: &Sensors, now: &FaultSituation<'_>) -> FaultSet {
         FaultSet::NONE
             .with(row::OVER_VOLTAGE, over_voltage(sensors.bus_v, now))
             .with(row::UNDER_VOLTAGE, self.under_voltage(sensors.bus_v, now))
@@ -116,7 +116,7 @@ impl Protection {
         self.wires = WireWatch::default();
     }
 
-    fn under_voltage(&mut self, bus_v: f32, now: &Situation<'_>) -> bool {
+    fn under_voltage(&mut self, bus_v: f32, now: &FaultSituation<'_>) -> bool {
         if self.supplied_for < SUPPLY_SETTLING_PERIODS {
             self.supplied_for += 1;
             return false;
@@ -126,7 +126,7 @@ impl Protection {
     }
 
     /// The voltage is used up at a standstill and the current still does not come, or one wire of a turning motor stays without.
-    fn loose_wire(&mut self, parameters: &Parameters, sensors: &Sensors, now: &Situation<'_>) -> bool {
+    fn loose_wire(&mut self, parameters: &Parameters, sensors: &Sensors, now: &FaultSituation<'_>) -> bool {
         let asked_a = now.servo.setpoint_a().abs();
         let missing = now.servo.is_saturated()
             && asked_a >= LOOSE_WIRE_LEAST_A
@@ -145,7 +145,7 @@ impl Protection {
     }
 }
 
-impl Situation<'_> {
+impl FaultSituation<'_> {
     fn current_a(&self) -> f32 {
         self.servo.current_a()
     }
@@ -158,7 +158,7 @@ pub(super) fn is_over_current(sensors: &Sensors) -> bool {
     [u, v, u + v].iter().any(|current_a| exceeds(current_a.abs(), OVER_CURRENT_A))
 }
 
-fn out_of_tolerance(parameters: &Parameters, now: &Situation<'_>) -> bool {
+fn out_of_tolerance(parameters: &Parameters, now: &FaultSituation<'_>) -> bool {
     match now.demand {
         Demand::Position(point) => {
             point.position.wrapping_sub(now.position).unsigned_abs() > parameters.out_of_tolerance
@@ -167,11 +167,11 @@ fn out_of_tolerance(parameters: &Parameters, now: &Situation<'_>) -> bool {
     }
 }
 
-fn over_voltage(bus_v: f32, now: &Situation<'_>) -> bool {
+fn over_voltage(bus_v: f32, now: &FaultSituation<'_>) -> bool {
     exceeds_with_hysteresis(bus_v, OVER_VOLTAGE_V, VOLTAGE_HYSTERESIS_V, now.latched.has(row::OVER_VOLTAGE))
 }
 
-fn too_hot(celsius: f32, limit_c: f32, now: &Situation<'_>, row: usize) -> bool {
+fn too_hot(celsius: f32, limit_c: f32, now: &FaultSituation<'_>, row: usize) -> bool {
     exceeds_with_hysteresis(celsius, limit_c, TEMPERATURE_HYSTERESIS_C, now.latched.has(row))
 }
 

@@ -24,4 +24,4 @@ pub use drive::{NODE_PROFILE, Zlim42c};
 pub use hardware::{Actuation, Hardware, PowerStage, Sensors};
 
 /// The values of the drive's objects.
-pub type Values = canopen::od::Dictionary<objects::Room>;
+pub type Values = canopen::od::Dictionary<objects::TableStorage>;

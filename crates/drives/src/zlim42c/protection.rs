@@ -7,7 +7,7 @@ use crate::engine::actuator::stepper::Peaks;
 use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis, within};
 
 /// What the causes are judged by, besides the sensors.
-pub(super) struct Situation {
+pub(super) struct FaultSituation {
     /// Current from the bus, A, mean over the supervision period.
     pub(super) bus_a: f32,
     pub(super) phase_lost: bool,
@@ -49,7 +49,7 @@ impl PhaseWatch {
     }
 }
 
-pub(super) fn causes(sensors: &Sensors, now: &Situation) -> FaultSet {
+pub(super) fn causes(sensors: &Sensors, now: &FaultSituation) -> FaultSet {
     FaultSet::NONE
         .with(row::OVER_VOLTAGE, over_voltage(sensors.bus_v, now))
         .with(row::OVER_CURRENT, is_over_current(sensors))
@@ -65,7 +65,7 @@ pub(super) fn is_over_current(sensors: &Sensors) -> bool {
     sensors.phase_current_a.iter().any(|current_a| exceeds(current_a.abs(), OVER_CURRENT_A))
 }
 
-fn over_voltage(bus_v: f32, now: &Situation) -> bool {
+fn over_voltage(bus_v: f32, now: &FaultSituation) -> bool {
     exceeds_with_hysteresis(bus_v, OVER_VOLTAGE_V, VOLTAGE_HYSTERESIS_V, now.latched.has(row::OVER_VOLTAGE))
 }
 

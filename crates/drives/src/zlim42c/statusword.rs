@@ -9,7 +9,7 @@ use crate::engine::cia402::Status;
 
 /// What the statusword is made of.
 #[derive(Clone, Copy)]
-pub(super) struct Condition {
+pub(super) struct StatusCondition {
     pub(super) state: PowerState,
     pub(super) mode: ModeOfOperation,
     pub(super) controlword: Controlword,
@@ -18,7 +18,7 @@ pub(super) struct Condition {
 }
 
 /// The value of 6041h.
-pub(super) fn statusword(now: Condition) -> Statusword {
+pub(super) fn statusword(now: StatusCondition) -> Statusword {
     let bit = |mask: u16, set: bool| if set { mask } else { 0 };
     let fault = matches!(now.state, PowerState::Fault | PowerState::FaultReactionActive);
     // There is nothing to be reached before the drive is live and has a mode.

@@ -1,6 +1,6 @@
 //! The axes of a file of CiA 402: as the standard has them, without what the file does not have of it.
 
-use super::rows::Row;
+use super::rows::DraftRow;
 use canopen::Mux;
 use canopen::od::{DefaultValue, Table};
 use cia402::object::SUPPORTED_DRIVE_MODES;
@@ -141,7 +141,7 @@ fn by_objects(has: impl Fn(u16, u8) -> bool) -> Vec<ModeOfOperation> {
 
 /// A 6502h that says no mode, as many files have it, which leave the value to the device: the modes whose objects are there. It
 /// would say otherwise that the axis has none.
-pub(super) fn say_modes(rows: &mut [Row]) {
+pub(super) fn say_modes(rows: &mut [DraftRow]) {
     for number in 0..MOST_AXES {
         let place = |index: u16, sub_index| Mux::new(index + number * BLOCK, sub_index);
         let find = |mux: Mux| rows.binary_search_by_key(&mux.key(), |row| row.entry.mux().key()).ok();

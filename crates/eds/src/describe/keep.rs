@@ -15,7 +15,7 @@ use devices::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoR
 
 use super::axis::{axes, say_modes};
 use super::names;
-use super::rows::{Row, leak, rows};
+use super::rows::{DraftRow, leak, rows};
 use crate::Eds;
 
 /// All descriptions that were made of files, by a fingerprint of what the files say: one for each place that such a file
@@ -160,12 +160,12 @@ fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
 }
 
 /// Nothing is kept of rows that make no table.
-fn table(rows: Vec<Row>) -> Result<&'static Table, Unkept> {
+fn table(rows: Vec<DraftRow>) -> Result<&'static Table, Unkept> {
     let mut facts = vec![RowFacts::NONE; rows.len()];
     let mut places = vec![FREE_PLACES; rows.len()];
     let bare: Vec<Entry> = rows.iter().map(|row| row.entry).collect();
     Table::check(&bare, &mut facts, &mut places).map_err(Unkept::Rows)?;
-    let kept: Vec<Entry> = rows.into_iter().map(Row::keep).collect();
+    let kept: Vec<Entry> = rows.into_iter().map(DraftRow::keep).collect();
     let table = Table::at_run_time(kept.leak(), facts.leak(), places.leak()).map_err(Unkept::Rows)?;
     Ok(Box::leak(Box::new(table)))
 }
@@ -176,7 +176,7 @@ const fn of_device_info(eds: &Eds) -> [Option<u32>; 3] {
 }
 
 /// What 1018h leaves open `[DeviceInfo]` says: the device answers it.
-fn say_identity(eds: &Eds, rows: &mut [Row]) {
+fn say_identity(eds: &Eds, rows: &mut [DraftRow]) {
     for (said, sub_index) in of_device_info(eds).into_iter().zip(1..) {
         let is_open = eds.variable(0x1018, sub_index).is_some_and(|of| of.default.is_none() && of.value.is_none());
         let row = rows.iter_mut().find(|row| row.entry.mux() == Mux::new(0x1018, sub_index));

@@ -15,7 +15,7 @@ const STRING_CAPACITY: usize = 64;
 const DOMAIN_CAPACITY: usize = 1_024;
 
 /// A row whose texts are not kept yet: of a file that makes no table nothing is.
-pub(super) struct Row {
+pub(super) struct DraftRow {
     /// With empty texts; limits, sizes and numbers are those of the row.
     pub(super) entry: Entry,
     name: String,
@@ -23,7 +23,7 @@ pub(super) struct Row {
     bytes: Option<Vec<u8>>,
 }
 
-impl Row {
+impl DraftRow {
     /// The row with its texts, kept for the life of the program.
     pub(super) fn keep(self) -> Entry {
         let Self { mut entry, name, title, bytes } = self;
@@ -41,7 +41,7 @@ impl Row {
 }
 
 /// All rows, ascending. Of a DCF, the values stand in place of the defaults: it is the device as configured.
-pub(super) fn rows(eds: &Eds) -> Vec<Row> {
+pub(super) fn rows(eds: &Eds) -> Vec<DraftRow> {
     let storing = Storing {
         on_command: eds.variable(0x1010, 1).is_some(),
         is_drive: eds.variable(0x6040, 0).is_some() && eds.variable(0x6041, 0).is_some(),
@@ -73,7 +73,7 @@ impl Storing {
     }
 }
 
-fn row(object: &Object, variable: &Variable, name: String, storing: Storing) -> Row {
+fn row(object: &Object, variable: &Variable, name: String, storing: Storing) -> DraftRow {
     let data_type = DataType::from_code(variable.data_type.0).unwrap_or(DataType::Unsigned32);
     let title = if variable.name.is_empty() { &object.name } else { &variable.name };
     let access = match variable.access {
@@ -103,7 +103,7 @@ fn row(object: &Object, variable: &Variable, name: String, storing: Storing) -> 
         row.capacity = capacity(data_type, bytes.as_ref().map_or(0, Vec::len));
     }
     row.saved = storing.stores(&row);
-    Row { entry: row, name, title: title.clone(), bytes }
+    DraftRow { entry: row, name, title: title.clone(), bytes }
 }
 
 fn capacity(data_type: DataType, length: usize) -> u32 {

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use super::{Document, Line, LineKind};
+use super::{Document, LineKind, LineSpan};
 use crate::document::Bounds;
 
 /// Why a value cannot be written into a document.
@@ -94,7 +94,7 @@ impl Document {
         let grown = value.len() as i64 - (to - from) as i64;
         let moved = |offset: &mut u32| *offset = (i64::from(*offset) + grown) as u32;
         moved(&mut self.lines[at].end);
-        for Line { start, end, kind } in &mut self.lines[at + 1..] {
+        for LineSpan { start, end, kind } in &mut self.lines[at + 1..] {
             moved(start);
             moved(end);
             if let LineKind::Entry { equals } = kind {

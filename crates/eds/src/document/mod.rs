@@ -34,7 +34,7 @@ pub enum LineKind {
 
 /// A line, without its end.
 #[derive(Clone, Copy, Debug)]
-struct Line {
+struct LineSpan {
     start: u32,
     end: u32,
     kind: LineKind,
@@ -55,7 +55,7 @@ struct SectionLines {
 pub struct Document {
     text: String,
     encoding: Encoding,
-    lines: Vec<Line>,
+    lines: Vec<LineSpan>,
     sections: Vec<SectionLines>,
 }
 
@@ -164,7 +164,7 @@ impl Document {
                 sections.push(SectionLines { name, heading: lines.len() as u32, end: 0 });
                 bounds.check_sections(number, sections.len())?;
             }
-            lines.push(Line { start: start as u32, end: (start + line.len()) as u32, kind });
+            lines.push(LineSpan { start: start as u32, end: (start + line.len()) as u32, kind });
             start = stop + 1;
         }
         if let Some(last) = sections.last_mut() {

@@ -1,7 +1,7 @@
 //! `CompactSubObj`: many sub-objects of one description. Source: CiA 306-1, clause 4.6.3.4.
 
 use super::fields::Fields;
-use super::places::{Part, Role};
+use super::places::{ObjectSection, Role};
 use super::reader::Reader;
 use crate::document::{Entry, Section};
 use crate::value::Number;
@@ -16,7 +16,7 @@ impl Reader {
         fields: &Fields<'_>,
         name: &str,
         count: u8,
-        beside: &[Part<'_>],
+        beside: &[ObjectSection<'_>],
     ) -> Vec<Variable> {
         let one = self.variable(section, fields, false, 1, String::new());
         let mut variables = Vec::with_capacity(usize::from(count) + 1);

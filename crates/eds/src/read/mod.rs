@@ -16,7 +16,7 @@ use crate::{Eds, Findings, Refusal, check};
 
 pub(crate) use places::is_about_modules;
 
-use places::Part;
+use places::ObjectSection;
 use reader::Reader;
 
 /// What came of reading a file.
@@ -45,7 +45,7 @@ impl Eds {
     pub fn read(document: &Document) -> Result<Reading, Refusal> {
         let mut reader = Reader::default();
         reader.strays(document)?;
-        let mut parts: Vec<Part<'_>> = Vec::with_capacity(document.sections().size_hint().0);
+        let mut parts: Vec<ObjectSection<'_>> = Vec::with_capacity(document.sections().size_hint().0);
         for section in document.sections() {
             reader.section(section, &mut parts);
         }

@@ -1,7 +1,7 @@
 //! Objects, put together from their sections.
 
 use super::fields::Fields;
-use super::places::{Part, Role};
+use super::places::{ObjectSection, Role};
 use super::reader::{Reader, shortened};
 use crate::document::{Entry, Section};
 use crate::{Object, ObjectType, Refusal, TypeCode, Value, Variable};
@@ -13,7 +13,7 @@ const MOST_REPEATED: usize = 8 << 20;
 
 impl Reader {
     /// All objects, from their sections in order.
-    pub(super) fn objects(&mut self, parts: &[Part<'_>]) -> Result<(), Refusal> {
+    pub(super) fn objects(&mut self, parts: &[ObjectSection<'_>]) -> Result<(), Refusal> {
         self.eds.objects.reserve(parts.iter().filter(|part| part.key.role == Role::Object).count());
         for of_one in parts.chunk_by(|a, b| a.key.index == b.key.index) {
             if let Some(object) = self.object(of_one)? {
@@ -24,7 +24,7 @@ impl Reader {
     }
 
     /// One object from its sections, the one with its index first.
-    fn object(&mut self, parts: &[Part<'_>]) -> Result<Option<Object>, Refusal> {
+    fn object(&mut self, parts: &[ObjectSection<'_>]) -> Result<Option<Object>, Refusal> {
         let parts = self.without_doubles(parts);
         let (first, rest) = parts.split_first().ok_or_else(|| Refusal::new(0, "an object without a section", ""))?;
         let index = first.key.index;
@@ -33,7 +33,8 @@ impl Reader {
         }
         let section = first.section;
         let fields = self.fields(section);
-        let subs: Vec<Part<'_>> = rest.iter().copied().filter(|part| matches!(part.key.role, Role::Sub(_))).collect();
+        let subs: Vec<ObjectSection<'_>> =
+            rest.iter().copied().filter(|part| matches!(part.key.role, Role::Sub(_))).collect();
         let compact =
             fields.compact_sub_obj.and_then(|entry| self.count::<u8>(section, entry)).filter(|count| *count > 0);
         let object_type = self.object_type(section, &fields, !subs.is_empty() || compact.is_some());
@@ -93,8 +94,8 @@ impl Reader {
     }
 
     /// The first of each section that stands twice.
-    fn without_doubles<'a>(&mut self, parts: &[Part<'a>]) -> Vec<Part<'a>> {
-        let mut kept: Vec<Part<'a>> = Vec::with_capacity(parts.len());
+    fn without_doubles<'a>(&mut self, parts: &[ObjectSection<'a>]) -> Vec<ObjectSection<'a>> {
+        let mut kept: Vec<ObjectSection<'a>> = Vec::with_capacity(parts.len());
         for part in parts {
             match kept.last() {
                 Some(first) if first.key == part.key => {
@@ -108,9 +109,10 @@ impl Reader {
     }
 
     /// Sub-objects of an index that has no section of its own.
-    fn orphans(&mut self, index: u16, parts: &[Part<'_>]) -> Result<Option<Object>, Refusal> {
+    fn orphans(&mut self, index: u16, parts: &[ObjectSection<'_>]) -> Result<Option<Object>, Refusal> {
         let section = parts[0].section;
-        let subs: Vec<Part<'_>> = parts.iter().copied().filter(|part| matches!(part.key.role, Role::Sub(_))).collect();
+        let subs: Vec<ObjectSection<'_>> =
+            parts.iter().copied().filter(|part| matches!(part.key.role, Role::Sub(_))).collect();
         if subs.is_empty() {
             self.error_section(section, format!("there is no section [{index:04X}]"), "nothing");
             return Ok(None);
@@ -164,7 +166,7 @@ impl Reader {
         }
     }
 
-    fn subs(&mut self, subs: &[Part<'_>]) -> Result<Vec<Variable>, Refusal> {
+    fn subs(&mut self, subs: &[ObjectSection<'_>]) -> Result<Vec<Variable>, Refusal> {
         let mut variables = Vec::with_capacity(subs.len());
         for part in subs {
             let Role::Sub(sub_index) = part.key.role else { continue };

@@ -4,7 +4,7 @@ use crate::document::Section;
 
 /// A section of an object.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Part<'a> {
+pub(super) struct ObjectSection<'a> {
     pub(super) key: Key,
     pub(super) section: Section<'a>,
 }
@@ -31,7 +31,7 @@ pub(super) enum Role {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum SectionPlace {
     Part(Key),
     Info(Info),
     /// One of the three lists.
@@ -52,32 +52,35 @@ pub(super) enum Info {
 }
 
 /// Sections that are not objects.
-const NAMED: &[(&str, Place)] = &[
-    ("FileInfo", Place::Info(Info::File)),
-    ("DeviceInfo", Place::Info(Info::Device)),
-    ("DummyUsage", Place::Info(Info::Dummies)),
-    ("Comments", Place::Info(Info::Comments)),
-    ("DeviceComissioning", Place::Info(Info::Commissioning)),
-    ("DeviceCommissioning", Place::Info(Info::Commissioning)),
-    ("DynamicChannels", Place::Info(Info::DynamicChannels)),
-    ("MandatoryObjects", Place::List),
-    ("OptionalObjects", Place::List),
-    ("ManufacturerObjects", Place::List),
-    ("SupportedModules", Place::Module),
-    ("ConnectedModules", Place::Module),
+const NAMED: &[(&str, SectionPlace)] = &[
+    ("FileInfo", SectionPlace::Info(Info::File)),
+    ("DeviceInfo", SectionPlace::Info(Info::Device)),
+    ("DummyUsage", SectionPlace::Info(Info::Dummies)),
+    ("Comments", SectionPlace::Info(Info::Comments)),
+    ("DeviceComissioning", SectionPlace::Info(Info::Commissioning)),
+    ("DeviceCommissioning", SectionPlace::Info(Info::Commissioning)),
+    ("DynamicChannels", SectionPlace::Info(Info::DynamicChannels)),
+    ("MandatoryObjects", SectionPlace::List),
+    ("OptionalObjects", SectionPlace::List),
+    ("ManufacturerObjects", SectionPlace::List),
+    ("SupportedModules", SectionPlace::Module),
+    ("ConnectedModules", SectionPlace::Module),
 ];
 
-pub(super) fn place(name: &str) -> Place {
+pub(super) fn place(name: &str) -> SectionPlace {
     if let Some(part) = part(name) {
-        return Place::Part(part);
+        return SectionPlace::Part(part);
     }
     let named = NAMED.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
-    named.map_or_else(|| if is_of_module(name) { Place::Module } else { Place::Unknown }, |(_, place)| *place)
+    named.map_or_else(
+        || if is_of_module(name) { SectionPlace::Module } else { SectionPlace::Unknown },
+        |(_, place)| *place,
+    )
 }
 
 /// True for the sections of a modular device and its modules (CiA 306-1, clause 4.7).
 pub(crate) fn is_about_modules(name: &str) -> bool {
-    place(name) == Place::Module
+    place(name) == SectionPlace::Module
 }
 
 /// `1018`, `1018sub1`, `1018Value`.
@@ -114,8 +117,8 @@ fn is_of_module(name: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn key(index: u16, role: Role) -> Place {
-        Place::Part(Key { index, role })
+    fn key(index: u16, role: Role) -> SectionPlace {
+        SectionPlace::Part(Key { index, role })
     }
 
     #[test]
@@ -124,8 +127,8 @@ mod tests {
         assert_eq!(place("1a00SUB1f"), key(0x1A00, Role::Sub(0x1F)));
         assert_eq!(place("1A00sub01"), key(0x1A00, Role::Sub(1)));
         assert_eq!(place("1600value"), key(0x1600, Role::Values));
-        assert_eq!(place("devicecommissioning"), Place::Info(Info::Commissioning));
-        assert_eq!(place("M12ModuleInfo"), Place::Module);
+        assert_eq!(place("devicecommissioning"), SectionPlace::Info(Info::Commissioning));
+        assert_eq!(place("M12ModuleInfo"), SectionPlace::Module);
         for name in [
             "",
             "101",
@@ -138,7 +141,7 @@ mod tests {
             "MModuleInfo",
             "\u{e4}\u{e4}\u{e4}",
         ] {
-            assert_eq!(place(name), Place::Unknown, "{name}");
+            assert_eq!(place(name), SectionPlace::Unknown, "{name}");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What has been read so far, and how findings are put down.
 
-use super::places::{self, Part, Place};
+use super::places::{self, ObjectSection, SectionPlace};
 use crate::document::{Document, Entry, LineKind, Section};
 use crate::{Eds, Finding, Findings, Refusal, Severity};
 
@@ -41,16 +41,16 @@ impl Reader {
     }
 
     /// Reads a section, or puts it aside for its object.
-    pub(super) fn section<'a>(&mut self, section: Section<'a>, parts: &mut Vec<Part<'a>>) {
+    pub(super) fn section<'a>(&mut self, section: Section<'a>, parts: &mut Vec<ObjectSection<'a>>) {
         if !section.is_well_formed() {
             let what = "the heading is not [name] and nothing else";
             self.warn_section(section, what, Some(format!("[{}]", section.name())));
         }
         match places::place(section.name()) {
-            Place::Part(key) => parts.push(Part { key, section }),
-            Place::List => {}
-            Place::Info(which) => self.info(which, section),
-            Place::Module | Place::Unknown => self.keep(section),
+            SectionPlace::Part(key) => parts.push(ObjectSection { key, section }),
+            SectionPlace::List => {}
+            SectionPlace::Info(which) => self.info(which, section),
+            SectionPlace::Module | SectionPlace::Unknown => self.keep(section),
         }
     }
 

@@ -9,7 +9,7 @@ use canopen::NodeId;
 use master::boot::{Assignment, Startup};
 
 use super::finding::{Place, Reporter, Severity};
-use super::yaml::{Entry, Node};
+use super::yaml::{Entry, YamlNode};
 use words::suggest::{did_you_mean, near};
 
 /// The keys of the master that are known: those of `dcfgen`, and those of ros2_canopen.
@@ -135,7 +135,7 @@ pub(super) struct Slave {
     pub(super) boot_timeout_ms: Option<At<i64>>,
     pub(super) polling: Option<At<bool>>,
     pub(super) pdos: Vec<Pdo>,
-    pub(super) sdo: Vec<Write>,
+    pub(super) sdo: Vec<SdoWrite>,
     /// 1F81h of the master, by the names of its keys.
     pub(super) assignment: Assignment,
     /// How many of its heartbeats the master waits for.
@@ -151,7 +151,7 @@ pub(super) struct Slave {
 
 /// A value that is written to an object.
 #[derive(Clone, Debug)]
-pub(super) struct Write {
+pub(super) struct SdoWrite {
     pub(super) index: u16,
     pub(super) sub_index: u8,
     pub(super) value: i64,
@@ -196,7 +196,7 @@ impl Slave {
 }
 
 /// The bus of a document; data sheets are looked for in `folder`.
-pub(super) fn read(document: &Node<'_>, folder: &Path, report: &mut Reporter<'_>) -> Option<Bus> {
+pub(super) fn read(document: &YamlNode<'_>, folder: &Path, report: &mut Reporter<'_>) -> Option<Bus> {
     report.rule = "shape";
     let entries = document.entries();
     let Some(master) = entries.iter().find(|entry| entry.key == "master") else {
@@ -267,7 +267,7 @@ fn of_master(entry: &Entry<'_>, multiplier: f64, report: &mut Reporter<'_>) -> M
 
 fn slave(
     entry: &Entry<'_>,
-    defaults: Option<&Node<'_>>,
+    defaults: Option<&YamlNode<'_>>,
     (folder, multiplier): (&Path, f64),
     report: &mut Reporter<'_>,
 ) -> Slave {
@@ -318,12 +318,17 @@ fn slave(
 }
 
 /// Of a node, or else of the defaults.
-fn value<'a>(own: &Node<'a>, defaults: Option<&Node<'a>>, key: &str) -> Option<Node<'a>> {
-    let of = |node: &Node<'a>| node.entries().into_iter().find(|entry| entry.key == key).map(|entry| entry.value);
+fn value<'a>(own: &YamlNode<'a>, defaults: Option<&YamlNode<'a>>, key: &str) -> Option<YamlNode<'a>> {
+    let of = |node: &YamlNode<'a>| node.entries().into_iter().find(|entry| entry.key == key).map(|entry| entry.value);
     of(own).or_else(|| of(defaults?))
 }
 
-fn number(own: &Node<'_>, defaults: Option<&Node<'_>>, key: &str, report: &mut Reporter<'_>) -> Option<At<i64>> {
+fn number(
+    own: &YamlNode<'_>,
+    defaults: Option<&YamlNode<'_>>,
+    key: &str,
+    report: &mut Reporter<'_>,
+) -> Option<At<i64>> {
     let node = value(own, defaults, key)?;
     let number = node.number();
     if number.is_none() {
@@ -337,7 +342,12 @@ fn number(own: &Node<'_>, defaults: Option<&Node<'_>>, key: &str, report: &mut R
     Some(At { value: number?, at: node.at() })
 }
 
-fn truth(own: &Node<'_>, defaults: Option<&Node<'_>>, key: &str, report: &mut Reporter<'_>) -> Option<At<bool>> {
+fn truth(
+    own: &YamlNode<'_>,
+    defaults: Option<&YamlNode<'_>>,
+    key: &str,
+    report: &mut Reporter<'_>,
+) -> Option<At<bool>> {
     let node = value(own, defaults, key)?;
     let truth = node.truth();
     if truth.is_none() {
@@ -381,19 +391,19 @@ fn pdo(entry: &Entry<'_>, is_transmit: bool, report: &mut Reporter<'_>) -> Optio
     })
 }
 
-fn write(node: &Node<'_>) -> Option<Write> {
+fn write(node: &YamlNode<'_>) -> Option<SdoWrite> {
     let (index, sub_index) = object(node)?;
     let value = value(node, None, "value").map_or(Some(0), |value| value.number())?;
-    Some(Write { index, sub_index, value, at: node.at() })
+    Some(SdoWrite { index, sub_index, value, at: node.at() })
 }
 
-fn object(node: &Node<'_>) -> Option<(u16, u8)> {
+fn object(node: &YamlNode<'_>) -> Option<(u16, u8)> {
     let index = value(node, None, "index")?.number()?;
     let sub_index = value(node, None, "sub_index").map_or(Some(0), |node| node.number())?;
     Some((index.try_into().ok()?, sub_index.try_into().ok()?))
 }
 
-fn unknown_keys(node: &Node<'_>, known: &[&str], report: &mut Reporter<'_>) {
+fn unknown_keys(node: &YamlNode<'_>, known: &[&str], report: &mut Reporter<'_>) {
     for entry in node.entries().iter().filter(|entry| !known.contains(&entry.key.as_str())) {
         let near = near(&entry.key, known.iter().copied());
         let what =

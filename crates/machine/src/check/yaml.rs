@@ -6,13 +6,13 @@ use super::finding::Place;
 use words::document::{BadFile, Located};
 
 /// A value and where it begins.
-pub(super) struct Node<'a>(&'a MarkedYaml<'a>);
+pub(super) struct YamlNode<'a>(&'a MarkedYaml<'a>);
 
 /// A key, its value, and where the key stands.
 pub(super) struct Entry<'a> {
     pub(super) key: String,
     pub(super) at: Place,
-    pub(super) value: Node<'a>,
+    pub(super) value: YamlNode<'a>,
 }
 
 /// Most columns before the first key or value of a line. Each level of a block takes one at least, and the reader of YAML, which
@@ -23,7 +23,7 @@ const MOST_INDENTED: usize = 200;
 ///
 /// # Errors
 /// It is not YAML, nested too deep, or not one document.
-pub(super) fn with_document<T>(text: &str, look: impl FnOnce(Node<'_>) -> T) -> Result<T, BadFile> {
+pub(super) fn with_document<T>(text: &str, look: impl FnOnce(YamlNode<'_>) -> T) -> Result<T, BadFile> {
     if let Some(line) = text.lines().position(|line| indentation(line) > MOST_INDENTED) {
         let what = format!("indented by more than {MOST_INDENTED} columns; expected the few levels of a bus");
         return Err(bad(text, line + 1, MOST_INDENTED, what));
@@ -33,7 +33,7 @@ pub(super) fn with_document<T>(text: &str, look: impl FnOnce(Node<'_>) -> T) -> 
         bad(text, at.line(), at.col(), format!("this is not YAML: {}", error.info()))
     })?;
     match &documents[..] {
-        [document] => Ok(look(Node(document))),
+        [document] => Ok(look(YamlNode(document))),
         [] => Err(bad(
             text,
             1,
@@ -61,7 +61,7 @@ fn place(at: Marker) -> Place {
     Place { line: at.line(), column: at.col() + 1 }
 }
 
-impl<'a> Node<'a> {
+impl<'a> YamlNode<'a> {
     pub(super) fn at(&self) -> Place {
         place(self.0.span.start)
     }
@@ -81,17 +81,17 @@ impl<'a> Node<'a> {
     pub(super) fn entries(&self) -> Vec<Entry<'a>> {
         let YamlData::Mapping(mapping) = &self.0.data else { return Vec::new() };
         let entry = |(key, value): (&'a MarkedYaml<'a>, &'a MarkedYaml<'a>)| Entry {
-            key: Node(key).text().unwrap_or_else(|| "?".to_owned()),
+            key: YamlNode(key).text().unwrap_or_else(|| "?".to_owned()),
             at: place(key.span.start),
-            value: Node(value),
+            value: YamlNode(value),
         };
         mapping.iter().map(entry).collect()
     }
 
     /// The items of a list; none of anything else.
-    pub(super) fn items(&self) -> Vec<Node<'a>> {
+    pub(super) fn items(&self) -> Vec<YamlNode<'a>> {
         let YamlData::Sequence(items) = &self.0.data else { return Vec::new() };
-        items.iter().map(Node).collect()
+        items.iter().map(YamlNode).collect()
     }
 
     pub(super) fn text(&self) -> Option<String> {

@@ -36,7 +36,7 @@ pub(super) fn source(table: &Table<'_>, problems: &mut Vec<Problem>) -> Source {
 
 /// What else is around a drive, with its places. What is wrong is added to `problems`, each thing on its own.
 pub(super) fn around(table: &Table<'_>, problems: &mut Vec<Problem>) -> Vec<(Stimulus, Located)> {
-    let parts: [Part; 7] = [load, inputs, switches, rotor, temperatures, faults, battery];
+    let parts: [TablePart; 7] = [load, inputs, switches, rotor, temperatures, faults, battery];
     let mut stimuli = Vec::new();
     for said in parts.into_iter().flat_map(|part| part(table)) {
         let stimulus = said.and_then(|Words { words, place }| match words.parse() {
@@ -52,7 +52,7 @@ pub(super) fn around(table: &Table<'_>, problems: &mut Vec<Problem>) -> Vec<(Sti
 }
 
 /// What makes world commands of a part of the table.
-type Part = fn(&Table<'_>) -> Vec<Said>;
+type TablePart = fn(&Table<'_>) -> Vec<Said>;
 
 /// A world command, or what is wrong where one would come from.
 type Said = Result<Words, Problem>;

@@ -40,7 +40,7 @@ pub enum ErrorStatus {
 }
 
 /// A row: the status, its letter, what it means, what to do.
-type Row = (ErrorStatus, char, &'static str, &'static str);
+type StatusRow = (ErrorStatus, char, &'static str, &'static str);
 
 use ErrorStatus::{
     ConfigurationFailed, InitiallyOperational, NoDeviceType, NoGuarding, NoHeartbeat, NoHeartbeatAtStart, NoProgram,
@@ -52,7 +52,7 @@ const WRONG_DEVICE: &str =
     "another device than planned is at this node-ID: check which one is wired there, or correct the plan";
 
 /// Every status once, in the order of the letters.
-const TABLE: [Row; 15] = [
+const TABLE: [StatusRow; 15] = [
     (
         NotListed,
         'A',
@@ -141,7 +141,7 @@ impl ErrorStatus {
         self != InitiallyOperational
     }
 
-    fn row(self) -> &'static Row {
+    fn row(self) -> &'static StatusRow {
         // The rows are in the order of the variants, which a test checks.
         &TABLE[self as usize]
     }

@@ -49,7 +49,7 @@ pub(super) struct NodeBoot<'a> {
 }
 
 /// What is known of the state of a node that must not be disturbed.
-enum State {
+enum KnownState {
     Operational,
     Other,
     Unknown,
@@ -120,9 +120,9 @@ impl<'a> NodeBoot<'a> {
         self.check_identity().await?;
         if keeps_alive {
             match self.state().await? {
-                State::Operational => self.left_operational = true,
-                State::Other => self.reset(NmtCommand::ResetCommunication).await,
-                State::Unknown => {}
+                KnownState::Operational => self.left_operational = true,
+                KnownState::Other => self.reset(NmtCommand::ResetCommunication).await,
+                KnownState::Unknown => {}
             }
         }
         if !self.left_operational {
@@ -174,28 +174,28 @@ impl<'a> NodeBoot<'a> {
     }
 
     /// Whether it is operational, by its heartbeat, which it is given where it has none.
-    async fn state(&mut self) -> Go<State> {
+    async fn state(&mut self) -> Go<KnownState> {
         let expected = Expected::OtherState(NmtState::Operational);
         let Some(patience) = self.produce_heartbeat().await else {
             let unknown = Found::Text("a node that sends no heartbeat (1017h): it is not reset".to_owned());
             self.note(StepKind::State, Some(PRODUCER_HEARTBEAT_TIME), expected, unknown, Verdict::Noted);
-            return Ok(State::Unknown);
+            return Ok(KnownState::Unknown);
         };
         let now = self.node.network().now();
         match self.hear_state(now, patience, |_| true).await {
             Ok(NmtState::Operational) => {
                 let found = Found::State(NmtState::Operational);
                 self.note(StepKind::State, None, expected, found, Verdict::LeftOperational);
-                Ok(State::Operational)
+                Ok(KnownState::Operational)
             }
             Ok(state) => {
                 self.note(StepKind::State, None, expected, Found::State(state), Verdict::Passed);
-                Ok(State::Other)
+                Ok(KnownState::Other)
             }
             Err(Elapsed) => {
                 let found = self.nothing(patience);
                 self.fail(StepKind::State, None, Expected::Heartbeat, found, ErrorStatus::NoHeartbeat)?;
-                Ok(State::Unknown)
+                Ok(KnownState::Unknown)
             }
         }
     }

@@ -25,7 +25,7 @@ impl Cycle {
 
 /// Whose SYNC counts the cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Source {
+enum SyncSource {
     Off,
     This,
     Another,
@@ -40,7 +40,7 @@ const LOST_AFTER_PERIODS: u64 = 3;
 /// missed altogether are not made up for; they are counted.
 #[derive(Clone, Debug)]
 pub(super) struct SyncClock {
-    source: Source,
+    source: SyncSource,
     period_ns: u64,
     /// When the next SYNC is due, or counts as lost.
     due: Option<Instant>,
@@ -54,7 +54,7 @@ pub(super) struct SyncClock {
 
 impl Default for SyncClock {
     fn default() -> Self {
-        let source = Source::Off;
+        let source = SyncSource::Off;
         Self { source, period_ns: 0, due: None, pending: false, cycle: None, first: true, lost: false, missed: 0 }
     }
 }
@@ -73,19 +73,19 @@ pub(super) enum Tick {
 impl SyncClock {
     /// Produces SYNC from now on, the first one at once, or stops (`None` or a zero period). Numbers go on.
     pub(super) fn produce(&mut self, period: Option<Duration>, now: Instant) {
-        self.begin(Source::This, period);
+        self.begin(SyncSource::This, period);
         self.due = (self.period_ns > 0).then_some(now);
     }
 
     /// Counts the SYNCs of another producer, which come with this period.
     pub(super) fn follow(&mut self, period: Option<Duration>, now: Instant) {
-        self.begin(Source::Another, period);
+        self.begin(SyncSource::Another, period);
         self.due = (self.period_ns > 0).then(|| now.plus_nanos(self.patience_ns()));
     }
 
-    fn begin(&mut self, source: Source, period: Option<Duration>) {
+    fn begin(&mut self, source: SyncSource, period: Option<Duration>) {
         self.period_ns = period.map_or(0, |period| u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
-        self.source = if self.period_ns > 0 { source } else { Source::Off };
+        self.source = if self.period_ns > 0 { source } else { SyncSource::Off };
         (self.due, self.pending, self.first, self.lost) = (None, false, true, false);
     }
 
@@ -96,7 +96,7 @@ impl SyncClock {
     /// Time has come to `now`.
     pub(super) fn handle_timeout(&mut self, now: Instant) -> Option<Tick> {
         let due = self.due.filter(|due| *due <= now)?;
-        if self.source == Source::Another {
+        if self.source == SyncSource::Another {
             self.due = None;
             self.lost = true;
             return Some(Tick::Lost);
@@ -109,7 +109,7 @@ impl SyncClock {
 
     /// A SYNC of another producer has come.
     pub(super) fn handle_sync(&mut self, now: Instant) -> Option<Tick> {
-        if self.source != Source::Another {
+        if self.source != SyncSource::Another {
             return None;
         }
         self.due = Some(now.plus_nanos(self.patience_ns()));
@@ -151,8 +151,8 @@ impl SyncClock {
     /// Time from one SYNC to the next; `None` while no producer's counts.
     pub(super) const fn period(&self) -> Option<Duration> {
         match self.source {
-            Source::Off => None,
-            Source::This | Source::Another => Some(Duration::from_nanos(self.period_ns)),
+            SyncSource::Off => None,
+            SyncSource::This | SyncSource::Another => Some(Duration::from_nanos(self.period_ns)),
         }
     }
 

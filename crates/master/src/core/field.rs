@@ -7,14 +7,14 @@ use crate::units::{Amperes, Celsius, Rpm, Turns, Volts};
 
 /// Where an object lies in the process image. Good until the PDO gets another mapping: then it finds nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct ImagePlace {
     pub(super) slot: u16,
     pub(super) generation: u16,
     pub(super) shift: u8,
     pub(super) mask: u64,
 }
 
-impl Place {
+impl ImagePlace {
     /// The bits of a frame's data at this place.
     #[inline]
     pub(super) const fn of(&self, data: u64) -> u64 {
@@ -205,7 +205,7 @@ quantities! { Rpm Turns Amperes Volts Celsius }
 /// [`crate::Node::signal`] or, in physical units, from [`crate::Drive`].
 #[derive(Debug)]
 pub struct Signal<T> {
-    pub(super) place: Place,
+    pub(super) place: ImagePlace,
     pub(super) field: Field,
     kind: PhantomData<fn() -> T>,
 }
@@ -214,7 +214,7 @@ pub struct Signal<T> {
 /// [`crate::Node::set_point`] or, in physical units, from [`crate::Drive`].
 #[derive(Debug)]
 pub struct SetPoint<T> {
-    pub(super) place: Place,
+    pub(super) place: ImagePlace,
     pub(super) field: Field,
     kind: PhantomData<fn(T)>,
 }
@@ -229,13 +229,13 @@ macro_rules! handles {
         impl<T> Copy for $handle<T> {}
         impl<T: Sample> $handle<T> {
             /// `None` if a field of this form and length does not hold such values.
-            pub(crate) fn new(place: Place, form: NumberForm, per_count: f64) -> Option<Self> {
+            pub(crate) fn new(place: ImagePlace, form: NumberForm, per_count: f64) -> Option<Self> {
                 let field = Field { bits: place.bits(), form, per_count };
                 // An entry without bits holds nothing, and REAL numbers have 32 or 64.
                 let whole = field.bits > 0 && (form != NumberForm::Real || matches!(field.bits, 32 | 64));
                 (whole && T::suits(&field)).then_some(Self { place, field, kind: PhantomData })
             }
-            pub(crate) const fn place(&self) -> Place {
+            pub(crate) const fn place(&self) -> ImagePlace {
                 self.place
             }
             /// How the object's bits are a number.
@@ -294,19 +294,19 @@ mod tests {
 
     #[test]
     fn a_field_without_bits_is_no_signal() {
-        let place = Place { slot: 0, generation: 0, shift: 0, mask: 0 };
+        let place = ImagePlace { slot: 0, generation: 0, shift: 0, mask: 0 };
         assert!(Signal::<i32>::new(place, NumberForm::Signed, 1.0).is_none());
         assert!(Signal::<bool>::new(place, NumberForm::Unsigned, 1.0).is_none());
-        let short = Place { mask: 0xFFFF, ..place };
+        let short = ImagePlace { mask: 0xFFFF, ..place };
         assert!(SetPoint::<f64>::new(short, NumberForm::Real, 1.0).is_none());
     }
 
     #[test]
     fn a_place_is_put_without_touching_its_neighbours() {
-        let place = Place { slot: 0, generation: 0, shift: 16, mask: 0xFFFF };
+        let place = ImagePlace { slot: 0, generation: 0, shift: 16, mask: 0xFFFF };
         assert_eq!(place.put(u64::MAX, 0x1_0000), 0xFFFF_FFFF_0000_FFFF);
         assert_eq!(place.of(0x1234_5678), 0x1234);
-        let whole = Place { slot: 0, generation: 0, shift: 0, mask: mask_of(&(0..64)) };
+        let whole = ImagePlace { slot: 0, generation: 0, shift: 0, mask: mask_of(&(0..64)) };
         assert_eq!((whole.put(1, u64::MAX), whole.bits()), (u64::MAX, 64));
     }
 }

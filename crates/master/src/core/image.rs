@@ -5,7 +5,7 @@ use can::{CanId, Frame, Instant, MAX_DATA_LENGTH};
 use canopen::pdo::PdoNumber;
 use canopen::{Mux, NodeId};
 
-use super::field::{Place, bits_of, mask_of};
+use super::field::{ImagePlace, bits_of, mask_of};
 use super::pdo_map::PdoMap;
 
 /// A value that came by PDO.
@@ -51,7 +51,7 @@ const NONE: u16 = u16::MAX;
 struct Tpdo {
     node: NodeId,
     number: PdoNumber,
-    /// Counts its mappings, so that a [`Place`] in an old one finds nothing.
+    /// Counts its mappings, so that a [`ImagePlace`] in an old one finds nothing.
     generation: u16,
     id: Option<u16>,
     map: PdoMap,
@@ -233,7 +233,7 @@ impl ProcessImage {
     }
 
     /// Where a node's TPDOs have an object, in the order in which they were set up.
-    pub(crate) fn find_signals(&self, node: NodeId, mux: Mux) -> impl Iterator<Item = (PdoNumber, Place)> {
+    pub(crate) fn find_signals(&self, node: NodeId, mux: Mux) -> impl Iterator<Item = (PdoNumber, ImagePlace)> {
         let tpdos = self.tpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node);
         tpdos.filter_map(move |(position, pdo)| {
             Some((pdo.number, Self::place(position, pdo.generation, &pdo.map.find(mux)?)))
@@ -245,7 +245,7 @@ impl ProcessImage {
         &self,
         node: NodeId,
         mux: Mux,
-    ) -> impl Iterator<Item = (PdoNumber, RpdoTrigger, Place)> {
+    ) -> impl Iterator<Item = (PdoNumber, RpdoTrigger, ImagePlace)> {
         let rpdos = self.rpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node);
         rpdos.filter_map(move |(position, pdo)| {
             let place = Self::place(position, pdo.generation, &pdo.map.find(mux)?);
@@ -263,27 +263,27 @@ impl ProcessImage {
         all.filter(|(of, ..)| *of == node).map(|(_, number, map)| (number, objects(map))).collect()
     }
 
-    fn place(position: usize, generation: u16, bits: &Range<u32>) -> Place {
-        Place { slot: position as u16, generation, shift: bits.start as u8, mask: mask_of(bits) }
+    fn place(position: usize, generation: u16, bits: &Range<u32>) -> ImagePlace {
+        ImagePlace { slot: position as u16, generation, shift: bits.start as u8, mask: mask_of(bits) }
     }
 
     /// The bits of a place in a TPDO, and when they came; `None` before the first, and after a new mapping.
     #[inline]
-    pub(super) fn at(&self, place: Place) -> Option<Received> {
+    pub(super) fn at(&self, place: ImagePlace) -> Option<Received> {
         let pdo = self.tpdos.get(usize::from(place.slot)).filter(|pdo| pdo.generation == place.generation)?;
         Some(Received { raw: place.of(pdo.data), at: pdo.at? })
     }
 
     /// Cycles that have begun since the TPDO of a place came; `None` before the first, and after a new mapping.
     #[inline]
-    pub(super) fn cycles_since(&self, place: Place) -> Option<u64> {
+    pub(super) fn cycles_since(&self, place: ImagePlace) -> Option<u64> {
         let pdo = self.tpdos.get(usize::from(place.slot)).filter(|pdo| pdo.generation == place.generation)?;
         pdo.at.map(|_| self.cycle.saturating_sub(pdo.cycle))
     }
 
     /// Puts bits into a place of an RPDO and queues it by its trigger. False after a new mapping.
     #[inline]
-    pub(super) fn put(&mut self, place: Place, raw: u64) -> bool {
+    pub(super) fn put(&mut self, place: ImagePlace, raw: u64) -> bool {
         let Some(pdo) = self.rpdos.get_mut(usize::from(place.slot)) else { return false };
         if pdo.generation != place.generation {
             return false;

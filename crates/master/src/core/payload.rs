@@ -5,33 +5,33 @@ const SHORT: usize = 4;
 
 /// The bytes of an object, little endian as on the wire. Values of up to four bytes are held in place.
 #[derive(Clone)]
-pub struct Payload(Form);
+pub struct Payload(PayloadForm);
 
 #[derive(Clone)]
-enum Form {
+enum PayloadForm {
     Short([u8; SHORT], u8),
     Long(Vec<u8>),
 }
 
 impl Payload {
     /// No bytes.
-    pub const EMPTY: Self = Self(Form::Short([0; SHORT], 0));
+    pub const EMPTY: Self = Self(PayloadForm::Short([0; SHORT], 0));
 
     /// A copy of `bytes`.
     pub fn new(bytes: &[u8]) -> Self {
         if bytes.len() > SHORT {
-            return Self(Form::Long(bytes.to_vec()));
+            return Self(PayloadForm::Long(bytes.to_vec()));
         }
         let mut short = [0; SHORT];
         short[..bytes.len()].copy_from_slice(bytes);
-        Self(Form::Short(short, bytes.len() as u8))
+        Self(PayloadForm::Short(short, bytes.len() as u8))
     }
 
     /// The bytes.
     pub fn as_bytes(&self) -> &[u8] {
         match &self.0 {
-            Form::Short(bytes, length) => &bytes[..usize::from(*length)],
-            Form::Long(bytes) => bytes,
+            PayloadForm::Short(bytes, length) => &bytes[..usize::from(*length)],
+            PayloadForm::Long(bytes) => bytes,
         }
     }
 
@@ -47,15 +47,15 @@ impl Payload {
 
 impl From<Vec<u8>> for Payload {
     fn from(bytes: Vec<u8>) -> Self {
-        if bytes.len() > SHORT { Self(Form::Long(bytes)) } else { Self::new(&bytes) }
+        if bytes.len() > SHORT { Self(PayloadForm::Long(bytes)) } else { Self::new(&bytes) }
     }
 }
 
 impl From<Payload> for Vec<u8> {
     fn from(payload: Payload) -> Self {
         match payload.0 {
-            Form::Short(bytes, length) => bytes[..usize::from(length)].to_vec(),
-            Form::Long(bytes) => bytes,
+            PayloadForm::Short(bytes, length) => bytes[..usize::from(length)].to_vec(),
+            PayloadForm::Long(bytes) => bytes,
         }
     }
 }

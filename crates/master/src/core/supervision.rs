@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use canopen::{Mux, NodeId};
 
-use super::field::Place;
+use super::field::ImagePlace;
 use super::image::ProcessImage;
 
 /// How a drive that is moved cycle by cycle is stopped, and when.
@@ -18,9 +18,9 @@ pub(crate) struct CycleRules {
     /// The object that takes the word.
     pub(crate) controlword: Mux,
     /// That object in an RPDO, where it is mapped.
-    pub(crate) place: Option<Place>,
+    pub(crate) place: Option<ImagePlace>,
     /// The TPDO that has to come.
-    pub(crate) heard: Place,
+    pub(crate) heard: ImagePlace,
     /// How often it comes.
     pub(crate) cadence: Cadence,
     /// Cycles in a row for which the program may stay away, and that TPDO beyond its cadence.
@@ -78,7 +78,7 @@ impl fmt::Display for CycleLoss {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Watch {
+struct CycleWatch {
     rules: CycleRules,
     state: WatchState,
 }
@@ -95,14 +95,14 @@ enum WatchState {
 /// All watches. A watch is never taken away: a node and its controlword have one.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Supervision {
-    watches: Vec<Watch>,
+    watches: Vec<CycleWatch>,
 }
 
 impl Supervision {
     /// A watch with these rules, at rest; in place of the one that the same controlword had.
     pub(super) fn set(&mut self, rules: CycleRules) -> WatchId {
-        let watch = Watch { rules, state: WatchState::Resting };
-        let same = |other: &Watch| (other.rules.node, other.rules.controlword) == (rules.node, rules.controlword);
+        let watch = CycleWatch { rules, state: WatchState::Resting };
+        let same = |other: &CycleWatch| (other.rules.node, other.rules.controlword) == (rules.node, rules.controlword);
         let position = self.watches.iter().position(same).unwrap_or(self.watches.len());
         match self.watches.get_mut(position) {
             Some(before) => *before = watch,
@@ -172,7 +172,7 @@ impl Supervision {
 
     /// An axis is being stopped by other means, whether it has been given a set-point or is about to be.
     pub(super) fn stop(&mut self, node: NodeId, controlword: Mux) {
-        let same = |watch: &&mut Watch| (watch.rules.node, watch.rules.controlword) == (node, controlword);
+        let same = |watch: &&mut CycleWatch| (watch.rules.node, watch.rules.controlword) == (node, controlword);
         self.watches.iter_mut().filter(same).for_each(|watch| watch.state = WatchState::Stopped(CycleLoss::StopAll));
     }
 

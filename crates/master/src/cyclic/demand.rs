@@ -4,7 +4,7 @@ use canopen::Mux;
 use cia402::{PowerState, Statusword};
 
 use crate::core::CycleLoss;
-use crate::limits::{Asked, Limits, Setting};
+use crate::limits::{AskedNumber, Limits, Setting};
 use crate::units::{Amperes, Angle, Rpm, Shown, Turns};
 
 /// What a drive is to do in one cycle.
@@ -127,7 +127,7 @@ impl fmt::Display for Refusal {
                 f.write_str("the set-point is not a number that its object can hold. The drive is held instead")
             }
             Self::OutOfLimits { asked, bound } => {
-                write!(f, "{} is out of range for {bound}. The drive is held instead", Asked(*asked))
+                write!(f, "{} is out of range for {bound}. The drive is held instead", AskedNumber(*asked))
             }
             Self::StepTooLarge { way, longest, bound } => write!(
                 f,

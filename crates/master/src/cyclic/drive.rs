@@ -9,7 +9,7 @@ use devices::PowerStyle;
 use super::demand::{Bound, CyclicState, Demand, Refusal};
 use super::sequence::controlword;
 use super::standstill::Standstill;
-use super::target::{Kind, Target};
+use super::target::{Target, TargetKind};
 use crate::core::{Cadence, SetPoint, Signal, WatchId};
 use crate::drive::STOP;
 use crate::host_loss::HostLoss;
@@ -48,7 +48,7 @@ pub struct CyclicDrive {
     pub(super) tolerance: u32,
     pub(super) host_loss: HostLoss,
     pub(super) watch: WatchId,
-    pub(super) progress: Progress,
+    pub(super) progress: CyclicProgress,
 }
 
 /// How the controlword gets to the drive.
@@ -62,7 +62,7 @@ pub(super) enum ControlwordPath {
 
 /// What one step leaves for the next.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Progress {
+pub(super) struct CyclicProgress {
     /// The drive has been heard since it was opened, or was sent a demand that does not want power.
     spoken: bool,
     /// The drive followed set-points.
@@ -75,7 +75,7 @@ pub(super) struct Progress {
     pub(super) standstill: Standstill,
 }
 
-impl Progress {
+impl CyclicProgress {
     /// Of a shaft that stands below this speed, in r/min of the output.
     pub(super) const fn new(standstill_rpm: f64) -> Self {
         let standstill = Standstill::new(standstill_rpm);
@@ -102,22 +102,22 @@ impl CyclicDrive {
     /// The highest speed that set-points may ask for, by the drive's own objects; `None` in a mode for torque.
     pub fn highest_speed(&self) -> Option<(Rpm, Bound)> {
         match self.target.kind {
-            Kind::Position { counts_per_turn, counts_per_s, speed, .. } => {
+            TargetKind::Position { counts_per_turn, counts_per_s, speed, .. } => {
                 Some((Rpm(counts_per_s / counts_per_turn * 60.0), speed))
             }
-            Kind::Velocity { per_count } => {
+            TargetKind::Velocity { per_count } => {
                 let bound = Bound::from(self.target.limits);
                 Some((Rpm(bound.high as f64 * per_count), bound))
             }
-            Kind::Current { .. } => None,
+            TargetKind::Current { .. } => None,
         }
     }
 
     /// The position that was sent last, in a mode that takes positions.
     pub fn set_point(&self) -> Option<Turns> {
         match self.target.kind {
-            Kind::Position { counts_per_turn, .. } => Some(Turns(self.target.last_sent as f64 / counts_per_turn)),
-            Kind::Velocity { .. } | Kind::Current { .. } => None,
+            TargetKind::Position { counts_per_turn, .. } => Some(Turns(self.target.last_sent as f64 / counts_per_turn)),
+            TargetKind::Velocity { .. } | TargetKind::Current { .. } => None,
         }
     }
 
@@ -264,8 +264,8 @@ impl CyclicDrive {
 
     fn actual(&self, io: &Exchange<'_>) -> Option<i64> {
         match self.target.kind {
-            Kind::Position { actual, .. } => io.read_fresh(actual, self.patience(io)),
-            Kind::Velocity { .. } | Kind::Current { .. } => None,
+            TargetKind::Position { actual, .. } => io.read_fresh(actual, self.patience(io)),
+            TargetKind::Velocity { .. } | TargetKind::Current { .. } => None,
         }
     }
 

@@ -12,8 +12,8 @@ use cia402::object::{
 use devices::{AxisDescription, Description, Quantity};
 
 use super::demand::Bound;
-use super::drive::{ControlwordPath, CyclicDrive, Progress};
-use super::target::{Kind, Target};
+use super::drive::{ControlwordPath, CyclicDrive, CyclicProgress};
+use super::target::{Target, TargetKind};
 use crate::core::{Cadence, CycleRules, NumberForm, PdoMap, Sample, Signal};
 use crate::drive::{Drive, STANDSTILL_RPM, STOP, SwitchedOff};
 use crate::error::Error;
@@ -138,7 +138,7 @@ impl Drive {
         let (number, mut target) = self.target(description, axis, mode).await?;
         let (statusword_in, cadence) = self.statusword_carrier(description, number, &mapped)?;
         let statusword = self.node().signal_in(statusword_in, axis.object(STATUSWORD))?;
-        if let Kind::Position { actual, .. } = &mut target.kind {
+        if let TargetKind::Position { actual, .. } = &mut target.kind {
             // A TPDO that comes, if one of them does.
             *actual = self.node().signal_in(statusword_in, axis.object(POSITION_ACTUAL_VALUE)).unwrap_or(*actual);
         }
@@ -177,7 +177,7 @@ impl Drive {
             tolerance: options.tolerance,
             host_loss,
             watch: self.node().network().with_core(|core| core.watch_cycles(rules)),
-            progress: Progress::new(self.gear().at_output(STANDSTILL_RPM)),
+            progress: CyclicProgress::new(self.gear().at_output(STANDSTILL_RPM)),
         })
     }
 
@@ -332,7 +332,7 @@ impl Drive {
         let (number, set_point) = self.node().scaled_set_point(quantity.object, NumberForm::Signed, 1.0)?;
         let per_count = self.step_of(quantity).await?;
         let speed = axis.units.target_velocity.is_some_and(|velocity| velocity.object == quantity.object);
-        let kind = if speed { Kind::Velocity { per_count } } else { Kind::Current { per_count } };
+        let kind = if speed { TargetKind::Velocity { per_count } } else { TargetKind::Current { per_count } };
         Ok((number, Target { set_point, limits: self.limits(quantity.object).await?, kind, last_sent: 0 }))
     }
 
@@ -341,7 +341,7 @@ impl Drive {
         let counts_per_turn = self.counts_per_turn().await?;
         let velocity = self.has(axis.units.target_velocity, "a target velocity")?;
         let (rpm, speed) = self.highest_speed(axis, velocity).await?;
-        let kind = Kind::Position {
+        let kind = TargetKind::Position {
             actual: self.node().signal(axis.object(POSITION_ACTUAL_VALUE))?,
             counts_per_turn,
             counts_per_s: rpm / 60.0 * counts_per_turn,

@@ -12,14 +12,14 @@ use crate::units::{Amperes, Angle, Rpm};
 pub(super) struct Target {
     pub(super) set_point: SetPoint<i64>,
     pub(super) limits: Limits,
-    pub(super) kind: Kind,
+    pub(super) kind: TargetKind,
     /// What was sent last.
     pub(super) last_sent: i64,
 }
 
 /// What the set-point is.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Kind {
+pub(super) enum TargetKind {
     /// A position in counts. The way from one to the next is bounded by the highest speed.
     Position { actual: Signal<i64>, counts_per_turn: f64, counts_per_s: f64, speed: Bound },
     /// A speed: r/min in one count.
@@ -33,12 +33,12 @@ impl Target {
     pub(super) fn follow(&self, demand: Demand, period: Duration) -> Result<i64, Refusal> {
         let raw = match (demand, self.kind) {
             (Demand::Hold, _) => return Ok(self.hold()),
-            (Demand::Position(Angle::Counts(counts)), Kind::Position { .. }) => counts,
-            (Demand::Position(Angle::Turns(turns)), Kind::Position { counts_per_turn, .. }) => {
+            (Demand::Position(Angle::Counts(counts)), TargetKind::Position { .. }) => counts,
+            (Demand::Position(Angle::Turns(turns)), TargetKind::Position { counts_per_turn, .. }) => {
                 whole(turns * counts_per_turn)?
             }
-            (Demand::Velocity(Rpm(value)), Kind::Velocity { per_count })
-            | (Demand::Current(Amperes(value)), Kind::Current { per_count }) => whole(value / per_count)?,
+            (Demand::Velocity(Rpm(value)), TargetKind::Velocity { per_count })
+            | (Demand::Current(Amperes(value)), TargetKind::Current { per_count }) => whole(value / per_count)?,
             _ => return Err(Refusal::WrongKind),
         };
         let limits = self.limits;
@@ -52,21 +52,21 @@ impl Target {
     /// What to send so that the drive comes to rest with power: the last position; no speed, no current.
     pub(super) const fn hold(&self) -> i64 {
         match self.kind {
-            Kind::Position { .. } => self.last_sent,
-            Kind::Velocity { .. } | Kind::Current { .. } => 0,
+            TargetKind::Position { .. } => self.last_sent,
+            TargetKind::Velocity { .. } | TargetKind::Current { .. } => 0,
         }
     }
 
     /// What to send while the drive has no power: where it is, so that it does not jump when it gets some; no speed, no current.
     pub(super) const fn rest(&self, actual: Option<i64>) -> i64 {
         match (self.kind, actual) {
-            (Kind::Position { .. }, Some(actual)) => actual,
+            (TargetKind::Position { .. }, Some(actual)) => actual,
             _ => self.hold(),
         }
     }
 
     fn check_step(&self, raw: i64, period: Duration) -> Result<(), Refusal> {
-        let Kind::Position { counts_per_s, speed, .. } = self.kind else { return Ok(()) };
+        let TargetKind::Position { counts_per_s, speed, .. } = self.kind else { return Ok(()) };
         let way = raw.saturating_sub(self.last_sent);
         // A drive that was given nothing for some cycles stands where it was: the next step is no longer for that.
         // A count more, for set-points that are rounded to whole ones.

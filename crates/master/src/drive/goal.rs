@@ -46,7 +46,7 @@ pub(super) struct Held {
 
 /// What one look has found.
 #[derive(Clone, Copy, Debug)]
-struct Look {
+struct SpeedLook {
     reached: bool,
     at: f64,
     /// Neither reached, nor nearer than at the look before.
@@ -74,7 +74,7 @@ impl Goal {
         intent: &'static str,
         statusword: Statusword,
         before: Option<f64>,
-    ) -> Result<Look, Error> {
+    ) -> Result<SpeedLook, Error> {
         match self {
             Self::Home { rules, method, looks } => {
                 *looks = looks.saturating_add(1);
@@ -83,12 +83,12 @@ impl Goal {
                     return Err(drive.not_reached(intent, Trigger::HomingFailed(*method)).await);
                 }
                 let at = drive.read_number(drive.place(POSITION_ACTUAL_VALUE)).await?;
-                Ok(Look { reached: settled && rules.attained.matches(statusword), at: at as f64, rests: false })
+                Ok(SpeedLook { reached: settled && rules.attained.matches(statusword), at: at as f64, rests: false })
             }
             Self::Speed(held) => {
                 let at = drive.read_quantity(held.quantity).await?;
                 let reached = (at - held.target_rpm).abs() <= held.band_rpm;
-                Ok(Look { reached, at, rests: !reached && at.abs() < drive.gear.at_output(STANDSTILL_RPM) })
+                Ok(SpeedLook { reached, at, rests: !reached && at.abs() < drive.gear.at_output(STANDSTILL_RPM) })
             }
             Self::Position { target, band, .. } => {
                 let position = drive.read_number(drive.place(POSITION_ACTUAL_VALUE)).await?;
@@ -96,7 +96,7 @@ impl Goal {
                 let at = position as f64;
                 let least = (*band / REACHED_TURNS * REST_TURNS).max(1.0);
                 let rests = !near && before.is_some_and(|before| (at - before).abs() <= least);
-                Ok(Look { reached: near && statusword.has(Statusword::TARGET_REACHED), at, rests })
+                Ok(SpeedLook { reached: near && statusword.has(Statusword::TARGET_REACHED), at, rests })
             }
         }
     }

@@ -13,7 +13,7 @@ use devices::AxisId;
 use devices::faults::FaultRow;
 
 use crate::identify::knowledge::{Guess, Identity};
-use crate::limits::{Asked, Limits, Setting};
+use crate::limits::{AskedNumber, Limits, Setting};
 use crate::units::{Shown, Volts};
 use hints::advice;
 
@@ -217,7 +217,7 @@ pub enum Error {
     },
     /// A value is outside what the drive takes, or would be held back by another object: it was not sent.
     #[error("node {node}: {} is out of range for {} {}, which takes {limits}. It was not sent",
-        Asked(*asked), limits.object, limits.name)]
+        AskedNumber(*asked), limits.object, limits.name)]
     OutOfLimits {
         /// The node.
         node: NodeId,

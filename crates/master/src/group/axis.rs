@@ -18,7 +18,7 @@ const KEPT: usize = 8;
 
 /// One axis of a group.
 #[derive(Debug)]
-pub(super) struct Axis {
+pub(super) struct GroupAxis {
     pub(super) drive: CyclicDrive,
     following: Following,
     /// The newest set-points, in turns, newest first.
@@ -38,7 +38,7 @@ enum Following {
     Speeds,
 }
 
-impl Axis {
+impl GroupAxis {
     pub(super) fn new(drive: CyclicDrive, claim: Claim) -> Self {
         let following = if drive.set_point().is_some() { Following::Positions } else { Following::Speeds };
         Self { drive, following, asked: [0.0; KEPT], error_turns: None, _claim: claim }

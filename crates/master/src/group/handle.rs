@@ -7,7 +7,7 @@ use can::Instant;
 
 use super::error::GroupError;
 use super::limits::PathPoint;
-use super::runner::{Activity, POWER_LIMIT, Runner};
+use super::runner::{Activity, GroupRunner, POWER_LIMIT};
 use super::state::{GroupState, Phase, StopCause};
 use super::stream::{Stream, StreamOptions};
 use super::trajectory::Trajectory;
@@ -25,7 +25,7 @@ const UNHEARD: u64 = 10;
 pub struct Group {
     pub(super) network: Network,
     pub(super) drives: Vec<Drive>,
-    pub(super) runner: Runner,
+    pub(super) runner: GroupRunner,
 }
 
 impl Group {

@@ -6,11 +6,11 @@ use canopen::Mux;
 use cia402::ModeOfOperation;
 use cia402::object::{CONTROLWORD, INTERPOLATION_TIME_INDEX, INTERPOLATION_TIME_PERIOD_VALUE};
 
-use super::axis::Axis;
+use super::axis::GroupAxis;
 use super::error::{GroupError, PERIODS};
 use super::handle::Group;
 use super::limits::AxisLimits;
-use super::runner::Runner;
+use super::runner::GroupRunner;
 use crate::cyclic::{CyclicDrive, CyclicOptions};
 use crate::drive::Drive;
 use crate::units::Rpm;
@@ -58,12 +58,12 @@ impl Group {
         let mut opened = Vec::new();
         for ((number, setup), claim) in (1..).zip(axes).zip(claims) {
             let drive = setup.open(number, period, options).await?;
-            opened.push(Axis::new(drive, claim));
+            opened.push(GroupAxis::new(drive, claim));
         }
         network.sync(Some(period));
         let limits = axes.iter().map(|axis| axis.limits.clone()).collect();
         let drives = axes.iter().map(|axis| axis.drive.clone()).collect();
-        Ok(Self { network, drives, runner: Runner::new(opened, limits, period.as_secs_f64()) })
+        Ok(Self { network, drives, runner: GroupRunner::new(opened, limits, period.as_secs_f64()) })
     }
 }
 

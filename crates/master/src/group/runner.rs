@@ -5,7 +5,7 @@ use core::time::Duration;
 use can::Instant;
 use cia402::{PowerState, Statusword};
 
-use super::axis::Axis;
+use super::axis::GroupAxis;
 use super::limits::{AxisLimits, PathPoint};
 use super::state::{GroupState, Phase, StopCause};
 use super::stream::{Due, Stream};
@@ -40,8 +40,8 @@ pub(super) enum Activity {
 
 /// The axes of a group and their path, stepped once in each cycle of SYNC.
 #[derive(Debug)]
-pub(super) struct Runner {
-    pub(super) axes: Vec<Axis>,
+pub(super) struct GroupRunner {
+    pub(super) axes: Vec<GroupAxis>,
     pub(super) limits: Vec<AxisLimits>,
     /// Where each axis is on its path.
     pub(super) points: Vec<PathPoint>,
@@ -68,8 +68,8 @@ const UNSEEN: CyclicState = CyclicState {
     refused: None,
 };
 
-impl Runner {
-    pub(super) fn new(axes: Vec<Axis>, limits: Vec<AxisLimits>, period_s: f64) -> Self {
+impl GroupRunner {
+    pub(super) fn new(axes: Vec<GroupAxis>, limits: Vec<AxisLimits>, period_s: f64) -> Self {
         let count = axes.len();
         Self {
             axes,
@@ -300,8 +300,8 @@ mod tests {
     use super::*;
 
     /// A group without axes, for which the planner finds no path.
-    fn runner(activity: Activity) -> Runner {
-        Runner { activity, ..Runner::new(Vec::new(), Vec::new(), 0.001) }
+    fn runner(activity: Activity) -> GroupRunner {
+        GroupRunner { activity, ..GroupRunner::new(Vec::new(), Vec::new(), 0.001) }
     }
 
     fn stream() -> Activity {

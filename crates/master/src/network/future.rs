@@ -7,7 +7,7 @@ use std::time::Duration;
 use can::Instant;
 use canopen::{Mux, NodeId};
 
-use super::handle::{Network, Shared, Slot, Watcher};
+use super::handle::{Network, NetworkState, Slot, Watcher};
 use crate::core::{Command, Core, NodeFacts, Outcome, Received, Request, Ticket};
 
 /// A request or timer that is started by the first poll. Dropping it cancels it: an SDO transfer that is on the
@@ -15,10 +15,10 @@ use crate::core::{Command, Core, NodeFacts, Outcome, Received, Request, Ticket};
 #[must_use = "futures do nothing unless awaited"]
 pub(super) struct Pending {
     network: Network,
-    state: State,
+    state: RequestState,
 }
 
-enum State {
+enum RequestState {
     Unstarted(Box<Start>),
     Started(Ticket),
     Finished,
@@ -31,11 +31,11 @@ enum Start {
 
 impl Pending {
     pub(super) fn request(network: Network, request: Request) -> Self {
-        Self { network, state: State::Unstarted(Box::new(Start::Request(request))) }
+        Self { network, state: RequestState::Unstarted(Box::new(Start::Request(request))) }
     }
 
     pub(super) fn timer(network: Network, duration: Duration) -> Self {
-        Self { network, state: State::Unstarted(Box::new(Start::Timer(duration))) }
+        Self { network, state: RequestState::Unstarted(Box::new(Start::Timer(duration))) }
     }
 }
 
@@ -43,38 +43,38 @@ impl Future for Pending {
     type Output = Outcome;
 
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Outcome> {
-        match core::mem::replace(&mut self.state, State::Finished) {
-            State::Unstarted(start) => {
+        match core::mem::replace(&mut self.state, RequestState::Finished) {
+            RequestState::Unstarted(start) => {
                 let ticket = self.network.lock().start(context);
-                self.state = State::Started(ticket);
+                self.state = RequestState::Started(ticket);
                 self.network.submit(match *start {
                     Start::Request(request) => Command::Request(ticket, request),
                     Start::Timer(duration) => Command::Timer(ticket, duration),
                 });
                 Poll::Pending
             }
-            State::Started(ticket) => {
+            RequestState::Started(ticket) => {
                 let outcome = self.network.lock().poll_slot(ticket, context);
                 if outcome.is_pending() {
-                    self.state = State::Started(ticket);
+                    self.state = RequestState::Started(ticket);
                 }
                 outcome
             }
             // Polled after it had finished: nothing more will come.
-            State::Finished => Poll::Pending,
+            RequestState::Finished => Poll::Pending,
         }
     }
 }
 
 impl Drop for Pending {
     fn drop(&mut self) {
-        if let State::Started(ticket) = self.state {
+        if let RequestState::Started(ticket) = self.state {
             self.network.withdraw(ticket);
         }
     }
 }
 
-impl Shared {
+impl NetworkState {
     fn start(&mut self, context: &mut Context<'_>) -> Ticket {
         let ticket = self.core.ticket();
         self.slots.insert(ticket, Slot::Waiting(context.waker().clone()));

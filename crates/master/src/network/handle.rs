@@ -18,11 +18,11 @@ use crate::models::Models;
 /// Futures that it hands out wait for facts in the core; dropping one cancels what it asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Network {
-    shared: Arc<Mutex<Shared>>,
+    shared: Arc<Mutex<NetworkState>>,
 }
 
 #[derive(Debug, Default)]
-pub(super) struct Shared {
+pub(super) struct NetworkState {
     pub(super) core: Core,
     /// Commands that wait for the runner's next time.
     inbox: VecDeque<Command>,
@@ -150,7 +150,7 @@ impl Network {
     }
 
     /// As [`with_core`](Self::with_core), with what else the handles share.
-    pub(super) fn with_shared<T>(&self, look: impl FnOnce(&mut Shared) -> T) -> T {
+    pub(super) fn with_shared<T>(&self, look: impl FnOnce(&mut NetworkState) -> T) -> T {
         let mut shared = self.lock();
         let result = look(&mut shared);
         let wakers = shared.activity_wakers();
@@ -266,13 +266,13 @@ impl Network {
         self.lock().woken = woken;
     }
 
-    pub(super) fn lock(&self) -> MutexGuard<'_, Shared> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, NetworkState> {
         // A panic elsewhere leaves the core whole: every call finishes its own step.
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Shared {
+impl NetworkState {
     /// Hands outcomes to their slots, and collects the wakers of those that waited.
     fn collect(&mut self) {
         while let Some(finished) = self.core.poll_finished() {

@@ -3,7 +3,7 @@
 use canopen::{AbortCode, Mux};
 
 use super::error::{ApplyError, PlanError, Why};
-use super::order::{Purpose, Step, pdo_of};
+use super::order::{ParameterStep, Purpose, pdo_of};
 use super::plan::Plan;
 use super::read::{Deviation, verify};
 use super::undone::{Undone, roll_back};
@@ -41,7 +41,7 @@ impl Drive {
     pub async fn apply_parameters(
         &self,
         plan: &Plan,
-        mut progress: impl FnMut(usize, &Step),
+        mut progress: impl FnMut(usize, &ParameterStep),
     ) -> Result<Result<Applied, ApplyError>, PlanError> {
         self.check_at_rest().await?;
         let mut rounded = Vec::new();
@@ -74,7 +74,7 @@ impl Drive {
         Ok(Ok(Applied { writes: plan.steps.len(), rounded, displaced }))
     }
 
-    async fn take(&self, step: &Step) -> Taken {
+    async fn take(&self, step: &ParameterStep) -> Taken {
         let node = self.node();
         match node.download(step.object, &step.value).await {
             Ok(()) => {}
@@ -100,13 +100,13 @@ impl Drive {
     }
 
     /// Puts back what `done` has written, in reverse, and reads it back.
-    async fn go_back(&self, plan: &Plan, done: &[Step]) -> Undone {
+    async fn go_back(&self, plan: &Plan, done: &[ParameterStep]) -> Undone {
         let undo: Vec<(Mux, Vec<u8>)> =
             done.iter().rev().filter_map(|step| Some((step.object, step.before.clone()?))).collect();
         roll_back(self.node(), &undo, |object| plan.current.get(&object).cloned()).await
     }
 
-    async fn limits_in_force(&self, step: &Step, why: &Why) -> Option<Limits> {
+    async fn limits_in_force(&self, step: &ParameterStep, why: &Why) -> Option<Limits> {
         let by_value = [AbortCode::INVALID_VALUE, AbortCode::VALUE_TOO_HIGH, AbortCode::VALUE_TOO_LOW];
         let Why::Failed(error) = why else { return None };
         if !error.abort().is_some_and(|code| by_value.contains(&code)) || pdo_of(step.object).is_some() {

@@ -19,7 +19,7 @@ mod values;
 
 pub use apply::{Applied, Rounded};
 pub use error::{ApplyError, PlanError, Unfit, Why};
-pub use order::{Purpose, Step, from_any_state, in_order};
+pub use order::{ParameterStep, Purpose, from_any_state, in_order};
 pub use plan::{Plan, PlanOptions};
 pub use read::{Backup, Deviation, verify};
 pub use undone::{NotPutBack, Undone, roll_back};

@@ -49,7 +49,7 @@ impl fmt::Display for Purpose {
 
 /// One write.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Step {
+pub struct ParameterStep {
     /// The object.
     pub object: Mux,
     /// What it gets, as an SDO carries it.
@@ -72,7 +72,7 @@ pub fn in_order(
     current: &BTreeMap<Mux, Vec<u8>>,
     wanted: &BTreeMap<Mux, Vec<u8>>,
     all: bool,
-) -> Vec<Step> {
+) -> Vec<ParameterStep> {
     let differs = |(object, value): &(&Mux, &Vec<u8>)| {
         all || current.get(object).is_none_or(|current| !same(**object, value, current))
     };
@@ -133,14 +133,14 @@ pub(super) fn pdo_of(object: Mux) -> Option<PdoId> {
 /// Steps, and the values that the device has after them.
 struct Writer {
     now: BTreeMap<Mux, Vec<u8>>,
-    steps: Vec<Step>,
+    steps: Vec<ParameterStep>,
     all: bool,
 }
 
 impl Writer {
     fn write(&mut self, object: Mux, value: &[u8], purpose: Purpose) {
         let before = self.now.insert(object, value.to_vec());
-        self.steps.push(Step { object, value: value.to_vec(), before, purpose });
+        self.steps.push(ParameterStep { object, value: value.to_vec(), before, purpose });
     }
 
     fn cob_id(&self, object: Mux) -> Option<CobId> {
@@ -209,7 +209,7 @@ mod tests {
         rows.iter().map(|(index, sub_index, value)| (Mux::new(*index, *sub_index), value.to_vec())).collect()
     }
 
-    fn shown(steps: &[Step]) -> Vec<String> {
+    fn shown(steps: &[ParameterStep]) -> Vec<String> {
         let hex = |value: &[u8]| value.iter().rev().map(|byte| format!("{byte:02X}")).collect::<String>();
         steps.iter().map(|step| format!("{} {}", step.object, hex(&step.value))).collect()
     }

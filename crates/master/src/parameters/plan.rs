@@ -9,7 +9,7 @@ use cia402::PowerState;
 use devices::{AxisId, Description};
 
 use super::error::{PlanError, Unfit};
-use super::order::{Step, in_order, number, pdo_of};
+use super::order::{ParameterStep, in_order, number, pdo_of};
 use super::values::{Left, Parameters, is_command, same};
 use crate::drive::Drive;
 use crate::error::Error;
@@ -30,7 +30,7 @@ pub struct Plan {
     /// What the node says that it is.
     pub identity: Identity,
     /// The writes in order.
-    pub steps: Vec<Step>,
+    pub steps: Vec<ParameterStep>,
     /// The values that it shall have in the end.
     pub wanted: BTreeMap<Mux, Vec<u8>>,
     /// The values that the objects of [`steps`](Self::steps) have now.

@@ -17,7 +17,7 @@ const MAX_OBJECTS: usize = 64;
 
 /// One write with its name for people.
 #[derive(Clone, Copy, Debug)]
-struct Write {
+struct NamedWrite {
     step: &'static str,
     mux: Mux,
     raw: u32,
@@ -27,12 +27,12 @@ struct Write {
 /// What a PDO was before, to go back to.
 struct Before {
     cob_id: CobId,
-    writes: Vec<Write>,
+    writes: Vec<NamedWrite>,
 }
 
 enum Trouble {
     Failed(&'static str, Error),
-    Differs(Write, u32),
+    Differs(NamedWrite, u32),
 }
 
 /// Sets the PDO up and gives its COB-ID.
@@ -48,7 +48,7 @@ pub(super) async fn apply(node: &Node, config: &PdoConfig, units: TimerUnits) ->
             let restored = restore(node, config, &before).await.is_ok();
             Err(match trouble {
                 Trouble::Failed(step, cause) => PdoError::Step { node: node.id(), pdo, step, cause, restored },
-                Trouble::Differs(Write { step, mux, raw, .. }, found) => {
+                Trouble::Differs(NamedWrite { step, mux, raw, .. }, found) => {
                     PdoError::ReadBack { node: node.id(), pdo, mux, step, asked: raw, found, restored }
                 }
             })
@@ -73,20 +73,30 @@ pub(super) async fn read(node: &Node, pdo: PdoId, units: TimerUnits) -> Result<(
 }
 
 /// Everything between invalidation and validation, in the standard's order.
-fn plan(node: &Node, config: &PdoConfig, units: TimerUnits) -> Result<Vec<Write>, PdoError> {
+fn plan(node: &Node, config: &PdoConfig, units: TimerUnits) -> Result<Vec<NamedWrite>, PdoError> {
     let pdo = config.pdo;
     let (bits, objects) = (config.map.bits(), config.map.0.len());
     if bits > u64::BITS || objects > MAX_OBJECTS {
         return Err(PdoError::TooLong { node: node.id(), pdo, bits, objects });
     }
-    let mut writes = vec![Write { step: "clear the mapping", mux: config.mapping(0), raw: 0, bytes: 1 }];
+    let mut writes = vec![NamedWrite { step: "clear the mapping", mux: config.mapping(0), raw: 0, bytes: 1 }];
     for (sub_index, object) in (1..).zip(&config.map.0) {
         let mux = config.mapping(sub_index);
-        writes.push(Write { step: "map an object", mux, raw: object.raw(), bytes: 4 });
+        writes.push(NamedWrite { step: "map an object", mux, raw: object.raw(), bytes: 4 });
     }
-    writes.push(Write { step: "set the number of objects", mux: config.mapping(0), raw: objects as u32, bytes: 1 });
+    writes.push(NamedWrite {
+        step: "set the number of objects",
+        mux: config.mapping(0),
+        raw: objects as u32,
+        bytes: 1,
+    });
     let transmission = u32::from(config.transmission.0);
-    writes.push(Write { step: "set the transmission type", mux: config.parameter(2), raw: transmission, bytes: 1 });
+    writes.push(NamedWrite {
+        step: "set the transmission type",
+        mux: config.parameter(2),
+        raw: transmission,
+        bytes: 1,
+    });
     let timers = [
         ("set the inhibit time", 3, config.inhibit_time, units.inhibit),
         ("set the event timer", 5, config.event_time, units.event),
@@ -94,7 +104,7 @@ fn plan(node: &Node, config: &PdoConfig, units: TimerUnits) -> Result<Vec<Write>
     for (step, sub_index, time, unit) in timers {
         let Some(asked) = time else { continue };
         let raw = counts(asked, unit).ok_or(PdoError::Time { node: node.id(), pdo, asked, unit })?;
-        writes.push(Write { step, mux: config.parameter(sub_index), raw: raw.into(), bytes: 2 });
+        writes.push(NamedWrite { step, mux: config.parameter(sub_index), raw: raw.into(), bytes: 2 });
     }
     Ok(writes)
 }
@@ -107,22 +117,28 @@ pub(super) fn counts(time: Duration, unit: Duration) -> Option<u16> {
 }
 
 /// Reads what the writes are going to change.
-async fn snapshot(node: &Node, config: &PdoConfig, writes: &[Write]) -> Result<Before, Error> {
+async fn snapshot(node: &Node, config: &PdoConfig, writes: &[NamedWrite]) -> Result<Before, Error> {
     let cob_id = CobId(cell(node, config.parameter(1)).await?);
     let count = cell(node, config.mapping(0)).await?;
-    let mut old = vec![Write { step: "clear the mapping", mux: config.mapping(0), raw: 0, bytes: 1 }];
+    let mut old = vec![NamedWrite { step: "clear the mapping", mux: config.mapping(0), raw: 0, bytes: 1 }];
     for sub_index in 1..=count.min(MAX_OBJECTS as u32) as u8 {
         let mux = config.mapping(sub_index);
-        old.push(Write { step: "map an object", mux, raw: cell(node, mux).await?, bytes: 4 });
+        old.push(NamedWrite { step: "map an object", mux, raw: cell(node, mux).await?, bytes: 4 });
     }
-    old.push(Write { step: "set the number of objects", mux: config.mapping(0), raw: count, bytes: 1 });
+    old.push(NamedWrite { step: "set the number of objects", mux: config.mapping(0), raw: count, bytes: 1 });
     for write in writes.iter().filter(|write| write.mux.index == config.parameter(0).index) {
-        old.push(Write { raw: cell(node, write.mux).await?, ..*write });
+        old.push(NamedWrite { raw: cell(node, write.mux).await?, ..*write });
     }
     Ok(Before { cob_id, writes: old })
 }
 
-async fn run(node: &Node, config: &PdoConfig, cob_id: CobId, before: CobId, writes: &[Write]) -> Result<(), Trouble> {
+async fn run(
+    node: &Node,
+    config: &PdoConfig,
+    cob_id: CobId,
+    before: CobId,
+    writes: &[NamedWrite],
+) -> Result<(), Trouble> {
     invalidate(node, config, before).await?;
     for write in writes {
         put(node, *write).await?;
@@ -137,7 +153,7 @@ async fn run(node: &Node, config: &PdoConfig, cob_id: CobId, before: CobId, writ
 /// Sets bit 31. A device that does not let its COB-ID be written is left valid: some remap regardless.
 async fn invalidate(node: &Node, config: &PdoConfig, cob_id: CobId) -> Result<(), Trouble> {
     let (step, mux) = ("invalidate it (bit 31 of its COB-ID)", config.parameter(1));
-    match put(node, Write { step, mux, raw: cob_id.0 | CobId::INVALID, bytes: 4 }).await {
+    match put(node, NamedWrite { step, mux, raw: cob_id.0 | CobId::INVALID, bytes: 4 }).await {
         Err(Trouble::Failed(_, Error::Aborted { code: AbortCode::READ_ONLY, .. })) => Ok(()),
         other => other,
     }
@@ -145,7 +161,7 @@ async fn invalidate(node: &Node, config: &PdoConfig, cob_id: CobId) -> Result<()
 
 async fn validate(node: &Node, config: &PdoConfig, cob_id: CobId) -> Result<(), Trouble> {
     let (step, mux) = ("validate it (its COB-ID without bit 31)", config.parameter(1));
-    let write = Write { step, mux, raw: cob_id.0, bytes: 4 };
+    let write = NamedWrite { step, mux, raw: cob_id.0, bytes: 4 };
     match put(node, write).await {
         // It may already be what it has to be.
         Err(Trouble::Failed(_, Error::Aborted { code: AbortCode::READ_ONLY, .. })) => {}
@@ -162,12 +178,12 @@ async fn restore(node: &Node, config: &PdoConfig, before: &Before) -> Result<(),
     validate(node, config, before.cob_id).await
 }
 
-async fn put(node: &Node, write: Write) -> Result<(), Trouble> {
+async fn put(node: &Node, write: NamedWrite) -> Result<(), Trouble> {
     let bytes = write.raw.to_le_bytes();
     node.download(write.mux, &bytes[..write.bytes]).await.map_err(|cause| Trouble::Failed(write.step, cause))
 }
 
-async fn check(node: &Node, write: Write) -> Result<(), Trouble> {
+async fn check(node: &Node, write: NamedWrite) -> Result<(), Trouble> {
     let found = cell(node, write.mux).await.map_err(|cause| Trouble::Failed(write.step, cause))?;
     // Bit 30 (no RTR) is the device's own: some keep it set whatever is written.
     let ignored = if write.mux.sub_index == 1 && write.mux.index & 0x200 == 0 { CobId::NO_RTR } else { 0 };

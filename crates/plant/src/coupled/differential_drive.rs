@@ -80,7 +80,7 @@ impl DifferentialDriveModel {
     }
 
     pub(super) fn step(&self, data: &mut DifferentialDriveData, dt_s: f64, pushes: [Push; 2]) -> [Motion; 2] {
-        let step = Step::new(self, data, dt_s, pushes);
+        let step = StepInput::new(self, data, dt_s, pushes);
         let limit_n = self.grip.map_or(f64::INFINITY, |grip| grip * self.wheel_n());
         let mut slip_n = [None; 2];
         let mut tried = step.attempt(slip_n);
@@ -101,7 +101,14 @@ impl DifferentialDriveModel {
         tried.motions
     }
 
-    fn finish(&self, data: &mut DifferentialDriveData, dt_s: f64, step: &Step<'_>, tried: &Tried, slips: [bool; 2]) {
+    fn finish(
+        &self,
+        data: &mut DifferentialDriveData,
+        dt_s: f64,
+        step: &StepInput<'_>,
+        tried: &Tried,
+        slips: [bool; 2],
+    ) {
         let mean = [0, 1].map(|i| 0.5 * (step.before_m_s[i] + tried.ground_m_s[i]));
         let (speed, yaw_rate) = (0.5 * (mean[0] + mean[1]), (mean[1] - mean[0]) / self.wheel_base_m);
         // A step is an arc; its chord points along the heading in its middle.
@@ -121,7 +128,7 @@ impl DifferentialDriveModel {
 }
 
 /// What is the same in all attempts at one step.
-struct Step<'a> {
+struct StepInput<'a> {
     model: &'a DifferentialDriveModel,
     pushes: [Push; 2],
     before_m_s: [f64; 2],
@@ -146,7 +153,7 @@ struct Tried {
     motions: [Motion; 2],
 }
 
-impl<'a> Step<'a> {
+impl<'a> StepInput<'a> {
     fn new(model: &'a DifferentialDriveModel, data: &DifferentialDriveData, dt_s: f64, pushes: [Push; 2]) -> Self {
         let (half, spin) = (0.25 * model.mass_kg, model.yaw_inertia_kg_m2 / model.wheel_base_m / model.wheel_base_m);
         let downhill_n = if model.slope_rad == 0.0 {

@@ -87,12 +87,12 @@ fn how_to_name(error: &Error) -> Option<String> {
 
 #[derive(Default)]
 struct Outcome {
-    state: Mutex<State>,
+    state: Mutex<JobState>,
     ended: Condvar,
 }
 
 #[derive(Default)]
-struct State {
+struct JobState {
     result: Option<Result<Value, Trouble>>,
     /// There is a result, or there was one until it was taken.
     reported: bool,
@@ -102,14 +102,14 @@ struct State {
     callback: Option<Py<PyAny>>,
 }
 
-impl State {
+impl JobState {
     const fn has_ended(&self) -> bool {
         self.reported || self.given_up
     }
 }
 
 impl Outcome {
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, JobState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

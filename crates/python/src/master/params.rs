@@ -12,11 +12,11 @@ use pyo3::prelude::*;
 use words::failure::Failure;
 
 use super::value::Value;
-use super::whole::Asked;
+use super::whole::AskedDrive;
 use super::{Job, Network, duration};
 use crate::failure::bad_value;
 
-impl Asked {
+impl AskedDrive {
     /// What the node is to have: as this file has it, or the machine file.
     fn wanted(
         &self,
@@ -42,7 +42,7 @@ pub(crate) fn params_backup(
     model: Option<&str>,
     file: Option<PathBuf>,
 ) -> PyResult<Job> {
-    let asked = Asked::of(network.get(), node, model)?;
+    let asked = AskedDrive::of(network.get(), node, model)?;
     // Before any request: no upload for a file that cannot be written.
     let form = file.as_deref().map(Form::of).transpose().map_err(bad_value)?;
     network.get().begin_said(py, async move {
@@ -90,7 +90,7 @@ pub(crate) fn params_compare(
         "verify" => Question::Verify,
         other => return Err(bad_value(format!("{other:?} is not asked of parameters"))),
     };
-    let asked = Asked::of(network.get(), node, model)?;
+    let asked = AskedDrive::of(network.get(), node, model)?;
     network.get().begin_said(py, async move {
         let drive = asked.drive().await?;
         let (wanted, name) = asked.wanted(file.as_ref(), drive.description())?;
@@ -118,7 +118,7 @@ pub(crate) struct TransactionOrder {
 }
 
 impl TransactionOrder {
-    fn transaction(self, asked: &Asked) -> PyResult<Transaction> {
+    fn transaction(self, asked: &AskedDrive) -> PyResult<Transaction> {
         let prove = match self.prove.as_deref() {
             None => None,
             Some(_) if !self.save => {
@@ -153,7 +153,7 @@ pub(crate) fn params_apply(
     file: Option<PathBuf>,
     order: TransactionOrder,
 ) -> PyResult<Job> {
-    let asked = Asked::of(network.get(), node, model)?;
+    let asked = AskedDrive::of(network.get(), node, model)?;
     let transaction = order.transaction(&asked)?;
     network.get().begin_said(py, async move {
         let drive = asked.drive().await?;
@@ -175,7 +175,7 @@ pub(crate) fn params_rollback(
     model: Option<&str>,
     journal: Option<PathBuf>,
 ) -> PyResult<Job> {
-    let asked = Asked::of(network.get(), node, model)?;
+    let asked = AskedDrive::of(network.get(), node, model)?;
     network.get().begin_said(py, async move {
         let path = journal.unwrap_or_else(|| default_path(asked.node));
         let drive = asked.drive().await?;

@@ -34,17 +34,17 @@ const MOST_WAITING: usize = 10_000;
 pub(crate) struct Supervisor {
     network: Py<Network>,
     core: Core,
-    watch: Arc<Watch>,
+    watch: Arc<SupervisionWatch>,
 }
 
 #[derive(Default)]
-struct Watch {
-    state: Mutex<State>,
+struct SupervisionWatch {
+    state: Mutex<SupervisionState>,
     closed: AtomicBool,
 }
 
 #[derive(Default)]
-struct State {
+struct SupervisionState {
     /// Between its boot-up and its keeping.
     opened: Option<(MasterSupervisor, Listener)>,
     events: VecDeque<WatchedEvent>,
@@ -55,8 +55,8 @@ struct State {
     released: Option<Result<(), master::Error>>,
 }
 
-impl Watch {
-    fn lock(&self) -> MutexGuard<'_, State> {
+impl SupervisionWatch {
+    fn lock(&self) -> MutexGuard<'_, SupervisionState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -11,10 +11,10 @@ const KEPT: usize = 1 << 16;
 
 /// What passes a master.
 #[derive(Clone, Default)]
-pub(crate) struct Traffic(Arc<Shared>);
+pub(crate) struct Traffic(Arc<TapState>);
 
 #[derive(Default)]
-struct Shared {
+struct TapState {
     listening: AtomicUsize,
     ears: Mutex<Vec<Arc<Ear>>>,
 }

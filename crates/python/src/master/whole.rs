@@ -298,7 +298,7 @@ pub(crate) fn explain(
 }
 
 /// What a job needs of a network to ask one of its drives.
-pub(super) struct Asked {
+pub(super) struct AskedDrive {
     pub(super) core: Core,
     pub(super) machine: Option<Arc<Machine>>,
     pub(super) node: NodeId,
@@ -307,7 +307,7 @@ pub(super) struct Asked {
     pub(super) is_virtual: bool,
 }
 
-impl Asked {
+impl AskedDrive {
     pub(super) fn of(network: &Network, node: u8, model: Option<&str>) -> PyResult<Self> {
         Ok(Self {
             core: network.core.clone(),

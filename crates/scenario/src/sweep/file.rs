@@ -6,7 +6,7 @@ use words::suggest::{did_you_mean, near};
 
 /// A parameter and the values that it goes through, in the words that they are put into texts with.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Axis {
+pub struct SweepAxis {
     /// The parameter.
     pub name: String,
     /// Its values.
@@ -19,7 +19,7 @@ const MOST_VALUES: usize = 100_000;
 const EXPECTED: &str = "a list of values, or { from = 0, to = 2, step = 0.5 }";
 
 /// The sweep of a scenario with these parameters.
-pub(crate) fn axes(file: &Table<'_>, parameters: &Parameters) -> Result<Vec<Axis>, Vec<Problem>> {
+pub(crate) fn axes(file: &Table<'_>, parameters: &Parameters) -> Result<Vec<SweepAxis>, Vec<Problem>> {
     let single = |problem| vec![problem];
     let Some(field) = file.get("sweep") else { return Ok(Vec::new()) };
     let table = field.table("the sweep", "a table of parameters and their values").map_err(single)?;
@@ -35,14 +35,14 @@ pub(crate) fn axes(file: &Table<'_>, parameters: &Parameters) -> Result<Vec<Axis
     table.fields().map(|field| axis(&field).map_err(single)).collect()
 }
 
-fn axis(field: &Field<'_>) -> Result<Axis, Problem> {
+fn axis(field: &Field<'_>) -> Result<SweepAxis, Problem> {
     let name = field.name().to_owned();
     if field.is_list() {
         let values = field.list(EXPECTED)?.iter().map(value).collect::<Result<Vec<_>, _>>()?;
         return match values.len() {
             0 => Err(field.wrong(EXPECTED)),
             count if count > MOST_VALUES => Err(field.problem(format!("more than {MOST_VALUES} values"))),
-            _ => Ok(Axis { name, values }),
+            _ => Ok(SweepAxis { name, values }),
         };
     }
     let range = field.table("a range", EXPECTED)?;
@@ -56,7 +56,7 @@ fn axis(field: &Field<'_>) -> Result<Axis, Problem> {
         return Err(field.problem(what));
     }
     let values = (0..=steps as usize).map(|n| shown(from + n as f64 * step)).collect();
-    Ok(Axis { name, values })
+    Ok(SweepAxis { name, values })
 }
 
 /// A number without the last digits, in which a sum of steps is off.

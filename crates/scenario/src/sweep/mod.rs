@@ -14,7 +14,7 @@ use serde::Serialize;
 use sim::machine::{Realism, TimingMode};
 
 use crate::{Outcome, Runner, Scenario};
-use file::Axis;
+use file::SweepAxis;
 use machine::file::Machine;
 use words::document::BadFile;
 use words::document::reader::Parameters;
@@ -30,7 +30,7 @@ pub const MOST_RUNS: u64 = 1_000_000_000;
 #[derive(Clone, Debug)]
 pub struct Sweep {
     scenario: Scenario,
-    axes: Vec<Axis>,
+    axes: Vec<SweepAxis>,
     seeds: RangeInclusive<u64>,
     runs: u64,
 }
@@ -107,7 +107,7 @@ impl Sweep {
     }
 
     /// Each parameter that is swept, and which of its values the run of this number has.
-    fn places(&self, number: u64) -> impl Iterator<Item = (&Axis, usize)> {
+    fn places(&self, number: u64) -> impl Iterator<Item = (&SweepAxis, usize)> {
         let mut rest = self.setting(number);
         self.axes.iter().map(move |axis| {
             let count = axis.values.len() as u64;

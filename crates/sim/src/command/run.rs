@@ -49,12 +49,12 @@ impl Run {
 #[derive(Clone, Debug)]
 pub struct Before {
     frames: u64,
-    nodes: Vec<Node>,
+    nodes: Vec<NodeState>,
 }
 
 /// What may change about a drive that is reported to a person.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-struct Node {
+struct NodeState {
     node: u8,
     power: &'static str,
     statusword: Option<u16>,
@@ -66,7 +66,7 @@ struct RunReport {
     ok: bool,
     t: f64,
     frames: u64,
-    changes: Vec<Node>,
+    changes: Vec<NodeState>,
 }
 
 impl Before {
@@ -85,10 +85,10 @@ impl Before {
     }
 }
 
-fn nodes(world: &mut World) -> Vec<Node> {
+fn nodes(world: &mut World) -> Vec<NodeState> {
     let numbers: Vec<u8> = world.drive_numbers().collect();
     let reports = numbers.into_iter().filter_map(|node| Some((node, world.report(node).ok()?)));
-    let seen = reports.map(|(node, report)| Node {
+    let seen = reports.map(|(node, report)| NodeState {
         node,
         power: report.power.word(),
         statusword: report.statusword,

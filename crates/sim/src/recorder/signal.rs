@@ -84,7 +84,7 @@ pub enum Signal {
 }
 
 /// A row of the table.
-struct Row {
+struct SignalRow {
     signal: Signal,
     /// With the unit at its end, as in CSV headers.
     name: &'static str,
@@ -94,13 +94,13 @@ struct Row {
     of: fn(&Report) -> Option<f64>,
 }
 
-const fn row(signal: Signal, name: &'static str, unit: &'static str, of: fn(&Report) -> Option<f64>) -> Row {
-    Row { signal, name, unit, of }
+const fn row(signal: Signal, name: &'static str, unit: &'static str, of: fn(&Report) -> Option<f64>) -> SignalRow {
+    SignalRow { signal, name, unit, of }
 }
 
 /// In the order of the enum and of a record's columns.
 #[rustfmt::skip]
-const ROWS: [Row; 38] = [
+const ROWS: [SignalRow; 38] = [
     row(Signal::Position, "position_counts", "counts", |report| Some(report.position as f64)),
     row(Signal::PositionDemand, "position_demand_counts", "counts", |report| report.position_demand.map(|demand| demand as f64)),
     row(Signal::Velocity, "velocity_rpm", "r/min", |report| Some(report.velocity_rpm)),
@@ -157,7 +157,7 @@ impl Signal {
         all
     };
 
-    const fn row(self) -> &'static Row {
+    const fn row(self) -> &'static SignalRow {
         &ROWS[self as usize]
     }
 

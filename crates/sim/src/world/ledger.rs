@@ -16,12 +16,12 @@ const MAX_HELD: usize = 8;
 pub(super) struct Ledger {
     pub(super) handed_out: u64,
     pub(super) confirmed: u64,
-    pub(super) held: VecDeque<Held>,
+    pub(super) held: VecDeque<HeldAnswer>,
 }
 
 /// An answer that waits for a store.
 #[derive(Clone, Debug)]
-pub(super) struct Held {
+pub(super) struct HeldAnswer {
     pub(super) frame: Frame,
     pub(super) needs: u64,
 }
@@ -45,7 +45,7 @@ impl Ledger {
             if !is_sdo_answer(&frame) || needs <= self.confirmed {
                 return Some(frame);
             }
-            self.held.push_back(Held { frame, needs });
+            self.held.push_back(HeldAnswer { frame, needs });
         }
         None
     }

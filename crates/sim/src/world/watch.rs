@@ -23,9 +23,9 @@ use crate::{Report, VirtualDrive};
 
 /// What a watched world remembers.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Watch {
+pub(super) struct WorldWatch {
     /// By station: its axes as they were when last looked at; none for a station that is not a drive.
-    seen: Vec<Vec<Condition>>,
+    seen: Vec<Vec<AxisCondition>>,
     /// By station: its controller as the wire last reported.
     controllers: Vec<Controller>,
     waiting: VecDeque<Event>,
@@ -35,7 +35,7 @@ pub(super) struct Watch {
 
 /// What events report of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Condition {
+struct AxisCondition {
     power: PowerPhase,
     nmt: Option<NmtState>,
     state: Option<PowerState>,
@@ -66,7 +66,7 @@ struct Subject<'a> {
     drive: &'a dyn VirtualDrive,
 }
 
-impl Watch {
+impl WorldWatch {
     pub(super) fn push(&mut self, event: Event) {
         if self.waiting.len() >= MAX_WAITING {
             self.waiting.pop_front();
@@ -176,10 +176,10 @@ impl Subject<'_> {
         self.drive.description()
     }
 
-    fn condition(self, axis: AxisId) -> Condition {
+    fn condition(self, axis: AxisId) -> AxisCondition {
         let Report { powered, power, nmt, state, mode, error_code, statusword, damage, .. } =
             self.drive.report_of(axis);
-        Condition {
+        AxisCondition {
             power,
             nmt,
             state,
@@ -195,7 +195,7 @@ impl Subject<'_> {
     }
 
     /// Reports to `note` how the one differs from the other. What is the whole drive's is reported at its first axis.
-    fn compare(self, place: Place, before: &Condition, after: &Condition, mut note: impl FnMut(EventKind)) {
+    fn compare(self, place: Place, before: &AxisCondition, after: &AxisCondition, mut note: impl FnMut(EventKind)) {
         let first = place.axis == AxisId::FIRST;
         if first && before.power != after.power {
             note(EventKind::Power(after.power));
@@ -243,7 +243,13 @@ impl Subject<'_> {
     }
 
     /// A drive that echoes its controlword has bit 10 like others, and bit 11 for something of its own.
-    fn compare_bits(self, axis: AxisId, before: &Condition, after: &Condition, note: &mut impl FnMut(EventKind)) {
+    fn compare_bits(
+        self,
+        axis: AxisId,
+        before: &AxisCondition,
+        after: &AxisCondition,
+        note: &mut impl FnMut(EventKind),
+    ) {
         let changed = before.statusword ^ after.statusword;
         let is_set = |bit| after.statusword & bit != 0;
         if changed & Statusword::TARGET_REACHED != 0

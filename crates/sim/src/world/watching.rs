@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::World;
-use super::watch::Watch;
+use super::watch::WorldWatch;
 use crate::events::{Event, EventKind};
 use crate::stimulus::{Place, Stimulus};
 use crate::wire::WireEvent;
@@ -15,7 +15,7 @@ impl World {
         if !on {
             self.watch = None;
         } else if self.watch.is_none() {
-            let mut watch = Watch::default();
+            let mut watch = WorldWatch::default();
             (0..self.members.len()).for_each(|i| watch.get_to_know(i, &self.members[i]));
             self.watch = Some(Box::new(watch));
         }

@@ -123,7 +123,7 @@ async fn guard(State(web): State<Web>, request: Request, next: Next) -> Response
 }
 
 #[derive(Deserialize)]
-struct Asked {
+struct TokenQuery {
     token: Option<String>,
 }
 
@@ -188,7 +188,7 @@ fn refuse(access: &Access, request: &Request) -> Option<Refusal> {
         let text = "foreign origin: expected an Origin of http:// followed by the Host";
         return Some(Refusal::Trouble(StatusCode::FORBIDDEN, "foreign_origin", text));
     }
-    let token = Query::<Asked>::try_from_uri(request.uri()).ok().and_then(|Query(asked)| asked.token);
+    let token = Query::<TokenQuery>::try_from_uri(request.uri()).ok().and_then(|Query(asked)| asked.token);
     if path == "/" && token.is_some_and(|token| access.is_token(&token)) {
         // Keeps the token out of the address bar and the history.
         Visitor::of(request).into_iter().for_each(Visitor::admit);

@@ -20,12 +20,16 @@ pub(super) const LARGEST: usize = 1 << 20;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Asked {
+pub(super) struct NodeQuery {
     node: Option<u8>,
 }
 
 /// The TOML of a DCF, read in another thread than the task that moves drives.
-pub(super) async fn toml(files: Arc<Semaphore>, asked: Result<Query<Asked>, QueryRejection>, dcf: Bytes) -> Response {
+pub(super) async fn toml(
+    files: Arc<Semaphore>,
+    asked: Result<Query<NodeQuery>, QueryRejection>,
+    dcf: Bytes,
+) -> Response {
     let malformed = |why: &str| trouble(StatusCode::BAD_REQUEST, "malformed", why);
     let node = match asked {
         Ok(Query(asked)) => NodeId::new(asked.node.unwrap_or(1)),

@@ -14,7 +14,7 @@ use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{mpsc, oneshot};
 
 use crate::access::{is_same, secret};
-use crate::message::{Malformed, Message};
+use crate::message::{MalformedMessage, PageMessage};
 use host::session::{HostHandle, Session};
 use host::{Answer, Command};
 use host::{JOG_SPAN, PRESENCE_SPAN};
@@ -82,8 +82,8 @@ async fn read(mut stream: SplitStream<WebSocket>, session: &Session, word: &str,
 }
 
 fn take(text: &str, session: &Session, word: &str, is_full: bool) -> Result<oneshot::Receiver<Answer>, Answer> {
-    let Message { seq, word: shown, command } =
-        Message::parse(text).map_err(|Malformed { seq, why }| Answer::failed(seq, "malformed", why))?;
+    let PageMessage { seq, word: shown, command } =
+        PageMessage::parse(text).map_err(|MalformedMessage { seq, why }| Answer::failed(seq, "malformed", why))?;
     if !is_same(&shown, word) {
         let text = "wrong session word: the message was meant for another session";
         return Err(Answer::failed(Some(seq), "foreign_session", text));

@@ -32,7 +32,7 @@ const PATIENCE: Duration = Duration::from_secs(600);
 
 const ADDRESS: &str = "127.0.0.1:8402";
 
-type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
+type PageSocket = WebSocketStream<MaybeTlsStream<TcpStream>>;
 
 fn server(password: Option<&str>) -> (Router, Arc<Access>, Inbox) {
     let password = password.map(|text| Password::new(text).expect("long enough"));
@@ -352,7 +352,7 @@ fn host_of(access: &Access) -> String {
     access.url().trim_start_matches("http://").split('/').next().expect("a host").to_owned()
 }
 
-async fn open(access: &Access, origin: &str) -> Result<Socket, SocketError> {
+async fn open(access: &Access, origin: &str) -> Result<PageSocket, SocketError> {
     let mut request = format!("ws://{}/ws", host_of(access)).into_client_request().expect("an address");
     let bearer = format!("Bearer {}", token(access));
     request.headers_mut().insert("authorization", bearer.parse().expect("text"));
@@ -361,7 +361,7 @@ async fn open(access: &Access, origin: &str) -> Result<Socket, SocketError> {
     opened.expect("it answers").map(|(socket, _)| socket)
 }
 
-async fn page(access: &Access) -> (Socket, Value) {
+async fn page(access: &Access) -> (PageSocket, Value) {
     let mut socket = open(access, &format!("http://{}", host_of(access))).await.expect("it is admitted");
     let welcome = next(&mut socket).await.expect("a welcome");
     assert_eq!(welcome["type"], "welcome");
@@ -369,7 +369,7 @@ async fn page(access: &Access) -> (Socket, Value) {
 }
 
 /// The next message; `None` at the end of the connection.
-async fn next(socket: &mut Socket) -> Option<Value> {
+async fn next(socket: &mut PageSocket) -> Option<Value> {
     loop {
         match tokio::time::timeout(PATIENCE, socket.next()).await.expect("something comes")? {
             Ok(Message::Text(text)) => return Some(serde_json::from_str(&text).expect("JSON")),
@@ -379,7 +379,7 @@ async fn next(socket: &mut Socket) -> Option<Value> {
     }
 }
 
-async fn send(socket: &mut Socket, text: String) -> Option<Value> {
+async fn send(socket: &mut PageSocket, text: String) -> Option<Value> {
     socket.send(Message::Text(text.into())).await.ok()?;
     next(socket).await
 }

@@ -88,7 +88,7 @@ pub(super) fn log(handle: HostHandle, doors: &Doors, asked: InQuery) -> Response
     };
     handle.trace().note_saved();
     let held = Arc::new(handle.trace().held());
-    let place = Arc::new(Place { kept: Mutex::new(Some((held, door))), asked: AtomicU64::new(0) });
+    let place = Arc::new(DownloadPlace { kept: Mutex::new(Some((held, door))), asked: AtomicU64::new(0) });
     tokio::spawn(give_up_idle(Arc::downgrade(&place)));
     let saving = Saving { handle, place, query: Arc::new(query), next: 0 };
     let parts = stream::unfold(saving, async |saving| {
@@ -106,19 +106,19 @@ pub(super) fn log(handle: HostHandle, doors: &Doors, asked: InQuery) -> Response
 /// A log being downloaded.
 struct Saving {
     handle: HostHandle,
-    place: Arc<Place>,
+    place: Arc<DownloadPlace>,
     query: Arc<Query>,
     next: u64,
 }
 
 /// One of the places for downloads, with the frames that it holds as long as its client keeps reading.
-struct Place {
+struct DownloadPlace {
     kept: Mutex<Option<(Arc<Held>, OwnedSemaphorePermit)>>,
     /// Counts the reads.
     asked: AtomicU64,
 }
 
-impl Place {
+impl DownloadPlace {
     /// The frames; `None` once they were released, which ends the log.
     fn held(&self) -> Option<Arc<Held>> {
         self.asked.fetch_add(1, Ordering::Relaxed);
@@ -128,7 +128,7 @@ impl Place {
 }
 
 /// Releases a place when its client reads nothing.
-async fn give_up_idle(place: Weak<Place>) {
+async fn give_up_idle(place: Weak<DownloadPlace>) {
     let mut before = None;
     loop {
         tokio::time::sleep(SAVING_PATIENCE).await;

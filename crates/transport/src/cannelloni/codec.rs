@@ -51,7 +51,7 @@ pub enum Item {
 
 /// Why bytes are not a cannelloni datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Malformed {
+pub enum MalformedDatagram {
     /// Less than a head.
     #[error("{0} bytes, expected a head of {HEAD_LENGTH}")]
     NoHead(usize),
@@ -87,13 +87,13 @@ pub fn emit(sequence: u8, frame: &Frame, out: &mut Vec<u8>) {
 
 impl<'a> Datagram<'a> {
     /// Reads the head.
-    pub fn parse(bytes: &'a [u8]) -> Result<Self, Malformed> {
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, MalformedDatagram> {
         let ([version, operation, sequence, high, low], rest) =
-            bytes.split_first_chunk::<HEAD_LENGTH>().ok_or(Malformed::NoHead(bytes.len()))?;
+            bytes.split_first_chunk::<HEAD_LENGTH>().ok_or(MalformedDatagram::NoHead(bytes.len()))?;
         match (*version, *operation) {
             (VERSION, DATA) => Ok(Self { sequence: *sequence, frames_left: u16::from_be_bytes([*high, *low]), rest }),
-            (VERSION, other) => Err(Malformed::Operation(other)),
-            (other, _) => Err(Malformed::Version(other)),
+            (VERSION, other) => Err(MalformedDatagram::Operation(other)),
+            (other, _) => Err(MalformedDatagram::Version(other)),
         }
     }
 
@@ -102,24 +102,24 @@ impl<'a> Datagram<'a> {
         self.sequence
     }
 
-    fn item(&mut self) -> Result<Item, Malformed> {
-        let truncated = Malformed::Truncated { missing: self.frames_left };
+    fn item(&mut self) -> Result<Item, MalformedDatagram> {
+        let truncated = MalformedDatagram::Truncated { missing: self.frames_left };
         let ([a, b, c, d, length], rest) = self.rest.split_first_chunk::<5>().ok_or(truncated)?;
         let word = u32::from_be_bytes([*a, *b, *c, *d]);
         let (is_fd, length) = (length & FD_FLAG != 0, length & !FD_FLAG);
-        let id = RawId::of_word(word).ok_or(Malformed::Frame { word, length })?;
+        let id = RawId::of_word(word).ok_or(MalformedDatagram::Frame { word, length })?;
         if let RawId::Remote(id) = id {
             self.rest = rest;
             let fits = usize::from(length) <= MAX_DATA_LENGTH && !is_fd;
             return if fits {
                 Ok(Item::Frame(Frame::remote(id, length)))
             } else {
-                Err(Malformed::Frame { word, length })
+                Err(MalformedDatagram::Frame { word, length })
             };
         }
         let longest = if is_fd { MAX_FD_LENGTH } else { MAX_DATA_LENGTH as u8 };
         if length > longest {
-            return Err(Malformed::Frame { word, length });
+            return Err(MalformedDatagram::Frame { word, length });
         }
         let rest = if is_fd { rest.get(1..).ok_or(truncated)? } else { rest };
         let (data, rest) = rest.split_at_checked(usize::from(length)).ok_or(truncated)?;
@@ -138,7 +138,7 @@ impl<'a> Datagram<'a> {
 
 /// The items; after the first error there are no more.
 impl Iterator for Datagram<'_> {
-    type Item = Result<Item, Malformed>;
+    type Item = Result<Item, MalformedDatagram>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.frames_left == 0 {
@@ -155,11 +155,11 @@ mod tests {
     use super::*;
     use crate::testing::Random;
 
-    fn items(bytes: &[u8]) -> Vec<Result<Item, Malformed>> {
+    fn items(bytes: &[u8]) -> Vec<Result<Item, MalformedDatagram>> {
         Datagram::parse(bytes).map_or_else(|error| vec![Err(error)], Iterator::collect)
     }
 
-    fn frame(text: &str) -> Result<Item, Malformed> {
+    fn frame(text: &str) -> Result<Item, MalformedDatagram> {
         Ok(Item::Frame(text.parse().unwrap()))
     }
 
@@ -192,19 +192,19 @@ mod tests {
 
     #[test]
     fn what_is_malformed_is_named_and_ends_its_datagram() {
-        assert_eq!(items(&[]), [Err(Malformed::NoHead(0))]);
-        assert_eq!(items(&[2, 0, 1, 0]), [Err(Malformed::NoHead(4))]);
-        assert_eq!(items(&[1, 0, 1, 0, 0]), [Err(Malformed::Version(1))]);
-        assert_eq!(items(&[2, 1, 1, 0, 0]), [Err(Malformed::Operation(1))]);
+        assert_eq!(items(&[]), [Err(MalformedDatagram::NoHead(0))]);
+        assert_eq!(items(&[2, 0, 1, 0]), [Err(MalformedDatagram::NoHead(4))]);
+        assert_eq!(items(&[1, 0, 1, 0, 0]), [Err(MalformedDatagram::Version(1))]);
+        assert_eq!(items(&[2, 1, 1, 0, 0]), [Err(MalformedDatagram::Operation(1))]);
         let whole = [2, 0, 0, 0, 2, 0, 0, 1, 0x81, 1, 0xAB, 0, 0, 1, 0x82, 1];
-        assert_eq!(items(&whole), [frame("181#AB"), Err(Malformed::Truncated { missing: 1 })]);
-        assert_eq!(items(&whole[..8]), [Err(Malformed::Truncated { missing: 2 })]);
+        assert_eq!(items(&whole), [frame("181#AB"), Err(MalformedDatagram::Truncated { missing: 1 })]);
+        assert_eq!(items(&whole[..8]), [Err(MalformedDatagram::Truncated { missing: 2 })]);
         let long = [2, 0, 0, 0, 1, 0, 0, 1, 0x81, 9, 1, 2, 3, 4, 5, 6, 7, 8, 9];
-        assert_eq!(items(&long), [Err(Malformed::Frame { word: 0x181, length: 9 })]);
+        assert_eq!(items(&long), [Err(MalformedDatagram::Frame { word: 0x181, length: 9 })]);
         let wide = [2, 0, 0, 0, 1, 0, 0, 8, 0, 0];
-        assert_eq!(items(&wide), [Err(Malformed::Frame { word: 0x800, length: 0 })]);
+        assert_eq!(items(&wide), [Err(MalformedDatagram::Frame { word: 0x800, length: 0 })]);
         let fd = [2, 0, 0, 0, 1, 0, 0, 1, 0x81, 0x80 | 65];
-        assert_eq!(items(&fd), [Err(Malformed::Frame { word: 0x181, length: 65 })]);
+        assert_eq!(items(&fd), [Err(MalformedDatagram::Frame { word: 0x181, length: 65 })]);
     }
 
     #[test]

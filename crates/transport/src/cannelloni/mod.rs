@@ -7,4 +7,4 @@ mod bus;
 mod codec;
 
 pub use bus::CannelloniBus;
-pub use codec::{Datagram, Item, Malformed, emit};
+pub use codec::{Datagram, Item, MalformedDatagram, emit};

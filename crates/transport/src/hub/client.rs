@@ -55,7 +55,7 @@ pub(super) struct End {
 
 /// Serves until the client closes the connection or the session is over.
 pub(super) async fn serve(stream: TcpStream, session: Box<dyn Session>, end: End) -> io::Result<()> {
-    let mut connection = Connection {
+    let mut connection = ClientConnection {
         session,
         end,
         input: Vec::with_capacity(READ_SIZE),
@@ -68,7 +68,7 @@ pub(super) async fn serve(stream: TcpStream, session: Box<dyn Session>, end: End
     connection.run(stream).await
 }
 
-struct Connection {
+struct ClientConnection {
     session: Box<dyn Session>,
     end: End,
     /// Received bytes, of which `consumed` have been through the session.
@@ -84,7 +84,7 @@ struct Connection {
     at_end: bool,
 }
 
-impl Connection {
+impl ClientConnection {
     async fn run(&mut self, mut stream: TcpStream) -> io::Result<()> {
         let (mut reader, mut writer) = stream.split();
         let mut segments = 0;

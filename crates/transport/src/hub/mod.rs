@@ -98,7 +98,7 @@ impl fmt::Display for Listener {
 /// it, or by [`discard`](Self::discard).
 #[derive(Debug)]
 pub struct Hub {
-    shared: Arc<Shared>,
+    shared: Arc<HubState>,
     inbox: mpsc::UnboundedReceiver<HubEvent>,
     listeners: Vec<Listener>,
     acceptors: Vec<AbortHandle>,
@@ -110,7 +110,7 @@ impl Hub {
     pub async fn bind(places: &[ServeSpec], options: HubOptions, clock: &WallClock) -> Result<Self, HubError> {
         // Unbounded in type only: each client is held to MAX_FRAMES_IN_FLIGHT.
         let (sender, inbox) = mpsc::unbounded_channel();
-        let shared = Arc::new(Shared { options, clock: clock.clone(), inbox: sender, clients: Mutex::default() });
+        let shared = Arc::new(HubState { options, clock: clock.clone(), inbox: sender, clients: Mutex::default() });
         let clock = clock.clone();
         let mut hub = Self { shared, inbox, listeners: Vec::new(), acceptors: Vec::new(), clock };
         for place in places {
@@ -236,7 +236,7 @@ impl AsyncBus for Hub {
 }
 
 #[derive(Debug)]
-struct Shared {
+struct HubState {
     options: HubOptions,
     clock: WallClock,
     inbox: mpsc::UnboundedSender<HubEvent>,
@@ -260,7 +260,7 @@ struct Client {
     task: AbortHandle,
 }
 
-impl Shared {
+impl HubState {
     fn lock(&self) -> MutexGuard<'_, Clients> {
         self.clients.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -342,7 +342,7 @@ impl Shared {
     }
 }
 
-async fn accept(socket: TcpListener, protocol: Protocol, shared: Arc<Shared>) {
+async fn accept(socket: TcpListener, protocol: Protocol, shared: Arc<HubState>) {
     loop {
         match socket.accept().await {
             Ok((stream, peer)) => {

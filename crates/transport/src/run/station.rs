@@ -57,20 +57,20 @@ where
             output = &mut until => return part(clock, send_all(bus, station, clock, None), output).await,
             event = changed_behind_our_back(station, deadline) => event,
             // A deadline goes before a frame: a babbling bus must not keep a station from its timeouts.
-            () = clock.sleep_until_due(deadline) => Event::Woken,
+            () = clock.sleep_until_due(deadline) => StationEvent::Woken,
             received = bus.recv() => received?.into(),
-            () = wakeup.notified() => Event::Woken,
+            () = wakeup.notified() => StationEvent::Woken,
         };
         match event {
-            Event::Received(frame) => station.handle_frame(&frame, clock.now()),
-            Event::Noted(at, note) => {
+            StationEvent::Received(frame) => station.handle_frame(&frame, clock.now()),
+            StationEvent::Noted(at, note) => {
                 if let Some(takes_part) = note.takes_part() {
                     station.handle_bus_off(!takes_part, clock.now());
                 }
                 tell(at, &note);
             }
-            Event::Offered(frame) => offered = Some(frame),
-            Event::Woken => station.handle_timeout(clock.now()),
+            StationEvent::Offered(frame) => offered = Some(frame),
+            StationEvent::Woken => station.handle_timeout(clock.now()),
         }
     }
 }
@@ -89,7 +89,7 @@ pub fn waker_of(wakeup: Arc<Notify>) -> Waker {
     Waker::from(Arc::new(Wakes(wakeup)))
 }
 
-enum Event {
+enum StationEvent {
     Received(Frame),
     Noted(Instant, Note),
     /// The station has something to send that it had not when it was last drained.
@@ -97,7 +97,7 @@ enum Event {
     Woken,
 }
 
-impl From<(Instant, Received)> for Event {
+impl From<(Instant, Received)> for StationEvent {
     fn from((at, received): (Instant, Received)) -> Self {
         match received {
             Received::Frame(frame) => Self::Received(frame),
@@ -130,10 +130,10 @@ async fn part<T>(
 }
 
 /// Completes if `until`, polled just before, made the station offer a frame or change its deadline.
-async fn changed_behind_our_back(station: &mut impl Station, deadline: Option<Instant>) -> Event {
+async fn changed_behind_our_back(station: &mut impl Station, deadline: Option<Instant>) -> StationEvent {
     poll_fn(|_| match station.poll_transmit() {
-        Some(frame) => Poll::Ready(Event::Offered(frame)),
-        None if station.poll_timeout() != deadline => Poll::Ready(Event::Woken),
+        Some(frame) => Poll::Ready(StationEvent::Offered(frame)),
+        None if station.poll_timeout() != deadline => Poll::Ready(StationEvent::Woken),
         None => Poll::Pending,
     })
     .await

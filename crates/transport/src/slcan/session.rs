@@ -17,7 +17,7 @@ const SERIAL_NUMBER: &str = "FD01";
 const STAMP_PERIOD_MS: u64 = 60_000;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Channel {
+enum ChannelState {
     Closed,
     Open,
     ListenOnly,
@@ -29,7 +29,7 @@ pub(crate) struct SlcanSession {
     bus_bitrate: Option<Bitrate>,
     /// What the client selected; `None` for nothing, or for raw timing registers.
     bitrate: Option<Bitrate>,
-    channel: Channel,
+    channel: ChannelState,
     time_stamps: bool,
     /// Flags of the status that stand for what has been: reading it clears them.
     happened: u8,
@@ -43,7 +43,7 @@ impl SlcanSession {
         Self {
             bus_bitrate,
             bitrate: None,
-            channel: Channel::Closed,
+            channel: ChannelState::Closed,
             time_stamps: false,
             happened: 0,
             decoder: Decoder::default(),
@@ -54,20 +54,20 @@ impl SlcanSession {
     fn handle(&mut self, command: Command) -> (Answer, Option<Frame>) {
         if let Command::Transmit(frame) = command {
             return match self.channel {
-                Channel::Open => (Answer::Queued { extended: frame.id().is_extended() }, Some(frame)),
-                Channel::Closed | Channel::ListenOnly => (Answer::Refused, None),
+                ChannelState::Open => (Answer::Queued { extended: frame.id().is_extended() }, Some(frame)),
+                ChannelState::Closed | ChannelState::ListenOnly => (Answer::Refused, None),
             };
         }
-        let is_closed = self.channel == Channel::Closed;
+        let is_closed = self.channel == ChannelState::Closed;
         let answer = match command {
             Command::Version => Answer::Version(VERSION.to_owned()),
             Command::SerialNumber => Answer::SerialNumber(SERIAL_NUMBER.to_owned()),
             Command::Empty | Command::AutoSend(true) => Answer::Done,
             // No other flag can be set: the bus is never off, and a client that falls behind is disconnected.
             Command::Status if !is_closed => Answer::Status(std::mem::take(&mut self.happened)),
-            Command::Close if !is_closed => self.set(Channel::Closed),
-            Command::Open if is_closed && self.rate_fits() => self.set(Channel::Open),
-            Command::OpenListenOnly if is_closed && self.rate_fits() => self.set(Channel::ListenOnly),
+            Command::Close if !is_closed => self.set(ChannelState::Closed),
+            Command::Open if is_closed && self.rate_fits() => self.set(ChannelState::Open),
+            Command::OpenListenOnly if is_closed && self.rate_fits() => self.set(ChannelState::ListenOnly),
             Command::SetBitrate(code) if is_closed => {
                 self.bitrate = bitrate_of_code(code);
                 Answer::Done
@@ -91,7 +91,7 @@ impl SlcanSession {
         self.bitrate.is_none() || self.bus_bitrate.is_none() || self.bitrate == self.bus_bitrate
     }
 
-    fn set(&mut self, channel: Channel) -> Answer {
+    fn set(&mut self, channel: ChannelState) -> Answer {
         self.channel = channel;
         Answer::Done
     }
@@ -113,7 +113,7 @@ impl Session for SlcanSession {
     }
 
     fn is_listening(&self) -> bool {
-        self.channel != Channel::Closed
+        self.channel != ChannelState::Closed
     }
 
     fn next_reply(&mut self, out: &mut Vec<u8>) -> Option<Duration> {

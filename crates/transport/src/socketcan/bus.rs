@@ -11,7 +11,7 @@ use nix::errno::Errno;
 use super::error_class::notes_of;
 use super::interface::{self, InterfaceProblem, SYSTEM};
 use super::socket::{Incoming, Socket};
-use super::wire::Message;
+use super::wire::KernelMessage;
 use crate::note::Suspicions;
 use crate::{AsyncBus, BusError, ControllerState, Note, Received, WallClock};
 
@@ -37,7 +37,7 @@ const MOST_FILTERS: usize = 512;
 pub struct SocketCanBus {
     interface: String,
     clock: WallClock,
-    connection: Connection,
+    connection: InterfaceState,
     /// Identifiers that are asked for; none for all.
     wanted: Vec<CanId>,
     /// What is to be reported next: what one message said, and what sending met.
@@ -52,7 +52,7 @@ pub struct SocketCanBus {
 }
 
 #[derive(Debug)]
-enum Connection {
+enum InterfaceState {
     Up(Socket),
     Away { again_at: Instant },
 }
@@ -64,7 +64,7 @@ impl SocketCanBus {
         let mut bus = Self {
             interface: interface.to_owned(),
             clock: clock.clone(),
-            connection: Connection::Up(socket),
+            connection: InterfaceState::Up(socket),
             wanted: Vec::new(),
             waiting: VecDeque::new(),
             suspicions: Suspicions::default(),
@@ -80,7 +80,7 @@ impl SocketCanBus {
     pub fn hear_only(&mut self, ids: &[CanId]) -> Result<bool, BusError> {
         let ids = if ids.len() > MOST_FILTERS { &[] } else { ids };
         self.wanted = ids.to_vec();
-        if let Connection::Up(socket) = &self.connection
+        if let InterfaceState::Up(socket) = &self.connection
             && let Err(error) = socket.set_filter(ids)
         {
             self.lose(error)?;
@@ -111,9 +111,9 @@ impl SocketCanBus {
             self.waiting.push_back((at, Note::Overrun { lost: Some(lost) }.into()));
         }
         match incoming.message {
-            Message::Frame(frame) => self.waiting.push_back((at, frame.into())),
-            Message::Fd { id, length } => self.waiting.push_back((at, Note::FdFrame { id, length }.into())),
-            Message::Error { class, data } => {
+            KernelMessage::Frame(frame) => self.waiting.push_back((at, frame.into())),
+            KernelMessage::Fd { id, length } => self.waiting.push_back((at, Note::FdFrame { id, length }.into())),
+            KernelMessage::Error { class, data } => {
                 self.waiting.extend(notes_of(class, data).map(|note| (at, note.into())));
             }
         }
@@ -125,7 +125,7 @@ impl SocketCanBus {
         if !problem.may_pass() {
             return Err(BusError::Interface(problem));
         }
-        self.connection = Connection::Away { again_at: self.clock.now() + AGAIN };
+        self.connection = InterfaceState::Away { again_at: self.clock.now() + AGAIN };
         self.tell(Note::ConnectionLost { reason: problem.to_string() });
         Ok(())
     }
@@ -138,12 +138,12 @@ impl SocketCanBus {
             filtered.map(|()| (socket, has_carrier)).map_err(|error| InterfaceProblem::of(&self.interface, error))
         }) {
             Ok((socket, has_carrier)) => {
-                self.connection = Connection::Up(socket);
+                self.connection = InterfaceState::Up(socket);
                 (self.lost, self.is_stuck) = (0, false);
                 self.tell(Note::ConnectionBack);
                 self.tell_state(has_carrier);
             }
-            Err(_) => self.connection = Connection::Away { again_at: self.clock.now() + AGAIN },
+            Err(_) => self.connection = InterfaceState::Away { again_at: self.clock.now() + AGAIN },
         }
     }
 
@@ -162,7 +162,7 @@ impl SocketCanBus {
 
 impl AsyncBus for SocketCanBus {
     async fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        let Connection::Up(socket) = &self.connection else { return Ok(()) };
+        let InterfaceState::Up(socket) = &self.connection else { return Ok(()) };
         match self.queue(socket, frame).await {
             Ok(()) => self.is_stuck = false,
             Err(error) if is_full(&error) => {
@@ -185,11 +185,11 @@ impl AsyncBus for SocketCanBus {
                 return Ok((at, next));
             }
             match &mut self.connection {
-                Connection::Up(socket) => match socket.receive().await {
+                InterfaceState::Up(socket) => match socket.receive().await {
                     Ok(incoming) => self.take(incoming),
                     Err(error) => self.lose(error)?,
                 },
-                Connection::Away { again_at } => {
+                InterfaceState::Away { again_at } => {
                     let again_at = *again_at;
                     self.clock.sleep_until(again_at).await;
                     self.look_again();

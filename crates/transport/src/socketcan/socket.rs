@@ -11,7 +11,7 @@ use socketcan::{CanFdSocket, Socket as _, SocketOptions as _};
 use tokio::io::Interest;
 use tokio::io::unix::AsyncFd;
 
-use super::wire::{self, FD_LENGTH, Message};
+use super::wire::{self, FD_LENGTH, KernelMessage};
 
 /// What a reader waits for: messages, and that the interface goes down, which the kernel reports as an error without a message.
 const HEARS: Interest = Interest::READABLE.add(Interest::ERROR);
@@ -27,7 +27,7 @@ pub(super) struct Socket {
 /// A message that came.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Incoming {
-    pub(super) message: Message,
+    pub(super) message: KernelMessage,
     /// Unix time at which the kernel had it from the driver; `None` where it does not report that.
     pub(super) stamp: Option<Duration>,
     /// How many messages the socket has lost since it was opened, for want of room.

@@ -21,7 +21,7 @@ const DATA: usize = 8;
 
 /// One message of the kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Message {
+pub(super) enum KernelMessage {
     /// A classical frame.
     Frame(Frame),
     /// An error message: its class, and what stands behind it.
@@ -31,7 +31,7 @@ pub(super) enum Message {
 }
 
 /// The message that `bytes` are; `None` if their length is that of neither form.
-pub(super) fn parse(bytes: &[u8]) -> Option<Message> {
+pub(super) fn parse(bytes: &[u8]) -> Option<KernelMessage> {
     let word = u32::from_ne_bytes(*bytes.first_chunk()?);
     let id = if word & EXTENDED != 0 {
         CanId::extended(word & EXTENDED_MASK)
@@ -39,15 +39,15 @@ pub(super) fn parse(bytes: &[u8]) -> Option<Message> {
         CanId::standard((word & STANDARD_MASK) as u16)
     };
     match bytes.len() {
-        FD_LENGTH => Some(Message::Fd { id, length: bytes[4] }),
+        FD_LENGTH => Some(KernelMessage::Fd { id, length: bytes[4] }),
         CLASSIC_LENGTH if word & ERROR != 0 => {
-            Some(Message::Error { class: word & EXTENDED_MASK, data: *bytes.last_chunk()? })
+            Some(KernelMessage::Error { class: word & EXTENDED_MASK, data: *bytes.last_chunk()? })
         }
         CLASSIC_LENGTH => {
             let length = bytes[4].min(8);
             let data = &bytes[DATA..DATA + usize::from(length)];
             let frame = if word & REMOTE != 0 { Frame::remote(id, length) } else { Frame::new(id, data) };
-            Some(Message::Frame(frame))
+            Some(KernelMessage::Frame(frame))
         }
         _ => None,
     }
@@ -88,14 +88,14 @@ mod tests {
     /// What `linux/can.h` says of each.
     #[test]
     fn the_kernels_form_is_read_and_written() {
-        let frame = |text: &str| Message::Frame(text.parse().unwrap());
+        let frame = |text: &str| KernelMessage::Frame(text.parse().unwrap());
         let data = [0x40, 0x41, 0x60, 0, 0, 0, 0, 0];
         for (id, length, expected) in [
             (0x604, 8, frame("604#4041600000000000")),
             (0x604, 3, frame("604#404160")),
             (0x8000_0604, 0, frame("00000604#")),
             (0x9FFF_FFFF, 1, frame("1FFFFFFF#40")),
-            (0x2000_0088, 8, Message::Error { class: 0x88, data }),
+            (0x2000_0088, 8, KernelMessage::Error { class: 0x88, data }),
         ] {
             let bytes = bytes(id, length, data);
             assert_eq!(parse(&bytes), Some(expected), "{id:08X}");
@@ -106,7 +106,7 @@ mod tests {
         let mut fd = [0; FD_LENGTH];
         fd[..4].copy_from_slice(&0x123_u32.to_ne_bytes());
         fd[4] = 64;
-        assert_eq!(parse(&fd), Some(Message::Fd { id: CanId::standard(0x123), length: 64 }));
+        assert_eq!(parse(&fd), Some(KernelMessage::Fd { id: CanId::standard(0x123), length: 64 }));
     }
 
     /// As `Documentation/networking/can.rst`, 4.1.1, has it: a frame fits where `received & mask == filter & mask`.
@@ -129,7 +129,7 @@ mod tests {
         let mut random = Random::new(29);
         for _ in 0..2_000 {
             let frame = random.frame();
-            assert_eq!(parse(&emit(&frame)), Some(Message::Frame(frame)));
+            assert_eq!(parse(&emit(&frame)), Some(KernelMessage::Frame(frame)));
             let length = random.below(80);
             let noise: Vec<u8> = (0..length).map(|_| random.next() as u8).collect();
             assert_eq!(parse(&noise).is_some(), matches!(length, CLASSIC_LENGTH | FD_LENGTH));

@@ -281,12 +281,12 @@ fn emit_frame(at: Instant, frame: &Frame, out: &mut Vec<u8>) {
 pub struct Decoder<M> {
     buffer: [u8; MAX_MESSAGE_LENGTH],
     length: usize,
-    place: Place,
+    place: StreamPlace,
     message: PhantomData<M>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Place {
+enum StreamPlace {
     Between,
     Stray,
     Inside,
@@ -295,7 +295,7 @@ enum Place {
 
 impl<M> Default for Decoder<M> {
     fn default() -> Self {
-        Self { buffer: [0; MAX_MESSAGE_LENGTH], length: 0, place: Place::Between, message: PhantomData }
+        Self { buffer: [0; MAX_MESSAGE_LENGTH], length: 0, place: StreamPlace::Between, message: PhantomData }
     }
 }
 
@@ -317,28 +317,28 @@ impl<M: Message> Decoder<M> {
 
     fn step(&mut self, byte: u8) -> Option<Result<M, Malformed>> {
         match (self.place, byte) {
-            (Place::Between, b'<') => self.begin(Place::Inside),
-            (Place::Between, byte) if byte.is_ascii_whitespace() || byte == 0 => None,
-            (Place::Between, byte) => {
-                self.begin(Place::Stray);
+            (StreamPlace::Between, b'<') => self.begin(StreamPlace::Inside),
+            (StreamPlace::Between, byte) if byte.is_ascii_whitespace() || byte == 0 => None,
+            (StreamPlace::Between, byte) => {
+                self.begin(StreamPlace::Stray);
                 self.keep(byte);
                 None
             }
-            (Place::Stray, b'<' | b'\n') => self.end(|text| Err(Malformed::Stray(text::shown(text)))),
-            (Place::Inside, b'<') => self.end(|text| Err(Malformed::Unclosed(text::shown(text)))),
-            (Place::Inside, b'>') => self.end(M::parse),
-            (Place::Overlong, b'<' | b'>') => self.end(|_| Err(Malformed::TooLong)),
-            (Place::Overlong, _) => None,
-            (Place::Stray | Place::Inside, byte) => {
-                if !self.keep(byte) && self.place == Place::Inside {
-                    self.place = Place::Overlong;
+            (StreamPlace::Stray, b'<' | b'\n') => self.end(|text| Err(Malformed::Stray(text::shown(text)))),
+            (StreamPlace::Inside, b'<') => self.end(|text| Err(Malformed::Unclosed(text::shown(text)))),
+            (StreamPlace::Inside, b'>') => self.end(M::parse),
+            (StreamPlace::Overlong, b'<' | b'>') => self.end(|_| Err(Malformed::TooLong)),
+            (StreamPlace::Overlong, _) => None,
+            (StreamPlace::Stray | StreamPlace::Inside, byte) => {
+                if !self.keep(byte) && self.place == StreamPlace::Inside {
+                    self.place = StreamPlace::Overlong;
                 }
                 None
             }
         }
     }
 
-    fn begin(&mut self, place: Place) -> Option<Result<M, Malformed>> {
+    fn begin(&mut self, place: StreamPlace) -> Option<Result<M, Malformed>> {
         self.place = place;
         self.length = 0;
         None
@@ -356,7 +356,7 @@ impl<M: Message> Decoder<M> {
     }
 
     fn end(&mut self, read: impl FnOnce(&str) -> Result<M, Malformed>) -> Option<Result<M, Malformed>> {
-        self.place = Place::Between;
+        self.place = StreamPlace::Between;
         let kept = &self.buffer[..self.length];
         Some(match std::str::from_utf8(kept) {
             Ok(text) => read(text),

@@ -11,7 +11,7 @@ const MAX_FD_LENGTH: usize = 64;
 
 /// A `can.Message`. What a sender omits is as the constructor of `can.Message` has it.
 #[derive(Debug, Deserialize, Serialize)]
-struct Message<'a> {
+struct PythonCanMessage<'a> {
     /// Unix time, in s.
     #[serde(default)]
     timestamp: f64,
@@ -59,7 +59,7 @@ pub enum Item {
 
 /// Why bytes are not a message of python-can.
 #[derive(Debug, thiserror::Error)]
-pub enum Malformed {
+pub enum MalformedDatagram {
     /// No MessagePack, or a map that lacks what a message has.
     #[error("no message of python-can: {0}")]
     Map(#[from] rmp_serde::decode::Error),
@@ -75,7 +75,7 @@ pub enum Malformed {
 
 /// Appends the datagram of `frame`, stamped with `unix_s`.
 pub fn emit(frame: &Frame, unix_s: f64, out: &mut Vec<u8>) {
-    let message = Message {
+    let message = PythonCanMessage {
         timestamp: unix_s,
         arbitration_id: frame.id().raw(),
         is_extended_id: frame.id().is_extended(),
@@ -94,8 +94,8 @@ pub fn emit(frame: &Frame, unix_s: f64, out: &mut Vec<u8>) {
 }
 
 /// Reads a datagram.
-pub fn parse(bytes: &[u8]) -> Result<Item, Malformed> {
-    let message: Message<'_> = rmp_serde::from_slice(bytes)?;
+pub fn parse(bytes: &[u8]) -> Result<Item, MalformedDatagram> {
+    let message: PythonCanMessage<'_> = rmp_serde::from_slice(bytes)?;
     if message.is_error_frame {
         return Ok(Item::Error);
     }
@@ -104,7 +104,7 @@ pub fn parse(bytes: &[u8]) -> Result<Item, Malformed> {
         true => message.dlc.unwrap_or(0) as usize,
         false => message.data.len(),
     };
-    let malformed = Malformed::Frame { id: raw, length };
+    let malformed = MalformedDatagram::Frame { id: raw, length };
     let id = match message.is_extended_id {
         true if raw <= CanId::MAX_EXTENDED => CanId::extended(raw),
         false if raw <= u32::from(CanId::MAX_STANDARD) => CanId::standard(raw as u16),
@@ -173,9 +173,9 @@ mod tests {
 
     #[test]
     fn what_is_no_frame_of_ours_is_told() {
-        let packed = |change: fn(&mut Message<'_>)| {
+        let packed = |change: fn(&mut PythonCanMessage<'_>)| {
             let data = [0; 65];
-            let mut message = Message {
+            let mut message = PythonCanMessage {
                 timestamp: 0.0,
                 arbitration_id: 0x181,
                 is_extended_id: false,
@@ -191,7 +191,7 @@ mod tests {
             change(&mut message);
             parse(&rmp_serde::to_vec_named(&message).unwrap())
         };
-        let said = |result: Result<Item, Malformed>| result.unwrap_err().to_string();
+        let said = |result: Result<Item, MalformedDatagram>| result.unwrap_err().to_string();
         assert_eq!(said(packed(|_| {})), "identifier 181h with 9 bytes is not a CAN frame");
         assert_eq!(said(packed(|m| m.arbitration_id = 0x800)), "identifier 800h with 9 bytes is not a CAN frame");
         assert_eq!(said(packed(|m| m.is_remote_frame = true)), "identifier 181h with 9 bytes is not a CAN frame");

@@ -7,7 +7,7 @@ mod bus;
 mod codec;
 
 pub use bus::UdpMulticastBus;
-pub use codec::{Item, Malformed, emit, parse};
+pub use codec::{Item, MalformedDatagram, emit, parse};
 
 /// python-can's port.
 pub const DEFAULT_PORT: u16 = 43_113;

@@ -17,14 +17,14 @@ pub type Parameters = BTreeMap<String, String>;
 
 /// A text and the parameters that it may name.
 #[derive(Clone, Copy)]
-pub struct Source<'a> {
+pub struct SourceText<'a> {
     text: &'a str,
     parameters: &'a Parameters,
 }
 
 /// The names of one table and what they stand for.
 pub struct Table<'a> {
-    source: Source<'a>,
+    source: SourceText<'a>,
     /// What the table describes: `a drive`.
     what: &'static str,
     at: Range<usize>,
@@ -33,7 +33,7 @@ pub struct Table<'a> {
 
 /// One value and its name.
 pub struct Field<'a> {
-    source: Source<'a>,
+    source: SourceText<'a>,
     name: String,
     value: &'a Spanned<DeValue<'a>>,
 }
@@ -50,7 +50,7 @@ pub fn read<T>(
 ) -> Result<T, Vec<Problem>> {
     let parsed = DeTable::parse(text)
         .map_err(|error| vec![Problem::new(error.span().unwrap_or(0..0), error.message().to_owned())])?;
-    take(&Table { source: Source { text, parameters }, what, at: 0..0, table: parsed.get_ref() })
+    take(&Table { source: SourceText { text, parameters }, what, at: 0..0, table: parsed.get_ref() })
 }
 
 impl<'a> Table<'a> {

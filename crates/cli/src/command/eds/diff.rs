@@ -30,11 +30,11 @@ pub(crate) struct Diff {
 pub(crate) struct DiffReport {
     first: String,
     second: String,
-    differences: Vec<Row>,
+    differences: Vec<DifferenceRow>,
 }
 
 #[derive(Debug, Serialize)]
-struct Row {
+struct DifferenceRow {
     /// `6040h:00`, or `6040h` for an object as a whole; `None` for the device.
     object: Option<String>,
     name: String,
@@ -50,12 +50,12 @@ impl Diff {
         Ok(DiffReport {
             first: self.first.clone(),
             second: self.second.clone(),
-            differences: diff(&first, &second).into_iter().map(Row::of).collect(),
+            differences: diff(&first, &second).into_iter().map(DifferenceRow::of).collect(),
         })
     }
 }
 
-impl Row {
+impl DifferenceRow {
     fn of(found: Difference) -> Self {
         let object = found.index.map(|index| match found.sub_index {
             Some(sub_index) => Mux::new(index, sub_index).to_string(),

@@ -45,7 +45,7 @@ struct OfFile {
     file: String,
     /// Why it is not read at all.
     #[serde(skip_serializing_if = "Option::is_none")]
-    refused: Option<Refused>,
+    refused: Option<RefusedFile>,
     /// The same, where the file itself cannot be read.
     #[serde(skip)]
     unread: Option<Failure>,
@@ -55,17 +55,17 @@ struct OfFile {
     warnings: usize,
     /// Counted, not listed.
     beyond: u32,
-    findings: Vec<Row>,
+    findings: Vec<FindingRow>,
 }
 
 #[derive(Debug, Serialize)]
-struct Refused {
+struct RefusedFile {
     message: String,
     next: String,
 }
 
 #[derive(Debug, Serialize)]
-struct Row {
+struct FindingRow {
     /// 0 for the file as a whole.
     line: u32,
     section: String,
@@ -125,12 +125,12 @@ impl OfFile {
                 errors: reading.findings.count(Severity::Error),
                 warnings: reading.findings.count(Severity::Warning),
                 beyond: reading.findings.beyond(),
-                findings: reading.findings.iter().map(Row::of).collect(),
+                findings: reading.findings.iter().map(FindingRow::of).collect(),
                 ..empty
             },
             Err(failure) => {
                 let message = format!("{}: {}", failure.what, failure.because.join("; "));
-                let refused = Some(Refused { message, next: failure.next.join("; ") });
+                let refused = Some(RefusedFile { message, next: failure.next.join("; ") });
                 Self { refused, unread: (failure.kind == "bad_file").then_some(failure), ..empty }
             }
         }
@@ -171,7 +171,7 @@ impl OfFile {
     }
 }
 
-impl Row {
+impl FindingRow {
     fn of(finding: &Finding) -> Self {
         Self {
             line: finding.line,

@@ -23,13 +23,13 @@ use crate::output::{Format, Report};
 )]
 pub(crate) struct Eds {
     #[command(subcommand)]
-    what: Option<What>,
+    what: Option<EdsCommand>,
     #[command(flatten)]
     sheet: sheet::SheetArgs,
 }
 
 #[derive(Subcommand)]
-enum What {
+enum EdsCommand {
     Lint(lint::Lint),
     Show(show::Show),
     Diff(diff::Diff),
@@ -39,14 +39,14 @@ impl Eds {
     /// Does it, and prints what came of it.
     pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
         match &self.what {
-            Some(What::Lint(lint)) => {
+            Some(EdsCommand::Lint(lint)) => {
                 let report = lint.run();
                 print(format, &report)?;
                 // For programs the report has it.
                 report.failure(lint.strict).map_or(Ok(()), |failure| Err(Failure { reported: format.json, ..failure }))
             }
-            Some(What::Show(show)) => print(format, &show.run()?),
-            Some(What::Diff(diff)) => print(format, &diff.run()?),
+            Some(EdsCommand::Show(show)) => print(format, &show.run()?),
+            Some(EdsCommand::Diff(diff)) => print(format, &diff.run()?),
             None => print(format, &self.sheet.run()?),
         }
     }

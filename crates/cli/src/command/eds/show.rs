@@ -41,21 +41,21 @@ pub(crate) struct ShowReport {
     granularity: u8,
     /// The one device that a DCF is about.
     #[serde(skip_serializing_if = "Option::is_none")]
-    commissioning: Option<Device>,
-    objects: Vec<Row>,
+    commissioning: Option<Commissioned>,
+    objects: Vec<ObjectRow>,
     #[serde(skip)]
     is_dcf: bool,
 }
 
 #[derive(Debug, Serialize)]
-struct Device {
+struct Commissioned {
     node: Option<u8>,
     name: String,
     bit_rate_kbit_s: Option<u16>,
 }
 
 #[derive(Debug, Serialize)]
-struct Row {
+struct ObjectRow {
     object: String,
     line: u32,
     name: String,
@@ -76,10 +76,10 @@ impl Show {
         let eds = source::sheet(&self.file)?;
         let wanted =
             |object: &Object, variable: &Variable| self.search.iter().all(|word| matches(object, variable, word));
-        let of_object = |object: &Object| -> Vec<Row> {
-            object.variables.iter().filter(|one| wanted(object, one)).map(|one| Row::of(object, one)).collect()
+        let of_object = |object: &Object| -> Vec<ObjectRow> {
+            object.variables.iter().filter(|one| wanted(object, one)).map(|one| ObjectRow::of(object, one)).collect()
         };
-        let objects: Vec<Row> = eds.objects.iter().flat_map(of_object).collect();
+        let objects: Vec<ObjectRow> = eds.objects.iter().flat_map(of_object).collect();
         if objects.is_empty() && !self.search.is_empty() {
             let words = self.search.join(" ");
             return Err(Failure::new(format!("no object of {} matches '{words}'", self.file)).next(format!(
@@ -104,10 +104,13 @@ fn matches(of: &Object, variable: &Variable, word: &str) -> bool {
 }
 
 impl ShowReport {
-    fn of(file: String, eds: &Eds, objects: Vec<Row>) -> Self {
+    fn of(file: String, eds: &Eds, objects: Vec<ObjectRow>) -> Self {
         let device = &eds.device;
-        let commissioned =
-            |of: &Commissioning| Device { node: of.node_id, name: of.node_name.clone(), bit_rate_kbit_s: of.bit_rate };
+        let commissioned = |of: &Commissioning| Commissioned {
+            node: of.node_id,
+            name: of.node_name.clone(),
+            bit_rate_kbit_s: of.bit_rate,
+        };
         Self {
             file,
             description: eds.file.description.clone(),
@@ -153,7 +156,7 @@ impl ShowReport {
     }
 }
 
-impl Row {
+impl ObjectRow {
     fn of(object: &Object, variable: &Variable) -> Self {
         let text = |value: &Option<Value>| value.as_ref().map(|value| value.in_file(object.index, variable.data_type));
         let name = match variable.name.as_str() {

@@ -15,7 +15,7 @@ use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
 use transport::Vitals;
 
-use super::places::Place;
+use super::places::ClientPlace;
 
 /// How long a client may take to read what it is sent; one that never reads is disconnected.
 const READER_PATIENCE: Duration = Duration::from_secs(10);
@@ -28,7 +28,7 @@ pub(super) struct Handle {
 }
 
 /// Serves a client until its connection ends or another needs its place, then has stopped what it moved.
-pub(super) async fn serve(stream: TcpStream, network: Network, mut handle: Handle, place: Place) {
+pub(super) async fn serve(stream: TcpStream, network: Network, mut handle: Handle, place: ClientPlace) {
     let mut session = Session::new(network);
     tokio::select! {
         // Whatever ended it, what it moved is stopped.
@@ -43,7 +43,7 @@ async fn converse(stream: TcpStream, session: &mut Session, handle: &mut Handle,
     stream.set_nodelay(true)?;
     let (input, mut output) = stream.into_split();
     let mut input = BufReader::new(input);
-    let mut line = Line::default();
+    let mut line = PartialLine::default();
     loop {
         let said = tokio::select! {
             read = line.read(&mut input) => {
@@ -83,7 +83,7 @@ async fn say(output: &mut OwnedWriteHalf, text: &str) -> io::Result<()> {
 
 /// A line as far as it has come.
 #[derive(Default)]
-struct Line {
+struct PartialLine {
     bytes: Vec<u8>,
     /// It was too long, and its rest is passed over.
     too_long: bool,
@@ -96,7 +96,7 @@ enum Read {
     End,
 }
 
-impl Line {
+impl PartialLine {
     /// The next line. Cancel-safe: what has come is kept.
     async fn read(&mut self, input: &mut (impl AsyncBufRead + Unpin)) -> io::Result<Read> {
         loop {
@@ -136,7 +136,7 @@ mod tests {
     /// What comes of `first` and then `rest`: a line, or `None` for one that is unreadable.
     fn lines(first: &[u8], rest: &[u8]) -> Vec<Option<String>> {
         let mut input = BufReader::with_capacity(64, first.chain(rest));
-        let mut line = Line::default();
+        let mut line = PartialLine::default();
         let mut lines = Vec::new();
         runtime().unwrap().block_on(async {
             loop {

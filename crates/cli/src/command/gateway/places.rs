@@ -24,7 +24,7 @@ struct Client {
 
 /// A client's own end of its place.
 #[derive(Debug)]
-pub(super) struct Place {
+pub(super) struct ClientPlace {
     pub(super) vitals: Arc<Vitals>,
     /// Ends when another needs the place.
     pub(super) stay: oneshot::Receiver<()>,
@@ -32,14 +32,14 @@ pub(super) struct Place {
 
 impl Places {
     /// A place for a client that comes at `now`, and the client that had to make room for it.
-    pub(super) fn take(&mut self, peer: SocketAddr, now: Instant) -> (Place, Option<SocketAddr>) {
+    pub(super) fn take(&mut self, peer: SocketAddr, now: Instant) -> (ClientPlace, Option<SocketAddr>) {
         self.0.retain(|client| !client.stay.is_closed());
         let least = Vitals::least(self.0.iter().map(|client| &*client.vitals));
         let displaced = least.filter(|_| self.0.len() >= MAX_CLIENTS).map(|place| self.0.remove(place).peer);
         let vitals = Arc::new(Vitals::new(now));
         let (stay, stays) = oneshot::channel();
         self.0.push(Client { peer, vitals: Arc::clone(&vitals), stay });
-        (Place { vitals, stay: stays }, displaced)
+        (ClientPlace { vitals, stay: stays }, displaced)
     }
 }
 
@@ -54,7 +54,7 @@ mod tests {
     #[test]
     fn the_client_that_has_moved_nothing_and_was_silent_longest_makes_room() {
         let mut places = Places::default();
-        let mut here: Vec<Place> = (0..MAX_CLIENTS)
+        let mut here: Vec<ClientPlace> = (0..MAX_CLIENTS)
             .map(|number| {
                 let (place, displaced) = places.take(peer(number), Instant::from_secs(number as u64));
                 assert_eq!(displaced, None, "client {number}");

@@ -10,7 +10,7 @@ use crate::failure::Failure;
 /// The requested parameters of a node, and their source: the named file, or the machine file.
 pub(super) fn wanted(
     context: &Context,
-    wanted: &super::Wanted,
+    wanted: &super::NodeAndFile,
     model: Option<&'static Description>,
 ) -> Result<(Parameters, String), Failure> {
     if let Some(path) = &wanted.file {

@@ -29,13 +29,13 @@ use plot::Table;
 
 /// What is to be configured.
 #[derive(Debug, clap::Args)]
-pub(super) struct Wanted {
+pub(super) struct WantedPdos {
     /// Node-ID
     #[arg(value_parser = node)]
     pub(super) node: NodeId,
     /// A PDO and its objects by name or number, or `off`: tpdo1=statusword,6064 (default: those of the machine file)
     #[arg(value_name = "PDO=OBJECTS", value_parser = asked)]
-    pdos: Vec<Asked>,
+    pdos: Vec<AskedPdo>,
     /// Transmission type of the named PDOs: 1 with every SYNC, 255 on events (CiA 301, tables 66 and 71)
     #[arg(long = "type", value_name = "0-255", requires = "pdos", value_parser = |text: &str| whole(text, 0..=u8::MAX))]
     transmission: Option<u8>,
@@ -56,7 +56,7 @@ pub(super) struct Wanted {
     ferrodrive --bus can0 --machine machine.toml pdo plan 4")]
 pub(super) struct PlanPdos {
     #[command(flatten)]
-    wanted: Wanted,
+    wanted: WantedPdos,
     /// Period of SYNC for which the bus load is calculated
     #[arg(long, value_name = "TIME", value_parser = period, default_value = "10ms")]
     cycle: Duration,
@@ -74,24 +74,24 @@ pub(super) struct PlanPdos {
     ferrodrive --bus can0 --machine machine.toml pdo apply 4")]
 pub(super) struct ApplyPdos {
     #[command(flatten)]
-    wanted: Wanted,
+    wanted: WantedPdos,
     #[command(flatten)]
     how: Transaction,
 }
 
 #[derive(Clone, Debug)]
-struct Asked {
+struct AskedPdo {
     pdo: PdoId,
     /// `None`: off.
     objects: Option<Vec<String>>,
 }
 
-fn asked(text: &str) -> Result<Asked, String> {
+fn asked(text: &str) -> Result<AskedPdo, String> {
     let (pdo, objects) = text
         .split_once('=')
         .ok_or("expected a PDO and its objects, e.g. tpdo1=statusword,position_actual_value, or tpdo2=off")?;
     let objects = (objects != "off").then(|| objects.split(',').map(|name| name.trim().to_owned()).collect());
-    Ok(Asked { pdo: pdo_id(pdo)?, objects })
+    Ok(AskedPdo { pdo: pdo_id(pdo)?, objects })
 }
 
 fn identifier(text: &str) -> Result<u16, String> {
@@ -126,7 +126,7 @@ pub(super) struct PdoPlanReport {
     plan: PlanReport,
 }
 
-impl Wanted {
+impl WantedPdos {
     /// The values of the objects of these PDOs in a model.
     fn parameters(&self, context: &Context, model: &'static Description) -> Result<(Parameters, String), Failure> {
         let node = self.node;

@@ -19,12 +19,12 @@ const SYNC: CanId = CanId::standard(0x80);
 const LISTENED: Duration = Duration::from_millis(300);
 
 /// The identifiers that others send with.
-pub(super) struct Heard {
+pub(super) struct HeardIds {
     frames: Receiver<BusFrame>,
     ids: BTreeSet<u32>,
 }
 
-impl Heard {
+impl HeardIds {
     /// Listens from now on.
     pub(super) fn listen(context: &Context) -> Self {
         Self { frames: context.traffic.of_others(), ids: BTreeSet::new() }

@@ -340,13 +340,13 @@ mod tests {
     const RESISTANCE_OHM: f32 = 1.85;
     const INDUCTANCE_H: f32 = 2.8e-3;
 
-    struct Bench {
+    struct StepperBench {
         stepper: Stepper,
         current_a: [f32; 2],
         duty: [f32; 2],
     }
 
-    impl Bench {
+    impl StepperBench {
         fn new() -> Self {
             Self { stepper: Stepper::default(), current_a: [0.0; 2], duty: [0.0; 2] }
         }
@@ -374,7 +374,7 @@ mod tests {
 
     #[test]
     fn the_vector_stands_up_at_its_amplitude_and_halves_at_rest() {
-        let mut bench = Bench::new();
+        let mut bench = StepperBench::new();
         (0..150).for_each(|_| bench.run(TrajectoryPoint::rest(0)));
         assert!((bench.current_a[0] - 1.2).abs() < 0.01 && bench.current_a[1].abs() < 0.01);
         (0..250).for_each(|_| bench.run(TrajectoryPoint::rest(0)));
@@ -383,7 +383,7 @@ mod tests {
 
     #[test]
     fn a_quarter_of_an_electrical_turn_is_a_full_step_from_phase_a_to_phase_b() {
-        let mut bench = Bench::new();
+        let mut bench = StepperBench::new();
         bench.run(TrajectoryPoint::rest(0));
         (0..150).for_each(|_| bench.run(TrajectoryPoint::rest(20)));
         assert!(bench.current_a[0].abs() < 0.01 && (bench.current_a[1] - 1.2).abs() < 0.01, "{:?}", bench.current_a);
@@ -394,7 +394,7 @@ mod tests {
     #[test]
     fn the_current_follows_a_turning_vector_without_lag() {
         // 25 pulses in 0.5 ms: 625 electrical turns a second, 750 r/min of a motor with 50 teeth.
-        let mut bench = Bench::new();
+        let mut bench = StepperBench::new();
         for n in 0..200 {
             bench.run(TrajectoryPoint::moving(25 * n, 50e3));
         }
@@ -441,7 +441,7 @@ mod tests {
         let model = StepperModel { detent_a: 0.05, ..MODEL };
         // Full steps (20 pulses) lie where the detent is zero, quarter steps where it is at its greatest.
         for (pulses, across_a) in [(0, 0.0), (5, 0.05), (10, 0.0), (15, -0.05), (20, 0.0), (25, 0.05)] {
-            let mut bench = Bench::new();
+            let mut bench = StepperBench::new();
             bench.run_with(&model, TrajectoryPoint::rest(0));
             (0..150).for_each(|_| bench.run_with(&model, TrajectoryPoint::rest(pulses)));
             let angle = f64::from(pulses) / 80.0 + across_a / 1.2 / core::f64::consts::TAU;
@@ -452,7 +452,7 @@ mod tests {
 
     #[test]
     fn clearing_the_position_and_a_counter_that_wraps_leave_the_vector_alone() {
-        let mut bench = Bench::new();
+        let mut bench = StepperBench::new();
         bench.run(TrajectoryPoint::rest(7));
         let field = bench.stepper.field;
         bench.stepper.shift(7);

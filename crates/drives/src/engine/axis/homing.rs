@@ -79,13 +79,13 @@ pub(super) struct Homing {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Run {
     sequence: HomingSequence,
-    phase: Phase,
+    phase: HomingPhase,
     /// The method's switch in the preceding look.
     was_on: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Phase {
+enum HomingPhase {
     Search { direction: Direction, turned: bool },
     Leave { direction: Direction, fast: bool, left_at: Option<i32> },
     Cross { direction: Direction },
@@ -99,8 +99,8 @@ impl Homing {
         *self = Self { state: HomingState::Failed, ..Self::default() };
         let sequence = parameters.sequence?;
         let phase = match sequence {
-            HomingSequence { switch: Some(row), .. } => Phase::at_start(row, parameters, switches),
-            HomingSequence { switch: None, index: Some(direction) } => Phase::Index { direction },
+            HomingSequence { switch: Some(row), .. } => HomingPhase::at_start(row, parameters, switches),
+            HomingSequence { switch: None, index: Some(direction) } => HomingPhase::Index { direction },
             HomingSequence { switch: None, index: None } => {
                 *self = Self { state: HomingState::Stopping, run: None, ended: true };
                 return Some(here);
@@ -114,7 +114,7 @@ impl Homing {
     /// Slows down, and the run counts as nothing.
     pub(super) fn interrupt(&mut self) {
         if let Some(run) = &mut self.run {
-            run.phase = Phase::SlowDown;
+            run.phase = HomingPhase::SlowDown;
         }
     }
 
@@ -164,7 +164,7 @@ impl Homing {
     pub(super) fn come_to_rest(&mut self) {
         match (self.state, self.run) {
             (HomingState::Stopping, _) => self.state = HomingState::Attained,
-            (_, Some(Run { phase: Phase::SlowDown, .. })) => self.abort(),
+            (_, Some(Run { phase: HomingPhase::SlowDown, .. })) => self.abort(),
             _ => {}
         }
     }
@@ -188,10 +188,10 @@ impl Run {
     ) -> Result<Option<i32>, LimitMet> {
         let on = switches.of(self.sequence.switch);
         let was_on = core::mem::replace(&mut self.was_on, on);
-        if let (Phase::Search { direction, .. }, Some(row)) = (self.phase, self.sequence.switch)
+        if let (HomingPhase::Search { direction, .. }, Some(row)) = (self.phase, self.sequence.switch)
             && on
         {
-            self.phase = Phase::found(row, Some(direction));
+            self.phase = HomingPhase::found(row, Some(direction));
         }
         let reverses = self.sequence.switch.is_some_and(|row| row.reverses_at_limit);
         if self.meets_limit(switches) && !self.phase.turn_round(reverses, switches) {
@@ -199,8 +199,8 @@ impl Run {
         }
         let moves = self.phase.direction().is_some_and(|direction| at.velocity * f64::from(direction.sign()) > 0.0);
         match &mut self.phase {
-            Phase::Search { .. } | Phase::SlowDown => {}
-            Phase::Leave { direction, left_at, .. } => {
+            HomingPhase::Search { .. } | HomingPhase::SlowDown => {}
+            HomingPhase::Leave { direction, left_at, .. } => {
                 match *left_at {
                     _ if on => *left_at = None,
                     None if was_on && moves => *left_at = Some(at.position),
@@ -209,10 +209,10 @@ impl Run {
                 if left_at
                     .is_some_and(|left_at| at.position.wrapping_sub(left_at).unsigned_abs() >= parameters.back_off)
                 {
-                    self.phase = Phase::Cross { direction: direction.reversed() };
+                    self.phase = HomingPhase::Cross { direction: direction.reversed() };
                 }
             }
-            Phase::Cross { .. } => {
+            HomingPhase::Cross { .. } => {
                 let edge = match self.sequence.switch.map(|row| row.edge) {
                     Some(SwitchEdge::Rising) => on && !was_on,
                     Some(SwitchEdge::Falling) => was_on && !on,
@@ -220,10 +220,10 @@ impl Run {
                 };
                 if edge && moves {
                     let Some(direction) = self.sequence.index else { return Ok(Some(here)) };
-                    self.phase = Phase::Index { direction };
+                    self.phase = HomingPhase::Index { direction };
                 }
             }
-            Phase::Index { .. } => return Ok(switches.index.filter(|_| moves)),
+            HomingPhase::Index { .. } => return Ok(switches.index.filter(|_| moves)),
         }
         Ok(None)
     }
@@ -240,7 +240,7 @@ impl Run {
     }
 }
 
-impl Phase {
+impl HomingPhase {
     fn at_start(row: &HomingRow, parameters: &HomingParameters, switches: Switches) -> Self {
         let is_met_by_search = row.edge == SwitchEdge::Rising && row.search == row.crossing;
         match switches.of(Some(row)) {

@@ -85,12 +85,12 @@ mod tests {
         deceleration: Ramp::Time(0.2),
     };
 
-    struct Bench {
+    struct SpeedBench {
         mode: Speed,
         trajectory: Trajectory,
     }
 
-    impl Bench {
+    impl SpeedBench {
         fn new() -> Self {
             Self { mode: Speed::default(), trajectory: Trajectory::resting(0) }
         }
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn speeding_up_and_slowing_down_take_their_times_whatever_the_change() {
-        let mut bench = Bench::new();
+        let mut bench = SpeedBench::new();
         assert!(close(bench.time_to(1000.0, &RAMPS), 0.5));
         assert!(close(bench.time_to(1100.0, &RAMPS), 0.5));
         assert!(close(bench.time_to(100.0, &RAMPS), 0.2));
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_reversal_slows_down_first_and_then_speeds_up() {
-        let mut bench = Bench::new();
+        let mut bench = SpeedBench::new();
         bench.time_to(1000.0, &RAMPS);
         assert!(close(bench.time_to(-1000.0, &RAMPS), 0.7));
     }
@@ -132,7 +132,7 @@ mod tests {
         let (up, down) = (Ramp::Rate(1000.0), Ramp::Rate(2000.0));
         for (down, reversal_s) in [(up, 2.0), (down, 1.5)] {
             let ramps = VelocityRamps { acceleration: up, deceleration: down, ..RAMPS };
-            let mut bench = Bench::new();
+            let mut bench = SpeedBench::new();
             assert!(close(bench.time_to(1000.0, &ramps), 1.0));
             let time_s = bench.time_to(-1000.0, &ramps);
             assert!(close(time_s, reversal_s), "{down:?}: {time_s} s");
@@ -141,14 +141,14 @@ mod tests {
 
     #[test]
     fn targets_are_held_to_the_highest_speed() {
-        let mut bench = Bench::new();
+        let mut bench = SpeedBench::new();
         bench.time_to(9999.0, &RAMPS);
         assert_eq!(bench.trajectory.point().velocity, 5000.0);
     }
 
     #[test]
     fn a_motion_from_rest_begins_with_the_start_speed() {
-        let mut bench = Bench::new();
+        let mut bench = SpeedBench::new();
         let ramps = VelocityRamps { start_speed: 70.0, ..RAMPS };
         bench.mode.update(-1000.0, &mut bench.trajectory, &ramps);
         assert_eq!(bench.trajectory.point().velocity, -70.0);
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn no_time_is_a_step() {
-        let mut bench = Bench::new();
+        let mut bench = SpeedBench::new();
         let ramps = VelocityRamps { acceleration: Ramp::NONE, ..RAMPS };
         assert!(bench.time_to(1000.0, &ramps) <= 2e-3);
     }

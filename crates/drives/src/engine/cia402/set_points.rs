@@ -123,12 +123,12 @@ mod tests {
         deceleration: Ramp::Time(0.1),
     };
 
-    struct Bench {
+    struct SetPointBench {
         mode: SetPoints,
         trajectory: Trajectory,
     }
 
-    impl Bench {
+    impl SetPointBench {
         fn new() -> Self {
             Self { mode: SetPoints::resting(0), trajectory: Trajectory::resting(0) }
         }
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn a_set_point_is_acknowledged_until_bit_4_falls() {
-        let mut bench = Bench::new();
+        let mut bench = SetPointBench::new();
         bench.take(1000, false, false);
         bench.run(10, true);
         assert!(bench.mode.is_acknowledged());
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_second_set_point_waits_and_a_third_is_lost() {
-        let mut bench = Bench::new();
+        let mut bench = SetPointBench::new();
         bench.take(1000, false, false);
         bench.take(2000, false, false);
         bench.run(1, false);
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn an_immediate_set_point_replaces_the_move_and_the_queue() {
-        let mut bench = Bench::new();
+        let mut bench = SetPointBench::new();
         bench.take(5000, false, false);
         bench.take(6000, false, false);
         bench.run(500, true);
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn relative_set_points_count_from_the_preceding_target() {
-        let mut bench = Bench::new();
+        let mut bench = SetPointBench::new();
         bench.take(1000, true, false);
         bench.run(300, true);
         bench.take(1000, true, true);
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn clearing_the_position_moves_the_numbers_and_not_the_shaft() {
-        let mut bench = Bench::new();
+        let mut bench = SetPointBench::new();
         bench.take(1000, false, false);
         bench.run(500, true);
         let here = bench.trajectory.point().position;

@@ -12,7 +12,7 @@ use crate::mjoint::assumptions::{INTERPOLATION_PERIODS, SUPERVISION_PERIOD_S};
 use crate::mjoint::homing::switches;
 use crate::mjoint::objects::effects::{Effect, effect};
 use crate::mjoint::objects::*;
-use crate::mjoint::origin::Written;
+use crate::mjoint::origin::OriginWrite;
 use crate::mjoint::parameters::TimeBase;
 use crate::mjoint::variations::ORIGIN_AT_EDGE;
 
@@ -22,8 +22,8 @@ const INTERPOLATION_PERIOD_S: f64 = INTERPOLATION_PERIODS as f64 * SUPERVISION_P
 /// The RPDO whose position waits for SYNC.
 const SYNCHRONOUS_RPDO: u16 = 4;
 
-impl Application<Room> for MJoint {
-    fn device(&mut self) -> &mut Device<Room> {
+impl Application<TableStorage> for MJoint {
+    fn device(&mut self) -> &mut Device<TableStorage> {
         &mut self.device
     }
 
@@ -260,12 +260,12 @@ impl MJoint {
     /// 260Ah: 60006 and then 60016 make the present position the origin, and neither stays.
     fn gear_numerator(&mut self, value: u16) {
         match self.origin.write(value) {
-            Written::Numerator => {
+            OriginWrite::Numerator => {
                 self.parameters_changed = true;
                 return;
             }
-            Written::First => {}
-            Written::Second => self.make_origin(),
+            OriginWrite::First => {}
+            OriginWrite::Second => self.make_origin(),
         }
         let kept = self.origin.gear_numerator();
         self.device.values_mut().set(GEAR_NUMERATOR, kept);

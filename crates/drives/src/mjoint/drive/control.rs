@@ -12,7 +12,7 @@ use crate::mjoint::homing::switches;
 use crate::mjoint::objects::TARGET_VELOCITY;
 use crate::mjoint::parameters::{Parameters, TimeBase};
 use crate::mjoint::power_on::Function;
-use crate::mjoint::protection::Situation;
+use crate::mjoint::protection::FaultSituation;
 use crate::mjoint::variations::STAYS_FREE;
 
 const DT_S: f64 = SUPERVISION_PERIOD_S as f64;
@@ -103,7 +103,7 @@ impl MJoint {
     }
 
     fn watch_alarms(&mut self, sensors: &Sensors) {
-        let situation = Situation {
+        let situation = FaultSituation {
             servo: &self.output.servo,
             live: self.axis.is_engaged(),
             current_a: self.output.shown_current_a().abs() * self.parameters.amplitude,

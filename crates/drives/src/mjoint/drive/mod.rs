@@ -32,7 +32,7 @@ use super::parameters::Parameters;
 use super::power_on::Function;
 use super::protection::Protection;
 use super::rhythm::Rhythm;
-use super::terminals::Terminals;
+use super::terminals::InputTerminals;
 use super::variations::{self, VARIANT};
 use super::{Values, storage};
 use crate::communication::communication;
@@ -65,7 +65,7 @@ const HEARTBEAT_ALARM: u8 = 0x04;
 #[derive(Clone)]
 pub struct MJoint {
     model: &'static Model,
-    device: Device<Room>,
+    device: Device<TableStorage>,
     powered_at: Instant,
     host: HostHeartbeat,
     parameters: Parameters,
@@ -79,7 +79,7 @@ pub struct MJoint {
     output: Output,
     alarms: FaultMonitor<ALARM_COUNT>,
     protection: Protection,
-    terminals: Terminals,
+    terminals: InputTerminals,
     battery: Battery,
     encoder: Encoder,
     rhythm: Rhythm,
@@ -99,7 +99,7 @@ impl MJoint {
     }
 
     /// Motor free, and the values of `device` in effect.
-    fn over(model: &'static Model, device: Device<Room>) -> Self {
+    fn over(model: &'static Model, device: Device<TableStorage>) -> Self {
         let function = Function::from_raw(device.values().get(MODE_SELECTION)).unwrap_or_default();
         let amplitude = variations::amplitude_per_a(device.variant());
         let parameters = Parameters::from(device.values(), model, function, amplitude);
@@ -118,7 +118,7 @@ impl MJoint {
             axis: Axis::new(),
             alarms: FaultMonitor::new(&ALARMS, &alarms::DEBOUNCE),
             protection: Protection::default(),
-            terminals: Terminals::default(),
+            terminals: InputTerminals::default(),
             battery: Battery::Full,
             encoder: Encoder::default(),
             rhythm: Rhythm::default(),
@@ -146,7 +146,7 @@ impl MJoint {
     }
 
     /// The communication side, to look at.
-    pub const fn node(&self) -> &Node<Room> {
+    pub const fn node(&self) -> &Node<TableStorage> {
         self.device.node()
     }
 

@@ -8,7 +8,7 @@ use crate::mjoint::alarms;
 use crate::mjoint::assumptions::{COUNTS_S_PER_RPM, POSITION_REACHED_COUNTS, SPEED_REACHED_RPM, STANDSTILL_RPM};
 use crate::mjoint::hardware::Sensors;
 use crate::mjoint::objects::*;
-use crate::mjoint::statusword::{Condition, statusword};
+use crate::mjoint::statusword::{StatusCondition, statusword};
 
 /// 6078h: 1/2000 A.
 const CURRENT_COUNTS_PER_A: f32 = 2000.0;
@@ -57,7 +57,7 @@ impl MJoint {
     /// The statusword; also right after a command, for a host that reads back.
     pub(super) fn publish_status(&mut self) {
         let in_homing = self.orders.mode == ModeOfOperation::HOMING;
-        let condition = Condition {
+        let condition = StatusCondition {
             controlword: self.orders.controlword,
             output_enabled: self.values().get(OUTPUT_ENABLED) == 1,
             alarm: !self.alarms.latched().is_empty(),

@@ -7,4 +7,4 @@ pub use conditions::CONDITIONS;
 pub use devices::mjoint::objects::*;
 
 /// Room for the values and PDOs of the drive.
-pub type Room = canopen::od::Fixed<ROW_COUNT_1_66>;
+pub type TableStorage = canopen::od::Fixed<ROW_COUNT_1_66>;

@@ -14,8 +14,8 @@ use crate::zlac8030l::restart;
 use crate::zlac8030l::variations::{MODE_NOT_SAVED, SYNC_FEEDS_WATCHDOG};
 use crate::zltech;
 
-impl Application<Room> for Zlac8030l {
-    fn device(&mut self) -> &mut Device<Room> {
+impl Application<TableStorage> for Zlac8030l {
+    fn device(&mut self) -> &mut Device<TableStorage> {
         &mut self.device
     }
 

@@ -17,7 +17,7 @@ use super::faults::{DEBOUNCE, FAULT_COUNT, FAULTS, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use super::objects::*;
 use super::parameters::Parameters;
-use super::protection::{Protection, Situation, is_over_current};
+use super::protection::{FaultSituation, Protection, is_over_current};
 use super::statusword::statusword;
 use super::terminals::{self, TERMINALS};
 use super::variations::{FIRMWARE_2_01, VARIANT};
@@ -47,7 +47,7 @@ static NODE_PROFILE_2_01: NodeProfile =
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]
 pub struct Zlac8030l {
-    device: Device<Room>,
+    device: Device<TableStorage>,
     dip_address: u8,
     parameters: Parameters,
     shell: Shell<2>,
@@ -82,7 +82,7 @@ impl Zlac8030l {
     }
 
     /// Motor free, position 0, and the values of `device` in effect.
-    fn over(mut device: Device<Room>) -> Self {
+    fn over(mut device: Device<TableStorage>) -> Self {
         let parameters = Parameters::of(device.values(), device.variant());
         // 202F:05 acts from a restart on (5.3).
         let resolution = device.values().get(VELOCITY_RESOLUTION);
@@ -122,7 +122,7 @@ impl Zlac8030l {
     }
 
     /// The communication side, to look at.
-    pub const fn node(&self) -> &Node<Room> {
+    pub const fn node(&self) -> &Node<TableStorage> {
         self.device.node()
     }
 
@@ -181,7 +181,7 @@ impl Zlac8030l {
 
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
         self.device.set_eeprom_ok(sensors.eeprom_ok);
-        let situation = Situation {
+        let situation = FaultSituation {
             servo: &self.servo,
             demand: &self.shell.demand,
             position: self.position(),

@@ -7,4 +7,4 @@ pub use conditions::{ABSOLUTE_TARGET_LIMIT, CONDITIONS};
 pub use devices::zltech::zlac8030l::objects::*;
 
 /// Room for the values and PDOs of the drive.
-pub type Room = canopen::od::Fixed<ROW_COUNT_2_01>;
+pub type TableStorage = canopen::od::Fixed<ROW_COUNT_2_01>;

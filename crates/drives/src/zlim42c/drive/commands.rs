@@ -14,8 +14,8 @@ use crate::zlim42c::restart;
 use crate::zlim42c::variations::FAULTS_STAY;
 use crate::zltech;
 
-impl Application<Room> for Zlim42c {
-    fn device(&mut self) -> &mut Device<Room> {
+impl Application<TableStorage> for Zlim42c {
+    fn device(&mut self) -> &mut Device<TableStorage> {
         &mut self.device
     }
 

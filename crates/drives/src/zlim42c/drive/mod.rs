@@ -16,7 +16,7 @@ use super::faults::{DEBOUNCE, FAULT_COUNT, FAULTS, FLASHES, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use super::objects::*;
 use super::parameters::Parameters;
-use super::protection::{PhaseWatch, Situation, causes, is_over_current};
+use super::protection::{FaultSituation, PhaseWatch, causes, is_over_current};
 use super::statusword::{self, statusword};
 use super::terminals::{self, TERMINALS};
 use super::variations::VARIANT;
@@ -39,7 +39,7 @@ pub static NODE_PROFILE: NodeProfile = communication(&devices::zltech::ZLIM42C);
 /// The firmware of a ZLIM42-C.
 #[derive(Clone)]
 pub struct Zlim42c {
-    device: Device<Room>,
+    device: Device<TableStorage>,
     dip_address: u8,
     parameters: Parameters,
     shell: Shell<4>,
@@ -66,7 +66,7 @@ impl Zlim42c {
     }
 
     /// Motor free, position 0, and the values of `device` in effect.
-    fn over(device: Device<Room>) -> Self {
+    fn over(device: Device<TableStorage>) -> Self {
         Self {
             parameters: Parameters::of(device.values(), device.variant()),
             device,
@@ -112,7 +112,7 @@ impl Zlim42c {
     }
 
     /// The communication side, to look at.
-    pub const fn node(&self) -> &Node<Room> {
+    pub const fn node(&self) -> &Node<TableStorage> {
         self.device.node()
     }
 
@@ -154,7 +154,7 @@ impl Zlim42c {
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
         self.device.set_eeprom_ok(sensors.eeprom_ok);
         let (peaks, speed_rpm) = (self.stepper.take_peaks(), self.velocity_rpm());
-        let situation = Situation {
+        let situation = FaultSituation {
             bus_a: core::mem::take(&mut self.bus_a),
             phase_lost: self.phases.observe(&peaks, self.stepper.reference_a(), speed_rpm),
             eeprom_sound: self.device.is_eeprom_sound(),
@@ -251,8 +251,13 @@ impl Zlim42c {
         let status = self.shell.status(&self.parameters.axis);
         let (state, mode) = (self.shell.axis.state(), self.shell.axis.mode());
         let energised = self.shell.is_energised(self.parameters.axis.external_stop, self.parameters.holding);
-        let word =
-            statusword(statusword::Condition { state, mode, controlword: self.controlword, energised, axis: status });
+        let word = statusword(statusword::StatusCondition {
+            state,
+            mode,
+            controlword: self.controlword,
+            energised,
+            axis: status,
+        });
         let conditions = Conditions {
             alarm: state == PowerState::Fault,
             enabled: self.shell.axis.is_live(),

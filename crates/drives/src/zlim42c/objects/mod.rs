@@ -5,4 +5,4 @@ pub mod effects;
 pub use devices::zltech::zlim42c::objects::*;
 
 /// Room for the values and PDOs of the drive.
-pub type Room = canopen::od::Fixed<ROW_COUNT>;
+pub type TableStorage = canopen::od::Fixed<ROW_COUNT>;

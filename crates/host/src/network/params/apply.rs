@@ -137,7 +137,7 @@ impl Transaction {
         let journal = || Journal { node: id, identity: plan.identity, undo: plan.undo() };
         let kept = self.journal.as_deref().map(|path| Kept::create(path, &journal(), self.on_kept)).transpose()?;
         let done = |kept: Option<Kept>| kept.map_or(Ok(()), Kept::remove);
-        let show = |number: usize, step: &master::parameters::Step| {
+        let show = |number: usize, step: &master::parameters::ParameterStep| {
             let name = name(model, step.object).unwrap_or_default();
             progress.count(format!("node {id}: {number} of {}: {} {name}", plan.steps.len(), step.object));
         };

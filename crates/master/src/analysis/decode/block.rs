@@ -33,11 +33,11 @@ pub(super) struct Block {
     confirmed: Vec<u8>,
     /// Bytes of the block that is being sent, whole segments.
     block: Vec<u8>,
-    phase: Phase,
+    phase: BlockPhase,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
+enum BlockPhase {
     /// The other side has not answered yet.
     Asked,
     /// Segments come; the last one has been seen if so.
@@ -73,7 +73,7 @@ impl Block {
             checked: raw[0] & HAS_CHECKSUM != 0,
             confirmed: Vec::new(),
             block: Vec::new(),
-            phase: Phase::Asked,
+            phase: BlockPhase::Asked,
         })
     }
 
@@ -90,7 +90,7 @@ impl Block {
     /// The next frame of either side.
     pub(super) fn step(&mut self, from: Side, raw: &[u8; LENGTH]) -> BlockStep {
         let sends = (from == Side::Client) == self.writes;
-        if sends && self.phase == (Phase::Segments { last: false }) && raw[0] != ABORT {
+        if sends && self.phase == (BlockPhase::Segments { last: false }) && raw[0] != ABORT {
             return self.segment(raw);
         }
         let specifier = raw[0] >> 5;
@@ -99,7 +99,7 @@ impl Block {
                 self.answer(raw)
             }
             (Side::Client, false, UPLOAD, 0b11) => {
-                self.phase = Phase::Segments { last: false };
+                self.phase = BlockPhase::Segments { last: false };
                 Goes(SdoStep::BlockAgreed(self.mux))
             }
             (Side::Server, true, DOWNLOAD_REPLY, 0b10) | (Side::Client, false, UPLOAD, 0b10) => self.confirm(raw[1]),
@@ -116,7 +116,7 @@ impl Block {
     fn answer(&mut self, raw: &[u8; LENGTH]) -> BlockStep {
         self.checked &= raw[0] & HAS_CHECKSUM != 0;
         if self.writes {
-            self.phase = Phase::Segments { last: false };
+            self.phase = BlockPhase::Segments { last: false };
             return Goes(SdoStep::BlockAgreed(self.mux));
         }
         self.size = size_of(raw);
@@ -131,7 +131,7 @@ impl Block {
         }
         self.block.extend_from_slice(&raw[1..]);
         if raw[0] & LAST != 0 {
-            self.phase = Phase::Segments { last: true };
+            self.phase = BlockPhase::Segments { last: true };
         }
         Goes(SdoStep::BlockSegment(self.mux, number, self.confirmed.len() + self.block.len()))
     }
@@ -144,8 +144,8 @@ impl Block {
         }
         self.block.clear();
         // What was not confirmed comes again, the last segment too.
-        let last = all && self.phase == (Phase::Segments { last: true });
-        self.phase = Phase::Segments { last };
+        let last = all && self.phase == (BlockPhase::Segments { last: true });
+        self.phase = BlockPhase::Segments { last };
         Goes(SdoStep::BlockConfirmed(self.mux, number))
     }
 
@@ -156,7 +156,7 @@ impl Block {
         if whole {
             self.confirmed.truncate(self.confirmed.len().saturating_sub(unused));
         }
-        self.phase = Phase::Ending;
+        self.phase = BlockPhase::Ending;
         let (said, found) = (u16::from_le_bytes([raw[1], raw[2]]), checksum(&self.confirmed));
         if self.checked && whole && said != found {
             return Goes(SdoStep::BadChecksum { mux: self.mux, said, found });

@@ -65,7 +65,7 @@ struct Known {
 /// The bounds of all frames of a bus, in their order.
 pub fn response_times(frames: &[Queued], bitrate: Bitrate, errors: Option<ErrorRate>) -> Vec<Bound> {
     let bit_ns = bitrate.bit_nanos();
-    let bus = Bus {
+    let bus = LoadedBus {
         bit_ns,
         error_ns: errors.map(|ErrorRate(every)| nanos(every).max(1)),
         frames: frames.iter().map(|frame| Sent::new(frame, bit_ns)).collect(),
@@ -137,13 +137,13 @@ impl<'a> Sent<'a> {
     }
 }
 
-struct Bus<'a> {
+struct LoadedBus<'a> {
     bit_ns: u64,
     error_ns: Option<u64>,
     frames: Vec<Sent<'a>>,
 }
 
-impl Bus<'_> {
+impl LoadedBus<'_> {
     /// Longest time from a frame's being offered to its last bit, jitter included, and what of it is the wait; `None` if there
     /// is no bound.
     fn response(&self, number: usize, known: &[Known]) -> Option<(u64, u64)> {

@@ -9,7 +9,7 @@ pub(super) enum Rest<F: Resting> {
     /// They are. From this time on it is worth a look whether they have to be.
     Awake { look_at: Instant },
     /// They are, for a whole round, while nothing may change.
-    Watching(Box<Watch<F>>),
+    Watching(Box<RestWatch<F>>),
     /// They are not, until the machine is disturbed.
     Resting(LeftOut<F>),
 }
@@ -27,7 +27,7 @@ pub(super) struct LeftOut<F: Resting> {
 
 /// A round under way.
 #[derive(Clone)]
-pub(super) struct Watch<F: Resting> {
+pub(super) struct RestWatch<F: Resting> {
     /// The firmware as it was at the beginning.
     before: F,
     sensors: Option<F::Sensors>,
@@ -55,7 +55,7 @@ impl<F: Resting> Rest<F> {
     }
 }
 
-impl<F: Resting> Watch<F> {
+impl<F: Resting> RestWatch<F> {
     /// Begins, with what the pins do now.
     pub(super) fn begin(firmware: &F, actuation: &F::Actuation) -> Self {
         let (before, actuation) = (firmware.clone(), actuation.clone());

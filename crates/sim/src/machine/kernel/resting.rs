@@ -13,7 +13,7 @@ use can::{Instant, Station};
 use drives::{Firmware, Resting};
 
 use super::assembly::Assembly;
-use super::rest::{LeftOut, Rest, Watch};
+use super::rest::{LeftOut, Rest, RestWatch};
 use super::{Life, Machine, Supply};
 
 /// From the last disturbance, or from a look in vain, to the next look. A look costs as much as some ten control periods.
@@ -117,7 +117,7 @@ impl<A: Assembly> Machine<A> {
             _ if !still => return,
             (Life::Dead, Supply::Off, _) => from_now(None),
             (Life::Running, Supply::On, Rest::Awake { .. }) => {
-                Rest::Watching(Box::new(Watch::begin(&self.firmware, &self.actuation)))
+                Rest::Watching(Box::new(RestWatch::begin(&self.firmware, &self.actuation)))
             }
             (Life::Running, Supply::On, Rest::Watching(watch)) => {
                 let Some(sensors) = watch.end(&self.firmware, self.next_tick) else { return };

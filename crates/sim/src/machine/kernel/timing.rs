@@ -45,19 +45,19 @@ const MAILBOXES: usize = 16;
 pub(crate) struct OwnTime {
     timing: Timing,
     prng: Prng,
-    waiting: VecDeque<Waiting>,
+    waiting: VecDeque<WaitingFrame>,
     pub(crate) chip: Chip,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Waiting {
+struct WaitingFrame {
     frame: Frame,
-    kind: Kind,
+    kind: MailboxKind,
     due: Instant,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum MailboxKind {
     /// To the SDO server.
     Request,
     /// RPDO, SYNC, and whatever else is not handled by the operating system.
@@ -94,17 +94,17 @@ impl OwnTime {
     pub(crate) fn take_in(&mut self, frame: &Frame, now: Instant) -> Option<Frame> {
         let kind = kind(frame);
         let span = match kind {
-            Kind::Management => return Some(*frame),
-            Kind::Request => self.timing.sdo_answer,
-            Kind::Process => self.timing.pdo_reaction,
+            MailboxKind::Management => return Some(*frame),
+            MailboxKind::Request => self.timing.sdo_answer,
+            MailboxKind::Process => self.timing.pdo_reaction,
         };
         let due = now.plus_nanos(self.draw(&span));
         // What came first is taken first, however the dice fall; and a request when the answer to the one before is out.
-        let pause_ns = if kind == Kind::Request { u64::from(span.least_us) * 1_000 } else { 0 };
+        let pause_ns = if kind == MailboxKind::Request { u64::from(span.least_us) * 1_000 } else { 0 };
         let before = self.waiting.iter().filter(|other| other.kind == kind).map(|other| other.due).max();
         let due = before.map_or(due, |before| before.plus_nanos(pause_ns).max(due));
         if self.waiting.len() < MAILBOXES {
-            self.waiting.push_back(Waiting { frame: *frame, kind, due });
+            self.waiting.push_back(WaitingFrame { frame: *frame, kind, due });
         }
         None
     }
@@ -150,15 +150,15 @@ impl OwnTime {
 }
 
 /// By the predefined connection set (CiA 301, 7.3.5).
-fn kind(frame: &Frame) -> Kind {
+fn kind(frame: &Frame) -> MailboxKind {
     let id = frame.id();
     if id.is_extended() {
-        return Kind::Process;
+        return MailboxKind::Process;
     }
     match id.raw() {
-        0 | 0x700.. => Kind::Management,
-        raw if raw & !0x7F == u32::from(SDO_REQUEST_BASE) => Kind::Request,
-        _ => Kind::Process,
+        0 | 0x700.. => MailboxKind::Management,
+        raw if raw & !0x7F == u32::from(SDO_REQUEST_BASE) => MailboxKind::Request,
+        _ => MailboxKind::Process,
     }
 }
 

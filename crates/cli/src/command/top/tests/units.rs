@@ -26,7 +26,7 @@ const MACHINE: &str = "[[drive]]\nmodel = 'cia402'\nnode = 1\nunits = { gear_rat
 const COUNTS_PER_TURN: f64 = 131_072.0 * 50.0;
 
 #[derive(Parser)]
-struct Line {
+struct GlobalArguments {
     #[command(flatten)]
     global: Global,
 }
@@ -101,7 +101,7 @@ fn the_units_of_a_machine_file_count_in_the_studio_and_in_top() {
     let folder = scratch("top_units");
     let file = folder.join("machine.toml");
     std::fs::write(&file, MACHINE).expect("written");
-    let line = Line::parse_from(["ferrodrive", "--bus", &format!("sim:{}", file.display())]);
+    let line = GlobalArguments::parse_from(["ferrodrive", "--bus", &format!("sim:{}", file.display())]);
     let ended = session::run(&line.global, async |context| {
         context.traffic.listen();
         let (host, app) = Host::new(context.network.clone(), setting(context));
