@@ -11,6 +11,7 @@ mod dependencies;
 mod exceptions;
 mod finding;
 mod manifests;
+mod paths;
 mod sizes;
 mod source;
 mod text;
@@ -74,7 +75,9 @@ fn findings() -> Result<Vec<Finding>, String> {
         // A file that is listed but deleted, or that is not text, has no style.
         let Ok(text) = std::fs::read_to_string(workspace::root().join(&path)) else { continue };
         TEXT_RULES.iter().for_each(|rule| found.extend(rule(&path, &text)));
-        found.extend(manifests::of_crates(&path, &text, |path| workspace::root().join(path).exists()));
+        let exists = |path: &str| workspace::root().join(path).exists();
+        found.extend(manifests::of_crates(&path, &text, exists));
+        found.extend(paths::of_page(&path, &text, exists));
         if path.ends_with(".rs") {
             let source = Source::new(&path, &text);
             SOURCE_RULES.iter().for_each(|rule| found.extend(rule(&source)));

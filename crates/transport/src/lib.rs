@@ -7,7 +7,7 @@
 //! - [`run_station`] drives a passive [`can::Station`] on a bus, [`run_world`] a virtual world behind a hub.
 //! - [`socketcand`], [`slcan`], [`cannelloni`] and [`udp_multicast`] are the wire formats, as pure codecs that any other program may use.
 //!
-//! This crate holds the only clock ([`WallClock`]) and the only sockets of the project. Everything else is sans-IO.
+//! This crate holds the only clock ([`WallClock`]) and the sockets of all buses. Below the programs everything else is sans-IO.
 //!
 //! A bus that is served, and a program that reaches it:
 //!
