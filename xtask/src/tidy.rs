@@ -67,9 +67,11 @@ pub(crate) fn step() -> Tally {
 }
 
 fn findings() -> Result<Vec<Finding>, String> {
-    let mut found = dependencies::directions(&workspace::packages()?, |folder| {
+    let packages = workspace::packages()?;
+    let mut found = dependencies::directions(&packages, |folder| {
         std::fs::read_to_string(workspace::root().join(folder).join("Cargo.toml")).unwrap_or_default()
     });
+    found.extend(dependencies::allowances(&packages));
     let (mut sources, mut python) = (Vec::new(), Vec::new());
     for path in tracked_files()? {
         // A file that is listed but deleted, or that is not text, has no style.
