@@ -14,7 +14,7 @@ use sim::machine::Order;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Place, Report, StationId, World};
 
-use super::datagram::{Pattern, bytes, frame, hex};
+use super::datagram::{Pattern, hex};
 use super::error::Error;
 use super::expect::Expect;
 use super::row::Row;
@@ -34,6 +34,10 @@ const TALKING_INTERVAL: Duration = Duration::from_millis(100);
 /// Longest wait for an answer; the drives answer within a millisecond or two.
 const ANSWER_TIME: Duration = Duration::from_millis(50);
 
+/// Identifiers of what is asked of an SDO server, and of its answers, without the node-ID (CiA 301, predefined connection set).
+const REQUESTS: u16 = 0x600;
+const ANSWERS: u16 = 0x580;
+
 const SAMPLING_PERIOD: Duration = Duration::from_millis(5);
 
 /// See the [module](self).
@@ -44,10 +48,12 @@ pub(super) struct Bench {
     world: World,
     adapter: StationId,
     heard: Vec<(Instant, Frame)>,
-    section: &'static str,
+    /// How many of them were waited for, or came before the last request.
+    listed: usize,
+    section: String,
     progress: Progress,
     rows: Vec<Row>,
-    sections: Vec<(Instant, &'static str, &'static str)>,
+    sections: Vec<(Instant, String, String)>,
     events: Vec<Event>,
     set_points: SetPoints,
     starts: Vec<Start>,
@@ -89,7 +95,7 @@ pub(super) struct Finished {
     pub(super) rows: Vec<Row>,
     pub(super) recorder: Recorder,
     /// Begin, number and name of each section.
-    pub(super) sections: Vec<(Instant, &'static str, &'static str)>,
+    pub(super) sections: Vec<(Instant, String, String)>,
     pub(super) events: Vec<Event>,
     pub(super) set_points: SetPoints,
     pub(super) starts: Vec<Start>,
@@ -131,7 +137,8 @@ impl Bench {
             world,
             adapter,
             heard: Vec::new(),
-            section: "",
+            listed: 0,
+            section: String::new(),
             progress,
             rows: Vec::new(),
             sections: Vec::new(),
@@ -163,9 +170,9 @@ impl Bench {
     }
 
     /// Begins a section of the manual.
-    pub(super) fn section(&mut self, number: &'static str, name: &'static str) {
-        self.section = number;
-        self.sections.push((self.world.now(), number, name));
+    pub(super) fn section(&mut self, number: &str, name: &str) {
+        number.clone_into(&mut self.section);
+        self.sections.push((self.world.now(), number.into(), name.into()));
         (self.progress)(&format!("{}: {number} {name}", self.model().title));
     }
 
@@ -194,80 +201,81 @@ impl Bench {
 
     /// Begins a row without a datagram.
     pub(super) fn step(&mut self, step: impl Into<String>) {
-        self.rows.push(Row::new(self.section, step));
+        self.rows.push(Row::new(self.section.as_str(), step));
     }
 
     /// Begins a row without a datagram that belongs to another section.
-    pub(super) fn step_in(&mut self, section: &'static str, step: impl Into<String>) {
+    pub(super) fn step_in(&mut self, section: &str, step: impl Into<String>) {
         self.rows.push(Row::new(section, step));
     }
 
-    /// Begins a row: sends a datagram to the drive's SDO server, and compares the answer with the one that is wanted.
-    /// Fewer than eight bytes of it, as some manuals print them, stand for zeros after them.
-    pub(super) fn ask(&mut self, step: impl Into<String>, request: &str, reply: &str) {
-        let reply = Pattern::sdo(reply);
-        self.ask_for(step, request, &reply, &reply.expectation());
+    /// Begins a row: sends a frame, and gives it and what it does some time, which is none where an answer is waited for.
+    pub(super) fn request(&mut self, step: impl Into<String>, frame: Frame, time: Duration) {
+        self.step(step);
+        self.row().asked = self.shown(&frame);
+        self.ask(frame);
+        if !time.is_zero() {
+            self.run_silently(time);
+        }
+    }
+
+    /// Waits for the frame that answers, and compares it in the row. `strict`: it is the next one that is heard, not the
+    /// next one with its identifier.
+    pub(super) fn hear(&mut self, expected: &Pattern, strict: bool) -> Option<Frame> {
+        let answered = self.next_heard((!strict).then_some(expected.id));
+        let is_sdo = !strict && expected.id == ANSWERS + u16::from(self.node());
+        let whole = format!("{:03X}#{}", expected.id, expected.data());
+        let shown = |frame: Frame| if strict { frame.to_string() } else { self.shown(&frame) };
+        let seen = answered.map_or_else(|| "nothing".into(), shown);
+        let ok = answered.is_some_and(|frame| expected.fits(&frame));
+        let row = self.row();
+        row.answered.clone_from(&seen);
+        match (is_sdo, ok) {
+            (true, true) => row.compare(expected.meaning(), "same", true),
+            (true, false) => row.compare(expected.data(), seen, false),
+            (false, true) => row.compare(whole, "same", true),
+            (false, false) => row.compare(whole, seen, false),
+        }
+        answered
+    }
+
+    /// Begins a row: a request and its answer.
+    pub(super) fn exchange(&mut self, step: impl Into<String>, request: &str, reply: &str) {
+        match (request.parse(), Pattern::parse(reply)) {
+            (Ok(request), Some(reply)) => {
+                self.request(step, request, Duration::ZERO);
+                self.hear(&reply, false);
+            }
+            _ => self.compare("two frames", format!("{request}, {reply}"), false),
+        }
     }
 
     /// Begins a row: writes an object, with the length that it has, and expects that the drive takes the value.
     pub(super) fn write(&mut self, step: impl Into<String>, index: u16, sub_index: u8, value: i64) {
-        let size = self.object(index, sub_index).map_or(4, |row| row.data_type.size());
+        let size = self.object(index, sub_index).map_or(4, |row| row.data_type.size()).clamp(1, 4);
         let [low, high] = index.to_le_bytes();
-        let mut request = [0x23 | (4 - size.clamp(1, 4) as u8) << 2, low, high, sub_index, 0, 0, 0, 0];
-        let raw = value.to_le_bytes();
-        request[4..4 + size.clamp(1, 4)].copy_from_slice(&raw[..size.clamp(1, 4)]);
-        let reply = Pattern::sdo(&hex(&[0x60, low, high, sub_index]));
-        self.ask_for(step, &hex(&request), &reply, "written");
-    }
-
-    fn ask_for(&mut self, step: impl Into<String>, request: &str, reply: &Pattern, expected: &str) {
-        self.step(step);
-        let request = bytes(request);
-        let answered = self.exchange(&request);
-        let text = answered.map_or_else(|| "nothing".into(), |data| hex(&data));
-        let ok = answered.is_some_and(|data| reply.fits(&data));
+        let mut request = [0x23 | (4 - size as u8) << 2, low, high, sub_index, 0, 0, 0, 0];
+        request[4..4 + size].copy_from_slice(&value.to_le_bytes()[..size]);
+        self.request(step, self.sdo(&request), Duration::ZERO);
+        let answered = self.next_heard(Some(ANSWERS + u16::from(self.node())));
+        let seen = answered.map_or_else(|| "nothing".into(), |frame| self.shown(&frame));
+        let ok = answered.is_some_and(|frame| *frame.padded() == [0x60, low, high, sub_index, 0, 0, 0, 0]);
         let row = self.row();
-        row.asked = hex(&request);
-        row.answered.clone_from(&text);
-        if ok {
-            row.compare(expected, "same", true);
-        } else {
-            row.compare(reply.text(), text, false);
-        }
+        row.answered.clone_from(&seen);
+        row.compare(
+            if ok { "written".into() } else { hex(&[0x60, low, high, sub_index, 0, 0, 0, 0]) },
+            if ok { "same" } else { &seen },
+            ok,
+        );
     }
 
-    /// Begins a row: sends a datagram that is not an SDO request, and compares the one that answers it. Both are given
-    /// as the identifier and the bytes, `..` being any byte.
-    pub(super) fn exchange_pdo(&mut self, step: impl Into<String>, request: &str, reply: &str) -> Option<Frame> {
-        self.step(step);
-        let (id, data) = reply.split_once(' ').unwrap_or((reply, ""));
-        let id = u16::from_str_radix(id, 16).unwrap_or_default();
-        let pattern = Pattern::new(data);
-        let request = frame(request);
-        let answered = self.await_frame(request, id);
-        let text = answered.map_or_else(|| "nothing".into(), |frame| frame.to_string());
-        let ok = answered.is_some_and(|frame| pattern.fits(frame.data()));
-        let row = self.row();
-        row.asked = request.to_string();
-        row.answered.clone_from(&text);
-        row.compare(format!("{id:03X}#{}", pattern.text()), if ok { "same".into() } else { text }, ok);
-        answered
-    }
-
-    /// Sends a datagram to the drive's SDO server within a row that speaks of something else.
-    pub(super) fn send_sdo(&mut self, request: &str) {
-        let answered = self.exchange(&bytes(request));
-        if answered.is_none_or(|reply| reply[0] == 0x80) {
+    /// Sends a request to the drive's SDO server within a row that speaks of something else.
+    pub(super) fn send_within(&mut self, request: Frame) {
+        self.ask(request);
+        let answered = self.next_heard(Some(ANSWERS + u16::from(self.node())));
+        if answered.is_none_or(|reply| reply.padded()[0] == 0x80) {
             self.row().compare("an answer", "refused, or none", false);
         }
-    }
-
-    /// Sends a frame that has no answer, within the row.
-    pub(super) fn send(&mut self, frame: Frame) {
-        self.row().asked = frame.to_string();
-        self.transmit(frame);
-        self.world.run_for(Duration::from_millis(2));
-        self.listen();
     }
 
     /// Says in the row what was asked.
@@ -367,7 +375,8 @@ impl Bench {
     /// Reads an object; `None` if the drive refuses or is silent.
     pub(super) fn read(&mut self, index: u16, sub_index: u8) -> Option<i64> {
         let [low, high] = index.to_le_bytes();
-        let reply = self.exchange(&[0x40, low, high, sub_index, 0, 0, 0, 0])?;
+        self.ask(self.sdo(&[0x40, low, high, sub_index, 0, 0, 0, 0]));
+        let reply = *self.next_heard(Some(ANSWERS + u16::from(self.node())))?.padded();
         let row = self.object(index, sub_index)?;
         let is_upload = reply[0] >> 5 == 2 && reply[1..4] == [low, high, sub_index];
         let raw = u32::from_le_bytes([reply[4], reply[5], reply[6], reply[7]]);
@@ -400,11 +409,10 @@ impl Bench {
         self.report().outputs.iter().any(|(output, on)| output == name && on)
     }
 
-    /// Does something to the machine around the drive, in the words of `ferrodrive sim`.
+    /// Does something to the machine around a drive: a command of `ferrodrive sim`.
     pub(super) fn machine(&mut self, command: &str) {
-        let line = format!("{} {command}", self.node());
         let refused =
-            sim::command::answer(&mut self.world, &line).filter(|answer| !answer.json.contains("\"ok\":true"));
+            sim::command::answer(&mut self.world, command).filter(|answer| !answer.json.contains("\"ok\":true"));
         if let Some(answer) = refused {
             self.row().compare(format!("the machine takes '{command}'"), answer.json, false);
         }
@@ -453,6 +461,22 @@ impl Bench {
         self.heard.iter().filter(wanted).copied().collect()
     }
 
+    /// The first frame that no line has waited for since the last request.
+    pub(super) fn unlisted(&self) -> Option<Frame> {
+        self.heard.get(self.listed).map(|(_, frame)| *frame)
+    }
+
+    /// Nothing that was heard until now is waited for.
+    pub(super) fn forget(&mut self) {
+        self.listed = self.heard.len();
+    }
+
+    /// What was seen instead, if something in the last row is not as expected.
+    pub(super) fn difference(&self) -> Option<String> {
+        let differing = self.rows.last()?.checks.iter().find(|check| !check.ok)?;
+        Some(differing.seen.clone())
+    }
+
     /// When the first frame with this identifier was heard from `begin` on; `None` if none was.
     pub(super) fn heard_after(&self, begin: Instant, id: u16) -> Option<Instant> {
         let latest = self.heard.iter().rev().take_while(|(at, _)| *at >= begin);
@@ -475,34 +499,52 @@ impl Bench {
 
     fn row(&mut self) -> &mut Row {
         if self.rows.is_empty() {
-            self.rows.push(Row::new(self.section, ""));
+            self.rows.push(Row::new(self.section.as_str(), ""));
         }
         let last = self.rows.len() - 1;
         &mut self.rows[last]
     }
 
-    fn exchange(&mut self, request: &[u8]) -> Option<[u8; 8]> {
-        self.set_points.note(request, self.world.now());
-        let node = u16::from(self.node());
-        let request = Frame::new(CanId::standard(0x600 + node), request);
-        self.await_frame(request, 0x580 + node).map(|frame| *frame.padded())
+    /// A request to the SDO server of the drive.
+    fn sdo(&self, request: &[u8]) -> Frame {
+        Frame::new(CanId::standard(REQUESTS + u16::from(self.node())), request)
     }
 
-    /// Sends a frame and waits for the first one with an identifier.
-    fn await_frame(&mut self, request: Frame, id: u16) -> Option<Frame> {
+    /// As the table shows it: what is said to the drive's SDO server, and by it, by its bytes alone.
+    fn shown(&self, frame: &Frame) -> String {
+        let node = u16::from(self.node());
+        match frame.standard_data_id() {
+            Some(id) if id == REQUESTS + node => hex(frame.data()),
+            Some(id) if id == ANSWERS + node => hex(frame.padded()),
+            _ => frame.to_string(),
+        }
+    }
+
+    /// Sends a frame; what was heard before does not answer it.
+    fn ask(&mut self, request: Frame) {
+        if request.standard_data_id() == Some(REQUESTS + u16::from(self.node())) {
+            self.set_points.note(request.data(), self.world.now());
+        }
         self.listen();
-        let before = self.heard.len();
+        self.listed = self.heard.len();
         self.transmit(request);
+    }
+
+    /// The next frame that was not listed yet, or the next one with an identifier.
+    fn next_heard(&mut self, id: Option<u16>) -> Option<Frame> {
         let limit = self.world.now() + ANSWER_TIME;
-        while self.world.now() < limit && self.world.next_event().is_some_and(|at| at <= limit) {
+        loop {
+            let wanted = |(_, frame): &(Instant, Frame)| id.is_none_or(|id| frame.standard_data_id() == Some(id));
+            if let Some(place) = self.heard[self.listed..].iter().position(wanted) {
+                self.listed += place + 1;
+                return Some(self.heard[self.listed - 1].1);
+            }
+            if self.world.now() >= limit || self.world.next_event().is_none_or(|at| at > limit) {
+                return None;
+            }
             self.world.step();
             self.listen();
-            let is_it = |(_, frame): &&(Instant, Frame)| frame.standard_data_id() == Some(id);
-            if let Some((_, frame)) = self.heard[before..].iter().find(is_it) {
-                return Some(*frame);
-            }
         }
-        None
     }
 
     fn listen(&mut self) {

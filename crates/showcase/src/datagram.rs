@@ -1,57 +1,59 @@
-//! Datagrams as manuals print them: bytes in hexadecimal with blanks between, and patterns of the answers.
+//! Datagrams in candump's notation, and patterns of those that answer them: `604#2F60600003000000`, `481#........3704`.
 
-use can::{CanId, Frame};
+use can::Frame;
 
-/// The bytes of an SDO: an answer always has eight.
-const SDO_BYTES: usize = 8;
-
-/// Bytes that a datagram must have; `None` is any byte.
+/// A frame that is expected: its identifier, and its bytes, of which `..` is any.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Pattern(Vec<Option<u8>>);
+pub(super) struct Pattern {
+    pub(super) id: u16,
+    bytes: Vec<Option<u8>>,
+}
 
 impl Pattern {
-    /// From text: `37 04 .. ..`, where `..` is any byte.
-    pub(super) fn new(text: &str) -> Self {
-        Self(pairs(text).map(|pair| u8::from_str_radix(&pair, 16).ok()).collect())
+    /// From text; `None` if it is not a pattern.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let (id, data) = text.split_once('#')?;
+        let pairs = (0..data.len()).step_by(2).map(|at| data.get(at..at + 2));
+        let byte = |pair: Option<&str>| match pair? {
+            ".." => Some(None),
+            digits => u8::from_str_radix(digits, 16).ok().map(Some),
+        };
+        Some(Self { id: u16::from_str_radix(id, 16).ok()?, bytes: pairs.map(byte).collect::<Option<_>>()? })
     }
 
-    /// An answer of an SDO server, filled up with zeros where fewer bytes are printed.
-    pub(super) fn sdo(text: &str) -> Self {
-        let Self(mut bytes) = Self::new(text);
-        bytes.resize(bytes.len().max(SDO_BYTES), Some(0));
-        Self(bytes)
+    /// Whether a frame is so.
+    pub(super) fn fits(&self, frame: &Frame) -> bool {
+        let data = frame.data();
+        let same = |(expected, byte): (&Option<u8>, &u8)| expected.is_none_or(|it| it == *byte);
+        frame.standard_data_id() == Some(self.id)
+            && self.bytes.len() == data.len()
+            && self.bytes.iter().zip(data).all(same)
     }
 
-    /// Whether `data` is so.
-    pub(super) fn fits(&self, data: &[u8]) -> bool {
-        self.0.len() == data.len() && self.0.iter().zip(data).all(|(wanted, byte)| wanted.is_none_or(|it| it == *byte))
-    }
-
-    /// In hexadecimal.
-    pub(super) fn text(&self) -> String {
-        self.0.iter().map(|byte| byte.map_or_else(|| "..".into(), |byte| format!("{byte:02X}"))).collect()
+    /// The bytes in hexadecimal.
+    pub(super) fn data(&self) -> String {
+        self.bytes.iter().map(|byte| byte.map_or_else(|| "..".into(), |byte| format!("{byte:02X}"))).collect()
     }
 
     /// What an SDO answer of this pattern means for the reader of a table.
-    pub(super) fn expectation(&self) -> String {
-        match self.0[..] {
+    pub(super) fn meaning(&self) -> String {
+        match self.bytes[..] {
             [Some(0x80), _, _, _, Some(a), Some(b), Some(c), Some(d)] => {
                 format!("abort {:04X} {:04X}h", u16::from_le_bytes([c, d]), u16::from_le_bytes([a, b]))
             }
-            _ => self.text(),
+            _ => self.data(),
         }
     }
-}
 
-/// The bytes of a datagram as printed: `2F 60 60 00 03 00 00 00`. Blanks may be left out.
-pub(super) fn bytes(text: &str) -> Vec<u8> {
-    pairs(text).map(|pair| u8::from_str_radix(&pair, 16).unwrap_or_default()).collect()
-}
-
-/// A frame as printed: `201 2F 00 01 50 C3 00 00`.
-pub(super) fn frame(text: &str) -> Frame {
-    let (id, data) = text.split_once(' ').unwrap_or((text, ""));
-    Frame::new(CanId::standard(u16::from_str_radix(id, 16).unwrap_or_default()), &bytes(data))
+    /// The bytes of a frame that stand where the pattern leaves them open, as a number: little-endian and signed.
+    pub(super) fn open_number(&self, frame: &Frame) -> i64 {
+        let open = self.bytes.iter().zip(frame.data()).filter(|(expected, _)| expected.is_none());
+        let bytes: Vec<u8> = open.map(|(_, byte)| *byte).collect();
+        let fill = if bytes.last().is_some_and(|byte| byte & 0x80 != 0) { 0xFF } else { 0 };
+        let mut wide = [fill; 8];
+        wide.iter_mut().zip(bytes).for_each(|(to, from)| *to = from);
+        i64::from_le_bytes(wide)
+    }
 }
 
 /// Bytes in hexadecimal.
@@ -59,40 +61,28 @@ pub(super) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02X}")).collect()
 }
 
-fn pairs(text: &str) -> impl Iterator<Item = String> {
-    let digits: Vec<char> = text.chars().filter(|digit| !digit.is_whitespace()).collect();
-    (0..digits.len() / 2).map(move |n| digits[2 * n..2 * n + 2].iter().collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn an_answer_printed_short_stands_for_eight_bytes() {
-        assert!(Pattern::sdo("60 40 60 00").fits(&[0x60, 0x40, 0x60, 0, 0, 0, 0, 0]));
-        assert!(!Pattern::sdo("60 40 60 00").fits(&[0x60, 0x40, 0x60, 0]));
+    fn pattern(text: &str) -> Pattern {
+        Pattern::parse(text).expect("a pattern")
     }
 
     #[test]
-    fn points_stand_for_any_byte_and_lengths_must_agree() {
-        let pattern = Pattern::new(".. .. 37 04");
-        assert!(
-            pattern.fits(&[1, 2, 0x37, 4]) && !pattern.fits(&[1, 2, 0x37, 5]) && !pattern.fits(&[1, 2, 0x37, 4, 0])
-        );
-        assert_eq!(pattern.text(), "....3704");
+    fn points_stand_for_any_byte_and_identifier_and_length_must_agree() {
+        let expected = pattern("481#....3704");
+        let fits = |text: &str| expected.fits(&text.parse().expect("a frame"));
+        assert!(fits("481#01023704"));
+        assert!(!fits("481#01023705") && !fits("481#0102370400") && !fits("482#01023704"));
+        assert_eq!(expected.data(), "....3704");
+        assert_eq!(expected.open_number(&"481#FEFF3704".parse().expect("a frame")), -2);
+        assert!(Pattern::parse("481#0").is_none() && Pattern::parse("48x#00").is_none());
     }
 
     #[test]
     fn an_abort_is_reported_by_its_code() {
-        assert_eq!(Pattern::sdo("80 16 10 00 00 00 02 06").expectation(), "abort 0602 0000h");
-        assert_eq!(Pattern::sdo("60 40 60 00").expectation(), "6040600000000000");
-    }
-
-    #[test]
-    fn frames_read_as_printed() {
-        assert_eq!(frame("201 2F 00 01 50 C3 00 00").to_string(), "201#2F000150C30000");
-        assert_eq!(frame("80").to_string(), "080#");
-        assert_eq!(bytes("2b40"), [0x2B, 0x40]);
+        assert_eq!(pattern("584#8016100000000206").meaning(), "abort 0602 0000h");
+        assert_eq!(pattern("584#6040600000000000").meaning(), "6040600000000000");
     }
 }

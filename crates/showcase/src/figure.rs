@@ -189,11 +189,11 @@ fn samples(finished: &Finished, drive: usize, signal: Signal) -> Vec<(f64, f64)>
 fn sections(finished: &Finished) -> Vec<Section> {
     let begins = finished.sections.iter();
     let ends = finished.sections.iter().skip(1).map(|(at, ..)| *at).chain([finished.end]);
-    let section = |(begin, number, name): &(can::Instant, &str, &str), end: can::Instant| Section {
+    let section = |(begin, number, name): &(can::Instant, String, String), end: can::Instant| Section {
         from_s: begin.as_secs_f64(),
         to_s: end.as_secs_f64(),
-        number: (*number).into(),
-        names: [*name].into_iter().chain(name.split(' ').next_back()).map(Into::into).collect(),
+        number: number.clone(),
+        names: [name.as_str()].into_iter().chain(name.split(' ').next_back()).map(str::to_owned).collect(),
     };
     begins.zip(ends).map(|(begin, end)| section(begin, end)).collect()
 }

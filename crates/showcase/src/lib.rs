@@ -24,17 +24,16 @@ mod error;
 mod expect;
 mod figure;
 mod lights;
-mod mjoint;
 mod part;
+mod player;
 mod report;
 mod row;
 mod set_points;
 mod timing;
 mod together;
-mod zlac8030l;
-mod zlim42c;
 
 use std::rc::Rc;
+use std::time::Duration;
 
 use can::Bitrate;
 use devices::Description;
@@ -46,6 +45,9 @@ pub use plot::Poster;
 pub use report::Report;
 pub use row::{Check, Row};
 
+/// Every drive boots within this time.
+const BOOT_TIME: Duration = Duration::from_secs(1);
+
 /// A part of the whole: some drives on a bus, and what is done with them.
 struct Part {
     /// As in the table's heading.
@@ -53,8 +55,28 @@ struct Part {
     /// The drives with their node-IDs; the first one is talked to.
     drives: &'static [(&'static Description, u8)],
     bitrate: Bitrate,
-    procedures: fn(&mut Bench),
+    procedures: Procedures,
     draw: fn(&bench::Finished, &'static str) -> Vec<Vec<plot::Figure>>,
+}
+
+/// What is done with them.
+enum Procedures {
+    /// A file of `procedures`, by its name and its text.
+    File(&'static str, &'static str),
+    /// What the master does with several drives.
+    Calls(fn(&mut Bench)),
+}
+
+impl Procedures {
+    fn run(&self, bench: &mut Bench) -> Result<(), Error> {
+        match *self {
+            Self::File(name, text) => player::play(bench, name, text, false),
+            Self::Calls(calls) => {
+                calls(bench);
+                Ok(())
+            }
+        }
+    }
 }
 
 /// "Set to different addresses in advance, such as addresses 1, 2, 3" (5.10.3).
@@ -73,35 +95,35 @@ const PARTS: [Part; 5] = [
         name: "ZLAC8030L",
         drives: &[(&devices::zltech::ZLAC8030L, 4)],
         bitrate: Bitrate::K500,
-        procedures: zlac8030l::procedures,
+        procedures: Procedures::File("zlac8030l.can", include_str!("../procedures/zlac8030l.can")),
         draw: figure::zlac8030l,
     },
     Part {
         name: "M4230E17B50",
         drives: &[(&devices::mjoint::M4230E17B50, 1)],
         bitrate: Bitrate::M1,
-        procedures: mjoint::procedures,
+        procedures: Procedures::File("mjoint.can", include_str!("../procedures/mjoint.can")),
         draw: figure::mjoint,
     },
     Part {
         name: "ZLIM42-C",
         drives: &[(&devices::zltech::ZLIM42C, 1)],
         bitrate: Bitrate::K500,
-        procedures: zlim42c::procedures,
+        procedures: Procedures::File("zlim42c.can", include_str!("../procedures/zlim42c.can")),
         draw: figure::zlim42c,
     },
     Part {
         name: "Three drives, one bus, the same calls",
         drives: &THREE,
         bitrate: Bitrate::K500,
-        procedures: together::intents::same_calls,
+        procedures: Procedures::Calls(together::intents::same_calls),
         draw: figure::same_calls,
     },
     Part {
         name: "Three joints, interpolation at 2 ms",
         drives: &JOINTS,
         bitrate: Bitrate::M1,
-        procedures: together::interpolation::three_joints,
+        procedures: Procedures::Calls(together::interpolation::three_joints),
         draw: figure::interpolation,
     },
 ];
@@ -129,12 +151,30 @@ pub fn run(only: Option<&'static Description>, progress: impl Fn(&str) + 'static
             },
         };
         let mut bench = Bench::new(&drives, part.bitrate, Rc::clone(&progress))?;
-        (part.procedures)(&mut bench);
+        part.procedures.run(&mut bench)?;
         let finished = bench.finish();
         poster.rows.extend((part.draw)(&finished, name));
         parts.push(PartReport::new(name, finished));
     }
     Ok(Showcase { parts, poster })
+}
+
+/// Plays a conversation: a file that begins with `drive MODEL NODE` and lists every frame that is sent and heard from then
+/// on, the drive having booted. The first line that the drive does not keep to is an error, shown with its neighbours.
+pub fn converse(name: &str, text: &str) -> Result<(), Error> {
+    let header = (1..).zip(text.lines()).find(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let (number, line) = header.unwrap_or((1, ""));
+    let mut words = line.split_whitespace();
+    let model = words.next().filter(|word| *word == "drive").and_then(|_| words.next()).and_then(devices::model);
+    let part = model.and_then(|model| PARTS.iter().find_map(|part| Some((part.with(model)?, part.bitrate))));
+    let Some((drives, bitrate)) = part else {
+        let what = format!("expected a header such as 'drive zlac8030l 4', got '{line}'");
+        return Err(Error::line(name, text, number, what));
+    };
+    let mut bench = Bench::new(&drives, bitrate, Rc::new(|_: &str| {}))?;
+    bench.run_silently(BOOT_TIME);
+    bench.forget();
+    player::play(&mut bench, name, text, true)
 }
 
 impl Part {

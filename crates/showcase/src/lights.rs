@@ -1,4 +1,4 @@
-//! The red light of a drive, watched as a person would: flashes, and the longer darkness between two rounds of them.
+//! The lights of a drive, watched as a person would: flashes, and the longer darkness between two rounds of them.
 
 use std::time::Duration;
 
@@ -32,4 +32,18 @@ pub(super) fn red_flashes(bench: &mut Bench) -> Vec<Duration> {
         }
         seen
     })
+}
+
+/// How often an output changes in a second.
+pub(super) fn changes(bench: &mut Bench, output: &str) -> u32 {
+    const LOOKS: u32 = 200;
+    let mut lit = bench.output(output);
+    let mut changes = 0;
+    for _ in 0..LOOKS {
+        bench.unseen(|bench| bench.run_ms(5));
+        let now = bench.output(output);
+        changes += u32::from(now != lit);
+        lit = now;
+    }
+    changes
 }

@@ -91,8 +91,8 @@ fn table<'a>(rows: impl Iterator<Item = &'a Row>, paint: Paint) -> String {
     let mut table = Table::new(&["", "step", "asked", "answered", "moved", "expected", "seen", "ok"]);
     let mut section = "";
     for row in rows {
-        let number = if row.section == section { "" } else { row.section };
-        section = row.section;
+        let number = if row.section == section { "" } else { &row.section };
+        section = &row.section;
         if row.checks.is_empty() {
             // A frame of this kind has no answer.
             table.row([number, &row.step, &row.asked]);
@@ -124,7 +124,7 @@ mod tests {
         let check = |ok| Check { expected: "1".into(), seen: if ok { "1" } else { "2" }.into(), ok };
         Row {
             drive: "a drive",
-            section: "4.1",
+            section: "4.1".into(),
             step: step.into(),
             asked: String::new(),
             answered: String::new(),

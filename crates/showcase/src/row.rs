@@ -10,7 +10,7 @@ pub struct Row {
     /// The part of it: a drive, or what the drives do together.
     pub drive: &'static str,
     /// The manual's section.
-    pub section: &'static str,
+    pub section: String,
     /// What is done.
     pub step: String,
     /// The frame sent, in candump form or as the eight bytes to the drive's SDO server.
@@ -38,8 +38,8 @@ pub struct Check {
 
 impl Row {
     /// A row that nothing is known against yet.
-    pub(crate) fn new(section: &'static str, step: impl Into<String>) -> Self {
-        Self { section, step: step.into(), ok: true, ..Self::default() }
+    pub(crate) fn new(section: impl Into<String>, step: impl Into<String>) -> Self {
+        Self { section: section.into(), step: step.into(), ok: true, ..Self::default() }
     }
 
     /// Adds an expectation and what was seen.

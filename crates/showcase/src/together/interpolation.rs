@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-use can::Instant;
+use can::{CanId, Frame, Instant};
 use canopen::NodeId;
 use cia402::ModeOfOperation;
 use drives::Firmware;
@@ -14,9 +14,7 @@ use master::units::Angle;
 use master::{Drive, Network, join_all};
 
 use crate::bench::{Bench, Start};
-use crate::datagram::frame;
 use crate::expect::Expect;
-use crate::mjoint::{COUNTS_PER_TURN, IN_PLACE_COUNTS};
 use plot::EventKind;
 
 /// "The above procedure is performed every 2 ms".
@@ -24,6 +22,12 @@ const CYCLE: Duration = Duration::from_millis(2);
 
 /// Longest time that opening the joints, or waiting for a SYNC, may take.
 const LIMIT: Duration = Duration::from_secs(5);
+
+/// Counts in a turn of the motor: 15 bits (parameter tables).
+const COUNTS_PER_TURN: f64 = 32_768.0;
+
+/// How near to a target the motor comes to rest, counts: a third of a degree of the motor's shaft.
+const IN_PLACE_COUNTS: f64 = 30.0;
 
 /// How far a shaft turns until it counts as started.
 const STARTED_COUNTS: f64 = 2.0;
@@ -81,9 +85,9 @@ fn prepare(bench: &mut Bench) {
     bench.run_ms(20);
     for node in NODES {
         bench.talk_to(node);
-        bench.machine("power cut");
+        bench.machine(&format!("{node} power cut"));
         bench.run(Duration::from_micros(1_730 * u64::from(node)));
-        bench.machine("power on");
+        bench.machine(&format!("{node} power on"));
         bench.run_ms(20);
     }
     for node in NODES {
@@ -97,12 +101,12 @@ fn prepare(bench: &mut Bench) {
 /// The printed procedure: a target for each, and SYNC. The spread of the start in µs.
 fn start(bench: &mut Bench, target: i32, time_base: TimeBase) -> f64 {
     let setting = time_base.setting();
-    let data = target.to_le_bytes().map(|byte| format!("{byte:02X}")).join(" ");
+    let data = target.to_le_bytes().map(|byte| format!("{byte:02X}")).concat();
     let before = NODES.map(|node| shaft_counts(bench, node));
     for node in NODES {
         bench.talk_to(node);
-        let (request, reply) = (format!("50{node} {data}"), format!("48{node} .. .. .. .. 37 04"));
-        bench.exchange_pdo(format!("node {node}: target {target}"), &request, &reply);
+        let (request, reply) = (format!("50{node}#{data}"), format!("48{node}#........3704"));
+        bench.exchange(format!("node {node}: target {target}"), &request, &reply);
     }
     bench.run_ms(3);
     for (node, before) in NODES.into_iter().zip(before) {
@@ -110,7 +114,7 @@ fn start(bench: &mut Bench, target: i32, time_base: TimeBase) -> f64 {
         bench.expect(&format!("node {node} waits"), Expect::Near(0.0, STARTED_COUNTS), "counts", waits);
     }
     bench.step(format!("SYNC, {setting}: all three start"));
-    bench.transmit(frame("80"));
+    bench.transmit(Frame::new(CanId::standard(0x80), &[]));
     bench.mark(format!("SYNC, {setting}"), EventKind::Note);
     let recorded = watch(bench, setting);
     let spread_us = recorded.spread_us();
