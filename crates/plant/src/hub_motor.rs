@@ -5,7 +5,6 @@
 //! Deliberately absent: switching ripple (a step sees the mean voltage), measurement noise, the drive's firmware.
 
 use crate::angle::{Angle, Axis};
-use crate::attachment::Attachment;
 use crate::brake::BrakeModel;
 use crate::clamp::ClampModel;
 use crate::cogging::Cogging;
@@ -13,8 +12,9 @@ use crate::encoder::{EncoderData, EncoderModel};
 use crate::flows::Flows;
 use crate::hall::{HallFault, HallModel};
 use crate::mechanics::{RotorData, RotorModel};
+use crate::motor::{self, Motor};
+use crate::physics::{Physics, load_velocity_rad_s};
 use crate::pmsm::{Dq, Phase, PmsmData, PmsmInput, PmsmModel, Terminals};
-use crate::rest::Rest;
 use crate::rig::{Rig, RigModel};
 use crate::shaft::{Motion, PendingStep, Turned};
 use crate::thermal::reading_c;
@@ -237,28 +237,6 @@ impl HubMotor {
         }
     }
 
-    /// Joins these things to the shaft, in place of those before. Not to a coupled one: what it shares it has already.
-    pub fn attach(&mut self, what: Attachment) {
-        self.rig.attach(what, &self.model.rotor, self.rotor.angle);
-    }
-
-    /// Where the load is: the shaft, or what is behind its load gear.
-    pub fn load_angle(&self) -> Angle {
-        self.rig.attached().map_or(self.rotor.angle, |attached| attached.load_angle(self.rotor.angle))
-    }
-
-    /// From now on the shaft is moved by [`follow`](Self::follow) after each step, for ever.
-    pub fn couple(&mut self) {
-        self.rig.couple();
-    }
-
-    /// Ends the step of a coupled motor.
-    pub fn follow(&mut self, motion: &Motion) {
-        if let Some((pending, turned)) = self.rig.follow(&mut self.rotor, motion) {
-            self.finish_joined(pending, &turned);
-        }
-    }
-
     /// Winding, rotor and encoder.
     // Inlined by force: it has two callers, and the frequent one would not get it.
     #[inline(always)]
@@ -302,17 +280,6 @@ impl HubMotor {
         self.seized
     }
 
-    #[cold]
-    fn seize(&mut self) {
-        self.seized = true;
-        self.rig.energy.friction_j += self.rig.seize(&self.model.rotor, &self.rotor);
-        // A coupled one stops with its machine.
-        if !self.rig.is_coupled() {
-            self.rotor = RotorData { angle: self.rotor.angle, ..RotorData::default() };
-        }
-        self.rig.load.locked = true;
-    }
-
     /// Molten switches join the motor's wires and short the bus, so that the source's fuse blows.
     #[cold]
     pub fn burn_power_stage(&mut self) {
@@ -350,7 +317,8 @@ impl HubMotor {
             self.burn_power_stage();
         }
         if self.rotor.velocity_rad_s.abs() > self.model.bearing_limit_rad_s {
-            self.seize();
+            self.seized = true;
+            self.rig.energy.friction_j += self.rig.seize(&self.model.rotor, &mut self.rotor);
         }
         self.axis = Axis::at_turns(self.model.pmsm.electrical_turns(self.rotor.angle));
     }
@@ -383,33 +351,35 @@ impl HubMotor {
     }
 }
 
-impl Rest for HubMotor {
+impl Motor for HubMotor {
     type Pins = Actuation;
     /// The power stage has melted.
     type Wear = bool;
 
-    fn step(&mut self, dt_s: f64, pins: &Actuation) {
-        HubMotor::step(self, dt_s, pins);
-    }
+    motor::parts!(HubMotor);
 
-    fn rig_and_model(&mut self) -> (&mut Rig, &RigModel) {
-        (&mut self.rig, &self.model.rig)
-    }
-
-    fn rig(&self) -> &Rig {
-        &self.rig
+    fn physics(&self) -> Physics {
+        let velocity_rad_s = load_velocity_rad_s(&self.rig, self.rotor.velocity_rad_s);
+        Physics {
+            motor_torque_nm: self.torque_nm,
+            phase_current_a: self.sense().phase_current_a.map(Some),
+            stored_j: self.stored_j(),
+            ..Physics::of_rig(&self.rig, (self.load_angle(), velocity_rad_s))
+        }
     }
 
     fn bleeds(&self, pins: &Actuation) -> bool {
         pins.bleeder_on
     }
 
-    fn step_slow(&mut self) {
-        HubMotor::step_slow(self);
-    }
-
     fn wear(&self) -> bool {
         self.power_stage_burnt
+    }
+
+    fn follow(&mut self, motion: &Motion) {
+        if let Some((pending, turned)) = self.rig.follow(&mut self.rotor, motion) {
+            self.finish_joined(pending, &turned);
+        }
     }
 }
 

@@ -57,16 +57,23 @@ impl Rig {
         }
     }
 
-    /// Stops what is attached, and returns what that takes from the moving masses.
-    pub(crate) fn seize(&mut self, rotor: &RotorModel, data: &RotorData) -> f64 {
-        if self.is_coupled() {
-            return 0.0;
-        }
-        let before_j = self.mechanical_j(rotor, data);
+    /// The bearings seize: shaft and load stand from now on. What that takes from the moving masses, which goes into the bearings as
+    /// heat.
+    #[cold]
+    pub(crate) fn seize(&mut self, model: &RotorModel, rotor: &mut RotorData) -> f64 {
+        let kinetic_j = if self.is_coupled() { 0.0 } else { self.stop(model, rotor) };
+        self.load.locked = true;
+        kinetic_j
+    }
+
+    /// Stops a shaft that is not coupled: a coupled one stops with its machine.
+    fn stop(&mut self, model: &RotorModel, rotor: &mut RotorData) -> f64 {
+        let before_j = self.mechanical_j(model, rotor);
         if let Some(Attached { gear: Some((_, gear)), .. }) = &mut self.attached {
             gear.output_velocity_rad_s = 0.0;
         }
-        before_j - self.mechanical_j(rotor, &RotorData { angle: data.angle, ..RotorData::default() })
+        *rotor = RotorData { angle: rotor.angle, ..RotorData::default() };
+        before_j - self.mechanical_j(model, rotor)
     }
 
     /// One step of an attached shaft.

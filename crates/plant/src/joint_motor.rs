@@ -14,8 +14,9 @@ use crate::cogging::Cogging;
 use crate::gear::{GearData, GearInput, GearModel};
 use crate::hub_motor::Inverter;
 use crate::mechanics::{Load, RotorData, RotorModel};
+use crate::motor::{self, Motor};
+use crate::physics::Physics;
 use crate::pmsm::{Phase, PmsmData, PmsmInput, PmsmModel};
-use crate::rest::Rest;
 use crate::rig::{Rig, RigModel};
 use crate::shaft::{Coupled, HELD_NM, Motion, PendingStep, Push, Turned};
 use crate::thermal::reading_c;
@@ -222,36 +223,6 @@ impl JointMotor {
         }
     }
 
-    /// Joins these things to the output, in place of those before. It has a gear already: none is taken from `what`.
-    pub fn attach(&mut self, what: Attachment) {
-        let angle = self.output_angle();
-        self.rig.attach(Attachment { gear: None, ..what }, &self.model.rotor, angle);
-    }
-
-    /// From now on the shaft is moved by [`follow`](Self::follow) after each step, for ever.
-    pub fn couple(&mut self) {
-        self.rig.couple();
-    }
-
-    /// Ends the step of a coupled joint.
-    pub fn follow(&mut self, motion: &Motion) {
-        let dry_nm = self.rig.push().map_or(0.0, |push| push.dry_nm);
-        let output_dry_nm = self.rig.load.coulomb_nm + self.model.gear.output_coulomb_nm;
-        let Some((pending, turned)) = self.rig.follow(&mut self.rotor, motion) else { return };
-        let JointMotorModel { rotor, gear, .. } = &self.model;
-        let ratio = gear.ratio;
-        // What the motor's side does not take goes through the gear. Of the friction it takes its share: motor, brake and teeth.
-        let gained_nm = rotor.inertia_kg_m2 * self.rotor.velocity_change_rad_s / pending.dt_s;
-        let viscous_nm = (rotor.viscous_nm_s + gear.viscous_nm_s) * motion.mean_rad_s;
-        let share = if dry_nm > 0.0 { 1.0 - output_dry_nm / ratio / dry_nm } else { 0.0 };
-        let dry_nm = motion.dry_nm * share;
-        self.gear.output_velocity_rad_s = motion.velocity_rad_s / ratio;
-        let torque_nm = ratio * (pending.motor_nm - gained_nm - viscous_nm - dry_nm);
-        self.gear.torque_nm = torque_nm;
-        self.model.gear.watch_strength(&mut self.gear, torque_nm);
-        self.finish(pending, &turned);
-    }
-
     /// The discharge module conducts.
     #[inline]
     fn is_discharging(&self) -> bool {
@@ -343,32 +314,56 @@ impl JointMotor {
     }
 }
 
-impl Rest for JointMotor {
+impl Motor for JointMotor {
     type Pins = Actuation;
     /// Power stage, turns of the encoder, its battery.
     type Wear = (bool, bool, BatteryState);
 
-    fn step(&mut self, dt_s: f64, pins: &Actuation) {
-        JointMotor::step(self, dt_s, pins);
-    }
+    motor::parts!(JointMotor);
 
-    fn rig_and_model(&mut self) -> (&mut Rig, &RigModel) {
-        (&mut self.rig, &self.model.rig)
-    }
-
-    fn rig(&self) -> &Rig {
-        &self.rig
+    /// The load is behind the reducer.
+    fn physics(&self) -> Physics {
+        Physics {
+            motor_torque_nm: self.torque_nm,
+            phase_current_a: self.sense().phase_current_a.map(Some),
+            stored_j: self.stored_j(),
+            ..Physics::of_rig(&self.rig, (self.output_angle(), self.gear.output_velocity_rad_s))
+        }
     }
 
     fn bleeds(&self, _pins: &Actuation) -> bool {
         self.is_discharging()
     }
 
-    fn step_slow(&mut self) {
-        JointMotor::step_slow(self);
-    }
-
     fn wear(&self) -> Self::Wear {
         (self.power_stage_burnt, self.encoder.turns_lost, self.model.encoder.battery_state(&self.encoder))
+    }
+
+    fn follow(&mut self, motion: &Motion) {
+        let dry_nm = self.rig.push().map_or(0.0, |push| push.dry_nm);
+        let output_dry_nm = self.rig.load.coulomb_nm + self.model.gear.output_coulomb_nm;
+        let Some((pending, turned)) = self.rig.follow(&mut self.rotor, motion) else { return };
+        let JointMotorModel { rotor, gear, .. } = &self.model;
+        let ratio = gear.ratio;
+        // What the motor's side does not take goes through the gear. Of the friction it takes its share: motor, brake and teeth.
+        let gained_nm = rotor.inertia_kg_m2 * self.rotor.velocity_change_rad_s / pending.dt_s;
+        let viscous_nm = (rotor.viscous_nm_s + gear.viscous_nm_s) * motion.mean_rad_s;
+        let share = if dry_nm > 0.0 { 1.0 - output_dry_nm / ratio / dry_nm } else { 0.0 };
+        let dry_nm = motion.dry_nm * share;
+        self.gear.output_velocity_rad_s = motion.velocity_rad_s / ratio;
+        let torque_nm = ratio * (pending.motor_nm - gained_nm - viscous_nm - dry_nm);
+        self.gear.torque_nm = torque_nm;
+        self.model.gear.watch_strength(&mut self.gear, torque_nm);
+        self.finish(pending, &turned);
+    }
+
+    /// To the output. It has a gear already: none is taken from `what`.
+    fn attach(&mut self, what: Attachment) {
+        let angle = self.output_angle();
+        self.rig.attach(Attachment { gear: None, ..what }, &self.model.rotor, angle);
+    }
+
+    fn load_angle(&self) -> Angle {
+        self.output_angle()
     }
 }

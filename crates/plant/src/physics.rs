@@ -4,10 +4,7 @@
 //! [`sense`](crate::HubMotor::sense).
 
 use crate::angle::Angle;
-use crate::hub_motor::HubMotor;
-use crate::joint_motor::JointMotor;
 use crate::rig::{Energy, Rig};
-use crate::stepper_motor::StepperMotor;
 
 /// Torques, currents, temperatures and energies of a motor.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -37,7 +34,7 @@ pub struct Physics {
 
 impl Physics {
     /// What a rig knows of it, of a load that stands here and turns so fast.
-    fn of_rig(rig: &Rig, load: (Angle, f64)) -> Self {
+    pub(crate) fn of_rig(rig: &Rig, load: (Angle, f64)) -> Self {
         let (angle, velocity_rad_s) = load;
         let load_torque_nm = match rig.attached() {
             None => rig.load.torque_nm,
@@ -57,45 +54,6 @@ impl Physics {
 }
 
 /// Velocity of a load whose shaft turns so fast.
-fn load_velocity_rad_s(rig: &Rig, shaft_rad_s: f64) -> f64 {
+pub(crate) fn load_velocity_rad_s(rig: &Rig, shaft_rad_s: f64) -> f64 {
     rig.attached().map_or(shaft_rad_s, |attached| attached.load_velocity_rad_s(shaft_rad_s))
-}
-
-impl HubMotor {
-    /// What it does now.
-    pub fn physics(&self) -> Physics {
-        let velocity_rad_s = load_velocity_rad_s(&self.rig, self.rotor.velocity_rad_s);
-        Physics {
-            motor_torque_nm: self.torque_nm,
-            phase_current_a: self.sense().phase_current_a.map(Some),
-            stored_j: self.stored_j(),
-            ..Physics::of_rig(&self.rig, (self.load_angle(), velocity_rad_s))
-        }
-    }
-}
-
-impl JointMotor {
-    /// What it does now. The load is behind the reducer.
-    pub fn physics(&self) -> Physics {
-        Physics {
-            motor_torque_nm: self.torque_nm,
-            phase_current_a: self.sense().phase_current_a.map(Some),
-            stored_j: self.stored_j(),
-            ..Physics::of_rig(&self.rig, (self.output_angle(), self.gear.output_velocity_rad_s))
-        }
-    }
-}
-
-impl StepperMotor {
-    /// What it does now.
-    pub fn physics(&self) -> Physics {
-        let velocity_rad_s = load_velocity_rad_s(&self.rig, self.rotor.velocity_rad_s);
-        let [a, b] = self.sense().phase_current_a;
-        Physics {
-            motor_torque_nm: self.torque_nm,
-            phase_current_a: [Some(a), Some(b), None],
-            stored_j: self.stored_j(),
-            ..Physics::of_rig(&self.rig, (self.load_angle(), velocity_rad_s))
-        }
-    }
 }

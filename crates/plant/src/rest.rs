@@ -4,37 +4,12 @@
 //! else. So many of them can be done at a fraction of the work, and end where steps end, to the last bit: the same sums in
 //! the same order. Whether a motor is one is found by steps, not by rules about what each kind of motor does.
 
-use crate::rig::{Rig, RigModel, SLOW_EVERY};
+use crate::motor::Motor;
+use crate::rig::SLOW_EVERY;
 use crate::thermal::reading_c;
 
-/// A motor of any kind with its rig.
-pub trait Rest: Clone + PartialEq {
-    /// What the drive's pins do.
-    type Pins;
-    /// What the slow things may do to a motor that stands: what melts, what runs empty.
-    type Wear: PartialEq;
-
-    /// One step.
-    fn step(&mut self, dt_s: f64, pins: &Self::Pins);
-
-    /// Load, supply, temperatures and energies, and what never changes about these.
-    fn rig_and_model(&mut self) -> (&mut Rig, &RigModel);
-
-    /// Load, supply, temperatures and energies.
-    fn rig(&self) -> &Rig;
-
-    /// A resistor is across the bus, as long as the bus is where it is.
-    fn bleeds(&self, pins: &Self::Pins) -> bool;
-
-    /// The slow things, which are looked at once in so many steps.
-    fn step_slow(&mut self);
-
-    /// What these may have done.
-    fn wear(&self) -> Self::Wear;
-}
-
 /// Whether a motor under these pins is at rest.
-pub fn is_at_rest<M: Rest>(motor: &M, dt_s: f64, pins: &M::Pins) -> bool {
+pub fn is_at_rest<M: Motor>(motor: &M, dt_s: f64, pins: &M::Pins) -> bool {
     let (mut stepped, mut booked) = (motor.clone(), motor.clone());
     // The slow things are among these steps.
     for _ in 0..=SLOW_EVERY {
@@ -59,7 +34,7 @@ pub struct Rested {
 
 /// Moves motors that [are at rest](is_at_rest), each under its pins, by so many steps, or by fewer: up to the first at whose
 /// end a thermometer reads otherwise or something has given way.
-pub fn rest<M: Rest>(motors: &mut [M], dt_s: f64, pins: impl Fn(usize) -> M::Pins, steps: u64) -> Rested {
+pub fn rest<M: Motor>(motors: &mut [M], dt_s: f64, pins: impl Fn(usize) -> M::Pins, steps: u64) -> Rested {
     let (mut done, mut same) = (0, true);
     while done < steps && same {
         let to_slow = motors.iter().map(|motor| motor.rig().steps_to_slow()).min().unwrap_or(SLOW_EVERY);
@@ -74,7 +49,7 @@ pub fn rest<M: Rest>(motors: &mut [M], dt_s: f64, pins: impl Fn(usize) -> M::Pin
 
 /// So many steps, of which at most the last is one with the slow things. False if these have changed what is to be seen.
 #[inline]
-fn book<M: Rest>(motor: &mut M, dt_s: f64, pins: &M::Pins, steps: u32) -> bool {
+fn book<M: Motor>(motor: &mut M, dt_s: f64, pins: &M::Pins, steps: u32) -> bool {
     let bleeds = motor.bleeds(pins);
     let (rig, model) = motor.rig_and_model();
     if !rig.book_rest(model, dt_s, bleeds, steps) {

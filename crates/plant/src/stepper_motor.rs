@@ -14,11 +14,11 @@
 //! which gives such a ringing `(w dt)^3 / 8` of critical damping back: 1e-4 at 50 µs, a thirtieth of its friction's.
 
 use crate::angle::{Angle, Axis};
-use crate::attachment::Attachment;
 use crate::clamp::ClampModel;
 use crate::flows::Flows;
 use crate::mechanics::{RotorData, RotorModel};
-use crate::rest::Rest;
+use crate::motor::{self, Motor};
+use crate::physics::{Physics, load_velocity_rad_s};
 use crate::rig::{Rig, RigModel};
 use crate::shaft::{Motion, PendingStep, Turned};
 use crate::stepper::{Bridges, Phase, StepperData, StepperInput, StepperModel, Turn};
@@ -184,32 +184,11 @@ impl StepperMotor {
     #[inline(always)]
     fn book(&mut self, dt_s: f64, mut flows: Flows) {
         if self.rotor.velocity_rad_s.abs() > self.model.bearing_limit_rad_s {
-            flows.friction_j += self.seize();
+            self.seized = true;
+            flows.friction_j += self.rig.seize(&self.model.rotor, &mut self.rotor);
         }
         if self.rig.step(&self.model.rig, dt_s, &flows, false) {
             self.step_slow();
-        }
-    }
-
-    /// Joins these things to the shaft, in place of those before. Not to a coupled one: what it shares it has already.
-    pub fn attach(&mut self, what: Attachment) {
-        self.rig.attach(what, &self.model.rotor, self.rotor.angle);
-    }
-
-    /// Where the load is: the shaft, or what is behind its load gear.
-    pub fn load_angle(&self) -> Angle {
-        self.rig.attached().map_or(self.rotor.angle, |attached| attached.load_angle(self.rotor.angle))
-    }
-
-    /// From now on the shaft is moved by [`follow`](Self::follow) after each step, for ever.
-    pub fn couple(&mut self) {
-        self.rig.couple();
-    }
-
-    /// Ends the step of a coupled motor.
-    pub fn follow(&mut self, motion: &Motion) {
-        if let Some((pending, turned)) = self.rig.follow(&mut self.rotor, motion) {
-            self.finish_joined(pending, &turned);
         }
     }
 
@@ -236,19 +215,6 @@ impl StepperMotor {
     /// Heat has broken a transistor down.
     pub fn is_overheated(&self) -> bool {
         self.overheated
-    }
-
-    /// What turned goes into the bearings as heat.
-    #[cold]
-    fn seize(&mut self) -> f64 {
-        let kinetic_j = self.rig.seize(&self.model.rotor, &self.rotor);
-        // A coupled one stops with its machine.
-        if !self.rig.is_coupled() {
-            self.rotor = RotorData { angle: self.rotor.angle, ..RotorData::default() };
-        }
-        self.rig.load.locked = true;
-        self.seized = true;
-        kinetic_j
     }
 
     /// Power that goes into what is broken, and the current of a short circuit.
@@ -302,33 +268,36 @@ impl StepperMotor {
     }
 }
 
-impl Rest for StepperMotor {
+impl Motor for StepperMotor {
     type Pins = Bridges;
     /// A transistor has broken down.
     type Wear = bool;
 
-    fn step(&mut self, dt_s: f64, pins: &Bridges) {
-        StepperMotor::step(self, dt_s, pins);
-    }
+    motor::parts!(StepperMotor);
 
-    fn rig_and_model(&mut self) -> (&mut Rig, &RigModel) {
-        (&mut self.rig, &self.model.rig)
-    }
-
-    fn rig(&self) -> &Rig {
-        &self.rig
+    fn physics(&self) -> Physics {
+        let velocity_rad_s = load_velocity_rad_s(&self.rig, self.rotor.velocity_rad_s);
+        let [a, b] = self.sense().phase_current_a;
+        Physics {
+            motor_torque_nm: self.torque_nm,
+            phase_current_a: [Some(a), Some(b), None],
+            stored_j: self.stored_j(),
+            ..Physics::of_rig(&self.rig, (self.load_angle(), velocity_rad_s))
+        }
     }
 
     fn bleeds(&self, _pins: &Bridges) -> bool {
         false
     }
 
-    fn step_slow(&mut self) {
-        StepperMotor::step_slow(self);
-    }
-
     fn wear(&self) -> bool {
         self.broken_down
+    }
+
+    fn follow(&mut self, motion: &Motion) {
+        if let Some((pending, turned)) = self.rig.follow(&mut self.rotor, motion) {
+            self.finish_joined(pending, &turned);
+        }
     }
 }
 

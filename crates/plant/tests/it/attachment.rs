@@ -2,6 +2,7 @@
 
 use core::f64::consts::TAU;
 
+use plant::Motor;
 use plant::angle::Angle;
 use plant::attachment::{Attachment, Fan, GRAVITY_M_S2, LoadGear, Pulley, Spring, Stops, Stribeck};
 use plant::{Actuation, Bridges, HubMotor, HubMotorModel, Inverter, JointMotor, JointMotorModel, StepperMotor};

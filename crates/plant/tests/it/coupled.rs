@@ -2,6 +2,7 @@
 
 use core::f64::consts::{PI, TAU};
 
+use plant::Motor;
 use plant::attachment::GRAVITY_M_S2;
 use plant::coupled::{ArmData, ArmModel, Body, CommonShaftData, CommonShaftModel, Link};
 use plant::coupled::{DifferentialDriveData, DifferentialDriveModel};

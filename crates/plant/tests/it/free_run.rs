@@ -1,5 +1,6 @@
 //! Where a free shaft ends up, against the same motor that is let run for so long.
 
+use plant::Motor;
 use plant::attachment::{Attachment, Fan, Pulley};
 use plant::{Actuation, Angle, Bridges, FreeRun, HubMotor, HubMotorModel, Inverter, JointMotor, JointMotorModel};
 use plant::{StepperMotor, StepperMotorModel, joint_motor};

@@ -1,5 +1,7 @@
 //! What a machine asks of one model's hardware, and what all models answer alike: supply, load and temperatures.
 
+use std::slice::from_mut;
+
 use devices::{AxisId, Description};
 use drives::engine::axis::Demand;
 use drives::engine::device::ResetTimes;
@@ -7,10 +9,10 @@ use drives::{Firmware, RegisterError, Resting};
 use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
 use plant::physics::Physics;
-use plant::rest::Rested;
+use plant::rest::{Rested, rest};
 use plant::rig::RigModel;
 use plant::shaft::Motion;
-use plant::{Angle, FreeRun, Rig};
+use plant::{Angle, FreeRun, Motor, Rig};
 
 use super::quantity::Quantity;
 use super::realism::{Noise, Realism};
@@ -49,6 +51,9 @@ pub struct ShaftFacts {
 pub trait Assembly: Clone + Send + 'static {
     /// The firmware that runs on it.
     type Firmware: Resting + Firmware<Actuation: Default + Send, Sensors: Send> + Send + 'static;
+
+    /// The motor of each axis.
+    type Motor: Motor<Pins: Copy>;
 
     /// The model's name as users type it.
     const MODEL: &'static str;
@@ -108,7 +113,19 @@ pub trait Assembly: Clone + Send + 'static {
     fn can_rest(&self, actuation: &<Self::Firmware as Firmware>::Actuation) -> bool;
 
     /// So many such periods, or fewer if the sensors read otherwise before.
-    fn rest(&mut self, actuation: &<Self::Firmware as Firmware>::Actuation, periods: u64) -> Rested;
+    fn rest(&mut self, actuation: &<Self::Firmware as Firmware>::Actuation, periods: u64) -> Rested {
+        let pins = self.pins(AxisId::FIRST, actuation);
+        rest(from_mut(self.motor_at_mut(AxisId::FIRST)), Self::PERIOD_S, |_| pins, periods)
+    }
+
+    /// The motor of an axis, and all that is joined to it; of an axis that there is not, the first.
+    fn motor_at(&self, axis: AxisId) -> &Self::Motor;
+
+    /// The same, to change.
+    fn motor_at_mut(&mut self, axis: AxisId) -> &mut Self::Motor;
+
+    /// What the power stage of an axis, and its brake, make of the firmware's outputs.
+    fn pins(&self, axis: AxisId, actuation: &<Self::Firmware as Firmware>::Actuation) -> <Self::Motor as Motor>::Pins;
 
     /// How many axes it has.
     fn axes(&self) -> u8 {
@@ -116,13 +133,20 @@ pub trait Assembly: Clone + Send + 'static {
     }
 
     /// The shaft of an axis, and load, supply, temperatures and energies around it.
-    fn shaft_and_rig(&self, axis: AxisId) -> (&RotorData, &Rig);
+    fn shaft_and_rig(&self, axis: AxisId) -> (&RotorData, &Rig) {
+        let motor = self.motor_at(axis);
+        (motor.rotor(), motor.rig())
+    }
 
     /// What the motor of an axis does, and what it does it with.
-    fn physics(&self, axis: AxisId) -> Physics;
+    fn physics(&self, axis: AxisId) -> Physics {
+        self.motor_at(axis).physics()
+    }
 
     /// Load, supply, temperatures and energies, to change.
-    fn rig_mut(&mut self, axis: AxisId) -> &mut Rig;
+    fn rig_mut(&mut self, axis: AxisId) -> &mut Rig {
+        self.motor_at_mut(axis).rig_and_model().0
+    }
 
     /// What can be measured from outside: `common`, what is measured alike at every model, with the model's own.
     fn report(&self, firmware: &Self::Firmware, axis: AxisId, common: Report) -> Report;
@@ -133,7 +157,9 @@ pub trait Assembly: Clone + Send + 'static {
     }
 
     /// What never changes about the rig, and the rig.
-    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel);
+    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel) {
+        self.motor_at_mut(AxisId::FIRST).rig_and_model()
+    }
 
     /// Whether the voltage is enough for the firmware to run on (`running`), or to start.
     #[inline]
@@ -143,7 +169,18 @@ pub trait Assembly: Clone + Send + 'static {
     }
 
     /// Where the motor shaft truly is, in counts of a fixed size, from an arbitrary zero.
-    fn shaft_counts(&self, axis: AxisId) -> i64;
+    #[inline]
+    fn shaft_counts(&self, axis: AxisId) -> i64 {
+        self.motor_at(axis).rotor().angle.count(self.counts_per_turn(axis))
+    }
+
+    /// How many of those are a turn of the motor's shaft.
+    fn counts_per_turn(&self, axis: AxisId) -> u32;
+
+    /// Motor turns per turn of the output shaft, where a reducer is built in.
+    fn reducer(&self) -> Option<f64> {
+        None
+    }
 
     /// How many of those are one count of the drive as it is set now.
     fn shaft_counts_per_count(&self, firmware: &Self::Firmware, axis: AxisId) -> i64 {
@@ -158,16 +195,30 @@ pub trait Assembly: Clone + Send + 'static {
     }
 
     /// What things are placed by that are joined to the shaft of an axis.
-    fn shaft_facts(&self, axis: AxisId) -> ShaftFacts;
+    fn shaft_facts(&self, axis: AxisId) -> ShaftFacts {
+        let motor = self.motor_at(axis);
+        ShaftFacts {
+            counts_per_turn: self.counts_per_turn(axis),
+            reducer: self.reducer(),
+            rotor_inertia_kg_m2: motor.rotor_model().inertia_kg_m2,
+            load_angle: motor.load_angle(),
+        }
+    }
 
     /// Joins these things to the output shaft, in place of those before.
-    fn attach(&mut self, axis: AxisId, what: Attachment);
+    fn attach(&mut self, axis: AxisId, what: Attachment) {
+        self.motor_at_mut(axis).attach(what);
+    }
 
     /// From now on the shaft of an axis moves by [`follow`](Self::follow), at the end of each control period.
-    fn couple(&mut self, axis: AxisId);
+    fn couple(&mut self, axis: AxisId) {
+        self.motor_at_mut(axis).couple();
+    }
 
     /// Ends the control period of a coupled axis.
-    fn follow(&mut self, axis: AxisId, motion: &Motion);
+    fn follow(&mut self, axis: AxisId, motion: &Motion) {
+        self.motor_at_mut(axis).follow(motion);
+    }
 
     /// What the shaft will do if its load stays as it is; `None` while the drive drives it, or where it is not known.
     fn free_run(&self, axis: AxisId) -> Option<FreeRun>;

@@ -4,8 +4,6 @@
 //! In go the firmware's power stage, brake and outputs, out come its sensors and the report for people. Figures of the
 //! motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
-use std::slice::from_mut;
-
 use can::Bitrate;
 use devices::AxisId;
 use devices::Description;
@@ -16,21 +14,16 @@ use drives::mjoint::assumptions::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
 use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
 use plant::absolute_encoder::BatteryState;
-use plant::attachment::Attachment;
 use plant::gear::GearData;
-use plant::mechanics::RotorData;
-use plant::physics::Physics;
 use plant::pmsm::Phase;
-use plant::rest::{Rested, is_at_rest, rest};
-use plant::rig::RigModel;
-use plant::shaft::Motion;
+use plant::rest::is_at_rest;
 use plant::supply::SupplyData;
-use plant::{Angle, FreeRun, Inverter, JointMotor, JointMotorModel, Rig, joint_motor};
+use plant::{Angle, FreeRun, Inverter, JointMotor, JointMotorModel, joint_motor};
 
 use super::order::{Order, OrderError};
 use super::pulse_source::PulseSource;
 use crate::machine::kernel::Machine;
-use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
+use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, with_demand};
 use crate::machine::kernel::realism::{
     JOINT_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
 };
@@ -148,23 +141,6 @@ impl Joint {
             self.motor.model = self.motor.model.with_brake();
         }
     }
-
-    /// What the power stage and the brake make of the firmware's outputs.
-    #[inline]
-    fn pins(&self, actuation: &Actuation) -> joint_motor::Actuation {
-        let braked = if actuation.running { actuation.brake == Brake::Engaged } else { self.braked_without_power };
-        joint_motor::Actuation {
-            inverter: match actuation.power_stage {
-                PowerStage::Off => Inverter::Open,
-                PowerStage::Modulate { duty } if self.dead_time => {
-                    Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
-                }
-                PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
-            },
-            brake_released: !braked,
-            set_origin: actuation.set_origin,
-        }
-    }
 }
 
 /// The physics of a model.
@@ -180,6 +156,7 @@ fn motor_of(model: &Model) -> JointMotorModel {
 
 impl Assembly for Joint {
     type Firmware = MJoint;
+    type Motor = JointMotor;
 
     const MODEL: &'static str = "M joint";
     const INPUTS: &'static [&'static str] = &["PU", "DIR"];
@@ -241,34 +218,13 @@ impl Assembly for Joint {
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
         self.fit_brake(actuation);
-        self.motor.step(Self::PERIOD_S, &self.pins(actuation));
+        self.motor.step(Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation));
         self.pulses.advance(Self::PERIOD_S);
     }
 
     fn can_rest(&self, actuation: &Actuation) -> bool {
         let quiet = self.motor.rotor.velocity_rad_s == 0.0 && !actuation.set_origin && self.pulses.is_idle();
-        quiet && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(actuation))
-    }
-
-    fn rest(&mut self, actuation: &Actuation, periods: u64) -> Rested {
-        let pins = self.pins(actuation);
-        rest(from_mut(&mut self.motor), Self::PERIOD_S, |_| pins, periods)
-    }
-
-    fn shaft_and_rig(&self, _axis: AxisId) -> (&RotorData, &Rig) {
-        (&self.motor.rotor, &self.motor.rig)
-    }
-
-    fn physics(&self, _axis: AxisId) -> Physics {
-        self.motor.physics()
-    }
-
-    fn rig_mut(&mut self, _axis: AxisId) -> &mut Rig {
-        &mut self.motor.rig
-    }
-
-    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel) {
-        (&mut self.motor.rig, &mut self.motor.model.rig)
+        quiet && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation))
     }
 
     /// Behind a burnt power stage there is no voltage.
@@ -283,6 +239,30 @@ impl Assembly for Joint {
         self.motor.rig.load.locked = locked;
         if !locked && (self.motor.is_seized() || self.motor.gear.jumps > 0) {
             self.motor.replace_reducer();
+        }
+    }
+
+    fn motor_at(&self, _axis: AxisId) -> &JointMotor {
+        &self.motor
+    }
+
+    fn motor_at_mut(&mut self, _axis: AxisId) -> &mut JointMotor {
+        &mut self.motor
+    }
+
+    #[inline]
+    fn pins(&self, _axis: AxisId, actuation: &Actuation) -> joint_motor::Actuation {
+        let braked = if actuation.running { actuation.brake == Brake::Engaged } else { self.braked_without_power };
+        joint_motor::Actuation {
+            inverter: match actuation.power_stage {
+                PowerStage::Off => Inverter::Open,
+                PowerStage::Modulate { duty } if self.dead_time => {
+                    Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+                }
+                PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
+            },
+            brake_released: !braked,
+            set_origin: actuation.set_origin,
         }
     }
 
@@ -312,29 +292,12 @@ impl Assembly for Joint {
     }
 
     #[inline]
-    fn shaft_counts(&self, _axis: AxisId) -> i64 {
-        self.motor.rotor.angle.count(COUNTS_PER_TURN)
+    fn counts_per_turn(&self, _axis: AxisId) -> u32 {
+        COUNTS_PER_TURN
     }
 
-    fn shaft_facts(&self, _axis: AxisId) -> ShaftFacts {
-        ShaftFacts {
-            counts_per_turn: COUNTS_PER_TURN,
-            reducer: Some(self.motor.model.gear.ratio),
-            rotor_inertia_kg_m2: self.motor.model.rotor.inertia_kg_m2,
-            load_angle: self.motor.output_angle(),
-        }
-    }
-
-    fn attach(&mut self, _axis: AxisId, what: Attachment) {
-        self.motor.attach(what);
-    }
-
-    fn couple(&mut self, _axis: AxisId) {
-        self.motor.couple();
-    }
-
-    fn follow(&mut self, _axis: AxisId, motion: &Motion) {
-        self.motor.follow(motion);
+    fn reducer(&self) -> Option<f64> {
+        Some(self.motor.model.gear.ratio)
     }
 
     fn free_run(&self, _axis: AxisId) -> Option<FreeRun> {

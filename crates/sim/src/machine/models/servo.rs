@@ -14,23 +14,18 @@ use drives::servo::{
 };
 use plant::FreeRun;
 use plant::angle::Angle;
-use plant::attachment::Attachment;
 use plant::encoder::EncoderFault;
 use plant::hall::HallFault;
 use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
-use plant::mechanics::RotorData;
-use plant::physics::Physics;
 use plant::pmsm::Phase;
 use plant::rest::{Rested, is_at_rest, rest};
-use plant::rig::{Rig, RigModel};
-use plant::shaft::Motion;
 use plant::supply::SupplyData;
 
 use super::boxed::Boxed;
 use super::order::{Order, OrderError};
 use super::{kept, order};
 use crate::machine::kernel::Machine;
-use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
+use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, with_demand};
 use crate::machine::kernel::quantity::Quantity;
 use crate::machine::kernel::realism::{
     HUB_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
@@ -170,16 +165,6 @@ impl ServoBench {
         self.motors.get_mut(axis)
     }
 
-    /// The motor of an axis; of one that there is not, the first.
-    fn at(&self, axis: AxisId) -> &HubMotor {
-        self.motors.get(usize::from(axis.0)).unwrap_or(self.first())
-    }
-
-    fn at_mut(&mut self, axis: AxisId) -> &mut HubMotor {
-        let number = Some(usize::from(axis.0)).filter(|number| *number < self.motors.len());
-        &mut self.motors[number.unwrap_or(0)]
-    }
-
     fn first(&self) -> &HubMotor {
         &self.motors[0]
     }
@@ -220,21 +205,8 @@ impl ServoBench {
         }
     }
 
-    /// What power stage and brake of an axis make of the firmware's outputs.
-    fn pins(&self, axis: usize, actuation: &Actuation) -> hub_motor::Actuation {
-        let AxisActuation { duty, brake_released, .. } = actuation.axes[axis];
-        let inverter = match duty.map(|duty| duty.map(f64::from)) {
-            None => Inverter::Open,
-            Some(duty) if self.dead_time => {
-                Inverter::Driven(with_dead_time(duty, self.motors[axis].sense().phase_current_a))
-            }
-            Some(duty) => Inverter::Driven(duty),
-        };
-        hub_motor::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released }
-    }
-
     fn step_axis(&mut self, axis: usize, actuation: &Actuation) {
-        let pins = self.pins(axis, actuation);
+        let pins = self.pins(AxisId(axis as u8), actuation);
         let motor = &mut self.motors[axis];
         let before = motor.rotor.angle.turns();
         motor.step(Self::PERIOD_S, &pins);
@@ -272,6 +244,7 @@ const INPUTS: [&str; SWITCHES * MAX_AXES] = [
 
 impl Assembly for ServoBench {
     type Firmware = ServoDrive<Boxed>;
+    type Motor = HubMotor;
 
     const MODEL: &'static str = "cia402";
     const INPUTS: &'static [&'static str] = &INPUTS;
@@ -341,13 +314,17 @@ impl Assembly for ServoBench {
 
     fn can_rest(&self, actuation: &Actuation) -> bool {
         let stand = self.motors.iter().all(|motor| motor.rotor.velocity_rad_s == 0.0);
-        let rests = |(axis, motor)| is_at_rest(motor, Self::PERIOD_S, &self.pins(axis, actuation));
+        let rests = |(axis, motor)| is_at_rest(motor, Self::PERIOD_S, &self.pins(AxisId(axis as u8), actuation));
         stand && self.indexes.iter().all(Option::is_none) && self.motors.iter().enumerate().all(rests)
     }
 
     fn rest(&mut self, actuation: &Actuation, periods: u64) -> Rested {
         let pins: [_; MAX_AXES] = std::array::from_fn(|axis| {
-            if axis < self.motors.len() { self.pins(axis, actuation) } else { hub_motor::Actuation::default() }
+            if axis < self.motors.len() {
+                self.pins(AxisId(axis as u8), actuation)
+            } else {
+                hub_motor::Actuation::default()
+            }
         });
         rest(&mut self.motors, Self::PERIOD_S, |axis| pins[axis], periods)
     }
@@ -362,26 +339,30 @@ impl Assembly for ServoBench {
         self.motors.len() as u8
     }
 
-    fn shaft_and_rig(&self, axis: AxisId) -> (&RotorData, &Rig) {
-        let motor = self.at(axis);
-        (&motor.rotor, &motor.rig)
+    fn motor_at(&self, axis: AxisId) -> &HubMotor {
+        self.motors.get(usize::from(axis.0)).unwrap_or(self.first())
     }
 
-    fn physics(&self, axis: AxisId) -> Physics {
-        self.at(axis).physics()
+    fn motor_at_mut(&mut self, axis: AxisId) -> &mut HubMotor {
+        let number = Some(usize::from(axis.0)).filter(|number| *number < self.motors.len());
+        &mut self.motors[number.unwrap_or(0)]
     }
 
-    fn rig_mut(&mut self, axis: AxisId) -> &mut Rig {
-        &mut self.at_mut(axis).rig
-    }
-
-    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel) {
-        let first = &mut self.motors[0];
-        (&mut first.rig, &mut first.model.rig)
+    fn pins(&self, axis: AxisId, actuation: &Actuation) -> hub_motor::Actuation {
+        let axis = usize::from(axis.0);
+        let AxisActuation { duty, brake_released, .. } = actuation.axes[axis];
+        let inverter = match duty.map(|duty| duty.map(f64::from)) {
+            None => Inverter::Open,
+            Some(duty) if self.dead_time => {
+                Inverter::Driven(with_dead_time(duty, self.motors[axis].sense().phase_current_a))
+            }
+            Some(duty) => Inverter::Driven(duty),
+        };
+        hub_motor::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released }
     }
 
     fn report(&self, firmware: &ServoDrive<Boxed>, axis: AxisId, common: Report) -> Report {
-        let counts_per_turn = f64::from(self.at(axis).model.encoder.counts_per_turn());
+        let counts_per_turn = f64::from(self.motor_at(axis).model.encoder.counts_per_turn());
         let number = usize::from(axis.0);
         let released = self.last.axes.get(number).is_some_and(|axis| axis.brake_released);
         let report = Report {
@@ -397,36 +378,14 @@ impl Assembly for ServoBench {
         }
     }
 
-    fn shaft_counts(&self, axis: AxisId) -> i64 {
-        let motor = self.at(axis);
-        motor.rotor.angle.count(motor.model.encoder.counts_per_turn())
-    }
-
-    fn shaft_facts(&self, axis: AxisId) -> ShaftFacts {
-        let motor = self.at(axis);
-        ShaftFacts {
-            counts_per_turn: motor.model.encoder.counts_per_turn(),
-            reducer: None,
-            rotor_inertia_kg_m2: motor.model.rotor.inertia_kg_m2,
-            load_angle: motor.load_angle(),
-        }
-    }
-
-    fn attach(&mut self, axis: AxisId, what: Attachment) {
-        self.at_mut(axis).attach(what);
-    }
-
-    fn couple(&mut self, axis: AxisId) {
-        self.at_mut(axis).couple();
-    }
-
-    fn follow(&mut self, axis: AxisId, motion: &Motion) {
-        self.at_mut(axis).follow(motion);
+    #[inline]
+    fn counts_per_turn(&self, axis: AxisId) -> u32 {
+        self.motor_at(axis).model.encoder.counts_per_turn()
     }
 
     fn free_run(&self, axis: AxisId) -> Option<FreeRun> {
         let actuation = self.last.axes.get(usize::from(axis.0))?;
-        if actuation.duty.is_some() { None } else { self.at(axis).free_run(actuation.brake_released) }
+        if actuation.duty.is_some() { None } else { self.motor_at(axis).free_run(actuation.brake_released) }
     }
 
     fn image(&self) -> &[u8] {
@@ -438,11 +397,11 @@ impl Assembly for ServoBench {
     }
 
     fn set_rotor_locked(&mut self, axis: AxisId, locked: bool) {
-        self.at_mut(axis).lock_rotor(locked);
+        self.motor_at_mut(axis).lock_rotor(locked);
     }
 
     fn set_fault(&mut self, axis: AxisId, component: Component, broken: bool) -> Result<(), Refused> {
-        let motor = self.at_mut(axis);
+        let motor = self.motor_at_mut(axis);
         match component {
             Component::Hall => motor.hall_fault = if broken { HallFault::Disconnected } else { HallFault::None },
             Component::Encoder => {

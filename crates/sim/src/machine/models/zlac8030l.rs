@@ -3,8 +3,6 @@
 //! In go the power stage, bleeder, outputs and brake of the firmware, out come its sensors and the report for people.
 //! Figures of the motor are those of `plant`; what is assumed of the surroundings is a constant below.
 
-use std::slice::from_mut;
-
 use canopen::Mux;
 use devices::variant::Variant;
 use devices::zltech::ZLAC8030L;
@@ -17,21 +15,16 @@ use drives::zlac8030l::variations::{FAST_MOTOR, VARIANT};
 use drives::zlac8030l::{Zlac8030l, objects, storage};
 use plant::FreeRun;
 use plant::angle::Angle;
-use plant::attachment::Attachment;
 use plant::encoder::EncoderFault;
 use plant::hall::HallFault;
 use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
-use plant::mechanics::RotorData;
-use plant::physics::Physics;
 use plant::pmsm::Phase;
-use plant::rest::{Rested, is_at_rest, rest};
-use plant::rig::{Rig, RigModel};
-use plant::shaft::Motion;
+use plant::rest::is_at_rest;
 use plant::supply::SupplyData;
 
 use super::order::{Order, OrderError, baud_rate};
 use crate::machine::kernel::Machine;
-use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
+use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, with_demand};
 use crate::machine::kernel::realism::{
     HUB_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
 };
@@ -119,20 +112,6 @@ impl HubWheel {
         self.motor.is_power_stage_burnt().then_some(BURNT).or(seized).or(bleeder)
     }
 
-    /// What the power stage and the brake make of the firmware's outputs.
-    #[inline]
-    fn pins(&self, actuation: &Actuation) -> hub_motor::Actuation {
-        let inverter = match actuation.power_stage {
-            PowerStage::Off => Inverter::Open,
-            PowerStage::Shorted => Inverter::Shorted,
-            PowerStage::Modulate { duty } if self.dead_time => {
-                Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
-            }
-            PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
-        };
-        hub_motor::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released: !actuation.brake_engaged }
-    }
-
     /// The motor and all that is joined to it, to change.
     pub fn motor_mut(&mut self) -> &mut HubMotor {
         &mut self.motor
@@ -141,6 +120,7 @@ impl HubWheel {
 
 impl Assembly for HubWheel {
     type Firmware = Zlac8030l;
+    type Motor = HubMotor;
 
     const MODEL: &'static str = ZLAC8030L.name;
     const INPUTS: &'static [&'static str] = &["X0", "X1"];
@@ -188,16 +168,12 @@ impl Assembly for HubWheel {
     #[inline(always)]
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
-        self.motor.step(Self::PERIOD_S, &self.pins(actuation));
+        self.motor.step(Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation));
     }
 
     fn can_rest(&self, actuation: &Actuation) -> bool {
-        self.motor.rotor.velocity_rad_s == 0.0 && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(actuation))
-    }
-
-    fn rest(&mut self, actuation: &Actuation, periods: u64) -> Rested {
-        let pins = self.pins(actuation);
-        rest(from_mut(&mut self.motor), Self::PERIOD_S, |_| pins, periods)
+        self.motor.rotor.velocity_rad_s == 0.0
+            && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation))
     }
 
     /// Behind a burnt power stage there is no voltage.
@@ -207,20 +183,25 @@ impl Assembly for HubWheel {
         !self.motor.is_power_stage_burnt() && self.motor.rig.supply.bus_v >= least_v
     }
 
-    fn shaft_and_rig(&self, _axis: AxisId) -> (&RotorData, &Rig) {
-        (&self.motor.rotor, &self.motor.rig)
+    fn motor_at(&self, _axis: AxisId) -> &HubMotor {
+        &self.motor
     }
 
-    fn physics(&self, _axis: AxisId) -> Physics {
-        self.motor.physics()
+    fn motor_at_mut(&mut self, _axis: AxisId) -> &mut HubMotor {
+        &mut self.motor
     }
 
-    fn rig_mut(&mut self, _axis: AxisId) -> &mut Rig {
-        &mut self.motor.rig
-    }
-
-    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel) {
-        (&mut self.motor.rig, &mut self.motor.model.rig)
+    #[inline]
+    fn pins(&self, _axis: AxisId, actuation: &Actuation) -> hub_motor::Actuation {
+        let inverter = match actuation.power_stage {
+            PowerStage::Off => Inverter::Open,
+            PowerStage::Shorted => Inverter::Shorted,
+            PowerStage::Modulate { duty } if self.dead_time => {
+                Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+            }
+            PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
+        };
+        hub_motor::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released: !actuation.brake_engaged }
     }
 
     fn report(&self, firmware: &Zlac8030l, _axis: AxisId, common: Report) -> Report {
@@ -236,29 +217,8 @@ impl Assembly for HubWheel {
     }
 
     #[inline]
-    fn shaft_counts(&self, _axis: AxisId) -> i64 {
-        self.motor.rotor.angle.count(self.motor.model.encoder.counts_per_turn())
-    }
-
-    fn shaft_facts(&self, _axis: AxisId) -> ShaftFacts {
-        ShaftFacts {
-            counts_per_turn: self.motor.model.encoder.counts_per_turn(),
-            reducer: None,
-            rotor_inertia_kg_m2: self.motor.model.rotor.inertia_kg_m2,
-            load_angle: self.motor.load_angle(),
-        }
-    }
-
-    fn attach(&mut self, _axis: AxisId, what: Attachment) {
-        self.motor.attach(what);
-    }
-
-    fn couple(&mut self, _axis: AxisId) {
-        self.motor.couple();
-    }
-
-    fn follow(&mut self, _axis: AxisId, motion: &Motion) {
-        self.motor.follow(motion);
+    fn counts_per_turn(&self, _axis: AxisId) -> u32 {
+        self.motor.model.encoder.counts_per_turn()
     }
 
     fn free_run(&self, _axis: AxisId) -> Option<FreeRun> {

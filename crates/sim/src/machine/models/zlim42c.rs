@@ -4,8 +4,6 @@
 //! know where its rotor is; the report has both, the commanded position and the rotor's in the same pulses. Figures of
 //! the motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
-use std::slice::from_mut;
-
 use canopen::Mux;
 use devices::AxisId;
 use devices::Description;
@@ -19,19 +17,14 @@ use drives::zlim42c::variations::VARIANT;
 use drives::zlim42c::{Zlim42c, objects, storage};
 use plant::FreeRun;
 use plant::angle::Angle;
-use plant::attachment::Attachment;
-use plant::mechanics::RotorData;
-use plant::physics::Physics;
-use plant::rest::{Rested, is_at_rest, rest};
-use plant::rig::{Rig, RigModel};
-use plant::shaft::Motion;
+use plant::rest::is_at_rest;
 use plant::stepper::{Bridges, Phase};
 use plant::stepper_motor::{StepperMotor, StepperMotorModel};
 use plant::supply::SupplyData;
 
 use super::order::{Order, OrderError, baud_rate};
 use crate::machine::kernel::Machine;
-use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, ShaftFacts};
+use crate::machine::kernel::assembly::{AMBIENT_C, Assembly};
 use crate::machine::kernel::quantity::Quantity;
 use crate::machine::kernel::realism::{Noise, Realism, SMALL_CURRENT_STEP_A, VOLTAGE_STEP_V, with_dead_time};
 use crate::{Component, Levels, Refused, Report, TemperatureSensor, VirtualDrive};
@@ -153,18 +146,6 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
         self.motor.is_overheated().then_some(BURNT).or(seized)
     }
 
-    /// What the bridges make of the firmware's outputs.
-    #[inline]
-    fn pins(&self, actuation: &Actuation) -> Bridges {
-        match actuation.power_stage {
-            PowerStage::Off => Bridges::Open,
-            PowerStage::Modulate { duty } if self.dead_time => {
-                Bridges::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
-            }
-            PowerStage::Modulate { duty } => Bridges::Driven(duty.map(f64::from)),
-        }
-    }
-
     /// Electrical turns of the rotor.
     fn rotor_turns(&self) -> f64 {
         self.motor.rotor.angle.as_rad() / core::f64::consts::TAU * f64::from(TEETH)
@@ -180,6 +161,7 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
 
 impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     type Firmware = Zlim42c;
+    type Motor = StepperMotor;
 
     const MODEL: &'static str = if LENGTH_MM == LONG { ZLIM42C_82.name } else { ZLIM42C.name };
     const INPUTS: &'static [&'static str] = &["X0", "X1", "X2", "X3"];
@@ -231,17 +213,12 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         if self.zero.is_none() && actuation.led.green {
             self.zero = Some(self.rotor_turns().round());
         }
-        self.motor.step(Self::PERIOD_S, &self.pins(actuation));
+        self.motor.step(Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation));
     }
 
     fn can_rest(&self, actuation: &Actuation) -> bool {
         let quiet = self.motor.rotor.velocity_rad_s == 0.0 && (self.zero.is_some() || !actuation.led.green);
-        quiet && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(actuation))
-    }
-
-    fn rest(&mut self, actuation: &Actuation, periods: u64) -> Rested {
-        let pins = self.pins(actuation);
-        rest(from_mut(&mut self.motor), Self::PERIOD_S, |_| pins, periods)
+        quiet && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation))
     }
 
     #[inline]
@@ -252,20 +229,23 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         supply.bus_v >= if running { Self::STOPS_BELOW_V } else { Self::STARTS_AT_V } && (running || may_start)
     }
 
-    fn shaft_and_rig(&self, _axis: AxisId) -> (&RotorData, &Rig) {
-        (&self.motor.rotor, &self.motor.rig)
+    fn motor_at(&self, _axis: AxisId) -> &StepperMotor {
+        &self.motor
     }
 
-    fn physics(&self, _axis: AxisId) -> Physics {
-        self.motor.physics()
+    fn motor_at_mut(&mut self, _axis: AxisId) -> &mut StepperMotor {
+        &mut self.motor
     }
 
-    fn rig_mut(&mut self, _axis: AxisId) -> &mut Rig {
-        &mut self.motor.rig
-    }
-
-    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel) {
-        (&mut self.motor.rig, &mut self.motor.model.rig)
+    #[inline]
+    fn pins(&self, _axis: AxisId, actuation: &Actuation) -> Bridges {
+        match actuation.power_stage {
+            PowerStage::Off => Bridges::Open,
+            PowerStage::Modulate { duty } if self.dead_time => {
+                Bridges::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+            }
+            PowerStage::Modulate { duty } => Bridges::Driven(duty.map(f64::from)),
+        }
     }
 
     fn report(&self, firmware: &Zlim42c, _axis: AxisId, common: Report) -> Report {
@@ -295,29 +275,8 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     }
 
     #[inline]
-    fn shaft_counts(&self, _axis: AxisId) -> i64 {
-        self.motor.rotor.angle.count(SHAFT_COUNTS)
-    }
-
-    fn shaft_facts(&self, _axis: AxisId) -> ShaftFacts {
-        ShaftFacts {
-            counts_per_turn: SHAFT_COUNTS,
-            reducer: None,
-            rotor_inertia_kg_m2: self.motor.model.rotor.inertia_kg_m2,
-            load_angle: self.motor.load_angle(),
-        }
-    }
-
-    fn attach(&mut self, _axis: AxisId, what: Attachment) {
-        self.motor.attach(what);
-    }
-
-    fn couple(&mut self, _axis: AxisId) {
-        self.motor.couple();
-    }
-
-    fn follow(&mut self, _axis: AxisId, motion: &Motion) {
-        self.motor.follow(motion);
+    fn counts_per_turn(&self, _axis: AxisId) -> u32 {
+        SHAFT_COUNTS
     }
 
     fn free_run(&self, _axis: AxisId) -> Option<FreeRun> {
