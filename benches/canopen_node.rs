@@ -223,7 +223,7 @@ fn round_trip(criterion: &mut Criterion) {
     criterion.bench_function("client and server round trip, upload", |bencher| {
         bencher.iter(|| {
             client.upload(black_box(mux), now);
-            let request = client.poll_transmit().unwrap();
+            let request = client.poll_transmit(&buffer).unwrap();
             node.handle_frame(&request, now);
             let reply = node.poll_transmit().unwrap();
             node.handle_transmitted(&reply, now);

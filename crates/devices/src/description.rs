@@ -43,6 +43,8 @@ pub struct Description {
     pub nmt: NmtRules,
     /// Whether it is an LSS slave (CiA 305): node-ID and bit rate by its identity and serial number.
     pub lss: bool,
+    /// Whether it has SDO block transfer (CiA 301, 7.2.4.3.9 to 7.2.4.3.16), which the standard leaves to the device.
+    pub sdo_block_transfer: bool,
     /// PDO rules.
     pub pdo: PdoRules,
     /// How long it takes to start, to answer and to store.

@@ -1,6 +1,7 @@
 //! How a firmware communicates, by its description.
 
 use canopen::node::NodeProfile;
+use canopen::sdo::block::MAX_BLOCK_SIZE;
 use devices::Description;
 
 /// How a firmware with this description communicates: a master reads of a drive what the drive does.
@@ -16,6 +17,7 @@ pub const fn communication(description: &Description) -> NodeProfile {
         pdo_changes_while_valid: pdo.remap_while_valid,
         mapping: pdo.mapping,
         short_rpdo: pdo.short_rpdo,
+        sdo_block_size: if description.sdo_block_transfer { MAX_BLOCK_SIZE } else { 0 },
         ..NodeProfile::cia_301(description.dictionary)
     }
 }

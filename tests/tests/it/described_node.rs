@@ -112,6 +112,18 @@ fn a_default_beyond_ascii_goes_over_the_bus_byte_for_byte() {
     assert_eq!(Bench::new().send("609#4008100000000000"), ["589#430810005072FC66"]);
 }
 
+/// CiA 301, 7.2.4.3.9: the label in two segments.
+#[test]
+fn a_text_is_written_in_blocks() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.send("609#C601200008000000"), ["589#A40120007F000000"]);
+    assert!(bench.send("609#0141424344454647").is_empty());
+    assert_eq!(bench.send("609#8248000000000000"), ["589#A2027F0000000000"]);
+    let [low, high] = canopen::sdo::block::checksum(0, b"ABCDEFGH").to_le_bytes();
+    assert_eq!(bench.send(&format!("609#D9{low:02X}{high:02X}0000000000")), ["589#A100000000000000"]);
+    assert_eq!(bench.send("609#4001200000000000"), ["589#4101200008000000"]);
+}
+
 #[test]
 fn texts_and_64_bits_are_set_from_outside_and_stored_over_power_cycles() {
     let mut bench = Bench::new();

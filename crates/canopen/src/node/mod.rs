@@ -113,7 +113,7 @@ impl<S: Storage> Node<S> {
             heartbeat_state: None,
             emcy: emcy::Producer::new(),
             emcy_id: None,
-            sdo: Server::new(profile.sdo_frame_length, profile.sdo_timeout_ns),
+            sdo: Server::new(profile.sdo_frame_length, profile.sdo_timeout_ns, profile.sdo_block_size),
             ticket: Ticket(0),
             pdos,
         }

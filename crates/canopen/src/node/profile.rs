@@ -1,6 +1,7 @@
 use crate::emcy::EmcyErrorCode;
 use crate::od::{Conditions, Dictionary, Storage, Table};
 use crate::pdo::{EventTrigger, MappingRules};
+use crate::sdo::block::MAX_BLOCK_SIZE;
 use crate::sdo::server::FrameLength;
 use crate::{NmtState, NodeId};
 
@@ -38,6 +39,8 @@ pub struct NodeProfile {
     pub sdo_frame_length: FrameLength,
     /// A segmented SDO transfer is aborted when the client is silent this long; 0 for never.
     pub sdo_timeout_ns: u64,
+    /// SDO block transfer: segments of the blocks that it asks for, up to 127; 0 for a device without block transfer.
+    pub sdo_block_size: u8,
 }
 
 impl NodeProfile {
@@ -46,7 +49,7 @@ impl NodeProfile {
     pub const SDO_TIMEOUT_NS: u64 = 1_000_000_000;
 
     /// What CiA 301 says: pre-operational after boot-up, inhibit time in 100 us, event timer in 1 ms, PDOs to be made
-    /// invalid before they are changed, SDO frames of eight bytes.
+    /// invalid before they are changed, SDO frames of eight bytes, block transfer with blocks as long as they can be.
     pub const fn cia_301(table: &'static Table) -> Self {
         Self {
             table,
@@ -62,6 +65,7 @@ impl NodeProfile {
             short_rpdo: Some(EmcyErrorCode::PDO_NOT_PROCESSED),
             sdo_frame_length: FrameLength::Eight,
             sdo_timeout_ns: Self::SDO_TIMEOUT_NS,
+            sdo_block_size: MAX_BLOCK_SIZE,
         }
     }
 }

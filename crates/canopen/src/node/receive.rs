@@ -49,6 +49,8 @@ impl<S: Storage> Node<S> {
         }
         if self.sdo.has_reply() {
             self.pending.insert(Source::SdoReply);
+        } else {
+            self.offer_segment();
         }
         self.deadline = self.deadline.min(self.sdo.deadline());
     }

@@ -73,9 +73,10 @@ impl<S: Storage> Node<S> {
                 let state = self.heartbeat_state.unwrap_or(self.state.heartbeat_byte());
                 Some(Heartbeat { node: self.node_id, state }.emit())
             }
-            Source::SdoReply => {
-                self.sdo.take_reply().map(|bytes| Frame::full(connection_set::sdo_reply(self.node_id), bytes))
-            }
+            Source::SdoReply => match self.sdo.take_reply() {
+                Some(bytes) => Some(Frame::full(connection_set::sdo_reply(self.node_id), bytes)),
+                None => self.take_segment(),
+            },
             Source::Tpdo(position) => {
                 let tpdo = &mut self.pdos.tpdos.as_mut()[position];
                 let frame = tpdo.take(&self.dictionary, self.now);
@@ -88,6 +89,19 @@ impl<S: Storage> Node<S> {
                 self.emcy_id.map(|id| emcy.emit(id))
             }
         }
+    }
+
+    /// Of an SDO block upload; the next one is offered at once.
+    #[inline(never)]
+    fn take_segment(&mut self) -> Option<Frame> {
+        let segment = self.sdo.take_segment(&self.dictionary.view());
+        self.offer_segment();
+        segment.map(|bytes| Frame::full(connection_set::sdo_reply(self.node_id), bytes))
+    }
+
+    #[inline(never)]
+    pub(super) fn offer_segment(&mut self) {
+        self.pending.set(Source::SdoReply, self.sdo.has_segment());
     }
 
     pub(super) fn offer_heartbeat(&mut self) {

@@ -1,14 +1,19 @@
 //! The other side of an SDO channel: asks a server to read or write one entry (CiA 301, 7.2.4).
 //!
 //! One transfer at a time. The bytes live with the caller: a download hands the same bytes to every call, an upload
-//! the buffer to fill. Expedited or segmented is chosen by length, and by the server's answer. Retries and queues
-//! are the caller's.
+//! the buffer to fill. Expedited or segmented is chosen by length, and by the server's answer; whether blocks are asked for, retries
+//! and queues are the caller's.
 
-use core::fmt;
+mod block;
+mod failure;
+
 use core::time::Duration;
 
 use can::{CanId, Frame, Instant};
 
+pub use failure::Failure;
+
+use super::block::{Receiver, Sender, wire as blocks};
 use super::wire::{LENGTH, MAX_SEGMENT, Payload, Reply, Request, Segment};
 use crate::{AbortCode, Mux, NodeId, connection_set};
 
@@ -29,104 +34,6 @@ pub enum Outcome {
     },
 }
 
-/// Why a transfer failed. It is over; the server was sent an abort where it may still be waiting.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Failure {
-    /// The server refused.
-    Aborted {
-        /// The entry.
-        mux: Mux,
-        /// Its reason.
-        code: AbortCode,
-    },
-    /// No reply in time.
-    TimedOut {
-        /// The entry.
-        mux: Mux,
-    },
-    /// A reply for another entry.
-    WrongMux {
-        /// The entry asked for.
-        expected: Mux,
-        /// The entry in the reply.
-        received: Mux,
-    },
-    /// A reply that does not belong to the request.
-    UnexpectedReply {
-        /// The entry.
-        mux: Mux,
-        /// Its first byte.
-        command: u8,
-    },
-    /// A segment came twice, or one was lost.
-    ToggleBit {
-        /// The entry.
-        mux: Mux,
-    },
-    /// The value is longer than the buffer.
-    BufferTooSmall {
-        /// The entry.
-        mux: Mux,
-        /// Bytes needed, as far as known.
-        needed: usize,
-    },
-    /// The server sent another number of bytes than it had declared.
-    LengthMismatch {
-        /// The entry.
-        mux: Mux,
-        /// Bytes declared.
-        declared: usize,
-        /// Bytes received.
-        received: usize,
-    },
-    /// A segment without a byte said that more follow: such an upload need not end.
-    EmptySegment {
-        /// The entry.
-        mux: Mux,
-        /// Bytes received before it.
-        received: usize,
-    },
-    /// Each segment was in time, and yet the upload did not end.
-    Endless {
-        /// The entry.
-        mux: Mux,
-        /// Bytes received.
-        received: usize,
-        /// Time that it was given.
-        limit: Duration,
-    },
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Aborted { mux, code } => write!(f, "{mux}: the device aborted with {code}"),
-            Self::TimedOut { mux } => write!(f, "{mux}: no reply from the device in time"),
-            Self::WrongMux { expected, received } => write!(f, "{expected}: the reply was for {received}"),
-            Self::UnexpectedReply { mux, command } => {
-                write!(f, "{mux}: the reply {command:02X}h does not fit the request")
-            }
-            Self::ToggleBit { mux } => write!(f, "{mux}: a segment was repeated or lost (toggle bit)"),
-            Self::BufferTooSmall { mux, needed } => write!(f, "{mux}: the value has at least {needed} bytes, too many"),
-            Self::LengthMismatch { mux, declared, received } => {
-                write!(f, "{mux}: {declared} bytes declared but {received} received")
-            }
-            Self::EmptySegment { mux, received } => {
-                write!(f, "{mux}: after {received} bytes came a segment without data that announced more")
-            }
-            Self::Endless { mux, received, limit } => {
-                write!(
-                    f,
-                    "{mux}: {received} bytes came in {} s and no end of them; a longer time-out allows for more",
-                    limit.as_secs()
-                )
-            }
-        }
-    }
-}
-
-impl core::error::Error for Failure {}
-
 /// A client of one server channel.
 ///
 /// Start with [`upload`](Self::upload) or [`download`](Self::download); then hand in frames and time until an
@@ -142,6 +49,10 @@ pub struct Client {
     began: Instant,
     limit: Duration,
     request: Option<[u8; LENGTH]>,
+    /// The end of an upload of blocks, which goes out before any other request.
+    closing: Option<[u8; LENGTH]>,
+    /// An upload of blocks was given up, whose server may have sent more of them meanwhile: after this number.
+    abandoned: Option<u8>,
     /// What was asked for before, the newest first: a server that is slow answers to that still, and some answer twice.
     earlier: [Option<Mux>; REMEMBERED],
     /// What another client asked for, as a reply that came meanwhile shows.
@@ -181,6 +92,29 @@ enum State {
         sent: usize,
         toggle: bool,
     },
+    /// Waits for the answer to an initiate upload of blocks.
+    BlockUpload {
+        mux: Mux,
+    },
+    /// Takes segments of blocks, and after them the end of the data.
+    UploadBlocks {
+        mux: Mux,
+        declared: Option<usize>,
+        receiver: Receiver,
+    },
+    /// Waits for the answer to an initiate download of blocks.
+    BlockDownload {
+        mux: Mux,
+    },
+    /// Sends segments of blocks, and waits for the confirmation of each block.
+    DownloadBlocks {
+        mux: Mux,
+        sender: Sender,
+    },
+    /// Waits for the confirmation of all blocks.
+    BlocksSent {
+        mux: Mux,
+    },
 }
 
 impl Client {
@@ -195,6 +129,8 @@ impl Client {
             began: Instant::ZERO,
             limit: Duration::MAX,
             request: None,
+            closing: None,
+            abandoned: None,
             earlier: [None; REMEMBERED],
             foreign: None,
         }
@@ -210,10 +146,24 @@ impl Client {
         !matches!(self.state, State::Idle)
     }
 
-    /// How many bytes have come of an upload whose length the server has not declared; `None` if none is under way.
-    pub const fn undeclared_upload(&self) -> Option<usize> {
-        match self.state {
-            State::UploadSegments { declared: None, received, .. } => Some(received),
+    /// How long the buffer of an upload has to be for what `frame` brings, or announces, if it is an answer to it.
+    pub fn needed_room(&self, frame: &Frame) -> Option<usize> {
+        let raw = frame.padded();
+        match (self.state, Reply::parse(raw)) {
+            (State::UploadBlocks { declared, receiver, .. }, _) => {
+                declared.is_none().then(|| receiver.written() + MAX_SEGMENT)
+            }
+            (State::BlockUpload { mux }, Reply::Unknown { .. }) => {
+                let reply = blocks::Reply::parse(raw).filter(|reply| reply.mux() == Some(mux))?;
+                reply.declared_size().map(|size| size as usize)
+            }
+            (
+                State::Upload { mux } | State::BlockUpload { mux },
+                Reply::InitiateUpload(received, Payload::Segmented { size: Some(size) }),
+            ) if received == mux => Some(size as usize),
+            (State::UploadSegments { declared: None, received, .. }, Reply::UploadSegment(segment)) => {
+                Some(received + segment.data().len())
+            }
             _ => None,
         }
     }
@@ -254,21 +204,29 @@ impl Client {
             return None;
         }
         let mux = self.mux()?;
-        let reply = Reply::parse(frame.padded());
-        if let Some(received) = self.of_another(mux, &reply) {
-            if !self.earlier.contains(&Some(received)) {
-                self.foreign = Some(received);
-            }
+        if self.is_stray(frame.padded()) {
             return None;
         }
-        match self.advance(mux, reply, buffer, now) {
+        let advanced = if let State::UploadBlocks { .. } = self.state {
+            self.take_of_blocks(frame.padded(), buffer, now)
+        } else {
+            let reply = Reply::parse(frame.padded());
+            if let Some(received) = self.of_another(mux, &reply, frame.padded()) {
+                if !self.earlier.contains(&Some(received)) {
+                    self.foreign = Some(received);
+                }
+                return None;
+            }
+            self.advance(mux, reply, frame.padded(), buffer, now)
+        };
+        match advanced {
             Ok(None) => None,
             Ok(Some(outcome)) => {
                 self.end();
                 Some(Ok(outcome))
             }
             Err(failure) => {
-                match abort_code_for(&failure) {
+                match failure.abort_code() {
                     Some(code) => self.give_up(mux, code),
                     None => self.end(),
                 }
@@ -280,10 +238,15 @@ impl Client {
     /// Time has reached `now`.
     pub fn handle_timeout(&mut self, now: Instant) -> Option<Failure> {
         let mux = self.mux().filter(|_| now >= self.deadline)?;
+        let is_endless = now >= self.began + self.limit;
         let endless = match self.state {
-            State::UploadSegments { received, .. } if now >= self.began + self.limit => Some(received),
+            State::UploadSegments { received, .. } if is_endless => Some(received),
+            State::UploadBlocks { receiver, .. } if is_endless => Some(receiver.written()),
             _ => None,
         };
+        if endless.is_none() && self.confirms_early(now) {
+            return None;
+        }
         self.give_up(mux, AbortCode::TIMED_OUT);
         Some(match (endless, self.foreign) {
             (Some(received), _) => Failure::Endless { mux, received, limit: self.limit },
@@ -292,9 +255,10 @@ impl Client {
         })
     }
 
-    /// The next frame to send.
-    pub fn poll_transmit(&mut self) -> Option<Frame> {
-        self.request.take().map(|bytes| Frame::full(self.request_id, bytes))
+    /// The next frame to send. `data` is that of a download.
+    pub fn poll_transmit(&mut self, data: &[u8]) -> Option<Frame> {
+        let waiting = self.closing.take().or_else(|| self.request.take());
+        waiting.or_else(|| self.next_segment(data)).map(|bytes| Frame::full(self.request_id, bytes))
     }
 
     /// When [`handle_timeout`](Self::handle_timeout) should next be called.
@@ -302,14 +266,22 @@ impl Client {
         self.is_busy().then_some(self.deadline)
     }
 
-    fn advance(&mut self, mux: Mux, reply: Reply, buffer: &mut [u8], now: Instant) -> Result<Option<Outcome>, Failure> {
+    fn advance(
+        &mut self,
+        mux: Mux,
+        reply: Reply,
+        raw: &[u8; LENGTH],
+        buffer: &mut [u8],
+        now: Instant,
+    ) -> Result<Option<Outcome>, Failure> {
         if let Reply::Abort(received, code) = reply {
             // Some servers abort segments without the multiplexor: 0 stands for the transfer under way.
             expect_mux(mux, if received.key() == 0 { mux } else { received })?;
             return Err(Failure::Aborted { mux, code });
         }
         match (self.state, reply) {
-            (State::Upload { .. }, Reply::InitiateUpload(received, payload)) => {
+            // A server may answer as if no blocks had been asked for.
+            (State::Upload { .. } | State::BlockUpload { .. }, Reply::InitiateUpload(received, payload)) => {
                 expect_mux(mux, received)?;
                 self.begin_upload(mux, payload, buffer, now)
             }
@@ -353,6 +325,11 @@ impl Client {
                 self.send_segment(mux, buffer, sent, !toggle, now);
                 Ok(None)
             }
+            (State::BlockUpload { .. }, Reply::Unknown { .. }) => self.begin_block_upload(mux, raw, buffer, now),
+            (
+                State::BlockDownload { .. } | State::DownloadBlocks { .. } | State::BlocksSent { .. },
+                Reply::Unknown { .. },
+            ) => self.advance_block_download(mux, raw, buffer, now),
             (_, reply) => Err(Failure::UnexpectedReply { mux, command: reply.emit()[0] }),
         }
     }
@@ -372,18 +349,30 @@ impl Client {
                 Ok(Some(Outcome::Uploaded { mux, length }))
             }
             Payload::Segmented { size } => {
-                let declared = size.map(|size| size as usize);
-                if let Some(needed) = declared.filter(|declared| *declared > buffer.len()) {
-                    return Err(Failure::BufferTooSmall { mux, needed });
-                }
-                let segments =
-                    declared.map_or(UNDECLARED_SEGMENTS, |bytes| bytes.div_ceil(MAX_SEGMENT) as u32).saturating_add(1);
-                self.limit = self.timeout.saturating_mul(segments);
-                self.began = now;
+                let declared = self.begin_long_upload(mux, size, buffer, now)?;
                 self.ask_segment(mux, declared, 0, false, now);
                 Ok(None)
             }
         }
+    }
+
+    /// Checks what is declared, and sets a limit to the whole.
+    fn begin_long_upload(
+        &mut self,
+        mux: Mux,
+        size: Option<u32>,
+        buffer: &[u8],
+        now: Instant,
+    ) -> Result<Option<usize>, Failure> {
+        let declared = size.map(|size| size as usize);
+        if let Some(needed) = declared.filter(|declared| *declared > buffer.len()) {
+            return Err(Failure::BufferTooSmall { mux, needed });
+        }
+        let segments =
+            declared.map_or(UNDECLARED_SEGMENTS, |bytes| bytes.div_ceil(MAX_SEGMENT) as u32).saturating_add(1);
+        self.limit = self.timeout.saturating_mul(segments);
+        self.began = now;
+        Ok(declared)
     }
 
     fn ask_segment(&mut self, mux: Mux, declared: Option<usize>, received: usize, toggle: bool, now: Instant) {
@@ -400,20 +389,29 @@ impl Client {
 
     /// The other object that the reply begins or ends a transfer of. In the middle of a transfer only one that was asked for
     /// before is passed over: another client's has ended this one in the server.
-    fn of_another(&self, asked: Mux, reply: &Reply) -> Option<Mux> {
-        let (Reply::InitiateUpload(received, _) | Reply::InitiateDownload(received) | Reply::Abort(received, _)) =
-            *reply
-        else {
-            return None;
+    fn of_another(&self, asked: Mux, reply: &Reply, raw: &[u8; LENGTH]) -> Option<Mux> {
+        let received = match *reply {
+            Reply::InitiateUpload(received, _) | Reply::InitiateDownload(received) | Reply::Abort(received, _) => {
+                received
+            }
+            Reply::Unknown { .. } => blocks::Reply::parse(raw)?.mux()?,
+            _ => return None,
         };
         let unnamed = matches!(reply, Reply::Abort(..)) && received.key() == 0;
-        let begins = matches!(self.state, State::Upload { .. } | State::Download { .. });
+        let begins = matches!(
+            self.state,
+            State::Upload { .. } | State::Download { .. } | State::BlockUpload { .. } | State::BlockDownload { .. }
+        );
         let passed_over = begins || self.earlier.contains(&Some(received));
         Some(received).filter(|received| *received != asked && !unnamed && passed_over)
     }
 
     fn ask(&mut self, request: Request, state: State, now: Instant) {
-        self.request = Some(request.emit());
+        self.ask_raw(request.emit(), state, now);
+    }
+
+    fn ask_raw(&mut self, request: [u8; LENGTH], state: State, now: Instant) {
+        self.request = Some(request);
         self.state = state;
         let asked = self.mux();
         if self.earlier[0] != asked {
@@ -428,6 +426,9 @@ impl Client {
     }
 
     fn give_up(&mut self, mux: Mux, code: AbortCode) {
+        if let State::UploadBlocks { receiver, .. } = self.state {
+            self.abandoned = (!receiver.is_complete()).then_some(receiver.seen());
+        }
         self.end();
         self.request = Some(Request::Abort(mux, code).emit());
     }
@@ -443,24 +444,16 @@ impl Client {
             State::Upload { mux }
             | State::UploadSegments { mux, .. }
             | State::Download { mux, .. }
-            | State::DownloadSegments { mux, .. } => Some(mux),
+            | State::DownloadSegments { mux, .. }
+            | State::BlockUpload { mux }
+            | State::UploadBlocks { mux, .. }
+            | State::BlockDownload { mux }
+            | State::DownloadBlocks { mux, .. }
+            | State::BlocksSent { mux } => Some(mux),
         }
     }
 }
 
 fn expect_mux(expected: Mux, received: Mux) -> Result<(), Failure> {
     if received == expected { Ok(()) } else { Err(Failure::WrongMux { expected, received }) }
-}
-
-/// What to report to the server; `None` where it has ended the transfer itself.
-const fn abort_code_for(failure: &Failure) -> Option<AbortCode> {
-    match failure {
-        Failure::Aborted { .. } => None,
-        Failure::TimedOut { .. } | Failure::Endless { .. } => Some(AbortCode::TIMED_OUT),
-        Failure::WrongMux { .. } | Failure::EmptySegment { .. } => Some(AbortCode::GENERAL),
-        Failure::UnexpectedReply { .. } => Some(AbortCode::UNKNOWN_COMMAND),
-        Failure::ToggleBit { .. } => Some(AbortCode::TOGGLE_BIT),
-        Failure::BufferTooSmall { .. } => Some(AbortCode::OUT_OF_MEMORY),
-        Failure::LengthMismatch { .. } => Some(AbortCode::LENGTH_MISMATCH),
-    }
 }

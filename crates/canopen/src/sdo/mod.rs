@@ -1,9 +1,9 @@
 //! Service data objects (CiA 301, 7.2.4): one entry of the object dictionary at a time, confirmed.
 //!
-//! [`wire`] is the eight bytes, [`server`] the device's side, [`client`] the other one. Both know expedited and
-//! segmented transfer. Block transfer is deliberately absent: a server answers 0504 0001h, and a client does not
-//! ask for it.
+//! [`wire`] is the eight bytes, [`server`] the device's side, [`client`] the other one. Both know expedited, segmented and
+//! [block] transfer; a server that does not offer block transfer answers 0504 0001h.
 
+pub mod block;
 pub mod client;
 pub mod server;
 pub mod wire;

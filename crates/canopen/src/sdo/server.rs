@@ -1,13 +1,16 @@
-//! The SDO server of a device: expedited and segmented transfer (CiA 301, 7.2.4).
+//! The SDO server of a device: expedited, segmented and block transfer (CiA 301, 7.2.4).
 //!
 //! A frame goes in with the values; out come a reply, or for a complete download the entry to write, which the owner
 //! checks, stores and reports back with [`Server::finish`], at once or later ([`Server::defer`]). A value longer than a cell
 //! waits in the dictionary until all of it has come, and an upload reads from a copy: a transfer that ends half way changes
 //! nothing, and one that takes its time gives the value of its first frame. One transfer at a time: a new request replaces
-//! an unfinished one. Block transfer is answered with 0504 0001h.
+//! an unfinished one. Block transfer is answered with 0504 0001h by a server that has none.
+
+mod block;
 
 use can::{Frame, Instant};
 
+use super::block::{Receiver, Sender};
 use super::wire::{LENGTH, MAX_EXPEDITED, MAX_SEGMENT, Payload, Reply, Request, Segment};
 use crate::od::{Dictionary, RowFacts, Slot, Storage, View};
 use crate::{AbortCode, Mux};
@@ -38,6 +41,7 @@ pub struct Write {
 enum Confirm {
     Expedited,
     Segment { toggle: bool },
+    Block,
 }
 
 /// One server channel.
@@ -48,6 +52,10 @@ pub struct Server {
     deadline: Instant,
     timeout_ns: u64,
     frame_length: FrameLength,
+    /// Segments of the blocks that it takes; 0 for no block transfer.
+    block_size: u8,
+    /// A download of blocks has begun: what comes may be a segment of it, and not what its bytes say. Set somewhat longer.
+    takes_segments: bool,
 }
 
 /// A transfer under way.
@@ -69,14 +77,52 @@ enum Transfer {
         length: usize,
         toggle: bool,
     },
+    BlockUpload {
+        mux: Mux,
+        source: Source,
+        sender: Sender,
+        phase: Phase,
+    },
+    BlockDownload {
+        mux: Mux,
+        slot: Slot,
+        facts: &'static RowFacts,
+        room: Room,
+        declared: Option<u32>,
+        receiver: Receiver,
+    },
+    /// The server has given up a download of blocks, whose client may have sent more of them meanwhile: after this number. Taken for
+    /// requests they would write whatever their bytes say.
+    Abandoned(u8),
     /// The owner has not decided yet.
     Deferred(Write),
+}
+
+/// What becomes of a frame in a download of blocks.
+enum Taken {
+    /// It is a part of it; perhaps its end.
+    Here(Option<Write>),
+    /// It is another request, and the download is over.
+    Another,
+}
+
+/// How far the upload of blocks is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The client has not started it yet.
+    Agreed,
+    /// Segments are sent, or a confirmation is waited for.
+    Segments,
+    /// The client has all, and has not confirmed the end.
+    Ended,
 }
 
 /// What an upload sends.
 #[derive(Clone, Copy, Debug)]
 enum Source {
     Constant(&'static [u8]),
+    /// A cell, this many bytes of it.
+    Cell([u8; MAX_EXPEDITED], u8),
     /// What waits in the dictionary, this many bytes.
     Staged(usize),
 }
@@ -95,10 +141,19 @@ enum Room {
 }
 
 impl Server {
-    /// A server with nothing under way. A segmented transfer whose client is silent for `timeout_ns` is aborted with
-    /// 0504 0000h, as is a download on which the owner has not decided for so long; 0 waits forever.
-    pub const fn new(frame_length: FrameLength, timeout_ns: u64) -> Self {
-        Self { transfer: Transfer::None, reply: None, deadline: Instant::FAR_FUTURE, timeout_ns, frame_length }
+    /// A server with nothing under way. A transfer whose client is silent for `timeout_ns` is aborted with
+    /// 0504 0000h, as is a download on which the owner has not decided for so long; 0 waits forever. `block_size` is how many segments,
+    /// up to 127, the blocks of a download have that it asks for; 0 for a server without block transfer.
+    pub const fn new(frame_length: FrameLength, timeout_ns: u64, block_size: u8) -> Self {
+        Self {
+            transfer: Transfer::None,
+            reply: None,
+            deadline: Instant::FAR_FUTURE,
+            timeout_ns,
+            frame_length,
+            block_size,
+            takes_segments: false,
+        }
     }
 
     /// A request arrived. Returns the write that the owner has to carry out, if it completes a download.
@@ -112,18 +167,30 @@ impl Server {
         if !self.listens_to(frame) {
             return None;
         }
+        if self.takes_segments
+            && let Taken::Here(write) = self.take_in_download(frame, values, now)
+        {
+            return write;
+        }
         match Request::parse(frame.padded()) {
             Request::InitiateUpload(mux) => self.initiate_upload(mux, values, now),
             Request::InitiateDownload(mux, payload) => return self.initiate_download(mux, payload, values, now),
-            request => return self.go_on(request, values, now),
+            request => return self.go_on(request, frame, values, now),
         }
         None
     }
 
     /// Any request but those with which a transfer begins.
     #[inline(never)]
-    fn go_on<S: Storage>(&mut self, request: Request, values: &mut Dictionary<S>, now: Instant) -> Option<Write> {
+    fn go_on<S: Storage>(
+        &mut self,
+        request: Request,
+        frame: &Frame,
+        values: &mut Dictionary<S>,
+        now: Instant,
+    ) -> Option<Write> {
         match request {
+            Request::Unknown { .. } if self.block_size > 0 => self.take_block_request(frame.padded(), values, now),
             Request::UploadSegment { toggle } => self.upload_segment(toggle, &values.view(), now),
             Request::DownloadSegment(segment) => return self.download_segment(segment, values.staging_mut(), now),
             Request::Abort(..) => self.end(),
@@ -138,14 +205,21 @@ impl Server {
     /// The owner stored `write`, or refuses it: confirms or aborts.
     #[inline]
     pub fn finish(&mut self, write: Write, result: Result<(), AbortCode>) {
-        self.reply = Some(
-            match (result, write.confirm) {
-                (Ok(()), Confirm::Expedited) => Reply::InitiateDownload(write.mux),
-                (Ok(()), Confirm::Segment { toggle }) => Reply::DownloadSegment { toggle },
-                (Err(code), _) => Reply::Abort(write.mux, code),
-            }
-            .emit(),
-        );
+        if let (Ok(()), Confirm::Expedited) = (result, write.confirm) {
+            self.answer(Reply::InitiateDownload(write.mux));
+        } else {
+            self.finish_long(write, result);
+        }
+    }
+
+    #[inline(never)]
+    fn finish_long(&mut self, write: Write, result: Result<(), AbortCode>) {
+        match (result, write.confirm) {
+            (Ok(()), Confirm::Expedited) => self.answer(Reply::InitiateDownload(write.mux)),
+            (Ok(()), Confirm::Segment { toggle }) => self.answer(Reply::DownloadSegment { toggle }),
+            (Ok(()), Confirm::Block) => self.confirm_block_download(),
+            (Err(code), _) => self.answer(Reply::Abort(write.mux, code)),
+        }
     }
 
     /// The owner decides later: [`take_deferred`](Self::take_deferred), then [`finish`](Self::finish). A new request, the client's
@@ -175,6 +249,7 @@ impl Server {
     pub fn handle_timeout(&mut self, now: Instant) {
         if now >= self.deadline
             && let Some(mux) = self.transfer_mux()
+            && !self.confirms_early(now)
         {
             self.refuse(mux, AbortCode::TIMED_OUT);
         }
@@ -240,10 +315,7 @@ impl Server {
         if !facts.summary.is_readable() {
             return self.refuse(mux, AbortCode::WRITE_ONLY);
         }
-        let source = match values.table().row(slot).constant_bytes() {
-            Some(constant) => Source::Constant(constant),
-            None => Source::Staged(values.stage(slot)),
-        };
+        let source = Source::of_long(slot, values);
         let view = values.view();
         let data = source.bytes(&view);
         if let Some(payload) = Payload::expedited(data) {
@@ -266,7 +338,8 @@ impl Server {
         let (data, after) = rest.split_at(rest.len().min(MAX_SEGMENT));
         let last = after.is_empty();
         (*sent, *expected) = (*sent + data.len(), !toggle);
-        self.answer(Reply::UploadSegment(Segment::new(toggle, last, data)));
+        let segment = Segment::new(toggle, last, data);
+        self.answer(Reply::UploadSegment(segment));
         if last {
             self.end();
         } else {
@@ -463,17 +536,29 @@ impl Server {
 
     fn transfer_mux(&self) -> Option<Mux> {
         match &self.transfer {
-            Transfer::None => None,
-            Transfer::Upload { mux, .. } | Transfer::Download { mux, .. } => Some(*mux),
+            Transfer::None | Transfer::Abandoned(_) => None,
+            Transfer::Upload { mux, .. }
+            | Transfer::Download { mux, .. }
+            | Transfer::BlockUpload { mux, .. }
+            | Transfer::BlockDownload { mux, .. } => Some(*mux),
             Transfer::Deferred(write) => Some(write.mux),
         }
     }
 }
 
 impl Source {
-    fn bytes<'a>(&self, values: &View<'a>) -> &'a [u8] {
+    /// Of a value that is longer than a cell.
+    fn of_long<S: Storage>(slot: Slot, values: &mut Dictionary<S>) -> Self {
+        match values.table().row(slot).constant_bytes() {
+            Some(constant) => Self::Constant(constant),
+            None => Self::Staged(values.stage(slot)),
+        }
+    }
+
+    fn bytes<'a>(&'a self, values: &View<'a>) -> &'a [u8] {
         match self {
             Self::Constant(bytes) => bytes,
+            Self::Cell(bytes, length) => &bytes[..usize::from(*length)],
             Self::Staged(length) => values.staged(*length),
         }
     }

@@ -85,6 +85,7 @@ const fn joint(name: &'static str, title: &'static str) -> Description {
         },
         nmt: NmtRules { start_state: NmtState::Operational, heartbeat_tells_alarm: true },
         lss: false,
+        sdo_block_transfer: false,
         pdo: PDO_RULES,
         timing: Timing::GUESSED,
         stated_departures: &[],

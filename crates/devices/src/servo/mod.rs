@@ -38,6 +38,7 @@ pub static CIA402: Description = Description {
     faults: FAULTS,
     nmt: NmtRules::CIA_301,
     lss: true,
+    sdo_block_transfer: true,
     pdo: PdoRules { max_objects: 8, ..PdoRules::CIA_301 },
     timing: Timing::GUESSED,
     stated_departures: &[],

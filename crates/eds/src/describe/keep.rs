@@ -151,6 +151,8 @@ fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
         faults: Faults { code: servo::FAULTS.code.filter(|_| has(0x603F, 0)), ..servo::FAULTS },
         nmt: NmtRules::CIA_301,
         lss: eds.device.lss,
+        // Files do not say it (CiA 306), and do not deny it either.
+        sdo_block_transfer: true,
         pdo: pdo_rules(table.rows()),
         timing: Timing::GUESSED,
         stated_departures: &[],

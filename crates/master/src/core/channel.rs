@@ -2,7 +2,7 @@ use std::collections::VecDeque;
 
 use can::{Frame, Instant};
 use canopen::sdo::client::{self, Client};
-use canopen::sdo::wire::{Payload as Initiation, Reply};
+use canopen::sdo::wire::Reply;
 use canopen::{AbortCode, Mux, NodeId};
 
 use super::payload::Payload;
@@ -17,6 +17,14 @@ const MAX_OBJECT: usize = 1 << 20;
 /// Room for an expedited answer and the first segment.
 const FIRST_ROOM: usize = 16;
 
+/// A download of at least so many bytes is asked for in blocks: 15 frames instead of 22. Of a device without block transfer the first
+/// of them takes two frames more.
+pub(super) const DOWNLOAD_BLOCKS_FROM: usize = 64;
+
+/// An upload whose server declares so many bytes is begun anew, in blocks: with the three frames that this takes 46 frames instead
+/// of 76.
+pub(super) const UPLOAD_BLOCKS_FROM: usize = 256;
+
 /// SDO client channel to one node with its queue: one transfer on the wire, the others wait.
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
@@ -28,6 +36,10 @@ pub(super) struct Channel {
     given_up: Option<Mux>,
     /// What is read goes here, what is written comes from here.
     buffer: Vec<u8>,
+    /// It has answered block transfer with 0504 0001h, and has not booted since.
+    refuses_blocks: bool,
+    /// It has just done so.
+    has_refused: bool,
 }
 
 /// The transfer on the wire.
@@ -37,6 +49,10 @@ struct Active {
     mux: Mux,
     timeout: core::time::Duration,
     uploads: bool,
+    /// It may be done in blocks.
+    may_use_blocks: bool,
+    /// It is done in blocks.
+    in_blocks: bool,
     /// Its first frame was taken by the runner.
     sent: bool,
 }
@@ -53,25 +69,44 @@ pub(super) struct Ended {
 impl Channel {
     pub(super) fn new(node: NodeId) -> Self {
         let client = Client::new(node, core::time::Duration::ZERO);
-        Self { client, active: None, queue: VecDeque::new(), ended: None, given_up: None, buffer: Vec::new() }
+        Self {
+            client,
+            active: None,
+            queue: VecDeque::new(),
+            ended: None,
+            given_up: None,
+            buffer: Vec::new(),
+            refuses_blocks: false,
+            has_refused: false,
+        }
     }
 
-    /// Starts the request, or queues it.
-    pub(super) fn push(&mut self, ticket: Ticket, request: Request, now: Instant) -> Result<(), Failure> {
+    /// True once after the node has refused block transfer.
+    pub(super) const fn take_refusal(&mut self) -> bool {
+        core::mem::replace(&mut self.has_refused, false)
+    }
+
+    /// The node has booted: it may be another device, or another firmware.
+    pub(super) const fn handle_boot_up(&mut self) {
+        self.refuses_blocks = false;
+    }
+
+    /// Starts the request, or queues it. Where `blocks` are allowed, a long value is sent in them.
+    pub(super) fn push(&mut self, ticket: Ticket, request: Request, blocks: bool, now: Instant) -> Result<(), Failure> {
         if self.queue.len() == QUEUE {
             return Err(Failure::QueueFull);
         }
         self.queue.push_back((ticket, request));
-        self.start_next(now);
+        self.start_next(blocks, now);
         Ok(())
     }
 
     /// Forgets a request; one on the wire is aborted. False if it is not here.
-    pub(super) fn cancel(&mut self, ticket: Ticket, now: Instant) -> bool {
+    pub(super) fn cancel(&mut self, ticket: Ticket, blocks: bool, now: Instant) -> bool {
         if self.active.as_ref().is_some_and(|active| active.ticket == ticket) {
             self.given_up = self.active.take().map(|active| active.mux);
             self.client.abort(AbortCode::GENERAL);
-            self.start_next(now);
+            self.start_next(blocks, now);
             return true;
         }
         let before = self.queue.len();
@@ -79,7 +114,7 @@ impl Channel {
         self.queue.len() < before
     }
 
-    pub(super) fn start_next(&mut self, now: Instant) {
+    pub(super) fn start_next(&mut self, blocks: bool, now: Instant) {
         if self.active.is_some() || self.ended.is_some() {
             return;
         }
@@ -87,29 +122,60 @@ impl Channel {
         let Request { mux, transfer, timeout, .. } = request;
         self.client.set_timeout(timeout);
         self.buffer.clear();
-        let uploads = match transfer {
+        let may_use_blocks = blocks && !self.refuses_blocks;
+        let (uploads, in_blocks) = match transfer {
             Transfer::Upload => {
                 self.buffer.resize(FIRST_ROOM, 0);
                 self.client.upload(mux, now);
-                true
+                (true, false)
             }
             Transfer::Download(data) => {
                 self.buffer.extend_from_slice(data.as_bytes());
-                self.client.download(mux, &self.buffer, now);
-                false
+                let in_blocks = may_use_blocks && self.buffer.len() >= DOWNLOAD_BLOCKS_FROM;
+                if in_blocks {
+                    self.client.download_blocks(mux, &self.buffer, now);
+                } else {
+                    self.client.download(mux, &self.buffer, now);
+                }
+                (false, in_blocks)
             }
         };
-        self.active = Some(Active { ticket, mux, timeout, uploads, sent: false });
+        self.active = Some(Active { ticket, mux, timeout, uploads, may_use_blocks, in_blocks, sent: false });
+    }
+
+    /// The node has no block transfer: the same again without.
+    fn start_without_blocks(&mut self, now: Instant) {
+        let Some(active) = &mut self.active else { return };
+        (self.refuses_blocks, self.has_refused) = (true, true);
+        (active.may_use_blocks, active.in_blocks) = (false, false);
+        if active.uploads {
+            self.client.upload(active.mux, now);
+        } else {
+            self.client.download(active.mux, &self.buffer, now);
+        }
     }
 
     pub(super) fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        let Some(active) = &self.active else { return };
-        let about = mux_of(&Reply::parse(frame.padded()));
-        if about.is_some() && about != Some(active.mux) && about == self.given_up {
-            return;
+        let Some(active) = &mut self.active else { return };
+        // Segments of blocks do not say what they are.
+        if self.client.bytes_done().is_none() {
+            let about = mux_of(&Reply::parse(frame.padded()));
+            if about.is_some() && about != Some(active.mux) && about == self.given_up {
+                return;
+            }
         }
-        if active.uploads {
-            self.make_room(frame);
+        if active.uploads
+            && let Some(needed) = self.client.needed_room(frame)
+        {
+            if active.may_use_blocks
+                && !active.in_blocks
+                && (UPLOAD_BLOCKS_FROM..=MAX_OBJECT).contains(&needed)
+                && self.client.begin_in_blocks(now)
+            {
+                active.in_blocks = true;
+                return;
+            }
+            self.make_room(needed);
         }
         match self.client.handle_frame(frame, &mut self.buffer, now) {
             None => {}
@@ -118,8 +184,15 @@ impl Channel {
                 self.end(Ok(Payload::new(bytes)));
             }
             Some(Ok(client::Outcome::Downloaded { .. })) => self.end(Ok(Payload::EMPTY)),
+            Some(Err(client::Failure::Aborted { code: AbortCode::UNKNOWN_COMMAND, .. })) if self.is_in_blocks() => {
+                self.start_without_blocks(now);
+            }
             Some(Err(failure)) => self.end(Err(self.failure(failure))),
         }
+    }
+
+    fn is_in_blocks(&self) -> bool {
+        self.active.as_ref().is_some_and(|active| active.in_blocks)
     }
 
     pub(super) fn handle_timeout(&mut self, now: Instant) {
@@ -130,7 +203,7 @@ impl Channel {
     }
 
     pub(super) fn poll_transmit(&mut self) -> Option<Frame> {
-        let frame = self.client.poll_transmit()?;
+        let frame = self.client.poll_transmit(&self.buffer)?;
         if let Some(active) = &mut self.active {
             active.sent = true;
         }
@@ -148,20 +221,9 @@ impl Channel {
 
     /// Lets the buffer grow to what the answer declares, or by a segment where it has declared nothing. What was not asked for takes no
     /// room.
-    fn make_room(&mut self, frame: &Frame) {
-        let asked = self.active.as_ref().map(|active| active.mux);
-        let wanted = match Reply::parse(frame.padded()) {
-            Reply::InitiateUpload(mux, Initiation::Segmented { size: Some(size) }) if Some(mux) == asked => {
-                size as usize
-            }
-            Reply::UploadSegment(segment) => match self.client.undeclared_upload() {
-                Some(received) => received + usize::from(segment.length),
-                None => return,
-            },
-            _ => return,
-        };
-        if wanted > self.buffer.len() && wanted <= MAX_OBJECT {
-            self.buffer.resize(wanted, 0);
+    fn make_room(&mut self, needed: usize) {
+        if needed > self.buffer.len() && needed <= MAX_OBJECT {
+            self.buffer.resize(needed, 0);
         }
     }
 
@@ -211,7 +273,7 @@ mod tests {
         let node = NodeId::new(4).unwrap();
         let mut channel = Channel::new(node);
         let request = Request { node, mux: NAME, transfer: Transfer::Upload, timeout: Duration::from_secs(1) };
-        channel.push(Ticket(1), request, Instant::ZERO).unwrap();
+        channel.push(Ticket(1), request, false, Instant::ZERO).unwrap();
         channel.poll_transmit().unwrap();
         channel
     }
@@ -258,5 +320,60 @@ mod tests {
             channel.poll_finished().unwrap().outcome,
             Err(Failure::BadAnswer(_) | Failure::Aborted(AbortCode::OUT_OF_MEMORY))
         ));
+    }
+
+    /// What a channel sends after each of these answers, when this is requested of it.
+    fn conversation(channel: &mut Channel, transfer: Transfer, blocks: bool, answers: &[&str]) -> Vec<String> {
+        let node = NodeId::new(4).unwrap();
+        let request = Request { node, mux: NAME, transfer, timeout: Duration::from_secs(1) };
+        channel.push(Ticket(1), request, blocks, Instant::ZERO).unwrap();
+        let mut sent = Vec::new();
+        for answer in answers {
+            sent.extend(std::iter::from_fn(|| channel.poll_transmit()).map(|frame| frame.to_string()));
+            channel.handle_frame(&answer.parse().unwrap(), Instant::ZERO);
+        }
+        sent.extend(std::iter::from_fn(|| channel.poll_transmit()).map(|frame| frame.to_string()));
+        sent
+    }
+
+    const REFUSED: &str = "584#8008100001000405";
+    const TAKEN: &str = "584#6008100000000000";
+
+    #[test]
+    fn a_long_download_goes_in_blocks_unless_the_node_has_refused_them_since_it_booted() {
+        let download = |bytes: usize| Transfer::Download(Payload::new(&vec![0; bytes]));
+        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        let sent = conversation(&mut channel, download(63), true, &[]);
+        assert_eq!(sent, ["604#210810003F000000"], "too short for it");
+        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        assert_eq!(conversation(&mut channel, download(64), false, &[]), ["604#2108100040000000"], "not allowed");
+        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        let sent = conversation(&mut channel, download(64), true, &[REFUSED, TAKEN]);
+        assert_eq!(sent, ["604#C608100040000000", "604#2108100040000000", "604#0000000000000000"]);
+        assert!(channel.take_refusal() && !channel.take_refusal());
+        channel.cancel(Ticket(1), true, Instant::ZERO);
+        channel.poll_transmit().unwrap();
+        assert_eq!(conversation(&mut channel, download(64), true, &[]), ["604#2108100040000000"], "it has refused");
+        channel.cancel(Ticket(1), true, Instant::ZERO);
+        channel.poll_transmit().unwrap();
+        channel.handle_boot_up();
+        assert_eq!(conversation(&mut channel, download(64), true, &[]), ["604#C608100040000000"], "it has booted");
+    }
+
+    #[test]
+    fn an_upload_is_begun_anew_in_blocks_where_a_long_value_is_declared_and_as_before_where_they_are_refused() {
+        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        let sent = conversation(&mut channel, Transfer::Upload, true, &["584#41081000FF000000"]);
+        assert_eq!(sent, ["604#4008100000000000", "604#6000000000000000"], "255 bytes");
+        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        let declared = "584#4108100000010000";
+        let sent = conversation(&mut channel, Transfer::Upload, true, &[declared, REFUSED, declared]);
+        let begin = ["604#4008100000000000", "604#8008100000000008", "604#A40810007F000000"];
+        assert_eq!(sent, [&begin[..], &["604#4008100000000000", "604#6000000000000000"]].concat());
+        assert!(channel.poll_finished().is_none(), "it goes on");
+        // Another abort is the node's answer.
+        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        conversation(&mut channel, Transfer::Upload, true, &[declared, "584#8008100000000008"]);
+        assert_eq!(channel.poll_finished().unwrap().outcome, Err(Failure::Aborted(AbortCode::GENERAL)));
     }
 }

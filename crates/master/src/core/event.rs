@@ -29,6 +29,8 @@ pub enum Event {
     TwoDevices(NodeId, Twins),
     /// A node aborted an SDO request.
     Aborted(NodeId, Mux, AbortCode),
+    /// A node has answered SDO block transfer with 0504 0001h: long values are transferred segment by segment until it boots again.
+    NoBlockTransfer(NodeId),
     /// So many periods directly before this one had no SYNC.
     CyclesMissed(u32),
     /// The SYNC of another producer stays away, for this long now.
@@ -53,6 +55,9 @@ impl fmt::Display for Event {
                 write!(f, "node {node} did not answer about {mux} within {} ms", time.as_millis())
             }
             Self::TwoDevices(node, twins) => f.write_str(&two_devices(*node, *twins)),
+            Self::NoBlockTransfer(node) => {
+                write!(f, "node {node} has no SDO block transfer (0504 0001h): long objects take twice as many frames")
+            }
             Self::CyclesMissed(1) => f.write_str("one cycle had no SYNC"),
             Self::CyclesMissed(cycles) => write!(f, "{cycles} cycles had no SYNC"),
             Self::SyncLost(time) => write!(f, "no SYNC for {} ms", time.as_secs_f64() * 1e3),

@@ -233,7 +233,8 @@ impl Core {
             let failure = Failure::NoAnswer { waited: Duration::ZERO, unsent: true };
             return self.finished.push_back(Finished { ticket, outcome: Err(failure) });
         }
-        match self.member_mut(node).channel.push(ticket, request, now) {
+        let blocks = self.may_use_blocks();
+        match self.member_mut(node).channel.push(ticket, request, blocks, now) {
             Ok(()) => self.settle(node),
             Err(failure) => self.finished.push_back(Finished { ticket, outcome: Err(failure) }),
         }
@@ -242,15 +243,25 @@ impl Core {
     fn cancel(&mut self, ticket: Ticket) {
         self.timers.cancel(ticket);
         let now = self.now;
-        let owner = self.members.iter_mut().position(|member| member.channel.cancel(ticket, now));
+        let blocks = self.may_use_blocks();
+        let owner = self.members.iter_mut().position(|member| member.channel.cancel(ticket, blocks, now));
         if let Some(node) = owner.and_then(|position| NodeId::new(position as u8 + 1)) {
             self.settle(node);
         }
     }
 
+    /// Not while SYNC is produced: the segments of a block wait for no answer, and a hundred of them would stand before SYNC and RPDOs
+    /// in the queue of an adapter.
+    fn may_use_blocks(&self) -> bool {
+        self.sync.period().is_none()
+    }
+
     /// Collects what a node's channel has to say after it was called.
     fn settle(&mut self, node: NodeId) {
         let now = self.now;
+        if self.member_mut(node).channel.take_refusal() {
+            self.events.push(Event::NoBlockTransfer(node), now);
+        }
         while let Some(ended) = self.member_mut(node).channel.poll_finished() {
             self.note_outcome(node, ended.mux, &ended.outcome);
             if ended.downloads {
@@ -259,7 +270,8 @@ impl Core {
             if ended.ticket != FEED {
                 self.finished.push_back(Finished { ticket: ended.ticket, outcome: ended.outcome });
             }
-            self.member_mut(node).channel.start_next(now);
+            let blocks = self.may_use_blocks();
+            self.member_mut(node).channel.start_next(blocks, now);
         }
         let busy = self.member(node).channel.poll_timeout().is_some();
         if busy {

@@ -117,6 +117,11 @@ impl Bench {
         Ok(row.data_type.value(raw))
     }
 
+    /// SDO answers that nothing has looked at yet.
+    pub fn take_answers(&mut self) -> Vec<String> {
+        self.answers.drain(..).map(|frame| frame.to_string()).collect()
+    }
+
     fn request(&mut self, data: [u8; 8]) -> [u8; 8] {
         self.answers.clear();
         let text: String = data.iter().map(|byte| format!("{byte:02X}")).collect();

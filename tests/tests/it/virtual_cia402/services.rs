@@ -16,6 +16,23 @@ fn is_live(mux: Mux) -> bool {
     matches!(mux.index, 0x6041 | 0x6061..=0x6064 | 0x606B | 0x606C | 0x6074 | 0x6077..=0x6079 | 0x60F4 | 0x60FC | 0x60FD)
 }
 
+/// CiA 301, 7.2.4.3.9 to 7.2.4.3.16: 607Ah, whose four bytes are one segment, and its checksum.
+#[test]
+fn an_object_is_written_and_read_in_blocks() {
+    let mut bench = Bench::new();
+    let checksum = canopen::sdo::block::checksum(0, &[0x10, 0x27, 0, 0]).to_le_bytes();
+    bench.frame("605#C67A600004000000");
+    bench.frame("605#8110270000000000");
+    bench.frame(&format!("605#CD{:02X}{:02X}0000000000", checksum[0], checksum[1]));
+    assert_eq!(bench.take_answers(), ["585#A47A60007F000000", "585#A2017F0000000000", "585#A100000000000000"]);
+    assert_eq!(bench.read(0x607A, 0), 10_000);
+    bench.frame("605#A47A60007F000000");
+    bench.frame("605#A300000000000000");
+    bench.frame("605#A2017F0000000000");
+    let end = format!("585#CD{:02X}{:02X}0000000000", checksum[0], checksum[1]);
+    assert_eq!(bench.take_answers(), ["585#C67A600004000000", "585#8110270000000000", &end]);
+}
+
 #[test]
 fn every_object_answers_as_it_is_delivered() {
     let mut bench = Bench::new();

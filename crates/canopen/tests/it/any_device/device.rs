@@ -93,7 +93,7 @@ fn client() -> Client {
 
 fn run(mut client: Client, node: &mut Node<Boxed>, buffer: &mut [u8]) -> Result<Outcome, Failure> {
     loop {
-        let request = client.poll_transmit().expect("the client goes on");
+        let request = client.poll_transmit(buffer).expect("the client goes on");
         node.handle_frame(&request, Instant::ZERO);
         let reply = node.poll_transmit().expect("the server answers");
         if let Some(result) = client.handle_frame(&reply, buffer, Instant::ZERO) {
@@ -114,7 +114,7 @@ pub(crate) fn download(node: &mut Node<Boxed>, mux: Mux, data: &[u8], segmented:
 }
 
 pub(crate) fn upload(node: &mut Node<Boxed>, mux: Mux) -> Result<Vec<u8>, Failure> {
-    let (mut client, mut buffer) = (client(), vec![0; 1000]);
+    let (mut client, mut buffer) = (client(), vec![0; 4096]);
     client.upload(mux, Instant::ZERO);
     match run(client, node, &mut buffer)? {
         Outcome::Uploaded { length, .. } => Ok(buffer[..length].to_vec()),

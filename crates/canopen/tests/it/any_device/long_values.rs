@@ -5,9 +5,11 @@ use std::time::Duration;
 use can::{Instant, Station};
 use canopen::od::{DataType, Entry, Kind, Value};
 use canopen::sdo::client::Failure;
-use canopen::{AbortCode, Mux, Node, NodeEvent};
+use canopen::{AbortCode, Mux, Node, NodeEvent, NodeProfile};
 
-use crate::any_device::device::{Boxed, Numbers, answer, download, drain, node, rw, talk, upload, written};
+use crate::any_device::device::{
+    Boxed, Numbers, answer, download, drain, node, node_of, rw, table, talk, upload, written,
+};
 
 const CAPACITY: u32 = 20;
 
@@ -173,9 +175,11 @@ fn an_upload_gives_the_value_of_its_first_frame() {
 }
 
 #[test]
-fn block_transfer_is_answered_with_0504_0001() {
+fn block_transfer_is_answered_with_0504_0001_by_a_device_without_it() {
+    let rows = vec![rw(0x2009, 0, DataType::VisibleString).text("old text").capacity(CAPACITY)];
+    let mut node = node_of(NodeProfile { sdo_block_size: 0, ..NodeProfile::cia_301(table(rows)) });
     talk(
-        &mut device(),
+        &mut node,
         &[("604#C209200014000000", "584#8009200001000405"), ("604#A009200014000000", "584#8009200001000405")],
     );
 }

@@ -3,6 +3,8 @@
 
 mod asked;
 mod bits;
+mod blocks;
+mod blocks_over_a_bad_wire;
 mod device;
 mod long_values;
 mod many_pdos;

@@ -20,7 +20,7 @@ fn client() -> Client {
 /// Lets client and node talk until the transfer ends.
 fn run(client: &mut Client, bench: &mut Bench, buffer: &mut [u8]) -> Result<Outcome, Failure> {
     for _ in 0..100 {
-        let request = client.poll_transmit().expect("the client says nothing");
+        let request = client.poll_transmit(buffer).expect("the client says nothing");
         bench.node.handle_frame(&request, bench.now);
         while let Some(reply) = bench.node.poll_transmit() {
             if let Some(result) = client.handle_frame(&reply, buffer, bench.now) {
@@ -35,7 +35,7 @@ fn run(client: &mut Client, bench: &mut Bench, buffer: &mut [u8]) -> Result<Outc
 fn replies(mut client: Client, buffer: &mut [u8], frames: &[&str]) -> (Option<Result<Outcome, Failure>>, Client) {
     let mut result = None;
     for frame in frames {
-        let _ = client.poll_transmit();
+        let _ = client.poll_transmit(&[]);
         result = client.handle_frame(&frame.parse().unwrap(), buffer, Instant::ZERO);
     }
     (result, client)
@@ -81,10 +81,10 @@ fn a_segmented_download_is_sent_in_sevens() {
     let mut client = client();
     let mut data = *b"0123456789abcdef";
     client.download(NAME, &data, Instant::ZERO);
-    let mut sent = vec![client.poll_transmit().unwrap()];
+    let mut sent = vec![client.poll_transmit(&[]).unwrap()];
     for reply in ["584#6008100000000000", "584#2000000000000000", "584#3000000000000000"] {
         assert_eq!(client.handle_frame(&reply.parse().unwrap(), &mut data, Instant::ZERO), None);
-        sent.push(client.poll_transmit().unwrap());
+        sent.push(client.poll_transmit(&[]).unwrap());
     }
     let expected = ["604#2108100010000000", "604#0030313233343536", "604#1037383961626364", "604#0B65660000000000"]
         .map(|text| text.parse::<Frame>().unwrap());
@@ -100,7 +100,7 @@ fn a_refusal_is_told_with_its_code() {
     client.upload(mux, bench.now);
     let refusal = run(&mut client, &mut bench, &mut [0; 4]);
     assert_eq!(refusal, Err(Failure::Aborted { mux, code: AbortCode::NO_SUCH_OBJECT }));
-    assert_eq!(client.poll_transmit(), None);
+    assert_eq!(client.poll_transmit(&[]), None);
     assert_eq!(
         refusal.unwrap_err().to_string(),
         "1003h:00: the device aborted with 0602 0000h (object does not exist in the object dictionary)"
@@ -123,7 +123,7 @@ fn a_reply_for_another_entry_is_passed_over_and_told_when_none_comes() {
         let failure = client.handle_timeout(Instant::from_millis(50));
         assert_eq!(failure, Some(Failure::WrongMux { expected, received: Mux::new(0x6040, 0) }), "{frame}");
         assert!(!client.is_busy());
-        assert_eq!(client.poll_transmit(), Some("604#8041600000000405".parse().unwrap()));
+        assert_eq!(client.poll_transmit(&[]), Some("604#8041600000000405".parse().unwrap()));
         // What is asked next has nothing to do with it.
         client.upload(expected, Instant::from_millis(60));
         assert_eq!(client.handle_timeout(Instant::from_millis(110)), Some(Failure::TimedOut { mux: expected }));
@@ -136,7 +136,7 @@ fn silence_times_out_and_the_server_is_told() {
     assert_eq!(client.poll_timeout(), Some(Instant::from_millis(50)));
     assert_eq!(client.handle_timeout(Instant::from_millis(49)), None);
     assert_eq!(client.handle_timeout(Instant::from_millis(50)), Some(Failure::TimedOut { mux: NAME }));
-    assert_eq!(client.poll_transmit(), Some("604#8008100000000405".parse().unwrap()));
+    assert_eq!(client.poll_transmit(&[]), Some("604#8008100000000405".parse().unwrap()));
     assert_eq!(client.handle_timeout(Instant::from_millis(500)), None);
     // Its late reply belongs to no transfer.
     let late = client.handle_frame(&"584#4108100014000000".parse().unwrap(), &mut [0; 4], Instant::from_millis(501));
@@ -156,7 +156,7 @@ fn a_repeated_segment_is_noticed() {
     let frames = ["584#4108100014000000", "584#0061206472697665", "584#0061206472697665"];
     let (result, mut client) = replies(uploading(NAME), &mut [0; 32], &frames);
     assert_eq!(result, Some(Err(Failure::ToggleBit { mux: NAME })));
-    assert_eq!(client.poll_transmit(), Some("604#8008100000000305".parse().unwrap()));
+    assert_eq!(client.poll_transmit(&[]), Some("604#8008100000000305".parse().unwrap()));
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn a_value_longer_than_the_buffer_is_refused_declared_or_not() {
     let undeclared = ["584#4008100000000000", "584#0061206472697665"];
     let (result, mut client) = replies(uploading(NAME), &mut [0; 4], &undeclared);
     assert_eq!(result, Some(Err(Failure::BufferTooSmall { mux: NAME, needed: 7 })));
-    assert_eq!(client.poll_transmit(), Some("604#8008100005000405".parse().unwrap()));
+    assert_eq!(client.poll_transmit(&[]), Some("604#8008100005000405".parse().unwrap()));
 }
 
 #[test]
@@ -184,7 +184,7 @@ fn more_than_declared_is_refused_at_the_first_byte_too_many() {
     let (result, mut client) = replies(uploading(NAME), &mut [0; 1024], &frames);
     assert_eq!(result, Some(Err(Failure::LengthMismatch { mux: NAME, declared: 3, received: 7 })));
     // CiA 301, 7.2.4.3.17: 0607 0010h, the length of the service parameter does not match.
-    assert_eq!(client.poll_transmit(), Some("604#8008100010000706".parse().unwrap()));
+    assert_eq!(client.poll_transmit(&[]), Some("604#8008100010000706".parse().unwrap()));
 }
 
 #[test]
@@ -193,7 +193,7 @@ fn a_segment_without_data_that_announces_more_ends_the_upload() {
         let frames = [first, "584#0061206472697665", "584#1E00000000000000"];
         let (result, mut client) = replies(uploading(NAME), &mut [0; 1024], &frames);
         assert_eq!(result, Some(Err(Failure::EmptySegment { mux: NAME, received: 7 })));
-        assert_eq!(client.poll_transmit(), Some("604#8008100000000008".parse().unwrap()));
+        assert_eq!(client.poll_transmit(&[]), Some("604#8008100000000008".parse().unwrap()));
     }
     // The last segment may be empty: how else would a server end that did not know the length?
     let frames = ["584#4008100000000000", "584#0061206472697665", "584#1F00000000000000"];
@@ -227,7 +227,7 @@ fn an_upload_whose_segments_are_all_in_time_ends_nevertheless() {
     assert_eq!(failure, Failure::Endless { mux: NAME, received: 103, limit });
     assert_eq!(at, Instant::ZERO + limit);
     // 0504 0000h: SDO protocol timed out.
-    assert_eq!(client.poll_transmit(), Some("604#8008100000000405".parse().unwrap()));
+    assert_eq!(client.poll_transmit(&[]), Some("604#8008100000000405".parse().unwrap()));
     // Of a length that was not declared: 256 and one.
     let (_, failure, _) = dribbled("584#4008100000000000");
     assert_eq!(failure, Failure::Endless { mux: NAME, received: 262, limit: Duration::from_millis(257 * 50) });
@@ -259,9 +259,9 @@ fn the_user_may_give_up() {
     let mut client = uploading(NAME);
     client.abort(AbortCode::GENERAL);
     assert!(!client.is_busy());
-    assert_eq!(client.poll_transmit(), Some("604#8008100000000008".parse().unwrap()));
+    assert_eq!(client.poll_transmit(&[]), Some("604#8008100000000008".parse().unwrap()));
     client.abort(AbortCode::GENERAL);
-    assert_eq!(client.poll_transmit(), None);
+    assert_eq!(client.poll_transmit(&[]), None);
 }
 
 #[test]

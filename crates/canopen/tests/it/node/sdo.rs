@@ -141,8 +141,12 @@ fn wrong_toggle_bits_abort_with_0503_0000() {
 
 #[test]
 fn unknown_command_specifiers_abort_with_0504_0001() {
-    // Undefined, block upload, block download.
+    // Undefined, block upload, block download; the last two of a device that has neither.
     talk(
+        "> 604#E000100000000000
+         < 584#8000100001000405",
+    );
+    Bench::new(&WITHOUT_BLOCKS).talk(
         "> 604#E000100000000000
          < 584#8000100001000405
          > 604#A408100000000000
@@ -339,6 +343,7 @@ fn frames_of_another_length_are_ignored_by_the_standard() {
     );
 }
 
+static WITHOUT_BLOCKS: NodeProfile = NodeProfile { sdo_block_size: 0, ..NodeProfile::cia_301(&TABLE) };
 static SHORT_FRAMES: NodeProfile = NodeProfile { sdo_frame_length: FrameLength::Used, ..NodeProfile::cia_301(&TABLE) };
 
 #[test]

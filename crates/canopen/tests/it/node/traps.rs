@@ -26,7 +26,8 @@ fn a_client_abort_of_a_block_upload_that_never_began_does_no_harm() {
     let mut bench = Bench::new(&STANDARD);
     bench.talk(
         "> 604#A40810007F000000
-         < 584#8008100001000405
+         < 584#C608100014000000
+         > 604#8008100000000008
          > 604#A300000000000000
          < 584#8000000001000405
          > 604#8008100000000408

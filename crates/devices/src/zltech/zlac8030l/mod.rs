@@ -62,6 +62,7 @@ const fn described(dictionary: &'static Table) -> Description {
         },
         nmt: NmtRules::CIA_301,
         lss: false,
+        sdo_block_transfer: false,
         pdo: PDO_RULES,
         timing: Timing::GUESSED,
         stated_departures: DEPARTURES,

@@ -55,6 +55,7 @@ const fn stepper(name: &'static str, title: &'static str) -> Description {
         faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: false, table: &FAULTS, section: "3.4 and 5.4" },
         nmt: NmtRules::CIA_301,
         lss: false,
+        sdo_block_transfer: false,
         pdo: zltech::PDO_RULES,
         timing: Timing::GUESSED,
         stated_departures: DEPARTURES,
