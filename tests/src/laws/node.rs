@@ -27,7 +27,8 @@ pub(super) const NODE_SAMPLES: &[&[u8]] = &[
     b"\0\x08\x23\x00\x14\x01\x04\x02\x00\x80\0\x08\x2F\x00\x18\x02\x01\x00\x00\x00\x01\x02\x01\x00\0\0\0\0\0\0",
 ];
 
-static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
+// Blocks have a law of their own.
+static PROFILE: NodeProfile = NodeProfile { sdo_block_size: 0, ..NodeProfile::cia_301(&TABLE) };
 const NODE_ID: u8 = 4;
 
 /// What a selector picks: SDO, NMT, SYNC, the four RPDOs, a heartbeat.

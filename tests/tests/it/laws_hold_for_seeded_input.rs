@@ -26,6 +26,7 @@ laws_hold! {
     a_socketcand_stream_decodes_alike_however_it_is_cut: "socketcand";
     an_slcan_stream_decodes_alike_however_it_is_cut: "slcan";
     sdo_bytes_read_back_as_written: "sdo_wire";
+    a_block_transfer_under_any_frames_changes_only_what_it_confirms_and_ends: "sdo_blocks";
     a_node_under_any_frames_keeps_its_dictionary_lawful: "node";
     an_mjoint_under_any_frames_and_sensors_keeps_its_objects_lawful_and_its_duty_cycles_shares: "mjoint";
     modbus_bytes_get_well_formed_responses_or_silence_and_the_next_request_its_answer: "modbus";
