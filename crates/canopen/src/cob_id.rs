@@ -11,14 +11,26 @@ pub struct CobId(pub u32);
 impl CobId {
     /// Bit 31 of PDO and EMCY COB-IDs: the object does not exist / is not valid.
     pub const INVALID: u32 = 1 << 31;
-    /// Bit 30 of TPDO COB-IDs: no RTR allowed; of the SYNC COB-ID: the device generates SYNC.
+    /// Bit 30 of TPDO COB-IDs: no RTR allowed.
     pub const NO_RTR: u32 = 1 << 30;
+    /// Bit 30 of the SYNC and TIME COB-IDs: the device generates the message.
+    pub const GENERATES: u32 = 1 << 30;
     /// Bit 29: 29-bit identifier.
     pub const EXTENDED: u32 = 1 << 29;
 
     /// A valid COB-ID with a standard identifier and no flags.
     pub const fn standard(id: u16) -> Self {
         Self(id as u32 & 0x7FF)
+    }
+
+    /// True if remote frames may ask for a TPDO with this COB-ID: bit 30 is not set.
+    pub const fn allows_rtr(self) -> bool {
+        self.0 & Self::NO_RTR == 0
+    }
+
+    /// True if the device generates the message (SYNC, TIME).
+    pub const fn generates(self) -> bool {
+        self.0 & Self::GENERATES != 0
     }
 
     /// False when bit 31 is set.
@@ -50,7 +62,7 @@ impl CobId {
     }
 
     /// Whether an object with this COB-ID may take `new`: the identifier of a valid one may move only if
-    /// `while_valid`. Bit 30 is stored and has no effect: RTR is not offered.
+    /// `while_valid`. Bit 30 may change at any time.
     ///
     /// # Errors
     /// 0609 0030h.

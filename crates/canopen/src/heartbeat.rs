@@ -2,9 +2,12 @@
 
 use can::{CanId, Frame, Instant};
 
-use crate::{NmtState, NodeId, connection_set};
+use crate::od::View;
+use crate::{AbortCode, Mux, NmtState, NodeId, connection_set};
 
 const NANOS_PER_MILLI: u64 = 1_000_000;
+/// The highest sub-index of 1016h (CiA 301, 7.5.2.19).
+const MAX_CONSUMERS: u8 = 127;
 
 /// A boot-up or heartbeat frame of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -176,6 +179,18 @@ impl Consumer {
             Watch::Waiting => None,
         }
     }
+}
+
+/// Whether an entry of 1016h may take this value: a node that another entry watches is refused (CiA 301, 7.5.2.19).
+///
+/// # Errors
+/// 0604 0043h.
+pub fn check_watched_once(values: &View<'_>, entry: Mux, raw: u32) -> Result<(), AbortCode> {
+    let Some(wanted) = Consumer::from_raw(raw) else { return Ok(()) };
+    let of_entry = |sub_index| Consumer::from_raw(values.value(Mux::new(entry.index, sub_index)).ok()? as u32);
+    let others = (1..=MAX_CONSUMERS).filter(|sub_index| *sub_index != entry.sub_index).filter_map(of_entry);
+    let mut same = others.filter(|other| other.node() == wanted.node());
+    if same.next().is_some() { Err(AbortCode::PARAMETER_INCOMPATIBLE) } else { Ok(()) }
 }
 
 #[cfg(test)]

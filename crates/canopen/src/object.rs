@@ -22,8 +22,12 @@ objects! {
     ERROR_REGISTER = 0x1001, 0;
     /// Pre-defined error field (7.5.2.4): the number of errors that are kept.
     PRE_DEFINED_ERROR_FIELD = 0x1003, 0;
+    /// COB-ID SYNC message (7.5.2.5).
+    COB_ID_SYNC_MESSAGE = 0x1005, 0;
     /// Communication cycle period in µs (7.5.2.6).
     COMMUNICATION_CYCLE_PERIOD = 0x1006, 0;
+    /// Synchronous window length in µs (7.5.2.7).
+    SYNCHRONOUS_WINDOW_LENGTH = 0x1007, 0;
     /// Manufacturer device name (7.5.2.8).
     MANUFACTURER_DEVICE_NAME = 0x1008, 0;
     /// Manufacturer software version (7.5.2.10).
@@ -32,8 +36,12 @@ objects! {
     GUARD_TIME = 0x100C, 0;
     /// Life time factor (7.5.2.12).
     LIFE_TIME_FACTOR = 0x100D, 0;
+    /// COB-ID time stamp object (7.5.2.15).
+    COB_ID_TIME_STAMP_OBJECT = 0x1012, 0;
     /// COB-ID EMCY (7.5.2.17).
     COB_ID_EMCY = 0x1014, 0;
+    /// Inhibit time EMCY in 100 µs (7.5.2.18).
+    INHIBIT_TIME_EMCY = 0x1015, 0;
     /// Consumer heartbeat time (7.5.2.19): how many nodes can be watched.
     CONSUMER_HEARTBEAT_TIME = 0x1016, 0;
     /// The first node that is watched, and for how long in ms (7.5.2.19).
@@ -48,10 +56,14 @@ objects! {
     REVISION_NUMBER = 0x1018, 3;
     /// Serial number of the identity object (7.5.2.21).
     SERIAL_NUMBER = 0x1018, 4;
+    /// Synchronous counter overflow value (7.5.2.22).
+    SYNCHRONOUS_COUNTER_OVERFLOW_VALUE = 0x1019, 0;
     /// Date of the verified configuration, in days (7.5.2.23).
     CONFIGURATION_DATE = 0x1020, 1;
     /// Time of the verified configuration, in ms of its day (7.5.2.23).
     CONFIGURATION_TIME = 0x1020, 2;
+    /// Emergency consumer object (7.5.2.31): how many producers can be heard.
+    EMERGENCY_CONSUMER_OBJECT = 0x1028, 0;
     /// Error behavior object (7.5.2.32): what a communication error does to the NMT state.
     COMMUNICATION_ERROR = 0x1029, 1;
     /// Application software identification of the first program (CiA 302-3).

@@ -263,6 +263,9 @@ pub struct PdoRules {
     pub rpdo_deadline: bool,
     /// Objects in one PDO.
     pub max_objects: u8,
+    /// Remote frames that ask for a TPDO are answered where bit 30 of its COB-ID allows it, and transmission types 252 and 253
+    /// are taken (CiA 301, 7.2.2.4.3).
+    pub remote_requests: bool,
     /// A PDO's records may be changed while the PDO is valid.
     pub remap_while_valid: bool,
     /// The mapping cannot be changed at all.
@@ -285,6 +288,7 @@ impl PdoRules {
         event_timer_unit_ns: 1_000_000,
         rpdo_deadline: true,
         max_objects: 64,
+        remote_requests: true,
         remap_while_valid: false,
         fixed_mapping: false,
         mapping: MappingRules::CIA_301,

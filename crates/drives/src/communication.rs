@@ -14,6 +14,7 @@ pub const fn communication(description: &Description) -> NodeProfile {
         event_timer_unit_ns: pdo.event_timer_unit_ns,
         rpdo_deadline: pdo.rpdo_deadline,
         event_trigger: pdo.event_trigger,
+        remote_requests: pdo.remote_requests,
         pdo_changes_while_valid: pdo.remap_while_valid,
         mapping: pdo.mapping,
         short_rpdo: pdo.short_rpdo,

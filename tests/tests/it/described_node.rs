@@ -176,6 +176,35 @@ fn write(bench: &mut Bench, index: u16, sub_index: u8, bytes: u8, value: u32) ->
     answer.starts_with("589#80").then_some(code)
 }
 
+const SYNC_OBJECTS: &[u8] = b"[1006]\nParameterName=Cycle\nDataType=7\nAccessType=rw\nDefaultValue=0\n\
+[1007]\nParameterName=Window\nDataType=7\nAccessType=rw\nDefaultValue=0\n\
+[1019]\nParameterName=Counter\nDataType=5\nAccessType=rw\nDefaultValue=0\n";
+
+#[test]
+fn a_file_with_1006h_and_1019h_makes_a_producer_of_sync_that_counts() {
+    let mut bench = Bench::of(&[SHEET, SYNC_OBJECTS].concat());
+    for (index, bytes, value) in [(0x1019, 1, 3), (0x1006, 4, 10_000), (0x1005, 4, 0x4000_0080)] {
+        assert_eq!(write(&mut bench, index, 0, bytes, value), None, "{index:04X}h");
+    }
+    // The write took its time on the wire: the second SYNC is not yet seen 20 ms after it. TPDO2 comes right behind each.
+    bench.world.run_for(Duration::from_millis(40));
+    assert_eq!(bench.heard(), ["080#02", "289#00", "080#03", "289#00", "080#01", "289#00", "080#02", "289#00"]);
+    assert_eq!(write(&mut bench, 0x1005, 0, 4, 0x4000_0081), Some(0x0609_0030), "its identifier stays");
+}
+
+#[test]
+fn a_remote_frame_gets_a_tpdo_unless_bit_30_of_its_cob_id_is_set() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.send("189#R1"), ["189#00"]);
+    assert_eq!(write(&mut bench, 0x1800, 1, 4, 0x4000_0189), None);
+    assert_eq!(bench.send("189#R1"), [""; 0]);
+    assert_eq!(write(&mut bench, 0x1800, 2, 1, 253), Some(0x0609_0030));
+    assert_eq!(write(&mut bench, 0x1800, 1, 4, 0x189), None);
+    assert_eq!(write(&mut bench, 0x1800, 2, 1, 253), None);
+    assert_eq!(bench.world_command("9 set 6000:01 5Ah"), [""; 0], "only when asked");
+    assert_eq!(bench.send("189#R1"), ["189#5A"]);
+}
+
 #[test]
 fn what_nothing_acts_on_and_what_contradicts_is_refused_with_the_standards_codes() {
     let services = b"[1006]\nParameterName=Cycle\nDataType=7\nAccessType=rw\nDefaultValue=0\n\
@@ -195,9 +224,7 @@ fn what_nothing_acts_on_and_what_contradicts_is_refused_with_the_standards_codes
     assert_eq!(refused(0x1016, 3, 4, 0x0006_01F4), None);
     assert_eq!(refused(0x1016, 1, 4, 0), None);
     assert_eq!(refused(0x1016, 2, 4, 0x0005_01F4), None, "no other entry watches it any more");
-    // There is no window of synchronous PDOs and no clock.
-    assert_eq!(refused(0x1007, 0, 4, 500), Some(0x0609_0030));
-    assert_eq!(refused(0x1007, 0, 4, 0), None);
+    // There is no clock.
     assert_eq!(refused(0x1012, 0, 4, 0x8000_0100), Some(0x0609_0030));
     assert_eq!(refused(0x1012, 0, 4, 0x4000_0100), Some(0x0609_0030));
     assert_eq!(refused(0x1012, 0, 4, 0x100), None);

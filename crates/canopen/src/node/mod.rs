@@ -1,4 +1,4 @@
-//! A CANopen device's communication: NMT slave, heartbeat producer, SYNC consumer, EMCY producer, SDO server,
+//! A CANopen device's communication: NMT slave, heartbeat producer, SYNC consumer and producer, EMCY producer, SDO server,
 //! RPDOs and TPDOs over one object dictionary (CiA 301).
 //! As many PDOs as the dictionary has records for, up to 512 each way.
 //!
@@ -33,6 +33,7 @@
 //! assert!(matches!(node.poll_event(), Some(NodeEvent::Written { raw: 6, .. })));
 //! ```
 
+mod cycle;
 mod event;
 mod identifiers;
 mod objects;
@@ -41,6 +42,7 @@ mod pdos;
 mod pending;
 mod profile;
 mod receive;
+mod sync;
 mod transmit;
 
 use can::{CanId, Frame, Instant, Station};
@@ -60,6 +62,7 @@ use crate::{NmtCommand, NmtState, NodeId};
 use identifiers::Identifiers;
 use pdos::Pdos;
 use pending::{Pending, Source};
+use sync::NodeSync;
 
 /// One device on the bus, with as much room as its [`Storage`] has.
 ///
@@ -85,6 +88,7 @@ pub struct Node<S: Storage> {
     emcy: emcy::Producer,
     emcy_id: Option<CanId>,
     sdo: Server,
+    sync: NodeSync,
     /// The latest question to the owner.
     ticket: Ticket,
     pdos: Pdos<S>,
@@ -114,6 +118,7 @@ impl<S: Storage> Node<S> {
             emcy: emcy::Producer::new(),
             emcy_id: None,
             sdo: Server::new(profile.sdo_frame_length, profile.sdo_timeout_ns, profile.sdo_block_size),
+            sync: NodeSync::NONE,
             ticket: Ticket(0),
             pdos,
         }
@@ -170,6 +175,7 @@ impl<S: Storage> Node<S> {
         self.deadline = Instant::FAR_FUTURE;
         self.sdo.reset();
         self.stop_pdos();
+        self.follow_nmt_with_sync();
         self.events.clear();
     }
 
@@ -289,6 +295,7 @@ impl<S: Storage> Node<S> {
         } else {
             self.stop_pdos();
         }
+        self.follow_nmt_with_sync();
         if state.allows_sdo() {
             self.offer_emcy();
         } else {
@@ -324,14 +331,19 @@ impl<S: Storage> Node<S> {
 impl<S: Storage> Station for Node<S> {
     #[inline]
     fn ignores(&self, frame: &Frame) -> bool {
-        !frame.standard_data_id().is_some_and(|id| self.received.contain(id))
+        match frame.standard_data_id() {
+            Some(id) => !self.received.contain(id),
+            None => !self.hears_remote(frame),
+        }
     }
 
     #[inline]
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         self.now = now;
-        if let Some(id) = frame.standard_data_id().filter(|id| self.received.contain(*id)) {
-            self.receive(frame, id);
+        match frame.standard_data_id() {
+            Some(id) if self.received.contain(id) => self.receive(frame, id),
+            Some(_) => {}
+            None => self.receive_remote(frame),
         }
     }
 

@@ -3,13 +3,17 @@
 use super::receive::number_at;
 use super::{Node, NodeEvent, Via};
 use crate::heartbeat;
+use crate::object::{
+    COB_ID_EMCY, COMMUNICATION_CYCLE_PERIOD, INHIBIT_TIME_EMCY, PRODUCER_HEARTBEAT_TIME,
+    SYNCHRONOUS_COUNTER_OVERFLOW_VALUE,
+};
 use crate::od::{Refusal, RowFacts, Slot, Storage, View};
-use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, TRANSMISSION_TYPE};
+use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, SYNC_START_VALUE, TRANSMISSION_TYPE};
 use crate::pdo::{
     Direction, Mapping, MappingRecord, Parameter, PdoId, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING,
     TPDO_PARAMETER, Tpdo, TransmissionType,
 };
-use crate::{AbortCode, CobId, Mux, NmtState, connection_set};
+use crate::{AbortCode, CobId, Mux, NmtState, connection_set, sync};
 
 impl<S: Storage> Node<S> {
     /// A client's write: checks, stores, takes effect, is reported to the owner, unless the owner is to be asked before.
@@ -67,23 +71,37 @@ impl<S: Storage> Node<S> {
     fn check_communication(&self, mux: Mux, raw: u32) -> Result<(), AbortCode> {
         let values = self.dictionary.view();
         match (mux.index, PdoId::of_object(mux.index)) {
-            // A consumer of SYNC only: bit 30 would make it a producer.
-            (0x1005, _) if raw & CobId::NO_RTR != 0 => Err(AbortCode::INVALID_VALUE),
-            (0x1005, _) => CobId(raw & !CobId::INVALID).check_identifier(),
+            (0x1005, _) => self.check_sync_cob_id(CobId(raw)),
+            (0x1019, _) => {
+                let present = self.object(SYNCHRONOUS_COUNTER_OVERFLOW_VALUE).unwrap_or(0) as u8;
+                let period_us = self.object(COMMUNICATION_CYCLE_PERIOD).unwrap_or(0);
+                sync::check_overflow(present, raw as u8, period_us)
+            }
+            (0x1016, _) if mux.sub_index > 0 => heartbeat::check_watched_once(&values, mux, raw),
             (0x1014, _) => self.emcy_cob_id().check_change(CobId(raw), self.profile.pdo_changes_while_valid),
-            (_, Some((_, false))) => self.check_parameter(&values, mux, raw),
+            (_, Some((pdo, false))) => self.check_parameter(&values, mux, raw, pdo.direction),
             (_, Some((pdo, true))) => self.check_mapping(&values, mux, raw, pdo),
             _ => Ok(()),
         }
     }
 
-    fn check_parameter(&self, values: &View<'_>, mux: Mux, raw: u32) -> Result<(), AbortCode> {
+    fn check_parameter(&self, values: &View<'_>, mux: Mux, raw: u32, direction: Direction) -> Result<(), AbortCode> {
         let while_valid = self.profile.pdo_changes_while_valid;
         let parameter = Parameter::read(values, mux.index);
         match mux.sub_index {
             COB_ID => parameter.cob_id.check_change(CobId(raw), while_valid),
-            TRANSMISSION_TYPE => TransmissionType::from_raw(raw as u8).map(|_| ()),
-            INHIBIT_TIME if parameter.cob_id.is_valid() && !while_valid => Err(AbortCode::UNSUPPORTED_ACCESS),
+            TRANSMISSION_TYPE => {
+                let may_be_remote =
+                    direction == Direction::Tpdo && self.profile.remote_requests && parameter.cob_id.allows_rtr();
+                let is_remote = TransmissionType::from_raw(raw as u8)?.is_remote();
+                if is_remote && !may_be_remote { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
+            }
+            SYNC_START_VALUE if direction == Direction::Tpdo && raw > u32::from(sync::MAX_COUNTER) => {
+                Err(AbortCode::INVALID_VALUE)
+            }
+            INHIBIT_TIME | SYNC_START_VALUE if parameter.cob_id.is_valid() && !while_valid => {
+                Err(AbortCode::UNSUPPORTED_ACCESS)
+            }
             _ => Ok(()),
         }
     }
@@ -108,10 +126,11 @@ impl<S: Storage> Node<S> {
     /// A communication object was stored: it takes effect at once.
     fn configure(&mut self, mux: Mux) {
         match (mux.index, PdoId::of_object(mux.index)) {
-            (0x1005, _) => {
+            (0x1005 | 0x1006 | 0x1019, _) => {
                 self.configure_sync();
                 self.listen();
             }
+            (0x1007, _) => self.configure_window(),
             (0x1014 | 0x1015, _) => self.configure_emcy(),
             (0x1017, _) => {
                 self.heartbeat = heartbeat::Producer::from_write(self.heartbeat_period_ms(), self.now);
@@ -125,6 +144,7 @@ impl<S: Storage> Node<S> {
                 let position = number.position();
                 let old = self.pdos.tpdos.as_ref()[position];
                 self.configure_tpdo(position);
+                self.configure_window();
                 let tpdo = &mut self.pdos.tpdos.as_mut()[position];
                 if self.state.allows_pdo() && tpdo.is_active() {
                     if old.is_active() { tpdo.take_over_from(&old, self.now) } else { tpdo.start(self.now) }
@@ -145,20 +165,16 @@ impl<S: Storage> Node<S> {
         for position in 0..self.pdos.tpdos.as_ref().len() {
             self.configure_tpdo(position);
         }
+        self.configure_window();
         self.received.listen(self.node_id);
     }
 
     pub(super) fn heartbeat_period_ms(&self) -> u16 {
-        self.object(0x1017).unwrap_or(0) as u16
+        self.object(PRODUCER_HEARTBEAT_TIME).unwrap_or(0) as u16
     }
 
-    fn object(&self, index: u16) -> Option<u32> {
-        self.dictionary.table().find(Mux::new(index, 0)).ok().map(|slot| self.dictionary.raw(slot))
-    }
-
-    fn configure_sync(&mut self) {
-        let cob_id = self.object(0x1005).map(CobId);
-        self.received.set_sync(cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
+    pub(super) fn object(&self, mux: Mux) -> Option<u32> {
+        self.dictionary.table().find(mux).ok().map(|slot| self.dictionary.raw(slot))
     }
 
     /// Identifiers have changed. A node that is down stays deaf.
@@ -170,13 +186,13 @@ impl<S: Storage> Node<S> {
 
     /// 1014h, or what it would be by default on a device without it.
     fn emcy_cob_id(&self) -> CobId {
-        self.object(0x1014).map_or(CobId(connection_set::emcy(self.node_id).raw()), CobId)
+        self.object(COB_ID_EMCY).map_or(CobId(connection_set::emcy(self.node_id).raw()), CobId)
     }
 
     fn configure_emcy(&mut self) {
         let cob_id = self.emcy_cob_id();
         self.emcy_id = (self.profile.emcy && cob_id.is_valid()).then(|| cob_id.can_id());
-        self.emcy.set_inhibit_time(self.object(0x1015).unwrap_or(0) as u16);
+        self.emcy.set_inhibit_time(self.object(INHIBIT_TIME_EMCY).unwrap_or(0) as u16);
     }
 
     fn configure_rpdo(&mut self, position: usize) {

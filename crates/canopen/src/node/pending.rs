@@ -9,6 +9,7 @@ pub(super) enum Source {
     SdoReply,
     Heartbeat,
     BootUp,
+    Sync,
 }
 
 const EMCY: u8 = 1 << 0;
@@ -17,6 +18,7 @@ const HEARTBEAT: u8 = 1 << 2;
 /// One or more of them.
 const TPDOS: u8 = 1 << 3;
 const BOOT_UP: u8 = 1 << 4;
+const SYNC: u8 = 1 << 5;
 
 impl Source {
     const fn bit(self) -> u8 {
@@ -26,11 +28,12 @@ impl Source {
             Self::Heartbeat => HEARTBEAT,
             Self::Tpdo(_) => TPDOS,
             Self::BootUp => BOOT_UP,
+            Self::Sync => SYNC,
         }
     }
 }
 
-const SINGLE: [Source; 4] = [Source::Emcy, Source::SdoReply, Source::Heartbeat, Source::BootUp];
+const SINGLE: [Source; 5] = [Source::Emcy, Source::SdoReply, Source::Heartbeat, Source::BootUp, Source::Sync];
 
 /// Which services have a frame that may be sent now.
 #[derive(Clone)]

@@ -27,6 +27,9 @@ pub struct NodeProfile {
     pub rpdo_deadline: bool,
     /// What makes the device send TPDOs of type 254 and 255.
     pub event_trigger: EventTrigger,
+    /// Remote frames that ask for a TPDO are answered where bit 30 of its COB-ID allows it, and transmission types 252 and 253
+    /// are taken.
+    pub remote_requests: bool,
     /// COB-ID, inhibit time and mapping of a PDO may be changed while it is valid, and the COB-ID of EMCY.
     pub pdo_changes_while_valid: bool,
     /// What entries of a mapping it takes.
@@ -60,6 +63,7 @@ impl NodeProfile {
             event_timer_unit_ns: 1_000_000,
             rpdo_deadline: true,
             event_trigger: EventTrigger::Change,
+            remote_requests: true,
             pdo_changes_while_valid: false,
             mapping: MappingRules::CIA_301,
             short_rpdo: Some(EmcyErrorCode::PDO_NOT_PROCESSED),

@@ -18,12 +18,32 @@ impl<S: Storage> Node<S> {
         if self.received.is_nmt(id) {
             self.receive_nmt(frame);
         } else if self.received.is_sync(id) {
-            self.receive_sync();
+            self.receive_sync(frame);
         } else if self.received.is_sdo(id) {
             self.receive_sdo(frame);
         } else {
             self.receive_rpdos(frame, id);
         }
+    }
+
+    /// Any other frame than a data frame with a base identifier: a remote frame may ask for a TPDO (CiA 301, 7.2.2.4.3).
+    #[cold]
+    pub(super) fn receive_remote(&mut self, frame: &Frame) {
+        if !self.hears_remote(frame) || !self.state.allows_pdo() {
+            return;
+        }
+        for position in 0..self.pdos.tpdos.as_ref().len() {
+            let tpdo = &mut self.pdos.tpdos.as_mut()[position];
+            if tpdo.can_id() == frame.id() && tpdo.handle_remote(&self.dictionary) {
+                self.offer_tpdo(position);
+            }
+        }
+    }
+
+    /// The frame may ask for a TPDO.
+    #[cold]
+    pub(super) fn hears_remote(&self, frame: &Frame) -> bool {
+        self.profile.remote_requests && frame.is_remote() && self.pdos.tpdo_ids.as_ref().contains(&frame.id().raw())
     }
 
     #[inline(never)]
@@ -104,30 +124,6 @@ impl<S: Storage> Node<S> {
         self.dictionary.view().staged(length)
     }
 
-    /// TPDOs first: their data is of the moment of SYNC, before what it lets take effect.
-    #[inline(never)]
-    fn receive_sync(&mut self) {
-        if self.state.allows_sdo() {
-            self.push(NodeEvent::Sync);
-        }
-        if !self.state.allows_pdo() {
-            return;
-        }
-        let mut from = 0;
-        while let Some(position) = self.pdos.synchronous.next(from) {
-            if self.pdos.tpdos.as_mut()[position].handle_sync(&self.dictionary) {
-                self.offer_tpdo(position);
-            }
-            from = position + 1;
-        }
-        while let Some(position) = self.pdos.latched.next(0) {
-            self.pdos.latched.set(position, false);
-            if let Some(data) = self.pdos.rpdos.as_mut()[position].take_latched() {
-                self.apply_rpdo(position, data);
-            }
-        }
-    }
-
     #[inline(never)]
     fn receive_rpdos(&mut self, frame: &Frame, id: u16) {
         for position in 0..self.received.rpdos().len() {
@@ -156,7 +152,7 @@ impl<S: Storage> Node<S> {
         }
         match reception {
             Reception::Apply(data) => self.apply_rpdo(position, data),
-            Reception::Latched => self.pdos.latched.set(position, true),
+            Reception::Latch(data) => self.latch_rpdo(position, data),
             Reception::TooShort => return self.refuse_short_rpdo(position),
             Reception::NothingMapped => return,
         }
@@ -194,7 +190,7 @@ impl<S: Storage> Node<S> {
 
     /// Stores each mapped object whose value may be written; the others keep their value.
     #[inline(always)]
-    fn apply_rpdo(&mut self, position: usize, data: u64) {
+    pub(super) fn apply_rpdo(&mut self, position: usize, data: u64) {
         let via = Via::Rpdo(number_at(position));
         let Some(mapping) = self.pdos.rpdos.as_ref()[position].mapping() else { return };
         let Some(objects) = mapping.plain_objects() else { return self.apply_at_the_bit(position, data) };

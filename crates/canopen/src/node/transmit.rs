@@ -14,6 +14,7 @@ impl<S: Storage> Node<S> {
     #[inline(never)]
     pub(super) fn serve_deadlines(&mut self) {
         self.offer_heartbeat();
+        self.serve_sync();
         self.sdo.handle_timeout(self.now);
         if self.sdo.has_reply() {
             self.pending.insert(Source::SdoReply);
@@ -32,7 +33,8 @@ impl<S: Storage> Node<S> {
     /// Finds the earliest deadline of all services, and offers what has become ready.
     pub(super) fn reschedule(&mut self) {
         let rpdos = self.pdos.rpdos.as_ref().iter().map(Rpdo::deadline);
-        self.deadline = rpdos.fold(self.heartbeat.deadline().min(self.sdo.deadline()), Instant::min);
+        let services = self.heartbeat.deadline().min(self.sdo.deadline()).min(self.sync.deadline());
+        self.deadline = rpdos.fold(services, Instant::min);
         self.offer_emcy();
         for position in 0..self.pdos.tpdos.as_ref().len() {
             self.offer_tpdo(position);
@@ -58,6 +60,7 @@ impl<S: Storage> Node<S> {
     fn pending_id(&self, source: Source) -> u32 {
         match source {
             Source::BootUp => 0,
+            Source::Sync => self.sync.id.raw(),
             Source::Emcy => self.emcy_id.map_or(u32::MAX, CanId::raw),
             Source::Tpdo(position) => self.pdos.tpdos.as_ref()[position].can_id().raw(),
             Source::SdoReply => connection_set::sdo_reply(self.node_id).raw(),
@@ -69,6 +72,7 @@ impl<S: Storage> Node<S> {
     fn take(&mut self, source: Source) -> Option<Frame> {
         match source {
             Source::BootUp => Some(Heartbeat::boot_up(self.node_id).emit()),
+            Source::Sync => self.sync.frame.take(),
             Source::Heartbeat => {
                 let state = self.heartbeat_state.unwrap_or(self.state.heartbeat_byte());
                 Some(Heartbeat { node: self.node_id, state }.emit())

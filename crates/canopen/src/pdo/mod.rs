@@ -1,8 +1,7 @@
 //! Process data objects (CiA 301, 7.2.2 and 7.5.2.35 to 7.5.2.38), named from the device's side.
 //!
 //! [`parameter`] is a PDO's communication record, [`mapping`] its mapping record, both read from the dictionary
-//! when they are written; [`Rpdo`] and [`Tpdo`] then work on resolved cells. Deliberately absent: RTR (types 252
-//! and 253 are refused, remote frames ignored), MPDO, dummy entries, SYNC start value, RPDO deadline monitoring.
+//! when they are written; [`Rpdo`] and [`Tpdo`] then work on resolved cells.
 
 mod form;
 pub mod mapping;

@@ -11,6 +11,8 @@ pub const TRANSMISSION_TYPE: u8 = 2;
 pub const INHIBIT_TIME: u8 = 3;
 /// Sub-index of the event timer.
 pub const EVENT_TIMER: u8 = 5;
+/// Sub-index of the SYNC start value, of TPDOs.
+pub const SYNC_START_VALUE: u8 = 6;
 
 /// When a PDO is sent, or takes effect. Source: CiA 301, tables 72 and 77.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +21,10 @@ pub enum TransmissionType {
     SynchronousAcyclic,
     /// 1 to 240: a TPDO at every n-th SYNC.
     SynchronousCyclic(u8),
+    /// 252: a TPDO is sampled at each SYNC, and sent when a remote frame asks for it.
+    RemoteSynchronous,
+    /// 253: a TPDO is sampled and sent when a remote frame asks for it.
+    RemoteEventDriven,
     /// 254: the manufacturer defines the event.
     EventDrivenManufacturer,
     /// 255: the device profile defines the event.
@@ -29,15 +35,22 @@ impl TransmissionType {
     /// From the value of sub-index 02h.
     ///
     /// # Errors
-    /// 0609 0030h for the reserved types 241 to 251 and the RTR types 252 and 253.
+    /// 0609 0030h for the reserved types 241 to 251.
     pub const fn from_raw(raw: u8) -> Result<Self, AbortCode> {
         match raw {
             0 => Ok(Self::SynchronousAcyclic),
             1..=240 => Ok(Self::SynchronousCyclic(raw)),
+            252 => Ok(Self::RemoteSynchronous),
+            253 => Ok(Self::RemoteEventDriven),
             254 => Ok(Self::EventDrivenManufacturer),
             255 => Ok(Self::EventDrivenProfile),
-            241..=253 => Err(AbortCode::INVALID_VALUE),
+            241..=251 => Err(AbortCode::INVALID_VALUE),
         }
+    }
+
+    /// True for 252 and 253: types of TPDOs only (reserved for RPDOs).
+    pub const fn is_remote(self) -> bool {
+        matches!(self, Self::RemoteSynchronous | Self::RemoteEventDriven)
     }
 
     /// True for 0 to 240.
@@ -57,6 +70,8 @@ pub struct Parameter {
     pub inhibit_time: u16,
     /// Sub-index 05h, in the device's unit.
     pub event_timer: u16,
+    /// Sub-index 06h: the counter of the SYNC that counts as the first one; 0 for none.
+    pub sync_start_value: u8,
 }
 
 impl Parameter {
@@ -70,6 +85,7 @@ impl Parameter {
                 .unwrap_or(TransmissionType::EventDrivenProfile),
             inhibit_time: value(INHIBIT_TIME).unwrap_or(0) as u16,
             event_timer: value(EVENT_TIMER).unwrap_or(0) as u16,
+            sync_start_value: value(SYNC_START_VALUE).unwrap_or(0) as u8,
         }
     }
 

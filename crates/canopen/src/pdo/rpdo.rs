@@ -30,8 +30,8 @@ impl Deadline {
 pub enum Reception {
     /// The data takes effect now.
     Apply(u64),
-    /// The data waits for the next SYNC, in place of what waited before.
-    Latched,
+    /// The data is to wait for the next SYNC: [`Rpdo::latch`].
+    Latch(u64),
     /// Fewer bytes than mapped: nothing of it is used.
     TooShort,
     /// No object is mapped.
@@ -73,12 +73,7 @@ impl Rpdo {
             return Reception::TooShort;
         }
         let data = u64::from_le_bytes(*frame.padded());
-        if self.synchronous {
-            self.latched = Some(data);
-            Reception::Latched
-        } else {
-            Reception::Apply(data)
-        }
+        if self.synchronous { Reception::Latch(data) } else { Reception::Apply(data) }
     }
 
     /// It has an event timer.
@@ -116,6 +111,12 @@ impl Rpdo {
     pub const fn stop(&mut self) {
         self.latched = None;
         self.deadline.until = Instant::FAR_FUTURE;
+    }
+
+    /// This data waits for the next SYNC, in place of what waited before.
+    #[inline]
+    pub const fn latch(&mut self, data: u64) {
+        self.latched = Some(data);
     }
 
     /// At SYNC: the data that waited for it.

@@ -27,6 +27,11 @@ pub struct Tpdo {
     due: Option<Cause>,
     answers_rpdo: bool,
     data: u64,
+    /// The data is of a SYNC since operational was entered.
+    sampled: bool,
+    allows_rtr: bool,
+    /// Of a synchronous one: the counter of the SYNC from which on SYNCs are counted; 0 for the next.
+    start_value: u8,
     inhibit_ns: u64,
     inhibited_until: Instant,
     timer_ns: u64,
@@ -39,6 +44,10 @@ enum Schedule {
     Acyclic { event: bool },
     /// At every `period`-th SYNC; `left` more until then.
     Cyclic { period: u8, left: u8 },
+    /// For the SYNC with the start value; acyclic then where `period` is 0, else cyclic.
+    Waiting { period: u8 },
+    /// When a remote frame asks for it; its data is of the SYNC before where `at_sync` is set.
+    Remote { at_sync: bool },
     /// By events; `on_change` if a changed value is one.
     Event { on_change: bool },
 }
@@ -61,6 +70,9 @@ impl Tpdo {
         due: None,
         answers_rpdo: false,
         data: 0,
+        sampled: false,
+        allows_rtr: false,
+        start_value: 0,
         inhibit_ns: 0,
         inhibited_until: Instant::ZERO,
         timer_ns: 0,
@@ -82,16 +94,21 @@ impl Tpdo {
             _ if answers_rpdo => Schedule::Event { on_change: false },
             TransmissionType::SynchronousAcyclic => Schedule::Acyclic { event: false },
             TransmissionType::SynchronousCyclic(period) => Schedule::Cyclic { period, left: period },
+            TransmissionType::RemoteSynchronous => Schedule::Remote { at_sync: true },
+            TransmissionType::RemoteEventDriven => Schedule::Remote { at_sync: false },
             TransmissionType::EventDrivenManufacturer => Schedule::Event { on_change: true },
             TransmissionType::EventDrivenProfile => Schedule::Event { on_change: !by_timer },
         };
         // The inhibit time is for types 254 and 255 (CiA 301, 7.5.2.37).
         let is_event_driven = matches!(schedule, Schedule::Event { .. });
+        let counts_syncs = matches!(schedule, Schedule::Acyclic { .. } | Schedule::Cyclic { .. });
         Self {
             id: CanId::standard(id),
             mapping,
             schedule,
             answers_rpdo,
+            allows_rtr: parameter.cob_id.allows_rtr(),
+            start_value: if counts_syncs { parameter.sync_start_value } else { 0 },
             inhibit_ns: if is_event_driven { u64::from(parameter.inhibit_time) * inhibit_unit_ns } else { 0 },
             timer_ns: u64::from(parameter.event_timer) * timer_unit_ns,
             ..Self::INVALID
@@ -110,7 +127,12 @@ impl Tpdo {
 
     /// True if SYNC is what sends it; else events do.
     pub const fn is_synchronous(&self) -> bool {
-        !matches!(self.schedule, Schedule::Event { .. })
+        !matches!(self.schedule, Schedule::Event { .. } | Schedule::Remote { at_sync: false })
+    }
+
+    /// True if it waits for a SYNC with a certain counter after each start.
+    pub const fn has_start_value(&self) -> bool {
+        self.start_value != 0
     }
 
     /// True if what the application changes can send it.
@@ -124,10 +146,11 @@ impl Tpdo {
         if !self.is_active() {
             return;
         }
+        self.sampled = false;
         self.restart_counting(now);
         match &mut self.schedule {
             Schedule::Acyclic { event } => *event = true,
-            Schedule::Cyclic { .. } => {}
+            Schedule::Cyclic { .. } | Schedule::Waiting { .. } | Schedule::Remote { .. } => {}
             Schedule::Event { .. } => self.due = (!self.answers_rpdo).then_some(Cause::Event),
         }
     }
@@ -142,7 +165,11 @@ impl Tpdo {
 
     fn restart_counting(&mut self, now: Instant) {
         match &mut self.schedule {
-            Schedule::Acyclic { .. } => {}
+            Schedule::Acyclic { .. } if self.start_value != 0 => self.schedule = Schedule::Waiting { period: 0 },
+            Schedule::Cyclic { period, .. } if self.start_value != 0 => {
+                self.schedule = Schedule::Waiting { period: *period };
+            }
+            Schedule::Acyclic { .. } | Schedule::Waiting { .. } | Schedule::Remote { .. } => {}
             Schedule::Cyclic { period, left } => *left = *period,
             Schedule::Event { .. } if self.timer_ns > 0 => self.timer_at = now.plus_nanos(self.timer_ns),
             Schedule::Event { .. } => {}
@@ -153,6 +180,40 @@ impl Tpdo {
     pub const fn stop(&mut self) {
         self.due = None;
         self.timer_at = Instant::FAR_FUTURE;
+    }
+
+    /// Of one with a start value, before [`handle_sync`](Self::handle_sync): a SYNC with this counter counts as the first one
+    /// where it is the start value, and any SYNC without a counter does (CiA 301, 7.5.2.37, sub-index 06h).
+    pub fn hear_counter(&mut self, counter: Option<u8>) {
+        let Schedule::Waiting { period } = self.schedule else { return };
+        if counter.is_none_or(|counter| counter == self.start_value) {
+            self.schedule = match period {
+                0 => Schedule::Acyclic { event: true },
+                period => Schedule::Cyclic { period, left: period },
+            };
+        }
+    }
+
+    /// A remote frame asks for it while operational (CiA 301, 7.2.2.4.3). True if a frame is to be sent: of type 252 not
+    /// before its first SYNC, and none at all where bit 30 of the COB-ID is set.
+    pub fn handle_remote<S: Storage>(&mut self, values: &Dictionary<S>) -> bool {
+        let Some(mapping) = self.mapping.as_ref().filter(|_| self.allows_rtr) else { return false };
+        let sample = match self.schedule {
+            Schedule::Event { .. } => false,
+            Schedule::Remote { at_sync: true } if !self.sampled => return false,
+            Schedule::Remote { at_sync } => !at_sync,
+            Schedule::Acyclic { .. } | Schedule::Cyclic { .. } | Schedule::Waiting { .. } => !self.sampled,
+        };
+        if sample {
+            self.data = mapping.gather(values);
+        }
+        self.due = Some(Cause::Event);
+        true
+    }
+
+    /// The synchronous window is over (1007h): what was sampled at its SYNC and is not sent yet is discarded.
+    pub const fn discard_late(&mut self) {
+        self.due = None;
     }
 
     /// A SYNC arrived while operational. True if a frame is to be sent; its data is sampled here.
@@ -169,10 +230,16 @@ impl Tpdo {
                 }
                 reached
             }
-            Schedule::Event { .. } => false,
+            Schedule::Event { .. } | Schedule::Waiting { .. } => return false,
+            Schedule::Remote { .. } => {
+                self.data = mapping.gather(values);
+                self.sampled = true;
+                return false;
+            }
         };
         if send {
             self.data = mapping.gather(values);
+            self.sampled = true;
             self.due = Some(Cause::Event);
         }
         send

@@ -131,6 +131,8 @@ const PDO_RULES: PdoRules = PdoRules {
     event_timer_unit_ns: 1_000_000,
     rpdo_deadline: false,
     max_objects: 3,
+    // The manual is silent; CiA advises against remote frames (application note 802).
+    remote_requests: false,
     remap_while_valid: true,
     fixed_mapping: true,
     first_in_manual: 1,

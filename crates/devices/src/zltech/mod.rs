@@ -33,6 +33,8 @@ const PDO_RULES: PdoRules = PdoRules {
     // The manuals say nothing of an RPDO's event timer: silence of the host is 2000h's.
     rpdo_deadline: false,
     max_objects: 4,
+    // The manuals are silent; CiA advises against remote frames (application note 802).
+    remote_requests: false,
     remap_while_valid: true,
     fixed_mapping: false,
     first_in_manual: 0,

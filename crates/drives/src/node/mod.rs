@@ -31,6 +31,8 @@ pub const fn acts_on(mux: Mux) -> bool {
                 | 0x1001
                 | 0x1003
                 | 0x1005
+                | 0x1006
+                | 0x1007
                 | 0x1008
                 | 0x1009
                 | 0x100A
@@ -43,6 +45,7 @@ pub const fn acts_on(mux: Mux) -> bool {
                 | 0x1016
                 | 0x1017
                 | 0x1018
+                | 0x1019
                 | 0x1029
                 | 0x1200
                 | 0x1400..=0x1BFF

@@ -4,7 +4,7 @@
 use can::{Frame, Instant};
 use canopen::guarding::Guarding;
 use canopen::heartbeat::{Consumer, ConsumerEvent};
-use canopen::object::{COB_ID_EMCY, COMMUNICATION_CYCLE_PERIOD, GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME};
+use canopen::object::{COB_ID_EMCY, GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME};
 use canopen::od::{Condition, Dictionary, Entry, Slot, Storage, Table, View};
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 
@@ -24,9 +24,7 @@ const HISTORY: u16 = 0x1003;
 const STORE: u16 = 0x1010;
 const RESTORE: u16 = 0x1011;
 const WATCH: u16 = 0x1016;
-const SYNC_WINDOW: u16 = 0x1007;
 const TIME_COB_ID: u16 = 0x1012;
-const SYNC_COUNTER: u16 = 0x1019;
 
 /// The services of one device.
 #[derive(Clone, Debug)]
@@ -220,11 +218,8 @@ pub fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Conditio
             (HISTORY, 0) => only_zero,
             (STORE, 1..) => only_save,
             (RESTORE, 1..) => only_load,
-            (WATCH, sub_index @ 1..=CONSUMERS) => WATCH_CHECKS[usize::from(sub_index) - 1],
             (WATCH, FIRST_UNWATCHED..) => only_nobody,
-            (SYNC_WINDOW, 0) => no_window,
             (TIME_COB_ID, 0) => no_time,
-            (SYNC_COUNTER, 0) => counter_of_sync,
             _ => return None,
         };
         Some((slot, Condition::Check(check)))
@@ -235,48 +230,9 @@ fn only_zero(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if raw == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
 }
 
-/// What refuses a value of an object.
-type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
-
-/// The checks know no sub-index: one for each entry of 1016h.
-const WATCH_CHECKS: [Check; CONSUMERS as usize] = [
-    watched_once::<1>,
-    watched_once::<2>,
-    watched_once::<3>,
-    watched_once::<4>,
-    watched_once::<5>,
-    watched_once::<6>,
-    watched_once::<7>,
-    watched_once::<8>,
-];
-
-/// 1016h: two entries with a time for one node are refused (CiA 301, 7.5.2.19).
-fn watched_once<const SUB_INDEX: u8>(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
-    let watched = |raw: u32| Consumer::from_raw(raw).map(|consumer| consumer.can_id());
-    let Some(wanted) = watched(raw) else { return Ok(()) };
-    let others = (1..=CONSUMERS).filter(|other| *other != SUB_INDEX);
-    let mut watched_by_others = others.filter_map(|other| watched(values.value(Mux::new(WATCH, other)).ok()? as u32));
-    if watched_by_others.any(|other| other == wanted) { Err(AbortCode::PARAMETER_INCOMPATIBLE) } else { Ok(()) }
-}
-
-/// 1007h: these devices have no window, in which synchronous PDOs would have to come (CiA 301, 7.5.2.7).
-fn no_window(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
-    if raw == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
-}
-
 /// 1012h: these devices have no clock, to consume TIME (bit 31) or to produce it (bit 30; CiA 301, 7.5.2.15).
 fn no_time(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if raw >> 30 == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
-}
-
-/// 1019h: 0, or 2 to 240, and not while 1006h says that SYNC runs (CiA 301, 7.5.2.22).
-fn counter_of_sync(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
-    if matches!(raw, 1 | 241..) {
-        return Err(AbortCode::INVALID_VALUE);
-    }
-    let runs = values.value(COMMUNICATION_CYCLE_PERIOD).is_ok_and(|period_us| period_us != 0);
-    let changes = values.value(Mux::new(SYNC_COUNTER, 0)) != Ok(i64::from(raw));
-    if runs && changes { Err(AbortCode::DEVICE_STATE) } else { Ok(()) }
 }
 
 /// More nodes than can be watched: an entry for one is refused, as it would have no effect.

@@ -5,7 +5,7 @@ mod asked;
 mod bits;
 mod blocks;
 mod blocks_over_a_bad_wire;
-mod device;
+pub(crate) mod device;
 mod long_values;
 mod many_pdos;
 mod tables;

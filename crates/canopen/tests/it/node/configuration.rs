@@ -9,13 +9,30 @@ fn talk(script: &str) {
 }
 
 #[test]
-fn reserved_and_rtr_transmission_types_abort_with_0609_0030() {
+fn reserved_transmission_types_abort_with_0609_0030_and_rtr_types_are_for_tpdos() {
     for raw in 0..=255_u8 {
-        let refused = (241..=253).contains(&raw);
-        for record in ["0018", "0014"] {
-            let reply = if refused { format!("80{record}0230000906") } else { format!("60{record}0200000000") };
+        for (record, reserved) in [("0018", 241..=251), ("0014", 241..=253)] {
+            let reply = match reserved.contains(&raw) {
+                true => format!("80{record}0230000906"),
+                false => format!("60{record}0200000000"),
+            };
             talk(&format!("> 604#2F{record}02{raw:02X}000000\n < 584#{reply}"));
         }
+    }
+}
+
+#[test]
+fn rtr_types_abort_with_0609_0030_where_no_remote_frame_is_answered() {
+    for raw in [252, 253] {
+        // Bit 30 of its COB-ID: no RTR allowed.
+        talk(&format!(
+            "> 604#2300180184010040
+             < 584#6000180100000000
+             > 604#2F001802{raw:02X}000000
+             < 584#8000180230000906"
+        ));
+        let mut bench = Bench::new(&LOOSE);
+        bench.talk(&format!("> 604#2F001802{raw:02X}000000\n < 584#8000180230000906"));
     }
 }
 
@@ -39,7 +56,7 @@ fn extended_identifiers_abort_with_0609_0030() {
 }
 
 #[test]
-fn a_sync_consumer_does_not_become_a_producer() {
+fn a_device_without_1006h_does_not_become_a_producer_of_sync() {
     talk("> 604#2305100080000040\n < 584#8005100030000906");
 }
 

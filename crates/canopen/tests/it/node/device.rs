@@ -140,12 +140,14 @@ static CONDITIONS: Conditions = Conditions::new(&GUARDED, &NUMBERS);
 /// As CiA 301 has it.
 pub(crate) static STANDARD: NodeProfile = NodeProfile { conditions: &CONDITIONS, ..NodeProfile::cia_301(&TABLE) };
 
-/// As the ZLAC8030L quick start guide V1.00, 6.1 has it: timers in 0.5 ms, changes while valid, 255 by its timer.
+/// As the ZLAC8030L quick start guide V1.00, 6.1 has it: timers in 0.5 ms, changes while valid, 255 by its timer; remote
+/// frames are not answered.
 pub(crate) static LOOSE: NodeProfile = NodeProfile {
     inhibit_unit_ns: 500_000,
     event_timer_unit_ns: 500_000,
     event_trigger: EventTrigger::ChangeOr255ByTimer,
     pdo_changes_while_valid: true,
+    remote_requests: false,
     conditions: &CONDITIONS,
     ..NodeProfile::cia_301(&TABLE)
 };

@@ -10,5 +10,6 @@ mod nmt;
 mod robustness;
 mod rpdo;
 mod sdo;
+mod sync;
 mod tpdo;
 mod traps;

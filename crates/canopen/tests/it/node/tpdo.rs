@@ -14,7 +14,7 @@ fn configured(profile: &'static NodeProfile, transmission_type: u8, inhibit_time
     let mut bench = Bench::new(profile);
     let [[t, _], [i, j], [e, f]] = [u16::from(transmission_type), inhibit_time, event_timer].map(u16::to_le_bytes);
     bench.talk(&format!(
-        "> 604#23001801840100C0
+        "> 604#2300180184010080
          < 584#6000180100000000
          > 604#2F001802{t:02X}000000
          < 584#6000180200000000
@@ -22,7 +22,7 @@ fn configured(profile: &'static NodeProfile, transmission_type: u8, inhibit_time
          < 584#6000180300000000
          > 604#2B001805{e:02X}{f:02X}0000
          < 584#6000180500000000
-         > 604#2300180184010040
+         > 604#2300180184010000
          < 584#6000180100000000",
     ));
     bench
@@ -270,9 +270,52 @@ fn no_tpdo_outside_operational() {
 }
 
 #[test]
-fn remote_frames_are_not_answered() {
+fn a_remote_frame_gets_the_tpdo_as_it_is_while_operational() {
     let mut bench = Bench::operational();
-    bench.talk("> 184#R2\n > 184#R0\n silence 10ms\n > 000#0204\n > 184#R2\n silence 10ms");
+    bench.talk("> 184#R2\n < 184#0000\n > 184#R0\n < 184#0000\n > 284#R2\n silence 10ms");
+    let slot = bench.slot(0x6041);
+    bench.node.dictionary_mut().set_raw(slot, 0x1234);
+    bench.talk("> 184#R8\n < 184#3412\n > 000#0204\n > 184#R2\n > 000#8004\n > 184#R2\n silence 10ms");
+}
+
+#[test]
+fn bit_30_of_the_cob_id_says_that_no_remote_frame_is_answered() {
+    let mut bench = Bench::operational();
+    bench.talk("> 604#2300180184010040\n < 584#6000180100000000\n > 184#R2\n silence 10ms");
+    bench.talk("> 604#2300180184010000\n < 584#6000180100000000\n > 184#R2\n < 184#0000");
+    let mut bench = configured(&LOOSE, 254, 0, 0);
+    bench.talk("> 000#0104\n < 184#0000\n > 184#R2\n silence 10ms");
+}
+
+/// CiA 301, table 77: 252 is sampled at SYNC and sent on request, 253 is sampled and sent on request.
+#[test]
+fn types_252_and_253_are_sent_on_request_only() {
+    let mut bench = configured(&STANDARD, 252, 0, 10);
+    bench.talk("> 000#0104\n silence 100ms\n > 184#R2\n silence 1ms");
+    bench.set(0x6041, 1);
+    bench.talk("> 080#\n silence 1ms");
+    bench.set(0x6041, 2);
+    bench.talk("> 184#R2\n < 184#0100\n > 184#R2\n < 184#0100\n > 080#\n > 184#R2\n < 184#0200");
+
+    let mut bench = configured(&STANDARD, 253, 0, 10);
+    bench.talk("> 000#0104\n silence 100ms\n > 080#\n silence 1ms");
+    bench.set(0x6041, 3);
+    bench.talk("silence 1ms\n > 184#R2\n < 184#0300");
+}
+
+#[test]
+fn a_request_for_a_synchronous_tpdo_gets_the_data_of_the_last_sync() {
+    let mut bench = configured(&STANDARD, 1, 0, 0);
+    bench.talk("> 000#0104\n > 184#R2\n < 184#0000\n > 080#\n < 184#0000");
+    bench.set(0x6041, 7);
+    bench.talk("> 184#R2\n < 184#0000\n > 080#\n < 184#0700\n > 184#R2\n < 184#0700");
+}
+
+#[test]
+fn the_inhibit_time_holds_back_what_a_remote_frame_asks_for() {
+    // 100 times 100 us.
+    let mut bench = configured(&STANDARD, 254, 100, 0);
+    bench.talk("> 000#0104\n < 184#0000\n > 184#R2\n > 184#R2\n 10ms < 184#0000\n silence 20ms");
 }
 
 #[test]
