@@ -1,5 +1,6 @@
-//! Node guarding and life guarding (CiA 301, 7.2.8.2.1 and 7.2.8.3.1) from the device's side: the answer to the master's
-//! remote frames, and the watch over the master by them (100Ch, 100Dh).
+//! Node guarding and life guarding (CiA 301, 7.2.8.2.1 and 7.2.8.3.1), both sides. [`Guarding`] is the device's: the answer to
+//! the master's remote frames, and the watch over the master by them (100Ch, 100Dh). [`Guard`] is the master's: the remote
+//! frames, and which answer counts.
 //!
 //! A device that produces heartbeats (1017h) does not guard: that is for its owner to see to.
 
@@ -68,6 +69,66 @@ impl Guarding {
     }
 }
 
+/// The guarding side: asks a node each guard time, on a grid from the start.
+#[derive(Clone, Copy, Debug)]
+pub struct Guard {
+    node: NodeId,
+    period_ns: u64,
+    next: Instant,
+    /// The toggle bit that the next answer has to have; `None` before the first.
+    toggle: Option<bool>,
+}
+
+impl Guard {
+    /// Asks `node` from `now` on, each `period_ns`; 0 asks once.
+    pub const fn new(node: NodeId, period_ns: u64, now: Instant) -> Self {
+        Self { node, period_ns, next: now, toggle: None }
+    }
+
+    /// Whom it asks.
+    pub const fn node(&self) -> NodeId {
+        self.node
+    }
+
+    /// When the next request is due; [`Instant::FAR_FUTURE`] for never.
+    pub const fn deadline(&self) -> Instant {
+        self.next
+    }
+
+    /// True if a request is due at `now`; those that were missed are not made up for.
+    pub fn handle_timeout(&mut self, now: Instant) -> bool {
+        if now < self.next {
+            return false;
+        }
+        self.next = match now.nanos_since(self.next).checked_div(self.period_ns) {
+            Some(missed) => self.next.plus_nanos((missed + 1).saturating_mul(self.period_ns)),
+            None => Instant::FAR_FUTURE,
+        };
+        true
+    }
+
+    /// The remote frame: one byte is asked for.
+    pub const fn request(&self) -> Frame {
+        Frame::remote(connection_set::heartbeat(self.node), 1)
+    }
+
+    /// An answer with this byte: the state in it; `None` if its toggle bit is that of the one before, which then counts as if
+    /// it had not come (CiA 301, 7.2.8.3.1). The first may have either: the node may have been asked before.
+    pub fn answer(&mut self, byte: u8) -> Option<u8> {
+        let toggle = byte & TOGGLE != 0;
+        if self.toggle.is_some_and(|expected| expected != toggle) {
+            return None;
+        }
+        self.toggle = Some(!toggle);
+        Some(byte & !TOGGLE)
+    }
+
+    /// The node has booted: the toggle bit of its next answer is 0.
+    pub const fn booted(&mut self) {
+        self.toggle = Some(false);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -100,6 +161,26 @@ mod tests {
         assert!(!Guarding::new(100, 3).take_return());
         guarding.answer(NODE, NmtState::Operational, at_ms(20_000));
         assert!(guarding.take_return() && !guarding.take_return());
+    }
+
+    #[test]
+    fn a_guard_and_a_guarded_node_understand_each_other_and_a_repeated_toggle_bit_does_not_count() {
+        let (mut guard, mut guarding) = (Guard::new(NODE, 100 * NANOS_PER_MILLI, at_ms(0)), Guarding::new(100, 3));
+        for n in 0..10 {
+            assert!(guard.handle_timeout(at_ms(n * 100)) && !guard.handle_timeout(at_ms(n * 100 + 99)));
+            assert!(Guarding::is_request(&guard.request(), NODE));
+            let answer = guarding.answer(NODE, NmtState::PreOperational, at_ms(n * 100));
+            assert_eq!(guard.answer(answer.data()[0]), Some(0x7F));
+            assert_eq!(guard.answer(answer.data()[0]), None, "the same again");
+        }
+        guard.booted();
+        assert_eq!((guard.answer(0x85), guard.answer(0x05)), (None, Some(0x05)));
+        assert_eq!(Guard::new(NODE, 1, at_ms(0)).answer(0x85), Some(0x05));
+        // Late: one request, and the grid goes on.
+        assert!(guard.handle_timeout(at_ms(1_350)) && !guard.handle_timeout(at_ms(1_350)));
+        assert_eq!(guard.deadline(), at_ms(1_400));
+        let mut once = Guard::new(NODE, 0, at_ms(5));
+        assert!(once.handle_timeout(at_ms(5)) && !once.handle_timeout(at_ms(50_000)));
     }
 
     #[test]

@@ -27,8 +27,8 @@ impl Host {
                 self.report(TimelineEvent::new(at, *node, Kind::Nmt, "booted"));
             }
             Event::NmtState(node, state) => self.note_nmt(at, *node, *state),
-            Event::HeartbeatLost(node, time) => {
-                let what = format!("no heartbeat for {} ms", time.as_millis());
+            Event::HeartbeatLost(node, silence) => {
+                let what = silence.to_string();
                 self.report(TimelineEvent {
                     remedy: Some(CHECK_SUPPLY),
                     ..TimelineEvent::new(at, *node, Kind::Silent, what)

@@ -1,10 +1,10 @@
-//! What a master writes to a drive at its start, in a machine file: `pdos`, `limits`, `heartbeat`, `start_up`. The simulator does
+//! What a master writes to a drive at its start, in a machine file: `pdos`, `limits`, `heartbeat`, `guarding`, `start_up`. The simulator does
 //! not use them: its `options` are what a drive has already.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use canopen::object::PRODUCER_HEARTBEAT_TIME;
+use canopen::object::{GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME};
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{Mux, NodeId};
 use cia402::object::{MAX_POSITION_LIMIT, MIN_POSITION_LIMIT};
@@ -19,12 +19,14 @@ use words::document::reader::{Field, Table};
 use words::object::object;
 
 /// Keys of a drive that are for its master.
-pub(super) const KEYS: &[&str] = &["pdos", "limits", "heartbeat", "start_up"];
+pub(super) const KEYS: &[&str] = &["pdos", "limits", "heartbeat", "guarding", "start_up"];
 
 const PDOS: &str = "a table of PDOs, e.g. { tpdo1 = { objects = [\"statusword\"], type = 1 } }";
 const PDO: &str = "\"off\", or a table of objects, type, inhibit, event, id";
 const OBJECTS: &str = "a list of objects, e.g. [\"statusword\", \"position_actual_value\"]";
 const TIME: &str = "a time as text, e.g. \"100ms\"";
+const GUARDING: &str = "a table of time and factor, e.g. { time = \"100ms\", factor = 3 }";
+const FACTOR: &str = "a life time factor, 1 to 255";
 const LIMITS: &str = "a table of position, speed, torque, current, e.g. { speed = \"100rpm\" }";
 const BOUNDS: &str = "two bounds, [low, high]";
 const START_UP: &str = "a table of objects and their values, e.g. { 1017 = 200 }";
@@ -53,6 +55,10 @@ pub(super) fn values(
     if let Some(field) = table.get("heartbeat") {
         let value = heartbeat(&field, model);
         all.add(&field, value.map(|value| vec![(PRODUCER_HEARTBEAT_TIME, value)]));
+    }
+    if let Some(field) = table.get("guarding") {
+        let values = guarding(&field, model);
+        all.add(&field, values);
     }
     if let Some(field) = table.get("start_up") {
         match field.table("the values at the start", START_UP).map_err(|problem| vec![problem]) {
@@ -160,6 +166,34 @@ fn heartbeat(field: &Field<'_>, model: &'static Description) -> Result<Vec<u8>, 
     Ok(ms.to_le_bytes().to_vec())
 }
 
+/// Node guarding in place of a heartbeat: the node watches its master by it as well (CiA 301, 7.2.8.2.1).
+fn guarding(field: &Field<'_>, model: &'static Description) -> Result<Vec<(Mux, Vec<u8>)>, Problem> {
+    let writable = |object| model.row(object).is_some_and(|row| row.access.is_writable());
+    if !writable(GUARD_TIME) || !writable(LIFE_TIME_FACTOR) {
+        let name = model.name;
+        return Err(field
+            .problem(format!("a {name} has no guard time and life time factor (100Ch, 100Dh) that can be written")));
+    }
+    let table = field.table("node guarding", GUARDING)?;
+    if let Some(problem) = table.strangers(&["time", "factor"]).into_iter().next() {
+        return Err(problem);
+    }
+    let (Some(time), Some(factor)) = (table.get("time"), table.get("factor")) else {
+        return Err(field.wrong(GUARDING));
+    };
+    let ms = whole_ms(&time, "100Ch")?;
+    let factor =
+        factor.whole::<u8>(FACTOR).and_then(|value| if value == 0 { Err(factor.wrong(FACTOR)) } else { Ok(value) })?;
+    Ok(vec![(GUARD_TIME, ms.to_le_bytes().to_vec()), (LIFE_TIME_FACTOR, vec![factor])])
+}
+
+fn whole_ms(field: &Field<'_>, object: &str) -> Result<u16, Problem> {
+    let time = time(field)?;
+    let ms = u16::try_from(time.as_millis()).ok();
+    let ms = ms.filter(|ms| *ms > 0 && Duration::from_millis((*ms).into()) == time);
+    ms.ok_or_else(|| field.problem(format!("{object} counts whole ms; expected \"1ms\" to \"65535ms\"")))
+}
+
 fn time(field: &Field<'_>) -> Result<Duration, Problem> {
     parse_duration(&field.words(TIME)?).map_err(|error| field.problem(format!("{error}; expected {TIME}")))
 }
@@ -255,6 +289,15 @@ mod tests {
     }
 
     #[test]
+    fn node_guarding_becomes_guard_time_and_life_time_factor() {
+        let values = values("guarding = { time = '250ms', factor = 3 }");
+        assert_eq!((&values[&GUARD_TIME][..], &values[&LIFE_TIME_FACTOR][..]), (&[250, 0][..], &[3][..]));
+        let joint = "[[drive]]\nmodel = 'm4230e17b50'\nnode = 5\nguarding = { time = '250ms', factor = 3 }\n";
+        let refused = Machine::parse(joint).map_or_else(|bad| bad.to_string(), |_| String::new());
+        assert!(refused.contains("has no guard time and life time factor (100Ch, 100Dh)"), "{refused}");
+    }
+
+    #[test]
     fn the_writes_of_a_drive_are_in_a_legal_order() {
         let machine = Machine::parse(&format!("{DRIVE}pdos = {{ tpdo1 = {{ objects = ['6041'], type = 1 }} }}"));
         let machine = machine.unwrap_or_else(|bad| panic!("{bad}"));
@@ -281,6 +324,11 @@ mod tests {
         assert!(refusal("heartbeat = 200").contains("expected a time as text"));
         assert!(refusal("heartbeat = '2d'").contains("expected"));
         assert!(refusal("heartbeat = '2h'").contains("to \"65535ms\""));
+        assert!(refusal("guarding = '100ms'").contains("expected a table of time and factor"));
+        assert!(refusal("guarding = { time = '100ms' }").contains("expected a table of time and factor"));
+        assert!(refusal("guarding = { time = '100ms', factor = 0 }").contains("expected a life time factor, 1 to 255"));
+        assert!(refusal("guarding = { time = '70s', factor = 2 }").contains("100Ch counts whole ms"));
+        assert!(refusal("guarding = { time = '1ms', factor = 2, of = 3 }").contains("has no 'of'"));
         assert!(refusal("limits = { position = [5, 1] }").contains("is not below the upper"));
         assert!(refusal("limits = { pace = 5 }").contains("has no 'pace'"));
         assert!(refusal("start_up = { 1017 = 5 }\nheartbeat = '5ms'").contains("1017h:00 gets a value twice"));

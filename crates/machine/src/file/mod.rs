@@ -62,6 +62,7 @@ pub const DRIVE_KEYS: &[&str] = &[
     "pdos",
     "limits",
     "heartbeat",
+    "guarding",
     "start_up",
 ];
 

@@ -1,5 +1,7 @@
 //! The bits that a CANopen manager's objects 1F80h and 1F81h are made of. Source: CiA 302-2.
 
+use std::time::Duration;
+
 /// NMT startup, 1F80h: what the master does on its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Startup(pub u32);
@@ -23,8 +25,7 @@ impl Startup {
     }
 }
 
-/// NMT slave assignment, one sub-index of 1F81h: what the master does with one node. Bits 8 to 31 are about node guarding,
-/// which this master leaves to heartbeats.
+/// NMT slave assignment, one sub-index of 1F81h: what the master does with one node. Bits 8 to 31 are about node guarding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Assignment(pub u32);
 
@@ -50,6 +51,15 @@ impl Assignment {
     /// True if all of these bits are set.
     pub const fn has(self, bits: u32) -> bool {
         self.0 & bits == bits
+    }
+
+    /// Guard time (bits 16 to 31, in ms) and retry factor (bits 8 to 15) of the node guarding that it is watched by; `None` where the
+    /// time is 0.
+    pub const fn guarding(self) -> Option<(Duration, u8)> {
+        match self.0 >> 16 {
+            0 => None,
+            ms => Some((Duration::from_millis(ms as u64), (self.0 >> 8) as u8)),
+        }
     }
 
     /// The same without these bits.

@@ -73,7 +73,12 @@ const TABLE: [StatusRow; 15] = [
         "it sends no heartbeat that would show its state",
         "check that its 1017h is not 0, and its cable",
     ),
-    (NoGuarding, 'F', "it does not answer node guarding", "use a heartbeat (1017h) instead"),
+    (
+        NoGuarding,
+        'F',
+        "it does not answer node guarding",
+        "check its cable, and that it has node guarding (100Ch, 100Dh) and no heartbeat (1017h is 0)",
+    ),
     (
         NoProgram,
         'G',

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use canopen::concise::{Concise, ConciseError};
 use canopen::heartbeat::Consumer;
+use canopen::object::{GUARD_TIME, LIFE_TIME_FACTOR};
 use canopen::{Mux, NodeId};
 use devices::Description;
 
@@ -93,6 +94,18 @@ impl Expectation {
             description: Some(description),
             ..Self::default()
         }
+    }
+
+    /// Guard time and life time factor of the node guarding that it is to be watched by, if it is: of 1F81h, or of the 100Ch and 100Dh
+    /// that it is given.
+    pub fn guarding(&self) -> Option<(Duration, u8)> {
+        let written =
+            |object| self.configuration.iter().rev().find(|(to, _)| *to == object).map(|(_, data)| number(data));
+        let given = || match written(GUARD_TIME)? {
+            0 => None,
+            ms => Some((Duration::from_millis(ms.into()), written(LIFE_TIME_FACTOR).unwrap_or(0) as u8)),
+        };
+        self.assignment.guarding().or_else(given)
     }
 
     /// A node of which nothing is known: that it answers is all that is expected.

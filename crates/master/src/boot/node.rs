@@ -2,13 +2,15 @@
 //!
 //! Two things differ from the standard's figure, for the sake of motors that may turn: a node that must not be reset while it
 //! is operational, and has its heartbeat off, is given one before anything else, so that its state is known; and one whose
-//! state cannot be known is not reset. Node guarding is not used, programs are not loaded: F and I do not come from here.
+//! state cannot be known is not reset. Node guarding is for nodes that send no heartbeat. Programs are not loaded: I does not come
+//! from here.
 
 use std::time::Duration;
 
 use can::Instant;
 use canopen::object::{
-    APPLICATION_SOFTWARE_IDENTIFICATION, CONFIGURATION_DATE, CONFIGURATION_TIME, DEVICE_TYPE, PRODUCER_HEARTBEAT_TIME,
+    APPLICATION_SOFTWARE_IDENTIFICATION, CONFIGURATION_DATE, CONFIGURATION_TIME, DEVICE_TYPE, GUARD_TIME,
+    LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME,
 };
 use canopen::{Mux, NmtCommand, NmtState, NodeId};
 use devices::HostWatch;
@@ -31,6 +33,9 @@ const LOAD: [u8; 4] = *b"load";
 /// How much later than its time a heartbeat may come: behind a bus full of other frames.
 const JITTER: Duration = Duration::from_millis(100);
 
+/// How many requests in a row a node may leave unanswered whose life time factor (100Dh) is 0.
+const GUARD_FACTOR: u8 = 3;
+
 /// How the boot-up of a node goes on after a step.
 type Go<T = ()> = Result<T, ErrorStatus>;
 
@@ -46,6 +51,15 @@ pub(super) struct NodeBoot<'a> {
     left_operational: bool,
     /// The longest time between its heartbeats, once it sends any.
     heartbeat: Option<Duration>,
+}
+
+/// How the master notices that a node is gone.
+#[derive(Clone, Copy)]
+enum Watch {
+    /// By its heartbeat: the longest time between two.
+    Heartbeat(Duration),
+    /// By node guarding: guard time, and life time factor.
+    Guarding(Duration, u8),
 }
 
 /// What is known of the state of a node that must not be disturbed.
@@ -110,7 +124,7 @@ impl<'a> NodeBoot<'a> {
             let left =
                 Found::Text("a node booted by another manager (1F81h, bit 2): its heartbeat is watched".to_owned());
             self.note(StepKind::Assignment, None, Expected::Listed, left, Verdict::Noted);
-            return self.watch_heartbeat().await;
+            return self.begin_watch().await;
         }
         let keeps_alive = assignment.has(Assignment::KEEP_ALIVE);
         if !keeps_alive {
@@ -130,7 +144,7 @@ impl<'a> NodeBoot<'a> {
             self.check_software().await?;
             self.configure().await?;
         }
-        self.watch_heartbeat().await?;
+        self.begin_watch().await?;
         self.arm_host_watch().await;
         Ok(())
     }
@@ -173,15 +187,19 @@ impl<'a> NodeBoot<'a> {
         Ok(())
     }
 
-    /// Whether it is operational, by its heartbeat, which it is given where it has none.
+    /// Whether it is operational, by its heartbeat, which it is given where it has none, or by node guarding.
     async fn state(&mut self) -> Go<KnownState> {
         let expected = Expected::OtherState(NmtState::Operational);
-        let Some(patience) = self.produce_heartbeat().await else {
+        let Some(watch) = self.find_watch().await else {
             let unknown = Found::Text("a node that sends no heartbeat (1017h): it is not reset".to_owned());
             self.note(StepKind::State, Some(PRODUCER_HEARTBEAT_TIME), expected, unknown, Verdict::Noted);
             return Ok(KnownState::Unknown);
         };
         let now = self.node.network().now();
+        let (patience, awaited, status) = match watch {
+            Watch::Heartbeat(patience) => (patience, Expected::Heartbeat, ErrorStatus::NoHeartbeat),
+            Watch::Guarding(..) => (self.guard_node(watch), Expected::GuardAnswer, ErrorStatus::NoGuarding),
+        };
         match self.hear_state(now, patience, |_| true).await {
             Ok(NmtState::Operational) => {
                 let found = Found::State(NmtState::Operational);
@@ -194,7 +212,7 @@ impl<'a> NodeBoot<'a> {
             }
             Err(Elapsed) => {
                 let found = self.nothing(patience);
-                self.fail(StepKind::State, None, Expected::Heartbeat, found, ErrorStatus::NoHeartbeat)?;
+                self.fail(StepKind::State, None, awaited, found, status)?;
                 Ok(KnownState::Unknown)
             }
         }
@@ -262,22 +280,66 @@ impl<'a> NodeBoot<'a> {
         Ok(())
     }
 
-    /// Has the master watch its heartbeat, and waits for the first.
-    async fn watch_heartbeat(&mut self) -> Go {
-        let Some(time) = self.produce_heartbeat().await else {
+    /// Has the master watch it, and waits for the first sign of life.
+    async fn begin_watch(&mut self) -> Go {
+        let Some(watch) = self.find_watch().await else {
             let found = Found::Text("a node that sends none: its loss would go unnoticed".to_owned());
             self.note(StepKind::Heartbeat, Some(PRODUCER_HEARTBEAT_TIME), Expected::Heartbeat, found, Verdict::Noted);
             return Ok(());
         };
-        self.node.watch_heartbeat(Some(time));
         let now = self.node.network().now();
-        let heard = self.hear_state(now, time, |_| true).await;
-        let (found, status) = match heard {
+        let (time, kind, object, expected, failed) = match watch {
+            Watch::Heartbeat(time) => {
+                self.node.watch_heartbeat(Some(time));
+                let failed = ErrorStatus::NoHeartbeatAtStart;
+                (time, StepKind::Heartbeat, PRODUCER_HEARTBEAT_TIME, Expected::Heartbeat, failed)
+            }
+            Watch::Guarding(..) => {
+                let time = self.guard_node(watch);
+                (time, StepKind::Guarding, GUARD_TIME, Expected::GuardAnswer, ErrorStatus::NoGuarding)
+            }
+        };
+        let (found, status) = match self.hear_state(now, time, |_| true).await {
             Ok(_) => (Found::Came, None),
-            Err(Elapsed) => (self.nothing(time), Some(ErrorStatus::NoHeartbeatAtStart)),
+            Err(Elapsed) => (self.nothing(time), Some(failed)),
         };
         self.heartbeat = Some(time);
-        self.judge(StepKind::Heartbeat, PRODUCER_HEARTBEAT_TIME, Expected::Heartbeat, found, status)
+        self.judge(kind, object, expected, found, status)
+    }
+
+    /// Begins to guard it; the longest time without an answer.
+    fn guard_node(&self, watch: Watch) -> Duration {
+        match watch {
+            Watch::Heartbeat(time) => time,
+            Watch::Guarding(time, factor) => {
+                self.node.watch_by_guarding(time, factor);
+                time * u32::from(factor.max(1))
+            }
+        }
+    }
+
+    /// By its heartbeat; by node guarding where 1F81h or its configuration has a guard time, 1016h has no time for it and it sends none, and where it
+    /// cannot send any and has 100Ch and 100Dh. CiA 302-2, start of error control.
+    async fn find_watch(&mut self) -> Option<Watch> {
+        if let (Some((time, factor)), None) = (self.expectation.guarding(), self.expectation.heartbeat)
+            && !matches!(self.read(PRODUCER_HEARTBEAT_TIME).await, Found::Value(1..))
+        {
+            return Some(Watch::Guarding(time, factor));
+        }
+        if let Some(time) = self.produce_heartbeat().await {
+            return Some(Watch::Heartbeat(time));
+        }
+        let (Found::Value(ms), Found::Value(factor)) = (self.read(GUARD_TIME).await, self.read(LIFE_TIME_FACTOR).await)
+        else {
+            return None;
+        };
+        // A time of 0 has it answer all the same, and not watch this master (CiA 301, 7.5.2.11).
+        let time = match ms & 0xFFFF {
+            0 => self.plan.heartbeat?,
+            ms => Duration::from_millis(ms.into()),
+        };
+        let factor = if factor as u8 == 0 { GUARD_FACTOR } else { factor as u8 };
+        Some(Watch::Guarding(time, factor))
     }
 
     /// Sees to it that it sends a heartbeat, if it can and is booted; the longest time between two.

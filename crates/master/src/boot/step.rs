@@ -44,6 +44,8 @@ pub enum StepKind {
     Configuration,
     /// Its heartbeat.
     Heartbeat,
+    /// Its answer to node guarding, where it sends no heartbeat.
+    Guarding,
     /// What it does when this program dies.
     HostWatch,
     /// NMT start.
@@ -63,6 +65,8 @@ pub enum Expected {
     BootUp,
     /// A heartbeat.
     Heartbeat,
+    /// An answer to node guarding.
+    GuardAnswer,
     /// A state.
     State(NmtState),
     /// Any other state.
@@ -149,6 +153,7 @@ impl StepKind {
             Self::Software => "software",
             Self::Configuration => "configuration",
             Self::Heartbeat => "heartbeat",
+            Self::Guarding => "guarding",
             Self::HostWatch => "host watch",
             Self::Start => "start",
         }
@@ -194,6 +199,7 @@ impl fmt::Display for Expected {
             Self::Write(bytes) => write!(f, "to take {} bytes", bytes.len()),
             Self::BootUp => f.write_str("a boot-up message"),
             Self::Heartbeat => f.write_str("a heartbeat"),
+            Self::GuardAnswer => f.write_str("an answer to node guarding"),
             Self::State(state) => write!(f, "{state}"),
             Self::OtherState(state) => write!(f, "another state than {state}"),
             Self::Stops => f.write_str("to stop without this program"),

@@ -17,9 +17,9 @@ pub enum Event {
     BootUp(NodeId),
     /// A node's heartbeat shows another state than before.
     NmtState(NodeId, NmtState),
-    /// A watched heartbeat has not come for this long.
-    HeartbeatLost(NodeId, Duration),
-    /// A lost heartbeat has come back.
+    /// A watched heartbeat, or the answer to node guarding, has not come for this long.
+    HeartbeatLost(NodeId, Silence),
+    /// It has come back.
     HeartbeatBack(NodeId),
     /// A node sent an emergency message.
     Emcy(NodeId, Emcy),
@@ -43,13 +43,30 @@ pub enum Event {
     Unguarded(NodeId, HostLoss),
 }
 
+/// What has not come from a node that is watched, and for how long.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Silence {
+    /// How long.
+    pub time: Duration,
+    /// It was asked for, by node guarding; else it is a heartbeat.
+    pub asked: bool,
+}
+
+/// `no heartbeat for 300 ms`, `no answer to node guarding for 300 ms`.
+impl fmt::Display for Silence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let what = if self.asked { "answer to node guarding" } else { "heartbeat" };
+        write!(f, "no {what} for {} ms", self.time.as_millis())
+    }
+}
+
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::BootUp(node) => write!(f, "node {node} booted"),
             Self::NmtState(node, state) => write!(f, "node {node} is {state}"),
-            Self::HeartbeatLost(node, time) => write!(f, "node {node}: no heartbeat for {} ms", time.as_millis()),
-            Self::HeartbeatBack(node) => write!(f, "node {node}: its heartbeat is back"),
+            Self::HeartbeatLost(node, silence) => write!(f, "node {node}: {silence}"),
+            Self::HeartbeatBack(node) => write!(f, "node {node}: it is heard again"),
             Self::Emcy(node, emcy) => write!(f, "node {node}: emergency {}", emcy.code),
             Self::NoAnswer(node, mux, time) => {
                 write!(f, "node {node} did not answer about {mux} within {} ms", time.as_millis())

@@ -41,12 +41,14 @@ pub struct NodeFacts {
     emcys: VecDeque<(Instant, Emcy)>,
 }
 
-/// Watch over a node's heartbeat. Source: CiA 301, 7.2.8.2.2.
+/// Watch over a node's heartbeat, or over its answers to node guarding. Source: CiA 301, 7.2.8.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HeartbeatWatch {
-    /// Longest time without a heartbeat.
+    /// Longest time without one: of guarding the guard time, times the life time factor.
     pub time: Duration,
-    /// When the heartbeat counts as lost; `None` until the first one has come, and once it is lost.
+    /// It is asked for by remote frames: node guarding.
+    pub asked: bool,
+    /// When it counts as lost; `None` once it is lost, and of a heartbeat until the first one has come.
     pub deadline: Option<Instant>,
     /// The heartbeat has been lost and has not come back.
     pub lost: bool,
@@ -96,8 +98,8 @@ impl NodeFacts {
             self.nmt_sent = None;
         }
         let Some(watch) = &mut self.heartbeat_watch else { return false };
-        // Boot-up does not arm the watch: the node may have lost its heartbeat time (CiA 301, 7.2.8.3.2.2).
-        watch.deadline = (!booted).then(|| now + watch.time);
+        // Boot-up does not arm the watch: the node may have lost its heartbeat time (CiA 301, 7.2.8.3.2.2). To be asked it needs none.
+        watch.deadline = (!booted || watch.asked).then(|| now + watch.time);
         !booted && core::mem::take(&mut watch.lost)
     }
 
@@ -151,7 +153,7 @@ mod tests {
     /// CiA 301, 7.2.8.3.2.2: monitoring begins with the first heartbeat.
     #[test]
     fn a_heartbeat_arms_the_watch_and_a_boot_up_message_does_not() {
-        let watch = HeartbeatWatch { time: Duration::from_millis(100), deadline: None, lost: false };
+        let watch = HeartbeatWatch { time: Duration::from_millis(100), asked: false, deadline: None, lost: false };
         let mut facts = NodeFacts { heartbeat_watch: Some(watch), ..NodeFacts::default() };
         assert!(!facts.note_heartbeat(NmtState::Initialising, ms(0)));
         assert!(!facts.check_heartbeat(ms(1000)), "it need not send any");

@@ -33,7 +33,7 @@ use canopen::{Mux, NodeId};
 use cia402::object::STATUSWORD;
 
 pub use cycle::Cycle;
-pub use event::{Event, two_devices};
+pub use event::{Event, Silence, two_devices};
 pub use facts::{HeartbeatWatch, NodeFacts};
 pub(crate) use field::bits_of;
 pub use field::{Field, NumberForm, Sample, SetPoint, Signal};
@@ -181,6 +181,7 @@ impl Core {
             Command::Sync(period) => self.produce_sync(period),
             Command::FollowSync(period) => self.follow_sync(period),
             Command::WatchHeartbeat(node, time) => self.watch_heartbeat(node, time),
+            Command::WatchByGuarding(node, period, factor) => self.watch_by_guarding(node, period, factor),
             Command::Heartbeat(node, period, allowed) => {
                 self.presence.set_heartbeat(node, period, allowed, self.now);
                 self.show_presence();

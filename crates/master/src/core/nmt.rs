@@ -5,7 +5,7 @@ use canopen::nmt::{NmtRequest, NmtTarget};
 use canopen::{NmtCommand, NodeId};
 
 use super::Core;
-use super::event::Event;
+use super::event::{Event, Silence};
 use super::facts::HeartbeatWatch;
 
 /// NMT commands, and the watch over the heartbeats that show their effect.
@@ -21,9 +21,24 @@ impl Core {
     }
 
     pub(super) fn watch_heartbeat(&mut self, node: NodeId, time: Option<Duration>) {
-        let facts = &mut self.member_mut(node).facts;
-        facts.heartbeat_watch = time.map(|time| HeartbeatWatch { time, deadline: None, lost: false });
-        match time {
+        self.presence.set_guard(node, None, self.now);
+        self.watch(node, time.map(|time| HeartbeatWatch { time, asked: false, deadline: None, lost: false }));
+    }
+
+    /// Asks the node for its state each guard time; it counts as lost when no answer has come for that times the factor.
+    pub(super) fn watch_by_guarding(&mut self, node: NodeId, period: Duration, factor: u8) {
+        let now = self.now;
+        self.presence.set_guard(node, Some(period), now);
+        let time = period.saturating_mul(factor.max(1).into());
+        let deadline = Some(now + time);
+        self.watch(node, Some(HeartbeatWatch { time, asked: true, deadline, lost: false }));
+        self.heartbeat_check = self.heartbeat_check.min(now + time);
+        self.show_presence();
+    }
+
+    fn watch(&mut self, node: NodeId, watch: Option<HeartbeatWatch>) {
+        self.member_mut(node).facts.heartbeat_watch = watch;
+        match watch {
             Some(_) => self.watched.insert(node),
             None => self.watched.remove(node),
         }
@@ -41,7 +56,7 @@ impl Core {
             let Some(watch) = facts.heartbeat_watch else { continue };
             if lost {
                 self.changed.insert(node);
-                self.events.push(Event::HeartbeatLost(node, watch.time), now);
+                self.events.push(Event::HeartbeatLost(node, Silence { time: watch.time, asked: watch.asked }), now);
             }
             if let Some(deadline) = watch.deadline {
                 self.heartbeat_check = self.heartbeat_check.min(deadline);

@@ -1,6 +1,7 @@
 use std::time::Duration;
 
 use can::{Frame, Instant};
+use canopen::guarding::Guard;
 use canopen::heartbeat::{Heartbeat, Producer};
 use canopen::{NmtState, NodeId};
 
@@ -12,7 +13,8 @@ const LONGEST_PERIOD_MS: u128 = u16::MAX as u128;
 /// Shortest time without a frame that a node is fed after: that of the fastest heartbeat.
 const SHORTEST_FEED: Duration = Duration::from_millis(1);
 
-/// How drives notice that this master lives: by its heartbeat, or by being asked something before they lose patience.
+/// How drives notice that this master lives: by its heartbeat, or by being asked something before they lose patience. And the
+/// remote frames of node guarding, by which nodes without a heartbeat are watched, and watch this master (life guarding).
 ///
 /// Heartbeats lie on a grid, as SYNC does. A node that is kept fed is asked only after a time in which nothing else was
 /// sent to it. A sign of life that comes later than a drive allows (the program was frozen) would have a drive that has stopped
@@ -25,6 +27,11 @@ pub(super) struct Presence {
     feeds: Vec<Feed>,
     /// The nodes of `feeds`.
     fed: NodeSet,
+    guards: Vec<Guard>,
+    /// The nodes of `guards`.
+    guarded: NodeSet,
+    /// Those that are to be asked for their state.
+    asked: NodeSet,
 }
 
 /// A heartbeat of this master.
@@ -99,6 +106,23 @@ impl Presence {
         }
     }
 
+    /// Starts to guard a node, with a first request at once, or stops.
+    pub(super) fn set_guard(&mut self, node: NodeId, period: Option<Duration>, now: Instant) {
+        self.guards.retain(|guard| guard.node() != node);
+        self.guarded.remove(node);
+        self.asked.remove(node);
+        if let Some(period) = period {
+            let period_ns = u64::try_from(period.max(SHORTEST_FEED).as_nanos()).unwrap_or(u64::MAX);
+            self.guards.push(Guard::new(node, period_ns, now));
+            self.guarded.insert(node);
+        }
+    }
+
+    /// The guard of a node, if it is guarded.
+    pub(super) fn guard(&mut self, node: NodeId) -> Option<&mut Guard> {
+        if self.guarded.contains(node) { self.guards.iter_mut().find(|guard| guard.node() == node) } else { None }
+    }
+
     /// Something was sent to a node.
     #[inline]
     pub(super) fn note_sent(&mut self, node: NodeId, now: Instant) {
@@ -126,6 +150,11 @@ impl Presence {
                 own.producer = None;
             }
         }
+        for guard in &mut self.guards {
+            if guard.handle_timeout(now) {
+                self.asked.insert(guard.node());
+            }
+        }
         let hungry = self.feeds.iter_mut().filter(|feed| feed.due <= now);
         hungry
             .filter_map(|feed| {
@@ -144,14 +173,19 @@ impl Presence {
     }
 
     pub(super) fn poll_transmit(&mut self) -> Option<Frame> {
-        let node = self.pending.first()?;
-        self.pending.remove(node);
-        Some(Heartbeat { node, state: NmtState::Operational.heartbeat_byte() }.emit())
+        if let Some(node) = self.pending.first() {
+            self.pending.remove(node);
+            return Some(Heartbeat { node, state: NmtState::Operational.heartbeat_byte() }.emit());
+        }
+        let node = self.asked.first()?;
+        self.asked.remove(node);
+        self.guards.iter().find(|guard| guard.node() == node).map(Guard::request)
     }
 
     pub(super) fn next(&self) -> Option<Instant> {
         let heartbeats = self.producers.iter().filter_map(|own| own.producer.as_ref()).map(Producer::deadline);
-        heartbeats.chain(self.feeds.iter().map(|feed| feed.due)).min()
+        let guards = self.guards.iter().map(Guard::deadline);
+        heartbeats.chain(self.feeds.iter().map(|feed| feed.due)).chain(guards).min()
     }
 }
 

@@ -49,11 +49,27 @@ impl Core {
 
     pub(super) fn handle_heartbeat(&mut self, node: NodeId, frame: &Frame) {
         let now = self.now;
-        let Some(state) = Heartbeat::parse(frame).and_then(Heartbeat::nmt_state) else { return };
+        let Some(heartbeat) = Heartbeat::parse(frame) else { return };
+        let mut byte = heartbeat.state;
+        let guarded = match self.presence.guard(node) {
+            Some(guard) if heartbeat.is_boot_up() => {
+                guard.booted();
+                true
+            }
+            Some(guard) => {
+                let Some(state) = guard.answer(byte) else { return };
+                byte = state;
+                true
+            }
+            None => false,
+        };
+        let Some(state) = NmtState::from_heartbeat_byte(byte) else { return };
         let facts = &mut self.member_mut(node).facts;
         let before = facts.nmt_state.replace(state);
         let twins = match state {
             NmtState::Initialising => facts.heartbeats.booted(now),
+            // Answers come when they are asked for: their times say nothing of two devices.
+            _ if guarded => None,
             state => facts.heartbeats.heard(state, now),
         };
         let back = facts.note_heartbeat(state, now);

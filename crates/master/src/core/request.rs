@@ -50,6 +50,9 @@ pub enum Command {
     FollowSync(Option<Duration>),
     /// Expect a heartbeat of the node at least this often, or stop watching.
     WatchHeartbeat(NodeId, Option<Duration>),
+    /// Ask the node for its state each guard time by a remote frame, and expect an answer at least once in as many of them as the
+    /// life time factor says (0 is as 1), in place of a heartbeat. [`WatchHeartbeat`](Self::WatchHeartbeat) ends it. Source: CiA 301, 7.2.8.2.1.
+    WatchByGuarding(NodeId, Duration, u8),
     /// Produce this master's heartbeat under a node-ID with this period in whole ms, or stop. One that would come later than the
     /// last time allows, if there is one, is not sent, nor any after it. Source: CiA 301, 7.2.8.3.2.1.
     Heartbeat(NodeId, Option<Duration>, Option<Duration>),

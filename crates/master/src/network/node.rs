@@ -104,6 +104,13 @@ impl Node {
         self.network.submit(Command::WatchHeartbeat(self.id, time));
     }
 
+    /// Watches it by node guarding in place of a heartbeat (CiA 301, 7.2.8.2.1): it is asked for its state each `guard_time`, of 1 ms at least,
+    /// and counts as lost when no answer has come for that times `life_time_factor` (0 is as 1). Ended by
+    /// [`watch_heartbeat`](Self::watch_heartbeat). The runner has to go on running.
+    pub fn watch_by_guarding(&self, guard_time: Duration, life_time_factor: u8) {
+        self.network.submit(Command::WatchByGuarding(self.id, guard_time, life_time_factor));
+    }
+
     /// Asks it for its statusword (6041h) whenever nothing else was sent to it for this long, so that a drive that stops when
     /// its host is silent goes on; `None` ends it. The runner has to go on running.
     pub fn keep_fed(&self, period: Option<Duration>) {

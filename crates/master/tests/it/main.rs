@@ -16,6 +16,7 @@ mod gear;
 mod group;
 mod group_trouble;
 mod guard;
+mod guarding;
 mod identify;
 mod parameters;
 mod pdo;
