@@ -39,6 +39,7 @@
 //! | serve a virtual bus to other programs | [`transport::Hub`], [`transport::run_world`] |
 //! | know what a device is: objects, units, faults | [`devices::Description`] |
 //! | read, check and write EDS and DCF files | [`eds::Eds`] |
+//! | test a device for conformance | [`conform::Suite`] |
 //! | put CANopen or CiA 402 into firmware of your own | [`canopen::node`], [`cia402`], [`motion`]; all `no_std` |
 //! | read or write frames | [`can::Frame`] |
 //!
@@ -51,6 +52,6 @@
 
 #[doc(inline)]
 pub use {
-    can, canlog, canopen, cia402, devices, drives, eds, host, machine, master, motion, plant, plot, recording,
+    can, canlog, canopen, cia402, conform, devices, drives, eds, host, machine, master, motion, plant, plot, recording,
     scenario, showcase, sim, studio, transport, words,
 };

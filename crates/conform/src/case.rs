@@ -1,0 +1,213 @@
+//! What a case is: a row of a table, and the conditions under which it says something about a device.
+
+use std::fmt;
+use std::pin::Pin;
+
+use cia402::ModeOfOperation;
+use devices::PowerStyle;
+
+use crate::bench::Bench;
+use crate::subject::Subject;
+use crate::suite::Options;
+
+/// One case of the suite.
+#[derive(Clone, Copy)]
+pub struct Case {
+    /// CiA's number where it is public (`SDO 07`); from 51 on, and `402-..`, ours.
+    pub id: &'static str,
+    /// What is asked, in a line.
+    pub title: &'static str,
+    /// Where the standard says what is expected.
+    pub clause: &'static str,
+    /// What a device has to have for it.
+    pub needs: &'static [Need],
+    /// Keys of the departures ([`devices::Departure::key`]) by which a device fails it as its maker's manual states.
+    pub departures: &'static [&'static str],
+    pub(crate) run: Run,
+}
+
+pub(crate) type Run = for<'a> fn(&'a mut Bench) -> Pin<Box<dyn Future<Output = Verdict> + 'a>>;
+
+/// What was seen where it is right; else what is wrong, or why the case says nothing.
+pub(crate) type Verdict = Result<String, Finding>;
+
+/// Why a case was not passed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Finding {
+    /// The node does something else.
+    Fail(String),
+    /// The device does not have what is asked about.
+    NotApplicable(String),
+}
+
+/// A part of the standard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "each has its title")]
+pub enum Group {
+    Sdo,
+    Pdo,
+    Dictionary,
+    Emcy,
+    Sync,
+    Guarding,
+    Heartbeat,
+    HeartbeatAndGuarding,
+    Other,
+    State,
+    Transition,
+    Lss,
+    Cia402,
+}
+
+impl Group {
+    const ALL: [(Self, &'static str, &'static str); 13] = [
+        (Self::Sdo, "SDO", "service data objects"),
+        (Self::Pdo, "PDO", "process data objects"),
+        (Self::Dictionary, "OD", "object dictionary"),
+        (Self::Emcy, "EMCY", "emergency messages"),
+        (Self::Sync, "SYNC", "synchronisation"),
+        (Self::Guarding, "GUARD", "node and life guarding"),
+        (Self::HeartbeatAndGuarding, "HBG", "heartbeat against guarding"),
+        (Self::Heartbeat, "HB", "heartbeat"),
+        (Self::Other, "OTHER", "storing, restricted identifiers"),
+        (Self::State, "STATE", "NMT states"),
+        (Self::Transition, "TRANS", "NMT transitions"),
+        (Self::Lss, "LSS", "layer setting services"),
+        (Self::Cia402, "402", "drives"),
+    ];
+
+    /// The first part of its cases' numbers.
+    pub fn prefix(self) -> &'static str {
+        self.row().1
+    }
+
+    /// What its cases are about.
+    pub fn title(self) -> &'static str {
+        self.row().2
+    }
+
+    fn row(self) -> (Self, &'static str, &'static str) {
+        let row = Self::ALL.into_iter().find(|(group, ..)| *group == self);
+        row.unwrap_or(Self::ALL[0])
+    }
+}
+
+impl Case {
+    /// Its group.
+    pub fn group(&self) -> Group {
+        let prefix = self.id.split([' ', '-']).next().unwrap_or_default();
+        let row = Group::ALL.into_iter().find(|(_, known, _)| *known == prefix);
+        row.map_or(Group::Other, |(group, ..)| group)
+    }
+
+    /// The need that the subject does not meet.
+    pub(crate) fn unmet(&self, subject: &Subject, options: &Options) -> Option<Need> {
+        self.needs.iter().copied().find(|need| !need.is_met(subject, options))
+    }
+}
+
+impl fmt::Debug for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({})", self.id, self.title)
+    }
+}
+
+/// What a device has to have, by its description, for a case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Need {
+    /// An object of this index.
+    Index(u16),
+    /// This sub-index of an object.
+    Sub(u16, u8),
+    /// A receive PDO.
+    Rpdo,
+    /// A transmit PDO.
+    Tpdo,
+    /// LSS.
+    Lss,
+    /// An axis with the power state machine of CiA 402.
+    PowerStates,
+    /// An axis.
+    Axis,
+    /// A mode of operation.
+    Mode(ModeOfOperation),
+    /// The leave to energise and move a motor.
+    Motion,
+    /// The leave to store parameters.
+    Store,
+}
+
+impl Need {
+    fn is_met(self, subject: &Subject, options: &Options) -> bool {
+        let description = subject.description;
+        let axis = description.first_axis();
+        match self {
+            Self::Index(index) => description.has_index(index),
+            Self::Sub(index, sub_index) => subject.row(index, sub_index).is_some(),
+            Self::Rpdo => subject.pdos(0x1400).next().is_some(),
+            Self::Tpdo => subject.pdos(0x1800).next().is_some(),
+            Self::Lss => description.lss,
+            Self::PowerStates => axis.is_some_and(|axis| axis.power == PowerStyle::Cia402),
+            Self::Axis => axis.is_some(),
+            Self::Mode(mode) => axis.is_some_and(|axis| axis.modes.contains(&mode)),
+            Self::Motion => options.allow_motion,
+            Self::Store => options.allow_store,
+        }
+    }
+
+    /// The object by which a description shows it.
+    pub(crate) const fn index(self) -> Option<u16> {
+        match self {
+            Self::Index(index) | Self::Sub(index, _) => Some(index),
+            Self::PowerStates => Some(0x6041),
+            _ => None,
+        }
+    }
+}
+
+/// Why a case does not apply.
+impl fmt::Display for Need {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Index(index) => write!(f, "the device has no object {index:04X}h"),
+            Self::Sub(index, sub_index) => write!(f, "the device has no object {index:04X}h:{sub_index:02X}"),
+            Self::Rpdo => f.write_str("the device has no receive PDO"),
+            Self::Tpdo => f.write_str("the device has no transmit PDO"),
+            Self::Lss => f.write_str("the device is not said to have LSS"),
+            Self::PowerStates => f.write_str("the device has no power state machine of CiA 402"),
+            Self::Axis => f.write_str("the device is not a drive"),
+            Self::Mode(mode) => {
+                write!(f, "the device does not have mode {} ({})", mode.0, mode.name().unwrap_or("the maker's"))
+            }
+            Self::Motion => f.write_str("energises the motor: give --allow-motion"),
+            Self::Store => f.write_str("stores parameters in the device's memory: give --allow-store"),
+        }
+    }
+}
+
+/// A row of a table of cases.
+macro_rules! case {
+    ($id:literal, $title:literal, $clause:literal, [$($need:expr),*], [$($departure:literal),*], $run:expr) => {
+        $crate::case::Case {
+            id: $id,
+            title: $title,
+            clause: $clause,
+            needs: &[$($need),*],
+            departures: &[$($departure),*],
+            run: |bench| Box::pin($run(bench)),
+        }
+    };
+}
+pub(crate) use case;
+
+/// Ends a case: the node does something else.
+macro_rules! fail {
+    ($($text:tt)*) => { return Err($crate::case::Finding::Fail(format!($($text)*))) };
+}
+pub(crate) use fail;
+
+/// Ends a case that says nothing about this device.
+macro_rules! not_applicable {
+    ($($text:tt)*) => { return Err($crate::case::Finding::NotApplicable(format!($($text)*))) };
+}
+pub(crate) use not_applicable;

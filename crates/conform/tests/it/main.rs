@@ -1,0 +1,4 @@
+//! The suite in virtual time: against every model, and against nodes that each have one defect.
+
+mod bench;
+mod models;
