@@ -3,9 +3,10 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    boot, check, completions, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, estop, events, explain,
-    export, gateway, group, home, init, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read,
-    readings, record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time, top, watch, world,
+    boot, check, completions, conform, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, estop, events,
+    explain, export, gateway, group, home, init, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan,
+    plot, read, readings, record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time, top, watch,
+    world,
 };
 use crate::global::Global;
 
@@ -51,6 +52,7 @@ pub(crate) enum Command {
     Send(send::Send),
     State(drive::State),
     Explain(explain::Explain),
+    Conform(conform::Conform),
     Enable(drive::Enable),
     Disable(drive::Disable),
     Estop(estop::Estop),

@@ -48,6 +48,7 @@ pub(crate) struct Context {
     json: bool,
     embedded: bool,
     remembered: RefCell<Remembered>,
+    restorer: RefCell<Option<conform::Restorer>>,
 }
 
 /// A model that need not be found out.
@@ -101,6 +102,7 @@ impl Context {
             json: global.json,
             embedded: embedded.is_some(),
             // On a bus of its own everything is known, and nothing of it lasts.
+            restorer: RefCell::new(None),
             remembered: RefCell::new(if embedded.is_some() { Remembered::default() } else { Remembered::by_people() }),
         }
     }
@@ -173,6 +175,17 @@ impl Context {
                 () = self.network.sleep(limit) => Ok(()),
             },
         }
+    }
+
+    /// Whatever ends the command, this puts back what it has written.
+    pub(crate) fn restore_at_end(&self, restorer: conform::Restorer) {
+        self.restorer.replace(Some(restorer));
+    }
+
+    /// Puts back what the command has written, if it has; what could not be.
+    pub(crate) async fn restore(&self) -> Option<Vec<String>> {
+        let restorer = self.restorer.take()?;
+        Some(restorer.restore().await)
     }
 
     /// What stands behind the shaft of a drive, as the machine file says.

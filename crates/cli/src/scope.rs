@@ -216,6 +216,7 @@ mod tests {
         "boot m.toml",
         "check m.toml",
         "completions bash",
+        "conform 4",
         "convert a.log b.asc",
         "dcf 4",
         "decode a.log",

@@ -279,10 +279,15 @@ pub(crate) fn exit_on_signal() {
 /// Stops every node that this command has set in motion; the failure then says what was seen of that.
 async fn stop_what_moves(context: &Context, failure: Failure) -> Failure {
     let stopped = context.network.stop_and_release().await;
-    stopped
+    let failure = stopped
         .iter()
         .map(|stopped| Account::of_stop(stopped, THIS))
-        .fold(failure, |failure, account| with_account(failure, &account))
+        .fold(failure, |failure, account| with_account(failure, &account));
+    match context.restore().await {
+        Some(left) if left.is_empty() => failure.because("what had been written was put back"),
+        Some(left) => left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}"))),
+        None => failure,
+    }
 }
 
 /// Adds what was seen of a drive that was moving.

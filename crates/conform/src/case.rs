@@ -102,7 +102,9 @@ impl Case {
 
     /// The need that the subject does not meet.
     pub(crate) fn unmet(&self, subject: &Subject, options: &Options) -> Option<Need> {
-        self.needs.iter().copied().find(|need| !need.is_met(subject, options))
+        let unmet = || self.needs.iter().copied().filter(|need| !need.is_met(subject, options));
+        // What the device lacks says more than what was not allowed.
+        unmet().find(|need| !matches!(need, Need::Motion | Need::Store)).or_else(|| unmet().next())
     }
 }
 

@@ -33,6 +33,7 @@ struct Passing {
     unix_zero: Duration,
     shown: Option<ShownFrames>,
     heard: Option<HeardFrames>,
+    further: Option<Box<dyn Listen + Send>>,
 }
 
 /// Where frames are shown.
@@ -83,6 +84,11 @@ impl Traffic {
         self.lock().heard.get_or_insert_default();
     }
 
+    /// Has another listener hear each frame from now on, before this program acts on it.
+    pub(crate) fn hand_on(&self, listener: impl Listen + Send + 'static) {
+        self.lock().further = Some(Box::new(listener));
+    }
+
     /// The next frame on the bus, of others or of this command, and when it came.
     pub(crate) async fn next(&self) -> BusFrame {
         poll_fn(|context| {
@@ -111,6 +117,9 @@ impl Traffic {
             let BusFrame { at, frame, .. } = passed;
             let text = decoder.decode(&frame).to_string();
             progress.line(&format!("{} {:<20}  {text}", paint.dim(&stamps.text(at)), frame.to_string()));
+        }
+        if let Some(further) = &mut passing.further {
+            further.hear(passed);
         }
         let Some(heard) = &mut passing.heard else { return };
         if heard.frames.len() == KEPT {

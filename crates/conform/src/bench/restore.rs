@@ -13,6 +13,9 @@ use crate::subject::Subject;
 /// How long an NMT command takes to get to the node and to act.
 pub(crate) const SETTLING: Duration = Duration::from_millis(60);
 
+/// Looks at a node that starts, each as long as an answer is waited for.
+const BOOT_LOOKS: usize = 10;
+
 /// Puts back what a case has touched. A clone outlives a run that is given up, for whoever ends it.
 #[derive(Clone, Debug)]
 pub struct Restorer {
@@ -86,6 +89,9 @@ impl Restorer {
             let was_reset = std::mem::take(&mut journal.was_reset);
             (journal.parameters.clone(), was_reset, std::mem::take(&mut journal.commanded))
         };
+        if was_reset {
+            self.wait_for_answer().await;
+        }
         if commanded {
             // SDO is not answered in the stopped state.
             self.command(NmtCommand::EnterPreOperational).await;
@@ -108,6 +114,15 @@ impl Restorer {
             self.command(back).await;
         }
         left
+    }
+
+    /// A node that was reset may still be starting.
+    async fn wait_for_answer(&self) {
+        for _ in 0..BOOT_LOOKS {
+            if self.node.upload(Mux::new(0x1000, 0)).await.is_ok() {
+                return;
+            }
+        }
     }
 
     /// Puts back what was written; what could not be.

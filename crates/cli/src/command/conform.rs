@@ -1,0 +1,239 @@
+//! `ferrodrive conform`: the conformance suite against one node of a bus.
+
+use std::path::{Path, PathBuf};
+
+use canopen::NodeId;
+use conform::{Capture, Case, CaseResult, Options, Outcome, Subject, Suite, SuiteError, all, html, junit, selected};
+use serde::Serialize;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::global::Global;
+use crate::output::{Format, Report, file_path};
+use crate::session;
+use plot::{Paint, Table};
+use words::models::{Description, is_from_file, resolve};
+use words::node::node;
+
+/// Test whether a node conforms to CiA 301, CiA 305 and CiA 402
+///
+/// Sends right and wrong requests and looks at the answers, case by case; docs/conformance.md lists the cases. A result is
+/// pass, fail, expected (the maker's manual states the departure) or not applicable (with the reason). The node is reset
+/// several times. What is written is put back after each case, and the node is left in its NMT state, also when the
+/// command is interrupted. No motor is energised without --allow-motion, and nothing is stored without --allow-store.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive conform 4\n  \
+    ferrodrive conform 4 --only SDO,PDO --skip 'SDO 30'\n  \
+    ferrodrive --bus can0 conform 5 --eds device.eds --html report.html --junit report.xml\n  \
+    ferrodrive conform --list")]
+pub(crate) struct Conform {
+    /// Node-ID
+    #[arg(value_parser = node, required_unless_present = "list")]
+    node: Option<NodeId>,
+    /// EDS or DCF of the device (default: the model that its identity names)
+    #[arg(long, value_name = "FILE.eds", value_parser = resolve)]
+    eds: Option<&'static Description>,
+    /// Run cases that energise the motor: a twentieth of a turn, or some seconds at 20 r/min of the drive's shaft
+    #[arg(long)]
+    allow_motion: bool,
+    /// Run cases that store parameters in the device's memory; what it had is stored again
+    #[arg(long)]
+    allow_store: bool,
+    /// Run only these cases or groups, e.g. 'SDO 07' or PDO; may be repeated
+    #[arg(long, value_name = "CASES", value_delimiter = ',')]
+    only: Vec<String>,
+    /// Leave out these cases or groups; may be repeated
+    #[arg(long, value_name = "CASES", value_delimiter = ',')]
+    skip: Vec<String>,
+    /// List the cases; no node is asked
+    #[arg(long, conflicts_with_all = ["node", "allow_motion", "allow_store"])]
+    list: bool,
+    /// Also write the report as one page of HTML
+    #[arg(long, value_name = "FILE", value_parser = file_path)]
+    html: Option<PathBuf>,
+    /// Also write the result as JUnit XML, as build servers read it
+    #[arg(long, value_name = "FILE", value_parser = file_path)]
+    junit: Option<PathBuf>,
+}
+
+impl Conform {
+    /// Runs the suite and reports, or lists the cases.
+    pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
+        let cases = selected(&self.only, &self.skip).map_err(|error| bad_selection(&error))?;
+        let Some(node) = self.node.filter(|_| !self.list) else {
+            return format.print(&CaseList::of(&cases)).map_err(Failure::of_stdout);
+        };
+        let report = session::run(global, async |context| self.test(context, node).await)?;
+        if let Some(path) = &self.html {
+            write(path, &html(&report))?;
+        }
+        if let Some(path) = &self.junit {
+            write(path, &junit(&report))?;
+        }
+        let failure = failure(&report, node);
+        format.print_judged(&Shown { report: &report }, failure)
+    }
+
+    async fn test(&self, context: &Context, node: NodeId) -> Result<conform::Report, Failure> {
+        let subject = self.subject(context, node).await?;
+        let capture = Capture::new();
+        context.traffic.hand_on(capture.clone());
+        let options = Options {
+            allow_motion: self.allow_motion,
+            allow_store: self.allow_store,
+            only: self.only.clone(),
+            skip: self.skip.clone(),
+            timeout: context.timeout(),
+        };
+        let suite = Suite::new(context.network.clone(), capture, subject, options);
+        context.restore_at_end(suite.restorer());
+        let progress = |at: conform::Progress<'_>| {
+            if at.result.is_none() {
+                context.progress.count(format!("{} of {}: {} {}", at.number, at.of, at.case.id, at.case.title));
+            }
+        };
+        suite.run(progress).await.map_err(|error| not_run(&error, node))
+    }
+
+    async fn subject(&self, context: &Context, node: NodeId) -> Result<Subject, Failure> {
+        let description = match self.eds {
+            Some(description) => description,
+            None => match context.known_drive(node).await?.description() {
+                Some(description) => description,
+                None => return Err(Failure::unknown_model(node)),
+            },
+        };
+        Ok(if is_from_file(description) {
+            Subject::of_file(node, description)
+        } else {
+            Subject::of_model(node, description)
+        })
+    }
+}
+
+fn bad_selection(error: &SuiteError) -> Failure {
+    Failure::usage(error.to_string()).next("list the cases: ferrodrive conform --list")
+}
+
+fn not_run(error: &SuiteError, node: NodeId) -> Failure {
+    let failure = Failure::new(format!("node {node}: {error}")).at_node(node);
+    match error {
+        SuiteError::Unknown(_) => bad_selection(error),
+        SuiteError::NoAnswer(_) => {
+            failure.of_kind("no_answer").next("check node-ID, bit rate and cable; `ferrodrive scan` shows who answers")
+        }
+        SuiteError::Enabled => failure.of_kind("state").next(format!("ferrodrive disable {node}")),
+    }
+}
+
+fn failure(report: &conform::Report, node: NodeId) -> Option<Failure> {
+    let failed: Vec<_> = report.failures().collect();
+    if report.ok {
+        return None;
+    }
+    let what = format!("node {node} does not conform: {} of {} cases failed", failed.len(), report.cases.len());
+    let failure = Failure::new(what).of_kind("conformance").at_node(node);
+    let failure =
+        failed.iter().take(3).fold(failure, |failure, case| failure.because(format!("{}: {}", case.id, case.why)));
+    let left = report.not_restored.iter();
+    let failure = left.fold(failure, |failure, left| failure.because(format!("not put back: {left}")));
+    Some(match failed.first() {
+        Some(case) => {
+            failure.next(format!("repeat one with its frames: ferrodrive conform {node} --only '{}' --json", case.id))
+        }
+        None => failure,
+    })
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    std::fs::write(path, text).map_err(|error| Failure::of_writing("the report", path, &error))
+}
+
+/// The cases, for people and programs.
+#[derive(Serialize)]
+struct CaseList {
+    cases: Vec<CaseRow>,
+}
+
+#[derive(Serialize)]
+struct CaseRow {
+    id: &'static str,
+    group: &'static str,
+    title: &'static str,
+    clause: &'static str,
+}
+
+impl CaseList {
+    fn of(cases: &[&'static Case]) -> Self {
+        let wanted = |case: &&Case| cases.iter().any(|wanted| wanted.id == case.id);
+        let rows = all().filter(wanted).map(|case| CaseRow {
+            id: case.id,
+            group: case.group().prefix(),
+            title: case.title,
+            clause: case.clause,
+        });
+        Self { cases: rows.collect() }
+    }
+}
+
+impl Report for CaseList {
+    fn text(&self, paint: Paint) -> String {
+        let mut table = Table::new(&["case", "asked", "clause"]);
+        for case in &self.cases {
+            table.row([case.id, case.title, case.clause]);
+        }
+        format!("{}\n{} cases", table.plain(paint), self.cases.len())
+    }
+}
+
+/// A report of the suite.
+#[derive(Serialize)]
+struct Shown<'a> {
+    #[serde(flatten)]
+    report: &'a conform::Report,
+}
+
+/// The column of results.
+const RESULT: usize = 1;
+/// So much of what was seen fits a line; `--json` has all.
+const WIDEST: usize = 110;
+
+impl Report for Shown<'_> {
+    fn text(&self, paint: Paint) -> String {
+        let mut table = Table::new(&["case", "result", "asked", "seen"]);
+        for case in &self.report.cases {
+            table.row([case.id, case.result.word(), case.title, &seen(case)]);
+        }
+        let colour = |_, column, cell: &str| match (column, cell) {
+            (RESULT, "pass") => Some(paint.good(cell)),
+            (RESULT, "fail") => Some(paint.bad(cell)),
+            (RESULT, "not applicable") => Some(paint.dim(cell)),
+            _ => None,
+        };
+        let mut lines =
+            vec![paint.strong(&format!("node {}: {}", self.report.node, self.report.model)), table.text(paint, colour)];
+        for case in self.report.failures() {
+            lines.push(format!(
+                "\n{} {}\n  {}\n  {}",
+                paint.bad(case.id),
+                case.clause,
+                case.why,
+                case.frames.join(" ")
+            ));
+        }
+        let summary = self.report.summary;
+        lines.push(format!(
+            "{} passed, {} failed, {} expected by the manual, {} not applicable",
+            summary.pass, summary.fail, summary.expected, summary.not_applicable
+        ));
+        lines.join("\n")
+    }
+}
+
+fn seen(case: &CaseResult) -> String {
+    let why = case.why.replace('\n', " ");
+    match why.char_indices().nth(WIDEST) {
+        Some((end, _)) if case.result != Outcome::Fail => format!("{}..", &why[..end]),
+        _ => why,
+    }
+}
