@@ -113,7 +113,7 @@ pub struct Suite {
 impl Suite {
     /// A run to come. `capture` has to hear what passes `network` ([`can::Tap`]).
     pub fn new(network: Network, capture: Capture, subject: Subject, options: Options) -> Self {
-        Self { bench: Bench::new(network, capture, subject, options.timeout), options, in_fault: false }
+        Self { bench: Bench::new(network, capture, subject, &options), options, in_fault: false }
     }
 
     /// What puts back what the run has touched, if it is given up on the way.

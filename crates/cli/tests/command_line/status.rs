@@ -31,6 +31,7 @@ fn commands() -> Vec<String> {
 const LINES: &[&str] = &[
     "boot",
     "check",
+    "conform 4",
     "dcf 4",
     "decode a.log",
     "disable 4",

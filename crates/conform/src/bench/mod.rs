@@ -22,6 +22,7 @@ pub(crate) use sdo::{Answer, hex, refused};
 use crate::capture::Capture;
 use crate::case::Finding;
 use crate::subject::Subject;
+use crate::suite::Options;
 
 /// Frames that a result shows: the last ones that were about the node.
 const EVIDENCE: usize = 16;
@@ -41,6 +42,8 @@ pub(crate) const fn ms(milliseconds: u64) -> Duration {
 pub(crate) struct Bench {
     pub(crate) network: Network,
     pub(crate) subject: Subject,
+    /// What the memory of the device has may change for a time.
+    pub(crate) allow_store: bool,
     /// Longest wait for the answer to a frame.
     pub(crate) timeout: Duration,
     pub(crate) restorer: Restorer,
@@ -52,10 +55,11 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    pub(crate) fn new(network: Network, capture: Capture, subject: Subject, timeout: Duration) -> Self {
+    pub(crate) fn new(network: Network, capture: Capture, subject: Subject, options: &Options) -> Self {
+        let Options { timeout, allow_store, .. } = *options;
         let restorer = Restorer::new(network.node(subject.node).with_timeout(timeout), subject);
         let (evidence, pinned, watched) = (VecDeque::new(), Vec::new(), Vec::new());
-        Self { network, subject, timeout, restorer, capture, evidence, pinned, watched, counting: None }
+        Self { network, subject, allow_store, timeout, restorer, capture, evidence, pinned, watched, counting: None }
     }
 
     pub(crate) const fn node(&self) -> NodeId {

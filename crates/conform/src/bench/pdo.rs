@@ -44,6 +44,7 @@ impl Bench {
         if mapped.is_none() && self.number(Mux::new(index + 0x200, 0)).await? == 0 {
             not_applicable!("nothing can be mapped into the transmit PDO {index:04X}h");
         }
+        self.count(id);
         self.switch_on(index, id).await?;
         self.watch(id);
         Ok(Tpdo { index, id, mapped })

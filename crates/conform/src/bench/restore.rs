@@ -116,6 +116,25 @@ impl Restorer {
         left
     }
 
+    /// All parameters of a node that has just started: those that its memory has.
+    pub(crate) async fn stored(&self) -> BTreeMap<Mux, Vec<u8>> {
+        self.read_parameters().await
+    }
+
+    /// Writes these where they differ, to be saved.
+    ///
+    /// # Errors
+    /// What is not taken, in words.
+    pub(crate) async fn store(&self, wanted: &BTreeMap<Mux, Vec<u8>>) -> Result<(), String> {
+        let current = self.read_parameters().await;
+        for step in in_order(Some(self.subject.description), &current, wanted, false) {
+            if let Err(error) = self.node.download(step.object, &step.value).await {
+                return Err(format!("{} does not take again what was stored: {error}", step.object));
+            }
+        }
+        Ok(())
+    }
+
     /// A node that was reset may still be starting.
     async fn wait_for_answer(&self) {
         for _ in 0..BOOT_LOOKS {

@@ -4,6 +4,8 @@ use canopen::od::{DataType, Entry};
 use canopen::{AbortCode, Mux};
 use cia402::{ModeOfOperation, PowerCommand, PowerState, Statusword};
 
+use devices::{AxisDescription, HomingStart};
+
 use crate::bench::{Bench, CHANGE, hex, refused};
 use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
 use crate::subject::bytes_of;
@@ -17,7 +19,7 @@ pub(crate) const CASES: &[Case] = &[
     case!("402-02", "Shutdown leads to Ready to switch on (transition 2)", "CiA 402-2, 8.2", [AXIS, STATES], [], |bench| transition(bench, PowerState::SwitchOnDisabled, PowerCommand::Shutdown, PowerState::ReadyToSwitchOn)),
     case!("402-03", "Disable voltage leads to Switch on disabled (transition 7)", "CiA 402-2, 8.2", [AXIS, STATES], [], |bench| transition(bench, PowerState::ReadyToSwitchOn, PowerCommand::DisableVoltage, PowerState::SwitchOnDisabled)),
     case!("402-04", "Quick stop leads to Switch on disabled (transition 7)", "CiA 402-2, 8.2", [AXIS, STATES], [], |bench| transition(bench, PowerState::ReadyToSwitchOn, PowerCommand::QuickStop, PowerState::SwitchOnDisabled)),
-    case!("402-05", "Enable operation does nothing in Switch on disabled", "CiA 402-2, 8.2", [AXIS, STATES], [], |bench| transition(bench, PowerState::SwitchOnDisabled, PowerCommand::EnableOperation, PowerState::SwitchOnDisabled)),
+    case!("402-05", "Enable operation does nothing in Switch on disabled", "CiA 402-2, 8.2", [AXIS, STATES, Need::Motion], [], |bench| transition(bench, PowerState::SwitchOnDisabled, PowerCommand::EnableOperation, PowerState::SwitchOnDisabled)),
     case!("402-06", "Fault reset without a fault does nothing", "CiA 402-2, 8.2", [AXIS, STATES], [], |bench| transition(bench, PowerState::SwitchOnDisabled, PowerCommand::FaultReset, PowerState::SwitchOnDisabled)),
     case!("402-07", "Bits of the statusword with the motor off", "CiA 402-2, 8.4.2", [AXIS, STATES], ["status_bit"], resting_bits),
     case!("402-08", "6041h can be read only, 6040h takes what 6041h follows", "CiA 402-2, 8.4.1", [AXIS], ["other_access"], words),
@@ -88,11 +90,16 @@ async fn modes(bench: &mut Bench) -> Verdict {
         fail!("there is no 6061h");
     }
     let mut seen = Vec::new();
-    for mode in axis.modes.iter().filter(|mode| **mode != ModeOfOperation::NONE) {
+    for mode in axis.modes.iter().filter(|mode| **mode != ModeOfOperation::NONE && !moves(axis, **mode)) {
         bench.choose(*mode).await?;
         seen.push(mode.0.to_string());
     }
     Ok(format!("modes {}", seen.join(", ")))
+}
+
+/// The choice of this mode is what starts a motion.
+fn moves(axis: &AxisDescription, mode: ModeOfOperation) -> bool {
+    mode == ModeOfOperation::HOMING && axis.homing.is_some_and(|rules| rules.start == HomingStart::ModeWrite)
 }
 
 async fn unsupported_mode(bench: &mut Bench) -> Verdict {
@@ -121,7 +128,8 @@ async fn supported_modes(bench: &mut Bench) -> Verdict {
     if says & 0x3FF != described {
         fail!("6502h is {says:08X}h; the modes of the description are {described:08X}h");
     }
-    for mode in (1..=10).filter(|mode| says >> (mode - 1) & 1 == 1) {
+    let starts = |mode: u8| moves(axis, ModeOfOperation(mode as i8));
+    for mode in (1..=10).filter(|mode| says >> (mode - 1) & 1 == 1 && !starts(*mode)) {
         if let Err(code) = bench.try_write(bench.place(0x6060), &[mode]).await? {
             fail!("6502h has mode {mode}, and 6060h refuses it: {code}");
         }

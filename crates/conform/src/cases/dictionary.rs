@@ -104,10 +104,30 @@ fn fits(row: &Entry, data: &[u8]) -> bool {
 }
 
 async fn defaults_of_communication(bench: &mut Bench) -> Verdict {
+    let subject = bench.subject;
+    let stores = subject.description.storage.save.is_some() || subject.description.has_index(0x1010);
     bench.reset(NmtCommand::ResetCommunication).await?;
+    if !stores {
+        return as_delivered(bench).await;
+    }
+    let restore = Mux::new(0x1011, 1);
+    if subject.row(0x1011, 1).is_none() || !bench.allow_store {
+        not_applicable!("values may have been stored: 1011h restores those as delivered, which needs --allow-store");
+    }
+    let stored = bench.restorer.stored().await;
+    if let Err(code) = bench.download(restore, b"load").await? {
+        fail!("{restore} does not take \"load\": {code}");
+    }
+    bench.reset(NmtCommand::ResetNode).await?;
+    let seen = as_delivered(bench).await;
+    bench.restorer.store(&stored).await.map_err(Finding::Fail)?;
+    bench.save().await?;
+    seen
+}
+
+async fn as_delivered(bench: &mut Bench) -> Verdict {
     let subject = bench.subject;
     let mut findings = Findings::default();
-    let mut stored = Vec::new();
     for row in subject
         .rows()
         .filter(|row| row.is_communication() && row.access == Access::ReadWrite && subject.is_setting(row))
@@ -116,19 +136,8 @@ async fn defaults_of_communication(bench: &mut Bench) -> Verdict {
         let Ok(has) = bench.upload(row.mux()).await? else { continue };
         findings.checked += 1;
         if has != expected {
-            // Power-on values are those that were stored, where a device can store.
-            stored.push(format!("{} is {} (as delivered {})", row.mux(), hex(&has), hex(&expected)));
+            findings.add(bench, format!("{} is {}; as delivered {}", row.mux(), hex(&has), hex(&expected)));
         }
-    }
-    if !stored.is_empty() && (subject.description.storage.save.is_some() || subject.description.has_index(0x1010)) {
-        return Ok(format!(
-            "{} as delivered; stored otherwise: {}",
-            findings.checked - stored.len(),
-            stored.join(", ")
-        ));
-    }
-    for what in stored {
-        findings.add(bench, what);
     }
     findings.verdict("values as delivered")
 }

@@ -1,5 +1,6 @@
 //! SDO 13 to 18: segmented transfers, and what breaks them off.
 
+use can::Frame;
 use canopen::od::{Access, Entry, Kind};
 use canopen::sdo::wire::{Payload, Reply, Request, Segment};
 use canopen::{AbortCode, Mux};
@@ -123,8 +124,9 @@ async fn begin_upload(bench: &mut Bench) -> Result<&'static Entry, Finding> {
 
 async fn client_abort(bench: &mut Bench) -> Verdict {
     let row = begin_upload(bench).await?;
-    bench.end_transfer(row.mux()).await;
-    if let Some(answer) = bench.further_answer().await {
+    let id = canopen::connection_set::sdo_request(bench.node());
+    let abort = Frame::full(id, Request::Abort(row.mux(), AbortCode::GENERAL).emit());
+    if let Some(answer) = bench.ask_briefly(abort).await {
         fail!("the client's abort was answered with {answer}");
     }
     let answer = bench.exchange(Request::UploadSegment { toggle: false }.emit()).await?;

@@ -1,0 +1,142 @@
+//! Nodes that each have one defect: each fails the case that is meant for it, and no case that it should not.
+
+mod communication;
+mod drive;
+mod objects;
+mod process_data;
+mod station;
+mod transfer;
+
+use conform::{Options, Outcome, Report, Subject, all};
+use devices::Description;
+
+use crate::bench::{drive as drive_of, node, run, shown};
+use crate::complete::{complete, extended};
+use station::{Kind, Wrong};
+
+/// A node that is right but for one thing.
+pub(crate) struct Defect {
+    /// What is wrong.
+    name: &'static str,
+    /// The case that is meant for it.
+    fails: &'static str,
+    /// Cases that look at the same thing and may fail too; `*` for all.
+    also: &'static [&'static str],
+    kind: Kind,
+}
+
+pub(crate) const fn defect(
+    name: &'static str,
+    fails: &'static str,
+    also: &'static [&'static str],
+    kind: Kind,
+) -> Defect {
+    Defect { name, fails, also, kind }
+}
+
+fn all_defects() -> impl Iterator<Item = &'static Defect> {
+    let tables = [objects::DEFECTS, transfer::DEFECTS, process_data::DEFECTS, communication::DEFECTS];
+    tables.into_iter().flatten()
+}
+
+fn report_of(description: &'static Description, kind: Kind, options: Options) -> Report {
+    run(Wrong::new(drive_of(description), kind), Subject::of_model(node(), description), options)
+}
+
+/// What is not as expected of a defect; none if all is.
+fn judged(defect: &Defect, report: &Report) -> Option<String> {
+    let failed: Vec<&str> =
+        report.cases.iter().filter(|case| case.result == Outcome::Fail).map(|case| case.id).collect();
+    let unnoticed = !failed.contains(&defect.fails);
+    let allowed = |id: &&&str| **id == defect.fails || defect.also.contains(id) || defect.also == ["*"];
+    let further: Vec<_> = failed.iter().filter(|id| !allowed(id)).collect();
+    if !unnoticed && further.is_empty() {
+        return None;
+    }
+    let why = shown(report, |case| further.contains(&&case.id) || case.id == defect.fails);
+    Some(format!(
+        "{} ({}): {}failed too: {further:?}\n{}",
+        defect.name,
+        defect.fails,
+        if unnoticed { "UNNOTICED; " } else { "" },
+        why
+    ))
+}
+
+fn check(defects: &[&Defect], description: &'static Description, options: &Options) {
+    let wrong: Vec<String> = defects
+        .iter()
+        .filter_map(|defect| judged(defect, &report_of(description, defect.kind, options.clone())))
+        .collect();
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), defects.len(), wrong.join("\n"));
+}
+
+fn without_drives() -> Options {
+    Options { allow_store: true, skip: vec!["402".into()], ..Options::default() }
+}
+
+#[test]
+fn the_complete_device_passes() {
+    let report = report_of(complete(), Kind::Right, without_drives());
+    if std::env::var("SHOW").is_ok() {
+        eprintln!("{:?}\n{}", report.summary, shown(&report, |_| true));
+    }
+    assert!(report.ok, "{:?}\n{}", report.not_restored, shown(&report, crate::bench::failed));
+}
+
+/// Cases about objects that the complete device of today does not have.
+const EXTENDED: &[&str] = &["OTHER 09", "PDO 08", "PDO 14", "PDO 20"];
+
+/// In parts, so that they run side by side.
+fn part(number: usize) {
+    const PARTS: usize = 4;
+    let only = std::env::var("ONLY").unwrap_or_default();
+    let chosen: Vec<_> =
+        all_defects().enumerate().filter(|(place, _)| place % PARTS == number).map(|(_, defect)| defect).collect();
+    let chosen: Vec<_> = chosen.into_iter().filter(|defect| only.is_empty() || only == defect.fails).collect();
+    let (extended_ones, plain): (Vec<_>, Vec<_>) =
+        chosen.into_iter().partition(|defect| EXTENDED.contains(&defect.fails));
+    check(&plain, complete(), &without_drives());
+    check(&extended_ones, extended(), &without_drives());
+}
+
+#[test]
+fn each_defect_fails_its_case_1() {
+    part(0);
+}
+
+#[test]
+fn each_defect_fails_its_case_2() {
+    part(1);
+}
+
+#[test]
+fn each_defect_fails_its_case_3() {
+    part(2);
+}
+
+#[test]
+fn each_defect_fails_its_case_4() {
+    part(3);
+}
+
+#[test]
+fn each_defect_of_a_drive_fails_its_case() {
+    let options = Options { allow_motion: true, only: vec!["402".into()], ..Options::default() };
+    let only = std::env::var("ONLY").unwrap_or_default();
+    let chosen: Vec<_> = drive::DEFECTS.iter().filter(|defect| only.is_empty() || only == defect.fails).collect();
+    check(&chosen, devices::model("cia402").unwrap(), &options);
+}
+
+/// Cases that no node of ours can fail yet are named here with the reason.
+const WITHOUT_DEFECT: &[(&str, &str)] = &[];
+
+#[test]
+fn every_case_has_a_defect_that_fails_it() {
+    let meant: Vec<&str> = all_defects().chain(drive::DEFECTS).map(|defect| defect.fails).collect();
+    let named = |id: &str| meant.contains(&id) || WITHOUT_DEFECT.iter().any(|(known, _)| *known == id);
+    let without: Vec<&str> = all().map(|case| case.id).filter(|id| !named(id)).collect();
+    assert_eq!(without, [""; 0]);
+    let unknown: Vec<&&str> = meant.iter().filter(|id| !all().any(|case| case.id == **id)).collect();
+    assert!(unknown.is_empty(), "{unknown:?}");
+}

@@ -1,0 +1,67 @@
+//! Defects of the dictionary and of what a server refuses.
+
+use super::station::{Kind, abort, answer, code_if, confirm, index, is_abort, reads, writes, written};
+use super::{Defect, defect};
+
+use Kind::{Alter, Answer, Ask, Hear};
+
+const GARBAGE: u32 = 0x0606_0000;
+
+#[rustfmt::skip]
+pub(crate) static DEFECTS: &[Defect] = &[
+    defect("1000h says another device type", "SDO 01", &["SDO 56", "OD 08"], Alter(|m, a| if reads(&m.request, 0x1000, 0) { answer(&a, 0x43, 0x0004_0192) } else { a })),
+    defect("1000h comes in segments of a size that is not its own", "SDO 13", &["SDO 01", "SDO 56", "OD 01", "OD 07", "OD 08"], Alter(|m, a| if reads(&m.request, 0x1000, 0) { answer(&a, 0x4B, 0x191) } else { a })),
+    defect("1017h is confirmed and not written", "SDO 02", &["SDO 15", "OTHER 52", "OD 09", "SDO 59", "SDO 58", "HBG 02", "HBG 04", "HBG 05", "HBG 06", "HBG 07", "HB 01", "HB 02", "HB 03", "HB 51", "STATE 02", "STATE 03", "STATE 04", "TRANS 02", "TRANS 03", "TRANS 04", "TRANS 51", "TRANS 52", "TRANS 53"], Answer(|_, r| (r[0] == 0x2B && writes(&r, 0x1017, 0)).then(|| confirm(&r)))),
+    defect("a write to 1000h is confirmed", "SDO 03", &["OD 03"], Answer(|_, r| writes(&r, 0x1000, 0).then(|| confirm(&r)))),
+    defect("a write to 1000h is refused as missing", "SDO 03", &["OD 03"], Alter(|m, a| { let so = writes(&m.request, 0x1000, 0); code_if(a, so, 0x0602_0000) })),
+    defect("a write-only object is read as 0", "SDO 04", &["OD 04"], Answer(|_, r| reads(&r, 0x2001, 0).then(|| answer(&r, 0x4F, 0)))),
+    defect("a missing sub-index is a missing object", "SDO 05", &["SDO 54"], Alter(|_, a| { let so = a[4..] == [0x11, 0, 0x09, 0x06]; code_if(a, so, 0x0602_0000) })),
+    defect("a missing object is read as 0", "SDO 06", &["OD 53"], Answer(|_, r| reads(&r, 0x1004, 0).then(|| answer(&r, 0x4F, 0)))),
+    defect("a missing object is a hardware error", "SDO 06", &["SDO 28", "SDO 29", "SDO 30", "OD 53", "PDO 59", "PDO 33"], Alter(|_, a| { let so = a[4..] == [0, 0, 0x02, 0x06]; code_if(a, so, GARBAGE) })),
+    defect("an unknown command specifier is not answered", "SDO 07", &[], Answer(|_, r| (r[0] >> 5 == 7).then_some([0; 8]))),
+    defect("an unknown command specifier is a general incompatibility", "SDO 07", &[], Alter(|m, a| { let so = m.request[0] >> 5 == 7; code_if(a, so, 0x0604_0043) })),
+    defect("four bytes are taken for 1017h", "SDO 08", &[], Answer(|_, r| (r[0] == 0x23 && index(&r) == 0x1017).then(|| confirm(&r)))),
+    defect("one byte is taken for 1017h", "SDO 09", &[], Answer(|_, r| (r[0] == 0x2F && index(&r) == 0x1017).then(|| confirm(&r)))),
+    defect("a value above the limit is taken", "SDO 10", &["OD 06"], Answer(|_, r| (writes(&r, 0x2000, 0) && written(&r) == 21).then(|| confirm(&r)))),
+    defect("a value above the limit is refused as read-only", "SDO 10", &["OD 06"], Alter(|m, a| { let so = index(&m.request) == 0x2000 && written(&m.request) == 21; code_if(a, so, 0x0601_0002) })),
+    defect("a value below the limit is taken", "SDO 11", &["OD 06"], Answer(|_, r| (writes(&r, 0x2000, 0) && written(&r) == 9).then(|| confirm(&r)))),
+    defect("1200h:02 is another identifier", "SDO 12", &[], Alter(|m, a| if reads(&m.request, 0x1200, 2) { answer(&a, 0x43, 0x586) } else { a })),
+    defect("1280h is there, and not described", "SDO 28", &["SDO 29", "SDO 30"], Answer(|_, r| reads(&r, 0x1280, 1).then(|| answer(&r, 0x43, 0x8000_0000)))),
+    defect("1201h appears with a reset of the communication", "SDO 29", &["SDO 30"], Answer(|m, r| { m.flag |= m.state == 0x7F && m.count > 40; m.count += 1; (reads(&r, 0x1201, 1) && m.flag && m.bytes[0] > 0).then(|| answer(&r, 0x43, 0)).or_else(|| { m.bytes[0] += u8::from(reads(&r, 0x1201, 1)); None }) })),
+    defect("1201h appears with a save", "SDO 30", &[], Answer(|m, r| { m.flag |= writes(&r, 0x1010, 1) && written(&r) == 0x6576_6173; (reads(&r, 0x1201, 1) && m.flag).then(|| answer(&r, 0x43, 0)) })),
+    defect("a frame of four bytes stops the server", "SDO 51", &[], Hear(|m, f| { m.flag |= f.standard_data_id() == Some(0x605) && f.dlc() == 4; m.flag &= f.id().raw() != 0; if m.flag && f.standard_data_id() == Some(0x605) { vec![] } else { vec![f] } })),
+    defect("a remote frame is answered", "SDO 52", &[], Kind::Add(|_, f| if f.is_remote() && f.id().raw() == 0x605 { vec!["585#4300100000000000".parse().unwrap()] } else { vec![] })),
+    defect("each answer comes twice", "SDO 53", &["*"], Kind::Say(|_, f| if f.id().raw() == 0x585 { vec![f, f] } else { vec![f] })),
+    defect("aborts are about no object", "SDO 53", &[], Alter(|_, a| if is_abort(&a) { [a[0], 0, 0, 0, a[4], a[5], a[6], a[7]] } else { a })),
+    defect("a missing sub-index of a record is a missing object", "SDO 54", &[], Alter(|m, a| { let so = m.request[3] == 0xFE; code_if(a, so, 0x0602_0000) })),
+    defect("2005h cannot be read", "OD 01", &["OD 07", "OD 03"], Answer(|_, r| reads(&r, 0x2005, 0).then(|| abort(&r, 0x0601_0001)))),
+    defect("2006h:02 has four bytes", "OD 01", &["OD 07", "OD 09", "SDO 09"], Alter(|m, a| if reads(&m.request, 0x2006, 2) { answer(&a, 0x43, 6) } else { a })),
+    defect("2005h cannot be read in operational", "OD 07", &[], Answer(|m, r| (m.state == 5 && reads(&r, 0x2005, 0)).then(|| abort(&r, 0x0601_0001)))),
+    defect("1015h is not as delivered after a reset", "OD 02", &[], Alter(|m, a| if reads(&m.request, 0x1015, 0) && a[0] == 0x4B { answer(&a, 0x4B, 3) } else { a })),
+    defect("a write of 2005h is confirmed", "OD 03", &[], Answer(|_, r| writes(&r, 0x2005, 0).then(|| confirm(&r)))),
+    defect("2001h can be read", "OD 04", &["SDO 04"], Answer(|_, r| reads(&r, 0x2001, 0).then(|| answer(&r, 0x4F, 7)))),
+    defect("sub-index FFh says an unknown type of object", "OD 05", &[], Answer(|_, r| reads(&r, 0x1018, 0xFF).then(|| answer(&r, 0x43, 0x0203)))),
+    defect("2004h takes more than its upper limit", "OD 06", &[], Answer(|_, r| (writes(&r, 0x2004, 0) && written(&r) == 2001).then(|| confirm(&r)))),
+    defect("2004h does not take its lower limit", "OD 06", &[], Answer(|_, r| (writes(&r, 0x2004, 0) && written(&r) == 100).then(|| abort(&r, 0x0609_0032)))),
+    defect("1010h:00 is another number", "OD 08", &["OD 51"], Alter(|m, a| if reads(&m.request, 0x1010, 0) { answer(&a, 0x4F, 4) } else { a })),
+    defect("2006h:01 does not take its own value", "OD 09", &[], Answer(|_, r| writes(&r, 0x2006, 1).then(|| abort(&r, 0x0609_0030)))),
+    defect("2006h:01 takes another value than it is given", "OD 09", &[], Ask(|_, r| if writes(&r, 0x2006, 1) { answer(&r, r[0], written(&r) + 1) } else { r })),
+    defect("2006h:00 counts one more", "OD 51", &["OD 08"], Alter(|m, a| if reads(&m.request, 0x2006, 0) { answer(&a, 0x4F, 3) } else { a })),
+    defect("1018h:02 is another product code", "OD 52", &["LSS 51", "LSS 52", "LSS 53", "LSS 54", "LSS 55", "LSS 56"], Alter(|m, a| if reads(&m.request, 0x1018, 2) { answer(&a, 0x43, 0x23) } else { a })),
+    defect("2FFFh is there, and not described", "OD 53", &[], Answer(|_, r| reads(&r, 0x2FFF, 0).then(|| answer(&r, 0x4F, 0)))),
+    defect("1014h is another identifier", "EMCY 01", &["OD 02", "OD 09"], Alter(|m, a| if reads(&m.request, 0x1014, 0) { answer(&a, 0x43, 0x86) } else { a })),
+    defect("1001h has two bytes", "EMCY 02", &["OD 01", "OD 07", "OD 03", "EMCY 04", "EMCY 05", "EMCY 06", "EMCY 52"], Alter(|m, a| if reads(&m.request, 0x1001, 0) { answer(&a, 0x4B, u32::from(a[4])) } else { a })),
+    defect("1003h counts an error that cannot be read", "EMCY 03", &["EMCY 51"], Alter(|m, a| if reads(&m.request, 0x1003, 0) { answer(&a, 0x4F, 5) } else { a })),
+    defect("1003h:00 takes 1", "EMCY 51", &[], Answer(|_, r| (writes(&r, 0x1003, 0) && written(&r) == 1).then(|| confirm(&r)))),
+    defect("a wrong signature stores", "OTHER 01", &[], Answer(|_, r| (writes(&r, 0x1010, 1) && written(&r) == u32::from_le_bytes(*b"wron")).then(|| confirm(&r)))),
+    defect("the signature backwards stores", "OTHER 02", &[], Answer(|_, r| (writes(&r, 0x1010, 1) && written(&r) == u32::from_le_bytes(*b"evas")).then(|| confirm(&r)))),
+    defect("a wrong signature restores", "OTHER 03", &[], Answer(|_, r| (writes(&r, 0x1011, 1) && written(&r) == u32::from_le_bytes(*b"wron")).then(|| confirm(&r)))),
+    defect("the signature backwards restores", "OTHER 04", &[], Answer(|_, r| (writes(&r, 0x1011, 1) && written(&r) == u32::from_le_bytes(*b"daol")).then(|| confirm(&r)))),
+    defect("a wrong signature stores the communication", "OTHER 05", &[], Answer(|_, r| (writes(&r, 0x1010, 2) && written(&r) == u32::from_le_bytes(*b"wron")).then(|| confirm(&r)))),
+    defect("the signature backwards stores the communication", "OTHER 06", &[], Answer(|_, r| (writes(&r, 0x1010, 2) && written(&r) == u32::from_le_bytes(*b"evas")).then(|| confirm(&r)))),
+    defect("a wrong signature restores the communication", "OTHER 07", &[], Answer(|_, r| (writes(&r, 0x1011, 2) && written(&r) == u32::from_le_bytes(*b"wron")).then(|| confirm(&r)))),
+    defect("the signature backwards restores the communication", "OTHER 08", &[], Answer(|_, r| (writes(&r, 0x1011, 2) && written(&r) == u32::from_le_bytes(*b"daol")).then(|| confirm(&r)))),
+    defect("1014h takes an identifier of SDO", "OTHER 10", &[], Answer(|_, r| (writes(&r, 0x1014, 0) && written(&r) == 0x601).then(|| confirm(&r)))),
+    defect("1010h:01 has reserved bits", "OTHER 51", &["OD 02"], Alter(|m, a| if reads(&m.request, 0x1010, 1) { answer(&a, 0x43, 5) } else { a })),
+    defect("a save stores nothing", "OTHER 52", &["SYNC 10", "SYNC 08", "OTHER 09"], Answer(|_, r| (writes(&r, 0x1010, 1) && written(&r) == u32::from_le_bytes(*b"save")).then(|| confirm(&r)))),
+];
