@@ -260,7 +260,7 @@ const OBJECTS: &[Object] = &[
     object!(0x6078, "Current actual value"),
     object!(0x6079, "DC link circuit voltage"),
     object!(0x607A, "Target position"),
-    object!(0x607B, "Position range limit"),
+    object!(0x607B, "Position range limit"; 0 HIGHEST, 1 "Min position range limit", 2 "Max position range limit"),
     object!(0x607C, "Home offset"),
     object!(0x607D, "Software position limit"; 0 HIGHEST, 1 "Min position limit", 2 "Max position limit"),
     object!(0x607E, "Polarity"),

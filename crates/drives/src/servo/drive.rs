@@ -236,7 +236,7 @@ impl<S: Storage> Firmware for ServoDrive<S> {
             state: shaft.power().state(),
             mode: shaft.power().mode(),
             fault_code: super::read(self.values(), shaft.slots().error_code, 0) as u16,
-            position_counts: shaft.parameters().scales.position(shaft.position()) as i32,
+            position_counts: shaft.shown(shaft.position()) as i32,
             velocity_rpm: shaft.velocity_rpm(),
             current_a: shaft.current_a(),
             brake_engaged: *shaft.demand() == crate::engine::axis::Demand::Off,

@@ -10,6 +10,7 @@ mod faults;
 mod hardware;
 mod motor;
 mod parameters;
+mod position_range;
 mod protection;
 mod scales;
 mod shaft;

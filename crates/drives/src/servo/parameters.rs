@@ -11,6 +11,7 @@ use motion::set_points::{Following, Interpolation};
 use motion::travel::{Bounds, Travel};
 
 use super::motor::Motor;
+use super::position_range::PositionRange;
 use super::read;
 use super::scales::Scales;
 use super::slots::AxisSlots;
@@ -59,6 +60,8 @@ pub(super) struct Parameters {
     /// How long velocities and torques by RPDO may stay away that come in another rhythm.
     pub(super) set_point_patience_s: f64,
     pub(super) travel: Option<Travel>,
+    /// 607Bh, while no software limit keeps the shaft from going round in it.
+    pub(super) range: Option<PositionRange>,
     pub(super) bounds: Bounds,
     /// 607Fh and 6080h, increments/s.
     pub(super) max_speed: f64,
@@ -106,6 +109,7 @@ impl<S: Storage> Reader<'_, S> {
             _ => self.motor.rated_torque_nm,
         };
         let deceleration = self.rate(slots.deceleration, bounds.deceleration);
+        let travel = self.travel();
         Parameters {
             scales: self.scales,
             power: self.power(&bounds, rated_torque_nm),
@@ -131,7 +135,8 @@ impl<S: Storage> Reader<'_, S> {
             },
             following: self.following(deceleration),
             set_point_patience_s: self.set_point_patience_s(),
-            travel: self.travel(),
+            travel,
+            range: self.range().filter(|_| travel.is_none()),
             bounds,
             max_speed,
             rated_torque_nm,
@@ -151,14 +156,15 @@ impl<S: Storage> Reader<'_, S> {
         let acceleration = self.rate(slots.acceleration, bounds.acceleration).min(bounds.acceleration);
         let deceleration = self.rate(slots.deceleration, bounds.deceleration).min(bounds.deceleration);
         let [acceleration, deceleration] = self.ramps(acceleration, deceleration);
+        let end_speed = self.scales.speed(self.magnitude(slots.end_velocity)).min(profile_speed);
         let ramps = VelocityRamps { start_speed: 0.0, max_speed: bounds.speed, acceleration, deceleration };
         let per_mille_a = rated_torque_nm * 1e-3 / self.motor.torque_constant_nm_a();
         power::Parameters {
             moves: MoveLimits {
                 start_speed: 0.0,
                 max_speed: profile_speed,
-                end_speed: 0.0,
-                passes: false,
+                end_speed,
+                passes: end_speed > 0.0,
                 acceleration,
                 deceleration,
             },
@@ -265,6 +271,14 @@ impl<S: Storage> Reader<'_, S> {
         });
         // Units that are finer than increments may leave both ends on one of them: limits all the same.
         Travel::new(a.min(b), a.max(b).max(a.min(b) + 0.5))
+    }
+
+    /// 607Bh: after its greatest position comes its least. The wrong way round it is off, and with all that 32 bits hold, too.
+    fn range(&self) -> Option<PositionRange> {
+        let (low, high) = (self.slots.min_position_range?, self.slots.max_position_range?);
+        let [low, high] = [low, high].map(|slot| self.read(Some(slot), 0));
+        let is_all = low <= i64::from(i32::MIN) && high >= i64::from(i32::MAX);
+        (low < high && !is_all).then(|| PositionRange::new(low, high, &self.scales))
     }
 
     fn bounds(&self, speed: f64) -> Bounds {

@@ -38,12 +38,22 @@ impl Scales {
 
     /// A position in increments. Units may be coarser than increments: what 32 bits of them say may need more bits.
     pub(super) fn increments(&self, position: i64) -> i64 {
-        self.factors.position.scale(position * self.polarity.position())
+        self.factors.position.scale(position.saturating_mul(self.polarity.position()))
     }
 
     /// A position in user units, held to 32 bits.
     pub(super) fn position(&self, increments: i32) -> i64 {
-        saturated(self.factors.position.inverse().scale(i64::from(increments)) * self.polarity.position())
+        saturated(self.whole_position(i64::from(increments)))
+    }
+
+    /// The same in 64 bits.
+    pub(super) fn whole_position(&self, increments: i64) -> i64 {
+        self.factors.position.inverse().scale(increments).saturating_mul(self.polarity.position())
+    }
+
+    /// Increments in a position unit, with the sign that 607Eh gives them.
+    pub(super) fn increments_in_unit(&self) -> f64 {
+        self.factors.position.as_f64() * self.polarity.position() as f64
     }
 
     /// A length in increments, whatever its sign; held to 32 bits, and at least one increment unless it is 0.

@@ -9,7 +9,7 @@ mod publish;
 mod targets;
 
 use canopen::od::{Dictionary, Storage, Table};
-use cia402::{Dwell, ModeOfOperation, PowerState, SupportedModes};
+use cia402::{Dwell, ModeOfOperation, PowerState, StopRamp, SupportedModes};
 use devices::AxisDescription;
 use devices::servo::faults::row;
 
@@ -25,7 +25,7 @@ use super::slots::AxisSlots;
 use super::touch_probes::TouchProbes;
 use crate::engine::actuator::overload::{Overload, OverloadLimits};
 use crate::engine::actuator::servo::{Servo, ServoGains, ServoLimits, ServoModel};
-use crate::engine::axis::{Demand, Feedback, Switches};
+use crate::engine::axis::{Demand, Feedback, StopState, Switches};
 use crate::engine::cia402::{self as power, PowerDrive, Targets};
 use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis};
 
@@ -43,6 +43,10 @@ const DISAGREEMENT_TURNS: f32 = 0.2;
 const STANDING_SHARE: f32 = 0.001;
 const SUPERVISION_MS: f64 = (CONTROL_PERIOD_NS * SUPERVISION_DIVIDER as u64) as f64 / 1e6;
 
+/// Shares of the rated bus voltage up to which a stop on the voltage limit brakes fully, and from which on it does not: between the
+/// braking resistor's 1.30 and the over-voltage of 1.40 (`protection.rs`).
+const BRAKING_VOLTAGE: [f32; 2] = [1.31, 1.37];
+
 /// What a target position of profile position was held back by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum TargetHold {
@@ -51,6 +55,13 @@ enum TargetHold {
     Limit,
     /// The counter cannot show it: the motion ends short of it, and the target is not reached.
     Counter,
+}
+
+/// The share of its current with which a stop on the voltage limit brakes, at this share of the rated bus voltage: less and less
+/// beyond what the braking resistor holds, so that what is fed back does not become an over-voltage.
+fn braking_share(voltage: f32) -> f32 {
+    let [full, none] = BRAKING_VOLTAGE;
+    ((none - voltage) / (none - full)).clamp(0.0, 1.0)
 }
 
 /// One axis of the drive.
@@ -72,6 +83,8 @@ pub(super) struct Shaft {
     targets: Targets,
     /// What is added to the counts since power-on to give the position.
     position_offset: i32,
+    /// The position with the rounds of its counter: the lowest 32 bits are the position.
+    whole_position: i64,
     /// Where the index pulse came since the last supervision.
     index: Option<i32>,
     set_points: CyclicSetPoints,
@@ -120,6 +133,7 @@ impl Shaft {
             demand: Demand::Off,
             targets: Targets::default(),
             position_offset: 0,
+            whole_position: 0,
             index: None,
             set_points: CyclicSetPoints::none(),
             faults: no_faults(),
@@ -165,6 +179,20 @@ impl Shaft {
         self.position_offset.wrapping_add(self.servo.position(&self.model))
     }
 
+    /// A position near the present one (increments) in user units, as 6064h shows it.
+    pub(super) fn shown(&self, increments: i32) -> i64 {
+        let Parameters { scales, range, .. } = &self.parameters;
+        match range {
+            Some(range) => range.shown(scales.whole_position(self.whole(increments))),
+            None => scales.position(increments),
+        }
+    }
+
+    /// A position near the present one with the rounds of its counter.
+    fn whole(&self, increments: i32) -> i64 {
+        self.whole_position + i64::from(increments.wrapping_sub(self.whole_position as i32))
+    }
+
     pub(super) fn velocity_rpm(&self) -> f32 {
         self.servo.velocity_rpm()
     }
@@ -207,8 +235,10 @@ impl Shaft {
         self.refresh(values);
         self.servo.measure(&self.model, &self.gains, sensors.phase_current_a);
         let velocity_rad_s = self.servo.velocity_rad_s();
+        let position = self.position();
+        self.whole_position = self.whole(position);
         Feedback {
-            position: self.position(),
+            position,
             velocity: f64::from(velocity_rad_s / self.model.rad_per_count()),
             current_a: self.servo.current_a(),
             standing: velocity_rad_s.abs() < STANDING_SHARE * self.motor.max_velocity_rad_s,
@@ -258,10 +288,11 @@ impl Shaft {
         bus_v: f32,
     ) {
         let index = self.index.take();
+        let [below, above] = self.runs_into_limit();
         self.power.set_switches(Switches {
             home: sensors.home,
-            positive_limit: sensors.positive_limit,
-            negative_limit: sensors.negative_limit,
+            positive_limit: sensors.positive_limit || above,
+            negative_limit: sensors.negative_limit || below,
             index,
         });
         self.read_targets(values, &feedback);
@@ -282,19 +313,32 @@ impl Shaft {
             self.shift(home.wrapping_add(self.parameters.home_offset));
         }
         let position = self.position();
-        let limits = self.limits();
+        let limits = self.limits(bus_v);
         self.servo.set_torque_offset(self.torque_offset_a(values));
         self.servo.control(&self.model, &self.gains, &self.demand, position, &limits);
-        let shown = self.parameters.scales.position(position);
-        let index = index.map(|at| self.parameters.scales.position(at));
+        let shown = self.shown(position);
+        let index = index.map(|at| self.shown(at));
         self.probes.update(values, &self.slots, sensors.probes, shown, index);
         self.judge(&feedback);
         self.publish(values, sensors, bus_v);
     }
 
+    /// A move that has passed its target (6082h) can just be stopped before a software limit: at the negative end, at the positive.
+    fn runs_into_limit(&self) -> [bool; 2] {
+        let axis = self.power.axis();
+        let (Some(travel), true) = (self.parameters.travel, axis.runs_on()) else { return [false; 2] };
+        let point = axis.point();
+        let rate = self.parameters.power.quick_stop_ramp.rate(point.velocity.abs());
+        // It is looked at once a period.
+        let next = f64::from(point.position) + 2.0 * point.velocity * f64::from(SUPERVISION_PERIOD_S);
+        let is_held = travel.hold_velocity(next, point.velocity, rate) != point.velocity;
+        [is_held && point.velocity < 0.0, is_held && point.velocity > 0.0]
+    }
+
     /// The current limit of the direction that the motor pulls in.
-    fn limits(&self) -> ServoLimits {
-        let [positive_a, negative_a] = self.parameters.max_current_a;
+    fn limits(&self, bus_v: f32) -> ServoLimits {
+        let share = if self.stops_by_voltage() { braking_share(bus_v / self.motor.bus_v) } else { 1.0 };
+        let [positive_a, negative_a] = self.parameters.max_current_a.map(|current_a| current_a * share);
         let downwards = self.servo.setpoint_a() * self.parameters.scales.direction() as f32 <= 0.0;
         ServoLimits {
             current_a: if downwards { negative_a } else { positive_a },
@@ -302,11 +346,18 @@ impl Shaft {
         }
     }
 
+    /// The stop under way is one on the voltage limit (605Ah = 4 or 8, 605Dh or 605Eh = 4), and the shaft still turns.
+    fn stops_by_voltage(&self) -> bool {
+        self.power.stop_ramp() == Some(StopRamp::VoltageLimit)
+            && self.power.axis().stop_state() == Some(StopState::Braking)
+    }
+
     /// What was `by` is 0 from now on.
     fn shift(&mut self, by: i32) {
         self.power.shift_position(by);
         self.set_points.shift(by);
         self.position_offset = self.position_offset.wrapping_sub(by);
+        self.whole_position -= i64::from(by);
         if let Demand::Position(point) = &mut self.demand {
             point.position = point.position.wrapping_sub(by);
         }
@@ -364,6 +415,7 @@ impl Shaft {
             demand,
             targets,
             position_offset,
+            whole_position,
             index,
             set_points,
             faults,
@@ -388,7 +440,8 @@ impl Shaft {
             && windows.iter().all(|(dwell, before, time_ms)| dwell.is_as_decided_as(before, *time_ms))
             && (power, servo, awake) == (&earlier.power, &earlier.servo, &earlier.awake)
             && (demand, targets) == (&earlier.demand, &earlier.targets)
-            && (position_offset, index) == (&earlier.position_offset, &earlier.index)
+            && (position_offset, whole_position, index)
+                == (&earlier.position_offset, &earlier.whole_position, &earlier.index)
             && *set_points == earlier.set_points
             && (faults, lost, overload) == (&earlier.faults, &earlier.lost, &earlier.overload)
             && (following_error, limited) == (&earlier.following_error, &earlier.limited)

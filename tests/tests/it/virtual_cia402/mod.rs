@@ -10,6 +10,7 @@ mod jerk;
 mod limits;
 mod modes;
 mod profile_objects;
+mod ranges;
 mod services;
 mod stops;
 mod units;

@@ -1,6 +1,6 @@
 //! How the motor is stopped: every option code against `tests/data/cia402/option_codes.csv`.
 
-use sim::VirtualDrive;
+use sim::{Component, VirtualDrive};
 
 use crate::virtual_cia402::bench::{Bench, TURN};
 
@@ -96,6 +96,41 @@ fn every_code_stops_along_its_ramp_and_ends_in_its_state() {
     }
     objects.dedup();
     assert_eq!(objects, ["605A", "605B", "605C", "605D", "605E"]);
+}
+
+/// A flywheel at full speed, and nothing that takes what it feeds back: a stop on the current limit is an over-voltage, one on the
+/// voltage limit is slower and is none.
+#[test]
+fn a_stop_on_the_voltage_limit_keeps_the_bus_below_its_over_voltage() {
+    let stopped = |object: u16, code: i64| {
+        let mut bench = Bench::new();
+        let motor = bench.machine.assembly_mut().motor_mut(0).unwrap();
+        motor.rig.load.inertia_kg_m2 = 100.0 * motor.model.rotor.inertia_kg_m2;
+        bench.machine.set_fault(Component::Bleeder, true, bench.now).unwrap();
+        bench.set(&[(0x6065, 0, 0xFFFF_FFFF), (object, 0, code), (0x6083, 0, 100 * TURN)]);
+        bench.enable(3);
+        bench.set(&[(0x60FF, 0, 50 * TURN)]);
+        bench.run_ms(2500);
+        assert!((bench.rpm() - 3000.0).abs() < 60.0, "{}", bench.rpm());
+        bench.control(if object == 0x605D { 0x10F } else { 0x02 });
+        let mut highest_mv = 0;
+        let took = bench.run_until(60_000, |bench| {
+            highest_mv = highest_mv.max(bench.read(0x6079, 0));
+            bench.rpm().abs() < 6.0
+        });
+        (took.expect("it comes to rest"), highest_mv, bench.emcy(), state(&mut bench))
+    };
+    let (_, _, emcy, after) = stopped(0x605A, 3);
+    assert_eq!((emcy, after), (vec![0x3210], "fault"), "the case that the voltage limit is for");
+    for (object, code, expected) in
+        [(0x605A, 4, "switch_on_disabled"), (0x605A, 8, "quick_stop_active"), (0x605D, 4, "operation_enabled")]
+    {
+        let (took, highest_mv, emcy, after) = stopped(object, code);
+        let case = format!("{object:04X}h = {code}: {took} ms, {highest_mv} mV");
+        assert!(emcy.is_empty() && highest_mv < 283_000 * 140 / 100, "{case} {emcy:X?}");
+        assert!(highest_mv > 283_000 * 131 / 100, "it brakes with what the bus takes: {case}");
+        assert!(after == expected || after == "quick_stop_active", "{case}: {after}");
+    }
 }
 
 /// CiA 402-2, 10.3 and 8.4.6: a halt with the slow down ramp interrupts a move, which goes on to its target. So the demand

@@ -24,7 +24,7 @@ const INC_S3: &str = "inc/s^3";
 const PER_MILLE: &str = "0.1 %";
 
 /// Number of rows.
-pub(super) const ROW_COUNT: usize = 144;
+pub(super) const ROW_COUNT: usize = 148;
 
 #[rustfmt::skip]
 pub(super) static ROWS: [Entry; ROW_COUNT] = [
@@ -64,6 +64,9 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     ro(0x6078, 0, I16).unit(PER_MILLE).mappable(),
     ro(0x6079, 0, U32).unit("mV").mappable(),
     rw(0x607A, 0, I32).unit(INC).mappable(),
+    ro(0x607B, 0, U8).default(2),
+    rw(0x607B, 1, I32).described("Least position, which follows on the greatest").default(i32::MIN as i64).unit(INC).mappable().saved(),
+    rw(0x607B, 2, I32).described("Greatest position, which the least follows on").default(i32::MAX as i64).unit(INC).mappable().saved(),
     rw(0x607C, 0, I32).described("Zero position seen from the home position").unit(INC).saved(),
     ro(0x607D, 0, U8).default(2),
     rw(0x607D, 1, I32).default(i32::MIN as i64).unit(INC).saved(),
@@ -72,6 +75,7 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x607F, 0, U32).default(RATED_TURNS_S * 5 / 3 * TURN).unit(INC_S).mappable().saved(),
     rw(0x6080, 0, U32).default(5000).unit("r/min").mappable().saved(),
     rw(0x6081, 0, U32).described("Velocity of position moves").default(10 * TURN).unit(INC_S).mappable().saved(),
+    rw(0x6082, 0, U32).described("Velocity at the target of a position move").unit(INC_S).mappable().saved(),
     rw(0x6083, 0, U32).default(200 * TURN).unit(INC_S2).mappable().saved(),
     rw(0x6084, 0, U32).default(200 * TURN).unit(INC_S2).mappable().saved(),
     rw(0x6085, 0, U32).default(1000 * TURN).unit(INC_S2).mappable().saved(),

@@ -21,17 +21,19 @@ pub(super) const QUICK_STOP: Values = &[
     (1, "slow down, then off"),
     (2, "quick stop, then off"),
     (3, "current limit, then off"),
+    (4, "voltage limit, then off"),
     (5, "slow down and stay"),
     (6, "quick stop and stay"),
     (7, "current limit and stay"),
+    (8, "voltage limit and stay"),
 ];
 
 pub(super) const SHUTDOWN: Values = &[(0, "off at once"), (1, "slow down, then off")];
 
-pub(super) const HALT: Values = &[(1, "slow down"), (2, "quick stop"), (3, "current limit")];
+pub(super) const HALT: Values = &[(1, "slow down"), (2, "quick stop"), (3, "current limit"), (4, "voltage limit")];
 
 pub(super) const FAULT_REACTION: Values =
-    &[(0, "off at once"), (1, "slow down"), (2, "quick stop"), (3, "current limit")];
+    &[(0, "off at once"), (1, "slow down"), (2, "quick stop"), (3, "current limit"), (4, "voltage limit")];
 
 pub(super) const PROFILE_TYPES: Values = &[(0, "linear"), (3, "jerk-limited")];
 

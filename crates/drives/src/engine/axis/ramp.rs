@@ -22,7 +22,7 @@ impl Ramp {
     }
 
     /// The straight ramp that takes the time of this one between rest and `speed`.
-    pub(super) fn rate(self, speed: f64) -> f64 {
+    pub fn rate(self, speed: f64) -> f64 {
         match self {
             Self::Rate(rate) | Self::Jerk(JerkRamp { rate, .. }) => rate,
             Self::Time(time_s) if time_s > 0.0 => speed / time_s,

@@ -84,6 +84,11 @@ impl PowerDrive {
         self.stop.map(|(cause, _)| cause)
     }
 
+    /// How the motor is being stopped.
+    pub fn stop_ramp(&self) -> Option<StopRamp> {
+        self.stop.map(|(_, ramp)| ramp)
+    }
+
     /// Operation enabled, quick stop active or fault reaction active: the motor is under control.
     pub const fn is_live(&self) -> bool {
         matches!(

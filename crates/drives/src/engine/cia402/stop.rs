@@ -58,6 +58,8 @@ pub(super) fn of_halt(option: HaltOption, emergency: StopRamp) -> StopRamp {
 pub(super) fn or_emergency(ramp: Option<StopRamp>, emergency: StopRamp) -> StopRamp {
     match ramp {
         Some(ramp @ (StopRamp::Free | StopRamp::SlowDown | StopRamp::QuickStop)) => ramp,
+        // A drive that stops on its current limit can keep to a voltage meanwhile.
+        Some(StopRamp::VoltageLimit) if emergency == StopRamp::CurrentLimit => StopRamp::VoltageLimit,
         Some(StopRamp::CurrentLimit | StopRamp::VoltageLimit) | None => emergency,
     }
 }

@@ -10,6 +10,9 @@ use crate::engine::axis::{Braking, Cyclic, Demand, MoveLimits, Stop, StopEnd, Ta
 
 /// A stop is over when the motor stands, or this long after its ramp: a load that drives the motor may never let it.
 const STANDSTILL_PATIENCE_S: f64 = 1.0;
+/// The same of a stop on the voltage limit, which has no ramp and takes as long as the supply makes it. Guess: a flywheel that
+/// coasts.
+const VOLTAGE_LIMIT_PATIENCE_S: f64 = 60.0;
 
 impl PowerDrive {
     /// Lays the stop that is wanted over the mode, or takes it away.
@@ -98,7 +101,10 @@ impl PowerDrive {
             // A quick stop gives up the way for the sake of time.
             on_path: ramp == StopRamp::SlowDown && self.follows_positions(),
             end: if lets_go { StopEnd::LetGo } else { StopEnd::Hold },
-            patience_s: STANDSTILL_PATIENCE_S,
+            patience_s: match ramp {
+                StopRamp::VoltageLimit => VOLTAGE_LIMIT_PATIENCE_S,
+                _ => STANDSTILL_PATIENCE_S,
+            },
         }
     }
 

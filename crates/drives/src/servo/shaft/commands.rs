@@ -197,9 +197,24 @@ impl Shaft {
     /// 607Ah as the axis is given it (bit 6: the way), held to the software limits, and to what the counter can show: to its
     /// two ends, and to no more than half of its round, for beyond that the short way is the other one. Relative moves turn on
     /// past the ends.
+    ///
+    /// In a range of positions (607Bh) a target counts in the round in which the shaft is to be (60F2h = 0, its default: as of a
+    /// linear axis), and may be further away than a round.
     fn held_target(&self, target: i64, controlword: Controlword) -> (i32, TargetHold) {
         let axis = self.power.axis();
         let relative = controlword.has(Controlword::RELATIVE);
+        if let (Some(range), false) = (self.parameters.range, relative) {
+            let from = if controlword.has(Controlword::CHANGE_SET_IMMEDIATELY) {
+                axis.point().position
+            } else {
+                axis.target()
+            };
+            let whole = self.whole(from);
+            let wanted = range.in_round_of(target, self.parameters.scales.whole_position(whole));
+            let way = (wanted - whole as f64).clamp(-f64::from(i32::MAX), f64::from(i32::MAX));
+            let hold = if way == wanted - whole as f64 { TargetHold::None } else { TargetHold::Counter };
+            return (from.wrapping_add(way as i32), hold);
+        }
         let from = if relative { i64::from(axis.target()) } else { 0 };
         let wanted = from.saturating_add(target);
         let within = match self.parameters.travel.map(|travel| travel.hold(wanted as f64)) {

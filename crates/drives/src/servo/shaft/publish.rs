@@ -27,7 +27,7 @@ impl Shaft {
         let position = self.position();
         let velocity = f64::from(self.servo.velocity_rad_s() / self.model.rad_per_count());
         let direction = scales.direction() as f32;
-        write(values, slots.position, scales.position(position));
+        write(values, slots.position, self.shown(position));
         write(values, slots.position_internal, i64::from(position));
         write(values, slots.velocity, scales.velocity(velocity));
         let torque = self.parameters.torque(self.servo.current_a(), &self.motor);
@@ -50,7 +50,7 @@ impl Shaft {
             Demand::Velocity(point) => (position, point.velocity),
             Demand::Off | Demand::Torque(_) => (position, 0.0),
         };
-        write(values, slots.position_demand, scales.position(demanded));
+        write(values, slots.position_demand, self.shown(demanded));
         write(values, slots.position_demand_internal, i64::from(demanded));
         write(values, slots.velocity_demand, scales.velocity(velocity));
         let error = self.error().unwrap_or(0);

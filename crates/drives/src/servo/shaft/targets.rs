@@ -77,8 +77,13 @@ impl Shaft {
         }
     }
 
+    /// In a range of positions (607Bh) the path goes the short way round, in increments with the rounds of the counter.
     fn take_position(&mut self, target: i64, by_rpdo: bool) {
-        let (wanted, from) = (target as f64, f64::from(self.position()));
+        let from = self.here();
+        let wanted = match self.parameters.range {
+            Some(range) => range.nearest(target as f64, from),
+            None => target as f64,
+        };
         let target = self.held_position(wanted);
         self.set_points.take(target, from, target != wanted, by_rpdo, &self.parameters.following);
     }
@@ -173,9 +178,19 @@ impl Shaft {
 
     /// A set-point held to the software limits, and to what the counter can show: its ends, and half of its round from here.
     fn held_position(&self, wanted: f64) -> f64 {
-        let (here, most) = (f64::from(self.position()), f64::from(i32::MAX));
+        let (here, most) = (self.here(), f64::from(i32::MAX));
         let within = self.parameters.travel.map_or(wanted, |travel| travel.hold(wanted));
-        within.clamp(f64::from(i32::MIN), most).clamp(here - most, here + most)
+        let least = f64::from(i32::MIN);
+        let within = if self.parameters.range.is_some() { within } else { within.clamp(least, most) };
+        within.clamp(here - most, here + most)
+    }
+
+    /// The position; in a range of positions with the rounds of the counter.
+    fn here(&self) -> f64 {
+        match self.parameters.range {
+            Some(_) => self.whole_position as f64,
+            None => f64::from(self.position()),
+        }
     }
 
     /// A velocity held to the highest speed, and to what can still be stopped before a software limit.
