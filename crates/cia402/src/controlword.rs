@@ -20,6 +20,12 @@ impl Controlword {
     pub const CHANGE_SET_IMMEDIATELY: u16 = 1 << 5;
     /// Bit 6 in profile position: the target position is relative.
     pub const RELATIVE: u16 = 1 << 6;
+    /// Bit 4 in velocity mode: the velocity follows the ramp.
+    pub const ENABLE_RAMP: u16 = 1 << 4;
+    /// Bit 5 in velocity mode: the ramp goes on; 0 keeps it where it is.
+    pub const UNLOCK_RAMP: u16 = 1 << 5;
+    /// Bit 6 in velocity mode: the ramp leads to the target; 0 leads it to standstill.
+    pub const REFERENCE_RAMP: u16 = 1 << 6;
     /// Bit 7: a rising edge resets a fault.
     pub const FAULT_RESET: u16 = 1 << 7;
     /// Bit 8.

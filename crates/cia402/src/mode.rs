@@ -11,6 +11,7 @@ impl ModeOfOperation {
     #[doc(alias = "PP")]
     pub const PROFILE_POSITION: Self = Self(1);
     /// Velocity (frequency converters).
+    #[doc(alias = "VL")]
     pub const VELOCITY: Self = Self(2);
     /// Profile velocity.
     #[doc(alias = "PV")]
@@ -32,9 +33,13 @@ impl ModeOfOperation {
     #[doc(alias = "CST")]
     pub const CYCLIC_SYNCHRONOUS_TORQUE: Self = Self(10);
 
-    /// True for the modes whose set-point comes with every SYNC (8, 9, 10).
+    /// Cyclic synchronous torque with commutation angle.
+    #[doc(alias = "CSTCA")]
+    pub const CYCLIC_SYNCHRONOUS_TORQUE_WITH_COMMUTATION_ANGLE: Self = Self(11);
+
+    /// True for the modes whose set-point comes with every SYNC (8 to 11).
     pub const fn is_cyclic_synchronous(self) -> bool {
-        matches!(self.0, 8..=10)
+        matches!(self.0, 8..=11)
     }
 
     /// The standard's name; `None` for numbers it reserves or leaves to manufacturers.
@@ -50,6 +55,7 @@ impl ModeOfOperation {
             8 => "cyclic synchronous position",
             9 => "cyclic synchronous velocity",
             10 => "cyclic synchronous torque",
+            11 => "cyclic synchronous torque with commutation angle",
             _ => return None,
         })
     }
@@ -62,8 +68,8 @@ impl ModeOfOperation {
 pub struct SupportedModes(pub u32);
 
 impl SupportedModes {
-    /// Bits of the lower half, one for each mode from 1 to 10; 5 is reserved.
-    const STANDARD: u32 = 0x03FF & !(1 << 4);
+    /// Bits of the lower half, one for each mode from 1 to 11; 5 is reserved.
+    const STANDARD: u32 = 0x07FF & !(1 << 4);
 
     /// True if the drive has the mode. [`ModeOfOperation::NONE`] is not a mode to have; a mode below 0 is never listed here.
     pub const fn has(self, mode: ModeOfOperation) -> bool {
@@ -84,11 +90,11 @@ impl SupportedModes {
 
     /// The modes, ascending.
     pub fn modes(self) -> impl Iterator<Item = ModeOfOperation> {
-        (1..=10).map(ModeOfOperation).filter(move |mode| self.has(*mode))
+        (1..=11).map(ModeOfOperation).filter(move |mode| self.has(*mode))
     }
 
     const fn bit(mode: ModeOfOperation) -> Option<u32> {
-        if mode.0 < 1 || mode.0 > 10 {
+        if mode.0 < 1 || mode.0 > 11 {
             return None;
         }
         let bit = 1 << (mode.0 - 1);
@@ -111,8 +117,8 @@ mod tests {
 
     #[test]
     fn the_bits_of_6502h_are_those_of_the_standard() {
-        // CiA 402-2, 6502h: pp 0, vl 1, pv 2, tq 3, hm 5, ip 6, csp 7, csv 8, cst 9.
-        let bits = [(1, 0), (2, 1), (3, 2), (4, 3), (6, 5), (7, 6), (8, 7), (9, 8), (10, 9)];
+        // CiA 402-2, 6502h: pp 0, vl 1, pv 2, tq 3, hm 5, ip 6, csp 7, csv 8, cst 9, cstca 10.
+        let bits = [(1, 0), (2, 1), (3, 2), (4, 3), (6, 5), (7, 6), (8, 7), (9, 8), (10, 9), (11, 10)];
         for (mode, bit) in bits {
             assert_eq!(SupportedModes::default().with(ModeOfOperation(mode)), SupportedModes(1 << bit), "mode {mode}");
             assert!(SupportedModes(1 << bit).has(ModeOfOperation(mode)), "mode {mode}");
@@ -122,7 +128,7 @@ mod tests {
 
     #[test]
     fn no_mode_reserved_modes_and_makers_modes_are_never_supported() {
-        for mode in [i8::MIN, -1, 0, 5, 11, 33, i8::MAX] {
+        for mode in [i8::MIN, -1, 0, 5, 12, 33, i8::MAX] {
             assert!(!SupportedModes(u32::MAX).has(ModeOfOperation(mode)), "{mode}");
         }
     }

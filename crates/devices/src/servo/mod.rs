@@ -54,9 +54,10 @@ pub const FAULTS: Faults = Faults {
     section: "error codes of 603Fh",
 };
 
-/// All modes of the standard but velocity mode (frequency converters).
+/// All modes of the standard.
 pub const MODES: &[ModeOfOperation] = &[
     ModeOfOperation::PROFILE_POSITION,
+    ModeOfOperation::VELOCITY,
     ModeOfOperation::PROFILE_VELOCITY,
     ModeOfOperation::PROFILE_TORQUE,
     ModeOfOperation::HOMING,
@@ -64,6 +65,7 @@ pub const MODES: &[ModeOfOperation] = &[
     ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION,
     ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY,
     ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE,
+    ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE_WITH_COMMUTATION_ANGLE,
 ];
 
 /// An axis as the standard has it, where it is placed, with its modes: all units are the standard's.

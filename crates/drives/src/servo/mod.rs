@@ -17,6 +17,7 @@ mod shaft;
 mod slots;
 mod statusword;
 mod touch_probes;
+mod velocity_mode;
 
 pub use drive::ServoDrive;
 pub use hardware::{Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Sensors};
@@ -61,8 +62,8 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
         .iter()
         .filter_map(move |axis| of_axis(axis.placement, INTERPOLATION_DATA_RECORD_1ST_SET_POINT, SET_POINT_CHECKS));
     let factors = table.iter().filter(|(_, row)| {
-        let of_axis = (0x6000..=0x9FFF).contains(&row.index) && row.index % 0x800 == VELOCITY_FACTOR_1 % 0x800;
-        of_axis && matches!(row.sub_index, 1 | 2)
+        let is_factor = |factor: u16| row.index % 0x800 == factor % 0x800;
+        (0x6000..=0x9FFF).contains(&row.index) && FACTORS.into_iter().any(is_factor) && matches!(row.sub_index, 1 | 2)
     });
     let factors = factors.map(|(slot, _)| (slot, Condition::Check(is_not_zero)));
     let methods = description.axes.iter().filter_map(move |axis| of_axis(axis.placement, HOMING_METHOD, METHOD_CHECKS));
@@ -76,8 +77,9 @@ type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
 /// How ramps look.
 const MOTION_PROFILE_TYPE: Mux = Mux::new(0x6086, 0);
 
-/// Velocity factor 1: numerator at sub-index 1, divisor at 2.
-const VELOCITY_FACTOR_1: u16 = 0x6095;
+/// Factors of a numerator at sub-index 1 and a divisor at 2: velocity factor 1, and of velocity mode the set-point factor and the
+/// dimension factor.
+const FACTORS: [u16; 3] = [0x6095, 0x604B, 0x604C];
 
 /// By the index of the object: an axis' block of the profile area begins at each 800h (CiA 402-1).
 macro_rules! by_axis {

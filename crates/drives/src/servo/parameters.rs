@@ -4,7 +4,7 @@ use canopen::object::COMMUNICATION_CYCLE_PERIOD;
 use canopen::od::{Dictionary, Slot, Storage};
 use cia402::{
     AbortConnectionOption, DisableOperationOption, FaultReactionOption, HaltOption, HomingMethod, InterpolationPeriod,
-    InterpolationSubMode, QuickStopOption, ShutdownOption, StopRamp, Window,
+    InterpolationSubMode, ModeOfOperation, QuickStopOption, ShutdownOption, StopRamp, Window,
 };
 use motion::jerk::JerkRamp;
 use motion::set_points::{Following, Interpolation};
@@ -15,8 +15,9 @@ use super::position_range::PositionRange;
 use super::read;
 use super::scales::Scales;
 use super::slots::AxisSlots;
+use super::velocity_mode::VelocityMode;
 use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, VelocityRamps};
-use crate::engine::cia402::{self as power, DisableOptions, ExternalStop, Tolerances};
+use crate::engine::cia402::{self as power, DisableOptions, ExternalStop, ModeChange, Tolerances};
 
 /// Periods of the bus that a cyclic set-point may stay away before the motion is brought to rest.
 pub(super) const FORGIVEN_PERIODS: f64 = 2.0;
@@ -39,6 +40,9 @@ const JERK_LIMITED: i64 = 3;
 /// A jerk that does not limit, increments/s³: a thousand times what stops any motor within a control period.
 const ANY_JERK: f64 = 1e15;
 
+/// A rate that does not limit, increments/s²: finite for the planner.
+const ANY_RATE: f64 = 1e12;
+
 /// A position that does not limit, increments: finite, so that its product with 0 is a number.
 const FAR: f64 = 1e18;
 
@@ -46,6 +50,9 @@ const FAR: f64 = 1e18;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parameters {
     pub(super) scales: Scales,
+    /// [`VELOCITY`](ModeOfOperation::VELOCITY) or any other.
+    pub(super) mode: ModeOfOperation,
+    pub(super) velocity_mode: VelocityMode,
     pub(super) power: power::Parameters,
     /// Position window 6067h, increments, and its time.
     pub(super) position_window: Window,
@@ -83,9 +90,34 @@ struct Reader<'a, S: Storage> {
 }
 
 impl Parameters {
-    pub(super) fn of(values: &Dictionary<impl Storage>, slots: &AxisSlots, motor: &Motor) -> Self {
+    /// As they act in a mode: velocity mode has ramps of its own.
+    pub(super) fn of(
+        values: &Dictionary<impl Storage>,
+        slots: &AxisSlots,
+        motor: &Motor,
+        mode: ModeOfOperation,
+    ) -> Self {
         let scales = Scales::of(values, slots, motor.increments_per_turn);
-        Reader { values, slots, scales, motor }.parameters()
+        let parameters = Reader { values, slots, scales, motor }.parameters();
+        if mode == ModeOfOperation::VELOCITY { parameters.in_velocity_mode() } else { parameters }
+    }
+
+    /// With the ramps of velocity mode where it has them.
+    fn in_velocity_mode(mut self) -> Self {
+        let VelocityMode { acceleration, deceleration, quick_stop, .. } = self.velocity_mode;
+        // A rate that is not finite is the motor's own; 0 would be a step.
+        let within = |rate: Option<f64>, bound: f64, own: Ramp| match rate.map(|rate| rate.min(bound)) {
+            Some(rate) if rate > 0.0 => Ramp::Rate(if rate.is_finite() { rate } else { ANY_RATE }),
+            _ => own.without_jerk(),
+        };
+        let power = &mut self.power;
+        power.velocity.acceleration = within(acceleration, self.bounds.acceleration, power.velocity.acceleration);
+        power.velocity.deceleration = within(deceleration, self.bounds.deceleration, power.velocity.deceleration);
+        power.moves.deceleration = power.velocity.deceleration;
+        power.quick_stop_ramp = within(quick_stop, f64::INFINITY, power.quick_stop_ramp);
+        self.following.deceleration = power.moves.deceleration.rate(self.max_speed);
+        self.mode = ModeOfOperation::VELOCITY;
+        self
     }
 
     /// A torque in thousandths of the rated one as a current, A.
@@ -112,6 +144,8 @@ impl<S: Storage> Reader<'_, S> {
         let travel = self.travel();
         Parameters {
             scales: self.scales,
+            mode: ModeOfOperation::NONE,
+            velocity_mode: VelocityMode::of(self.values, slots, &self.scales),
             power: self.power(&bounds, rated_torque_nm),
             position_window: Window {
                 half_width: self.window(slots.position_window, POSITION_WINDOW),
@@ -186,6 +220,7 @@ impl<S: Storage> Reader<'_, S> {
                 velocity: self.speed(slots.velocity_window, VELOCITY_WINDOW_SHARE * self.fastest()),
                 current_a: TORQUE_WINDOW_SHARE * self.motor.rated_current_a,
             },
+            mode_change: ModeChange::Turning,
         }
     }
 

@@ -104,6 +104,8 @@ pub(super) struct Shaft {
     travel_holds: bool,
     target_hold: TargetHold,
     probes: TouchProbes,
+    /// Where the motor is commutated in cstca, electrical turns.
+    commutation_angle: Option<f32>,
 }
 
 impl Shaft {
@@ -115,7 +117,7 @@ impl Shaft {
         values: &Dictionary<impl Storage>,
     ) -> Self {
         let slots = AxisSlots::of(table, description.placement);
-        let parameters = Parameters::of(values, &slots, &motor);
+        let parameters = Parameters::of(values, &slots, &motor, ModeOfOperation::NONE);
         let model = motor.model();
         let declared = SupportedModes(read(values, slots.supported_modes, 0) as u32);
         let described = description.modes.iter().fold(SupportedModes::default(), |modes, mode| modes.with(*mode));
@@ -147,6 +149,7 @@ impl Shaft {
             travel_holds: false,
             target_hold: TargetHold::None,
             probes: TouchProbes::default(),
+            commutation_angle: None,
         }
     }
 
@@ -208,6 +211,9 @@ impl Shaft {
             self.servo = Servo::new(&self.model, sensors.tracks, sensors.encoder_count);
         }
         self.servo.sense(&self.model, sensors.tracks, sensors.encoder_count);
+        if let Some(electrical_turns) = self.commutation_angle {
+            self.servo.commutate_at(electrical_turns);
+        }
         if let Some(count) = sensors.index_count {
             let since = sensors.encoder_count.wrapping_sub(count) as i16;
             self.index = Some(self.position().wrapping_sub(i32::from(since)));
@@ -247,9 +253,11 @@ impl Shaft {
 
     /// The parameters as they are written by now.
     fn refresh(&mut self, values: &Dictionary<impl Storage>) {
-        if self.parameters_changed {
+        let mode = self.power.mode();
+        let of_mode = |mode| mode == ModeOfOperation::VELOCITY;
+        if self.parameters_changed || of_mode(mode) != of_mode(self.parameters.mode) {
             self.parameters_changed = false;
-            self.parameters = Parameters::of(values, &self.slots, &self.motor);
+            self.parameters = Parameters::of(values, &self.slots, &self.motor, mode);
         }
     }
 
@@ -308,6 +316,11 @@ impl Shaft {
             Some(demand) => demand,
             None => self.power.idle(None, dt_s),
         };
+        let commutation_angle = self.wanted_commutation(values);
+        if self.commutation_angle.is_some() && commutation_angle.is_none() {
+            self.servo.forget_current();
+        }
+        self.commutation_angle = commutation_angle;
         if let Some(home) = self.power.take_home() {
             // Zero position = home position + home offset.
             self.shift(home.wrapping_add(self.parameters.home_offset));
@@ -429,6 +442,7 @@ impl Shaft {
             travel_holds: _,
             target_hold,
             probes,
+            commutation_angle,
         } = self;
         // The windows go on counting, which changes nothing once their times have passed.
         let windows = [
@@ -445,7 +459,8 @@ impl Shaft {
             && *set_points == earlier.set_points
             && (faults, lost, overload) == (&earlier.faults, &earlier.lost, &earlier.overload)
             && (following_error, limited) == (&earlier.following_error, &earlier.limited)
-            && (target_hold, probes) == (&earlier.target_hold, &earlier.probes)
+            && (target_hold, probes, commutation_angle)
+                == (&earlier.target_hold, &earlier.probes, &earlier.commutation_angle)
     }
 
     /// Operation enabled, with no fault on its way.

@@ -39,9 +39,9 @@ pub(super) fn statusword(state: PowerState, mode: ModeOfOperation, facts: &Facts
         ModeOfOperation::HOMING => (facts.homing_attained, facts.homing_error),
         ModeOfOperation::INTERPOLATED_POSITION => (facts.follows, facts.following_error),
         ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => (facts.follows, facts.following_error),
-        ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => {
-            (facts.follows, false)
-        }
+        ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY
+        | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE
+        | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE_WITH_COMMUTATION_ANGLE => (facts.follows, false),
         _ => (false, false),
     };
     Statusword(common | bit(bit_12, 1 << 12) | bit(bit_13, 1 << 13))
@@ -57,7 +57,7 @@ mod tests {
     fn the_states_have_the_standards_bits_whatever_the_mode() {
         let facts = Facts { voltage: true, ..Facts::default() };
         for state in PowerState::ALL {
-            for mode in (0..=10).map(ModeOfOperation) {
+            for mode in (0..=11).map(ModeOfOperation) {
                 assert_eq!(statusword(state, mode, &facts).state(), Some(state), "{state:?} {mode}");
             }
         }
@@ -74,7 +74,7 @@ mod tests {
         let bits = |mode, facts: &Facts| statusword(ENABLED, ModeOfOperation(mode), facts).0 >> 12 & 3;
         assert_eq!([1, 3, 6, 7, 8].map(|mode| bits(mode, &acknowledged)), [1, 0, 0, 0, 0]);
         assert_eq!([1, 3, 6, 7, 8].map(|mode| bits(mode, &standing)), [0, 1, 0, 0, 0]);
-        assert_eq!([1, 3, 6, 7, 8, 9, 10].map(|mode| bits(mode, &follows)), [0, 0, 0, 1, 1, 1, 1]);
+        assert_eq!([1, 2, 3, 6, 7, 8, 9, 10, 11].map(|mode| bits(mode, &follows)), [0, 0, 0, 0, 1, 1, 1, 1, 1]);
         assert_eq!([1, 3, 6, 7, 8].map(|mode| bits(mode, &attained)), [0, 0, 1, 0, 0]);
         assert_eq!([1, 3, 4, 6, 7, 8, 9, 10].map(|mode| bits(mode, &lost)), [2, 0, 0, 2, 2, 2, 0, 0]);
     }

@@ -5,7 +5,7 @@ use cia402::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption
 
 use crate::engine::axis::{HomingParameters, MoveLimits, Ramp, VelocityRamps};
 use crate::engine::cia402::DisableOptions;
-use crate::engine::cia402::{ExternalStop, Parameters as AxisParameters, Tolerances};
+use crate::engine::cia402::{ExternalStop, ModeChange, Parameters as AxisParameters, Tolerances};
 
 /// Where a drive's table has them.
 pub(crate) struct ProfileObjects {
@@ -71,6 +71,7 @@ impl ProfileObjects {
             homing: HomingParameters::default(),
             external_stop: ExternalStop::Hold,
             tolerances: Tolerances::default(),
+            mode_change: ModeChange::AtStandstill,
         }
     }
 }

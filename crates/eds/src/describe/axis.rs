@@ -106,7 +106,7 @@ impl Objects {
 
     /// Those that 6502h says; without it, those whose objects are there.
     fn modes(&self) -> Vec<ModeOfOperation> {
-        let of_standard = (1..=10).map(ModeOfOperation).filter(|mode| mode.name().is_some());
+        let of_standard = (1..=11).map(ModeOfOperation).filter(|mode| mode.name().is_some());
         if let Some(said) = self.supported_modes() {
             return of_standard.filter(|mode| said.has(*mode)).collect();
         }
@@ -128,6 +128,7 @@ fn by_objects(has: impl Fn(u16, u8) -> bool) -> Vec<ModeOfOperation> {
     let cyclic = has(0x60C2, 1);
     let of_objects = [
         (Mode::PROFILE_POSITION, has(0x607A, 0)),
+        (Mode::VELOCITY, has(0x6042, 0)),
         (Mode::PROFILE_VELOCITY, has(0x60FF, 0)),
         (Mode::PROFILE_TORQUE, has(0x6071, 0)),
         (Mode::HOMING, has(0x6098, 0)),
@@ -135,6 +136,7 @@ fn by_objects(has: impl Fn(u16, u8) -> bool) -> Vec<ModeOfOperation> {
         (Mode::CYCLIC_SYNCHRONOUS_POSITION, cyclic && has(0x607A, 0)),
         (Mode::CYCLIC_SYNCHRONOUS_VELOCITY, cyclic && has(0x60FF, 0)),
         (Mode::CYCLIC_SYNCHRONOUS_TORQUE, cyclic && has(0x6071, 0)),
+        (Mode::CYCLIC_SYNCHRONOUS_TORQUE_WITH_COMMUTATION_ANGLE, cyclic && has(0x6071, 0) && has(0x60EA, 0)),
     ];
     of_objects.into_iter().filter(|(_, is_there)| *is_there).map(|(mode, _)| mode).collect()
 }

@@ -361,16 +361,16 @@ fn without_default(eds: &mut Eds, index: u16, sub_index: u8) {
 fn supported_modes_that_are_left_open_are_those_whose_objects_are_there() {
     let answers = |kept: &Description| kept.row(Mux::new(0x6502, 0)).map(|row| row.default);
     let open = of_servo(|eds| without_default(eds, 0x6502, 0));
-    // pp, pv, tq, hm, ip, csp, csv, cst: bits 0, 2, 3, 5, 6, 7, 8, 9.
-    assert_eq!(answers(open), Some(DefaultValue::Value(0x3ED)));
+    // pp, vl, pv, tq, hm, ip, csp, csv, cst, cstca: bits 0 to 3 and 5 to 10.
+    assert_eq!(answers(open), Some(DefaultValue::Value(0x7EF)));
     assert_eq!(open.axes[0].modes, devices::servo::MODES);
     let few = of_servo(|eds| {
         without_default(eds, 0x6502, 0);
-        eds.objects.retain(|object| !matches!(object.index, 0x6071 | 0x6098 | 0x60C1 | 0x60C2));
+        eds.objects.retain(|object| !matches!(object.index, 0x6042 | 0x6071 | 0x6098 | 0x60C1 | 0x60C2));
     });
     assert_eq!(answers(few), Some(DefaultValue::Value(0b101)));
     let said = of_servo(|eds| eds.objects.retain(|object| object.index != 0x6071));
-    assert_eq!(answers(said), Some(DefaultValue::Value(0x3ED)), "what the file says stands");
+    assert_eq!(answers(said), Some(DefaultValue::Value(0x7EF)), "what the file says stands");
 }
 
 #[test]

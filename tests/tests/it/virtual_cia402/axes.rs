@@ -111,9 +111,9 @@ fn eight_axes_run_each_at_its_own_speed_and_refuse_what_their_own_objects_refuse
         bench.set(&[(at(0x6060), 0, 3), (at(0x6040), 0, 6), (at(0x6040), 0, 7), (at(0x6040), 0, 15)]);
         bench.set(&[(at(0x60FF), 0, (i64::from(number) + 1) * TURN)]);
         assert_eq!(
-            bench.write(at(0x6060), 0, 2),
+            bench.write(at(0x6060), 0, 5),
             Err(AbortCode::INVALID_VALUE),
-            "6502h of axis {number} has no mode 2"
+            "6502h of axis {number} has no mode 5"
         );
     }
     bench.run_ms(500);

@@ -8,12 +8,14 @@ mod connection;
 mod homing;
 mod jerk;
 mod limits;
+mod mode_changes;
 mod modes;
 mod profile_objects;
 mod ranges;
 mod services;
 mod stops;
 mod units;
+mod velocity_mode;
 
 use bench::{Bench, TURN};
 

@@ -22,9 +22,10 @@ const INC_S: &str = "inc/s";
 const INC_S2: &str = "inc/s^2";
 const INC_S3: &str = "inc/s^3";
 const PER_MILLE: &str = "0.1 %";
+const RPM: &str = "r/min";
 
 /// Number of rows.
-pub(super) const ROW_COUNT: usize = 148;
+pub(super) const ROW_COUNT: usize = 170;
 
 #[rustfmt::skip]
 pub(super) static ROWS: [Entry; ROW_COUNT] = [
@@ -32,6 +33,27 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     ro(0x603F, 0, U16).mappable(),
     rw(0x6040, 0, U16).mappable(),
     ro(0x6041, 0, U16).mappable(),
+    rw(0x6042, 0, I16).unit(RPM).mappable(),
+    ro(0x6043, 0, I16).unit(RPM).mappable(),
+    ro(0x6044, 0, I16).unit(RPM).mappable(),
+    ro(0x6046, 0, U8).default(2),
+    rw(0x6046, 1, U32).unit(RPM).mappable().saved(),
+    rw(0x6046, 2, U32).default(5000).unit(RPM).mappable().saved(),
+    ro(0x6048, 0, U8).default(2),
+    rw(0x6048, 1, U32).described("Change of speed in the delta time of sub-index 02h").default(12_000).unit(RPM).mappable().saved(),
+    rw(0x6048, 2, U16).described("Time in which the speed rises by sub-index 01h; 0: at once").default(1).unit("s").mappable().saved(),
+    ro(0x6049, 0, U8).default(2),
+    rw(0x6049, 1, U32).described("Change of speed in the delta time of sub-index 02h").default(12_000).unit(RPM).mappable().saved(),
+    rw(0x6049, 2, U16).described("Time in which the speed falls by sub-index 01h; 0: at once").default(1).unit("s").mappable().saved(),
+    ro(0x604A, 0, U8).default(2),
+    rw(0x604A, 1, U32).described("Change of speed in the delta time of sub-index 02h").default(60_000).unit(RPM).mappable().saved(),
+    rw(0x604A, 2, U16).described("Time in which a quick stop takes sub-index 01h off the speed; 0: at once").default(1).unit("s").mappable().saved(),
+    ro(0x604B, 0, U8).default(2),
+    rw(0x604B, 1, I16).described("Of the target: units of 6044h for so many of 6042h").default(1).mappable().saved(),
+    rw(0x604B, 2, I16).described("Of the target: units of 6042h for so many of 6044h").default(1).mappable().saved(),
+    ro(0x604C, 0, U8).default(2),
+    rw(0x604C, 1, I32).described("r/min of the motor for so many units of 6044h").default(1).mappable().saved(),
+    rw(0x604C, 2, I32).described("Units of 6044h for so many r/min of the motor").default(1).mappable().saved(),
     rw(0x605A, 0, I16).described("What a quick stop does").values(QUICK_STOP).default(2).saved(),
     rw(0x605B, 0, I16).described("What shutdown does").values(SHUTDOWN).default(0).saved(),
     rw(0x605C, 0, I16).described("What disable operation does").values(SHUTDOWN).default(1).saved(),
@@ -73,7 +95,7 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x607D, 2, I32).default(i32::MAX as i64).unit(INC).saved(),
     rw(0x607E, 0, U8).described("Bit 7: positions, bit 6: velocities change their sign").saved(),
     rw(0x607F, 0, U32).default(RATED_TURNS_S * 5 / 3 * TURN).unit(INC_S).mappable().saved(),
-    rw(0x6080, 0, U32).default(5000).unit("r/min").mappable().saved(),
+    rw(0x6080, 0, U32).default(5000).unit(RPM).mappable().saved(),
     rw(0x6081, 0, U32).described("Velocity of position moves").default(10 * TURN).unit(INC_S).mappable().saved(),
     rw(0x6082, 0, U32).described("Velocity at the target of a position move").unit(INC_S).mappable().saved(),
     rw(0x6083, 0, U32).default(200 * TURN).unit(INC_S2).mappable().saved(),
@@ -168,6 +190,7 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     ro(0x60E3, 30, I8).default(34),
     ro(0x60E3, 31, I8).default(35),
     ro(0x60E3, 32, I8).default(37),
+    rw(0x60EA, 0, U16).described("65536ths of an electrical turn").mappable(),
     ro(0x60F4, 0, I32).unit(INC).mappable(),
     ro(0x60FA, 0, I32).described("Velocity that the position loop asks for").unit(INC_S).mappable(),
     ro(0x60FC, 0, I32).described("Position demand by the encoder").unit(INC).mappable(),
@@ -178,8 +201,8 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x60FF, 0, I32).unit(INC_S).mappable(),
     // Permanent magnets, sine.
     ro(0x6402, 0, U16).default(10),
-    // pp, pv, tq, hm, ip, csp, csv, cst.
-    ro(0x6502, 0, U32).default(0x03ED),
+    // pp, vl, pv, tq, hm, ip, csp, csv, cst, cstca.
+    ro(0x6502, 0, U32).default(0x07EF),
     // Of the profile: 4.0. Read as major, minor and revision in bits 16 to 23, 8 to 15 and 0 to 7.
     ro(0x67FE, 0, U32).default(0x0004_0000),
 ];

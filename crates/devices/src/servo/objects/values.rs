@@ -5,6 +5,7 @@ use crate::row::Values;
 pub(super) const MODES: Values = &[
     (0, "no mode"),
     (1, "profile position"),
+    (2, "velocity"),
     (3, "profile velocity"),
     (4, "profile torque"),
     (6, "homing"),
@@ -12,6 +13,7 @@ pub(super) const MODES: Values = &[
     (8, "cyclic synchronous position"),
     (9, "cyclic synchronous velocity"),
     (10, "cyclic synchronous torque"),
+    (11, "cyclic synchronous torque with commutation angle"),
 ];
 
 pub(super) const ABORT_CONNECTION: Values = &[(0, "nothing"), (1, "fault"), (2, "disable voltage"), (3, "quick stop")];

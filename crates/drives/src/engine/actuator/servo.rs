@@ -129,6 +129,17 @@ impl Servo {
         self.observer.update(&model.observer, count);
     }
 
+    /// Commutates at an angle (electrical turns) in place of the sensors', until they are looked at again.
+    pub const fn commutate_at(&mut self, electrical_turns: f32) {
+        self.electrical_turns = electrical_turns;
+    }
+
+    /// The current that flows is none of the load's: the loops begin without it.
+    pub fn forget_current(&mut self) {
+        self.cascade.reset(0.0);
+        self.setpoint_a = 0.0;
+    }
+
     /// Takes the angle anew from the Hall sensors, as at power-on.
     pub fn realign(&mut self, model: &ServoModel, hall: u8, count: u16) {
         self.commutation = Commutation::new(&model.commutation, hall, count);

@@ -11,7 +11,7 @@ mod status;
 mod stop;
 mod stopping;
 
-pub use parameters::{Parameters, Status, Targets, Tolerances};
+pub use parameters::{ModeChange, Parameters, Status, Targets, Tolerances};
 pub use power::{DisableOptions, PowerMachine};
 pub use power_drive::PowerDrive;
 pub use set_points::{SetPoint, SetPoints};

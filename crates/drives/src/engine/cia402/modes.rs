@@ -43,7 +43,7 @@ impl PowerDrive {
                 }
                 return demand;
             }
-            ModeOfOperation::PROFILE_VELOCITY => {
+            ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::VELOCITY => {
                 self.axis.begin(Task::Speed { velocity: targets.velocity, ramps: parameters.velocity });
             }
             ModeOfOperation::PROFILE_TORQUE => {
@@ -76,5 +76,6 @@ pub(super) const fn is_cyclic(mode: ModeOfOperation) -> bool {
             | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION
             | ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY
             | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE
+            | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE_WITH_COMMUTATION_ANGLE
     )
 }

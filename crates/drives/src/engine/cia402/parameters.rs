@@ -33,6 +33,17 @@ pub struct Parameters {
     pub external_stop: ExternalStop,
     /// Tolerances of the status.
     pub tolerances: Tolerances,
+    /// When a mode that is asked for takes effect while the shaft is driven.
+    pub mode_change: ModeChange,
+}
+
+/// When a mode that is asked for takes effect on a shaft that is driven (CiA 402-2 leaves it to the drive; 6061h shows it).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ModeChange {
+    /// Once it stands.
+    AtStandstill,
+    /// At once: the mode takes the shaft over as it turns.
+    Turning,
 }
 
 /// When a target counts as reached.
@@ -49,7 +60,7 @@ pub struct Tolerances {
 /// What the host wants of the modes that follow something at all times.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Targets {
-    /// Profile velocity, counts/s.
+    /// Profile velocity and velocity mode, counts/s.
     pub velocity: f64,
     /// Profile torque, A.
     pub current_a: f32,

@@ -7,7 +7,7 @@
 
 use cia402::{Controlword, FaultReactionOption, ModeOfOperation, PowerState, StopRamp, Transition};
 
-use super::parameters::{Parameters, Targets};
+use super::parameters::{ModeChange, Parameters, Targets};
 use super::power::PowerMachine;
 use super::set_points::{SetPoint, SetPoints};
 use super::stop::StopCause;
@@ -136,10 +136,10 @@ impl PowerDrive {
         wants_reset
     }
 
-    /// Asks for a mode: it takes effect at standstill.
+    /// Asks for a mode: it takes effect at standstill, or with the next period ([`ModeChange`]).
     pub fn request_mode(&mut self, mode: ModeOfOperation) {
         self.requested_mode = mode;
-        self.adopt_mode();
+        self.adopt_mode(ModeChange::AtStandstill);
     }
 
     /// Whether the external stop input is active.
@@ -194,7 +194,7 @@ impl PowerDrive {
         dt_s: f64,
     ) -> Option<Demand> {
         self.axis.observe(feedback);
-        self.adopt_mode();
+        self.adopt_mode(parameters.mode_change);
         if !self.is_live() {
             return None;
         }
@@ -240,8 +240,9 @@ impl PowerDrive {
         self.axis.feedback().standing && no_way_to_go && !homing
     }
 
-    fn adopt_mode(&mut self) {
-        if self.requested_mode == self.mode || (self.engaged == Engaged::Yes && !self.is_at_rest()) {
+    fn adopt_mode(&mut self, change: ModeChange) {
+        let waits = || change == ModeChange::AtStandstill && self.engaged == Engaged::Yes && !self.is_at_rest();
+        if self.requested_mode == self.mode || waits() {
             return;
         }
         self.mode = self.requested_mode;

@@ -41,7 +41,7 @@ impl PowerDrive {
             ModeOfOperation::PROFILE_POSITION => {
                 !self.set_points.is_under_way() && !self.short_of_target && self.is_in_position(&parameters.tolerances)
             }
-            ModeOfOperation::PROFILE_VELOCITY => {
+            ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::VELOCITY => {
                 let limit = parameters.velocity.max_speed;
                 (feedback.velocity - targets.velocity.clamp(-limit, limit)).abs() <= velocity
             }

@@ -69,7 +69,7 @@ impl PowerDrive {
         let velocity = self.axis.point().velocity;
         match self.mode {
             ModeOfOperation::HOMING => 0.0,
-            ModeOfOperation::PROFILE_VELOCITY if velocity == 0.0 => targets.velocity,
+            ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::VELOCITY if velocity == 0.0 => targets.velocity,
             mode if is_cyclic(mode) && velocity == 0.0 => match targets.cyclic {
                 Some(Cyclic::Position(point)) => f64::from(point.position.wrapping_sub(self.axis.point().position)),
                 Some(Cyclic::Velocity(point)) => point.velocity,

@@ -40,6 +40,7 @@ fn parameters() -> Parameters {
         homing: HomingParameters::default(),
         external_stop: ExternalStop::Hold,
         tolerances: Tolerances { position: 1, velocity: 1.0, current_a: 0.1 },
+        mode_change: ModeChange::AtStandstill,
     }
 }
 

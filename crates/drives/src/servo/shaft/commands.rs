@@ -81,7 +81,8 @@ impl Shaft {
         let of_mode = match self.power.mode() {
             ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => slots.target_position,
             ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => slots.target_velocity,
-            ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => slots.target_torque,
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE
+            | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE_WITH_COMMUTATION_ANGLE => slots.target_torque,
             ModeOfOperation::INTERPOLATED_POSITION => slots.interpolation_set_point,
             _ => None,
         };

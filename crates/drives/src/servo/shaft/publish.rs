@@ -30,6 +30,7 @@ impl Shaft {
         write(values, slots.position, self.shown(position));
         write(values, slots.position_internal, i64::from(position));
         write(values, slots.velocity, scales.velocity(velocity));
+        write(values, slots.vl_actual, self.parameters.velocity_mode.actual(velocity));
         let torque = self.parameters.torque(self.servo.current_a(), &self.motor);
         write(values, slots.torque, torque * scales.direction() as i64);
         let current = self.servo.current_a() * direction / self.motor.rated_current_a;
@@ -53,6 +54,7 @@ impl Shaft {
         write(values, slots.position_demand, self.shown(demanded));
         write(values, slots.position_demand_internal, i64::from(demanded));
         write(values, slots.velocity_demand, scales.velocity(velocity));
+        write(values, slots.vl_demand, self.parameters.velocity_mode.demand(velocity));
         let error = self.error().unwrap_or(0);
         let error = i32::try_from(error).unwrap_or(if error < 0 { i32::MIN } else { i32::MAX });
         write(values, slots.following_error, scales.position(error));

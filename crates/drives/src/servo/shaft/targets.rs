@@ -6,7 +6,7 @@ use motion::profile::Point;
 use motion::set_points::{Following, Interpolation};
 
 use super::{SUPERVISION_PERIOD_S, Shaft, TargetHold};
-use crate::engine::axis::{Cyclic, Feedback, TrajectoryPoint};
+use crate::engine::axis::{Cyclic, Demand, Feedback, TrajectoryPoint};
 use crate::engine::cia402::Targets;
 use crate::servo::parameters::counter;
 use crate::servo::{read, write};
@@ -36,16 +36,21 @@ impl Shaft {
             }
             ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => self.cyclic_position(values),
             ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => self.cyclic_velocity(values, feedback),
-            ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => self.cyclic_torque(values),
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE
+            | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE_WITH_COMMUTATION_ANGLE => self.cyclic_torque(values),
             _ => None,
         };
-        let wanted = self.velocity(values);
-        let profile = mode == ModeOfOperation::PROFILE_VELOCITY;
-        self.targets = Targets {
-            velocity: if profile { self.held_velocity(wanted, position) } else { 0.0 },
-            current_a: self.torque_a(values),
-            cyclic,
+        let velocity = match mode {
+            ModeOfOperation::PROFILE_VELOCITY => self.held_velocity(self.velocity(values), position),
+            ModeOfOperation::VELOCITY => {
+                let (wanted, limited) = self.velocity_mode_reference(values);
+                let held = self.held_velocity(wanted, position);
+                self.limited |= limited;
+                held
+            }
+            _ => 0.0,
         };
+        self.targets = Targets { velocity, current_a: self.torque_a(values), cyclic };
     }
 
     /// A set-point of the mode came: 607Ah in csp, 60FFh in csv, 6071h in cst, 60C1h in ip.
@@ -56,7 +61,8 @@ impl Shaft {
                 let (target, following) = (self.velocity(values), self.following_straight());
                 self.set_points.take(target, f64::from(from), false, by_rpdo, &following);
             }
-            ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => {
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE
+            | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE_WITH_COMMUTATION_ANGLE => {
                 let from = f64::from(self.servo.current_a());
                 let (target, following) = (f64::from(self.torque_a(values)), self.following_straight());
                 self.set_points.take(target, from, false, by_rpdo, &following);
@@ -145,6 +151,20 @@ impl Shaft {
             None => 0.0,
         };
         Following { interpolation: Interpolation::Linear, period_s, ..self.parameters.following }
+    }
+
+    /// 6042h, increments/s, by the ramp's bits of the controlword; and whether 6046h limits it.
+    fn velocity_mode_reference(&self, values: &Dictionary<impl Storage>) -> (f64, bool) {
+        let output = self.power.axis().point().velocity;
+        let target = read(values, self.slots.vl_target, 0);
+        self.parameters.velocity_mode.reference(target, self.power.controlword(), output)
+    }
+
+    /// 60EAh in cstca, while a torque is followed: electrical turns, of which there are 65536 parts. A stop has the encoder's.
+    pub(super) fn wanted_commutation(&self, values: &Dictionary<impl Storage>) -> Option<f32> {
+        let in_mode = self.power.mode() == ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE_WITH_COMMUTATION_ANGLE;
+        let follows = in_mode && matches!(self.demand, Demand::Torque(_)) && self.power.stop_cause().is_none();
+        follows.then(|| read(values, self.slots.commutation_angle, 0) as u16 as f32 / 65_536.0)
     }
 
     /// 60FFh, increments/s.
