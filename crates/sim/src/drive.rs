@@ -88,6 +88,16 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
         None
     }
 
+    /// It is an encoder, which sits on the shaft of another node ([`World::mount`](crate::World::mount)).
+    fn reads_a_shaft(&self) -> bool {
+        false
+    }
+
+    /// The shaft that it sits on is at so many turns, and turns so fast, in turns a second.
+    fn see_shaft(&mut self, turns: f64, turns_s: f64) {
+        let _ = (turns, turns_s);
+    }
+
     /// Whether the shaft of an axis can be handed over to a coupled machine.
     fn check_couple(&self, axis: AxisId) -> Result<(), Refused> {
         let _ = axis;

@@ -8,6 +8,7 @@ mod due;
 mod ledger;
 mod log;
 mod member;
+mod mounted;
 mod probe;
 mod step;
 mod stores;
@@ -26,6 +27,7 @@ pub use stores::StoredImage;
 use crate::fault::{Corruption, NodeFaults};
 use crate::machine::TimingMode;
 use crate::recorder::Recorder;
+use crate::stimulus::Place;
 use crate::wire::{Bus, ControllerOptions};
 use crate::{Prng, VirtualDrive};
 use body::CoupledBody;
@@ -60,6 +62,8 @@ pub struct World {
     watch: Option<Box<WorldWatch>>,
     /// What several drives move together.
     bodies: Vec<CoupledBody>,
+    /// What sits on the shafts of others: the station, and the place of the shaft.
+    mounted: Vec<(usize, Place)>,
 }
 
 /// Names one station of one world: what `add_*` returned.
@@ -108,6 +112,7 @@ impl World {
             ledgers: Vec::new(),
             watch: None,
             bodies: Vec::new(),
+            mounted: Vec::new(),
         }
     }
 

@@ -14,6 +14,11 @@ use crate::unresolved::Unresolved;
 
 pub use devices::Description;
 
+/// Devices beside drives that are built in, by the data sheets that describe them: inputs and outputs of CiA 401, an encoder of CiA 406.
+/// They are what any such file makes, and nobody's product.
+const DEVICES: [(&str, &str); 2] =
+    [("io401", include_str!("models/io401.eds")), ("encoder406", include_str!("models/encoder406.eds"))];
+
 /// What a MODEL argument means: the name of a model, with choices that come with other objects behind it
 /// (`zlac8030l,firmware=2.01`), or an EDS or DCF file that describes one.
 ///
@@ -51,7 +56,10 @@ pub fn resolve_in(text: &str, folder: &Path) -> Result<&'static Description, Unr
     if is_file(text) {
         return described(&folder.join(text)).map_err(Unresolved::File);
     }
-    let known = || models().map(|model| model.name);
+    if let Some(device) = device(text) {
+        return device.map_err(Unresolved::File);
+    }
+    let known = || models().map(|model| model.name).chain(DEVICES.iter().map(|(name, _)| *name));
     models().find(|model| model.name.eq_ignore_ascii_case(text)).ok_or_else(|| {
         let near = near(text, known());
         format!(
@@ -61,6 +69,13 @@ pub fn resolve_in(text: &str, folder: &Path) -> Result<&'static Description, Unr
         )
         .into()
     })
+}
+
+/// A device beside drives that is built in.
+fn device(text: &str) -> Option<Result<&'static Description, String>> {
+    let (name, sheet) = DEVICES.iter().find(|(name, _)| name.eq_ignore_ascii_case(text))?;
+    let reading = eds::Eds::load(sheet.as_bytes()).map_err(|refusal| format!("{name}: {refusal}"));
+    Some(reading.and_then(|reading| keep_of(&reading.eds, name).map_err(|error| format!("{name}: {error}"))))
 }
 
 /// True for what has the ending of a file that describes a device.
@@ -114,7 +129,7 @@ pub fn embedded() -> Vec<(NodeId, &'static Description)> {
 
 /// The names of all models, for messages.
 pub fn names() -> String {
-    models().map(|model| model.name).collect::<Vec<_>>().join(", ")
+    models().map(|model| model.name).chain(DEVICES.iter().map(|(name, _)| *name)).collect::<Vec<_>>().join(", ")
 }
 
 /// How the user says which of `models` a node is.
@@ -139,6 +154,20 @@ mod tests {
         assert!(refusal("zlac8030l,colour=red").contains("it has: firmware, motor"));
         assert!(refusal("zlac8030l,firmware").contains("KEY=CHOICE"));
         assert!(!is_from_file(resolve("zlac8030l,firmware=2.01").unwrap()));
+    }
+
+    #[test]
+    fn devices_beside_drives_are_built_in_and_their_sheets_have_no_finding() {
+        for (name, sheet) in DEVICES {
+            let reading = eds::Eds::load(sheet.as_bytes()).unwrap();
+            assert!(reading.findings.is_empty(), "{name}: {:?}", reading.findings);
+            let device = resolve(&name.to_uppercase()).unwrap();
+            assert!(device.name == name && device.axes.is_empty() && device.lss, "{name}");
+            assert!(std::ptr::eq(device, resolve(name).unwrap()));
+            assert_eq!(file_of(device), Some(name), "what a MODEL argument takes");
+            assert!(names().contains(name));
+        }
+        assert!(resolve("io40").unwrap_err().to_string().contains("did you mean io401?"));
     }
 
     #[test]

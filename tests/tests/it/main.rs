@@ -10,6 +10,7 @@ mod documented;
 mod eds_of_the_drives;
 mod every_drive;
 mod files_of_makers;
+mod io_and_encoders;
 mod laws_hold_for_seeded_input;
 mod lss;
 mod realism;

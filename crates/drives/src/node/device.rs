@@ -1,4 +1,5 @@
-//! The device: node and services joined over the dictionary, with a supply switch. What it measures comes from outside.
+//! The device: node, services and what its profile says of its objects, joined over the dictionary, with a supply switch. What it
+//! measures comes from outside.
 
 use can::{Bitrate, Instant};
 use canopen::node::{NodeProfile, Via};
@@ -9,7 +10,8 @@ use devices::Description;
 use devices::variant::Variant;
 
 use super::Memory;
-use super::described::{Described, DescribedDevice, described_station};
+use super::described::{Described, DescribedDevice, Loss, described_station};
+use super::profile::Profile;
 use crate::engine::device::{Application, Device, ResetTimes};
 
 /// The firmware of a described device that is not a drive.
@@ -17,6 +19,9 @@ use crate::engine::device::{Application, Device, ResetTimes};
 pub struct DescribedNode<S: Storage> {
     description: &'static Description,
     base: DescribedDevice<S>,
+    profile: Profile,
+    /// NMT operational.
+    operational: bool,
 }
 
 impl<S: Storage> DescribedNode<S> {
@@ -34,7 +39,37 @@ impl<S: Storage> DescribedNode<S> {
         let variant = Variant::first_of(description.variations);
         let memory = Memory::empty(description.dictionary);
         let base = DescribedDevice::new(profile, node_id, bitrate, memory, variant, description.lss);
-        Self { description, base }
+        Self { description, base, profile: Profile::of(description), operational: false }
+    }
+
+    /// Lines of digital inputs and of digital outputs (CiA 401).
+    pub fn lines(&self) -> [u8; 2] {
+        self.profile.lines(self.values())
+    }
+
+    /// Levels at the digital inputs and at the digital outputs, the first line in bit 0. Outputs are off without power.
+    pub fn levels(&self) -> [u64; 2] {
+        let [inputs, outputs] = self.profile.levels(self.values());
+        [inputs, if self.is_running() { outputs } else { 0 }]
+    }
+
+    /// The level at a digital input changes; lines count from 0, as many as there are [`lines`](Self::lines).
+    pub fn set_input(&mut self, line: u8, level: bool, now: Instant) {
+        if line < self.lines()[0] {
+            self.profile.set_input(self.base.device.values_mut(), line, level);
+            self.notice(now);
+        }
+    }
+
+    /// The shaft that an encoder sits on (CiA 406) is at so many turns, and turns so fast, in turns a second.
+    pub fn see_shaft(&mut self, turns: f64, turns_s: f64) {
+        self.profile.see_shaft(self.base.device.values_mut(), turns, turns_s);
+    }
+
+    fn notice(&mut self, now: Instant) {
+        if self.profile.take_event() {
+            self.base.device.notice_changes(now);
+        }
     }
 
     /// What it is built from.
@@ -103,7 +138,9 @@ impl<S: Storage> DescribedNode<S> {
         } else {
             device.values_mut().set_bytes(slot, bytes)?;
         }
-        device.notice_changes(now);
+        let mux = device.values().table().row(slot).mux();
+        self.profile.measured(self.base.device.values(), mux);
+        self.notice(now);
         Ok(())
     }
 
@@ -119,7 +156,12 @@ impl<S: Storage> Application<S> for DescribedNode<S> {
     }
 
     fn written(&mut self, slot: Slot, raw: u32, _via: Via, now: Instant) -> bool {
-        self.service_written(slot, raw, now);
+        if !self.service_written(slot, raw, now) {
+            let mux = self.base.device.values().table().row(slot).mux();
+            if let Some((slot, raw)) = self.profile.written(self.base.device.values_mut(), mux) {
+                self.base.device.write_own(slot, raw);
+            }
+        }
         false
     }
 
@@ -127,19 +169,28 @@ impl<S: Storage> Application<S> for DescribedNode<S> {
 
     fn nmt_changed(&mut self, state: NmtState, now: Instant) {
         self.follow_nmt(state, now);
+        let operational = state == NmtState::Operational;
+        if core::mem::replace(&mut self.operational, operational) && !operational {
+            self.profile.fail(self.base.device.values_mut());
+        }
     }
 
     fn restart(&mut self, now: Instant) {
         self.base.restart(now);
+        self.operational = false;
+        self.profile.restart(self.base.device.values_mut());
         self.base.boot(now);
     }
 
     fn restart_communication(&mut self, now: Instant) {
+        if core::mem::replace(&mut self.operational, false) {
+            self.profile.fail(self.base.device.values_mut());
+        }
         self.base.restart_communication(now);
     }
 
     fn communication_task(&mut self, now: Instant) {
-        self.base.device.notice_changes(now);
+        self.notice(now);
     }
 }
 
@@ -150,6 +201,13 @@ impl<S: Storage> Described<S> for DescribedNode<S> {
 
     fn base_mut(&mut self) -> &mut DescribedDevice<S> {
         &mut self.base
+    }
+
+    fn connection(&mut self, loss: Loss, lost: bool, now: Instant) {
+        if lost && matches!(loss, Loss::Silence | Loss::BusOff) {
+            self.profile.fail(self.base.device.values_mut());
+        }
+        self.base.report(loss, lost, now);
     }
 }
 

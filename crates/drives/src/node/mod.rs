@@ -1,17 +1,22 @@
-//! A device of any kind whose objects come from a description: the services of CiA 301 over them, and no application.
+//! A device of any kind whose objects come from a description: the services of CiA 301 over them.
 //!
 //! PDOs, limits, heartbeat, EMCY, error history and parameter store work by the objects that are there. What a sensor of
-//! the device would measure is put into its objects from outside ([`DescribedNode::set`]); what a host writes stays there.
+//! the device would measure is put into its objects from outside ([`DescribedNode::set`]); what a host writes stays there. Inputs and
+//! outputs of CiA 401 and encoders of CiA 406 act as their profile has it.
 
 pub(crate) mod described;
 mod device;
+mod encoder;
+mod io;
 mod lss;
 mod memory;
+mod profile;
 mod services;
 
 pub use described::{DescribedDevice, Loss};
 pub use device::DescribedNode;
 pub use memory::{Memory, image_size, is_makers_mark, is_storable};
+pub use profile::profile_conditions;
 pub use services::{Services, Written, conditions};
 
 use canopen::Mux;
@@ -50,6 +55,11 @@ pub const fn acts_on(mux: Mux) -> bool {
                 | 0x1200
                 | 0x1400..=0x1BFF
         )
+}
+
+/// Whether a device that is not a drive does something with an object, by CiA 301 or by its profile.
+pub fn device_acts_on(description: &devices::Description, mux: Mux) -> bool {
+    acts_on(mux) || profile::acts_on(description, mux)
 }
 
 /// 1029h:01, where the device has it (CiA 301, 7.5.2.32): 0 to pre-operational, 1 no change, 2 stopped.

@@ -8,6 +8,7 @@ mod bodies;
 mod configuration;
 mod cycles;
 mod motion;
+mod seat;
 mod surroundings;
 mod units;
 
@@ -26,6 +27,7 @@ use bodies::Joined;
 pub use configuration::{mapped, pdo_id};
 pub use cycles::{BASE_PERIOD, CyclePlan, GROUP_PERIOD, TOLERANCE, TooFull, speed_mode, too_full, too_full_at};
 pub use motion::{AxisPlan, BasePlan, GroupPlan, WATCHDOG};
+use seat::Seat;
 use words::document::reader::{self, Field, Parameters as Placeholders, Table};
 use words::document::{BadFile, Located, Problem, read_text};
 use words::drive::DriveSpec;
@@ -55,6 +57,7 @@ pub const DRIVE_KEYS: &[&str] = &[
     "inputs",
     "switches",
     "rotor_locked",
+    "shaft",
     "temperatures_c",
     "faults",
     "battery",
@@ -95,6 +98,8 @@ pub struct Placed {
     source: Source,
     /// Where the supply is described.
     source_at: Option<Located>,
+    /// The shaft of another node that it sits on, with its place in the file.
+    shaft: Option<Seat>,
     /// What is around it, with the places in the file.
     around: Vec<(Stimulus, Located)>,
     /// The keys that the file has of it for a simulated machine.
@@ -248,6 +253,8 @@ impl Machine {
     /// # Errors
     /// What is in the way, with its place in the file.
     pub fn join(&self, world: &mut World) -> Result<(), BadFile> {
+        let seated = self.drives.iter().filter_map(|placed| Some((placed.spec.node, placed.shaft.as_ref()?)));
+        seated.into_iter().try_for_each(|(node, seat)| seat.take(world, node))?;
         self.bodies.iter().try_for_each(|body| body.couple(world))
     }
 
@@ -313,6 +320,7 @@ impl From<DriveSpec> for Placed {
             spec,
             source: Source::default(),
             source_at: None,
+            shaft: None,
             around: Vec::new(),
             keys: Vec::new(),
             start_up: BTreeMap::new(),
@@ -382,6 +390,7 @@ impl Placed {
         let source_at = ["supply", "supply_v"].into_iter().find_map(|name| table.get(name));
         let source_at = source_at.map(|field| field.problem("").locate(table.text()));
         let around = surroundings::around(table, &mut problems);
+        let shaft = noted(Seat::parse(table), &mut problems);
         let (described, id) = match (model(table, folder), node_id(table)) {
             (Ok(described), Ok(id)) => (described, id),
             (described, id) => {
@@ -405,7 +414,7 @@ impl Placed {
         let of_simulator = |key: &&str| !matches!(*key, "model" | "node") && !of_master(key);
         let keys = DRIVE_KEYS.iter().copied().filter(|key| of_simulator(key) && table.get(key).is_some());
         if problems.is_empty() {
-            Ok(Self { spec, source, source_at, around, keys: keys.collect(), start_up, gear })
+            Ok(Self { spec, source, source_at, shaft, around, keys: keys.collect(), start_up, gear })
         } else {
             Err(problems)
         }

@@ -124,6 +124,9 @@ impl World {
         if !self.bodies.is_empty() {
             self.settle_body_of(station);
         }
+        if !self.mounted.is_empty() {
+            self.look_at_shaft(station);
+        }
     }
 
     fn settle_body_of(&mut self, station: usize) {

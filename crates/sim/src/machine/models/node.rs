@@ -1,10 +1,11 @@
-//! A described device that is not a drive: its objects on the bus, a supply switch and a memory, and nothing that turns.
+//! A described device that is not a drive: its objects on the bus, a supply switch and a memory, terminals
+//! by CiA 401, the eye of an encoder by CiA 406, and nothing that turns.
 
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::Mux;
 use canopen::od::{DataType, Entry, Kind, Value};
 use devices::{AxisId, Description};
-use drives::node::{DescribedNode, Memory, conditions};
+use drives::node::{DescribedNode, Memory, conditions, profile_conditions};
 
 use super::boxed::Boxed;
 use super::kept;
@@ -12,10 +13,39 @@ use super::order::{self, Order, OrderError};
 use crate::machine::kernel::NMT;
 use crate::machine::kernel::timing::{OwnTime, TimingMode};
 use crate::stimulus::{ObjectValue, Power, Stimulus};
-use crate::{PowerPhase, Refused, Report, Source, VirtualDrive};
+use crate::{Levels, PowerPhase, Refused, Report, Source, VirtualDrive};
 
 /// Supply that such devices have. Assumed: the 24 V of control cabinets.
 const SUPPLY_V: f64 = 24.0;
+
+/// Low word of 1000h of an encoder (CiA 406).
+const ENCODER: u32 = 406;
+
+/// Digital inputs of CiA 401, the first line first.
+#[rustfmt::skip]
+const INPUTS: [&str; 64] = [
+    "DI1", "DI2", "DI3", "DI4", "DI5", "DI6", "DI7", "DI8",
+    "DI9", "DI10", "DI11", "DI12", "DI13", "DI14", "DI15", "DI16",
+    "DI17", "DI18", "DI19", "DI20", "DI21", "DI22", "DI23", "DI24",
+    "DI25", "DI26", "DI27", "DI28", "DI29", "DI30", "DI31", "DI32",
+    "DI33", "DI34", "DI35", "DI36", "DI37", "DI38", "DI39", "DI40",
+    "DI41", "DI42", "DI43", "DI44", "DI45", "DI46", "DI47", "DI48",
+    "DI49", "DI50", "DI51", "DI52", "DI53", "DI54", "DI55", "DI56",
+    "DI57", "DI58", "DI59", "DI60", "DI61", "DI62", "DI63", "DI64",
+];
+
+/// Digital outputs.
+#[rustfmt::skip]
+const OUTPUTS: [&str; 64] = [
+    "DO1", "DO2", "DO3", "DO4", "DO5", "DO6", "DO7", "DO8",
+    "DO9", "DO10", "DO11", "DO12", "DO13", "DO14", "DO15", "DO16",
+    "DO17", "DO18", "DO19", "DO20", "DO21", "DO22", "DO23", "DO24",
+    "DO25", "DO26", "DO27", "DO28", "DO29", "DO30", "DO31", "DO32",
+    "DO33", "DO34", "DO35", "DO36", "DO37", "DO38", "DO39", "DO40",
+    "DO41", "DO42", "DO43", "DO44", "DO45", "DO46", "DO47", "DO48",
+    "DO49", "DO50", "DO51", "DO52", "DO53", "DO54", "DO55", "DO56",
+    "DO57", "DO58", "DO59", "DO60", "DO61", "DO62", "DO63", "DO64",
+];
 
 /// A described node, as a station of a world.
 #[derive(Clone)]
@@ -39,7 +69,7 @@ enum Supply {
 /// A node of this description as ordered, without power.
 pub(super) fn ordered(model: &'static Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
     let memory = order::memory(model, order)?;
-    let profile = kept::profile(model, conditions(model.dictionary));
+    let profile = kept::profile(model, conditions(model.dictionary).chain(profile_conditions(model)));
     let firmware = DescribedNode::new(model, profile, order.node, order.bitrate);
     Ok(Box::new(NodeMachine { firmware, memory, supply: Supply::Off, own_time: None }))
 }
@@ -229,8 +259,13 @@ impl VirtualDrive for NodeMachine {
             }
             Stimulus::Power(power) => self.switch(*power == Power::On, now),
             Stimulus::Object { mux, value } => return self.set_object(*mux, value, now),
-            Stimulus::Input { name, .. } | Stimulus::Switch { name, .. } => {
+            Stimulus::Input { name, level } => {
+                let line = self.input_number(name)?;
+                self.firmware.set_input(line as u8, *level, now);
+            }
+            Stimulus::Switch { name, .. } => {
                 self.input_number(name)?;
+                return Err(self.absent("position that an input could be tied to"));
             }
             Stimulus::LoadTorque(_) | Stimulus::LoadInertia(_) | Stimulus::Load(_) | Stimulus::RotorLock(_) => {
                 return Err(self.absent("motor"));
@@ -264,11 +299,25 @@ impl VirtualDrive for NodeMachine {
         let supply_v = if powered { SUPPLY_V } else { 0.0 };
         let nmt = self.firmware.is_running().then(|| self.firmware.nmt_state());
         let node = self.firmware.node_id().raw();
-        Report { node, powered, power: self.phase(), nmt, supply_v, ..Report::default() }
+        let outputs =
+            Levels { names: &OUTPUTS[..usize::from(self.firmware.lines()[1])], bits: self.firmware.levels()[1] };
+        Report { node, powered, power: self.phase(), nmt, supply_v, outputs, ..Report::default() }
     }
 
     fn inputs(&self) -> &'static [&'static str] {
-        &[]
+        &INPUTS[..usize::from(self.firmware.lines()[0])]
+    }
+
+    fn input_levels(&self) -> Levels {
+        Levels { names: self.inputs(), bits: self.firmware.levels()[0] }
+    }
+
+    fn reads_a_shaft(&self) -> bool {
+        self.firmware.description().identity.device_type & 0xFFFF == ENCODER
+    }
+
+    fn see_shaft(&mut self, turns: f64, turns_s: f64) {
+        self.firmware.see_shaft(turns, turns_s);
     }
 
     fn nvm_generation(&self) -> u64 {

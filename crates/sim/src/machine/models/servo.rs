@@ -8,7 +8,7 @@ use devices::servo::variations::VARIATIONS;
 use devices::variant::Pick;
 use devices::{AxisId, Description};
 use drives::engine::device::ResetTimes;
-use drives::node::Memory;
+use drives::node::{Memory, device_acts_on};
 use drives::servo::{
     Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Motor, Sensors, ServoDrive, acts_on, conditions,
 };
@@ -67,7 +67,8 @@ pub(super) fn ordered(model: &'static Description, order: &Order) -> Result<Box<
 /// The objects that a description has and the firmware does not act on: they are stored and answered, and have no effect.
 pub fn without_effect(model: &Description) -> impl Iterator<Item = Mux> {
     let rows = model.dictionary.rows().iter().map(canopen::od::Entry::mux);
-    rows.filter(|mux| !acts_on(model, *mux))
+    let acts = if model.axes.is_empty() { device_acts_on } else { acts_on };
+    rows.filter(move |mux| !acts(model, *mux))
 }
 
 /// A motor with the figures that its data sheet has beyond the model's.

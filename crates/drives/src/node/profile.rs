@@ -1,0 +1,134 @@
+//! What a described device does by the profile that 1000h names: CiA 401 (inputs and outputs), CiA 406 (encoders), or none, where
+//! objects are stored and answered.
+
+use canopen::AbortCode;
+use canopen::Mux;
+use canopen::od::{Condition, Dictionary, Slot, Storage, View};
+use devices::Description;
+
+use super::encoder::{self, CYCLIC_TIMER, Encoder};
+use super::io::{self, Io};
+
+/// The event timer of the first TPDO.
+const EVENT_TIMER: Mux = Mux::new(0x1800, 5);
+
+/// The profile of a device, with what it remembers.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Profile {
+    /// No objects that act.
+    None,
+    /// CiA 401.
+    Io(Io),
+    /// CiA 406.
+    Encoder(Encoder),
+}
+
+/// Whether a profile does something with an object of a device so described, beyond CiA 301.
+pub(super) fn acts_on(description: &Description, mux: Mux) -> bool {
+    match Profile::of(description) {
+        Profile::None => false,
+        Profile::Io(_) => io::acts_on(mux),
+        Profile::Encoder(_) => encoder::acts_on(mux),
+    }
+}
+
+/// What a device so described refuses for its profile: writes to objects of the profile that nothing acts on, and what the profile says.
+pub fn profile_conditions(description: &'static Description) -> impl Iterator<Item = (Slot, Condition)> {
+    let table = description.dictionary;
+    let has_profile = !matches!(Profile::of(description), Profile::None);
+    let rows = table.iter().filter(move |(_, row)| {
+        let of_profile = (0x6000..=0x67FF).contains(&row.index);
+        has_profile && of_profile && row.access.is_writable() && !acts_on(description, row.mux())
+    });
+    let is_encoder = matches!(Profile::of(description), Profile::Encoder(_));
+    let own = is_encoder.then(|| encoder::conditions(table)).into_iter().flatten();
+    rows.map(|(slot, _)| (slot, Condition::Check(refused))).chain(own)
+}
+
+/// Nothing would come of it.
+fn refused(_: &View<'_>, _: u32) -> Result<(), AbortCode> {
+    Err(AbortCode::READ_ONLY)
+}
+
+impl Profile {
+    /// By the low word of 1000h, of a device that is not a drive.
+    pub(super) const fn of(description: &Description) -> Self {
+        match description.identity.device_type & 0xFFFF {
+            401 if description.axes.is_empty() => Self::Io(Io::NONE),
+            406 if description.axes.is_empty() => Self::Encoder(Encoder::NONE),
+            _ => Self::None,
+        }
+    }
+
+    pub(super) fn restart(&mut self, values: &mut Dictionary<impl Storage>) {
+        match self {
+            Self::None => {}
+            Self::Io(io) => io.restart(values),
+            Self::Encoder(encoder) => encoder.show(values),
+        }
+    }
+
+    pub(super) fn lines(&self, values: &Dictionary<impl Storage>) -> [u8; 2] {
+        match self {
+            Self::Io(_) => [Io::input_lines(values), Io::output_lines(values)],
+            _ => [0; 2],
+        }
+    }
+
+    pub(super) fn levels(&self, values: &Dictionary<impl Storage>) -> [u64; 2] {
+        match self {
+            Self::Io(io) => [io.inputs(), io.output_levels(values)],
+            _ => [0; 2],
+        }
+    }
+
+    pub(super) fn set_input(&mut self, values: &mut Dictionary<impl Storage>, line: u8, level: bool) {
+        if let Self::Io(io) = self {
+            io.set_input(values, line, level);
+        }
+    }
+
+    pub(super) fn see_shaft(&mut self, values: &mut Dictionary<impl Storage>, turns: f64, turns_s: f64) {
+        if let Self::Encoder(encoder) = self {
+            encoder.see(values, turns, turns_s);
+        }
+    }
+
+    /// The outer world has set an object.
+    pub(super) fn measured(&mut self, values: &Dictionary<impl Storage>, mux: Mux) {
+        if let Self::Io(io) = self {
+            io.measured(values, mux);
+        }
+    }
+
+    /// A host has; a communication object that follows from it, with its value.
+    pub(super) fn written(&mut self, values: &mut Dictionary<impl Storage>, mux: Mux) -> Option<(Slot, u32)> {
+        match self {
+            Self::None => None,
+            Self::Io(io) => {
+                io.written(values, mux);
+                None
+            }
+            Self::Encoder(encoder) => {
+                encoder.written(values, mux);
+                let timer_ms = values.view().value(CYCLIC_TIMER).ok().filter(|_| mux == CYCLIC_TIMER)?;
+                Some((values.table().find(EVENT_TIMER).ok()?, u32::try_from(timer_ms).ok()?))
+            }
+        }
+    }
+
+    /// The node has left NMT operational, or its host is lost.
+    pub(super) fn fail(&mut self, values: &mut Dictionary<impl Storage>) {
+        if let Self::Io(io) = self {
+            io.fail(values);
+        }
+    }
+
+    /// Whether changes of mapped objects are events now: by CiA 401 not each is.
+    pub(super) const fn take_event(&mut self) -> bool {
+        match self {
+            Self::Io(io) => io.take_event(),
+            Self::None | Self::Encoder(_) => true,
+        }
+    }
+}
