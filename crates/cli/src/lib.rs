@@ -36,7 +36,7 @@
 //! | let several people or programs move drives, each held by what it shows of life | [`host::Host`], [`studio::app`] |
 //! | reach a bus: socketcand, slcan, a log | [`transport::BusSpec`], [`transport::run_station`] |
 //! | read and write log files | [`canlog::LogReader`], [`canlog::LogWriter`] |
-//! | serve a virtual bus to other programs | [`transport::Hub`], [`transport::run_world`] |
+//! | serve a virtual bus to other programs | [`serve::world::ServedWorld`], [`transport::Hub`], [`transport::run_world`] |
 //! | know what a device is: objects, units, faults | [`devices::Description`] |
 //! | read, check and write EDS and DCF files | [`eds::Eds`] |
 //! | test a device for conformance | [`conform::Suite`] |
@@ -53,5 +53,5 @@
 #[doc(inline)]
 pub use {
     can, canlog, canopen, cia402, conform, devices, drives, eds, host, machine, master, motion, plant, plot, recording,
-    scenario, showcase, sim, studio, transport, words,
+    scenario, serve, showcase, sim, studio, transport, words,
 };

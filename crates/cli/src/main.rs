@@ -25,13 +25,12 @@ mod recording;
 mod remembered;
 mod scope;
 mod senses;
-mod serve;
+mod served;
 mod session;
 mod signals;
 mod status;
 mod wire;
 mod word_order;
-mod world_bus;
 
 use std::io::{self, Write};
 use std::process::ExitCode;

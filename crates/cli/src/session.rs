@@ -25,11 +25,12 @@ use crate::frames::stamp::Stamps;
 use crate::frames::tap::Traffic;
 use crate::global::Global;
 use crate::progress::Progress;
-use crate::recording::{CommandLog, LogPath, Pace, interface_of};
+use crate::recording::{LogPath, interface_of};
 use crate::signals::asked_to_end;
 use crate::wire;
-use crate::world_bus::WorldBus;
 use machine::file::Machine;
+use serve::world_bus::WorldBus;
+use serve::writing::{CommandLog, Pace};
 use words::failure::causes;
 
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.

@@ -1,4 +1,4 @@
-//! What is reported of drives that whoever has moved them lets go of: by a signal, a failure, a client that has gone, a network that
+//! What is reported of drives that the program which has moved them lets go of: by a signal, a failure, a client that has gone, a network that
 //! is closed. How they are stopped is the master's: [`Network::stop_and_release`] and [`Network::stop_moved`].
 
 use canopen::NodeId;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Poll, Wake, Waker};
 
-/// A future that whoever moves a [`World`](crate::World) polls between its steps. `F` is a pinned pointer to it, a `Box` where
+/// A future that the mover of a [`World`](crate::World) polls between its steps. `F` is a pinned pointer to it, a `Box` where
 /// it is kept.
 ///
 /// After a poll the world has to look again at the stations whose handles the future has: [`World::refresh`](crate::World::refresh).

@@ -30,6 +30,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("recording", &["can", "plot", "sim", "words"]),
     ("scenario", &["can", "canopen", "cia402", "devices", "machine", "master", "sim", "words"]),
     ("host", &["can", "canopen", "cia402", "devices", "eds", "machine", "master", "plot", "sim", "words"]),
+    ("serve", &["can", "canlog", "host", "recording", "scenario", "sim", "transport", "words"]),
     ("studio", &["can", "canopen", "cia402", "host", "machine", "master", "recording", "words"]),
     (
         "python",
@@ -68,6 +69,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "plot",
             "showcase",
             "host",
+            "serve",
             "studio",
             "machine",
             "recording",

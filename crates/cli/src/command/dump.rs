@@ -21,11 +21,12 @@ use crate::frames::stamp::{Stamps, TimeForm};
 use crate::global::Global;
 use crate::output::{Format, Report};
 use crate::plain::plain;
-use crate::recording::{CommandLog, LogPath, Pace, interface_of};
+use crate::recording::{LogPath, interface_of};
 use crate::session::{bus_failure, enter_real_time, exit_on_signal, runtime, virtual_world};
 use crate::signals::asked_to_end;
 use machine::file::Machine;
 use plot::Paint;
+use serve::writing::{CommandLog, Pace};
 use words::counted;
 
 /// Show the traffic of the bus decoded: SDO, PDOs, statuswords in words
@@ -168,7 +169,7 @@ impl Dump {
         let partial = matches!(global.bus, BusSpec::Log { .. }) && sink.has_printed.get();
         let summarised = summarised.map_err(|failure| Failure { partial, ..failure });
         let written = writing.finish();
-        summarised.and(written)
+        summarised.and(written.map_err(Failure::from))
     }
 
     /// Shows what a log has, as fast as it can be read.

@@ -138,7 +138,7 @@ pub(super) fn write_svg(path: &Path, svg: String) -> Result<Option<String>, Fail
 
 /// Writes a picture to a new file, or over an earlier picture, and over nothing else.
 fn write(path: &Path, text: &str, begin: &[u8]) -> Result<(), Failure> {
-    let written = crate::serve::files::create_picture(path, begin).and_then(|mut file| file.write_all(text.as_bytes()));
+    let written = serve::files::create_picture(path, begin).and_then(|mut file| file.write_all(text.as_bytes()));
     written.map_err(|error| Failure::of_writing("the picture", path, &error))
 }
 

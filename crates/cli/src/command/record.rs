@@ -26,10 +26,10 @@ use super::sdo::resolve;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::recording::{ObjectBatch, ObjectRecord};
-use crate::serve::files::create_record;
-use crate::serve::messages::Messages;
 use plot::Paint;
+use serve::files::create_record;
+use serve::messages::Messages;
+use serve::writing::{ObjectBatch, ObjectRecord};
 
 /// Record objects of a node over time
 ///

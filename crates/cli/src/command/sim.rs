@@ -3,11 +3,20 @@
 mod described;
 
 use std::collections::{BTreeSet, VecDeque};
+use std::io::stdin;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::Mux;
+use serve::control::ControlServer;
+use serve::eeprom::Eeproms;
+use serve::messages::Messages;
+use serve::pacer::{Clock, Pacer, Speed};
+use serve::service::{PARTING_PATIENCE, REQUESTS_WAITING, Service, read_lines, tick};
+use serve::store_writer::{StoreWriter, file_name};
+use serve::world::ServedWorld;
+use serve::writing::{FrameLog, Pace, RecordFile};
 use sim::machine::{Realism, TimingMode};
 use sim::{VirtualDrive, World};
 use tokio::sync::mpsc;
@@ -21,19 +30,12 @@ use crate::global::Global;
 use crate::numbers::whole;
 use crate::output::file_path;
 use crate::plain::plain;
-use crate::recording::{FrameLog, LogPath, NewLog, Pace, RecordFile, RecordOptions};
-use crate::serve::control::{ControlOptions, ControlServer};
-use crate::serve::eeprom::{EepromError, Eeproms};
-use crate::serve::messages::Messages;
-use crate::serve::pacer::{Clock, Pacer, Speed};
-use crate::serve::service::{
-    PARTING_PATIENCE, REQUESTS_WAITING, Request, Service, listen_to_signals, read_lines, runtime_of_clients, tick,
-};
-use crate::serve::store_writer::{StoreWriter, file_name};
-use crate::serve::world::ServedWorld;
+use crate::recording::{LogPath, RecordOptions};
+use crate::served::{Asked, ClockArg, ControlOptions, at_the_end, is_typed, listen_to_signals, runtime_of_clients};
 use crate::session::{bus_failure, enter_real_time, not_served, start_clock};
 use described::notes;
 use machine::file::{Machine, Placed};
+use serve::writing::NewLog;
 use words::document::BadFile;
 use words::drive::{DriveSpec, drive_spec};
 use words::models::is_from_file;
@@ -146,7 +148,7 @@ pub(crate) struct Sim {
     /// drives whose power, statusword or error code has changed. Lines that arrive before that wait for it; a second
     /// `quit` does not.
     #[arg(long, value_name = "real|manual", value_enum, default_value = "real", hide_possible_values = true)]
-    clock: Clock,
+    clock: ClockArg,
     #[command(flatten)]
     recording: RecordOptions,
     /// Name the objects of a file that have no effect, which are otherwise only counted at the start
@@ -168,7 +170,7 @@ impl Sim {
         let is_typed = global.machine_file.as_ref().is_some_and(|file| file.is_typed);
         let file = global.machine.as_ref().filter(|_| is_typed || self.drives.is_empty());
         let machine = self.machine(file)?;
-        if global.realtime && (self.clock != Clock::Real || self.speed.is_some()) {
+        if global.realtime && (self.clock != ClockArg::Real || self.speed.is_some()) {
             return Err(Failure::usage("--realtime has no meaning where the bus does not run with the clock")
                 .next("omit --realtime, or --speed and --clock"));
         }
@@ -178,7 +180,7 @@ impl Sim {
                 .next("omit --bus, or give e.g. --bus socketcand://HOST:29536/can0"));
         }
         if bridge.is_some()
-            && (self.clock == Clock::Manual || self.speed.is_some_and(|speed| speed != Speed::Times(1.0)))
+            && (self.clock == ClockArg::Manual || self.speed.is_some_and(|speed| speed != Speed::Times(1.0)))
         {
             return Err(Failure::usage(format!("on {} time passes by itself", global.bus))
                 .because("--speed and --clock manual need a bus of its own")
@@ -188,7 +190,7 @@ impl Sim {
         // Everything that its drives refuse is reported at once, before any of them is created.
         file.map(Machine::build).transpose().map_err(unusable)?;
         let warnings = Messages::of_warnings();
-        let eeproms = self.state.as_deref().map(Eeproms::open).transpose()?;
+        let eeproms = self.state.as_deref().map(Eeproms::open).transpose().map_err(words::failure::Failure::from)?;
         let mut world = machine.world();
         for placed in &machine.drives {
             world.set_timing(machine.timing_of(placed, TimingMode::Device));
@@ -200,7 +202,7 @@ impl Sim {
         machine.make_real(&mut world);
         let log = global.log.as_ref().map(LogPath::create).transpose()?;
         let record = self.recording.start(&mut world, self.pace(), warnings.clone())?;
-        let pacer = Pacer::new(self.clock, self.speed.unwrap_or(Speed::Times(1.0)));
+        let pacer = Pacer::new(Clock::from(self.clock), self.speed.unwrap_or(Speed::Times(1.0)));
         let world = ServedWorld::new(world, pacer, log.is_some() || record.is_some(), warnings.clone());
         let runtime = runtime_of_clients()?;
         let ended = runtime.block_on(self.serve(world, eeproms, (log, record), warnings, global, bridge));
@@ -227,7 +229,7 @@ impl Sim {
 
     /// Whether log and record have to keep up with the clock.
     fn pace(&self) -> Pace {
-        if self.clock == Clock::Real && self.speed.is_none() { Pace::RealTime } else { Pace::Free }
+        if self.clock == ClockArg::Real && self.speed.is_none() { Pace::RealTime } else { Pace::Free }
     }
 
     /// The machine of the file, if there is one, with what the command line says beside it.
@@ -265,11 +267,13 @@ impl Sim {
         listen_to_signals(requests.clone());
         let answers = Messages::of_answers(warnings.clone());
         // A bus whose time is moved by hand has no time of day, and its log is the same each time.
-        let unix_zero = if self.clock == Clock::Manual { Duration::ZERO } else { clock.unix_zero() };
+        let unix_zero = if self.clock == ClockArg::Manual { Duration::ZERO } else { clock.unix_zero() };
         let log = log.map(|file| FrameLog::start(file, unix_zero, self.pace(), warnings.clone()));
-        let (waiting, by_hand) = (VecDeque::new(), self.clock == Clock::Manual);
+        let (waiting, by_hand) = (VecDeque::new(), self.clock == ClockArg::Manual);
         let (said, warned) = (answers.clone(), warnings.clone());
-        let mut service = Service { answers: said, warnings: warned, log, record, waiting, quit_in: None, by_hand };
+        let is_typed = is_typed();
+        let mut service =
+            Service { answers: said, warnings: warned, log, record, waiting, quit_in: None, by_hand, is_typed };
         let outer = match bridge {
             Some(spec) => Some(spec.open(&clock).await.map_err(|error| bus_failure(global, &error))?),
             None => None,
@@ -283,25 +287,25 @@ impl Sim {
         if let Some(eeproms) = eeproms {
             let stored = requests.clone();
             // A full queue wakes the loop as well.
-            world.keep_stores(StoreWriter::start(eeproms, warnings, move || drop(stored.try_send(Request::Stored))));
+            world.keep_stores(StoreWriter::start(eeproms, warnings, move || drop(stored.try_send(Asked::Stored))));
         }
         let over = requests.clone();
-        world.on_run_over(move || over.try_send(Request::RunIsOver).is_ok());
+        world.on_run_over(move || over.try_send(Asked::RunIsOver).is_ok());
         let full = requests.clone();
-        world.on_full_piece(move || full.try_send(Request::PieceIsFull).is_ok());
+        world.on_full_piece(move || full.try_send(Asked::PieceIsFull).is_ok());
         let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
         answers.say(&self.ready(&hub, modbus.as_ref(), control.as_ref(), bridge));
         if self.places.is_empty() && modbus.is_none() && control.is_none() && bridge.is_none() {
             service.warnings.say(UNREACHABLE);
         }
         tokio::spawn(tick(requests.clone(), clock.clone()));
-        std::thread::spawn(move || read_lines(&requests, &answers));
+        std::thread::spawn(move || read_lines(stdin().lock(), &requests, &answers));
         // After all threads that it starts: a disk or a terminal does not need real time.
         enter_real_time(global)?;
         let serving =
             run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| service.serve(world, request));
         let ended = serving.await;
-        let ended = service.part(&mut world, ended);
+        let ended = at_the_end(ended, service.part(&mut world));
         drop(world);
         if let Some(control) = control {
             control.part(PARTING_PATIENCE).await;
@@ -327,7 +331,7 @@ impl Sim {
     /// The server of `--modbus`, listening.
     async fn serve_registers(
         &self,
-        requests: &mpsc::Sender<Request>,
+        requests: &mpsc::Sender<Asked>,
         clock: &WallClock,
     ) -> Result<Option<ModbusServer>, Failure> {
         let Some(place) = &self.modbus else { return Ok(None) };
@@ -348,7 +352,11 @@ fn add_drive(
     placed.supply(drive.as_mut()).map_err(unusable)?;
     let number = spec.node.raw();
     let name = file_name(spec.model.name, number);
-    let image = eeproms.map(|eeproms| eeproms.load(&name, spec.model.name)).transpose()?.flatten();
+    let image = eeproms
+        .map(|eeproms| eeproms.load(&name, spec.model.name))
+        .transpose()
+        .map_err(words::failure::Failure::from)?
+        .flatten();
     if let Some(image) = &image {
         drive.load_nvm(image).map_err(|error| {
             Failure::new(format!("the EEPROM contents kept for {name} cannot be used"))
@@ -393,31 +401,15 @@ fn note_what_the_image_changes(
     }
 }
 
-impl From<EepromError> for Failure {
-    fn from(error: EepromError) -> Self {
-        let failure = Self::new(error.to_string());
-        match error {
-            EepromError::Corrupt(..) => failure.next("move the file away to start this drive factory-fresh"),
-            EepromError::File(..) => {
-                failure.next("put an EEPROM file of this program there, or none, and make sure that it can be written")
-            }
-            EepromError::InUse(_) => failure.next("end the other simulator, or give another --state directory"),
-            EepromError::Directory(..) | EepromError::Replaced(_) => {
-                failure.next("give --state a directory that this user can write, or a path where it can be made")
-            }
-        }
-    }
-}
-
 /// Joins another bus to this one. A bus that goes away and comes back is waited for, and the drives go on meanwhile; its end
 /// ends the simulator.
-fn join(hub: &Hub, outer: AnyBus, requests: mpsc::Sender<Request>, global: Global, warnings: Messages) {
+fn join(hub: &Hub, outer: AnyBus, requests: mpsc::Sender<Asked>, global: Global, warnings: Messages) {
     let mut notes = BusNotes::of(&global.bus);
     let joined = hub.join(outer, move |note| {
         notes.news(note).iter().for_each(|text| warnings.say(&plain(&format!("note: {text}"))));
     });
     tokio::spawn(async move {
         let error = joined.await;
-        let _ = requests.send(Request::BridgeLost(bus_failure(&global, &error))).await;
+        let _ = requests.send(Asked::Ended(bus_failure(&global, &error))).await;
     });
 }

@@ -8,7 +8,8 @@ use transport::BusSpec;
 
 use crate::failure::Failure;
 use crate::output::file_path;
-use crate::serve::files::create_log;
+use serve::files::create_log;
+use serve::writing::{NewLog, ROOM};
 
 /// A log that is to be written.
 #[derive(Clone, Debug)]
@@ -18,12 +19,6 @@ pub(crate) struct LogPath {
     /// What the log of a command has not got, once that is known; the copies are of one log.
     missing: Arc<OnceLock<String>>,
 }
-
-/// What a disk needs for a log.
-pub(crate) const ROOM: &str = "make sure that the disk has room and is fast enough";
-
-/// A log that has just been begun.
-pub(crate) type NewLog = LogWriter<std::io::BufWriter<std::fs::File>>;
 
 /// Reads the name of a log to be written: its extension selects the format, candump where it has none.
 pub(crate) fn log_path(text: &str) -> Result<LogPath, String> {
@@ -54,7 +49,7 @@ impl LogPath {
     }
 
     /// Puts down why it is not complete.
-    pub(crate) fn lacks(&self, torn: Failure) {
+    pub(crate) fn lacks(&self, torn: words::failure::Failure) {
         // The first is what went wrong.
         let _ = self.missing.set(torn.because.join("; "));
     }

@@ -9,12 +9,11 @@ use sim::coupling::BodyState;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Place, World};
 
-use super::background::Pace;
-use super::file::RecordFile;
 use crate::failure::Failure;
-use crate::serve::files::create_record;
-use crate::serve::messages::Messages;
 use master::units::parse_duration;
+use serve::files::create_record;
+use serve::messages::Messages;
+use serve::writing::{Pace, RecordFile};
 
 /// Sample rate and choice of signals of a record.
 #[derive(clap::Args, Clone, Debug, Default)]

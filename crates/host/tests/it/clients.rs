@@ -79,7 +79,7 @@ impl Bench {
         Self { world, network, master, notes: Rc::default() }
     }
 
-    /// Runs a script of clients to its end; whoever serves them goes on for `after` the script.
+    /// Runs a script of clients to its end; the guards and stops go on for `after` the script.
     fn run<T>(&mut self, after: Duration, script: impl AsyncFnOnce(&Network, &Clients) -> T) -> T {
         let network = self.network.clone();
         let notes = Rc::clone(&self.notes);
@@ -179,7 +179,7 @@ fn a_guard_is_given_back_when_the_last_has_gone_that_needed_it() {
             assert_eq!(network.guarded(joint).is_some(), held);
         }
     });
-    // Nothing watches any more: an end of the program is no alarm (20h: heartbeat of the host lost).
+    // Nothing watches any more: an end of the program does not raise an alarm (20h: heartbeat of the host lost).
     bench.world.remove(bench.master);
     bench.world.run_for(Duration::from_secs(4));
     assert_eq!(bench.world.report(JOINT).unwrap().error_code, 0);

@@ -178,7 +178,7 @@ fn a_synchronous_rpdo_after_the_window_is_discarded_until_the_next_sync() {
     write(&mut node, "23071000F4010000");
     answer(&mut node, "000#0104");
     let value = |node: &Node<Boxed>| node.dictionary().raw(node.table().find(canopen::Mux::new(0x2000, 0)).unwrap());
-    let mut frame = |node: &mut Node<Boxed>, text: &str, us| {
+    let frame = |node: &mut Node<Boxed>, text: &str, us| {
         node.handle_timeout(at_us(us));
         node.handle_frame(&text.parse().unwrap(), at_us(us));
         written(node).into_iter().filter(|event| matches!(event, NodeEvent::Written { .. })).count()

@@ -17,11 +17,12 @@ use crate::failure::Failure;
 use crate::numbers::whole;
 use crate::output::{Format, file_path};
 use crate::progress::Progress;
-use crate::recording::{Batch, Pace, RecordOptions};
-use crate::serve::messages::Messages;
+use crate::recording::RecordOptions;
 use crate::session::exit_on_signal;
 use loaded::{Loaded, unbuildable, write};
 use report::RunReport;
+use serve::messages::Messages;
+use serve::writing::{Batch, Pace};
 use serving::ServeOptions;
 
 /// Run scenarios in virtual time, and check what they expect

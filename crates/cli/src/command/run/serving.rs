@@ -4,19 +4,18 @@ use std::collections::VecDeque;
 use std::path::Path;
 
 use scenario::{Execution, Outcome, Scenario};
+use serve::messages::Messages;
+use serve::pacer::{Clock, Pacer, Speed};
+use serve::service::{PARTING_PATIENCE, REQUESTS_WAITING, Service, tick};
+use serve::world::ServedWorld;
+use serve::writing::Pace;
 use tokio::sync::mpsc;
 use transport::{Hub, HubOptions, ServeSpec, WallClock, run_world};
 
 use super::loaded::unbuildable;
 use crate::failure::Failure;
-use crate::recording::{Pace, RecordOptions};
-use crate::serve::control::ControlOptions;
-use crate::serve::messages::Messages;
-use crate::serve::pacer::{Clock, Pacer, Speed};
-use crate::serve::service::{
-    PARTING_PATIENCE, REQUESTS_WAITING, Request, Service, listen_to_signals, runtime_of_clients, tick,
-};
-use crate::serve::world::ServedWorld;
+use crate::recording::RecordOptions;
+use crate::served::{Asked, ClockArg, ControlOptions, at_the_end, is_typed, listen_to_signals, runtime_of_clients};
 use crate::session::not_served;
 
 /// Where and how fast a scenario is served.
@@ -34,7 +33,7 @@ pub(crate) struct ServeOptions {
     speed: Option<Speed>,
     /// What advances the time of a served scenario: the clock, or `run` on the control connection (manual)
     #[arg(long, value_name = "real|manual", value_enum, default_value = "real")]
-    clock: Clock,
+    clock: ClockArg,
     #[command(flatten)]
     control: ControlOptions,
 }
@@ -47,7 +46,7 @@ impl ServeOptions {
 
     /// Refuses a clock that nothing could advance.
     pub(super) fn check(&self) -> Result<(), Failure> {
-        if self.clock == Clock::Manual && self.control.place().is_none() {
+        if self.clock == ClockArg::Manual && self.control.place().is_none() {
             return Err(Failure::usage("the time cannot be advanced with --clock manual")
                 .because("that is for a scenario that is served to programs outside")
                 .next("give --serve URL, and --control 127.0.0.1:0: its clients advance time with `run 20ms`"));
@@ -68,14 +67,15 @@ impl ServeOptions {
     ) -> Result<(Outcome, Result<(), Failure>), Failure> {
         let (mut world, execution) = Execution::begin(scenario, seed).map_err(|bad| unbuildable(file, bad))?;
         let warnings = Messages::of_warnings();
-        let real_time = self.clock == Clock::Real && self.speed.is_none();
+        let real_time = self.clock == ClockArg::Real && self.speed.is_none();
         let pace = if real_time { Pace::RealTime } else { Pace::Free };
         let record = recording.start(&mut world, pace, warnings.clone())?;
-        let pacer = Pacer::new(self.clock, self.speed.unwrap_or(Speed::Times(1.0))).waiting_for_a_client();
+        let pacer = Pacer::new(Clock::from(self.clock), self.speed.unwrap_or(Speed::Times(1.0))).waiting_for_a_client();
         let world = ServedWorld::new(world, pacer, record.is_some(), warnings.clone());
         let answers = Messages::of_answers(warnings.clone());
-        let (waiting, by_hand) = (VecDeque::new(), self.clock == Clock::Manual);
-        let service = Service { answers, warnings, log: None, record, waiting, quit_in: None, by_hand };
+        let (waiting, by_hand) = (VecDeque::new(), self.clock == ClockArg::Manual);
+        let is_typed = is_typed();
+        let service = Service { answers, warnings, log: None, record, waiting, quit_in: None, by_hand, is_typed };
         runtime_of_clients()?.block_on(self.serve(world, execution, service))
     }
 
@@ -92,9 +92,9 @@ impl ServeOptions {
         let mut hub = Hub::bind(&self.places, options, &clock).await.map_err(|error| not_served(&error))?;
         let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
         let (run_is_over, scenario_is_over, full) = (requests.clone(), requests.clone(), requests.clone());
-        world.on_run_over(move || run_is_over.try_send(Request::RunIsOver).is_ok());
-        world.on_full_piece(move || full.try_send(Request::PieceIsFull).is_ok());
-        world.follow(execution, move || scenario_is_over.try_send(Request::ScenarioIsOver).is_ok());
+        world.on_run_over(move || run_is_over.try_send(Asked::RunIsOver).is_ok());
+        world.on_full_piece(move || full.try_send(Asked::PieceIsFull).is_ok());
+        world.follow(execution, move || scenario_is_over.try_send(Asked::ScenarioIsOver).is_ok());
         let listeners = hub.listeners().iter().map(|listener| format!(" {listener}"));
         let place = control.iter().map(|server| format!(" {}", server.place()));
         service.answers.say(&["ready".to_owned()].into_iter().chain(listeners).chain(place).collect::<String>());
@@ -102,7 +102,7 @@ impl ServeOptions {
         let serving =
             run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| service.serve(world, request));
         let ended = serving.await;
-        let ended = service.part(&mut world, ended);
+        let ended = at_the_end(ended, service.part(&mut world));
         let (mut world, execution) = world.into_course();
         if let Some(control) = control {
             control.part(PARTING_PATIENCE).await;

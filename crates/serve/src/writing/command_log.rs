@@ -3,15 +3,18 @@
 //! A thread of its own writes what has come ten times a second, so that a command that is killed loses less than a second,
 //! and a slow disk costs frames of the log, never time of the bus.
 
+use std::fs::File;
 use std::io;
 use std::time::Duration;
 
 use can::{BusFrame, Frame, Instant, Listen};
-use canlog::{Content, Direction, Interface, Record};
+use canlog::{Content, Direction, Interface, LogWriter, Record};
 
 use super::background::{Background, Output, Pace, WaitingRules};
-use super::log_options::NewLog;
-use crate::failure::Failure;
+use words::failure::Failure;
+
+/// A log file that has just been begun.
+pub type NewLog = LogWriter<io::BufWriter<File>>;
 
 /// How long frames may wait in memory.
 const INTERVAL: Duration = Duration::from_millis(100);
@@ -21,7 +24,7 @@ const MOST_WAITING: usize = 1 << 17;
 
 /// A log under way; the clones write the same file. Without a file nothing is kept.
 #[derive(Clone, Default)]
-pub(crate) struct CommandLog(Option<Log>);
+pub struct CommandLog(Option<Log>);
 
 #[derive(Clone)]
 struct Log {
@@ -31,7 +34,7 @@ struct Log {
 }
 
 /// The end of a log, which its owner waits for.
-pub(crate) struct Writing(Option<Background<Record>>);
+pub struct Writing(Option<Background<Record>>);
 
 impl Output<Record> for NewLog {
     const FILE: &'static str = "the log";
@@ -53,30 +56,25 @@ impl Output<Record> for NewLog {
 impl CommandLog {
     /// Writes to `file` from now on. `unix_zero` is the Unix time of the bus's zero; a bus of virtual time waits for the
     /// disk. What goes wrong is reported at the end.
-    pub(crate) fn start(
-        file: Option<NewLog>,
-        interface: Interface,
-        unix_zero: Duration,
-        pace: Pace,
-    ) -> (Self, Writing) {
+    pub fn start(file: Option<NewLog>, interface: Interface, unix_zero: Duration, pace: Pace) -> (Self, Writing) {
         let waiting = WaitingRules { pace, room: MOST_WAITING, gathers: INTERVAL };
         let file = file.map(|file| Background::start(file, waiting, None));
         (Self(file.clone().map(|file| Log { file, interface, unix_zero })), Writing(file))
     }
 
     /// Takes a frame that passed.
-    pub(crate) fn frame(&self, frame: &Frame, now: Instant, direction: Direction) {
+    pub fn frame(&self, frame: &Frame, now: Instant, direction: Direction) {
         self.take(Content::Frame(*frame), now, Some(direction));
     }
 
     /// Takes what was on the bus.
-    pub(crate) fn take(&self, content: Content, now: Instant, direction: Option<Direction>) {
+    pub fn take(&self, content: Content, now: Instant, direction: Option<Direction>) {
         let Some(Log { file, interface, unix_zero }) = &self.0 else { return };
         file.write(Record { at: Some(now + *unix_zero), interface: *interface, direction, content }, 1);
     }
 
     /// Takes a record of another log as it is.
-    pub(crate) fn record(&self, record: &Record) {
+    pub fn record(&self, record: &Record) {
         if let Some(log) = &self.0 {
             log.file.write(record.clone(), 1);
         }
@@ -88,7 +86,7 @@ impl Writing {
     ///
     /// # Errors
     /// The log is not whole.
-    pub(crate) fn finish(self) -> Result<(), Failure> {
+    pub fn finish(self) -> Result<(), Failure> {
         self.0.map_or(Ok(()), |file| file.finish(Duration::MAX))
     }
 }

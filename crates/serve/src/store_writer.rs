@@ -18,7 +18,7 @@ use super::messages::Messages;
 const RETRY_INTERVAL: Duration = Duration::from_millis(500);
 
 /// See the [module](self).
-pub(crate) struct StoreWriter {
+pub struct StoreWriter {
     shared: Arc<Shared>,
     /// How the last attempts went, when it is over.
     outcome: Receiver<Result<(), EepromError>>,
@@ -41,7 +41,7 @@ struct State {
 
 impl StoreWriter {
     /// Writes to `eeproms` from now on. `settled` is called when there is something for [`take_settled`](Self::take_settled).
-    pub(crate) fn start(eeproms: Eeproms, messages: Messages, settled: impl Fn() + Send + 'static) -> Self {
+    pub fn start(eeproms: Eeproms, messages: Messages, settled: impl Fn() + Send + 'static) -> Self {
         let shared = Arc::new(Shared::default());
         let (done, outcome) = channel();
         let served = Arc::clone(&shared);
@@ -51,7 +51,7 @@ impl StoreWriter {
 
     /// One whose disk is the holder of the other value, which gets what is kept, by drive number and store.
     #[cfg(test)]
-    pub(crate) fn by_hand() -> (Self, impl Fn(u8, u64)) {
+    pub fn by_hand() -> (Self, impl Fn(u8, u64)) {
         let shared = Arc::new(Shared::default());
         let (_, outcome) = channel();
         let held = Arc::clone(&shared);
@@ -59,19 +59,19 @@ impl StoreWriter {
     }
 
     /// Has an image brought to the disk.
-    pub(crate) fn hand_over(&self, image: StoredImage) {
+    pub fn hand_over(&self, image: StoredImage) {
         self.shared.lock().waiting.insert(image.number, image);
         self.shared.changed.notify_one();
     }
 
     /// The stores that need not be waited for any more, by drive number.
-    pub(crate) fn take_settled(&self) -> Vec<(u8, u64)> {
+    pub fn take_settled(&self) -> Vec<(u8, u64)> {
         std::mem::take(&mut self.shared.lock().settled)
     }
 
     /// Returns when everything is on the disk, or with the reason why it is not, at most after `patience`; `None` if nothing
     /// is known by then.
-    pub(crate) fn finish(self, patience: Duration) -> Option<Result<(), EepromError>> {
+    pub fn finish(self, patience: Duration) -> Option<Result<(), EepromError>> {
         self.shared.lock().over = true;
         self.shared.changed.notify_one();
         self.outcome.recv_timeout(patience).ok()
@@ -79,7 +79,7 @@ impl StoreWriter {
 }
 
 /// The name under which a drive's image is kept.
-pub(crate) fn file_name(model: &str, number: u8) -> String {
+pub fn file_name(model: &str, number: u8) -> String {
     format!("{model}@{number}")
 }
 
@@ -142,7 +142,7 @@ impl Shared {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::serve::scratch;
+    use crate::scratch;
 
     const SOON: Duration = Duration::from_secs(600);
 

@@ -10,41 +10,35 @@ use sim::events::Event;
 use sim::recorder::Recorder;
 
 use super::background::{Background, Output, Pace, WaitingRules};
-use crate::failure::Failure;
-use crate::serve::messages::Messages;
+use crate::messages::Messages;
+use words::failure::Failure;
 
 /// What happened since the batch before, each kind in the order of its times.
 #[derive(Default)]
-pub(crate) struct Batch {
+pub struct Batch {
     /// Samples.
-    pub(crate) recorded: Option<Recorder>,
+    pub recorded: Option<Recorder>,
     /// What the bus carried.
-    pub(crate) frames: Vec<(Instant, Frame)>,
+    pub frames: Vec<(Instant, Frame)>,
     /// What happened.
-    pub(crate) events: Vec<Event>,
+    pub events: Vec<Event>,
 }
 
 /// A record that a thread of its own writes.
-pub(crate) struct RecordFile(Background<Batch>);
+pub struct RecordFile(Background<Batch>);
 
 impl RecordFile {
     /// Writes to `file` from now on. Later errors are reported to `messages`.
     ///
     /// # Errors
     /// That of writing the begin.
-    pub(crate) fn start(
-        kind: Kind,
-        file: File,
-        columns: &[Column],
-        pace: Pace,
-        messages: Messages,
-    ) -> io::Result<Self> {
+    pub fn start(kind: Kind, file: File, columns: &[Column], pace: Pace, messages: Messages) -> io::Result<Self> {
         let record = Record::begin(kind, Box::new(file), columns)?;
         Ok(Self(Background::start(record, WaitingRules::of(pace), Some(messages))))
     }
 
     /// Takes a batch.
-    pub(crate) fn write(&mut self, batch: Batch) {
+    pub fn write(&mut self, batch: Batch) {
         let samples = batch.recorded.as_ref().map_or(0, |recorded| recorded.times().len());
         self.0.write(batch, samples as u64);
     }
@@ -53,7 +47,7 @@ impl RecordFile {
     ///
     /// # Errors
     /// The file is not whole.
-    pub(crate) fn finish(self, patience: Duration) -> Result<(), Failure> {
+    pub fn finish(self, patience: Duration) -> Result<(), Failure> {
         self.0.finish(patience)
     }
 }

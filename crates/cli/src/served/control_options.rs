@@ -3,10 +3,11 @@
 use host::control::ControlAddress;
 use tokio::sync::mpsc;
 
-use super::{ControlMessage, ControlServer, Entry};
+use serve::control::{ControlMessage, ControlServer, Entry};
+use serve::messages::Messages;
+use serve::world::ServedWorld;
+
 use crate::failure::Failure;
-use crate::serve::messages::Messages;
-use crate::serve::world::ServedWorld;
 
 /// Where the world can be commanded from, and by whom.
 #[derive(clap::Args, Clone, Debug)]
@@ -66,7 +67,7 @@ impl ControlOptions {
         };
         let entry = if token.is_some() { Entry::ByToken } else { Entry::Free };
         token.into_iter().for_each(|token| world.ask_for_token(token));
-        ControlServer::bind(address, entry, requests.clone()).await.map(Some)
+        Ok(Some(ControlServer::bind(address, entry, requests.clone()).await?))
     }
 }
 

@@ -4,7 +4,6 @@
 //! and values kept and the others counted, and is not listened to while many answers wait for it. Where a token is asked for, who has
 //! not given it is a stranger: there are few of them at a time, they come slowly, and they do not stay.
 
-mod options;
 mod rate;
 mod shared_outbox;
 #[cfg(unix)]
@@ -21,10 +20,9 @@ use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, mpsc};
 use transport::WallClock;
 
-use crate::failure::Failure;
-pub(crate) use options::ControlOptions;
 use rate::Rate;
-pub(crate) use shared_outbox::{OutboxSender, SharedOutbox};
+pub use shared_outbox::{OutboxSender, SharedOutbox};
+use words::failure::Failure;
 
 /// Clients served at a time.
 const MAX_CLIENTS: usize = 256;
@@ -49,7 +47,7 @@ const READ_SIZE: usize = 4096;
 const WRITE_SIZE: usize = 16 * 1024;
 
 /// What the world's loop hears of the clients.
-pub(crate) enum ControlMessage {
+pub enum ControlMessage {
     /// One has come. Lines for it go into the shared_outbox.
     Joined(ClientNumber, Arc<SharedOutbox>),
     /// It has sent a line.
@@ -76,7 +74,7 @@ const STRANGERS_AT_ONCE: u32 = 64;
 
 /// Who may come to a server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Entry {
+pub enum Entry {
     /// Everyone who reaches it.
     Free,
     /// Who gives the token in good time.
@@ -84,7 +82,7 @@ pub(crate) enum Entry {
 }
 
 /// Listens until it is dropped; a Unix socket is removed then.
-pub(crate) struct ControlServer {
+pub struct ControlServer {
     place: ControlAddress,
     listening: tokio::task::JoinHandle<()>,
     places: Arc<Semaphore>,
@@ -95,11 +93,7 @@ pub(crate) struct ControlServer {
 
 impl ControlServer {
     /// Listens at `address`; messages go to `requests`. The world says whom it admits.
-    pub(crate) async fn bind<T>(
-        address: &ControlAddress,
-        entry: Entry,
-        requests: mpsc::Sender<T>,
-    ) -> Result<Self, Failure>
+    pub async fn bind<T>(address: &ControlAddress, entry: Entry, requests: mpsc::Sender<T>) -> Result<Self, Failure>
     where
         T: From<ControlMessage> + Send + 'static,
     {
@@ -135,13 +129,13 @@ impl ControlServer {
     }
 
     /// Where it listens, with the real port.
-    pub(crate) const fn place(&self) -> &ControlAddress {
+    pub const fn place(&self) -> &ControlAddress {
         &self.place
     }
 
     /// Accepts no more clients, and waits until the present ones have read what was sent, at most for `patience`. The world
     /// has released them before.
-    pub(crate) async fn part(self, patience: Duration) {
+    pub async fn part(self, patience: Duration) {
         self.listening.abort();
         // Who does not read by then has no use for it.
         let _ = tokio::time::timeout(patience, self.places.acquire_many(MAX_CLIENTS as u32)).await;

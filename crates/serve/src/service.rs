@@ -2,7 +2,7 @@
 //! records that it keeps. Nothing here waits for the program at the other end.
 
 use std::collections::VecDeque;
-use std::io::{self, IsTerminal};
+use std::io::{self, BufRead};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -14,10 +14,8 @@ use super::control::ControlMessage;
 use super::input::next_line;
 use super::messages::Messages;
 use super::world::{Commanded, ServedWorld};
-use crate::failure::Failure;
-use crate::recording::{Batch, FrameLog, RecordFile};
-use crate::session::{no_runtime, runtime};
-use crate::signals::{Signal, Signals};
+use crate::writing::{Batch, FrameLog, RecordFile};
+use words::failure::Failure;
 
 /// How often the log is handed on, and drives are looked at that nothing has happened to.
 const KEEPING_INTERVAL: Duration = Duration::from_millis(100);
@@ -25,12 +23,14 @@ const KEEPING_INTERVAL: Duration = Duration::from_millis(100);
 /// How long standard input waits for the reader of the answers before answers may be dropped.
 const READER_PATIENCE: Duration = Duration::from_secs(1);
 
-/// How long the end waits for the disk, and then for the reader of the last answers.
+/// How long the end waits for the disk.
 const DISK_PATIENCE: Duration = Duration::from_secs(5);
-pub(crate) const PARTING_PATIENCE: Duration = Duration::from_millis(500);
 
-/// How long after a signal the process ends in any case: what stores, log and the last words may take together.
-const END_PATIENCE: Duration = Duration::from_secs(12);
+/// How long the end then waits for the reader of the last answers.
+pub const PARTING_PATIENCE: Duration = Duration::from_millis(500);
+
+/// How long the end may take in any case: what stores, log and the last words may take together.
+pub const END_PATIENCE: Duration = Duration::from_secs(12);
 
 /// How many times [`KEEPING_INTERVAL`] a `quit` waits for the end of a run: 10 s, in which a drive alone has hours.
 const QUIT_TURNS: u32 = 100;
@@ -39,19 +39,21 @@ const QUIT_TURNS: u32 = 100;
 const LINES_WAITING: usize = 1024;
 
 /// Requests that may wait.
-pub(crate) const REQUESTS_WAITING: usize = 64;
+pub const REQUESTS_WAITING: usize = 64;
 
 /// Tasks of clients that run before the world has its turn again; see [`transport::Hub`] on how much each does.
 const TASKS_A_TURN: u32 = 16;
 
 /// The runtime of a served world and its clients.
-pub(crate) fn runtime_of_clients() -> Result<tokio::runtime::Runtime, Failure> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().event_interval(TASKS_A_TURN).build();
-    runtime.map_err(|error| no_runtime(&error))
+///
+/// # Errors
+/// The system's.
+pub fn runtime_of_clients() -> io::Result<tokio::runtime::Runtime> {
+    tokio::runtime::Builder::new_current_thread().enable_all().event_interval(TASKS_A_TURN).build()
 }
 
-/// Something to be served between two steps of the world.
-pub(crate) enum Request {
+/// Something to be served between two steps of the world. `E` is why the service ends, where that is not a line that asks for it.
+pub enum Request<E> {
     /// A line of standard input.
     Line(String),
     /// A run has come to its end.
@@ -68,45 +70,58 @@ pub(crate) enum Request {
     Control(ControlMessage),
     /// The scenario has come to its end.
     ScenarioIsOver,
-    /// A signal asks for the end.
-    Ended(Signal),
-    /// The bus that was joined is gone.
-    BridgeLost(Failure),
+    /// A signal asks for the end, or the bus that was joined is gone.
+    Ended(E),
 }
 
-impl From<ControlMessage> for Request {
+impl<E> From<ControlMessage> for Request<E> {
     fn from(message: ControlMessage) -> Self {
         Self::Control(message)
     }
 }
 
-impl From<ModbusRequest> for Request {
+impl<E> From<ModbusRequest> for Request<E> {
     fn from(request: ModbusRequest) -> Self {
         Self::Registers(request)
     }
 }
 
 /// What a running simulation says and writes.
-pub(crate) struct Service {
+pub struct Service {
     /// Answers to world commands.
-    pub(crate) answers: Messages,
+    pub answers: Messages,
     /// Everything else that people should know.
-    pub(crate) warnings: Messages,
+    pub warnings: Messages,
     /// The log, if one is asked for.
-    pub(crate) log: Option<FrameLog>,
+    pub log: Option<FrameLog>,
     /// The record, if one is asked for.
-    pub(crate) record: Option<RecordFile>,
+    pub record: Option<RecordFile>,
     /// Lines that came while a run was under way: each is answered in its turn.
-    pub(crate) waiting: VecDeque<String>,
+    pub waiting: VecDeque<String>,
     /// RoundRobin of keeping after which a `quit` that waits ends the run.
-    pub(crate) quit_in: Option<u32>,
+    pub quit_in: Option<u32>,
     /// Time is moved by hand.
-    pub(crate) by_hand: bool,
+    pub by_hand: bool,
+    /// Lines are typed at a terminal: a `quit` among them does not wait for the end of a run.
+    pub is_typed: bool,
+}
+
+/// How the service has ended.
+#[derive(Debug)]
+pub struct Parted {
+    /// What is not whole on the disk: stores, log, record.
+    pub torn: Vec<Failure>,
+    /// What was said has been read: without a reader nothing more can be said either.
+    pub is_read: bool,
 }
 
 impl Service {
     /// Serves one request; breaks when it was the last.
-    pub(crate) fn serve(&mut self, world: &mut ServedWorld, request: Request) -> ControlFlow<Result<(), Failure>> {
+    pub fn serve<E: From<Failure>>(
+        &mut self,
+        world: &mut ServedWorld,
+        request: Request<E>,
+    ) -> ControlFlow<Result<(), E>> {
         match request {
             Request::Line(line) if world.is_running() && asks_to_quit(&line) => {
                 return self.quit_later(world, line);
@@ -131,14 +146,13 @@ impl Service {
                 self.after_a_run(world)?;
                 return ControlFlow::Break(Ok(()));
             }
-            Request::Ended(signal) => return ControlFlow::Break(Err(Failure::ended_by(signal))),
-            Request::BridgeLost(failure) => return ControlFlow::Break(Err(failure)),
+            Request::Ended(why) => return ControlFlow::Break(Err(why)),
         }
         ControlFlow::Continue(())
     }
 
     /// Answers a line.
-    fn obey(&mut self, world: &mut ServedWorld, line: &str) -> ControlFlow<Result<(), Failure>> {
+    fn obey<E: From<Failure>>(&mut self, world: &mut ServedWorld, line: &str) -> ControlFlow<Result<(), E>> {
         let Commanded::Done(answer) = world.command(line) else { return ControlFlow::Continue(()) };
         if !answer.quit {
             self.answers.say(&answer.json);
@@ -147,7 +161,7 @@ impl Service {
         // What was stored is on the disk when the answer is read.
         let kept = self.finish(world);
         self.answers.say(&answer.json);
-        ControlFlow::Break(kept)
+        ControlFlow::Break(kept.map_err(E::from))
     }
 
     /// A line that came during a run waits for its end.
@@ -161,9 +175,9 @@ impl Service {
 
     /// A `quit` that comes during a run has its turn like other lines, so that lines which a script sends at once mean what they say.
     /// It does not wait for ever: a second one, one typed at a terminal, and [`QUIT_TURNS`] end the run.
-    fn quit_later(&mut self, world: &mut ServedWorld, quit: String) -> ControlFlow<Result<(), Failure>> {
+    fn quit_later<E: From<Failure>>(&mut self, world: &mut ServedWorld, quit: String) -> ControlFlow<Result<(), E>> {
         self.put_off(quit);
-        if self.quit_in.is_some() || io::stdin().is_terminal() {
+        if self.quit_in.is_some() || self.is_typed {
             return self.quit_in_a_run(world);
         }
         self.quit_in = Some(QUIT_TURNS);
@@ -171,13 +185,13 @@ impl Service {
     }
 
     /// One turn less until a `quit` that waits ends the run.
-    fn count_down(&mut self, world: &mut ServedWorld) -> ControlFlow<Result<(), Failure>> {
+    fn count_down<E: From<Failure>>(&mut self, world: &mut ServedWorld) -> ControlFlow<Result<(), E>> {
         self.quit_in = self.quit_in.and_then(|round_robin| round_robin.checked_sub(1));
         if self.quit_in == Some(0) { self.quit_in_a_run(world) } else { ControlFlow::Continue(()) }
     }
 
     /// Ends the run, and answers the lines that waited for it, up to `quit`; runs among them end where they begin.
-    fn quit_in_a_run(&mut self, world: &mut ServedWorld) -> ControlFlow<Result<(), Failure>> {
+    fn quit_in_a_run<E: From<Failure>>(&mut self, world: &mut ServedWorld) -> ControlFlow<Result<(), E>> {
         self.end_run(world, "quit");
         while let Some(line) = self.waiting.pop_front() {
             self.obey(world, &line)?;
@@ -194,7 +208,7 @@ impl Service {
     }
 
     /// Answers a run that is over, and the lines that waited for it, up to the next run.
-    fn after_a_run(&mut self, world: &mut ServedWorld) -> ControlFlow<Result<(), Failure>> {
+    fn after_a_run<E: From<Failure>>(&mut self, world: &mut ServedWorld) -> ControlFlow<Result<(), E>> {
         if let Some(answer) = world.take_run() {
             self.answers.say(&answer);
         }
@@ -207,28 +221,13 @@ impl Service {
         ControlFlow::Continue(())
     }
 
-    /// Ends with `ended`: stores and log are on the disk, and what was said is read, as far as the disk and the readers
-    /// allow in good time. The reason that ended the simulation is reported first, then what kept a store from the disk.
-    pub(crate) fn part(mut self, world: &mut ServedWorld, ended: Result<(), Failure>) -> Result<(), Failure> {
-        let kept = self.finish(world);
-        let mut ended = match (ended, kept) {
-            (Err(failure), Err(lost)) => Err(failure.because(lost.what)),
-            (ended, kept) => ended.and(kept),
-        };
-        let logged = self.log.take().map(|log| log.finish(DISK_PATIENCE));
-        let recorded = self.record.take().map(|record| record.finish(DISK_PATIENCE));
-        for torn in [logged, recorded].into_iter().flatten().filter_map(Result::err) {
-            ended = Err(match ended {
-                Ok(()) => torn,
-                Err(failure) => torn.because.into_iter().fold(failure.because(torn.what), Failure::because),
-            });
-        }
-        let read = self.answers.finish(PARTING_PATIENCE) & self.warnings.finish(PARTING_PATIENCE);
-        if let Err(failure) = &mut ended {
-            // Without a reader the reason cannot be printed either: that would wait for ever.
-            failure.reported |= !read;
-        }
-        ended
+    /// Ends: stores and log are on the disk, and what was said is read, as far as the disk and the readers allow in good time.
+    pub fn part(mut self, world: &mut ServedWorld) -> Parted {
+        let kept = self.finish(world).err();
+        let logged = self.log.take().and_then(|log| log.finish(DISK_PATIENCE).err());
+        let recorded = self.record.take().and_then(|record| record.finish(DISK_PATIENCE).err());
+        let is_read = self.answers.finish(PARTING_PATIENCE) & self.warnings.finish(PARTING_PATIENCE);
+        Parted { torn: [kept, logged, recorded].into_iter().flatten().collect(), is_read }
     }
 
     /// Brings to the disk what has happened since the last time.
@@ -259,9 +258,8 @@ fn asks_to_quit(line: &str) -> bool {
     line.parse() == Ok(Command::Quit)
 }
 
-/// Hands over the lines of standard input; ends with it. A reader of `answers` that is slow is waited for here.
-pub(crate) fn read_lines(requests: &mpsc::Sender<Request>, answers: &Messages) {
-    let mut input = io::stdin().lock();
+/// Hands over the lines of `input`; ends with it. A reader of `answers` that is slow is waited for here.
+pub fn read_lines<E>(mut input: impl BufRead, requests: &mpsc::Sender<Request<E>>, answers: &Messages) {
     while let Ok(Some(line)) = next_line(&mut input) {
         if sim::command::asks_for_an_answer(&line) {
             answers.wait_for_room(READER_PATIENCE);
@@ -273,39 +271,13 @@ pub(crate) fn read_lines(requests: &mpsc::Sender<Request>, answers: &Messages) {
 }
 
 /// Asks for records to be kept.
-pub(crate) async fn tick(requests: mpsc::Sender<Request>, clock: WallClock) {
+pub async fn tick<E>(requests: mpsc::Sender<Request<E>>, clock: WallClock) {
     loop {
         clock.sleep(KEEPING_INTERVAL).await;
         if requests.send(Request::Keep).await.is_err() {
             return;
         }
     }
-}
-
-/// Listens to signals from now on, in a thread of its own. The first asks for the end; if that takes too long, or a second
-/// one comes, the process ends at once. Stores that were acknowledged are on the disk in any case.
-pub(crate) fn listen_to_signals(requests: mpsc::Sender<Request>) {
-    let (ready, listening) = std::sync::mpsc::channel();
-    std::thread::spawn(move || {
-        let Ok(runtime) = runtime() else { return };
-        runtime.block_on(async {
-            let mut signals = Signals::listen();
-            drop(ready);
-            let signal = signals.next().await;
-            let asked = async {
-                let _ = requests.send(Request::Ended(signal)).await;
-                std::future::pending::<()>().await;
-            };
-            tokio::select! {
-                () = asked => {}
-                _ = signals.next() => {}
-                () = tokio::time::sleep(END_PATIENCE) => {}
-            }
-            std::process::exit(signal.status() as i32);
-        });
-    });
-    // A client that has read `ready` may ask for the end; the other end is dropped when that is so.
-    let _: Result<(), _> = listening.recv();
 }
 
 #[cfg(test)]
@@ -323,11 +295,13 @@ mod tests {
     use sim::stimulus::Place;
     use transport::RealTimeWorld;
 
-    use super::super::files::{create_log, create_record};
-    use super::super::pacer::{Clock, Pacer, Speed};
-    use super::super::scratch;
     use super::*;
-    use crate::recording::Pace;
+    use crate::files::{create_log, create_record};
+    use crate::pacer::{Clock, Pacer, Speed};
+    use crate::scratch;
+    use crate::writing::Pace;
+
+    type Asked = Request<Failure>;
 
     /// The record and the log of some lines; before line `keep_before` the clock comes to where they are looked for.
     fn written(kind: Kind, keep_before: usize) -> [Vec<u8>; 2] {
@@ -358,22 +332,23 @@ mod tests {
             waiting: VecDeque::new(),
             quit_in: None,
             by_hand: true,
+            is_typed: false,
         };
         let lines = ["run 1500ms", "4 load torque 0.5", "run 2ms", "4 fault hall on", "run 1s", "4 fault hall off"];
         for (place, line) in lines.into_iter().enumerate() {
             if place == keep_before {
-                assert!(service.serve(&mut served, Request::Keep).is_continue());
+                assert!(service.serve(&mut served, Asked::Keep).is_continue());
             }
-            assert!(service.serve(&mut served, Request::Line(line.to_owned())).is_continue());
+            assert!(service.serve(&mut served, Asked::Line(line.to_owned())).is_continue());
             while served.is_running() {
                 let target = served.target(Instant::ZERO);
                 let before = served.now();
                 served.advance_to(target);
-                let request = if served.now() == before { Request::RunIsOver } else { Request::PieceIsFull };
+                let request = if served.now() == before { Asked::RunIsOver } else { Asked::PieceIsFull };
                 assert!(service.serve(&mut served, request).is_continue());
             }
         }
-        assert!(service.part(&mut served, Ok(())).is_ok());
+        assert!(service.part(&mut served).torn.is_empty());
         let bytes = [path, log].map(|path| std::fs::read(path).unwrap());
         std::fs::remove_dir_all(folder).unwrap();
         bytes

@@ -20,7 +20,7 @@ const SPEEDS: std::ops::RangeInclusive<f64> = 0.001..=100_000.0;
 
 /// What `--speed` says.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Speed {
+pub enum Speed {
     /// So many times as fast as the clock.
     Times(f64),
     /// As fast as the machine goes, while a client is connected; else with the clock.
@@ -42,18 +42,18 @@ impl std::str::FromStr for Speed {
 }
 
 /// What `--clock` says.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Clock {
-    /// Time passes by itself
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Clock {
+    /// Time passes by itself.
     #[default]
     Real,
-    /// Time passes by `run 20ms` only
+    /// Time passes by `run 20ms` only.
     Manual,
 }
 
 /// See the [module](self).
 #[derive(Debug)]
-pub(crate) struct Pacer {
+pub struct Pacer {
     way: Way,
     /// Of a world that follows the clock.
     pace: Pace,
@@ -76,7 +76,7 @@ enum Way {
 
 impl Pacer {
     /// A world at time zero when the clock shows zero.
-    pub(crate) fn new(clock: Clock, speed: Speed) -> Self {
+    pub fn new(clock: Clock, speed: Speed) -> Self {
         let (way, times) = match (clock, speed) {
             (Clock::Manual, _) => (Way::Manual(Instant::ZERO), 0.0),
             (Clock::Real, Speed::Times(times)) => (Way::Clock, times),
@@ -93,12 +93,12 @@ impl Pacer {
     }
 
     /// Time stands until the first client comes, unless it is moved by hand.
-    pub(crate) fn waiting_for_a_client(self) -> Self {
+    pub fn waiting_for_a_client(self) -> Self {
         Self { waits: !self.is_manual(), ..self }
     }
 
     /// How far a world at `now` is to come when the clock shows `clock`.
-    pub(crate) fn target(&mut self, clock: Instant, now: Instant) -> Instant {
+    pub fn target(&mut self, clock: Instant, now: Instant) -> Instant {
         // The time in which the machine slept is left out.
         self.changed |= clock - self.moved > ASLEEP;
         self.moved = clock;
@@ -117,7 +117,7 @@ impl Pacer {
     }
 
     /// What the clock shows when a world is to have come to `at`; `None` for never.
-    pub(crate) fn clock_at(&self, at: Instant) -> Option<Instant> {
+    pub fn clock_at(&self, at: Instant) -> Option<Instant> {
         match self.way {
             Way::Manual(end) => (at <= end).then_some(Instant::ZERO),
             _ if self.waits => None,
@@ -130,28 +130,28 @@ impl Pacer {
     }
 
     /// Whether a world can fall behind: it follows the clock.
-    pub(crate) fn follows_the_clock(&self) -> bool {
+    pub fn follows_the_clock(&self) -> bool {
         self.way == Way::Clock || (self.way == Way::Max && self.clients == 0)
     }
 
     /// Time is moved by hand.
-    pub(crate) fn is_manual(&self) -> bool {
+    pub fn is_manual(&self) -> bool {
         matches!(self.way, Way::Manual(_))
     }
 
     /// Has time pass up to `end`, where it is moved by hand.
-    pub(crate) fn run_to(&mut self, end: Instant) {
+    pub fn run_to(&mut self, end: Instant) {
         self.way = Way::Manual(end);
     }
 
     /// A client has come.
-    pub(crate) fn joined(&mut self) {
+    pub fn joined(&mut self) {
         self.clients += 1;
         self.changed |= std::mem::take(&mut self.waits);
     }
 
     /// A client is gone. A world that has hurried goes on from where it is.
-    pub(crate) fn left(&mut self) {
+    pub fn left(&mut self) {
         self.clients = self.clients.saturating_sub(1);
         self.changed |= self.clients == 0 && self.way == Way::Max;
     }

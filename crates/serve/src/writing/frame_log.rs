@@ -7,14 +7,14 @@ use can::{Frame, Instant};
 use canlog::{LogWriter, Record};
 
 use super::background::{Background, Output, Pace, WaitingRules};
-use crate::failure::Failure;
-use crate::serve::messages::Messages;
+use crate::messages::Messages;
+use words::failure::Failure;
 
 /// Frames, and when the bus carried them.
 type Batch = Vec<(Instant, Frame)>;
 
 /// See the [module](self).
-pub(crate) struct FrameLog(Background<Batch>);
+pub struct FrameLog(Background<Batch>);
 
 /// A log whose times are counted from this one.
 struct Timed<W: Write> {
@@ -38,7 +38,7 @@ impl<W: Write + Seek + Send + 'static> Output<Batch> for Timed<W> {
 
 impl FrameLog {
     /// Writes to `log` from now on, with times counted from `unix_zero`. Errors are reported to `messages`.
-    pub(crate) fn start<W: Write + Seek + Send + 'static>(
+    pub fn start<W: Write + Seek + Send + 'static>(
         log: LogWriter<W>,
         unix_zero: Duration,
         pace: Pace,
@@ -48,7 +48,7 @@ impl FrameLog {
     }
 
     /// Takes frames that were carried.
-    pub(crate) fn write(&mut self, batch: Batch) {
+    pub fn write(&mut self, batch: Batch) {
         let count = batch.len() as u64;
         if count > 0 {
             self.0.write(batch, count);
@@ -59,7 +59,7 @@ impl FrameLog {
     ///
     /// # Errors
     /// The file is not whole.
-    pub(crate) fn finish(self, patience: Duration) -> Result<(), Failure> {
+    pub fn finish(self, patience: Duration) -> Result<(), Failure> {
         self.0.finish(patience)
     }
 }

@@ -10,15 +10,15 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::failure::{Failure, FailureBody};
-use crate::plain::plain;
+use words::failure::{Failure, FailureBody};
+use words::plain;
 
 /// Bytes that may wait: some 7,000 answers to `get`.
 const MAX_BYTES: usize = 4 << 20;
 
 /// Speaks to one stream. A copy speaks to the same.
 #[derive(Clone)]
-pub(crate) struct Messages(Arc<Shared>);
+pub struct Messages(Arc<Shared>);
 
 /// What replaces answers that were not read in time.
 #[derive(Serialize)]
@@ -50,7 +50,7 @@ struct Queue {
 
 impl Messages {
     /// Standard output, of lines that answer world commands.
-    pub(crate) fn of_answers(warned: Messages) -> Self {
+    pub fn of_answers(warned: Messages) -> Self {
         let gap = |dropped| {
             let failure = Failure::new(format!("{dropped} answers are missing here: they were not read in time"))
                 .of_kind("dropped")
@@ -61,13 +61,13 @@ impl Messages {
     }
 
     /// Standard error.
-    pub(crate) fn of_warnings() -> Self {
+    pub fn of_warnings() -> Self {
         Self::start(io::stderr(), |dropped| format!("warning: {dropped} messages are missing here"), None)
     }
 
     /// To no reader.
     #[cfg(test)]
-    pub(crate) fn silent() -> Self {
+    pub fn silent() -> Self {
         Self::start(io::sink(), |_| String::new(), None)
     }
 
@@ -79,7 +79,7 @@ impl Messages {
     }
 
     /// Says a line. Characters that would steer a terminal are shown instead.
-    pub(crate) fn say(&self, line: &str) {
+    pub fn say(&self, line: &str) {
         let line = plain(line);
         let mut queue = self.0.lock();
         if queue.bytes + line.len() > MAX_BYTES {
@@ -95,7 +95,7 @@ impl Messages {
     }
 
     /// Waits until half of the room is free, at most for `patience`, and not again before something has been read.
-    pub(crate) fn wait_for_room(&self, patience: Duration) {
+    pub fn wait_for_room(&self, patience: Duration) {
         let queue = self.0.lock();
         if !queue.stalled {
             let crowded = |queue: &mut Queue| queue.bytes > MAX_BYTES / 2;
@@ -107,7 +107,7 @@ impl Messages {
 
     /// Waits until everything is written, at most for `patience`; false if it is not by then: what writes to the stream
     /// now would wait too.
-    pub(crate) fn finish(&self, patience: Duration) -> bool {
+    pub fn finish(&self, patience: Duration) -> bool {
         let busy = |queue: &mut Queue| queue.writing || !queue.lines.is_empty() || queue.dropped > 0;
         let waited = self.0.changed.wait_timeout_while(self.0.lock(), patience, busy);
         !waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()

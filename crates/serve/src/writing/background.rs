@@ -5,13 +5,15 @@ use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::ROOM;
-use crate::failure::Failure;
-use crate::serve::messages::Messages;
+use crate::messages::Messages;
+use words::failure::Failure;
+
+/// What a disk needs for a file that is not whole.
+pub const ROOM: &str = "make sure that the disk has room and is fast enough";
 
 /// Whether time passes by the clock while a batch waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Pace {
+pub enum Pace {
     /// The bus goes with the clock: what the disk has no time for is left out.
     RealTime,
     /// The bus waits for the disk: everything is written, and little waits.

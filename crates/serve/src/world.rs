@@ -35,7 +35,7 @@ use super::store_writer::StoreWriter;
 use super::stores::Stores;
 
 /// See the [module](self).
-pub(crate) struct ServedWorld {
+pub struct ServedWorld {
     world: World,
     adapter: StationId,
     round_robin: RoundRobin<ClientId>,
@@ -85,7 +85,7 @@ struct FollowedExecution {
 }
 
 /// The result of a world command.
-pub(crate) enum Commanded {
+pub enum Commanded {
     /// Nothing is answered: a blank line or a comment.
     Nothing,
     /// It is done.
@@ -97,7 +97,7 @@ pub(crate) enum Commanded {
 impl ServedWorld {
     /// Adds the adapter to `world`, whose time passes as `pacer` says. `logged` keeps carried frames for [`Self::take_carried`]; what is to be said of the
     /// service goes to `messages`.
-    pub(crate) fn new(mut world: World, pacer: Pacer, logged: bool, messages: Messages) -> Self {
+    pub fn new(mut world: World, pacer: Pacer, logged: bool, messages: Messages) -> Self {
         let adapter = world.add_probe();
         let mut control = Control::new(None);
         if world.is_watched() {
@@ -128,7 +128,7 @@ impl ServedWorld {
     }
 
     /// Goes through a scenario with the clients as its host; calls `is_over` at its end, until that returns true. Time then stands.
-    pub(crate) fn follow(&mut self, mut execution: Execution, is_over: impl Fn() -> bool + 'static) {
+    pub fn follow(&mut self, mut execution: Execution, is_over: impl Fn() -> bool + 'static) {
         execution.is_served_by(self.adapter, &mut self.world);
         if self.world.is_watched() {
             self.control.keep_events();
@@ -138,22 +138,22 @@ impl ServedWorld {
     }
 
     /// The world and its scenario, as they stand.
-    pub(crate) fn into_course(self) -> (World, Option<Execution>) {
+    pub fn into_course(self) -> (World, Option<Execution>) {
         (self.world, self.execution.map(|followed| followed.execution))
     }
 
     /// From now on what drives store is kept, and acknowledged when it is.
-    pub(crate) fn keep_stores(&mut self, store_writer: StoreWriter) {
+    pub fn keep_stores(&mut self, store_writer: StoreWriter) {
         self.stores = Some(Stores::guard(&mut self.world, store_writer, self.messages.clone()));
     }
 
     /// Clients of the control connection have to give this token from now on.
-    pub(crate) fn ask_for_token(&mut self, token: String) {
+    pub fn ask_for_token(&mut self, token: String) {
         self.control.ask_for(token);
     }
 
     /// A client of the control connection comes, speaks or goes.
-    pub(crate) fn serve_control(&mut self, message: ControlMessage) {
+    pub fn serve_control(&mut self, message: ControlMessage) {
         match message {
             ControlMessage::Joined(number, shared_outbox) => self.control.join(number, OutboxSender(shared_outbox)),
             ControlMessage::Left(number) => self.see_off(number),
@@ -178,12 +178,12 @@ impl ServedWorld {
     }
 
     /// The bus's rate.
-    pub(crate) fn bitrate(&self) -> Bitrate {
+    pub fn bitrate(&self) -> Bitrate {
         self.world.bitrate()
     }
 
     /// Does what a world command says.
-    pub(crate) fn command(&mut self, line: &str) -> Commanded {
+    pub fn command(&mut self, line: &str) -> Commanded {
         if let Ok(Command::Run(run)) = line.parse() {
             return match self.begin(run) {
                 Ok(()) => Commanded::Begun,
@@ -229,24 +229,24 @@ impl ServedWorld {
     }
 
     /// Calls `run_is_over` when there is something for [`take_run`](Self::take_run), until it returns true.
-    pub(crate) fn on_run_over(&mut self, run_is_over: impl Fn() -> bool + 'static) {
+    pub fn on_run_over(&mut self, run_is_over: impl Fn() -> bool + 'static) {
         self.run_is_over = Box::new(run_is_over);
     }
 
     /// Calls `is_full` when what is kept has to be [taken](Self::take_carried) before time goes on, until it returns true.
-    pub(crate) fn on_full_piece(&mut self, is_full: impl Fn() -> bool + 'static) {
+    pub fn on_full_piece(&mut self, is_full: impl Fn() -> bool + 'static) {
         if let Some(kept) = &mut self.kept {
             kept.on_full(is_full);
         }
     }
 
     /// True while a run is under way.
-    pub(crate) fn is_running(&self) -> bool {
+    pub fn is_running(&self) -> bool {
         self.run.is_some()
     }
 
     /// Ends the run that is under way where it stands, if there is one; the answer, unless it goes to a client of the control connection.
-    pub(crate) fn end_run(&mut self, why: &'static str) -> Option<String> {
+    pub fn end_run(&mut self, why: &'static str) -> Option<String> {
         let run = self.run.take()?;
         let now = self.world.now();
         self.pacer.run_to(now);
@@ -261,7 +261,7 @@ impl ServedWorld {
     }
 
     /// Ends a run that has come to its end; the answer, unless it goes to a client of the control connection.
-    pub(crate) fn take_run(&mut self) -> Option<String> {
+    pub fn take_run(&mut self) -> Option<String> {
         let run = self.run.take_if(|run| run.end <= self.world.now())?;
         let answer = run.before.answer(&mut self.world);
         match run.client {
@@ -274,7 +274,7 @@ impl ServedWorld {
     }
 
     /// Has a Modbus request answered.
-    pub(crate) fn serve_registers(&mut self, request: ModbusRequest) {
+    pub fn serve_registers(&mut self, request: ModbusRequest) {
         match &mut self.stores {
             Some(stores) => stores.answer(&mut self.world, request, self.clock),
             None => {
@@ -285,25 +285,25 @@ impl ServedWorld {
     }
 
     /// What was recorded since the last call, if anything is.
-    pub(crate) fn take_recorded(&mut self) -> Option<Recorder> {
+    pub fn take_recorded(&mut self) -> Option<Recorder> {
         self.world.take_recorded()
     }
 
     /// What happened since the last call, if the world is watched.
-    pub(crate) fn take_events(&mut self) -> Vec<Event> {
+    pub fn take_events(&mut self) -> Vec<Event> {
         let mut events = std::mem::take(&mut self.events);
         events.append(&mut self.control.take_events(&mut self.world));
         events
     }
 
     /// Frames carried since the last call.
-    pub(crate) fn take_carried(&mut self) -> Vec<(Instant, Frame)> {
+    pub fn take_carried(&mut self) -> Vec<(Instant, Frame)> {
         let now = self.world.now();
         self.kept.as_mut().map(|kept| kept.take(now)).unwrap_or_default()
     }
 
     /// Finds stores that no frame goes with: a joint notes its position when its supply falls.
-    pub(crate) fn look_for_stores(&mut self) {
+    pub fn look_for_stores(&mut self) {
         let Some(stores) = &mut self.stores else { return };
         let numbers: Vec<u8> = self.world.drive_numbers().collect();
         for number in numbers {
@@ -315,7 +315,7 @@ impl ServedWorld {
 
     /// Returns when all stores are on the disk, at most after `patience`; `None` if nothing is known by then. Stores of
     /// later are not kept.
-    pub(crate) fn finish_stores(&mut self, patience: Duration) -> Option<Result<(), EepromError>> {
+    pub fn finish_stores(&mut self, patience: Duration) -> Option<Result<(), EepromError>> {
         self.look_for_stores();
         match self.stores.take() {
             Some(stores) => stores.finish(&mut self.world, patience),

@@ -7,7 +7,7 @@ use tokio::sync::{Notify, watch};
 
 /// Lines for one client, and whether more will come.
 #[derive(Debug, Default)]
-pub(crate) struct SharedOutbox {
+pub struct SharedOutbox {
     content: Mutex<Content>,
     filled: Notify,
     emptied: Notify,
@@ -31,7 +31,7 @@ struct Content {
 
 /// The world's end of a shared_outbox. Dropped, it closes it: what is there is still sent.
 #[derive(Debug)]
-pub(crate) struct OutboxSender(pub(crate) Arc<SharedOutbox>);
+pub struct OutboxSender(pub Arc<SharedOutbox>);
 
 impl Sink for OutboxSender {
     fn put(&mut self, class: Class, line: String) {

@@ -9,6 +9,8 @@ use std::fs::{self, File, Metadata};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use words::failure::Failure;
+
 use super::files::{create_new, identity, read_bounded};
 
 const MAGIC: &str = "ferrodrive eeprom 1";
@@ -18,14 +20,14 @@ const MAX_LENGTH: u64 = 64 * 1024;
 
 /// The directory of `--state`, locked against a second simulator.
 #[derive(Debug)]
-pub(crate) struct Eeproms {
+pub struct Eeproms {
     directory: PathBuf,
     lock: File,
 }
 
 /// Why images cannot be kept or used.
 #[derive(Debug)]
-pub(crate) enum EepromError {
+pub enum EepromError {
     /// The directory cannot be made or locked.
     Directory(PathBuf, io::Error),
     /// Another simulator has the directory.
@@ -50,9 +52,25 @@ impl std::fmt::Display for EepromError {
     }
 }
 
+impl From<EepromError> for Failure {
+    fn from(error: EepromError) -> Self {
+        let failure = Self::new(error.to_string());
+        match error {
+            EepromError::Corrupt(..) => failure.next("move the file away to start this drive factory-fresh"),
+            EepromError::File(..) => {
+                failure.next("put an EEPROM file of this program there, or none, and make sure that it can be written")
+            }
+            EepromError::InUse(_) => failure.next("end the other simulator, or give another --state directory"),
+            EepromError::Directory(..) | EepromError::Replaced(_) => {
+                failure.next("give --state a directory that this user can write, or a path where it can be made")
+            }
+        }
+    }
+}
+
 impl Eeproms {
     /// Opens or makes the directory. A last symbolic link is not followed.
-    pub(crate) fn open(directory: &Path) -> Result<Self, EepromError> {
+    pub fn open(directory: &Path) -> Result<Self, EepromError> {
         // Without the slashes at its end, behind which a link would be followed.
         let directory: PathBuf = directory.components().collect();
         let failed = |error| EepromError::Directory(directory.clone(), error);
@@ -78,7 +96,7 @@ impl Eeproms {
     }
 
     /// The image kept for a drive; `None` if there is none yet.
-    pub(crate) fn load(&self, drive: &str, model: &str) -> Result<Option<Vec<u8>>, EepromError> {
+    pub fn load(&self, drive: &str, model: &str) -> Result<Option<Vec<u8>>, EepromError> {
         self.check_place()?;
         let path = self.path(drive);
         match read_bounded(&path, MAX_LENGTH) {
@@ -89,7 +107,7 @@ impl Eeproms {
     }
 
     /// Keeps an image for a drive; returns when it is on the disk.
-    pub(crate) fn store(&self, drive: &str, model: &str, image: &[u8]) -> Result<(), EepromError> {
+    pub fn store(&self, drive: &str, model: &str, image: &[u8]) -> Result<(), EepromError> {
         self.check_place()?;
         let path = self.path(drive);
         let temporary = self.directory.join(format!("{drive}.new"));
@@ -188,7 +206,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::serve::scratch;
+    use crate::scratch;
 
     #[test]
     fn crc_matches_the_published_check_value() {

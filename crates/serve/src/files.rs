@@ -41,7 +41,7 @@ fn open_regular(path: &Path, options: &OpenOptions) -> io::Result<File> {
 }
 
 /// The contents of a regular file of at most `limit` bytes; `None` if there is none.
-pub(crate) fn read_bounded(path: &Path, limit: u64) -> io::Result<Option<Vec<u8>>> {
+pub fn read_bounded(path: &Path, limit: u64) -> io::Result<Option<Vec<u8>>> {
     let file = match open_regular(path, OpenOptions::new().read(true)) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         opened => opened?,
@@ -55,18 +55,18 @@ pub(crate) fn read_bounded(path: &Path, limit: u64) -> io::Result<Option<Vec<u8>
 }
 
 /// A file that did not exist, to be written and read.
-pub(crate) fn create_new(path: &Path) -> io::Result<File> {
+pub fn create_new(path: &Path) -> io::Result<File> {
     OpenOptions::new().read(true).write(true).create_new(true).open(path)
 }
 
 /// An empty file to write a log to: a new one, or one that is empty or begins as a log of that format does. Any other
 /// file belongs to others, and is not changed.
-pub(crate) fn create_log(path: &Path, format: Format) -> io::Result<File> {
+pub fn create_log(path: &Path, format: Format) -> io::Result<File> {
     create_or_replace(path, format.written_begin().unwrap_or_default(), &format!("a log of the format {format}"))
 }
 
 /// An empty file to write a record to: a new one, or one that is empty or a record already.
-pub(crate) fn create_record(path: &Path, kind: Kind) -> io::Result<File> {
+pub fn create_record(path: &Path, kind: Kind) -> io::Result<File> {
     match kind {
         Kind::Mcap => create_or_replace(path, b"\x89MCAP0\r\n", "an MCAP file"),
         Kind::Csv => create_or_replace(path, b"t_s,", "a record"),
@@ -74,7 +74,7 @@ pub(crate) fn create_record(path: &Path, kind: Kind) -> io::Result<File> {
 }
 
 /// An empty file to write a picture to: a new one, or one that is empty or begins as our pictures of its kind do.
-pub(crate) fn create_picture(path: &Path, begin: &[u8]) -> io::Result<File> {
+pub fn create_picture(path: &Path, begin: &[u8]) -> io::Result<File> {
     create_or_replace(path, begin, "a picture of this program")
 }
 
@@ -98,21 +98,21 @@ fn create_or_replace(path: &Path, begin: &[u8], what: &str) -> io::Result<File> 
 
 /// What distinguishes two files, where the system has it.
 #[cfg(unix)]
-pub(crate) fn identity(metadata: &Metadata) -> Option<(u64, u64)> {
+pub fn identity(metadata: &Metadata) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt;
     Some((metadata.dev(), metadata.ino()))
 }
 
 /// What distinguishes two files, where the system has it.
 #[cfg(not(unix))]
-pub(crate) fn identity(_: &Metadata) -> Option<(u64, u64)> {
+pub fn identity(_: &Metadata) -> Option<(u64, u64)> {
     None
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::serve::scratch;
+    use crate::scratch;
 
     #[test]
     fn a_log_replaces_a_log_and_nothing_else() {

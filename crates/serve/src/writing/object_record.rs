@@ -8,35 +8,35 @@ use can::{Frame, Instant};
 use recording::{Column, Kind, Mark, Record};
 
 use super::background::{Background, Output, Pace, WaitingRules};
-use crate::failure::Failure;
-use crate::serve::messages::Messages;
+use crate::messages::Messages;
+use words::failure::Failure;
 
 /// What came since the batch before, each kind in the order of its times.
 #[derive(Default)]
-pub(crate) struct ObjectBatch {
+pub struct ObjectBatch {
     /// The values of all columns.
-    pub(crate) rows: Vec<(Instant, Vec<f64>)>,
+    pub rows: Vec<(Instant, Vec<f64>)>,
     /// What others sent.
-    pub(crate) frames: Vec<(Instant, Frame)>,
+    pub frames: Vec<(Instant, Frame)>,
     /// What happened.
-    pub(crate) marks: Vec<Mark>,
+    pub marks: Vec<Mark>,
 }
 
 /// A record that a thread of its own writes.
-pub(crate) struct ObjectRecord(Background<ObjectBatch>);
+pub struct ObjectRecord(Background<ObjectBatch>);
 
 impl ObjectRecord {
     /// Writes to `file` from now on. Later errors are reported to `messages`.
     ///
     /// # Errors
     /// That of writing the begin.
-    pub(crate) fn start(kind: Kind, file: File, columns: &[Column], messages: Messages) -> io::Result<Self> {
+    pub fn start(kind: Kind, file: File, columns: &[Column], messages: Messages) -> io::Result<Self> {
         let record = Record::begin(kind, Box::new(file), columns)?;
         Ok(Self(Background::start(record, WaitingRules::of(Pace::RealTime), Some(messages))))
     }
 
     /// Takes a batch; one that the disk has no time for is left out and reported.
-    pub(crate) fn write(&mut self, batch: ObjectBatch) {
+    pub fn write(&mut self, batch: ObjectBatch) {
         let samples = batch.rows.len() as u64;
         self.0.write(batch, samples);
     }
@@ -45,7 +45,7 @@ impl ObjectRecord {
     ///
     /// # Errors
     /// The file is not whole.
-    pub(crate) fn finish(self, patience: Duration) -> Result<(), Failure> {
+    pub fn finish(self, patience: Duration) -> Result<(), Failure> {
         self.0.finish(patience)
     }
 }

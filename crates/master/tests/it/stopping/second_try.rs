@@ -1,0 +1,52 @@
+//! A stop that was not heard, and is sent again.
+
+use std::task::Poll;
+use std::time::Duration;
+
+use devices::{HostWatch, model};
+use master::drive::{MotionOptions, SwitchedOff};
+use master::units::Rpm;
+use sim::task::Task;
+use sim::{Place, Stimulus};
+
+use super::{Bench, NODES, PERIOD, models, options};
+
+/// A connection that was gone for a moment, as a converter that is plugged in again: the first stop is not heard.
+#[test]
+fn a_drive_that_is_reached_again_is_stopped_by_a_second_try() {
+    // Longer than until the last request of the first try, which ends 300 ms after the first.
+    const GONE: Duration = Duration::from_millis(250);
+    for name in models() {
+        let mut bench = Bench::new(name);
+        let [drive, _] = bench.drives.clone();
+        bench.run(drive.guard(SwitchedOff::SwitchOn)).unwrap();
+        bench.run(drive.velocity(Rpm(60.0), MotionOptions { wait: true, ..options() })).unwrap();
+        bench.moving = vec![NODES[0]];
+        let cut = |bench: &mut Bench, cut| {
+            bench.world.apply(Place::node(NODES[0]), &Stimulus::CableCut(cut)).unwrap().unwrap();
+        };
+        cut(&mut bench, true);
+        let (began, network) = (bench.world.now(), bench.network.clone());
+        let mut stopping = Task::new(Box::pin(async move { network.stop_and_release().await }));
+        let mut is_cut = true;
+        let stopped = loop {
+            match stopping.poll_if_woken() {
+                Some(Poll::Ready(stopped)) => break stopped,
+                Some(_) => bench.world.refresh(),
+                None if is_cut && bench.world.now() - began >= GONE => {
+                    is_cut = false;
+                    cut(&mut bench, false);
+                }
+                None => assert!(bench.world.step(), "{name}"),
+            }
+        };
+        let [stopped] = &stopped[..] else { panic!("{name}: {stopped:?}") };
+        let after = stopped.outcome.clone().unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(after >= GONE, "{name}: {after:?}");
+        assert!(after + PERIOD >= bench.world.now() - began, "{name}: {after:?} since the first try");
+        // What it would have done without this program, for who reports a stop that was not seen.
+        let watch = model(name).unwrap().host_watch;
+        assert_eq!(stopped.loss.is_some(), watch != HostWatch::None, "{name}: {stopped:?}");
+        assert!(bench.fastest() < 1.0 && bench.network.moved().is_empty(), "{name}");
+    }
+}

@@ -1,0 +1,32 @@
+//! Virtual drives for other programs: a world whose bus is served, whose time follows a clock or is moved by hand, which is
+//! commanded by lines and over sockets, and whose stores, logs and records reach the disk without holding the bus up.
+//!
+//! [`world::ServedWorld`] is the world behind a [`transport::Hub`]; [`pacer`] says how fast its time passes; [`service`] answers what is
+//! asked of it between two steps, and [`control`] has the sockets of the control connection. [`world_bus::WorldBus`] is a world as the bus
+//! of this very program.
+
+pub mod control;
+pub mod eeprom;
+pub mod files;
+mod input;
+mod kept;
+mod lag;
+pub mod messages;
+pub mod pacer;
+mod registers;
+mod round_robin;
+pub mod service;
+pub mod store_writer;
+mod stores;
+pub mod world;
+pub mod world_bus;
+pub mod writing;
+
+/// An empty directory of a test's own.
+#[cfg(test)]
+pub(crate) fn scratch(name: &str) -> std::path::PathBuf {
+    let path = std::env::temp_dir().join(format!("ferrodrive-serve-{}-{name}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).expect("the temporary directory can be written");
+    path
+}
