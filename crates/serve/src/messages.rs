@@ -51,18 +51,28 @@ struct Queue {
 impl Messages {
     /// Standard output, of lines that answer world commands.
     pub fn of_answers(warned: Messages) -> Self {
+        Self::answers_to(io::stdout(), warned)
+    }
+
+    /// The same to another stream.
+    pub fn answers_to(stream: impl Write + Send + 'static, warned: Messages) -> Self {
         let gap = |dropped| {
             let failure = Failure::new(format!("{dropped} answers are missing here: they were not read in time"))
                 .of_kind("dropped")
                 .next("read the answers as they come");
             sim::json::line(&Gap { ok: false, error: (&failure).into(), dropped })
         };
-        Self::start(io::stdout(), gap, Some(warned))
+        Self::start(stream, gap, Some(warned))
     }
 
     /// Standard error.
     pub fn of_warnings() -> Self {
-        Self::start(io::stderr(), |dropped| format!("warning: {dropped} messages are missing here"), None)
+        Self::warnings_to(io::stderr())
+    }
+
+    /// The same to another stream.
+    pub fn warnings_to(stream: impl Write + Send + 'static) -> Self {
+        Self::start(stream, |dropped| format!("warning: {dropped} messages are missing here"), None)
     }
 
     /// To no reader.

@@ -1,17 +1,27 @@
 //! The command line on drives of its own: commands that end by themselves, in virtual time. One program: a file each.
 
+mod boot;
 mod broken_pipe;
 mod completion;
 mod cycles;
+mod dump;
 mod eds;
+mod every_day;
+mod groups;
 mod handbook;
 mod init;
 mod json;
+mod latency;
+mod limits;
+mod logs;
 mod machine;
 mod on_sim;
 mod output;
+mod params;
 mod plan;
+mod recording;
 mod run;
+mod serving;
 mod status;
 mod units;
 mod usage;

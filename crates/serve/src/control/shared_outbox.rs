@@ -61,6 +61,13 @@ impl SharedOutbox {
         self.filled.notify_one();
     }
 
+    /// The next line for its client, if there is one.
+    pub fn next_line(&self) -> Option<String> {
+        let line = self.content().outbox.next_line();
+        self.emptied.notify_one();
+        line
+    }
+
     /// The world has not admitted its client yet.
     pub(super) fn is_stranger(&self) -> bool {
         *self.standing.borrow() == Standing::Stranger

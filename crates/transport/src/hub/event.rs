@@ -11,6 +11,13 @@ use crate::Protocol;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ClientId(pub(super) u64);
 
+impl ClientId {
+    /// A client by its number, for a world that is moved without a hub.
+    pub const fn of(number: u64) -> Self {
+        Self(number)
+    }
+}
+
 impl fmt::Display for ClientId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "client {}", self.0)

@@ -14,7 +14,6 @@ mod logs;
 mod lss;
 mod modbus;
 mod models;
-mod pace;
 mod params;
 mod recording;
 mod run_served;

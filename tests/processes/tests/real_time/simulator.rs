@@ -4,8 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 use std::time::Duration;
 
-use processes::{Simulator, command, done, ferrodrive, scratch, wait_until};
-use serde_json::json;
+use processes::{Simulator, command, done, scratch, wait_until};
 
 const DRIVE: [&str; 2] = ["--drive", "zlac8030l@4"];
 const SERVE: [&str; 4] = ["--serve", "socketcand://127.0.0.1:0", "--serve", "slcan://127.0.0.1:0"];
@@ -44,44 +43,6 @@ fn the_ready_line_names_every_listener_with_its_port() {
         let address = simulator.address(protocol);
         let port: u16 = address.rsplit_once(':').unwrap().1.parse().unwrap();
         assert_ne!(port, 0);
-    }
-}
-
-#[test]
-fn world_commands_are_answered_line_by_line() {
-    let mut simulator = simulator(&[]);
-    let get = simulator.ask("4 get");
-    assert_eq!((&get["ok"], &get["node"]), (&json!(true), &json!(4)));
-    for field in ["t", "position", "velocity_rpm", "current_a", "supply_v"] {
-        assert!(get[field].is_number(), "{field} in {get}");
-    }
-    assert!(get["outputs"]["Y0"].is_number() && get["outputs"]["Y1"].is_number(), "{get}");
-    assert_eq!(get["brake"], "released");
-    assert_eq!(simulator.ask("4 supply 36")["ok"], true);
-    for wrong in ["fly", "5 get", "4 supply", "4 input X9 1", "4 fault wing on", "128 get"] {
-        let answer = simulator.ask(wrong);
-        assert_eq!(answer["ok"], false, "{wrong}");
-        assert!(answer["error"]["message"].as_str().is_some_and(|error| !error.is_empty()), "{answer}");
-    }
-    // Blank lines have no answer: the next one belongs to the next command.
-    simulator.send("");
-    simulator.send("   ");
-    assert_eq!(simulator.ask("now")["ok"], true);
-    assert_eq!(simulator.ask("quit")["ok"], true);
-    assert_eq!(simulator.wait(), Some(0));
-}
-
-#[test]
-fn every_drive_tells_the_same_fields_of_itself() {
-    let mut simulator = simulator(&["--drive", "m4230e17b50@1", "--drive", "zlim42c@2"]);
-    for node in [1, 2, 4] {
-        let got = simulator.ask(&format!("{node} get"));
-        assert_eq!((&got["ok"], &got["node"]), (&json!(true), &json!(node)));
-        for field in ["t", "position", "velocity_rpm", "current_a", "supply_v"] {
-            assert!(got[field].is_number(), "{field} in {got}");
-        }
-        assert_eq!(got["brake"], "released", "also where there is none: nothing holds the shaft");
-        assert!(got["outputs"].is_object(), "{got}");
     }
 }
 
@@ -131,17 +92,6 @@ fn two_simulators_joined_by_a_bus_hear_each_other() {
     );
 }
 
-#[test]
-fn only_a_live_bus_given_on_the_command_line_is_joined() {
-    let drive = ["sim", "--drive", "zlac8030l@4", "--bus"];
-    let ended = ferrodrive(&[&drive[..], &["sim"]].concat());
-    assert_eq!(ended.status, Some(2));
-    assert!(ended.err.contains("a live bus only"), "{}", ended.err);
-    let ended = ferrodrive(&[&drive[..], &["socketcand://127.0.0.1:1/can0"]].concat());
-    assert_eq!(ended.status, Some(1));
-    assert!(ended.err.contains("cannot connect") && !ended.out.contains("ready"), "{}", ended.err);
-}
-
 /// `dump` goes on where the server is back, and a command that waits for an answer ends with what happened.
 #[test]
 fn a_lost_connection_is_told_and_made_again() {
@@ -163,13 +113,6 @@ fn a_lost_connection_is_told_and_made_again() {
     dump.kill().unwrap();
     dump.wait().unwrap();
     drop(second);
-}
-
-#[test]
-fn a_bus_that_is_not_there_is_a_failure_with_the_reason() {
-    let ended = ferrodrive(&["--bus", "socketcand://127.0.0.1:1/can0", "scan"]);
-    assert_eq!(ended.status, Some(1));
-    assert!(ended.err.contains("cannot connect"), "{}", ended.err);
 }
 
 #[test]
@@ -226,16 +169,6 @@ fn an_image_is_on_the_disk_before_the_simulator_ends() {
 }
 
 #[test]
-fn a_corrupt_image_is_reported_and_not_used() {
-    let directory = scratch("corrupt");
-    std::fs::write(directory.join("zlac8030l@4.eeprom"), "ferrodrive eeprom 1 zlac8030l 5\nwrong").unwrap();
-    let ended = ferrodrive(&[&["sim"], &DRIVE[..], &["--state", directory.to_str().unwrap()]].concat());
-    assert_eq!(ended.status, Some(1));
-    assert!(ended.err.contains("corrupt") && ended.err.contains("zlac8030l@4.eeprom"), "{}", ended.err);
-    assert!(!ended.out.contains("ready"));
-}
-
-#[test]
 fn every_frame_is_in_the_log() {
     let directory = scratch("log");
     let log = directory.join("bus.log");
@@ -269,17 +202,4 @@ fn every_model_can_be_simulated_and_a_scan_from_outside_says_what_it_cannot_tell
     assert!(node(3)["remark"].as_str().unwrap().contains("--model 3=zlim42c (or zlim42c-82)"), "{found}");
     simulator.ask("quit");
     assert_eq!(simulator.wait(), Some(0));
-}
-
-#[test]
-fn everything_that_the_drives_of_a_machine_file_do_not_take_is_told_at_once() {
-    let place = scratch("sim-machine-problems");
-    let file = place.join("two.toml");
-    let drives = "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nbattery = true\n[[drive]]\nmodel = 'zlim42c'\nnode = 2\n";
-    std::fs::write(&file, format!("{drives}inputs = {{ Y9 = true }}\n")).unwrap();
-    let ended = ferrodrive(&["sim", "--machine", file.to_str().unwrap(), "--serve", "socketcand://127.0.0.1:0"]);
-    assert_eq!(ended.status, Some(1), "{}", ended.err);
-    for expected in ["line 4", "has no battery", "line 8", "X0, X1, X2, X3"] {
-        assert!(ended.err.contains(expected), "{expected}: {}", ended.err);
-    }
 }

@@ -1,0 +1,90 @@
+//! `group move` and `drive-base` on the embedded bus.
+
+use std::path::PathBuf;
+
+use processes::{done, ferrodrive};
+use serde_json::Value;
+
+fn example(name: &str) -> String {
+    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "..", "..", "examples", name].iter().collect();
+    path.display().to_string()
+}
+
+#[track_caller]
+fn refused(arguments: &[&str], status: i32, part: &str) {
+    let ended = ferrodrive(arguments);
+    assert_eq!(ended.status, Some(status), "{arguments:?}: {}", ended.err);
+    assert!(ended.err.contains(part), "{arguments:?} should say {part:?}, but says: {}", ended.err);
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+#[test]
+fn axes_that_are_named_go_where_they_are_sent_in_the_time_that_is_given() {
+    let moved = done(&["--json", "group", "move", "1=90deg", "4=0.5turn", "--within", "3s"]).json();
+    assert_eq!(number(&moved["time_s"]), 3.0);
+    assert_eq!(moved["missed_cycles"], 0);
+    for (axis, (node, to)) in moved["axes"].as_array().unwrap().iter().zip([(1, 90.0), (4, 180.0)]) {
+        assert_eq!((axis["node"].as_u64(), number(&axis["to_deg"])), (Some(node), to), "{axis}");
+        assert!((number(&axis["at_deg"]) - to).abs() < 1.0, "{axis}");
+        assert_eq!(number(&axis["limits"]["velocity_rpm"]), 30.0, "{axis}");
+    }
+}
+
+#[test]
+fn the_limits_of_the_command_line_are_those_of_the_path() {
+    let limits = ["--velocity", "60rpm", "--acceleration", "300rpm/s", "--rounding", "100ms"];
+    let moved = done(&[&["--json", "group", "move", "4=1turn"], &limits[..]].concat()).json();
+    // v = 1 turn/s, a = 5 turns/s^2, j = 50 turns/s^3: L/v + v/a + a/j.
+    assert!((number(&moved["time_s"]) - 1.3).abs() < 1e-6, "{moved}");
+}
+
+#[test]
+fn a_group_of_the_file_holds_the_axes_that_are_not_named_and_keeps_to_its_software_limits() {
+    let file = example("two_axes.toml");
+    let moved = done(&["--json", "group", "move", &file, "2=-45deg"]).json();
+    let [joint, stepper] = &moved["axes"].as_array().unwrap()[..] else { panic!("{moved}") };
+    assert!((number(&joint["at_deg"]) - number(&joint["from_deg"])).abs() < 0.5, "{joint}");
+    assert!((number(&stepper["at_deg"]) + 45.0).abs() < 1.0, "{stepper}");
+    assert_eq!(stepper["limits"]["range_deg"], serde_json::json!([-360.0, 360.0]));
+    refused(&["group", "move", &file, "1=181deg"], 1, "outside its software limits of -180 to 180 deg");
+    refused(&["group", "move", &file, "1=1deg", "--group", "legs"], 1, "the machine file has: pair");
+    refused(&["group", "move", &file, "4=1deg"], 1, "node 4");
+    refused(&["group", "move", &file, "1=90deg", "--within", "10ms"], 1, "give more time, or raise a limit");
+}
+
+#[test]
+fn what_is_no_group_move_is_refused() {
+    refused(&["group", "move", "1=90deg", "1=0deg"], 2, "two positions for node 1");
+    refused(&["group", "move", "90deg"], 2, "expected a machine file, FILE.toml, or NODE=POSITION");
+    refused(&["group", "move", "4=NaN"], 2, "does not begin with a number");
+    refused(&["group", "move", "4=1turn", "--acceleration", "300ms"], 2, "expected a rate above 0");
+    refused(&["group", "move", "4=1turn", "--velocity", "9000rpm"], 1, "the drive does 1000 r/min at most");
+    refused(&["group", "move", "/no/such/file.toml", "4=1turn"], 1, "cannot use the machine file");
+}
+
+#[test]
+fn a_base_goes_the_way_of_its_twist() {
+    let file = example("base.toml");
+    let driven = done(&["--json", "drive-base", &file, "--linear", "0.3", "--angular", "0.2", "--for", "3s"]).json();
+    let pose = &driven["pose"];
+    let heading = number(&pose["heading_deg"]);
+    // Ramps up and down are alike, so that the way is speed times time: 0.6 rad on a circle of 1.5 m; whole r/min and cycles.
+    assert!((heading - 0.6_f64.to_degrees()).abs() < 1.5, "{pose}");
+    let (x, y) = (1.5 * 0.6_f64.sin(), 1.5 * (1.0 - 0.6_f64.cos()));
+    assert!((number(&pose["x_m"]) - x).abs() < 0.02 && (number(&pose["y_m"]) - y).abs() < 0.02, "{pose}");
+    assert_eq!(driven["dead_man_stops"], 0);
+}
+
+#[test]
+fn what_is_no_drive_of_a_base_is_refused() {
+    let file = example("base.toml");
+    refused(&["drive-base"], 2, "expected a machine file with a [base]");
+    refused(&["drive-base", &example("two_axes.toml")], 1, "the machine file has no [base]");
+    refused(&["drive-base", &file, "--linear", "0.3"], 2, "--for");
+    refused(&["drive-base", &file, "--linear", "nan", "--for", "1s"], 2, "expected a finite number");
+    refused(&["drive-base", &file, "--for", "1s", "--dead-man", "1s"], 2, "cannot be used with");
+    refused(&["drive-base", &file, "--dead-man", "0s"], 2, "the limit watchdog in seconds is 0");
+}

@@ -1,0 +1,143 @@
+//! Logs: written by a command, converted, read back, replayed.
+
+use std::path::Path;
+
+use processes::{done, ferrodrive, scratch};
+use serde_json::Value;
+
+/// The extensions of what can be written.
+const WRITTEN: [&str; 4] = ["log", "asc", "blf", "pcapng"];
+
+/// The frames of a log as `decode` prints them, with their direction.
+fn frames(log: &Path) -> Vec<(String, Option<bool>)> {
+    let ended = done(&["--json", "decode", log.to_str().unwrap()]);
+    let lines = ended.out.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+    lines.map(|line| (line["frame"].as_str().expect("a frame").to_owned(), line["sent"].as_bool())).collect()
+}
+
+/// A program whose files take no more than a few kilobytes, as on a disk that is full then.
+#[cfg(unix)]
+fn on_a_full_disk(input: &str, arguments: &str) -> processes::Ended {
+    let program = processes::program();
+    let limited = format!("trap '' XFSZ; ulimit -f 2; printf '{input}' | {program} {arguments}");
+    let ended = std::process::Command::new("sh").args(["-c", &limited]).env_remove("FERRODRIVE_BUS").output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    processes::Ended { status: ended.status.code(), out: text(ended.stdout), err: text(ended.stderr) }
+}
+
+#[test]
+fn a_command_logs_what_it_sends_and_hears_in_every_form() {
+    let directory = scratch("logs");
+    let mut logs = Vec::new();
+    for extension in WRITTEN {
+        let log = directory.join(format!("read.{extension}"));
+        done(&["read", "4", "1018:01", "--log", log.to_str().unwrap()]);
+        let frames = frames(&log);
+        // CiA 301, 7.2.4.3: the request, and the answer of the one vendor-ID.
+        let asked = frames.iter().position(|(frame, sent)| frame == "604#4018100100000000" && *sent == Some(true));
+        let said = frames.iter().position(|(frame, sent)| frame.starts_with("584#43181001") && *sent == Some(false));
+        assert!(asked.is_some() && asked < said, "{extension}: {frames:?}");
+        logs.push(frames);
+    }
+    assert!(logs.iter().all(|log| *log == logs[0]), "the same command is the same log in every form");
+}
+
+#[test]
+fn a_log_goes_through_every_form_and_comes_out_as_it_was() {
+    let directory = scratch("convert");
+    let path = |name: &str| directory.join(name).to_str().unwrap().to_owned();
+    let first = path("first.log");
+    let lines = "(1700000000.123456) can0 604#4041600000000000 T\n(1700000000.123999) can1 18EBFF00#0102 R\n\
+                 (1700000001.000000) can0 184#R4 R\n(1700000002.500000) can0 080# T\n";
+    std::fs::write(&first, lines).unwrap();
+    let mut from = first;
+    for (step, extension) in ["asc", "blf", "pcapng", "log"].iter().enumerate() {
+        let to = path(&format!("{step}.{extension}"));
+        let report = done(&["--json", "convert", &from, &to]).json();
+        assert_eq!((&report["frames"], &report["passed_over"]), (&4.into(), &0.into()), "{report}");
+        from = to;
+    }
+    assert_eq!(std::fs::read_to_string(&from).unwrap(), lines);
+
+    let same = ferrodrive(&["convert", &from, &from]);
+    assert_eq!(same.status, Some(2), "{}", same.err);
+    let trc = ferrodrive(&["convert", &from, &path("out.trc")]);
+    assert!(trc.status == Some(2) && trc.err.contains("TRC file is only read"), "{}", trc.err);
+    std::fs::write(path("letter.blf"), "Dear Sir").unwrap();
+    let letter = ferrodrive(&["convert", &from, &path("letter.blf")]);
+    assert!(
+        letter.status == Some(1) && letter.err.contains("it exists and is not a log of the format BLF"),
+        "{}",
+        letter.err
+    );
+}
+
+#[test]
+fn a_log_that_is_torn_is_told_and_read_as_far_as_it_goes() {
+    let directory = scratch("torn_logs");
+    for (extension, what) in [("asc", "passed over"), ("blf", "ends within"), ("pcapng", "ends within")] {
+        let log = directory.join(format!("whole.{extension}"));
+        done(&["read", "4", "1018:01", "--log", log.to_str().unwrap()]);
+        let bytes = std::fs::read(&log).unwrap();
+        let torn = directory.join(format!("torn.{extension}"));
+        // In the middle of the last frame, container or line, behind the foot of an ASC file.
+        let cut = if extension == "asc" { b"End TriggerBlock\n".len() + 5 } else { 9 };
+        std::fs::write(&torn, &bytes[..bytes.len() - cut]).unwrap();
+        let shown = ferrodrive(&["decode", torn.to_str().unwrap()]);
+        assert!(shown.err.contains(what), "{extension}: {}{}", shown.out, shown.err);
+        let none = directory.join(format!("none.{extension}"));
+        std::fs::write(&none, "this is not a log\n").unwrap();
+        let shown = ferrodrive(&["decode", none.to_str().unwrap()]);
+        assert_eq!(shown.status, Some(1), "{extension}: {}", shown.out);
+        assert!(shown.err.contains("no frame"), "{extension}: {}", shown.err);
+    }
+    let missing = ferrodrive(&["decode", "/no/such/trace.blf"]);
+    assert!(
+        missing.status == Some(1) && missing.err.contains("cannot open the log /no/such/trace.blf"),
+        "{}",
+        missing.err
+    );
+}
+
+#[test]
+fn a_replay_says_what_may_move_a_drive_before_it_sends_anything() {
+    let directory = scratch("replay");
+    let log = directory.join("trace.log");
+    // A read, a controlword, an NMT start, a heartbeat of a node.
+    let lines = "(1.0) can0 604#4041600000000000 T\n(1.1) can0 604#2B40600006000000 T\n(1.2) can0 000#0104 T\n\
+                 (1.3) can0 704#05 R\n";
+    std::fs::write(&log, lines).unwrap();
+    let log = log.to_str().unwrap();
+    let refused = ferrodrive(&["replay", log]);
+    assert_eq!(refused.status, Some(1));
+    for part in ["2 frames of", "1 x a controlword", "1 x NMT start", "604#2B40600006000000", "--allow-motion"] {
+        assert!(refused.err.contains(part), "{part}: {}", refused.err);
+    }
+    let count = |arguments: &[&str], field: &str| {
+        done(&[&["--json", "replay", log], arguments].concat()).json()[field].as_u64().expect("a number")
+    };
+    assert_eq!((count(&["--skip-motion"], "sent"), count(&["--skip-motion"], "motion_skipped")), (2, 2));
+    assert_eq!(count(&["--only", "received"], "sent"), 1, "what is not chosen needs no leave");
+    assert_eq!(count(&["--only", "604", "--skip-motion"], "not_chosen"), 2);
+    assert_eq!(count(&["--allow-motion", "--only", "sent"], "motion_sent"), 2);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_log_that_the_disk_has_no_room_for_is_a_failure_of_the_command() {
+    let folder = scratch("full-disk");
+    let log = folder.join("scan.log");
+    let ended = on_a_full_disk("", &format!("--log {} --bus sim scan", log.display()));
+    assert_eq!(ended.status, Some(1), "{}", ended.err);
+    // What was asked for was done, and is shown.
+    assert!(ended.out.contains("zlac8030l") && ended.err.contains("is not complete"), "{}{}", ended.out, ended.err);
+    for name in ["--log run.log", "--record run.csv"] {
+        let (option, name) = name.split_once(' ').unwrap();
+        let file = folder.join(name);
+        let drive = "--drive m4230e17b50@1 --clock manual --serve socketcand://127.0.0.1:0";
+        let options = format!("sim {drive} {option} {}", file.display());
+        // Its heartbeat is sent each second (M joint manual, 5.11.1).
+        let ended = on_a_full_disk("run 900s\\nquit\\n", &options);
+        assert!(ended.status == Some(1) && ended.err.contains("is not complete"), "{option}: {}", ended.err);
+    }
+}

@@ -1,0 +1,190 @@
+//! Records of scenarios, and what is refused of them.
+
+use std::path::Path;
+
+use processes::{done, ferrodrive, scratch};
+use recording::{Kind, Recorded, read};
+
+fn recorded(path: &Path) -> Recorded {
+    let kind = Kind::of_name(path.to_str().unwrap()).unwrap();
+    read(kind, &std::fs::read(path).unwrap()).unwrap()
+}
+
+/// The time of the last sample.
+fn last(recorded: &Recorded) -> f64 {
+    recorded.series.first().and_then(|series| series.points.last()).map_or(0.0, |(at, _)| *at)
+}
+
+#[test]
+fn a_picture_overwrites_only_a_picture() {
+    let place = scratch("plots");
+    let csv = place.join("run.csv");
+    let text = "t_s,4.velocity_rpm,4.velocity_demand_rpm,5.current_a,mark\n0,0,0,1,\n1,60,60,1.5,node 4: started\n";
+    std::fs::write(&csv, text).unwrap();
+    let csv = csv.to_str().unwrap();
+    for _ in 0..2 {
+        let html = place.join("run.html");
+        let drawn = done(&["plot", csv, "--html", html.to_str().unwrap(), "--json"]).json();
+        assert_eq!((&drawn["signals"], &drawn["marks"]), (&3.into(), &1.into()), "{drawn}");
+        let page = std::fs::read_to_string(html).unwrap();
+        assert!(page.contains("Velocity") && page.contains("started") && page.ends_with("</html>\n"));
+    }
+    let letter = place.join("letter.svg");
+    std::fs::write(&letter, "Dear reader").unwrap();
+    let refused = |arguments: &[&str], parts: &[&str]| {
+        let ended = ferrodrive(arguments);
+        assert!(ended.status != Some(0), "{arguments:?}");
+        for part in parts {
+            assert!(ended.err.contains(part), "{arguments:?}: {part:?} in {}", ended.err);
+        }
+    };
+    refused(&["plot", csv, "--svg", letter.to_str().unwrap()], &["cannot write the picture", "choose another name"]);
+    assert_eq!(std::fs::read(&letter).unwrap(), b"Dear reader");
+    refused(&["plot", csv, "--signals", "velocty_rpm"], &["did you mean velocity_rpm"]);
+    refused(&["plot", csv, "--from", "5"], &["recorded from 0.000 s to 1.000 s"]);
+    refused(&["plot", csv, "--from", "1", "--to", "0.5"], &["--to is before --from"]);
+    refused(&["plot", letter.to_str().unwrap()], &["NAME.mcap or NAME.csv"]);
+    refused(&["plot", "/nowhere/run.mcap"], &["cannot read the record"]);
+    let wrong = place.join("wrong.mcap");
+    std::fs::write(&wrong, text).unwrap();
+    refused(&["plot", wrong.to_str().unwrap()], &["not an MCAP file"]);
+}
+
+#[test]
+fn a_record_is_asked_for_in_words_that_make_sense() {
+    let refused = |arguments: &[&str], part: &str| {
+        let ended = ferrodrive(&[&["sim", "--drive", "zlac8030l@4"], arguments].concat());
+        assert_eq!(ended.status, Some(2), "{arguments:?}");
+        assert!(ended.err.contains(part), "{arguments:?}: {part:?} in {}", ended.err);
+    };
+    refused(&["--record", "run.txt"], "NAME.mcap or NAME.csv");
+    refused(&["--record", "run.csv", "--record-period", "1us"], "expected 50us or more: a control period");
+    refused(&["--record-period", "1ms"], "--record <FILE>");
+    let place = scratch("refused-record");
+    let csv = place.join("run.csv");
+    refused(&["--record", csv.to_str().unwrap(), "--record-signals", "5.*"], "unknown signal '5.*'");
+    assert!(!csv.exists());
+}
+
+#[test]
+fn a_scenario_that_is_recorded_is_the_same_run() {
+    let place = scratch("recorded-scenario");
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/brown_out.toml");
+    let plain = done(&["run", scenario, "--json"]).json();
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let record = ["run", scenario, "--json", "--record", path.to_str().unwrap(), "--record-period", "500us"];
+        let recording = done(&record).json();
+        assert!(plain["digest"] == recording["digest"] && !plain["digest"].is_null(), "{name}: {plain}");
+        let recorded = recorded(&path);
+        assert!(!recorded.torn && !recorded.series.is_empty(), "{name}");
+        let end = recorded.series[0].points.len() as f64 * 0.0005;
+        assert!((last(&recorded) - end).abs() < 0.001, "{name}: no sample is missing");
+        // The brown-out is among what happened.
+        assert!(recorded.marks.iter().any(|mark| mark.text.contains("under-voltage")), "{name}: {:?}", recorded.marks);
+    }
+    let both = ferrodrive(&["run", scenario, "--seeds", "1..3", "--record", place.join("a.csv").to_str().unwrap()]);
+    assert!(both.status == Some(2) && both.err.contains("a sweep has many"), "{}", both.err);
+}
+
+#[test]
+fn a_body_is_recorded_with_what_it_does() {
+    let place = scratch("recorded-body");
+    let scenario = place.join("base.toml");
+    let text = r#"
+title = "A base that is driven"
+end = "3s"
+
+[[machine.drive]]
+model = "zlac8030l"
+node = 4
+
+[[machine.drive]]
+model = "zlac8030l"
+node = 5
+
+[[machine.body]]
+name = "base"
+kind = "common-shaft"
+drives = [4, 5]
+
+[[step]]
+at = "1s"
+do = "4 load torque -1"
+"#;
+    std::fs::write(&scenario, text).unwrap();
+    let csv = place.join("run.csv");
+    done(&["run", scenario.to_str().unwrap(), "--record", csv.to_str().unwrap(), "--record-signals", "base.*"]);
+    let recorded = recorded(&csv);
+    let names: Vec<String> = recorded.series.iter().map(|series| series.column.name()).collect();
+    assert_eq!(names, ["base.angle_deg", "base.speed_rpm"]);
+    let units: Vec<&str> = recorded.series.iter().map(|series| &*series.column.unit).collect();
+    assert_eq!(units, ["°", "r/min"]);
+    let fastest = recorded.series[1].points.iter().map(|(_, rpm)| *rpm).fold(0.0, f64::max);
+    assert!(fastest > 10.0, "the load turns it: {fastest} r/min");
+}
+
+#[test]
+fn the_energies_of_a_driven_shaft_fit_together() {
+    let place = scratch("recorded-energies");
+    // Model, node-ID, load, how it is turned, gear.
+    let drives = [
+        ("zlac8030l", 4, "1.5", "4 velocity 60rpm", 1.0),
+        ("zlim42c", 2, "0.1", "2 velocity 120rpm", 1.0),
+        ("m4230e17b50", 1, "5", "1 velocity 600rpm", 50.0),
+    ];
+    for (model, node, load, turn, ratio) in drives {
+        let scenario = place.join(format!("{model}.toml"));
+        let text = format!(
+            "title = \"A load that is driven\"\nend = \"3s\"\n[machine]\ndrive = [{{ model = \"{model}\", node = {node} }}]\n\
+             [[host]]\ndo = [\"{turn}\", \"wait 1s\"]\n[[step]]\nat = \"1200ms\"\ndo = \"{node} load torque {load}\"\n"
+        );
+        std::fs::write(&scenario, text).unwrap();
+        let path = place.join(format!("{model}.mcap"));
+        done(&["run", scenario.to_str().unwrap(), "--record", path.to_str().unwrap()]);
+        let recorded = recorded(&path);
+        let of = |signal: &str| -> Vec<(f64, f64)> {
+            let name = format!("{node}.{signal}");
+            let found = recorded.series.iter().find(|series| series.column.name() == name);
+            found.unwrap_or_else(|| panic!("{name}")).points.clone()
+        };
+        let out = [
+            "electronics_energy_j",
+            "winding_heat_j",
+            "switches_heat_j",
+            "bleeder_heat_j",
+            "friction_heat_j",
+            "load_work_j",
+        ];
+        let mut rest = of("source_energy_j");
+        for signal in out.into_iter().chain(["stored_energy_j"]) {
+            rest.iter_mut().zip(of(signal)).for_each(|(rest, (_, joules))| rest.1 -= joules);
+        }
+        let through = of("source_energy_j").last().unwrap().1;
+        let worst = rest.iter().map(|(_, missing)| (missing - rest[0].1).abs()).fold(0.0, f64::max);
+        assert!(through > 5.0 && worst < 1e-3 * through, "{model}: {worst} J missing of {through} J");
+        // From when the load pulls until the end, whatever the drive does meanwhile: work is torque times way.
+        let under_load = |signal: &str| -> f64 {
+            let values: Vec<f64> = of(signal).iter().filter(|(at, _)| *at >= 1.25).map(|(_, value)| *value).collect();
+            values.last().unwrap() - values[0]
+        };
+        let load_nm: f64 = load.parse().unwrap();
+        let (of_load, done_j) = (load_nm * under_load("load_angle_rad"), under_load("load_work_j"));
+        assert!(
+            of_load > 0.1 && (done_j - of_load).abs() < 1e-3 * of_load,
+            "{model}: {of_load} J, {done_j} J recorded"
+        );
+        let way_rad = under_load("shaft_angle_rad");
+        assert!((under_load("load_angle_rad") * ratio - way_rad).abs() < 0.02 * way_rad.abs(), "{model}: the gear");
+    }
+}
+
+#[test]
+fn the_page_tells_of_every_signal_with_its_unit() {
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recording.md")).unwrap();
+    for signal in sim::recorder::Signal::ALL {
+        let unit = if signal.unit().is_empty() { String::new() } else { format!(" {}", signal.unit()) };
+        let row = format!("| `{}` |{unit} | ", signal.name());
+        assert!(page.contains(&row), "{row}");
+    }
+}
