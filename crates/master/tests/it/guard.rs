@@ -11,7 +11,7 @@ use devices::model;
 use drives::mjoint::Model;
 use master::core::NodeSet;
 use master::drive::{HostLoss, MotionOptions, SwitchedOff};
-use master::units::{Ramp, Rpm};
+use master::units::{Ramp, Rpm, Turns};
 use master::{Drive, Network};
 use sim::machine::{Order, mjoint, order, zlac8030l, zlim42c};
 use sim::{StationId, World, block_on};
@@ -168,6 +168,26 @@ fn a_stepper_turns_on_and_the_guard_reports_it() {
     bench.kill();
     bench.wait(20_000);
     assert!(bench.turns(STEPPER));
+}
+
+/// It has no watch (ZLIM42-C user manual, 5.4): a position move ends where it was to end.
+#[test]
+fn a_stepper_finishes_its_move_without_its_program() {
+    let mut bench = Bench::new();
+    bench.guard(STEPPER);
+    let drive = bench.drive(STEPPER);
+    let options = MotionOptions { speed: Some(Rpm(60.0)), wait: false, ..MotionOptions::default() };
+    let before = bench.world.report(STEPPER).unwrap().position;
+    bench.run(drive.move_relative(Turns(4.0), options)).unwrap();
+    bench.wait(500);
+    assert!(bench.turns(STEPPER));
+    bench.kill();
+    // 4 turns of 60 r/min take 4 s and the ramps.
+    bench.wait(6_000);
+    assert!(!bench.turns(STEPPER));
+    let moved = bench.world.report(STEPPER).unwrap().position - before;
+    // 4000 steps a turn as delivered; an open-loop rotor stands within a fraction of a step of its field.
+    assert!((moved - 16_000).abs() <= 160, "{moved}");
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! What each drive does when the command that moves it is killed (kill -9), and what was said of it before.
+//! A command that is killed (kill -9), and what is said before of what a drive does then. What each drive does in each motion is asked in
+//! virtual time (`crates/master/tests/it/guard.rs` and `stopping`).
 //!
 //! Times are the manuals': 2000h of the ZLAC8030L is 1000 ms as delivered (quick start guide, chapter 9); 1016h:01 of the
 //! joint is node 7Fh within 2000 ms (M joint manual, 5.11.2); the ZLIM42-C has no such object (user manual, 5.4).
@@ -104,127 +105,35 @@ fn a_servo_stops_a_second_after_its_master_was_killed() {
     bench.stops("4", Duration::from_millis(1000) + SLACK);
 }
 
-/// Whatever it was doing: the watch is the drive's, not a mode's.
+/// Before anything moves. What has a watch that is armed has nothing to be said.
 #[test]
-fn a_drive_with_a_watch_ends_every_kind_of_motion_by_itself() {
-    let mut bench = Bench::new();
-    let longest = Duration::from_millis(2000) + SLACK;
-    for (drive, motion) in [
-        (SERVO, &["move", "4", "200turn", "--relative", "--profile-velocity", "60rpm"][..]),
-        (SERVO, &["torque", "4", "1A", "--for", "1h"]),
-        (JOINT, &["move", "1", "200turn", "--relative", "--profile-velocity", "60rpm"]),
-        (JOINT, &["home", "1", "--method", "17"]),
-    ] {
-        let child = bench.moving_by(drive, motion, &[]);
-        bench.kill(child);
-        bench.stops(drive.0, longest);
-        bench.json(drive, &["reset", drive.0]);
-        bench.json(drive, &["disable", drive.0]);
-    }
-}
-
-/// A servo of CiA 402 is delivered without a watch (1016h is 0, as CiA 301, 7.5.2.19 has it); a command gives it one of 2000 ms
-/// while it moves it, and what 6007h makes of its loss ends the motion. With `--no-guard` it has none, which is reported.
-#[test]
-fn a_described_servo_stops_by_itself_where_it_was_given_a_watch_and_else_it_was_said() {
-    const DESCRIBED: (&str, &str) = ("5", "5=cia402");
-    let simulator = Simulator::start(&["--drive", "cia402@5", "--serve", "socketcand://127.0.0.1:0"]);
+fn what_nothing_would_stop_is_said_before_it_moves() {
+    let drives = ["--drive", "m4230e17b50@1", "--drive", "zlim42c@2", "--drive", "zlac8030l@4", "--drive", "cia402@5"];
+    let switched_off = ["--drive", "zlac8030l@6,2000=0"];
+    let served = ["--serve", "socketcand://127.0.0.1:0"];
+    let simulator = Simulator::start(&[&drives[..], &switched_off, &served].concat());
     let bus = simulator.bus("socketcand");
-    let mut bench = Bench::booted(simulator, bus);
-    let child = bench.moving(DESCRIBED, &["--no-guard"]);
-    let said = bench.kill(child);
-    assert!(said.contains("node 5: if this command dies") && said.contains("emergency stop"), "{said}");
-    bench.json(DESCRIBED, &["stop", "5"]);
-    let child = bench.moving(DESCRIBED, &[]);
-    bench.kill(child);
-    bench.stops("5", Duration::from_millis(2000) + SLACK);
-}
-
-/// The watch is the node's, not a mode's.
-#[test]
-fn a_described_servo_with_a_watch_ends_every_kind_of_motion_by_itself() {
-    const DESCRIBED: (&str, &str) = ("5", "5=cia402");
-    let simulator = Simulator::start(&["--drive", "cia402@5", "--serve", "socketcand://127.0.0.1:0"]);
-    let bus = simulator.bus("socketcand");
-    let mut bench = Bench::booted(simulator, bus);
-    for motion in [
-        &["move", "5", "200turn", "--relative", "--profile-velocity", "60rpm"][..],
-        &["torque", "5", "100mA", "--for", "1h"],
-        &["home", "5", "--method", "17"],
+    let bench = Bench::booted(simulator, bus);
+    for ((node, model), options, parts) in [
+        (SERVO, &[][..], &[][..]),
+        (JOINT, &[], &[]),
+        (("5", "5=cia402"), &[], &[]),
+        (STEPPER, &[], &["node 2: if this command dies, nothing stops it", "no watch over its host", "emergency stop"]),
+        (JOINT, &["--no-guard"], &["node 1: if this command dies, nothing stops it"]),
+        (JOINT, &["--guard", "off"], &["node 1: if this command dies, nothing stops it"]),
+        (("5", "5=cia402"), &["--no-guard"], &["node 5: if this command dies", "emergency stop"]),
+        (("6", "6=zlac8030l"), &[], &["node 6: if this command dies", "2000h:00) is set to 0; --guard gives it"]),
+        (("6", "6=zlac8030l"), &["--guard"], &[]),
     ] {
-        let child = bench.moving_by(DESCRIBED, motion, &["--guard"]);
-        bench.kill(child);
-        bench.stops("5", Duration::from_millis(2000) + SLACK);
-        bench.json(DESCRIBED, &["reset", "5"]);
-        bench.json(DESCRIBED, &["disable", "5"]);
+        let motion = ["velocity", node, "60rpm", "--for", "100ms"];
+        let said = done(&[&["--bus", &bench.bus, "--model", model], &motion[..], options].concat()).err;
+        assert_eq!(said.contains("if this command dies"), !parts.is_empty(), "{node} {options:?}: {said}");
+        for part in parts {
+            assert!(said.contains(part), "{node} {options:?}: {part:?} in {said}");
+        }
     }
-}
-
-#[test]
-fn a_joint_stops_two_seconds_after_its_master_was_killed_and_the_next_command_begins_at_rest() {
-    let mut bench = Bench::new();
-    let child = bench.moving(JOINT, &[]);
-    assert_eq!(bench.kill(child), "");
-    bench.stops("1", Duration::from_millis(2000) + SLACK);
-    // Alarm 20h: heartbeat of the host lost (M joint manual, alarm table).
-    assert_eq!(bench.json(JOINT, &["state", "1"])["fault_code"], 0x20);
-    let moved = bench.json(JOINT, &["move", "1", "--relative", "10deg"]);
-    assert_eq!((&moved["reached"], &moved["fault_code"]), (&json!(true), &json!(0)));
-    assert!(!bench.turns("1"));
-}
-
-#[test]
-fn a_stepper_turns_on_after_its_master_was_killed_as_was_said_before() {
-    let mut bench = Bench::new();
-    let child = bench.moving(STEPPER, &[]);
-    let said = bench.kill(child);
-    for part in ["node 2: if this command dies, nothing stops it", "no watch over its host", "emergency stop"] {
-        assert!(said.contains(part), "{part:?} in {said}");
-    }
-    bench.simulator.pass(Duration::from_secs(4));
-    assert!(bench.turns("2"));
-}
-
-/// It has no watch (ZLIM42-C user manual, 5.4): a position move ends where it was to end, a search for a switch that is not there
-/// goes on.
-#[test]
-fn a_stepper_finishes_its_move_and_goes_on_with_its_homing_after_its_master_was_killed() {
-    /// 4 turns of 60 r/min and the ramps take 5 s; what `get` counts is 4000 steps a turn at the least.
-    const TURNS: &str = "4turn";
-    let mut bench = Bench::new();
-    let whole = |bench: &mut Bench| {
-        let said = bench.json(STEPPER, &["move", "2", TURNS, "--relative", "--profile-velocity", "60rpm"]);
-        assert_eq!(said["reached"], json!(true));
-        bench.position("2")
-    };
-    let before = bench.position("2");
-    let of_a_move = whole(&mut bench) - before;
-    let before = bench.position("2");
-    let child = bench.moving_by(STEPPER, &["move", "2", TURNS, "--relative", "--profile-velocity", "60rpm"], &[]);
-    let said = bench.kill(child);
-    assert!(said.contains("node 2: if this command dies"), "{said}");
-    bench.stops("2", Duration::from_secs(5) + SLACK);
-    let moved = bench.position("2") - before;
-    // An open-loop rotor stands within a fraction of a step of its field.
-    assert!(moved.abs_diff(of_a_move) <= of_a_move.unsigned_abs() / 100, "{moved} instead of {of_a_move}");
-    let child = bench.moving_by(STEPPER, &["home", "2", "--method", "17"], &[]);
-    bench.kill(child);
-    bench.simulator.pass(Duration::from_secs(3));
-    assert!(bench.turns("2"));
-    bench.json(STEPPER, &["disable", "2"]);
-}
-
-#[test]
-fn an_unguarded_joint_turns_on_as_was_said_before() {
-    let mut bench = Bench::new();
-    for off in [&["--no-guard"][..], &["--guard", "off"]] {
-        let child = bench.moving(JOINT, off);
-        let said = bench.kill(child);
-        assert!(said.contains("node 1: if this command dies, nothing stops it"), "{said}");
-        bench.simulator.pass(Duration::from_secs(4));
-        assert!(bench.turns("1"));
-        bench.json(JOINT, &["stop", "1"]);
-    }
+    // The time that --guard gave it is taken back.
+    assert_eq!(bench.json(("6", "6=zlac8030l"), &["read", "6", "2000"])["value"], 0);
 }
 
 #[test]
@@ -250,32 +159,6 @@ fn a_command_that_leaves_a_motor_turning_says_what_happens_then() {
     // A motion that has come to its end leaves nothing to say.
     let moved = bench.json(STEPPER, &["velocity", "2", "60rpm", "--for", "200ms"]);
     assert_eq!((&moved["notes"], &moved["guard"]["armed"]), (&json!([]), &json!(false)));
-}
-
-#[test]
-fn a_motion_that_is_not_waited_for_goes_on_alone() {
-    let mut bench = Bench::new();
-    let said = bench.json(JOINT, &["velocity", "1", "60rpm", "--no-wait"]);
-    assert!(said["notes"][0].as_str().unwrap().contains("nothing monitors the drive"), "{said}");
-    bench.simulator.pass(Duration::from_secs(4));
-    assert!(bench.turns("1"));
-    assert_eq!(bench.json(JOINT, &["state", "1"])["fault_code"], 0);
-}
-
-#[test]
-fn a_watch_that_is_switched_off_is_told_and_switched_on_if_asked_for() {
-    let mut bench = Bench::new();
-    let time = |bench: &Bench| bench.json(SERVO, &["read", "4", "2000"])["value"].clone();
-    bench.json(SERVO, &["write", "4", "2000", "0"]);
-    let child = bench.moving(SERVO, &[]);
-    let said = bench.kill(child);
-    assert!(said.contains("2000h:00) is set to 0; --guard gives it"), "{said}");
-    assert_eq!(time(&bench), 0);
-    let moved = bench.json(SERVO, &["velocity", "4", "60rpm", "--for", "500ms", "--guard"]);
-    assert_eq!((&moved["guard"]["armed"], time(&bench)), (&json!(true), json!(0)));
-    let child = bench.moving(SERVO, &["--guard", "on"]);
-    bench.kill(child);
-    bench.stops("4", Duration::from_millis(1000) + SLACK);
 }
 
 /// Whatever program moves the drives: `supervise` feeds their watches, and they stop when it dies. The ZLIM42-C has none, which it
