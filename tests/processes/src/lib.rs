@@ -70,6 +70,20 @@ pub fn ferrodrive(arguments: &[&str]) -> Ended {
     }
 }
 
+/// Runs a command line to its end with this on its standard input.
+pub fn fed(arguments: &[&str], input: impl AsRef<[u8]>) -> Ended {
+    let mut command = command(arguments);
+    let command = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the binary runs");
+    child.stdin.take().expect("piped").write_all(input.as_ref()).expect("it reads");
+    let output = child.wait_with_output().expect("it ends");
+    Ended {
+        status: output.status.code(),
+        out: String::from_utf8(output.stdout).expect("UTF-8"),
+        err: String::from_utf8(output.stderr).expect("UTF-8"),
+    }
+}
+
 /// Runs a command line that has to succeed.
 pub fn done(arguments: &[&str]) -> Ended {
     let ended = ferrodrive(arguments);

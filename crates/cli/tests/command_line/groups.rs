@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use processes::{done, ferrodrive};
+use processes::{done, fed, ferrodrive};
 use serde_json::Value;
 
 fn example(name: &str) -> String {
@@ -87,4 +87,26 @@ fn what_is_no_drive_of_a_base_is_refused() {
     refused(&["drive-base", &file, "--linear", "nan", "--for", "1s"], 2, "expected a finite number");
     refused(&["drive-base", &file, "--for", "1s", "--dead-man", "1s"], 2, "cannot be used with");
     refused(&["drive-base", &file, "--dead-man", "0s"], 2, "the limit watchdog in seconds is 0");
+}
+
+#[test]
+fn lines_of_twists_are_driven_one_after_the_other_and_bad_ones_are_told() {
+    let file = example("base.toml");
+    // Ten lines of 100 ms each; a line that is not a twist takes no time.
+    let lines = format!("{}\nnan 0\nfast\n0.2\n1 2 3\n", "0.3 0\n".repeat(10));
+    let driven = fed(&["--json", "drive-base", &file], &lines);
+    assert_eq!(driven.status, Some(0), "{}", driven.err);
+    let report = driven.json();
+    assert!((number(&report["pose"]["x_m"]) - 0.3).abs() < 0.02, "{report}");
+    assert_eq!(report["bad_lines"], 4);
+    assert_eq!(driven.err, "");
+    let said = fed(&["drive-base", &file], &lines).err;
+    assert!(said.contains("expected a twist of two numbers, m/s and rad/s, e.g. 0.3 -0.1, got 'fast'"), "{said}");
+}
+
+#[test]
+fn what_a_base_cannot_do_is_said_with_what_it_does_instead() {
+    let driven = fed(&["drive-base", &example("base.toml")], "1e308 0\n1e308 0\n0.1 0\n");
+    assert_eq!(driven.status, Some(0), "{}", driven.err);
+    assert_eq!(driven.err.matches("are beyond the limits of the base: it is driven at").count(), 1, "{}", driven.err);
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use processes::{done, ferrodrive, scratch};
+use processes::{done, fed, ferrodrive, scratch};
 use serde_json::Value;
 
 /// The extensions of what can be written.
@@ -139,5 +139,40 @@ fn a_log_that_the_disk_has_no_room_for_is_a_failure_of_the_command() {
         // Its heartbeat is sent each second (M joint manual, 5.11.1).
         let ended = on_a_full_disk("run 900s\\nquit\\n", &options);
         assert!(ended.status == Some(1) && ended.err.contains("is not complete"), "{option}: {}", ended.err);
+    }
+}
+
+#[test]
+fn a_log_is_read_from_standard_input() {
+    for arguments in [&["decode", "-"][..], &["--bus", "log:-", "dump"]] {
+        let ended = fed(arguments, "(1.5) can0 704#00\n(2.5) can0 704#05");
+        assert_eq!(ended.status, Some(0), "{arguments:?}: {}", ended.err);
+        let out = ended.out;
+        assert_eq!(out.lines().count(), 2, "{out}");
+        assert!(out.contains("boot-up node 4") && out.contains("heartbeat node 4: operational"), "{out}");
+    }
+}
+
+/// What the same lines on standard input write where time is moved by hand, in bytes.
+fn by_hand(folder: &Path, number: usize, record: &str) -> [Vec<u8>; 2] {
+    let [log, record] = ["run.log", record].map(|name| folder.join(format!("{number}-{name}")));
+    let drives = ["--drive", "zlac8030l@4", "--drive", "m4230e17b50@1", "--clock", "manual"];
+    let files = ["--log", log.to_str().unwrap(), "--record", record.to_str().unwrap()];
+    let lines = "run 2s\n4 load torque 0.5\n1 load torque 1\nrun 1s\n4 fault hall on\nrun 1500us\n4 fault hall off\nrun 1s\nquit\n";
+    let ended = fed(&[&["sim"], &drives[..], &files].concat(), lines);
+    assert_eq!(ended.status, Some(0), "{}", ended.err);
+    [log, record].map(|path| std::fs::read(path).unwrap())
+}
+
+#[test]
+fn moved_by_hand_a_simulator_writes_the_same_log_and_record_to_the_byte() {
+    let folder = scratch("by-hand");
+    for record in ["run.csv", "run.mcap"] {
+        let first = by_hand(&folder, 0, record);
+        let log = String::from_utf8_lossy(&first[0]);
+        assert!(log.starts_with("(0000000000.") && log.lines().count() > 3, "{log}");
+        for number in 1..4 {
+            assert!(by_hand(&folder, number, record) == first, "{record}, run {number}");
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! What `sim` and `run --serve` refuse before they serve anything.
+//! What `sim`, `run --serve`, `studio` and `top` refuse before they serve anything.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -118,4 +118,47 @@ fn a_pace_that_cannot_be_is_refused_with_what_can() {
         assert_eq!(ended.status, Some(2), "{arguments:?}");
         assert!(ended.err.contains(said), "{arguments:?}: {}", ended.err);
     }
+}
+
+#[test]
+fn a_serial_number_is_one_of_a_device_that_has_it() {
+    for (drive, reported) in
+        [("cia402@4,1018:04=4294967296", "1018h:04 cannot be 4294967296"), ("zlac8030l@4,1018:04=7", "1018h:04")]
+    {
+        let refused = ferrodrive(&["sim", "--drive", drive]);
+        assert_ne!(refused.status, Some(0), "{drive}");
+        assert!(refused.err.contains(reported), "{}", refused.err);
+    }
+}
+
+#[test]
+fn a_model_without_lss_does_not_begin_without_a_node_id() {
+    let refused = ferrodrive(&["sim", "--drive", "zlac8030l@4,node-id=none"]);
+    assert_eq!(refused.status, Some(2));
+    assert!(refused.err.contains("a zlac8030l has no LSS"), "{}", refused.err);
+}
+
+#[test]
+fn elsewhere_takes_a_password_and_says_what_that_means() {
+    let ended = ferrodrive(&["studio", "--listen", "0.0.0.0:0"]);
+    assert_eq!(ended.status, Some(2), "{}", ended.err);
+    assert!(ended.err.contains("--password-file") && ended.err.contains("can move the drives"), "{}", ended.err);
+    let directory = processes::scratch("studio");
+    let short = directory.join("short");
+    std::fs::write(&short, "hunter2\n").unwrap();
+    let ended = ferrodrive(&["studio", "--listen", "0.0.0.0:0", "--password-file", short.to_str().unwrap()]);
+    assert_eq!(ended.status, Some(1), "{}", ended.err);
+    assert!(ended.err.contains("at least 12"), "{}", ended.err);
+    let missing = ferrodrive(&["studio", "--password-file", "/no/such/file"]);
+    assert_eq!(missing.status, Some(1), "{}", missing.err);
+}
+
+#[test]
+fn what_is_no_terminal_is_told_what_to_use() {
+    let ended = ferrodrive(&["top"]);
+    assert_eq!(ended.status, Some(2));
+    assert!(ended.err.contains("not a terminal") && ended.err.contains("ferrodrive watch"), "{}", ended.err);
+    let json = ferrodrive(&["--json", "top"]);
+    assert_eq!(json.status, Some(2));
+    assert!(format!("{}{}", json.out, json.err).contains("for programs"), "{}{}", json.out, json.err);
 }

@@ -2,52 +2,11 @@
 #![cfg(unix)]
 
 use std::io::Write;
-use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use processes::{Ended, Simulator, command, wait_until};
+use processes::{Simulator, command, wait_until};
 use serde_json::Value;
-
-fn example(name: &str) -> String {
-    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "..", "..", "examples", name].iter().collect();
-    path.display().to_string()
-}
-
-fn with_input(arguments: &[&str], input: &str) -> Ended {
-    let mut child = processes::command(arguments)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
-    let ended = child.wait_with_output().unwrap();
-    Ended {
-        status: ended.status.code(),
-        out: String::from_utf8(ended.stdout).unwrap(),
-        err: String::from_utf8(ended.stderr).unwrap(),
-    }
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
-}
-
-#[test]
-fn lines_of_twists_are_driven_one_after_the_other_and_bad_ones_are_told() {
-    let file = example("base.toml");
-    // Ten lines of 100 ms each; a line that is not a twist takes no time.
-    let lines = format!("{}\nnan 0\nfast\n0.2\n1 2 3\n", "0.3 0\n".repeat(10));
-    let driven = with_input(&["--json", "drive-base", &file], &lines);
-    assert_eq!(driven.status, Some(0), "{}", driven.err);
-    let report = driven.json();
-    assert!((number(&report["pose"]["x_m"]) - 0.3).abs() < 0.02, "{report}");
-    assert_eq!(report["bad_lines"], 4);
-    assert_eq!(driven.err, "");
-    let said = with_input(&["drive-base", &file], &lines).err;
-    assert!(said.contains("expected a twist of two numbers, m/s and rad/s, e.g. 0.3 -0.1, got 'fast'"), "{said}");
-}
 
 /// Two hub motors behind a socketcand server, in real time.
 struct Bench {
@@ -121,8 +80,8 @@ fn a_group_is_stopped_when_its_command_is_asked_to_end_or_killed() {
 #[test]
 fn a_base_stops_when_no_line_comes_and_drives_on_with_the_next() {
     let mut bench = Bench::new();
-    let file = example("base.toml");
-    let mut driving = bench.start(&["drive-base", &file]);
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/base.toml");
+    let mut driving = bench.start(&["drive-base", file]);
     let mut lines = driving.stdin.take().unwrap();
     // A line with each look, as often as a program gives them.
     let mut drives = |bench: &mut Bench| {

@@ -108,21 +108,3 @@ fn a_device_is_found_by_its_make_and_a_listener_reads_it_in_words() {
         assert!(reported.contains(words), "{words}: {reported}");
     }
 }
-
-#[test]
-fn a_serial_number_is_one_of_a_device_that_has_it() {
-    for (drive, reported) in
-        [("cia402@4,1018:04=4294967296", "1018h:04 cannot be 4294967296"), ("zlac8030l@4,1018:04=7", "1018h:04")]
-    {
-        let refused = ferrodrive(&["sim", "--drive", drive]);
-        assert_ne!(refused.status, Some(0), "{drive}");
-        assert!(refused.err.contains(reported), "{}", refused.err);
-    }
-}
-
-#[test]
-fn a_model_without_lss_does_not_begin_without_a_node_id() {
-    let refused = ferrodrive(&["sim", "--drive", "zlac8030l@4,node-id=none"]);
-    assert_eq!(refused.status, Some(2));
-    assert!(refused.err.contains("a zlac8030l has no LSS"), "{}", refused.err);
-}

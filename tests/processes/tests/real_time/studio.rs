@@ -1,6 +1,5 @@
-//! `ferrodrive studio` as a process: its first line, access, and its end.
+//! `ferrodrive studio` as a process: its first line and its end.
 
-use processes::ferrodrive;
 use processes::studio::Studio;
 
 #[test]
@@ -25,21 +24,6 @@ fn it_ends_when_it_is_asked_to() {
     let asked = std::process::Command::new("kill").arg(studio.child.id().to_string()).status().unwrap();
     assert!(asked.success());
     assert_eq!(studio.child.wait().unwrap().code(), Some(143));
-}
-
-#[test]
-fn elsewhere_takes_a_password_and_says_what_that_means() {
-    let ended = ferrodrive(&["studio", "--listen", "0.0.0.0:0"]);
-    assert_eq!(ended.status, Some(2), "{}", ended.err);
-    assert!(ended.err.contains("--password-file") && ended.err.contains("can move the drives"), "{}", ended.err);
-    let directory = processes::scratch("studio");
-    let short = directory.join("short");
-    std::fs::write(&short, "hunter2\n").unwrap();
-    let ended = ferrodrive(&["studio", "--listen", "0.0.0.0:0", "--password-file", short.to_str().unwrap()]);
-    assert_eq!(ended.status, Some(1), "{}", ended.err);
-    assert!(ended.err.contains("at least 12"), "{}", ended.err);
-    let missing = ferrodrive(&["studio", "--password-file", "/no/such/file"]);
-    assert_eq!(missing.status, Some(1), "{}", missing.err);
 }
 
 /// Starts a studio that opens its page with the programs of `path`, and gives what it prints and says once `wanted` holds of

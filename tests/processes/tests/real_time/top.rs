@@ -9,7 +9,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use processes::{Simulator, ferrodrive, wait_for, wait_until};
+use processes::{Simulator, wait_for, wait_until};
 
 const LINES: NonZero<u16> = NonZero::new(24).expect("it is not 0");
 const COLUMNS: NonZero<u16> = NonZero::new(80).expect("it is not 0");
@@ -169,14 +169,4 @@ fn a_terminal_that_is_lost_stops_what_it_moves() {
     // The window closes: its processes are hung up.
     drop(terminal);
     wait_until_it_stands(&mut simulator);
-}
-
-#[test]
-fn what_is_no_terminal_is_told_what_to_use() {
-    let ended = ferrodrive(&["top"]);
-    assert_eq!(ended.status, Some(2));
-    assert!(ended.err.contains("not a terminal") && ended.err.contains("ferrodrive watch"), "{}", ended.err);
-    let json = ferrodrive(&["--json", "top"]);
-    assert_eq!(json.status, Some(2));
-    assert!(format!("{}{}", json.out, json.err).contains("for programs"), "{}{}", json.out, json.err);
 }
