@@ -66,8 +66,8 @@ fn standard_type(mux: Mux) -> Option<DataType> {
 
 /// Variables of the standards that none of the models has, ascending, with their types.
 #[rustfmt::skip]
-const TYPES: [(u16, DataType); 8] = [
-    (0x1002, U32), (0x1007, U32), (0x1012, U32), (0x1013, U32), (0x1F80, U32), (0x6069, I32), (0x606A, I16), (0x60FA, I32),
+const TYPES: [(u16, DataType); 7] = [
+    (0x1002, U32), (0x1007, U32), (0x1012, U32), (0x1013, U32), (0x1F80, U32), (0x6069, I32), (0x606A, I16),
 ];
 
 /// Arrays and records of the standards that none of the models has: what stands in them differs by sub-index.
