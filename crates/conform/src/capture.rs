@@ -15,11 +15,11 @@ const KEPT: usize = 1 << 14;
 /// The frames of a bus, of others and of this program, since they were last taken. All clones share them.
 #[derive(Clone, Debug, Default)]
 pub struct Capture {
-    shared: Arc<Mutex<Shared>>,
+    shared: Arc<Mutex<Captured>>,
 }
 
 #[derive(Debug, Default)]
-struct Shared {
+struct Captured {
     frames: VecDeque<BusFrame>,
     waker: Option<Waker>,
 }
@@ -50,7 +50,7 @@ impl Capture {
         self.lock().frames.pop_front()
     }
 
-    fn lock(&self) -> MutexGuard<'_, Shared> {
+    fn lock(&self) -> MutexGuard<'_, Captured> {
         // Nothing is half done between two frames.
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }

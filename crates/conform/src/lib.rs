@@ -49,4 +49,4 @@ pub use html::html;
 pub use junit::junit;
 pub use report::{CaseResult, Outcome, Report, Summary};
 pub use subject::Subject;
-pub use suite::{Options, Progress, Suite, SuiteError, selected};
+pub use suite::{CaseProgress, Options, Suite, SuiteError, selected};

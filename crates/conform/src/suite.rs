@@ -90,7 +90,7 @@ fn is_named(case: &Case, name: &str) -> bool {
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
-pub struct Progress<'a> {
+pub struct CaseProgress<'a> {
     /// The case that begins, or that has ended.
     pub case: &'static Case,
     /// What came of it, once it has ended.
@@ -125,16 +125,16 @@ impl Suite {
     ///
     /// # Errors
     /// [`SuiteError`]: nothing was run then.
-    pub async fn run(mut self, mut progress: impl FnMut(Progress<'_>)) -> Result<Report, SuiteError> {
+    pub async fn run(mut self, mut progress: impl FnMut(CaseProgress<'_>)) -> Result<Report, SuiteError> {
         let wanted = selected(&self.options.only, &self.options.skip)?;
         let identity = self.prepare().await?;
         let mut results: Vec<CaseResult> = Vec::with_capacity(wanted.len());
         let mut not_restored = Vec::new();
         for (position, case) in wanted.iter().enumerate() {
             let (number, of) = (position + 1, wanted.len());
-            progress(Progress { case, result: None, number, of });
+            progress(CaseProgress { case, result: None, number, of });
             let (result, left) = self.run_case(case).await;
-            progress(Progress { case, result: Some(&result), number, of });
+            progress(CaseProgress { case, result: Some(&result), number, of });
             results.push(result);
             not_restored.extend(left);
         }

@@ -100,7 +100,7 @@ impl fmt::Display for HostLoss {
 
 /// A drive that watches this program.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Guard {
+pub(crate) struct ArmedGuard {
     pub(crate) loss: HostLoss,
     /// How often it needs a sign of life.
     pub(crate) period: Duration,

@@ -25,7 +25,7 @@ pub fn velocity_change(from: f64, acceleration: f64, to: f64, ramp: &JerkRamp) -
     if !ramp.is_limited() {
         return trapezoid::velocity_change(from, to, ramp.rate);
     }
-    let mut plan = Plan::from(sane(from), sane(acceleration));
+    let mut plan = JerkPlan::from(sane(from), sane(acceleration));
     plan.change_to(sane(to), ramp, ramp);
     plan.profile(None)
 }
@@ -66,7 +66,7 @@ impl PositionMove {
         let distance = sane(self.distance);
         let (max_speed, end_speed) =
             (sane_speed(self.max_speed), sane_speed(self.end_speed).min(sane_speed(self.max_speed)));
-        let mut plan = Plan::from(sane(self.velocity), sane(self.acceleration));
+        let mut plan = JerkPlan::from(sane(self.velocity), sane(self.acceleration));
         if distance == 0.0 && plan.is_at_rest() {
             return plan.profile(Some(Point::default()));
         }
@@ -99,7 +99,7 @@ impl PositionMove {
     }
 
     /// Whether the motion can end at the target without turning round.
-    fn fits(&self, from: &Plan, sign: f64, length: f64, end_speed: f64) -> bool {
+    fn fits(&self, from: &JerkPlan, sign: f64, length: f64, end_speed: f64) -> bool {
         let relaxed = relaxed_velocity(from, &self.up, &self.down) * sign;
         let slowest = if relaxed > end_speed { end_speed } else { relaxed };
         let way = self.way(from, sign, slowest, end_speed);
@@ -107,20 +107,20 @@ impl PositionMove {
     }
 
     /// The way to a peak and on to the end.
-    fn way(&self, from: &Plan, sign: f64, peak: f64, end_speed: f64) -> f64 {
+    fn way(&self, from: &JerkPlan, sign: f64, peak: f64, end_speed: f64) -> f64 {
         let mut plan = *from;
         self.to_peak_and_end(&mut plan, sign, peak, 0.0, end_speed);
         (plan.position - from.position) * sign
     }
 
-    fn to_peak_and_end(&self, plan: &mut Plan, sign: f64, peak: f64, plateau_s: f64, end_speed: f64) {
+    fn to_peak_and_end(&self, plan: &mut JerkPlan, sign: f64, peak: f64, plateau_s: f64, end_speed: f64) {
         plan.change_to(sign * peak, &self.up, &self.down);
         plan.push(plateau_s, 0.0);
         plan.change_to(sign * end_speed.min(peak), &self.up, &self.down);
     }
 
     /// Speed up, run, slow down, in the direction of what is left.
-    fn go(&self, plan: &mut Plan, left: f64, max_speed: f64, end_speed: f64) {
+    fn go(&self, plan: &mut JerkPlan, left: f64, max_speed: f64, end_speed: f64) {
         let (sign, length) = (1_f64.copysign(left), left.abs());
         let full = self.way(plan, sign, max_speed, end_speed);
         if full <= length {
@@ -137,7 +137,7 @@ impl PositionMove {
 }
 
 /// The velocity after the present acceleration has fallen to none.
-fn relaxed_velocity(from: &Plan, up: &JerkRamp, down: &JerkRamp) -> f64 {
+fn relaxed_velocity(from: &JerkPlan, up: &JerkRamp, down: &JerkRamp) -> f64 {
     let mut plan = *from;
     plan.relax(up, down);
     plan.velocity
@@ -145,7 +145,7 @@ fn relaxed_velocity(from: &Plan, up: &JerkRamp, down: &JerkRamp) -> f64 {
 
 /// Stretches of constant jerk so far, and where they end.
 #[derive(Clone, Copy)]
-struct Plan {
+struct JerkPlan {
     jerks: [Jerk; MAX_JERKS],
     count: usize,
     start: Point,
@@ -154,7 +154,7 @@ struct Plan {
     acceleration: f64,
 }
 
-impl Plan {
+impl JerkPlan {
     fn from(velocity: f64, acceleration: f64) -> Self {
         Self {
             jerks: [Jerk::default(); MAX_JERKS],

@@ -71,7 +71,7 @@ impl Conform {
             write(path, &junit(&report))?;
         }
         let failure = failure(&report, node);
-        format.print_judged(&Shown { report: &report }, failure)
+        format.print_judged(&ReportLine { report: &report }, failure)
     }
 
     async fn test(&self, context: &Context, node: NodeId) -> Result<conform::Report, Failure> {
@@ -87,7 +87,7 @@ impl Conform {
         };
         let suite = Suite::new(context.network.clone(), capture, subject, options);
         context.restore_at_end(suite.restorer());
-        let progress = |at: conform::Progress<'_>| {
+        let progress = |at: conform::CaseProgress<'_>| {
             if at.result.is_none() {
                 context.progress.count(format!("{} of {}: {} {}", at.number, at.of, at.case.id, at.case.title));
             }
@@ -188,7 +188,7 @@ impl Report for CaseList {
 
 /// A report of the suite.
 #[derive(Serialize)]
-struct Shown<'a> {
+struct ReportLine<'a> {
     #[serde(flatten)]
     report: &'a conform::Report,
 }
@@ -198,7 +198,7 @@ const RESULT: usize = 1;
 /// So much of what was seen fits a line; `--json` has all.
 const WIDEST: usize = 110;
 
-impl Report for Shown<'_> {
+impl Report for ReportLine<'_> {
     fn text(&self, paint: Paint) -> String {
         let mut table = Table::new(&["case", "result", "asked", "seen"]);
         for case in &self.report.cases {

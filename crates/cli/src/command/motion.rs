@@ -121,7 +121,7 @@ pub(crate) struct MotionOutcome {
     #[serde(skip)]
     done: String,
     /// Each value that was asked for, and what was sent for it.
-    commanded: Vec<Sent>,
+    commanded: Vec<SentCommand>,
     reached: bool,
     reached_after_s: Option<f64>,
     stopped: bool,
@@ -137,7 +137,7 @@ pub(crate) struct MotionOutcome {
 
 /// A value that was asked for, and what the drive was sent for it.
 #[derive(Debug, Serialize)]
-struct Sent {
+struct SentCommand {
     what: &'static str,
     requested: f64,
     commanded: f64,
@@ -150,7 +150,7 @@ struct Sent {
     text: String,
 }
 
-impl From<&Commanded> for Sent {
+impl From<&Commanded> for SentCommand {
     fn from(sent: &Commanded) -> Self {
         let Commanded { what, requested, commanded, unit, object, raw } = *sent;
         let (object, rounded) = (object.to_string(), sent.is_rounded());
@@ -320,7 +320,7 @@ pub(super) async fn outcome(
     Ok(MotionOutcome {
         asked,
         done,
-        commanded: motion.commanded.iter().map(Sent::from).collect(),
+        commanded: motion.commanded.iter().map(SentCommand::from).collect(),
         reached: motion.reached_after.is_some(),
         reached_after_s: motion.reached_after.map(|time| time.as_secs_f64()),
         stopped: before_stop.is_some(),

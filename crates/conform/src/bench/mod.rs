@@ -17,7 +17,7 @@ use master::Network;
 pub(crate) use axis::{CHANGE, MOTION};
 pub(crate) use pdo::{Tpdo, another, entry, is_mappable};
 pub use restore::Restorer;
-pub(crate) use sdo::{Answer, hex, refused};
+pub(crate) use sdo::{SdoResult, hex, refused};
 
 use crate::capture::Capture;
 use crate::case::Finding;

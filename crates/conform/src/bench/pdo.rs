@@ -5,7 +5,7 @@ use canopen::od::{DataType, Entry, PdoMapping};
 use canopen::pdo::PdoId;
 use canopen::{CobId, Mux, connection_set};
 
-use super::{Answer, Bench, ms};
+use super::{Bench, SdoResult, ms};
 use crate::case::{Finding, not_applicable};
 use crate::subject::{bytes_of, number_of};
 
@@ -77,7 +77,7 @@ impl Bench {
     }
 
     /// Maps these entries into the PDO of a communication parameter, which is off.
-    pub(crate) async fn map(&mut self, index: u16, entries: &[u32]) -> Result<Answer<()>, Finding> {
+    pub(crate) async fn map(&mut self, index: u16, entries: &[u32]) -> Result<SdoResult<()>, Finding> {
         let mapping = index + 0x200;
         if let Err(code) = self.try_write(Mux::new(mapping, 0), &[0]).await? {
             return Ok(Err(code));

@@ -10,7 +10,7 @@ use crate::case::{Finding, Verdict, fail};
 use crate::subject::number_of;
 
 /// What a server made of a request: it did it, or aborted.
-pub(crate) type Answer<T> = Result<T, AbortCode>;
+pub(crate) type SdoResult<T> = Result<T, AbortCode>;
 
 /// Most segments that are read: a server that does not come to an end is wrong.
 const MOST_SEGMENTS: usize = 1 << 16;
@@ -56,7 +56,7 @@ impl Bench {
     }
 
     /// Reads an object.
-    pub(crate) async fn upload(&mut self, mux: Mux) -> Result<Answer<Vec<u8>>, Finding> {
+    pub(crate) async fn upload(&mut self, mux: Mux) -> Result<SdoResult<Vec<u8>>, Finding> {
         let reply = Reply::parse(&self.exchange(Request::InitiateUpload(mux).emit()).await?);
         let size = match reply {
             Reply::Abort(_, code) => return Ok(Err(code)),
@@ -91,13 +91,13 @@ impl Bench {
     }
 
     /// Writes an object, in one frame where it fits.
-    pub(crate) async fn download(&mut self, mux: Mux, data: &[u8]) -> Result<Answer<()>, Finding> {
+    pub(crate) async fn download(&mut self, mux: Mux, data: &[u8]) -> Result<SdoResult<()>, Finding> {
         let Some(payload) = Payload::expedited(data) else { return self.download_segmented(mux, data).await };
         self.initiate_download(mux, payload).await
     }
 
     /// Writes an object in segments, whatever its length.
-    pub(crate) async fn download_segmented(&mut self, mux: Mux, data: &[u8]) -> Result<Answer<()>, Finding> {
+    pub(crate) async fn download_segmented(&mut self, mux: Mux, data: &[u8]) -> Result<SdoResult<()>, Finding> {
         let begun = self.initiate_download(mux, Payload::Segmented { size: Some(data.len() as u32) }).await?;
         if begun.is_err() {
             return Ok(begun);
@@ -124,7 +124,7 @@ impl Bench {
         self.pause(ms(10)).await;
     }
 
-    async fn initiate_download(&mut self, mux: Mux, payload: Payload) -> Result<Answer<()>, Finding> {
+    async fn initiate_download(&mut self, mux: Mux, payload: Payload) -> Result<SdoResult<()>, Finding> {
         match Reply::parse(&self.exchange(Request::InitiateDownload(mux, payload).emit()).await?) {
             Reply::Abort(_, code) => Ok(Err(code)),
             Reply::InitiateDownload(about) if about == mux => Ok(Ok(())),
@@ -168,7 +168,7 @@ impl Bench {
     }
 
     /// Writes an object that may refuse the value; what it had comes back after the case.
-    pub(crate) async fn try_write(&mut self, mux: Mux, data: &[u8]) -> Result<Answer<()>, Finding> {
+    pub(crate) async fn try_write(&mut self, mux: Mux, data: &[u8]) -> Result<SdoResult<()>, Finding> {
         self.touch(mux).await?;
         let written = self.download(mux, data).await?;
         if written.is_err() {
@@ -188,7 +188,7 @@ impl Bench {
 }
 
 /// Judges an answer that has to be an abort with one of these codes.
-pub(crate) fn refused<T>(what: &str, answer: &Answer<T>, accepted: &[AbortCode]) -> Verdict {
+pub(crate) fn refused<T>(what: &str, answer: &SdoResult<T>, accepted: &[AbortCode]) -> Verdict {
     match answer {
         Err(code) if accepted.contains(code) => Ok(format!("{what}: aborted with {code}")),
         Err(code) => fail!("{what}: aborted with {code}; expected {}", listed(accepted)),

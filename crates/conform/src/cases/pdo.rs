@@ -13,24 +13,24 @@ use crate::subject::{bytes_of, number_of};
 pub(crate) const CASES: &[Case] = &[
     case!("PDO 01", "Parameters of the receive PDOs", "CiA 301, 7.5.2.35", [Need::Rpdo], [], |bench| parameters(bench, 0x1400)),
     case!("PDO 02", "Parameters of the transmit PDOs", "CiA 301, 7.5.2.37", [Need::Tpdo], [], |bench| parameters(bench, 0x1800)),
-    case!("PDO 03", "A remote frame is answered in operational", "CiA 301, 7.2.2.5.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Remote, Phase::Operational)),
-    case!("PDO 04", "Event-driven: sent when what it carries changes", "CiA 301, 7.2.2.3", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Event, Phase::Operational)),
-    case!("PDO 05", "Event timer: sent with its period", "CiA 301, 7.5.2.37", [Need::Tpdo], ["pdo_timers", "tpdo_answers_rpdo"], |bench| in_state(bench, Way::Timer, Phase::Operational)),
-    case!("PDO 06", "Synchronous, cyclic: sent after every nth SYNC", "CiA 301, 7.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Cyclic, Phase::Operational)),
-    case!("PDO 07", "Synchronous, acyclic: sent after a SYNC only", "CiA 301, 7.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Acyclic, Phase::Operational)),
-    case!("PDO 08", "SYNC start value: counted from that SYNC on", "CiA 301, 7.5.2.37", [Need::Tpdo], [], |bench| in_state(bench, Way::StartValue, Phase::Operational)),
-    case!("PDO 09", "A remote frame is not answered in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["starts_operational"], |bench| in_state(bench, Way::Remote, Phase::Stopped)),
-    case!("PDO 10", "Event-driven: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Event, Phase::Stopped)),
-    case!("PDO 11", "Event timer: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Timer, Phase::Stopped)),
-    case!("PDO 12", "Synchronous, cyclic: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Cyclic, Phase::Stopped)),
-    case!("PDO 13", "Synchronous, acyclic: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Acyclic, Phase::Stopped)),
-    case!("PDO 14", "SYNC start value: nothing in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], [], |bench| in_state(bench, Way::StartValue, Phase::Stopped)),
-    case!("PDO 15", "A remote frame is not answered in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["starts_operational"], |bench| in_state(bench, Way::Remote, Phase::PreOperational)),
-    case!("PDO 16", "Event-driven: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Event, Phase::PreOperational)),
-    case!("PDO 17", "Event timer: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Timer, Phase::PreOperational)),
-    case!("PDO 18", "Synchronous, cyclic: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Cyclic, Phase::PreOperational)),
-    case!("PDO 19", "Synchronous, acyclic: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Acyclic, Phase::PreOperational)),
-    case!("PDO 20", "SYNC start value: nothing in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], [], |bench| in_state(bench, Way::StartValue, Phase::PreOperational)),
+    case!("PDO 03", "A remote frame is answered in operational", "CiA 301, 7.2.2.5.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Remote, NmtPhase::Operational)),
+    case!("PDO 04", "Event-driven: sent when what it carries changes", "CiA 301, 7.2.2.3", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Event, NmtPhase::Operational)),
+    case!("PDO 05", "Event timer: sent with its period", "CiA 301, 7.5.2.37", [Need::Tpdo], ["pdo_timers", "tpdo_answers_rpdo"], |bench| in_state(bench, Way::Timer, NmtPhase::Operational)),
+    case!("PDO 06", "Synchronous, cyclic: sent after every nth SYNC", "CiA 301, 7.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Cyclic, NmtPhase::Operational)),
+    case!("PDO 07", "Synchronous, acyclic: sent after a SYNC only", "CiA 301, 7.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Acyclic, NmtPhase::Operational)),
+    case!("PDO 08", "SYNC start value: counted from that SYNC on", "CiA 301, 7.5.2.37", [Need::Tpdo], [], |bench| in_state(bench, Way::StartValue, NmtPhase::Operational)),
+    case!("PDO 09", "A remote frame is not answered in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["starts_operational"], |bench| in_state(bench, Way::Remote, NmtPhase::Stopped)),
+    case!("PDO 10", "Event-driven: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Event, NmtPhase::Stopped)),
+    case!("PDO 11", "Event timer: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Timer, NmtPhase::Stopped)),
+    case!("PDO 12", "Synchronous, cyclic: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Cyclic, NmtPhase::Stopped)),
+    case!("PDO 13", "Synchronous, acyclic: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Acyclic, NmtPhase::Stopped)),
+    case!("PDO 14", "SYNC start value: nothing in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], [], |bench| in_state(bench, Way::StartValue, NmtPhase::Stopped)),
+    case!("PDO 15", "A remote frame is not answered in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["starts_operational"], |bench| in_state(bench, Way::Remote, NmtPhase::PreOperational)),
+    case!("PDO 16", "Event-driven: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Event, NmtPhase::PreOperational)),
+    case!("PDO 17", "Event timer: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Timer, NmtPhase::PreOperational)),
+    case!("PDO 18", "Synchronous, cyclic: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Cyclic, NmtPhase::PreOperational)),
+    case!("PDO 19", "Synchronous, acyclic: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Acyclic, NmtPhase::PreOperational)),
+    case!("PDO 20", "SYNC start value: nothing in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], [], |bench| in_state(bench, Way::StartValue, NmtPhase::PreOperational)),
     case!("PDO 51", "Inhibit time: never sent sooner", "CiA 301, 7.5.2.37", [Need::Tpdo], ["pdo_timers", "tpdo_answers_rpdo"], inhibit_time),
     case!("PDO 52", "A receive PDO writes what it carries", "CiA 301, 7.2.2.5.1", [Need::Rpdo], ["fixed_mapping"], receive),
     case!("PDO 53", "A receive PDO of pre-operational is dropped, not kept for operational", "CiA 301, 7.3.2.2.2", [Need::Rpdo], ["starts_operational", "fixed_mapping"], receive_before_start),
@@ -82,7 +82,7 @@ enum Way {
 
 /// The NMT state in which it is looked for.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Phase {
+enum NmtPhase {
     Operational,
     Stopped,
     PreOperational,
@@ -92,7 +92,7 @@ const TIMER_MS: u16 = 100;
 /// SYNCs from one to the next of a cyclic PDO.
 const CYCLE: u8 = 2;
 
-async fn in_state(bench: &mut Bench, way: Way, phase: Phase) -> Verdict {
+async fn in_state(bench: &mut Bench, way: Way, phase: NmtPhase) -> Verdict {
     bench.nmt(NmtCommand::EnterPreOperational).await;
     if way == Way::StartValue {
         return start_value(bench, phase).await;
@@ -107,19 +107,19 @@ async fn in_state(bench: &mut Bench, way: Way, phase: Phase) -> Verdict {
     let tpdo = bench.set_up_tpdo(transmission, timer).await?;
     enter(bench, phase).await;
     match phase {
-        Phase::Operational => sent(bench, way, tpdo).await,
-        Phase::Stopped | Phase::PreOperational => unsent(bench, way, phase, tpdo).await,
+        NmtPhase::Operational => sent(bench, way, tpdo).await,
+        NmtPhase::Stopped | NmtPhase::PreOperational => unsent(bench, way, phase, tpdo).await,
     }
 }
 
-async fn enter(bench: &mut Bench, phase: Phase) {
+async fn enter(bench: &mut Bench, phase: NmtPhase) {
     match phase {
-        Phase::Operational => bench.nmt(NmtCommand::Start).await,
-        Phase::Stopped => {
+        NmtPhase::Operational => bench.nmt(NmtCommand::Start).await,
+        NmtPhase::Stopped => {
             bench.nmt(NmtCommand::Start).await;
             bench.nmt(NmtCommand::Stop).await;
         }
-        Phase::PreOperational => {}
+        NmtPhase::PreOperational => {}
     }
 }
 
@@ -237,14 +237,14 @@ async fn sent_after_sync(bench: &mut Bench, tpdo: Tpdo) -> Verdict {
     }
 }
 
-async fn unsent(bench: &mut Bench, way: Way, phase: Phase, tpdo: Tpdo) -> Verdict {
+async fn unsent(bench: &mut Bench, way: Way, phase: NmtPhase, tpdo: Tpdo) -> Verdict {
     // What was on its way when the node was stopped is not meant.
-    if phase == Phase::Stopped {
+    if phase == NmtPhase::Stopped {
         bench.count(tpdo.id);
     }
     match way {
         Way::Remote => bench.send(Frame::remote(tpdo.id, 8)),
-        Way::Event | Way::Acyclic if phase == Phase::PreOperational => {
+        Way::Event | Way::Acyclic if phase == NmtPhase::PreOperational => {
             if let Some(row) = tpdo.mapped {
                 bench.change(row).await?;
             }
@@ -264,7 +264,7 @@ async fn unsent(bench: &mut Bench, way: Way, phase: Phase, tpdo: Tpdo) -> Verdic
 }
 
 /// Sub-index 06h of the communication parameter: the SYNC counter with which counting begins.
-async fn start_value(bench: &mut Bench, phase: Phase) -> Verdict {
+async fn start_value(bench: &mut Bench, phase: NmtPhase) -> Verdict {
     const OVERFLOW: u8 = 10;
     const START: u8 = 3;
     let Some(index) = bench.subject.pdos(0x1800).next() else { not_applicable!("the device has no transmit PDO") };
@@ -285,7 +285,7 @@ async fn start_value(bench: &mut Bench, phase: Phase) -> Verdict {
     for counter in 1..=6 {
         heard.push(bench.sync(Some(counter), tpdo.id).await.len());
     }
-    let expected: &[usize] = if phase == Phase::Operational { &[0, 0, 1, 1, 1, 1] } else { &[0; 6] };
+    let expected: &[usize] = if phase == NmtPhase::Operational { &[0, 0, 1, 1, 1, 1] } else { &[0; 6] };
     if heard != expected {
         fail!("with SYNC counters 1 to 6 and the start value {START} it came {heard:?} times; expected {expected:?}");
     }

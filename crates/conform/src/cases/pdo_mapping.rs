@@ -3,7 +3,7 @@
 use canopen::od::{Access, DataType, Entry, PdoMapping};
 use canopen::{AbortCode, CobId, Mux, NmtCommand};
 
-use crate::bench::{Answer, Bench, entry, is_mappable, refused};
+use crate::bench::{Bench, SdoResult, entry, is_mappable, refused};
 use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
 
 #[rustfmt::skip]
@@ -149,7 +149,7 @@ async fn too_long(bench: &mut Bench) -> Verdict {
 }
 
 /// Maps one object into the first PDO of a direction.
-async fn map_one(bench: &mut Bench, base: u16, raw: u32) -> Result<Answer<()>, Finding> {
+async fn map_one(bench: &mut Bench, base: u16, raw: u32) -> Result<SdoResult<()>, Finding> {
     let index = emptied(bench, base).await?;
     bench.map(index, &[raw]).await
 }

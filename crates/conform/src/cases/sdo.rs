@@ -5,7 +5,7 @@ use canopen::od::{Access, Entry};
 use canopen::sdo::wire::{Payload, Reply, Request};
 use canopen::{AbortCode, Mux, NmtCommand, connection_set};
 
-use crate::bench::{Answer, Bench, hex, refused};
+use crate::bench::{Bench, SdoResult, hex, refused};
 use crate::case::{Case, Need, Verdict, case, fail, not_applicable};
 use crate::subject::{Subject, bytes_of};
 
@@ -98,7 +98,7 @@ async fn missing_object(bench: &mut Bench) -> Verdict {
 
 async fn unknown_command(bench: &mut Bench) -> Verdict {
     let answer = bench.exchange([0xE0, 0x00, 0x10, 0, 0, 0, 0, 0]).await?;
-    let aborted: Answer<()> = match Reply::parse(&answer) {
+    let aborted: SdoResult<()> = match Reply::parse(&answer) {
         Reply::Abort(_, code) => Err(code),
         _ => Ok(()),
     };

@@ -5,7 +5,7 @@ use canopen::od::{Access, Entry, Kind};
 use canopen::sdo::wire::{Payload, Reply, Request, Segment};
 use canopen::{AbortCode, Mux};
 
-use crate::bench::{Answer, Bench, hex, refused};
+use crate::bench::{Bench, SdoResult, hex, refused};
 use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
 
 #[rustfmt::skip]
@@ -216,7 +216,7 @@ async fn kept(bench: &mut Bench, mux: Mux, before: &[u8], seen: Verdict) -> Verd
 }
 
 /// An answer that should be an abort.
-pub(super) fn aborted(answer: &[u8; 8]) -> Answer<()> {
+pub(super) fn aborted(answer: &[u8; 8]) -> SdoResult<()> {
     match Reply::parse(answer) {
         Reply::Abort(_, code) => Err(code),
         _ => Ok(()),

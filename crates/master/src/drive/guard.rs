@@ -14,7 +14,7 @@ use devices::HostWatch;
 use super::handle::Drive;
 use crate::core::NodeSet;
 use crate::error::Error;
-use crate::host_loss::{Guard, HostLoss};
+use crate::host_loss::{ArmedGuard, HostLoss};
 use crate::network::{Network, Node, join_all};
 
 /// How often a drive that watches for silence or for a heartbeat is content within its time: two may get lost.
@@ -115,7 +115,7 @@ impl Drive {
         }
         let loss = self.loss(armed);
         let Some(time) = loss.stops_after() else { return Ok(loss) };
-        let guard = Guard { loss, period: (time / SIGNS_IN_TIME).max(SHORTEST_PERIOD), before, armed };
+        let guard = ArmedGuard { loss, period: (time / SIGNS_IN_TIME).max(SHORTEST_PERIOD), before, armed };
         // Noted before anything changes on the drive: whatever fails from here on, a release puts it back.
         network.with_guards(|guards| guards.insert(id, guard));
         if let Err(error) = self.begin_guard(object, &guard, switches_on).await {
@@ -128,7 +128,7 @@ impl Drive {
     }
 
     /// Arms the drive's watch where it was off, and ends a motion that would go on with the first heartbeat.
-    async fn begin_guard(&self, object: Mux, guard: &Guard, switches_on: bool) -> Result<(), Error> {
+    async fn begin_guard(&self, object: Mux, guard: &ArmedGuard, switches_on: bool) -> Result<(), Error> {
         if switches_on {
             self.write_number(object, guard.armed).await?;
         }
@@ -275,7 +275,7 @@ impl Network {
     /// Ceases to send the heartbeats that guarded drives watch, or sends them again. The guards stay.
     pub(crate) fn hold_heartbeats(&self, hold: bool) {
         let hosts: NodeSet = self.with_guards(|guards| {
-            let host = |guard: &Guard| match guard.loss {
+            let host = |guard: &ArmedGuard| match guard.loss {
                 HostLoss::StopsWithoutHeartbeat { host, .. } => Some(host),
                 _ => None,
             };
@@ -312,7 +312,7 @@ impl Network {
     fn send_heartbeat(&self, host: NodeId) -> bool {
         let guards = self.with_guards(|guards| {
             let of_host =
-                |guard: &&Guard| matches!(guard.loss, HostLoss::StopsWithoutHeartbeat { host: own, .. } if own == host);
+                |guard: &&ArmedGuard| matches!(guard.loss, HostLoss::StopsWithoutHeartbeat { host: own, .. } if own == host);
             guards.values().filter(of_host).copied().collect::<Vec<_>>()
         });
         let period = guards.iter().map(|guard| guard.period).min();

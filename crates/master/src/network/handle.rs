@@ -10,7 +10,7 @@ use devices::AxisId;
 
 use super::moved::{Moved, MovedAxis};
 use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, Ticket};
-use crate::host_loss::Guard;
+use crate::host_loss::ArmedGuard;
 use crate::models::Models;
 
 /// A CANopen network as its master sees it: a cheap handle that all tasks and the runner share.
@@ -43,7 +43,7 @@ pub(super) struct NetworkState {
     /// The models that a node may be.
     models: Models,
     /// What watches this program, by node.
-    guards: BTreeMap<NodeId, Guard>,
+    guards: BTreeMap<NodeId, ArmedGuard>,
     /// Axes that belong to a group or a base, by the place of their controlword.
     pub(super) claims: BTreeSet<(NodeId, Mux)>,
 }
@@ -211,7 +211,7 @@ impl Network {
     }
 
     /// The guards of this program, to look at or to change.
-    pub(crate) fn with_guards<T>(&self, look: impl FnOnce(&mut BTreeMap<NodeId, Guard>) -> T) -> T {
+    pub(crate) fn with_guards<T>(&self, look: impl FnOnce(&mut BTreeMap<NodeId, ArmedGuard>) -> T) -> T {
         look(&mut self.lock().guards)
     }
 

@@ -30,7 +30,7 @@ struct Before {
     writes: Vec<NamedWrite>,
 }
 
-enum Trouble {
+enum WriteTrouble {
     Failed(&'static str, Error),
     Differs(NamedWrite, u32),
 }
@@ -47,8 +47,8 @@ pub(super) async fn apply(node: &Node, config: &PdoConfig, units: TimerUnits) ->
         Err(trouble) => {
             let restored = restore(node, config, &before).await.is_ok();
             Err(match trouble {
-                Trouble::Failed(step, cause) => PdoError::Step { node: node.id(), pdo, step, cause, restored },
-                Trouble::Differs(NamedWrite { step, mux, raw, .. }, found) => {
+                WriteTrouble::Failed(step, cause) => PdoError::Step { node: node.id(), pdo, step, cause, restored },
+                WriteTrouble::Differs(NamedWrite { step, mux, raw, .. }, found) => {
                     PdoError::ReadBack { node: node.id(), pdo, mux, step, asked: raw, found, restored }
                 }
             })
@@ -138,7 +138,7 @@ async fn run(
     cob_id: CobId,
     before: CobId,
     writes: &[NamedWrite],
-) -> Result<(), Trouble> {
+) -> Result<(), WriteTrouble> {
     invalidate(node, config, before).await?;
     for write in writes {
         put(node, *write).await?;
@@ -151,26 +151,26 @@ async fn run(
 }
 
 /// Sets bit 31. A device that does not let its COB-ID be written is left valid: some remap regardless.
-async fn invalidate(node: &Node, config: &PdoConfig, cob_id: CobId) -> Result<(), Trouble> {
+async fn invalidate(node: &Node, config: &PdoConfig, cob_id: CobId) -> Result<(), WriteTrouble> {
     let (step, mux) = ("invalidate it (bit 31 of its COB-ID)", config.parameter(1));
     match put(node, NamedWrite { step, mux, raw: cob_id.0 | CobId::INVALID, bytes: 4 }).await {
-        Err(Trouble::Failed(_, Error::Aborted { code: AbortCode::READ_ONLY, .. })) => Ok(()),
+        Err(WriteTrouble::Failed(_, Error::Aborted { code: AbortCode::READ_ONLY, .. })) => Ok(()),
         other => other,
     }
 }
 
-async fn validate(node: &Node, config: &PdoConfig, cob_id: CobId) -> Result<(), Trouble> {
+async fn validate(node: &Node, config: &PdoConfig, cob_id: CobId) -> Result<(), WriteTrouble> {
     let (step, mux) = ("validate it (its COB-ID without bit 31)", config.parameter(1));
     let write = NamedWrite { step, mux, raw: cob_id.0, bytes: 4 };
     match put(node, write).await {
         // It may already be what it has to be.
-        Err(Trouble::Failed(_, Error::Aborted { code: AbortCode::READ_ONLY, .. })) => {}
+        Err(WriteTrouble::Failed(_, Error::Aborted { code: AbortCode::READ_ONLY, .. })) => {}
         other => other?,
     }
     check(node, write).await
 }
 
-async fn restore(node: &Node, config: &PdoConfig, before: &Before) -> Result<(), Trouble> {
+async fn restore(node: &Node, config: &PdoConfig, before: &Before) -> Result<(), WriteTrouble> {
     invalidate(node, config, before.cob_id).await?;
     for write in &before.writes {
         put(node, *write).await?;
@@ -178,16 +178,16 @@ async fn restore(node: &Node, config: &PdoConfig, before: &Before) -> Result<(),
     validate(node, config, before.cob_id).await
 }
 
-async fn put(node: &Node, write: NamedWrite) -> Result<(), Trouble> {
+async fn put(node: &Node, write: NamedWrite) -> Result<(), WriteTrouble> {
     let bytes = write.raw.to_le_bytes();
-    node.download(write.mux, &bytes[..write.bytes]).await.map_err(|cause| Trouble::Failed(write.step, cause))
+    node.download(write.mux, &bytes[..write.bytes]).await.map_err(|cause| WriteTrouble::Failed(write.step, cause))
 }
 
-async fn check(node: &Node, write: NamedWrite) -> Result<(), Trouble> {
-    let found = cell(node, write.mux).await.map_err(|cause| Trouble::Failed(write.step, cause))?;
+async fn check(node: &Node, write: NamedWrite) -> Result<(), WriteTrouble> {
+    let found = cell(node, write.mux).await.map_err(|cause| WriteTrouble::Failed(write.step, cause))?;
     // Bit 30 (no RTR) is the device's own: some keep it set whatever is written.
     let ignored = if write.mux.sub_index == 1 && write.mux.index & 0x200 == 0 { CobId::NO_RTR } else { 0 };
-    if (found ^ write.raw) & !ignored == 0 { Ok(()) } else { Err(Trouble::Differs(write, found)) }
+    if (found ^ write.raw) & !ignored == 0 { Ok(()) } else { Err(WriteTrouble::Differs(write, found)) }
 }
 
 /// An object of up to four bytes, whatever its length: devices differ in the types of PDO parameters.

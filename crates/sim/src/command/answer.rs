@@ -39,7 +39,7 @@ pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> 
                 return Ok(switched(world, place.node));
             }
             let note = if is_load(stimulus) { outlook(world, *place) } else { None };
-            Ok(json::line(&Done { ok: true, t: seconds(world), note }))
+            Ok(json::line(&CommandDone { ok: true, t: seconds(world), note }))
         }
     }
 }
@@ -86,7 +86,7 @@ fn body(world: &mut World, name: &str) -> Result<String, CommandError> {
 }
 
 #[derive(Serialize)]
-struct Done {
+struct CommandDone {
     ok: bool,
     t: f64,
     /// What will come of it, where a person may not expect it.
@@ -95,7 +95,7 @@ struct Done {
 }
 
 fn done(world: &World) -> String {
-    json::line(&Done { ok: true, t: seconds(world), note: None })
+    json::line(&CommandDone { ok: true, t: seconds(world), note: None })
 }
 
 /// The answer to a switch of the supply: what the drive makes of it now. A bus drains for a while after it.

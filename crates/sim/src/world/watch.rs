@@ -61,7 +61,7 @@ impl Controller {
 
 /// A drive of the world, to be looked at.
 #[derive(Clone, Copy)]
-struct Subject<'a> {
+struct WatchedDrive<'a> {
     number: u8,
     drive: &'a dyn VirtualDrive,
 }
@@ -88,7 +88,7 @@ impl WorldWatch {
     pub(super) fn get_to_know(&mut self, i: usize, member: &Member) {
         let seen = match member {
             Member::Drive { number, drive } => {
-                let subject = Subject { number: *number, drive: &**drive };
+                let subject = WatchedDrive { number: *number, drive: &**drive };
                 (0..drive.axes()).map(|axis| subject.condition(AxisId(axis))).collect()
             }
             _ => Vec::new(),
@@ -99,7 +99,7 @@ impl WorldWatch {
 
     pub(super) fn look_at(&mut self, i: usize, member: &Member, now: Instant) {
         let Member::Drive { number, drive } = member else { return };
-        let subject = Subject { number: *number, drive: &**drive };
+        let subject = WatchedDrive { number: *number, drive: &**drive };
         for axis in 0..drive.axes() {
             let after = subject.condition(AxisId(axis));
             let Some(before) = self.seen.get_mut(i).and_then(|axes| axes.get_mut(usize::from(axis))) else { continue };
@@ -171,7 +171,7 @@ fn is_own(axis: &AxisDescription, bit: u16) -> bool {
     axis.statusword_bits.iter().any(|(mask, _)| mask & bit != 0)
 }
 
-impl Subject<'_> {
+impl WatchedDrive<'_> {
     fn description(self) -> Option<&'static Description> {
         self.drive.description()
     }

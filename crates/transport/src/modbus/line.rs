@@ -12,13 +12,13 @@ const AROUND: usize = 3;
 
 /// What came in and has not been understood.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Line {
+pub(super) struct SerialLine {
     input: Vec<u8>,
     /// No frame begins before this place, unless the whole input is one.
     start: usize,
 }
 
-impl Line {
+impl SerialLine {
     pub(super) fn receive(&mut self, bytes: &[u8]) {
         self.input.extend_from_slice(bytes);
     }
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn frames_without_a_silence_between_them_are_taken_one_by_one() {
-        let mut line = Line::default();
+        let mut line = SerialLine::default();
         let read = framed(&[7, 3, 0, 0, 0, 1]);
         let write = framed(&[7, 0x10, 0, 0, 0, 1, 2, 0xBE, 0xEF]);
         // The answer of another unit, as long as it likes, then two requests.
@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn what_has_no_length_of_its_own_or_a_wrong_one_is_whole_at_the_silence() {
-        let mut line = Line::default();
+        let mut line = SerialLine::default();
         for content in
             [&[7, 0x41, 1, 2, 3][..], &[7, 0x10, 0, 0, 0, 2, 2, 0, 1, 0, 2], &[7, 3, 0, 0, 0, 1, 0], &[7, 0x2B]]
         {
@@ -166,7 +166,7 @@ mod tests {
         let read = framed(&[7, 3, 0, 0, 0, 1]);
         // A write of FFh bytes is awaited for as long as the line is not silent.
         for noise in [&[0][..], &[0xFF; 40], &[9, 0x10, 0, 0, 0, 1, 0xFF], &read[..5], &[7, 3]] {
-            let mut line = Line::default();
+            let mut line = SerialLine::default();
             line.receive(&[noise, &read].concat());
             let adu = line.take().or_else(|| line.take_at_silence());
             assert_eq!(adu.map(|adu| adu.pdu), Some(read[1..6].to_vec()), "{noise:02X?}");
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn noise_is_forgotten_and_never_kept_beyond_a_frame() {
-        let mut line = Line::default();
+        let mut line = SerialLine::default();
         for byte in 0..10_000_u32 {
             line.receive(&[(byte % 251) as u8]);
             assert_eq!(line.take(), None);

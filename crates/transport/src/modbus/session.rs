@@ -33,7 +33,7 @@ pub struct ModbusSession {
 #[derive(Clone, Debug)]
 enum Input {
     Tcp(Vec<u8>),
-    SerialLine(line::Line),
+    SerialLine(line::SerialLine),
 }
 
 impl ModbusSession {
@@ -41,7 +41,7 @@ impl ModbusSession {
     pub fn new(medium: ModbusMedium) -> Self {
         let input = match medium {
             ModbusMedium::Tcp => Input::Tcp(Vec::new()),
-            ModbusMedium::SerialLine => Input::SerialLine(line::Line::default()),
+            ModbusMedium::SerialLine => Input::SerialLine(line::SerialLine::default()),
         };
         Self { input, ready: None, over: false }
     }

@@ -71,13 +71,13 @@ pub enum HomingState {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Homing {
     state: HomingState,
-    run: Option<Run>,
+    run: Option<HomingRun>,
     /// The run has just ended by itself.
     ended: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Run {
+struct HomingRun {
     sequence: HomingSequence,
     phase: HomingPhase,
     /// The method's switch in the preceding look.
@@ -107,7 +107,7 @@ impl Homing {
             }
         };
         let was_on = switches.of(sequence.switch);
-        *self = Self { state: HomingState::Running, run: Some(Run { sequence, phase, was_on }), ended: false };
+        *self = Self { state: HomingState::Running, run: Some(HomingRun { sequence, phase, was_on }), ended: false };
         None
     }
 
@@ -164,7 +164,7 @@ impl Homing {
     pub(super) fn come_to_rest(&mut self) {
         match (self.state, self.run) {
             (HomingState::Stopping, _) => self.state = HomingState::Attained,
-            (_, Some(Run { phase: HomingPhase::SlowDown, .. })) => self.abort(),
+            (_, Some(HomingRun { phase: HomingPhase::SlowDown, .. })) => self.abort(),
             _ => {}
         }
     }
@@ -178,7 +178,7 @@ impl Homing {
 /// A limit switch stands in the way.
 struct LimitMet;
 
-impl Run {
+impl HomingRun {
     fn watch(
         &mut self,
         parameters: &HomingParameters,

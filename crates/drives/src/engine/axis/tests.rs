@@ -22,14 +22,14 @@ const HOLD: Task = Task::Hold { control: Control::Position, ramp: RAMP };
 const STOP: Stop =
     Stop { braking: Braking::Ramp(Ramp::Rate(4000.0)), on_path: true, end: StopEnd::Hold, patience_s: 1.0 };
 
-struct Bench {
+struct AxisBench {
     axis: Axis,
     /// Counts, with their share.
     position: f64,
     velocity: f64,
 }
 
-impl Bench {
+impl AxisBench {
     fn turning_at(velocity: f64) -> Self {
         let mut bench = Self { axis: Axis::new(), position: 0.0, velocity };
         bench.look();
@@ -72,7 +72,7 @@ impl Bench {
 #[test]
 fn a_shaft_that_turns_is_taken_over_and_brought_to_rest() {
     // v²/2a from 1000 counts/s.
-    let mut bench = Bench::turning_at(1000.0);
+    let mut bench = AxisBench::turning_at(1000.0);
     bench.run(0.25);
     assert!((bench.velocity - 500.0).abs() < 2.0, "{}", bench.velocity);
     assert!(bench.run(0.26).stands_at(250.0), "{}", bench.position);
@@ -80,7 +80,7 @@ fn a_shaft_that_turns_is_taken_over_and_brought_to_rest() {
 
 #[test]
 fn a_stop_lies_over_a_move_which_goes_on_afterwards() {
-    let mut bench = Bench::turning_at(0.0);
+    let mut bench = AxisBench::turning_at(0.0);
     bench.axis.begin(Task::Move { target: 5000, limits: LIMITS });
     bench.run(1.0);
     let there = bench.position;
@@ -95,7 +95,7 @@ fn a_stop_lies_over_a_move_which_goes_on_afterwards() {
 
 #[test]
 fn a_task_that_is_begun_under_a_stop_waits_for_its_end() {
-    let mut bench = Bench::turning_at(0.0);
+    let mut bench = AxisBench::turning_at(0.0);
     bench.axis.set_stop(Some(STOP));
     bench.run(0.1);
     bench.axis.begin(Task::Move { target: -700, limits: LIMITS });
@@ -106,7 +106,7 @@ fn a_task_that_is_begun_under_a_stop_waits_for_its_end() {
 
 #[test]
 fn a_coasting_shaft_is_free_and_is_taken_over_as_it_turns() {
-    let mut bench = Bench::turning_at(0.0);
+    let mut bench = AxisBench::turning_at(0.0);
     bench.axis.begin(Task::Speed { velocity: 800.0, ramps: SPEEDS });
     bench.run(1.0);
     bench.axis.set_stop(Some(Stop { braking: Braking::Coast, ..STOP }));
@@ -120,7 +120,7 @@ fn a_coasting_shaft_is_free_and_is_taken_over_as_it_turns() {
 
 #[test]
 fn another_stop_goes_on_where_the_first_has_come_to_unless_it_is_faster() {
-    let mut bench = Bench::turning_at(0.0);
+    let mut bench = AxisBench::turning_at(0.0);
     bench.axis.begin(Task::Speed { velocity: 1000.0, ramps: SPEEDS });
     bench.run(1.0);
     bench.axis.set_stop(Some(STOP));
@@ -134,7 +134,7 @@ fn another_stop_goes_on_where_the_first_has_come_to_unless_it_is_faster() {
 
 #[test]
 fn cyclic_set_points_are_followed_to_the_point_and_again_after_a_stop() {
-    let mut bench = Bench::turning_at(0.0);
+    let mut bench = AxisBench::turning_at(0.0);
     let point = |n: i32| TrajectoryPoint::moving(n, 1.0 / DT_S);
     for n in 0..200 {
         bench.axis.begin(Task::Cyclic(Cyclic::Position(point(n))));
@@ -154,7 +154,7 @@ fn cyclic_set_points_are_followed_to_the_point_and_again_after_a_stop() {
 
 #[test]
 fn an_interpolation_under_a_stop_leads_to_its_last_target_afterwards() {
-    let mut bench = Bench::turning_at(0.0);
+    let mut bench = AxisBench::turning_at(0.0);
     bench.axis.begin(Task::Interpolate { target: 10, time_s: 0.01, max_speed: 0.0 });
     bench.run(0.005);
     assert!((bench.position - 5.0).abs() < 1e-6);
@@ -169,7 +169,7 @@ fn an_interpolation_under_a_stop_leads_to_its_last_target_afterwards() {
 
 #[test]
 fn homing_tells_the_edge_and_comes_to_rest_beyond_it() {
-    let mut bench = Bench::turning_at(0.0);
+    let mut bench = AxisBench::turning_at(0.0);
     bench.axis.begin(Task::Home(HomingParameters {
         sequence: HomingMethod(19).sequence(),
         search_speed: 500.0,
