@@ -1,6 +1,7 @@
 //! Why a command did not do what was asked: what failed, what the drive said, what to do next.
 
 use std::fmt;
+use std::ops::{Deref, DerefMut};
 
 use canopen::{Mux, NodeId};
 use clap::error::{ContextKind, ErrorKind};
@@ -12,60 +13,50 @@ use crate::plain::short;
 use crate::signals::Signal;
 use crate::status::Status;
 pub(crate) use words::failure::FailureBody;
-use words::failure::Subject;
-use words::models::how_to_say;
+use words::models::name_its_model;
 use words::unresolved::Unresolved;
 
-/// A reason for people, in up to three parts, and what programs look for in it.
+/// A reason for people and for programs, and what it means for the command that fails with it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Failure {
     /// Decides the exit status.
     pub(crate) status: Status,
-    /// What kind it is, in a word that programs may rely on.
-    pub(crate) kind: &'static str,
-    /// What could not be done, with node and object.
-    pub(crate) what: String,
-    /// Why: what the drive or the system said, one line each.
-    pub(crate) because: Vec<String>,
-    /// What to do next, one line each.
-    pub(crate) next: Vec<String>,
-    /// The node, object and abort code that it is about.
-    pub(crate) subject: Subject,
     /// It has been reported already, as part of what the command printed.
     pub(crate) reported: bool,
     /// Lines of output were printed before it, which are not all that there would be.
     pub(crate) partial: bool,
+    /// What failed, why, and what to do next.
+    pub(crate) reason: words::failure::Failure,
+}
+
+impl Deref for Failure {
+    type Target = words::failure::Failure;
+
+    fn deref(&self) -> &Self::Target {
+        &self.reason
+    }
+}
+
+impl DerefMut for Failure {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.reason
+    }
 }
 
 impl Failure {
     /// The operation failed.
     pub(crate) fn new(what: impl Into<String>) -> Self {
-        Self {
-            status: Status::Failed,
-            kind: "failed",
-            what: what.into(),
-            because: Vec::new(),
-            next: Vec::new(),
-            subject: Subject::default(),
-            reported: false,
-            partial: false,
-        }
-    }
-
-    /// Standard output cannot be written.
-    #[allow(clippy::needless_pass_by_value, reason = "for map_err")]
-    pub(crate) fn not_printed(error: std::io::Error) -> Self {
-        Self::of_stdout(error)
+        words::failure::Failure::new(what).into()
     }
 
     /// The command line makes no sense, as found out only now.
     pub(crate) fn usage(what: impl Into<String>) -> Self {
-        Self { status: Status::Usage, kind: "usage", ..Self::new(what) }
+        words::failure::Failure::usage(what).into()
     }
 
     /// A file that the command is to work by is missing, or is not what it is to be.
     pub(crate) fn bad_file(what: impl Into<String>) -> Self {
-        Self { kind: "bad_file", ..Self::new(what) }
+        words::failure::Failure::bad_file(what).into()
     }
 
     /// What the command has to say does not get out.
@@ -77,21 +68,18 @@ impl Failure {
 
     /// A file that was asked for cannot be written.
     pub(crate) fn of_writing(what: &str, path: &std::path::Path, error: &std::io::Error) -> Self {
-        Self::new(format!("cannot write {what} {}", path.display())).of_kind("file").because(error).next(
-            "make sure that its folder exists, can be written and has room; an existing file of another kind is not overwritten",
-        )
+        words::failure::Failure::of_writing(what, path, error).into()
     }
 
     /// What is asked for needs the model of a node, and that is not known.
     pub(crate) fn unknown_model(node: NodeId) -> Self {
-        let failure =
-            Self::new(format!("the model of node {node} is not known")).of_kind("unknown_model").at_node(node);
-        failure.next(format!("name its model: {}", how_to_say(node, &["MODEL"])))
+        let failure = Self::new(format!("the model of node {node} is not known")).of_kind("unknown_model");
+        failure.at_node(node).next(name_its_model(node, &["MODEL"]))
     }
 
     /// A signal asked the command to end.
     pub(crate) fn ended_by(signal: Signal) -> Self {
-        Self { status: signal.status(), kind: "interrupted", ..Self::new(signal.text()) }
+        Self { status: signal.status(), ..Self::new(signal.text()).of_kind("interrupted") }
     }
 
     /// What the parser of the command line found, for programs; people get its own text.
@@ -127,40 +115,33 @@ impl Failure {
 
     /// Names its kind.
     pub(crate) fn of_kind(self, kind: &'static str) -> Self {
-        Self { kind, ..self }
+        Self { reason: self.reason.of_kind(kind), ..self }
     }
 
     /// Says which node it is about.
-    pub(crate) fn at_node(mut self, node: NodeId) -> Self {
-        self.subject.node = Some(node);
-        self
+    pub(crate) fn at_node(self, node: NodeId) -> Self {
+        Self { reason: self.reason.at_node(node), ..self }
     }
 
     /// Says which object it is about.
-    pub(crate) fn at_object(mut self, object: Mux) -> Self {
-        self.subject.object = Some(object);
-        self
+    pub(crate) fn at_object(self, object: Mux) -> Self {
+        Self { reason: self.reason.at_object(object), ..self }
     }
 
     /// Adds a reason.
-    pub(crate) fn because(mut self, reason: impl fmt::Display) -> Self {
-        self.because.push(reason.to_string());
-        self
+    pub(crate) fn because(self, reason: impl fmt::Display) -> Self {
+        Self { reason: self.reason.because(reason), ..self }
     }
 
     /// Adds advice.
-    pub(crate) fn next(mut self, advice: impl fmt::Display) -> Self {
-        self.next.push(advice.to_string());
-        self
+    pub(crate) fn next(self, advice: impl fmt::Display) -> Self {
+        Self { reason: self.reason.next(advice), ..self }
     }
 }
 
-/// Several lines, each complete: `what`, then the reasons, then the advice.
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.what)?;
-        self.because.iter().try_for_each(|reason| write!(f, "\n  because: {reason}"))?;
-        self.next.iter().try_for_each(|advice| write!(f, "\n  next:    {advice}"))
+        self.reason.fmt(f)
     }
 }
 
@@ -181,15 +162,14 @@ impl From<&Failure> for FailureReport {
 
 impl From<&Failure> for FailureBody {
     fn from(failure: &Failure) -> Self {
-        Self::new(failure.kind, (&failure.what, &failure.because, &failure.next), failure.subject)
+        (&failure.reason).into()
     }
 }
 
 impl From<words::failure::Failure> for Failure {
-    fn from(failure: words::failure::Failure) -> Self {
-        let words::failure::Failure { kind, what, because, next, subject, is_usage } = failure;
-        let status = if is_usage { Status::Usage } else { Status::Failed };
-        Self { status, kind, what, because, next, subject, reported: false, partial: false }
+    fn from(reason: words::failure::Failure) -> Self {
+        let status = if reason.is_usage { Status::Usage } else { Status::Failed };
+        Self { status, reported: false, partial: false, reason }
     }
 }
 
@@ -218,12 +198,12 @@ impl From<master::Error> for Failure {
         let advice = match &error {
             Error::GuessedModel { node, guess, .. } => {
                 let fitting: Vec<_> = guess.fitting().map(|model| model.name).collect();
-                Some(format!("name its model: {}", how_to_say(*node, &fitting)))
+                Some(name_its_model(*node, &fitting))
             }
             Error::WrongModel { node, .. } | Error::OtherModel { node, .. } => Some(format!(
                 "omit --model {node}=.., see what `ferrodrive scan` shows for it, or correct the machine file"
             )),
-            Error::UnknownModel { node, .. } => Some(format!("name its model: {}", how_to_say(*node, &["MODEL"]))),
+            Error::UnknownModel { node, .. } => Some(name_its_model(*node, &["MODEL"])),
             _ => None,
         };
         advice.into_iter().fold(words::failure::Failure::from(error).into(), Self::next)
@@ -236,11 +216,9 @@ mod tests {
     use canopen::AbortCode;
 
     #[test]
-    fn a_failure_names_what_why_and_next() {
-        let failure = Failure::new("cannot read 6064h:00 of node 9").because("no answer").next("ferrodrive scan");
-        let text = "cannot read 6064h:00 of node 9\n  because: no answer\n  next:    ferrodrive scan";
-        assert_eq!(failure.to_string(), text);
-        assert_eq!(Failure::usage("x").status as u8, 2);
+    fn what_makes_no_sense_has_its_own_status() {
+        assert_eq!((Failure::usage("x").status, Failure::new("x").status), (Status::Usage, Status::Failed));
+        assert_eq!(Failure::usage("x").next("y").of_kind("z").status as u8, 2);
     }
 
     #[test]

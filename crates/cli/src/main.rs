@@ -75,7 +75,7 @@ fn main() -> ExitCode {
         (ran, None) => ran,
         // What the command found out has been printed.
         (Ok(()), Some(torn)) => Err(torn),
-        (Err(failure), Some(torn)) => Err(torn.because.into_iter().fold(failure.because(torn.what), Failure::because)),
+        (Err(failure), Some(torn)) => Err(torn.because.iter().fold(failure.because(&torn.what), Failure::because)),
     };
     match ran {
         Ok(()) => ExitCode::SUCCESS,
@@ -234,15 +234,9 @@ impl Typed {
     }
 }
 
-/// Prints a report, and fails as it says; for programs the report has the failure.
-fn judged(format: Format, report: &impl Report, failure: Option<Failure>) -> Result<(), Failure> {
-    print(format, report)?;
-    failure.map_or(Ok(()), |failure| Err(Failure { reported: format.json || failure.reported, ..failure }))
-}
-
 fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Result<(), Failure> {
     match command {
-        Command::Demo(demo) => demo.run(global).and_then(|report| judged(format, &report, report.failure())),
+        Command::Demo(demo) => demo.run(global).and_then(|report| format.print_judged(&report, report.failure())),
         Command::Sim(sim) => sim.run(global, typed.bus.then_some(&global.bus)),
         Command::Run(run) => run.run(format),
         Command::Scan(command) => on_bus(global, format, async |context| command.run(context).await),
@@ -283,11 +277,13 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Plan(plan) => plan.run(global, format),
         Command::Check(check) => {
             let report = check.run(global)?;
-            judged(format, &report, report.failure(check.strict()).map(Into::into))
+            print(format, &report)?;
+            format.ended(report.failure(check.strict()).map(Into::into))
         }
         Command::Init(init) => {
             let report = init.run(global, typed.bus)?;
-            judged(format, &report, report.failure().map(Into::into))
+            print(format, &report)?;
+            format.ended(report.failure().map(Into::into))
         }
         Command::Plot(plot) => print(format, &plot.draw()?),
         Command::Readings(readings) => print(format, &readings.list()?),
@@ -327,7 +323,7 @@ fn stops(
     command: impl AsyncFnOnce(&Context) -> Result<StopOutcome, Failure>,
 ) -> Result<(), Failure> {
     let outcome = session::run(global, command)?;
-    judged(format, &outcome, outcome.failure())
+    format.print_judged(&outcome, outcome.failure())
 }
 
 fn on_bus<R: Report>(

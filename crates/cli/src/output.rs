@@ -47,7 +47,12 @@ impl Format {
     /// As [`print_failed`](Self::print_failed), and then fails with it: for programs the report has said it.
     pub(crate) fn print_judged(self, report: &impl Report, failure: Option<Failure>) -> Result<(), Failure> {
         self.print_failed(report, failure.as_ref())?;
-        failure.map_or(Ok(()), |failure| Err(Failure { reported: self.json, ..failure }))
+        self.ended(failure)
+    }
+
+    /// Fails with what the report that was printed has for programs.
+    pub(crate) fn ended(self, failure: Option<Failure>) -> Result<(), Failure> {
+        failure.map_or(Ok(()), |failure| Err(Failure { reported: self.json || failure.reported, ..failure }))
     }
 
     /// Prints one line of JSON about something that was done.

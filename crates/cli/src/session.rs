@@ -299,8 +299,8 @@ fn with_account(failure: Failure, account: &Account) -> Failure {
 
 /// A failure of the bus itself, with every cause that is known.
 pub(crate) fn bus_failure(global: &Global, error: &dyn Error) -> Failure {
-    let failure = failure_of(error);
-    let failure = Failure { what: format!("bus {}: {}", global.bus, failure.what), kind: "bus", ..failure };
+    let mut failure = failure_of(error).of_kind("bus");
+    failure.what = format!("bus {}: {}", global.bus, failure.what);
     if failure.next.is_empty() {
         return failure
             .next("check that it exists and is spelled correctly; `ferrodrive help options` lists the forms of --bus");

@@ -139,6 +139,11 @@ pub fn how_to_say(node: NodeId, models: &[&str]) -> String {
     format!("--model {node}={first}{others}, or a machine file (--machine FILE)")
 }
 
+/// The advice to name the model of a node, which may be one of `models`.
+pub fn name_its_model(node: NodeId, models: &[&str]) -> String {
+    format!("name its model: {}", how_to_say(node, models))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

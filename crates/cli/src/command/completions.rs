@@ -54,7 +54,7 @@ impl Completions {
                 Failure::new(format!("cannot print a script for {name}")).next("name bash, fish or zsh")
             })?;
             let written = shell.write_registration(ASKED_BY, "ferrodrive", "ferrodrive", "ferrodrive", &mut script);
-            written.map_err(Failure::not_printed)?;
+            written.map_err(Failure::of_stdout)?;
         }
         if matches!(self.shell, Shell::Zsh) {
             script.extend_from_slice(ZSH_AUTOLOAD.as_bytes());

@@ -9,7 +9,7 @@ use sim::machine::models;
 use transport::WallClock;
 
 use crate::command::plot::{svg_path, write_svg};
-use crate::failure::{Failure, FailureBody};
+use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Report;
 use crate::progress::Progress;
@@ -44,7 +44,7 @@ impl Demo {
         progress.clear();
         let picture = write_svg(&self.svg, showcase.poster.to_svg())?;
         let (svg, took_s) = (self.svg.display().to_string(), clock.now().as_secs_f64());
-        Ok(DemoReport { picture, ..DemoReport::from(showcase::Report::new(showcase.parts, svg, took_s)) })
+        Ok(DemoReport { found: showcase::Report::new(showcase.parts, svg, took_s), picture })
     }
 }
 
@@ -53,24 +53,18 @@ impl Demo {
 pub(crate) struct DemoReport {
     #[serde(flatten)]
     found: showcase::Report,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<FailureBody>,
     /// The picture, if it goes to standard output.
     #[serde(skip_serializing_if = "Option::is_none")]
     picture: Option<String>,
 }
 
-impl From<showcase::Report> for DemoReport {
-    fn from(found: showcase::Report) -> Self {
-        let error = (!found.ok).then(|| (&differs()).into());
-        Self { found, error, picture: None }
-    }
-}
-
 impl DemoReport {
     /// Why the demo failed, if it did.
     pub(crate) fn failure(&self) -> Option<Failure> {
-        (!self.found.ok).then(differs)
+        (!self.found.ok).then(|| {
+            let failure = Failure::new("not every result matches the manuals").of_kind("differs");
+            failure.next("look for DIFFERS in the table, or for \"ok\":false in the rows")
+        })
     }
 }
 
@@ -81,9 +75,4 @@ impl Report for DemoReport {
             None => self.found.text(paint),
         }
     }
-}
-
-fn differs() -> Failure {
-    let failure = Failure::new("not every result matches the manuals");
-    Failure { kind: "differs", ..failure.next("look for DIFFERS in the table, or for \"ok\":false in the rows") }
 }

@@ -345,7 +345,7 @@ impl Sink {
 
     fn print(&self, line: &impl Report) -> Result<(), Failure> {
         self.has_printed.set(true);
-        self.format.print(line).map_err(|error| not_printed(&error))
+        self.format.print(line).map_err(Failure::of_stdout)
     }
 
     /// Reports what is skipped: among the frames to programs, on standard error to people.
@@ -361,7 +361,7 @@ impl Sink {
             };
             self.has_printed.set(true);
             let skipped = Skipped { line, byte, skipped: finding.text, reason: finding.reason };
-            return self.format.print_json(&skipped).map_err(|error| not_printed(&error));
+            return self.format.print_json(&skipped).map_err(Failure::of_stdout);
         }
         // The reader may have gone.
         let _ = writeln!(io::stderr(), "warning: {}", plain(&finding.to_string()));
@@ -384,7 +384,7 @@ impl Sink {
         }
         if self.format.json {
             let summary = LogSummary { frames, lines_skipped, fd_frames };
-            return self.format.print_json(&summary).map_err(|error| not_printed(&error));
+            return self.format.print_json(&summary).map_err(Failure::of_stdout);
         }
         let _ = writeln!(
             io::stderr(),
@@ -433,8 +433,4 @@ pub(crate) fn unreadable(path: &Path, error: &io::Error) -> Failure {
     Failure::bad_file(format!("cannot read the log {} to its end", path.display()))
         .because(error)
         .next("copy it to this machine's disk, and see whether it can be read there")
-}
-
-fn not_printed(error: &io::Error) -> Failure {
-    Failure::of_stdout(io::Error::new(error.kind(), error.to_string()))
 }

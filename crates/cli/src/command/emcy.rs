@@ -95,7 +95,7 @@ impl Emcy {
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         match &self.what {
             EmcyCommand::Watch(watch) => watch.run(context, format).await,
-            EmcyCommand::Show(show) => format.print(&show.run(context).await?).map_err(Failure::not_printed),
+            EmcyCommand::Show(show) => format.print(&show.run(context).await?).map_err(Failure::of_stdout),
         }
     }
 }
@@ -110,7 +110,7 @@ impl WatchEmcy {
                 let Decoded::Emcy(node, message, fault) = decoder.decode(&frame) else { continue };
                 if self.nodes == Nodes::All || self.nodes == Nodes::One(node) {
                     let entry = ErrorEntry::message(at.as_secs_f64(), node, &message, fault, stamps.text(at));
-                    format.print(&entry).map_err(Failure::not_printed)?;
+                    format.print(&entry).map_err(Failure::of_stdout)?;
                 }
             }
         };

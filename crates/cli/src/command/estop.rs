@@ -11,7 +11,7 @@ use master::{Error, join_all};
 use serde::Serialize;
 
 use crate::context::Context;
-use crate::failure::{Failure, FailureBody};
+use crate::failure::Failure;
 use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
@@ -39,8 +39,6 @@ pub(crate) struct Estop {
 pub(crate) struct StopReport {
     ok: bool,
     nodes: Vec<AxisReport>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<FailureBody>,
     #[serde(skip)]
     failure: Option<Failure>,
 }
@@ -182,8 +180,7 @@ impl StopReport {
                 })
                 .fold(failure, Failure::because)
         });
-        let error = failure.as_ref().map(FailureBody::from);
-        Ok(Self { ok: failure.is_none(), nodes, error, failure })
+        Ok(Self { ok: failure.is_none(), nodes, failure })
     }
 
     /// Why not every drive was seen to stand.
@@ -308,9 +305,9 @@ mod tests {
             let said = json_of(&report);
             let stands = said["nodes"].as_array().expect("a list").iter().map(|row| (&row["node"], &row["stands"]));
             assert_eq!(stands.collect::<Vec<_>>(), [(&json!(2), &json!(false)), (&json!(5), &json!(true))], "{said}");
-            assert_eq!((&said["ok"], &said["error"]["kind"]), (&json!(false), &json!("not_stopped")), "{said}");
-            assert!(said["error"]["next"].as_str().is_some_and(|next| next.contains("emergency stop")), "{said}");
-            assert!(report.failure().is_some());
+            let failure = report.failure().expect("it failed");
+            assert_eq!((&said["ok"], failure.kind), (&json!(false), "not_stopped"), "{said}");
+            assert!(failure.next.iter().any(|next| next.contains("emergency stop")), "{failure}");
             let people = report.text(Paint::OFF);
             assert!(people.contains("node 2 (zlim42c): may still be moving"), "{people}");
             Ok(())

@@ -85,7 +85,7 @@ impl Gateway {
             context.note(&format!("there is no password: anyone who can reach {address} can move the drives"));
         }
         format.print(&Ready { listen: address }).map_err(Failure::of_stdout)?;
-        let drive = async |node: NodeId| context.drive_to_stop(node).await.map_err(|failure| failure.what);
+        let drive = async |node: NodeId| context.drive_to_stop(node).await.map_err(|failure| failure.what.clone());
         let (clients, serving) = Clients::of(&context.network, "this gateway", drive, |text| context.note(text));
         tokio::select! {
             () = accept_clients(context, &listener, clients) => {}

@@ -195,6 +195,6 @@ impl Params {
                 return format.print_judged(&report, report.failure().map(Failure::from));
             }
         };
-        printed.map_err(Failure::not_printed)
+        printed.map_err(Failure::of_stdout)
     }
 }

@@ -136,10 +136,10 @@ impl Pdo {
     /// Shows them.
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         match &self.what {
-            PdoCommand::Show(show) => format.print(&show.run(context).await?).map_err(Failure::not_printed),
+            PdoCommand::Show(show) => format.print(&show.run(context).await?).map_err(Failure::of_stdout),
             PdoCommand::Watch(watch) => watch.run(context, format).await,
-            PdoCommand::Plan(plan) => format.print(&plan.run(context).await?).map_err(Failure::not_printed),
-            PdoCommand::Apply(apply) => format.print(&apply.run(context).await?).map_err(Failure::not_printed),
+            PdoCommand::Plan(plan) => format.print(&plan.run(context).await?).map_err(Failure::of_stdout),
+            PdoCommand::Apply(apply) => format.print(&apply.run(context).await?).map_err(Failure::of_stdout),
         }
     }
 }
@@ -195,7 +195,7 @@ impl WatchPdo {
                 let Decoded::Pdo(pdo) = decoder.decode(&frame) else { continue };
                 if pdo.node == self.node {
                     let line = PdoLine::new(&decoder, drive.description(), &pdo, at.as_secs_f64(), stamps.text(at));
-                    format.print(&line).map_err(Failure::not_printed)?;
+                    format.print(&line).map_err(Failure::of_stdout)?;
                 }
             }
         };

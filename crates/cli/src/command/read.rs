@@ -47,7 +47,7 @@ impl Read {
         if let Some(path) = &self.to {
             self.check_file(path, one.is_some(), format.json)?;
         }
-        let show = |report: &ObjectReport| format.print(report).map_err(Failure::not_printed);
+        let show = |report: &ObjectReport| format.print(report).map_err(Failure::of_stdout);
         if let Some(object) = one {
             let report = self.one(context, object).await?;
             // The bytes are there already, and nothing else is to be among them.

@@ -82,7 +82,7 @@ impl Supervise {
         while let Some((at, event)) = context.network.poll_event() {
             // What the report of the boot-up does not have.
             if let Event::TwoDevices(..) = event {
-                format.print(&WatchedEvent::new(at, &SupervisorEvent::Event(event))).map_err(Failure::not_printed)?;
+                format.print(&WatchedEvent::new(at, &SupervisorEvent::Event(event))).map_err(Failure::of_stdout)?;
             }
         }
         let mut supervisor = Supervisor::new(context.network.clone(), plan);
@@ -99,7 +99,7 @@ impl Supervise {
             }
             // To its end, whatever else happens: it may be stopping a motor.
             if let Some((at, happening)) = supervisor.next().await {
-                format.print(&WatchedEvent::new(at, &happening)).map_err(Failure::not_printed)?;
+                format.print(&WatchedEvent::new(at, &happening)).map_err(Failure::of_stdout)?;
             }
         }
         let open = supervisor.emcys().records().filter(|record| record.gone.is_none());

@@ -102,7 +102,7 @@ impl Watch {
                 watched.iter_mut().zip(&look.values).for_each(|(watched, seen)| watched.note(seen));
                 match &mut screen {
                     Some(screen) => screen.show(&table(&watched, &look, format.paint)),
-                    None => format.print(&look).map_err(Failure::not_printed)?,
+                    None => format.print(&look).map_err(Failure::of_stdout)?,
                 }
                 looks += 1;
             }

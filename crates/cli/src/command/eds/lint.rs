@@ -6,7 +6,7 @@ use eds::{Finding, Severity};
 use serde::Serialize;
 
 use super::source;
-use crate::failure::{Failure, FailureBody};
+use crate::failure::Failure;
 use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
@@ -34,9 +34,6 @@ pub(crate) struct Lint {
 pub(crate) struct LintReport {
     /// False if the command fails.
     ok: bool,
-    /// Why the command fails, if it does.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<FailureBody>,
     files: Vec<OfFile>,
 }
 
@@ -78,10 +75,8 @@ struct FindingRow {
 impl Lint {
     /// Looks into all files.
     pub(super) fn run(&self) -> LintReport {
-        let mut report =
-            LintReport { ok: true, error: None, files: self.files.iter().map(|path| OfFile::of(path)).collect() };
+        let mut report = LintReport { ok: true, files: self.files.iter().map(|path| OfFile::of(path)).collect() };
         report.ok = report.failure(self.strict).is_none();
-        report.error = report.failure(self.strict).as_ref().map(FailureBody::from);
         report
     }
 }

@@ -41,9 +41,7 @@ impl Eds {
         match &self.what {
             Some(EdsCommand::Lint(lint)) => {
                 let report = lint.run();
-                print(format, &report)?;
-                // For programs the report has it.
-                report.failure(lint.strict).map_or(Ok(()), |failure| Err(Failure { reported: format.json, ..failure }))
+                format.print_judged(&report, report.failure(lint.strict))
             }
             Some(EdsCommand::Show(show)) => print(format, &show.run()?),
             Some(EdsCommand::Diff(diff)) => print(format, &diff.run()?),

@@ -126,14 +126,8 @@ impl Run {
             write(path, &outcome.to_junit())?;
         }
         let report = RunReport::new(&outcome, file);
-        format.print(&report).map_err(Failure::of_stdout)?;
-        ended?;
-        match report.failure() {
-            // The report has it.
-            Some(failure) if format.json => Err(Failure { reported: true, ..failure }),
-            Some(failure) => Err(failure),
-            None => Ok(()),
-        }
+        let judged = format.print_judged(&report, report.failure());
+        ended.and(judged)
     }
 
     fn in_virtual_time(&self, scenario: &Scenario, file: &Path, format: Format) -> Result<Outcome, Failure> {

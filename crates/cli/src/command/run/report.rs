@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use master::units::Shown;
-use scenario::{Outcome, OutcomeReport, Verdict};
+use scenario::{Outcome, Verdict};
 use serde::Serialize;
 
-use crate::failure::{Failure, FailureBody};
+use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
 use plot::Table;
@@ -49,19 +49,8 @@ impl<'a> RunReport<'a> {
 
 impl Serialize for RunReport<'_> {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let error = self.failure().as_ref().map(FailureBody::from);
-        RunBody { outcome: self.outcome.to_json(), error }.serialize(serializer)
+        self.outcome.to_json().serialize(serializer)
     }
-}
-
-/// What came of a run, for programs.
-#[derive(Serialize)]
-struct RunBody<'a> {
-    #[serde(flatten)]
-    outcome: OutcomeReport<'a>,
-    /// Why the command fails, if it does.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<FailureBody>,
 }
 
 impl Report for RunReport<'_> {

@@ -56,23 +56,21 @@ pub(super) fn run(
         },
     );
     progress.clear();
-    let mut report = SeveralReport { files, results: &results, error: None };
+    let mut report = SeveralReport { ok: true, files, results: &results };
     let failure = crew.signal().map(Failure::ended_by).or_else(|| report.failure());
-    report.error = failure.as_ref().map(FailureBody::from);
+    report.ok = failure.is_none();
     if let Some(path) = junit_file {
         write(path, &report.junit())?;
     }
-    format.print(&report).map_err(Failure::of_stdout)?;
-    // For programs it is part of the report; a signal needs no words.
-    failure.map_or(Ok(()), |failure| Err(Failure { reported: format.json || failure.status.is_signal(), ..failure }))
+    format.print_judged(&report, failure)
 }
 
 /// What came of each file, in the order of the command line.
 struct SeveralReport<'a> {
+    /// False if the command fails.
+    ok: bool,
     files: &'a [PathBuf],
     results: &'a [Ended],
-    /// Why the command fails, if it does.
-    error: Option<FailureBody>,
 }
 
 /// What came of one file, for programs.
@@ -95,8 +93,6 @@ enum FileReport<'a> {
 #[derive(Serialize)]
 struct SeveralBody<'a> {
     ok: bool,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<&'a FailureBody>,
     passed: usize,
     failed: usize,
     unusable: usize,
@@ -163,8 +159,7 @@ impl Serialize for SeveralReport<'_> {
         });
         let (passed, failed, unusable) = (self.passed(), self.failed(), self.unusable());
         let body = SeveralBody {
-            ok: self.error.is_none(),
-            error: self.error.as_ref(),
+            ok: self.ok,
             passed,
             failed,
             unusable,

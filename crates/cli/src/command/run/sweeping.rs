@@ -6,11 +6,10 @@ use std::path::Path;
 use master::units::Shown;
 use scenario::sweep::{Alike, OfValue, Summary, Sweep, SweepReport, Worst};
 use scenario::{Outcome, Scenario};
-use serde::Serialize;
 use words::document::BadFile;
 
 use super::crew::Crew;
-use crate::failure::{Failure, FailureBody};
+use crate::failure::Failure;
 use crate::output::{Format, Report};
 use crate::progress::Progress;
 use plot::Paint;
@@ -38,26 +37,7 @@ pub(super) fn sweep(
     let mut report = SweepReport::new(file, &sweep, &summary);
     let failure = crew.signal().map(Failure::ended_by).or_else(|| failure(&report));
     report.ok = failure.is_none();
-    let error = failure.as_ref().map(FailureBody::from);
-    format.print(&SweepBody { report, error }).map_err(Failure::of_stdout)?;
-    // For programs it is part of the report; a signal needs no words.
-    failure.map_or(Ok(()), |failure| Err(Failure { reported: format.json || failure.status.is_signal(), ..failure }))
-}
-
-/// What came of a sweep, for programs.
-#[derive(Serialize)]
-struct SweepBody {
-    #[serde(flatten)]
-    report: SweepReport,
-    /// Why the command fails, if it does.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<FailureBody>,
-}
-
-impl Report for SweepBody {
-    fn text(&self, paint: Paint) -> String {
-        text(&self.report, paint)
-    }
+    format.print_judged(&report, failure)
 }
 
 fn sum_up(sweep: &Sweep, crew: &Crew, progress: &Progress) -> Summary {
@@ -118,24 +98,26 @@ fn of_values(values: &[OfValue], paint: Paint) -> Option<String> {
     (!values.is_empty()).then(|| [table.text(paint, colour)].into_iter().chain(notes).collect::<Vec<_>>().join("\n"))
 }
 
-fn text(report: &SweepReport, paint: Paint) -> String {
-    let mut lines = vec![paint.strong(&report.title)];
-    lines.extend(of_values(&report.values, paint));
-    if !report.figures.is_empty() {
-        let mut table = Table::new(&["figure", "min", "median", "max", "lowest with", "highest with"]);
-        for it in &report.figures {
-            let values = [it.min, it.median, it.max].map(|value| Shown(value).to_string());
-            let row = [it.name.clone()].into_iter().chain(values);
-            table.row(row.chain([it.lowest.options(), it.highest.options()]));
+impl Report for SweepReport {
+    fn text(&self, paint: Paint) -> String {
+        let mut lines = vec![paint.strong(&self.title)];
+        lines.extend(of_values(&self.values, paint));
+        if !self.figures.is_empty() {
+            let mut table = Table::new(&["figure", "min", "median", "max", "lowest with", "highest with"]);
+            for it in &self.figures {
+                let values = [it.min, it.median, it.max].map(|value| Shown(value).to_string());
+                let row = [it.name.clone()].into_iter().chain(values);
+                table.row(row.chain([it.lowest.options(), it.highest.options()]));
+            }
+            lines.push(table.plain(paint));
         }
-        lines.push(table.plain(paint));
+        for Worst { failed, again } in &self.worst {
+            lines.push(format!("{} {}: {}", paint.bad("FAILED"), failed.asked, failed.seen.replace('\n', " ")));
+            lines.push(format!("  again: {again}"));
+        }
+        lines.extend(self.note.as_ref().map(|note| format!("note: {note}")));
+        let ended = if self.complete { "" } else { ", ended before the others" };
+        lines.push(format!("{} of {} runs passed, {} failed{ended}", self.passed, self.runs, self.failed));
+        lines.join("\n")
     }
-    for Worst { failed, again } in &report.worst {
-        lines.push(format!("{} {}: {}", paint.bad("FAILED"), failed.asked, failed.seen.replace('\n', " ")));
-        lines.push(format!("  again: {again}"));
-    }
-    lines.extend(report.note.as_ref().map(|note| format!("note: {note}")));
-    let ended = if report.complete { "" } else { ", ended before the others" };
-    lines.push(format!("{} of {} runs passed, {} failed{ended}", report.passed, report.runs, report.failed));
-    lines.join("\n")
 }

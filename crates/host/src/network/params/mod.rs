@@ -21,7 +21,7 @@ pub use shown::{Shown, name};
 use super::Progress;
 use machine::parameters::{Form, sheet, to_concise, to_dcf};
 use words::failure::Failure;
-use words::models::how_to_say;
+use words::models::name_its_model;
 
 /// What was read.
 #[derive(Debug, Serialize)]
@@ -62,7 +62,7 @@ pub async fn back_up(
     let node = drive.node().id();
     let model = drive.description().ok_or_else(|| {
         let failure = Failure::new(format!("the model of node {node} is not known")).of_kind("unknown_model");
-        failure.at_node(node).next(format!("name its model: {}", how_to_say(node, &["MODEL"])))
+        failure.at_node(node).next(name_its_model(node, &["MODEL"]))
     })?;
     let backup = drive.back_up(|number, of, object| progress.count(format!("{number} of {of}: {object}"))).await?;
     let refused = backup.refused.iter().map(|(object, error)| Refused {
