@@ -113,6 +113,22 @@ impl NmtCommand {
     pub const ALL: [Self; 5] =
         [Self::Start, Self::Stop, Self::EnterPreOperational, Self::ResetNode, Self::ResetCommunication];
 
+    /// As people write it: `reset` is reset node.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Stop => "stop",
+            Self::EnterPreOperational => "pre-operational",
+            Self::ResetNode => "reset",
+            Self::ResetCommunication => "reset-communication",
+        }
+    }
+
+    /// The command of a [word](Self::word).
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|command| command.word() == word)
+    }
+
     /// The command specifier byte.
     pub const fn code(self) -> u8 {
         match self {
@@ -227,6 +243,15 @@ mod tests {
                 assert_eq!(NmtRequest::parse(&request.emit()), Ok(request));
             }
         }
+    }
+
+    #[test]
+    fn the_word_of_a_command_is_understood() {
+        for command in NmtCommand::ALL {
+            assert_eq!(NmtCommand::of_word(command.word()), Some(command));
+        }
+        assert_eq!(NmtCommand::of_word("reset"), NmtCommand::from_code(0x81));
+        assert_eq!(NmtCommand::of_word("preop"), None);
     }
 
     #[test]

@@ -70,7 +70,7 @@ impl Host {
             SessionCommand::LimitSpeed { rpm } => self.limit_speed(session, rpm, asked),
             SessionCommand::Scan {} => self.begin_scan(Some(asked)),
             SessionCommand::Help { node, topic, name } => {
-                self.help(node.and_then(NodeId::new), topic, &name, asked);
+                self.help(node, topic, &name, asked);
             }
         }
     }

@@ -322,14 +322,10 @@ fn closed() -> PyErr {
 }
 
 fn nmt_command(word: &str) -> PyResult<NmtCommand> {
-    match word {
-        "start" => Ok(NmtCommand::Start),
-        "stop" => Ok(NmtCommand::Stop),
-        "pre-operational" => Ok(NmtCommand::EnterPreOperational),
-        "reset" => Ok(NmtCommand::ResetNode),
-        "reset-communication" => Ok(NmtCommand::ResetCommunication),
-        _ => Err(bad_value(format!(
-            "{word:?} is not an NMT command; expected start, stop, pre-operational, reset or reset-communication"
-        ))),
-    }
+    NmtCommand::of_word(word).ok_or_else(|| {
+        bad_value(format!(
+            "{word:?} is not an NMT command; expected {}",
+            NmtCommand::ALL.map(NmtCommand::word).join(", ")
+        ))
+    })
 }

@@ -87,14 +87,6 @@ pub enum PdoCommand {
     Read(ObjectArg),
 }
 
-const NMT: [(&str, NmtCommand); 5] = [
-    ("start", NmtCommand::Start),
-    ("stop", NmtCommand::Stop),
-    ("pre-operational", NmtCommand::EnterPreOperational),
-    ("reset", NmtCommand::ResetNode),
-    ("reset-communication", NmtCommand::ResetCommunication),
-];
-
 impl FromStr for Command {
     type Err = String;
 
@@ -193,10 +185,9 @@ fn node(text: &str) -> Result<NodeId, String> {
 }
 
 fn nmt(word: &str) -> Result<NmtCommand, String> {
-    let known = NMT.iter().find(|(name, _)| *name == word);
-    known
-        .map(|(_, command)| *command)
-        .ok_or_else(|| format!("'{word}' is not a command; expected {}", NMT.map(|(name, _)| name).join(", ")))
+    NmtCommand::of_word(word).ok_or_else(|| {
+        format!("'{word}' is not an NMT command; expected {}", NmtCommand::ALL.map(NmtCommand::word).join(", "))
+    })
 }
 
 #[cfg(test)]

@@ -78,8 +78,8 @@ struct Said {
 impl Nmt {
     /// Sends the command; after a reset of one node waits for its boot-up message.
     pub(crate) async fn run(&self, context: &Context) -> Result<NmtReport, Failure> {
-        let (command, name) = self.command.meaning();
-        let done = NmtReport { node: None, command: name, booted: None, state: None, nodes: None };
+        let command = self.command.command();
+        let done = NmtReport { node: None, command: command.word(), booted: None, state: None, nodes: None };
         let Nodes::One(node) = self.nodes else {
             context.network.nmt_all(command);
             let nodes = match self.wait {
@@ -189,13 +189,13 @@ async fn said_by_all(context: &Context, patience: Duration) -> Vec<Said> {
 }
 
 impl NmtWord {
-    fn meaning(self) -> (NmtCommand, &'static str) {
+    const fn command(self) -> NmtCommand {
         match self {
-            Self::Start => (NmtCommand::Start, "start"),
-            Self::Stop => (NmtCommand::Stop, "stop"),
-            Self::PreOperational => (NmtCommand::EnterPreOperational, "pre-operational"),
-            Self::Reset => (NmtCommand::ResetNode, "reset"),
-            Self::ResetCommunication => (NmtCommand::ResetCommunication, "reset-communication"),
+            Self::Start => NmtCommand::Start,
+            Self::Stop => NmtCommand::Stop,
+            Self::PreOperational => NmtCommand::EnterPreOperational,
+            Self::Reset => NmtCommand::ResetNode,
+            Self::ResetCommunication => NmtCommand::ResetCommunication,
         }
     }
 }

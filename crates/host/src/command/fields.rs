@@ -2,6 +2,7 @@
 
 use canopen::NodeId;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value, from_value};
 
 /// The fields of a message.
@@ -20,8 +21,35 @@ pub(super) fn taken<T: DeserializeOwned>(fields: &mut Fields, name: &str) -> Res
     }
 }
 
+/// A node-ID as a number.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "u8")]
+struct Number(NodeId);
+
+impl TryFrom<u8> for Number {
+    type Error = String;
+
+    fn try_from(raw: u8) -> Result<Self, String> {
+        NodeId::new(raw).map(Self).ok_or_else(|| format!("expected a node-ID from 1 to 127, got {raw}"))
+    }
+}
+
 /// The field `node`, taken out.
 pub(super) fn node_id(fields: &mut Fields) -> Result<NodeId, String> {
-    let raw: u8 = taken(fields, "node")?;
-    NodeId::new(raw).ok_or_else(|| format!("expected a node-ID from 1 to 127, got {raw}"))
+    taken(fields, "node").map(|Number(node)| node)
+}
+
+/// The node-ID of a field.
+pub(super) fn node<'de, D: Deserializer<'de>>(deserializer: D) -> Result<NodeId, D::Error> {
+    Number::deserialize(deserializer).map(|Number(node)| node)
+}
+
+/// The node-ID of a field that may be `null`.
+pub(super) fn node_or_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<NodeId>, D::Error> {
+    Option::deserialize(deserializer).map(|number| number.map(|Number(node)| node))
+}
+
+/// The node-IDs of a pair.
+pub(super) fn two_nodes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[NodeId; 2], D::Error> {
+    <[Number; 2]>::deserialize(deserializer).map(|numbers| numbers.map(|Number(node)| node))
 }

@@ -2,7 +2,9 @@
 
 use canopen::NodeId;
 use master::base::Twist;
-use serde::{Deserialize, Deserializer};
+use serde::Deserialize;
+
+use super::fields;
 
 /// A motion of several drives.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -58,7 +60,7 @@ pub struct GroupMove {
 #[serde(deny_unknown_fields)]
 pub struct AxisTarget {
     /// Which drive.
-    #[serde(deserialize_with = "node")]
+    #[serde(deserialize_with = "fields::node")]
     pub node: NodeId,
     /// Of its output.
     pub degrees: f64,
@@ -69,7 +71,7 @@ pub struct AxisTarget {
 #[serde(deny_unknown_fields)]
 pub struct AxisSpeed {
     /// Which drive.
-    #[serde(deserialize_with = "node")]
+    #[serde(deserialize_with = "fields::node")]
     pub node: NodeId,
     /// Of its output.
     pub rpm: f64,
@@ -80,7 +82,7 @@ pub struct AxisSpeed {
 #[serde(deny_unknown_fields)]
 pub struct BaseJog {
     /// The left one and the right one.
-    #[serde(deserialize_with = "nodes")]
+    #[serde(deserialize_with = "fields::two_nodes")]
     pub wheels: [NodeId; 2],
     /// Turns of each drive for a turn of its wheel forward.
     pub turns: [f64; 2],
@@ -103,17 +105,4 @@ impl BaseJog {
     pub const fn twist(&self) -> Twist {
         Twist { linear_m_s: self.linear_m_s, angular_rad_s: self.angular_rad_s }
     }
-}
-
-fn node<'de, D: Deserializer<'de>>(deserializer: D) -> Result<NodeId, D::Error> {
-    let raw = u8::deserialize(deserializer)?;
-    NodeId::new(raw).ok_or_else(|| serde::de::Error::custom(format!("expected a node-ID from 1 to 127, got {raw}")))
-}
-
-fn nodes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[NodeId; 2], D::Error> {
-    let raw = <[u8; 2]>::deserialize(deserializer)?;
-    let known = |raw: u8| {
-        NodeId::new(raw).ok_or_else(|| serde::de::Error::custom(format!("expected node-IDs from 1 to 127, got {raw}")))
-    };
-    Ok([known(raw[0])?, known(raw[1])?])
 }

@@ -122,6 +122,26 @@ mod tests {
     }
 
     #[test]
+    fn a_number_that_is_not_a_node_id_is_refused_in_every_field() {
+        for text in [
+            r#"{"do":"help","node":NODE,"topic":"state","name":"fault"}"#,
+            r#"{"do":"group_jog","axes":[{"node":NODE,"rpm":1}],"rpm_per_s":null}"#,
+            r#"{"do":"explain","node":NODE}"#,
+        ] {
+            let read = |node: &str| {
+                let message: serde_json::Map<_, _> =
+                    serde_json::from_str(&text.replace("NODE", node)).expect("an object");
+                super::read(message)
+            };
+            assert!(read("127").is_ok(), "{text}: {:?}", read("127"));
+            for number in ["0", "128", "200"] {
+                let refused = read(number).expect_err(text);
+                assert!(refused.contains(&format!("expected a node-ID from 1 to 127, got {number}")), "{refused}");
+            }
+        }
+    }
+
+    #[test]
     fn the_words_of_each_kind_are_its_variants() {
         assert_eq!(variants::<SessionCommand>(), SessionCommand::WORDS);
         assert_eq!(variants::<WorldCommand>(), WorldCommand::WORDS);

@@ -1,6 +1,9 @@
 //! Commands about the session itself and the bus as a whole, as JSON.
 
+use canopen::NodeId;
 use serde::Deserialize;
+
+use super::fields;
 
 /// What concerns the session, or the bus as a whole.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -32,7 +35,8 @@ pub enum SessionCommand {
     /// Explains a term that the state has.
     Help {
         /// The node that has it, for terms of its model.
-        node: Option<u8>,
+        #[serde(default, deserialize_with = "fields::node_or_null")]
+        node: Option<NodeId>,
         /// The kind of term.
         topic: Topic,
         /// The term.

@@ -224,7 +224,7 @@ pub enum ParseCommandError {
         /// The motion.
         motion: &'static str,
         /// The options that it has.
-        options: &'static str,
+        options: String,
     },
     /// Not a homing method.
     #[error("'{0}' is not a homing method; expected a number from -128 to 127, as in: home 17")]
@@ -251,13 +251,13 @@ impl FromStr for Command {
             return Ok(*command);
         }
         match *words {
-            ["velocity", speed, ref rest @ ..] => Ok(Motion::Velocity(speed.parse()?, manner(&VELOCITY, rest)?.1)),
+            ["velocity", speed, ref rest @ ..] => Ok(Motion::Velocity(speed.parse()?, manner("velocity", rest)?.1)),
             ["move", "by", to, ref rest @ ..] => movement(to, true, rest),
             ["move", to, ref rest @ ..] if to != "by" => movement(to, false, rest),
             ["torque", current] => Ok(Motion::Torque(current.parse()?)),
             ["home", method, ref rest @ ..] => {
                 let number = method.parse().map_err(|_| ParseCommandError::Method(method.to_owned()))?;
-                let (speed, Manner { wait, within, .. }) = manner(&HOME, rest)?;
+                let (speed, Manner { wait, within, .. }) = manner("home", rest)?;
                 Ok(Motion::Home { method: number, speed, wait, within })
             }
             _ => Err(ParseCommandError::Form(words.join(" "))),
@@ -266,34 +266,24 @@ impl FromStr for Command {
     }
 }
 
-/// A motion: its word, and its options as a list and in words.
-type Options = (&'static str, &'static [&'static str], &'static str);
-
-const VELOCITY: Options = (
-    "velocity",
-    &["acceleration", "deceleration", "within", "no-wait"],
-    "acceleration RAMP, deceleration RAMP, within TIME or no-wait",
-);
-const MOVE: Options = (
-    "move",
-    &["at", "acceleration", "deceleration", "within", "no-wait"],
-    "at SPEED, acceleration RAMP, deceleration RAMP, within TIME or no-wait",
-);
-const HOME: Options = ("home", &["at", "within", "no-wait"], "at SPEED, within TIME or no-wait");
+/// The options of a motion with their values, as its form has them behind its target: `at SPEED`, `no-wait`.
+fn options_of(motion: &str) -> impl Iterator<Item = &'static str> {
+    let form = Command::FORMS.iter().find(|form| form.split(' ').next() == Some(motion));
+    form.into_iter().flat_map(|form| form.split('[')).filter_map(|part| part.trim_end().strip_suffix(']'))
+}
 
 fn movement(to: &str, relative: bool, rest: &[&str]) -> Result<Motion, ParseCommandError> {
-    let (speed, manner) = manner(&MOVE, rest)?;
+    let (speed, manner) = manner("move", rest)?;
     Ok(Motion::Move { to: to.parse()?, relative, speed, manner })
 }
 
 /// What stands behind the target of a motion: its speed and how it is made.
-fn manner(
-    (motion, known, options): &Options,
-    mut words: &[&str],
-) -> Result<(Option<Along<Rpm>>, Manner), ParseCommandError> {
+fn manner(motion: &'static str, mut words: &[&str]) -> Result<(Option<Along<Rpm>>, Manner), ParseCommandError> {
     let (mut speed, mut manner) = (None, Manner::default());
     while let Some((&word, rest)) = words.split_first() {
-        if !known.contains(&word) {
+        if !options_of(motion).any(|option| option.split(' ').next() == Some(word)) {
+            let options: Vec<_> = options_of(motion).collect();
+            let options = options.join(", ").replace(", no-wait", " or no-wait");
             return Err(ParseCommandError::Option { word: word.to_owned(), motion, options });
         }
         words = rest;
@@ -464,7 +454,11 @@ mod tests {
             ("move 90deg quickly", "expected at SPEED"),
             ("home up", "expected a number from -128 to 127"),
             ("home 200", "expected a number from -128 to 127"),
-            ("home 17 acceleration 1s", "'acceleration' is not an option of home"),
+            ("home 17 acceleration 1s", "is not an option of home; expected at SPEED, within TIME or no-wait"),
+            (
+                "move by 1deg by",
+                "'by' is not an option of move; expected at SPEED, acceleration RAMP, deceleration RAMP,",
+            ),
             ("torque 2", "has no unit"),
         ] {
             let refused = text.parse::<Command>().err().map(|error| error.to_string()).unwrap_or_default();
