@@ -277,13 +277,11 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Plan(plan) => plan.run(global, format),
         Command::Check(check) => {
             let report = check.run(global)?;
-            print(format, &report)?;
-            format.ended(report.failure(check.strict()).map(Into::into))
+            print_whole(format, &report, report.failure(check.strict()))
         }
         Command::Init(init) => {
             let report = init.run(global, typed.bus)?;
-            print(format, &report)?;
-            format.ended(report.failure().map(Into::into))
+            print_whole(format, &report, report.failure())
         }
         Command::Plot(plot) => print(format, &plot.draw()?),
         Command::Readings(readings) => print(format, &readings.list()?),
@@ -332,6 +330,12 @@ fn on_bus<R: Report>(
     command: impl AsyncFnOnce(&Context) -> Result<R, Failure>,
 ) -> Result<(), Failure> {
     print(format, &session::run(global, command)?)
+}
+
+/// Prints a report that has why the command fails, and fails with that.
+fn print_whole(format: Format, report: &impl Report, failure: Option<words::failure::Failure>) -> Result<(), Failure> {
+    print(format, report)?;
+    format.ended(failure.map(Failure::from))
 }
 
 fn print(format: Format, report: &impl Report) -> Result<(), Failure> {
