@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_arrive_in_order_and_the_ending_is_told() {
+    fn lines_arrive_in_order_and_the_ending_is_reported() {
         let mut lines = Vec::new();
         let ok = run(Command::new("cargo").arg("--version"), |line| lines.push(line.to_owned()));
         assert_eq!(ok, Ok(true));

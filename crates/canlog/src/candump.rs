@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn error_frames_and_fd_frames_are_told_apart() {
+    fn error_frames_and_fd_frames_are_distinguished() {
         let content = |line| parse_line(line).map(|record| record.map(|record| record.content));
         let error = |class, data| Ok(Some(Content::Error(RawErrorFrame { class, data })));
         assert_eq!(content("(1.0) can0 20000080#0000000000000000"), error(0x80, [0; 8]));

@@ -145,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_extension_tells_the_format() {
+    fn an_extension_shows_the_format() {
         for format in Format::all() {
             let name = format!("a.b/trace.{}", format.extension().to_uppercase());
             assert_eq!(Format::of_name(Path::new(&name)), Some(format));
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_bytes_tell_the_format() {
+    fn the_first_bytes_show_the_format() {
         for (begin, format) in [
             (&b"LOGG\x90\0\0\0"[..], Some(Format::Blf)),
             (b"\x0A\x0D\x0D\x0A\x1C\0\0\0", Some(Format::Pcapng)),

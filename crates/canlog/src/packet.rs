@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn fd_frames_and_torn_packets_are_told() {
+    fn fd_frames_and_torn_packets_are_reported() {
         let fd = Content::FdFrame { id: CanId::standard(0x123), length: 12 };
         assert_eq!(parse(CAN_SOCKETCAN, &[0, 0, 1, 0x23, 12, 4, 0, 0]), Ok(Some((None, fd))));
         for packet in

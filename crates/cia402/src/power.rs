@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn every_state_is_told_by_its_statusword() {
+    fn every_state_is_shown_by_its_statusword() {
         for state in PowerState::ALL {
             // Bits 4 and 9 belong to no state.
             assert_eq!(Statusword(state.statusword_bits() | 0x0210).state(), Some(state));

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_mask_tells_whose_level_an_output_has() {
+    fn the_mask_shows_whose_level_an_output_has() {
         let outputs = DigitalOutputs { physical_outputs: 0b1100, bit_mask: 0b1010 };
         assert_eq!(outputs.levels(0b0000), 0b1000);
         assert_eq!(outputs.levels(0b1111), 0b1101);

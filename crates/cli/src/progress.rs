@@ -155,15 +155,15 @@ mod tests {
 
     #[test]
     fn a_long_count_has_a_line_every_five_seconds_on_a_pipe_and_a_short_one_none() {
-        let told_after = |answer: Duration, count: u32| -> Vec<u64> {
+        let shown_after = |answer: Duration, count: u32| -> Vec<u64> {
             let mut lines = Lines { last: Duration::ZERO };
             let times = (1..=count).map(|number| answer * number);
             times.filter(|time| lines.is_due(*time)).map(|time| time.as_millis() as u64).collect()
         };
         // A scan whose nodes answer at once, a slow one of 127 nodes, and a drive that takes 450 ms for each of 133 objects.
-        assert!(told_after(Duration::from_millis(5), 127).is_empty());
-        assert_eq!(told_after(Duration::from_millis(200), 127), [5000, 10_000, 15_000, 20_000, 25_000]);
-        let slow = told_after(Duration::from_millis(450), 133);
+        assert!(shown_after(Duration::from_millis(5), 127).is_empty());
+        assert_eq!(shown_after(Duration::from_millis(200), 127), [5000, 10_000, 15_000, 20_000, 25_000]);
+        let slow = shown_after(Duration::from_millis(450), 133);
         assert_eq!(slow, [5400, 10_800, 16_200, 21_600, 27_000, 32_400, 37_800, 43_200, 48_600, 54_000, 59_400]);
     }
 }

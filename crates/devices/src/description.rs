@@ -145,7 +145,7 @@ impl Description {
     }
 
     /// The fault that an EMCY message with this error code reports.
-    pub fn fault_told_by(&self, code: EmcyErrorCode) -> Option<&'static FaultRow> {
+    pub fn fault_reported_by(&self, code: EmcyErrorCode) -> Option<&'static FaultRow> {
         self.faults.table.iter().find(|row| row.emcy == code && code != EmcyErrorCode::NO_ERROR)
     }
 }

@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn objects_of_one_file_only_are_told_in_order() {
+    fn objects_of_one_file_only_are_reported_in_order() {
         let other = OBJECT.replace("2000", "3000");
         assert_eq!(
             short(OBJECT, &other),
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_pdo_maps_is_told_in_words() {
+    fn what_a_pdo_maps_is_reported_in_words() {
         let pdo = |record: &str| {
             format!(
                 "[1600]\nParameterName=M\nObjectType=9\nSubNumber=1\n[1600sub1]\nParameterName=E\nDataType=7\nAccessType=rw\nDefaultValue={record}\n"

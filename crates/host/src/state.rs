@@ -84,7 +84,7 @@ pub struct Host {
     /// Drives whose stop was not seen, and in how many consecutive readings each has been at rest since.
     pub(crate) unseen_stops: BTreeMap<NodeId, u32>,
     /// The last reported stop of each node, and its time.
-    pub(crate) stops_told: BTreeMap<NodeId, (Instant, &'static str)>,
+    pub(crate) stops_reported: BTreeMap<NodeId, (Instant, &'static str)>,
     /// Several drives as one motion.
     pub(crate) group: Option<GroupRun>,
     pub(crate) listening: Vec<Listening>,
@@ -136,7 +136,7 @@ impl Host {
             speed_limits: BTreeMap::new(),
             accepted: BTreeSet::new(),
             unseen_stops: BTreeMap::new(),
-            stops_told: BTreeMap::new(),
+            stops_reported: BTreeMap::new(),
             group: None,
             listening: Vec::new(),
             parameters: Transactions::default(),

@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_settled_and_told_at_the_end() {
+    fn what_cannot_be_written_is_settled_and_reported_at_the_end() {
         let place = scratch("unwritable");
         let (wake, woken) = channel();
         let store_writer = StoreWriter::start(Eeproms::open(&place).unwrap(), Messages::of_warnings(), move || {

@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn tells_how_far_the_world_is_behind() {
+    fn shows_how_far_the_world_is_behind() {
         let pace = Pace::with_speed(Instant::ZERO, 10.0);
         let elapsed = Duration::from_millis(100);
         assert_eq!(pace.target(elapsed), Instant::from_secs(1));

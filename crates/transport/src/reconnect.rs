@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_lost_connection_is_told_once_made_again_and_told() {
+    async fn a_lost_connection_is_reported_once_made_again_and_reported() {
         let sent = Arc::new(Mutex::new(Vec::new()));
         let first = Script { frames: [frame("181#01")].into(), end: closed(), ..Script::default() };
         let second = Script { frames: [frame("181#02")].into(), sent: Arc::clone(&sent), ..Script::default() };

@@ -28,14 +28,14 @@ pub(super) fn bus_yml(data: &[u8]) {
                 if whole {
                     let _ = checked.predict();
                 }
-                assert_told(&checked, &text);
+                assert_reported(&checked, &text);
             }
             Err(bad) => assert!(!bad.problems.is_empty() && bad.to_string().len() < 200_000),
         }
     }
 }
 
-fn assert_told(checked: &Checked, text: &str) {
+fn assert_reported(checked: &Checked, text: &str) {
     // A carriage return alone ends a line too (YAML 1.2, 5.4).
     let lines = text.split(['\n', '\r']).count();
     for finding in &checked.findings {

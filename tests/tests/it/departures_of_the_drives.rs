@@ -69,7 +69,7 @@ fn a_departure_that_can_be_asked_for_is_listed_where_the_running_drive_has_it_an
 }
 
 #[test]
-fn what_is_told_of_a_short_rpdo_stands_in_the_profile_that_masters_read() {
+fn what_is_reported_of_a_short_rpdo_stands_in_the_profile_that_masters_read() {
     let reported = |name| model(name).and_then(|model| model.pdo.short_rpdo).map(|code| code.0);
     assert_eq!(["zlac8030l", "zlim42c", "m4230e17b50"].map(reported), [Some(0x8210), Some(0x8210), None]);
 }

@@ -146,7 +146,7 @@ fn texts_and_64_bits_are_set_from_outside_and_stored_over_power_cycles() {
 }
 
 #[test]
-fn a_new_error_register_is_told_by_emcy_and_kept_in_the_history() {
+fn a_new_error_register_is_reported_by_emcy_and_kept_in_the_history() {
     let mut bench = Bench::new();
     // Generic and temperature.
     assert_eq!(bench.world_command("9 set 1001 9"), ["089#0010090000000000"]);

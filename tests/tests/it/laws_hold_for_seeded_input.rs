@@ -18,11 +18,11 @@ laws_hold! {
     candump_text_is_read_or_refused_and_reads_back_as_printed: "frame_text";
     a_frame_is_never_shorter_than_its_bits_nor_longer_than_with_all_stuff_bits: "frame_length";
     a_candump_line_is_read_or_refused_and_reads_back_as_written: "candump_line";
-    an_asc_log_is_read_or_told_of_and_is_written_again_as_read: "log_asc";
-    a_trc_log_is_read_or_told_of_and_is_written_again_as_read: "log_trc";
-    a_blf_log_is_read_or_told_of_and_is_written_again_as_read: "log_blf";
-    a_pcap_log_is_read_or_told_of_and_is_written_again_as_read: "log_pcap";
-    a_pcapng_log_is_read_or_told_of_and_is_written_again_as_read: "log_pcapng";
+    an_asc_log_is_read_or_reported_and_is_written_again_as_read: "log_asc";
+    a_trc_log_is_read_or_reported_and_is_written_again_as_read: "log_trc";
+    a_blf_log_is_read_or_reported_and_is_written_again_as_read: "log_blf";
+    a_pcap_log_is_read_or_reported_and_is_written_again_as_read: "log_pcap";
+    a_pcapng_log_is_read_or_reported_and_is_written_again_as_read: "log_pcapng";
     a_socketcand_stream_decodes_alike_however_it_is_cut: "socketcand";
     an_slcan_stream_decodes_alike_however_it_is_cut: "slcan";
     sdo_bytes_read_back_as_written: "sdo_wire";

@@ -76,7 +76,7 @@ fn a_real_wheel_reaches_a_position_and_keeps_it_within_some_counts() {
 }
 
 #[test]
-fn a_real_joint_and_a_real_stepper_turn_as_they_are_told_without_a_fault() {
+fn a_real_joint_and_a_real_stepper_turn_as_commanded_without_a_fault() {
     let mut joint = mjoint::Bench::new();
     make_real(&mut joint.world);
     joint.set(0x6060, 3).set(0x60FF, 600).set(0x6040, 0x0F).run_ms(2000);

@@ -16,7 +16,7 @@ fn axes() -> [&'static AxisDescription; 2] {
 }
 
 #[test]
-fn both_zl_drives_say_the_same_identity_and_their_descriptions_tell_it() {
+fn both_zl_drives_say_the_same_identity_and_their_descriptions_state_it() {
     let (mut servo, mut stepper) = (zlac8030l::Bench::new(), zlim42c::Bench::new());
     for (object, expected) in [((0x1018, 1), 0x100), ((0x1018, 2), 1), ((0x1018, 3), 0), ((0x1000, 0), 0x0004_0192)] {
         servo.reads(object, expected);

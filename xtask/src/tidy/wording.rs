@@ -189,7 +189,7 @@ mod tests {
             "That is it. No drive answers.",
             "as it is: no drive answers",
             "let is = no;",
-            "model.fault_told_by(code)",
+            "model.fault_reported_by(code)",
             "he_told",
             "foretold",
             "leave out, go away",

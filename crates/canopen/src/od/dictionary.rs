@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_object_and_missing_sub_index_are_told_apart() {
+    fn missing_object_and_missing_sub_index_are_distinguished() {
         assert_eq!(TABLE.find(Mux::new(0x1000, 5)), Err(AbortCode::NO_SUCH_SUB_INDEX));
         assert_eq!(TABLE.find(Mux::new(0x1003, 0)), Err(AbortCode::NO_SUCH_OBJECT));
         assert_eq!(TABLE.find(Mux::new(0xFFFF, 0xFF)), Err(AbortCode::NO_SUCH_OBJECT));

@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_busy_host_is_told_which_options_help_and_a_silent_drive_is_not() {
+    fn a_busy_host_is_shown_which_options_help_and_a_silent_drive_is_not() {
         let advised = |tolerance, loss| {
             CycleArgs { tolerance }.advised(Failure::new("axis 1 stopped"), Refusal::Stopped(loss)).next.join("; ")
         };

@@ -182,7 +182,7 @@ impl ErrorEntry {
     /// The low 16 bits are the error code, the high ones the maker's.
     fn remembered(node: NodeId, raw: u32, model: Option<&'static Description>) -> Self {
         let code = EmcyErrorCode(raw as u16);
-        let fault = model.and_then(|model| model.fault_told_by(code));
+        let fault = model.and_then(|model| model.fault_reported_by(code));
         Self {
             t: None,
             node: node.raw(),

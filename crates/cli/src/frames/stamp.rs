@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_told_in_each_form() {
+    fn times_are_written_in_each_form() {
         let times = [1_000_000_000_250_000, 1_000_000_001_500_000, 1_000_000_001_000_000].map(Instant::from_micros);
         let shown = |form| {
             let mut stamps = Stamps::new(form, Duration::ZERO);

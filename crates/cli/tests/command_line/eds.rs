@@ -176,7 +176,7 @@ fn a_devices_values_make_a_dcf_that_is_not_written_over_unasked() {
 }
 
 #[test]
-fn values_that_differ_from_a_makers_sheet_are_in_the_dcf_and_what_the_device_refuses_is_told() {
+fn values_that_differ_from_a_makers_sheet_are_in_the_dcf_and_what_the_device_refuses_is_reported() {
     let folder = folder("dcf_eds");
     let sheet = "; kept\n[FileInfo]\nFileName=v.eds\n\
         [2014]\nParameterName=Rated current\nDataType=6\nAccessType=rw\nDefaultValue=300\n\

@@ -28,7 +28,7 @@ fn is(error: &Value, kind: &str, node: Option<u8>, object: Option<&str>, abort: 
 }
 
 #[test]
-fn what_a_drive_refuses_is_told_with_node_object_and_abort_code() {
+fn what_a_drive_refuses_is_reported_with_node_object_and_abort_code() {
     // CiA 301, table 22: attempt to write a read-only object; object does not exist.
     is(&failed(&["write", "4", "6064", "5"], 1), "aborted", Some(4), Some("6064h:00"), Some(0x0601_0002));
     is(&failed(&["read", "4", "6502"], 1), "aborted", Some(4), Some("6502h:00"), Some(0x0602_0000));
@@ -48,7 +48,7 @@ fn silence_a_missing_mode_and_a_motion_that_fails_have_their_kinds() {
 }
 
 #[test]
-fn a_command_line_that_makes_no_sense_is_told_in_json_too() {
+fn a_command_line_that_makes_no_sense_is_reported_in_json_too() {
     for arguments in [
         &["velocity", "4", "fast"][..],
         &["reed", "4"],

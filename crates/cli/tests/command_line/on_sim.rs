@@ -40,7 +40,7 @@ fn a_value_is_written_with_unit_or_word() {
 }
 
 #[test]
-fn what_the_drive_refuses_is_told_with_its_reason() {
+fn what_the_drive_refuses_is_reported_with_its_reason() {
     let ended = ferrodrive(&["write", "4", "6064", "5"]);
     assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("6064h") && ended.err.contains("0601 0002h"), "{}", ended.err);
@@ -126,7 +126,7 @@ fn a_torque_is_refused_where_the_model_has_no_such_mode() {
 }
 
 #[test]
-fn a_value_that_is_refused_is_told_with_what_the_object_takes() {
+fn a_value_that_is_refused_is_reported_with_what_the_object_takes() {
     let said = |arguments: &[&str], status| {
         let ended = ferrodrive(arguments);
         assert_eq!(ended.status, Some(status), "{arguments:?}: {}", ended.err);
@@ -174,7 +174,7 @@ fn a_joint_homes_on_the_switch_of_its_machine_file() {
 }
 
 #[test]
-fn homing_that_finds_nothing_in_time_is_told_with_what_to_check() {
+fn homing_that_finds_nothing_in_time_is_reported_with_what_to_check() {
     let ended = ferrodrive(&["home", "2", "--method", "17", "--within", "2s"]);
     assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("still looks for its reference") && ended.err.contains("switch"), "{}", ended.err);

@@ -38,7 +38,7 @@ fn a_scenario_that_passes_ends_with_0_and_one_with_a_false_expectation_with_1_an
 }
 
 #[test]
-fn a_sweep_tells_how_many_failed_how_figures_are_spread_and_how_to_repeat_a_run() {
+fn a_sweep_reports_how_many_failed_how_figures_are_spread_and_how_to_repeat_a_run() {
     let swept = ferrodrive(&["run", &scenario("step_loss.toml"), "--seeds", "1..2", "--jobs", "2", "--json"]);
     assert_eq!(swept.status, Some(0), "{}{}", swept.out, swept.err);
     let said: serde_json::Value = serde_json::from_str(&swept.out).unwrap();
@@ -63,7 +63,7 @@ fn a_sweep_tells_how_many_failed_how_figures_are_spread_and_how_to_repeat_a_run(
 }
 
 #[test]
-fn a_sweep_tells_what_came_of_each_value_and_a_value_that_is_set_is_not_swept() {
+fn a_sweep_reports_what_came_of_each_value_and_a_value_that_is_set_is_not_swept() {
     let directory = scratch("run-values");
     let file = directory.join("values.toml");
     let text = "[parameters]\nvolts = 24\n[sweep]\nvolts = { from = 20, to = 26, step = 2 }\n[machine]\n\

@@ -17,7 +17,7 @@ fn bus(test: &str) -> (Scratch, String) {
 }
 
 #[test]
-fn a_way_is_moved_at_a_speed_along_it_and_told_in_all_units() {
+fn a_way_is_moved_at_a_speed_along_it_and_reported_in_all_units() {
     let (_folder, bus) = bus("along");
     let command =
         ["--bus", &bus, "--json", "move", "2", "40mm", "--profile-velocity", "20mm/s", "--acceleration", "100mm/s2"];

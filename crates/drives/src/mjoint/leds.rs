@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn both_are_lit_once_at_power_on_and_green_then_tells_of_the_battery() {
+    fn both_are_lit_once_at_power_on_and_green_then_shows_the_battery() {
         assert_eq!(leds(0, Battery::Missing, 100), Leds { red: true, green: true });
         let changes = |battery| {
             let states: Vec<bool> = (1000..2000).map(|ms| leds(0, battery, ms).green).collect();

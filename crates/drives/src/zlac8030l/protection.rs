@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wire_that_is_off_is_told_within_two_electrical_turns_whichever_it_is_and_whichever_way_the_motor_turns() {
+    fn a_wire_that_is_off_is_reported_within_two_electrical_turns_whichever_it_is_and_whichever_way_the_motor_turns() {
         for wire in 0..3 {
             for turns_per_period in [2e-3, -2e-3, 0.0125, -0.0125] {
                 assert!(judged(1.0, Some(wire), turns_per_period, 2.0), "{wire} at {turns_per_period}");
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rotor_that_swings_tells_a_wire_that_is_off_only_if_it_swings_farther_than_a_sound_one_leaves_it_empty() {
+    fn a_rotor_that_swings_shows_a_wire_that_is_off_only_if_it_swings_farther_than_a_sound_one_leaves_it_empty() {
         let swings = |turns: f32| {
             let mut watch = WireWatch::default();
             (0..10_000)

@@ -52,7 +52,7 @@ fn a_pdo_has_64_bits() {
 }
 
 #[test]
-fn identifiers_that_every_node_would_have_are_told() {
+fn identifiers_that_every_node_would_have_are_reported() {
     let emcy = |default: &str| {
         whats(&format!("[1014]\nParameterName=COB-ID EMCY\nDataType=7\nAccessType=ro\nDefaultValue={default}\n"))
     };
@@ -79,7 +79,7 @@ fn sub_index_0_is_there_and_unsigned8_and_counts_no_more_than_there_is() {
 }
 
 #[test]
-fn names_that_other_tools_cut_and_letters_beyond_ascii_are_told() {
+fn names_that_other_tools_cut_and_letters_beyond_ascii_are_reported() {
     let file = "[2000]\nParameterName=Gain #1 \u{fc}\nDataType=5\nAccessType=ro\n";
     let found: Vec<_> = whats(file).into_iter().map(|(line, _, what)| (line, what)).collect();
     let letters = (2, "letters beyond ASCII, which CiA 306 does not have".to_owned());
@@ -87,7 +87,7 @@ fn names_that_other_tools_cut_and_letters_beyond_ascii_are_told() {
 }
 
 #[test]
-fn a_drive_that_names_no_mode_is_told() {
+fn a_drive_that_names_no_mode_is_reported() {
     let drive = |modes: &str| {
         let words =
             "[6040]\nParameterName=C\nDataType=6\nAccessType=rw\n[6041]\nParameterName=S\nDataType=6\nAccessType=ro\n";

@@ -63,7 +63,7 @@ fn access_is_read_in_any_case_and_the_process_directions_too() {
 }
 
 #[test]
-fn an_unknown_type_is_taken_as_unsigned32_and_told_with_its_line() {
+fn an_unknown_type_is_taken_as_unsigned32_and_reported_with_its_line() {
     let reading = of_2000("ParameterName=P\nDataType=0x0077\nAccessType=rw\n");
     assert_eq!(short(&reading), [(Severity::Error, "DataType".into(), Some("UNSIGNED32".into()))]);
     let finding = reading.findings.iter().next().expect("one");
@@ -230,7 +230,7 @@ fn sub_objects_without_their_object_and_a_var_with_sub_objects_are_records() {
 }
 
 #[test]
-fn lists_that_do_not_fit_the_sections_are_told() {
+fn lists_that_do_not_fit_the_sections_are_reported() {
     let reading = reading(&[0x2000, 0x2001, 0x6000, 0x2000], &format!("[2000]\n{U16}[6000]\n{U16}[2002]\n{U16}"));
     let whats: Vec<&str> = reading.findings.iter().map(|finding| finding.what.as_str()).collect();
     assert_eq!(
@@ -263,7 +263,7 @@ fn a_dcf_has_values_and_one_device() {
 }
 
 #[test]
-fn in_a_dcf_the_values_of_compact_sub_objects_are_values_and_one_beyond_its_limits_is_told() {
+fn in_a_dcf_the_values_of_compact_sub_objects_are_values_and_one_beyond_its_limits_is_reported() {
     let object = "[2000]\nParameterName=W\nObjectType=8\nDataType=6\nAccessType=rw\nDefaultValue=1\nHighLimit=9\nCompactSubObj=2\n\
                   [2000Value]\nNrOfEntries=1\n2=7\n";
     let second = |text: &str| {
@@ -322,7 +322,7 @@ fn dynamic_channels_dummies_and_comments_are_read() {
 }
 
 #[test]
-fn lines_that_are_nothing_are_told() {
+fn lines_that_are_nothing_are_reported() {
     let reading = reading(&[], "what is this\n");
     assert_eq!(reading.findings.iter().map(|finding| finding.line).collect::<Vec<_>>(), [36]);
     assert_eq!(Eds::load(b"a=b\n").expect_err("no section").reason, "the file has no sections");

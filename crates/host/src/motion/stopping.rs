@@ -75,8 +75,8 @@ impl Host {
     /// Reports that a node is stopped, once for a press that comes by two channels, or from several pages.
     fn report_stop(&mut self, id: NodeId, why: &'static str) {
         let now = self.network.now();
-        let before = self.stops_told.insert(id, (now, why));
-        if before.is_none_or(|(told_at, of)| of != why || now - told_at >= SAME_PRESS) {
+        let before = self.stops_reported.insert(id, (now, why));
+        if before.is_none_or(|(reported_at, of)| of != why || now - reported_at >= SAME_PRESS) {
             self.send_news(Some(id), why);
             self.note_stop(id, why);
         }

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn other_masters_are_told_first_and_listed_heartbeats_and_answers_are_not() {
+    fn other_masters_are_reported_first_and_listed_heartbeats_and_answers_are_not() {
         // CiA 301, 7.3.3: 584h is an SDO answer, 704h a heartbeat, 205h RPDO 1, 606h an SDO request, 187h TPDO 1.
         let lines = heard(&[
             "584#4B41600037020000",
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_node_that_boots_or_reports_an_error_is_told_and_kinds_are_bounded() {
+    fn a_node_that_boots_or_reports_an_error_is_reported_and_kinds_are_bounded() {
         let lines = heard(&["704#00", "084#1023010000000000"]);
         // CiA 301, table 26: 23xxh is a current on the device's output side.
         assert!(lines[0].contains("node 4") && lines[0].contains("2310h"), "{lines:?}");

@@ -44,7 +44,7 @@ impl Host {
             return self.inbox.timeline.end_but(at, node, Kind::Emcy, &[]);
         }
         let model = self.description(node);
-        let row = model.and_then(|model| model.fault_told_by(emcy.code));
+        let row = model.and_then(|model| model.fault_reported_by(emcy.code));
         let name = row.map_or_else(|| emcy.code.to_string(), |row| row.name.to_owned());
         let what = format!("{name}, error register {:02X}h", emcy.error_register);
         let event = TimelineEvent { code: Some(emcy.code.0), ..TimelineEvent::new(at, node, Kind::Emcy, what) };
@@ -120,7 +120,7 @@ impl Host {
     /// An event in words: an emergency message in those of the model's fault table.
     pub(crate) fn words_of(&self, event: &Event) -> String {
         let Event::Emcy(node, emcy) = event else { return event.to_string() };
-        match self.description(*node).and_then(|model| model.fault_told_by(emcy.code)) {
+        match self.description(*node).and_then(|model| model.fault_reported_by(emcy.code)) {
             Some(row) => format!("node {node}: emergency {:04X}h ({})", emcy.code.0, row.name),
             None => event.to_string(),
         }

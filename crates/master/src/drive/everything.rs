@@ -109,8 +109,8 @@ async fn stop_node(node: &Node, named: Option<&'static Description>, is_expected
     }
     let first = Drive { node: node.clone(), axis: AxisId::FIRST, description: named, guess: None, gear: Gear::DIRECT };
     // The model is asked for only once the stop is sent.
-    let told_to_stop = first.tell_to_stop().await;
-    match told_to_stop {
+    let commanded = first.command_stop().await;
+    match commanded {
         Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT, .. }) => return Vec::new(),
         Err(Error::NoAnswer { .. }) if !is_expected && node.facts().seen_at.is_none() => return Vec::new(),
         _ => {}
@@ -150,7 +150,7 @@ async fn stop_unseen_axes(node: &Node) -> Vec<StoppedAxis> {
 
 impl Drive {
     /// The first word to a drive of which it is not known what it does.
-    async fn tell_to_stop(&self) -> Result<(), Error> {
+    async fn command_stop(&self) -> Result<(), Error> {
         if self.may_hold_by_stopping() && self.is_without_power().await {
             return Ok(());
         }

@@ -74,7 +74,11 @@ impl Drive {
         facts.extend(seen.probable_state(self.description).map(Fact::Nmt));
         facts.push(Fact::Heartbeat(seen.heartbeat_age(now)));
         facts.extend(seen.last_emcy().map(|(at, emcy)| {
-            Fact::Emcy(now - *at, *emcy, self.description.and_then(|description| description.fault_told_by(emcy.code)))
+            Fact::Emcy(
+                now - *at,
+                *emcy,
+                self.description.and_then(|description| description.fault_reported_by(emcy.code)),
+            )
         }));
     }
 }

@@ -48,7 +48,7 @@ impl EmcyLog {
     /// Keeps a message, and returns what was kept. One with error code 0 ends those of its node, and is not
     /// kept itself.
     pub fn push(&mut self, at: Instant, node: NodeId, emcy: Emcy, model: Option<&Description>) -> EmcyRecord {
-        let fault = model.and_then(|model| model.fault_told_by(emcy.code));
+        let fault = model.and_then(|model| model.fault_reported_by(emcy.code));
         let record = EmcyRecord { at, node, emcy, fault, gone: None };
         if emcy.code == EmcyErrorCode::NO_ERROR {
             self.end(node, at);

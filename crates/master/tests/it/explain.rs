@@ -414,7 +414,7 @@ fn what_should_have_come_and_did_not_is_named() {
 
 /// The hub motor ends at 48 V over the published constant of its voltage, 0.7613 V s: V / sqrt(3) against 2/3 of Kt (docs/drives, L091).
 #[test]
-fn a_speed_beyond_the_supply_is_told_with_the_voltage_and_what_is_reached() {
+fn a_speed_beyond_the_supply_is_reported_with_the_voltage_and_what_is_reached() {
     let mut bench = Bench::new("zlac8030l");
     turn_at(&mut bench, 900);
     let explained = bench.explain();

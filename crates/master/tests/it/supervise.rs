@@ -267,7 +267,7 @@ fn a_guard_of_a_program_that_moves_a_drive_is_left_as_it_is() {
 }
 
 #[test]
-fn a_second_device_with_a_node_id_is_told_of_once_by_its_heartbeats() {
+fn a_second_device_with_a_node_id_is_reported_once_by_its_heartbeats() {
     let mut bench = Bench::new();
     bench.watch(Duration::from_secs(20));
     assert!(!bench.kinds().contains(&("node_twice", Some(SERVO))), "{:?}", bench.reported);

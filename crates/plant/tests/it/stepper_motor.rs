@@ -153,7 +153,7 @@ fn a_rotor_pulls_out_at_the_holding_torque_and_not_before() {
 }
 
 #[test]
-fn a_lost_rotor_comes_to_rest_whole_times_four_full_steps_away_and_no_sensor_tells() {
+fn a_lost_rotor_comes_to_rest_whole_times_four_full_steps_away_and_no_sensor_shows_it() {
     let run = |overload_nm: f64| {
         let mut motor = motor(FREE);
         settle(&mut motor, 0.0);

@@ -150,7 +150,7 @@ impl WorldWatch {
                     Member::Drive { drive, .. } => drive.description(),
                     _ => None,
                 };
-                (node, EventKind::Emcy { emcy, row: description.and_then(|model| model.fault_told_by(emcy.code)) })
+                (node, EventKind::Emcy { emcy, row: description.and_then(|model| model.fault_reported_by(emcy.code)) })
             }
             _ => return,
         };

@@ -56,7 +56,7 @@ fn a_refusal_begins_as_every_answer_does_and_says_what_is_expected() {
 }
 
 #[test]
-fn get_tells_what_can_be_measured() {
+fn get_answers_what_can_be_measured() {
     let (mut world, _) = world();
     // Half a turn at 60 r/min.
     let got = answer(&mut world, "4 get").unwrap().json;
@@ -77,7 +77,7 @@ fn get_tells_what_can_be_measured() {
 }
 
 #[test]
-fn now_and_quit_tell_the_time_and_blank_lines_and_comments_nothing() {
+fn now_and_quit_answer_the_time_and_blank_lines_and_comments_nothing() {
     let (mut world, _) = world();
     assert_eq!(answer(&mut world, "now").unwrap().json, r#"{"ok":true,"t":0.5,"behind_ms":0,"frames_lost":0}"#);
     assert_eq!(ask(&mut world, "quit")["ok"], true);
@@ -87,7 +87,7 @@ fn now_and_quit_tell_the_time_and_blank_lines_and_comments_nothing() {
 }
 
 #[test]
-fn now_and_get_tell_what_the_one_who_serves_the_world_knows() {
+fn now_and_get_answer_what_the_one_who_serves_the_world_knows() {
     let (mut world, _) = world();
     let service = Service { behind: Duration::from_micros(12_900), frames_lost: 3 };
     let json = |world: &mut World, line| -> Value {

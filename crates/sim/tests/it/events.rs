@@ -44,7 +44,7 @@ fn apply(world: &mut World, words: &str) {
 const ENABLE: [&str; 3] = ["604#2B40600006000000", "604#2B40600007000000", "604#2B4060000F000000"];
 
 #[test]
-fn a_drive_that_boots_tells_of_power_nmt_state_and_the_boot_up_message() {
+fn a_drive_that_boots_reports_power_nmt_state_and_the_boot_up_message() {
     let (mut world, _) = world();
     world.run_for(Duration::from_secs(1));
     let events = events(&mut world);
@@ -59,7 +59,7 @@ fn a_drive_that_boots_tells_of_power_nmt_state_and_the_boot_up_message() {
 }
 
 #[test]
-fn each_step_of_the_power_state_machine_is_told_where_it_comes_from() {
+fn each_step_of_the_power_state_machine_is_reported_where_it_comes_from() {
     let (mut world, probe) = world();
     world.run_for(Duration::from_secs(1));
     events(&mut world);
@@ -77,7 +77,7 @@ fn each_step_of_the_power_state_machine_is_told_where_it_comes_from() {
 }
 
 #[test]
-fn a_fault_is_told_with_its_remedy_and_its_emcy_and_its_end() {
+fn a_fault_is_reported_with_its_remedy_and_its_emcy_and_its_end() {
     let (mut world, probe) = world();
     world.run_for(Duration::from_secs(1));
     send(&mut world, probe, &ENABLE);
@@ -102,7 +102,7 @@ fn a_fault_is_told_with_its_remedy_and_its_emcy_and_its_end() {
 }
 
 #[test]
-fn arriving_storing_and_dying_are_told() {
+fn arriving_storing_and_dying_are_reported() {
     let (mut world, probe) = world();
     world.run_for(Duration::from_secs(1));
     // Profile velocity, 60 r/min.
@@ -125,7 +125,7 @@ fn arriving_storing_and_dying_are_told() {
 }
 
 #[test]
-fn a_drive_alone_on_its_bus_becomes_error_passive_and_attempts_are_told_ever_more_rarely() {
+fn a_drive_alone_on_its_bus_becomes_error_passive_and_attempts_are_reported_ever_more_rarely() {
     let mut world = World::new(Bitrate::K500, 1);
     world.watch(true);
     world.add_drive(4, Box::new(zlac8030l(4, 1))).unwrap();
@@ -147,7 +147,7 @@ fn a_drive_alone_on_its_bus_becomes_error_passive_and_attempts_are_told_ever_mor
 }
 
 #[test]
-fn bus_off_and_the_way_back_are_told() {
+fn bus_off_and_the_way_back_are_reported() {
     let (mut world, _) = world();
     world.run_for(Duration::from_secs(1));
     events(&mut world);
@@ -214,7 +214,7 @@ fn kinds_have_names_of_their_own() {
 /// 202Eh:02 = 1000 W lets the drive load the resistor of 100 W with all of its 72²/5 W. It warms to ten times what its rated power
 /// does, with 30 s, and burns at twice that: after -30 s ln(1 - 0.2 * 5 * 100 / 72²).
 #[test]
-fn a_bleeder_that_burns_out_is_told_shown_as_damage_and_mended() {
+fn a_bleeder_that_burns_out_is_reported_shown_as_damage_and_mended() {
     let (mut world, probe) = world();
     world.run_for(Duration::from_millis(20));
     // 202Eh:05 = 1, :02 = 1000.

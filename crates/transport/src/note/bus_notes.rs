@@ -59,7 +59,7 @@ mod tests {
     use crate::ControllerState;
 
     #[test]
-    fn a_kind_is_told_once_and_a_connection_each_time() {
+    fn a_kind_is_reported_once_and_a_connection_each_time() {
         let mut notes = BusNotes::of(&"can3".parse().unwrap());
         let off = Note::State(ControllerState::BusOff);
         let text = notes.news(&off).unwrap();

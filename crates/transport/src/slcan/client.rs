@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_refused_open_and_a_silent_line_are_told_apart() {
+    async fn a_refused_open_and_a_silent_line_are_distinguished() {
         let clock = WallClock::start();
         let (host, line) = SerialStream::pair().unwrap();
         let answers = ["\r", "\r", "\r", "V1013\r", "\x07"];

@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn the_status_tells_of_a_bus_error_once() {
+    fn the_status_reports_a_bus_error_once() {
         let mut session = SlcanSession::new(None);
         session.deliver_error(Instant::ZERO, 0x88, &mut Vec::new());
         assert_eq!(exchange(&mut session, "O\rF\r").0, "\rF00\r", "a closed channel hears nothing");

@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_without_an_interface_is_told_how_to_make_one() {
+    fn a_machine_without_an_interface_is_shown_how_to_make_one() {
         let system = system("none", &[]);
         let said = look(&system, "can0").unwrap_err().to_string();
         assert!(said.contains("ip link add dev vcan0 type vcan"), "{said}");

@@ -131,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn error_frames_are_told_from_refusals() {
+    fn error_frames_are_distinguished_from_refusals() {
         assert_eq!([error_class("004 23.424242"), error_class("20000080")], [Some(4), Some(0x80)]);
         assert_eq!(["bad request", "unknown command", ""].map(error_class), [None; 3]);
     }

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_frame_of_ours_is_told() {
+    fn what_is_not_a_frame_of_ours_is_reported() {
         let packed = |change: fn(&mut PythonCanMessage<'_>)| {
             let data = [0; 65];
             let mut message = PythonCanMessage {

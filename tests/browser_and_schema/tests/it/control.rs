@@ -247,7 +247,7 @@ fn with_the_clock_moved_by_hand_samples_are_exact_and_a_run_is_answered_when_it_
 }
 
 #[test]
-fn a_client_that_does_not_read_is_told_what_it_missed_and_holds_up_nobody() {
+fn a_client_that_does_not_read_learns_what_it_missed_and_holds_up_nobody() {
     let simulator = Simulator::start(&[&DRIVE[..], &["--clock", "manual"]].concat());
     let (mut deaf, mut other) = (Client::connect(&simulator), Client::connect(&simulator));
     let signals = ["position_counts", "velocity_rpm", "current_a", "supply_v", "motor_c", "driver_c"];

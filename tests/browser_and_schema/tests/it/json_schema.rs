@@ -149,7 +149,7 @@ fn a_failure_says_what_to_do_next() {
 }
 
 #[test]
-fn files_and_logs_are_told_of_in_the_same_form() {
+fn files_and_logs_are_reported_in_the_same_form() {
     let directory = scratch("schema");
     let path = |name: &str| directory.join(name).to_str().expect("UTF-8").to_owned();
     let (sheet, log, odd) = (path("a.eds"), path("a.log"), path("odd.log"));

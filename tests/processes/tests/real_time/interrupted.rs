@@ -192,7 +192,7 @@ fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
 }
 
 #[test]
-fn a_bus_lost_in_a_move_is_told_with_what_was_moving_and_what_to_do() {
+fn a_bus_lost_in_a_move_is_reported_with_what_was_moving_and_what_to_do() {
     let mut simulator = bench();
     let bus = simulator.bus("socketcand");
     let moving = start(&bus, "4=zlac8030l", &["move", "4", "200turn", "--relative", "--profile-velocity", "100rpm"]);

@@ -87,7 +87,7 @@ fn real_time_is_entered_or_refused_with_what_to_do() {
 /// CAP_IPC_LOCK and a limit for locked memory (mlock(2)) no mlockall.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_user_who_may_not_run_in_real_time_is_told_how_to_allow_it() {
+fn a_user_who_may_not_run_in_real_time_is_shown_how_to_allow_it() {
     let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
     let without = |limits: &str, capabilities: &str, program: &str, arguments: &[&str]| {

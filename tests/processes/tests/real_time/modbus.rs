@@ -96,8 +96,8 @@ async fn a_joint_moves_and_tells_its_values_in_the_scales_of_the_manual() {
     until("the speed", -3050..=-2950, speed).await;
     // 1/2000 A, without a sign.
     let mut current = async || f64::from(read(&mut joint, CURRENT).await) / 2000.0;
-    let (told_a, true_a) = (current().await, simulator.ask("2 get")["current_a"].as_f64().unwrap().abs());
-    assert!((told_a - true_a).abs() < 0.2 + 0.3 * true_a, "{told_a} A reported, {true_a} A true");
+    let (reported_a, true_a) = (current().await, simulator.ask("2 get")["current_a"].as_f64().unwrap().abs());
+    assert!((reported_a - true_a).abs() < 0.2 + 0.3 * true_a, "{reported_a} A reported, {true_a} A true");
 
     // CANopen has the same object. (Of a drive that it does not know the command line shows the bits.)
     let over_can = done(&["--bus", &simulator.bus("socketcand"), "--json", "read", "2", "60FF"]).json();
@@ -141,7 +141,7 @@ async fn clients_share_a_joint_and_one_that_leaves_does_not_stop_it() {
 }
 
 #[test]
-fn a_place_that_cannot_be_served_is_told_before_it_is_ready() {
+fn a_place_that_cannot_be_served_is_reported_before_it_is_ready() {
     let ended = ferrodrive(&["sim", "--drive", "m4230e17b50@2", "--modbus", "tcp://here"]);
     assert_eq!(ended.status, Some(2), "{}", ended.err);
     let ended = ferrodrive(&["sim", "--drive", "m4230e17b50@2", "--modbus", "rtu:///dev/no-such-line"]);

@@ -41,7 +41,7 @@ impl Bench {
 }
 
 #[test]
-fn a_scan_says_that_it_cannot_tell_and_how_the_user_can() {
+fn a_scan_says_that_it_cannot_know_and_how_the_user_can() {
     let bench = bench();
     let found = bench.json(&["scan"]);
     let nodes = found["nodes"].as_array().unwrap();
@@ -68,7 +68,7 @@ fn a_scan_says_that_it_cannot_tell_and_how_the_user_can() {
 }
 
 #[test]
-fn a_scan_names_what_it_is_told_and_says_what_speaks_against_it() {
+fn a_scan_names_what_was_stated_and_says_what_speaks_against_it() {
     let bench = bench();
     let node = |found: &Value, id: u64| {
         found["nodes"].as_array().unwrap().iter().find(|node| node["node"] == id).cloned().unwrap()

@@ -201,7 +201,7 @@ fn an_interface_that_is_removed_and_made_again_is_found_again() {
 
 #[test]
 #[ignore = "needs the interfaces of cargo xtask vcan-test"]
-fn what_the_controller_tells_is_shown() {
+fn what_the_controller_reports_is_shown() {
     let dump = Listener::dump("vcan0");
     // Error messages as a driver sends them (linux/can/error.h): flag 20000000h, class, bytes.
     for (message, kind) in [
@@ -224,7 +224,7 @@ fn what_the_controller_tells_is_shown() {
 
 #[test]
 #[ignore = "needs the interfaces of cargo xtask vcan-test"]
-fn fd_frames_are_told_of_and_do_no_harm() {
+fn fd_frames_are_reported_and_do_no_harm() {
     let dump = Listener::dump("vcan0");
     run("cansend", &["vcan0", "123##1112233"]);
     let note = dump.note("fd_frame");

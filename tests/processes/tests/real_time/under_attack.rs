@@ -44,7 +44,7 @@ impl Drop for Flood {
 }
 
 #[test]
-fn answers_that_nobody_reads_stop_no_drive_and_their_number_is_told() {
+fn answers_that_nobody_reads_stop_no_drive_and_their_number_is_reported() {
     const ASKED: u64 = 30_000;
     let mut simulator = Simulator::start_deaf(&SERVED);
     let mut input = simulator.take_input();

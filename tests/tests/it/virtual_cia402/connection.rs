@@ -197,7 +197,7 @@ fn a_lost_connection_leaves_operational_as_1029h_says() {
 }
 
 #[test]
-fn bus_off_stops_the_motor_and_is_told_when_the_bus_is_back() {
+fn bus_off_stops_the_motor_and_is_reported_when_the_bus_is_back() {
     let mut world = World::new(Bitrate::K500, 1);
     let host = world.add_probe();
     let node = NodeId::new(5).unwrap();

@@ -198,7 +198,7 @@ fn each_of_eight_nodes_is_watched_once() {
 }
 
 #[test]
-fn an_rpdo_that_is_too_short_is_told() {
+fn an_rpdo_that_is_too_short_is_reported() {
     let mut bench = Bench::new();
     bench.frame("405#0600");
     bench.run_ms(2);

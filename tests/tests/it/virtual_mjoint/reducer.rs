@@ -7,7 +7,7 @@ fn output(bench: &mut Bench) -> sim::OutputShaft {
 }
 
 #[test]
-fn a_load_that_takes_more_than_the_peak_start_stop_torque_is_told_and_a_lighter_one_is_not() {
+fn a_load_that_takes_more_than_the_peak_start_stop_torque_is_reported_and_a_lighter_one_is_not() {
     // 44 N·m: 20000 (r/min)/s are 42 rad/s² behind a ratio of 50, and 3 kg·m² would take 126 N·m for them.
     for (inertia_kg_m2, overloaded) in [(0.3, false), (3.0, true)] {
         let mut bench = Bench::new();

@@ -9,7 +9,7 @@ const DRIVER_TEMPERATURE: i64 = 0x0800;
 /// The drive is disabled: the motor's voltage passes the bus's, charges it through the diodes, and the source takes nothing
 /// back. What limits the bus takes the power in the end.
 #[test]
-fn a_free_wheel_under_2_5_nm_ends_where_the_bus_is_limited_and_over_voltage_is_told() {
+fn a_free_wheel_under_2_5_nm_ends_where_the_bus_is_limited_and_over_voltage_is_reported() {
     let mut bench = Bench::new();
     bench.forget().world("4 load torque 2.5").run_ms(5000);
     let report = bench.report();
@@ -36,15 +36,15 @@ fn the_bleeder_keeps_a_driven_bus_between_its_two_voltages() {
 }
 
 #[test]
-fn a_bus_that_is_fed_for_long_makes_the_power_stage_hot_which_is_told_before_it_burns() {
+fn a_bus_that_is_fed_for_long_makes_the_power_stage_hot_which_is_reported_before_it_burns() {
     let mut bench = Bench::new();
     bench.world("4 load torque 5");
-    let told_s = bench.seconds_until(60.0, std::time::Duration::from_millis(100), |report| {
+    let reported_s = bench.seconds_until(60.0, std::time::Duration::from_millis(100), |report| {
         i64::from(report.error_code) & DRIVER_TEMPERATURE != 0
     });
     assert_within("driver in degC", bench.report().driver_c.expect("a sensor"), 79.0, 82.0);
     let burnt_s = bench.seconds_until(100.0, std::time::Duration::from_millis(100), |report| report.damage.is_some());
-    assert!(told_s > 10.0 && burnt_s > 30.0, "{told_s} s, then {burnt_s} s");
+    assert!(reported_s > 10.0 && burnt_s > 30.0, "{reported_s} s, then {burnt_s} s");
     let answer = bench.world_answer("4 get");
     assert!(answer.contains("\"powered\":false") && answer.contains("power stage burnt"), "{answer}");
 }

@@ -151,7 +151,7 @@ fn after_a_fault_alarm_pwm_brakes_the_wheel_and_without_it_the_wheel_coasts() {
 
 /// 16 and 75 V of the maker's hardware manual V1.00 (docs/drives/zlac8030l.md, L108).
 #[test]
-fn under_voltage_and_over_voltage_of_the_supply_are_told() {
+fn under_voltage_and_over_voltage_of_the_supply_are_reported() {
     for (supply_v, code) in [(15.5, 0x0002), (75.5, 0x0001), (16.5, 0), (74.5, 0)] {
         let mut bench = Bench::new();
         bench.set_supply(supply_v).run_ms(2000);

@@ -10,7 +10,7 @@ const RUNNING: u16 = 1 << 14;
 const MODE_BITS: u16 = REACHED | BIT_12 | IN_PLACE | RUNNING;
 
 #[test]
-fn in_profile_velocity_bits_10_12_and_14_tell_reached_standing_and_running() {
+fn in_profile_velocity_bits_10_12_and_14_show_reached_standing_and_running() {
     let mut bench = Bench::new();
     bench.enable_in(3).run_ms(100);
     assert_eq!(bench.statusword() & MODE_BITS, REACHED | BIT_12, "at the target 0");
@@ -23,7 +23,7 @@ fn in_profile_velocity_bits_10_12_and_14_tell_reached_standing_and_running() {
 }
 
 #[test]
-fn in_profile_position_bits_10_12_13_and_14_tell_reached_acknowledged_in_place_and_running() {
+fn in_profile_position_bits_10_12_13_and_14_show_reached_acknowledged_in_place_and_running() {
     let mut bench = Bench::new();
     bench.enable_in(1).run_ms(100);
     assert_eq!(bench.statusword() & MODE_BITS, REACHED | IN_PLACE, "nothing to do");
@@ -38,7 +38,7 @@ fn in_profile_position_bits_10_12_13_and_14_tell_reached_acknowledged_in_place_a
 }
 
 #[test]
-fn in_profile_torque_bits_10_and_14_tell_reached_and_running() {
+fn in_profile_torque_bits_10_and_14_show_reached_and_running() {
     let mut bench = Bench::new();
     bench.set_rotor_locked(true).enable_in(4).set(0x6087, 1000).set(0x6071, 2000).run_ms(1000);
     assert_eq!(bench.statusword() & MODE_BITS, 0, "1 A of 2 A, a shaft that cannot turn");

@@ -98,7 +98,7 @@ fn without_a_mode_an_enabled_drive_stands_whatever_its_targets_are() {
 }
 
 #[test]
-fn an_external_stop_that_is_active_is_told_by_bit_15_and_lets_nothing_start_in_any_mode() {
+fn an_external_stop_that_is_active_is_reported_by_bit_15_and_lets_nothing_start_in_any_mode() {
     for mode in [1, 3, 4] {
         let mut bench = Bench::new();
         bench.shows(0x8000, 0).set_input(0, true).run_ms(20);

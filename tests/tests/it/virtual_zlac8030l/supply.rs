@@ -25,7 +25,7 @@ fn seconds_to_live(bench: &mut Bench) -> f64 {
 }
 
 #[test]
-fn switched_off_the_drive_lives_on_its_capacitor_and_tells_of_under_voltage() {
+fn switched_off_the_drive_lives_on_its_capacitor_and_reports_under_voltage() {
     let mut bench = Bench::new();
     bench.forget().world("4 power off").run(Duration::from_secs_f64(drain_s(48.0, UNDER_VOLTAGE_V) - 0.002));
     bench.hears_of(EMCY_UNDER_VOLTAGE, &[]);

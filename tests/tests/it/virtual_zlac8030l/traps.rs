@@ -91,7 +91,7 @@ fn lines_and_direction_changed_while_enabled_wait_until_the_motor_is_free() {
 }
 
 #[test]
-fn an_eeprom_that_cannot_be_written_is_told_and_factory_settings_mend_it() {
+fn an_eeprom_that_cannot_be_written_is_reported_and_factory_settings_mend_it() {
     let mut bench = Bench::new();
     bench.set_fault(Component::Eeprom, true).run_ms(20).reads(0x603F, 0x0100).reads(0x1001, 0x81);
     bench.set_fault(Component::Eeprom, false).run_ms(5);
@@ -99,7 +99,7 @@ fn an_eeprom_that_cannot_be_written_is_told_and_factory_settings_mend_it() {
 }
 
 #[test]
-fn a_broken_encoder_and_a_lost_phase_are_told_once_the_motor_is_to_turn() {
+fn a_broken_encoder_and_a_lost_phase_are_reported_once_the_motor_is_to_turn() {
     for (component, code) in [(Component::Encoder, 0x1000), (Component::Phase, 0x0004)] {
         let mut bench = Bench::new();
         bench.enable_in(3).set_fault(component, true).set(0x60FF, 60).run_ms(2500);

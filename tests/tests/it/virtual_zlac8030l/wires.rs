@@ -17,7 +17,7 @@ fn turning(rpm: i64, load_nm: f64) -> Bench {
 }
 
 #[test]
-fn a_wire_that_comes_off_while_the_motor_turns_is_told() {
+fn a_wire_that_comes_off_while_the_motor_turns_is_reported() {
     for rpm in [-300_i64, -100, 10, 30, 100, 300, 450] {
         for load_nm in [0.0, 1.0, 2.0, 4.0] {
             let load_nm = load_nm * rpm.signum() as f64;
@@ -29,7 +29,7 @@ fn a_wire_that_comes_off_while_the_motor_turns_is_told() {
 }
 
 #[test]
-fn a_wire_that_comes_off_under_a_load_that_stops_the_motor_is_told() {
+fn a_wire_that_comes_off_under_a_load_that_stops_the_motor_is_reported() {
     for load_nm in [6.0, 8.0] {
         let mut bench = turning(100, load_nm);
         bench.set_fault(Component::Phase, true).run_ms(1000);
@@ -38,7 +38,7 @@ fn a_wire_that_comes_off_under_a_load_that_stops_the_motor_is_told() {
 }
 
 #[test]
-fn wires_that_touch_are_told_as_soon_as_the_drive_gives_them_a_voltage_and_mended_it_turns_again() {
+fn wires_that_touch_are_reported_as_soon_as_the_drive_gives_them_a_voltage_and_mended_it_turns_again() {
     for rpm in [0, 100, 400] {
         let mut bench = turning(rpm, 0.0);
         bench.set_fault(Component::Short, true).set(0x60FF, if rpm == 0 { 50 } else { rpm }).run_ms(100);

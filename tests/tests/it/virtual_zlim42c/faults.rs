@@ -41,7 +41,7 @@ fn faulty(cause: Cause) -> Bench {
 }
 
 #[test]
-fn each_fault_frees_the_motor_and_is_told_by_603fh_1001h_and_emcy() {
+fn each_fault_frees_the_motor_and_is_reported_by_603fh_1001h_and_emcy() {
     for (cause, code, _, register) in CAUSES {
         let mut bench = faulty(cause);
         assert_eq!(bench.statusword() & 0x20FF, 0x0098, "{cause:?}: bit 13 off");
@@ -258,7 +258,7 @@ fn over_voltage_begins_above_40_v() {
 }
 
 #[test]
-fn two_faults_are_told_one_by_one_and_go_one_by_one() {
+fn two_faults_are_reported_one_by_one_and_go_one_by_one() {
     let mut bench = faulty(Cause::Broken(Component::Reference));
     set(&mut bench, Cause::OverVoltage, true);
     let heard: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("081#")).collect();

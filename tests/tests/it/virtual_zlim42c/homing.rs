@@ -181,7 +181,7 @@ fn an_interrupted_homing_starts_again_with_the_next_edge_and_a_quick_stop_ends_i
 }
 
 #[test]
-fn an_output_tells_that_homing_is_done() {
+fn an_output_shows_that_homing_is_done() {
     let mut bench = on_track("between", 18);
     bench.set((0x2030, 0x0E), 3).set(0x6040, 0x1F).run_ms(500).reads(0x2004, 0);
     bench.run_ms(4500);

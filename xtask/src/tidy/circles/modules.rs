@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn items_of_a_module_are_told_from_those_within_items() {
+    fn items_of_a_module_are_distinguished_from_those_within_items() {
         let tree =
             tree("struct A;\nimpl A { const B: u8 = 1; fn c() {} }\nmod d { pub const E: u8 = 1; }\nconst fn f() {}");
         let names = |module: usize| tree.modules[module].defined.iter().map(String::as_str).collect::<Vec<_>>();

@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_marks_are_told_apart_and_lifetimes_and_numbers_left_out() {
+    fn names_and_marks_are_distinguished_and_lifetimes_and_numbers_left_out() {
         let texts: Vec<&str> = tokens("use a::b_2; f::<'a>(0x1F, x.y)").iter().map(|token| token.text).collect();
         assert_eq!(texts, ["use", "a", "::", "b_2", ";", "f", "::", "<", "'", ">", "(", ",", "x", ".", "y", ")"]);
     }

@@ -47,7 +47,7 @@ fn sent(node: &mut Node<Boxed>) -> Vec<String> {
 }
 
 #[test]
-fn what_the_owner_accepts_is_stored_told_and_confirmed() {
+fn what_the_owner_accepts_is_stored_reported_and_confirmed() {
     let mut node = device();
     let (slot, ticket) = asked(&mut node);
     assert!(node.answer(ticket, Ok(()), Instant::from_millis(30)));

@@ -35,7 +35,7 @@ fn number(number: u16) -> PdoNumber {
 }
 
 #[test]
-fn every_one_of_512_rpdos_writes_its_object_and_every_tpdo_tells_it() {
+fn every_one_of_512_rpdos_writes_its_object_and_every_tpdo_carries_it() {
     let mut node = device();
     answer(&mut node, "000#0104");
     for n in (5..=512_u16).filter(|n| !(0x80..=0x84).contains(n) && *n != 0x100) {

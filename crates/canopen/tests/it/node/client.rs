@@ -94,7 +94,7 @@ fn a_segmented_download_is_sent_in_sevens() {
 }
 
 #[test]
-fn a_refusal_is_told_with_its_code() {
+fn a_refusal_is_reported_with_its_code() {
     let (mut client, mut bench) = (client(), Bench::new(&STANDARD));
     let mux = Mux::new(0x1003, 0);
     client.upload(mux, bench.now);
@@ -109,7 +109,7 @@ fn a_refusal_is_told_with_its_code() {
 
 /// CiA 301, 7.2.4.3: one client for each channel. Where there are two all the same, each sees the other's replies.
 #[test]
-fn a_reply_for_another_entry_is_passed_over_and_told_when_none_comes() {
+fn a_reply_for_another_entry_is_passed_over_and_reported_when_none_comes() {
     let expected = Mux::new(0x6041, 0);
     let foreign = ["584#4B40600000000000", "584#6040600000000000", "584#8040600000000206"];
     for frame in foreign {
@@ -131,7 +131,7 @@ fn a_reply_for_another_entry_is_passed_over_and_told_when_none_comes() {
 }
 
 #[test]
-fn silence_times_out_and_the_server_is_told() {
+fn silence_times_out_and_the_server_is_informed() {
     let mut client = uploading(NAME);
     assert_eq!(client.poll_timeout(), Some(Instant::from_millis(50)));
     assert_eq!(client.handle_timeout(Instant::from_millis(49)), None);

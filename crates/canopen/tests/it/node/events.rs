@@ -108,7 +108,7 @@ fn a_frame_that_four_rpdos_listen_to_after_they_were_too_short_loses_none_of_36_
 }
 
 #[test]
-fn an_rpdo_that_stays_too_short_is_told_once_and_told_when_it_fits_again() {
+fn an_rpdo_that_stays_too_short_is_reported_once_and_reported_when_it_fits_again() {
     let mut bench = operational();
     // Only RPDO 1 and 2 stay valid.
     for n in 2..4_u8 {
@@ -125,7 +125,7 @@ fn an_rpdo_that_stays_too_short_is_told_once_and_told_when_it_fits_again() {
 }
 
 #[test]
-fn an_owner_that_does_not_poll_is_told_that_events_are_lost_and_gets_the_newest() {
+fn an_owner_that_does_not_poll_learns_that_events_are_lost_and_gets_the_newest() {
     let mut bench = operational();
     let most = EVENT_QUEUE_LENGTH / (RPDOS * OBJECTS);
     for _ in 0..most {

@@ -46,7 +46,7 @@ fn a_command_to_the_present_state_changes_nothing() {
 }
 
 #[test]
-fn heartbeats_come_at_exactly_their_period_and_tell_the_state() {
+fn heartbeats_come_at_exactly_their_period_and_carry_the_state() {
     let mut bench = Bench::new(&STANDARD);
     bench.talk(
         "> 604#2B171000E8030000

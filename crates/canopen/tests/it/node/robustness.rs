@@ -31,7 +31,7 @@ fn values(bench: &Bench) -> Vec<u32> {
 
 /// What the events say was written, applied to `before`, must be what is there now.
 #[track_caller]
-fn assert_only_told_changes(bench: &mut Bench, mut before: Vec<u32>, frame: &Frame) {
+fn assert_only_reported_changes(bench: &mut Bench, mut before: Vec<u32>, frame: &Frame) {
     let mut resets = false;
     for event in bench.events() {
         match event {
@@ -59,7 +59,7 @@ fn every_first_byte_and_length_is_survived_in_every_state() {
                     let frame = Frame::new(CanId::standard(id), &bytes[..length]);
                     let before = values(&bench);
                     bench.send_frame(&frame);
-                    assert_only_told_changes(&mut bench, before, &frame);
+                    assert_only_reported_changes(&mut bench, before, &frame);
                     bench.wait(Duration::from_millis(20));
                 }
             }
@@ -100,7 +100,7 @@ fn random_frame(random: &mut Random, indices: &[(u16, u8)]) -> Frame {
 }
 
 #[test]
-fn random_conversations_are_survived_and_change_only_what_is_told() {
+fn random_conversations_are_survived_and_change_only_what_is_reported() {
     for (seed, profile) in [(1, &STANDARD), (2, &LOOSE), (3, &STANDARD), (4, &LOOSE)] {
         let mut random = Random(0x9E37_79B9 ^ seed);
         let mut bench = Bench::new(profile);
@@ -110,7 +110,7 @@ fn random_conversations_are_survived_and_change_only_what_is_told() {
             let frame = random_frame(&mut random, &indices);
             let before = values(&bench);
             bench.send_frame(&frame);
-            assert_only_told_changes(&mut bench, before, &frame);
+            assert_only_reported_changes(&mut bench, before, &frame);
             if random.below(4) == 0 {
                 bench.wait(Duration::from_micros(u64::from(random.below(3_000))));
             }

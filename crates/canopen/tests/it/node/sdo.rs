@@ -37,7 +37,7 @@ fn upload_requests_are_known_by_their_top_three_bits() {
 }
 
 #[test]
-fn expedited_download_stores_tells_the_owner_and_confirms() {
+fn expedited_download_stores_reports_to_the_owner_and_confirms() {
     let mut bench = Bench::new(&STANDARD);
     bench.talk(
         "> 604#23FF60009CFFFFFF

@@ -337,7 +337,7 @@ fn a_drive_whose_stop_was_not_seen_is_named_on_a_screen_of_any_size() {
 }
 
 #[test]
-fn answers_are_told_where_they_say_something() {
+fn answers_are_shown_where_they_say_something() {
     let mut app = app();
     let refused = json!({ "ok": false, "error": { "kind": "no_control", "message": "session 2 has control" } });
     assert!(app.answered(Some(4), &refused));

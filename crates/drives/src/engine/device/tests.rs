@@ -100,7 +100,7 @@ fn assert_sent<const F: usize>(device: &mut Device<Fixed<3>>, frames: [&str; F],
 }
 
 #[test]
-fn errors_of_communication_stand_beside_the_faults_and_no_error_is_told_when_the_last_has_ended() {
+fn errors_of_communication_stand_beside_the_faults_and_no_error_is_reported_when_the_last_has_ended() {
     let mut device = started();
     let mut faults = FaultMonitor::new(&FAULTS, &[1]);
     device.report_rpdo_length(false, at(1, 0));
@@ -118,7 +118,7 @@ fn errors_of_communication_stand_beside_the_faults_and_no_error_is_told_when_the
 }
 
 #[test]
-fn lost_events_are_told_as_objects_lost_until_faults_are_reset_or_communication_is() {
+fn lost_events_are_reported_as_objects_lost_until_faults_are_reset_or_communication_is() {
     let mut device = started();
     device.report_lost_events(at(1, 0));
     assert_sent(&mut device, ["701#00", "081#1081110000000000"], 0b1_0001);

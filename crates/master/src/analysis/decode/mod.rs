@@ -165,7 +165,7 @@ impl Decoder {
             Service::Emcy(node) => {
                 let emcy = Emcy::parse(frame)?;
                 let model = self.models.get(node);
-                Decoded::Emcy(node, emcy, model.and_then(|model| model.0.fault_told_by(emcy.code)))
+                Decoded::Emcy(node, emcy, model.and_then(|model| model.0.fault_reported_by(emcy.code)))
             }
             Service::Heartbeat(node) => match Heartbeat::parse(frame)?.nmt_state()? {
                 NmtState::Initialising => Decoded::BootUp(node),

@@ -170,8 +170,8 @@ async fn figures_of_twelve_objects_a_thousand_times_a_second() {
     stage.click("#scope-pause").await;
     stage.click("#scope-save").await;
     every_frame_is_a_sample(&std::fs::read_to_string(stage.saved("node1.csv").await).expect("text"));
-    let is_told = stage.client.find(Locator::XPath("//*[contains(., 'are not drawn')]")).await;
-    println!("frames that were too many: {}", is_told.is_ok());
+    let is_reported = stage.client.find(Locator::XPath("//*[contains(., 'are not drawn')]")).await;
+    println!("frames that were too many: {}", is_reported.is_ok());
     stage.close().await;
 }
 

@@ -128,7 +128,7 @@ async fn the_bit_rate_is_selected_again_when_an_adapter_behind_tcp_is_back() {
 }
 
 #[tokio::test]
-async fn an_adapter_that_answers_nonsense_or_no_is_told_apart() {
+async fn an_adapter_that_answers_nonsense_or_no_is_distinguished() {
     let clock = WallClock::start();
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
@@ -153,7 +153,7 @@ async fn an_adapter_that_answers_nonsense_or_no_is_told_apart() {
 
 /// A million bytes without an end of line, half a frame, and then a frame.
 #[tokio::test]
-async fn noise_costs_itself_and_is_told() {
+async fn noise_costs_itself_and_is_reported() {
     let clock = WallClock::start();
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let place = format!("slcan://{}", listener.local_addr().unwrap());

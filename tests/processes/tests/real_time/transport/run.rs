@@ -335,7 +335,7 @@ async fn a_late_world_catches_up_in_steps_and_then_wakes_once_a_deadline() {
 }
 
 #[tokio::test]
-async fn a_world_is_told_when_a_client_is_gone_and_after_its_frames() {
+async fn a_world_learns_when_a_client_is_gone_and_after_its_frames() {
     let clock = WallClock::start();
     let mut hub = hub(&clock).await;
     let address = socketcand_port(&hub);

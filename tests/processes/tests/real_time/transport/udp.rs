@@ -70,7 +70,7 @@ async fn a_plain_socket_that_speaks_cannelloni_is_understood() {
 }
 
 #[tokio::test]
-async fn a_cannelloni_peer_that_is_not_there_is_told_once_and_may_come() {
+async fn a_cannelloni_peer_that_is_not_there_is_reported_once_and_may_come() {
     let clock = WallClock::start();
     let (mut bus, peer, at) = with_peer(&clock).await;
     let address = peer.local_addr().unwrap();
@@ -99,7 +99,7 @@ async fn a_cannelloni_peer_that_is_not_there_is_told_once_and_may_come() {
 }
 
 #[tokio::test]
-async fn a_port_that_is_taken_is_told() {
+async fn a_port_that_is_taken_is_reported() {
     let clock = WallClock::start();
     let taken = UdpSocket::bind("0.0.0.0:0").await.unwrap();
     let port = taken.local_addr().unwrap().port();
