@@ -10,7 +10,7 @@ pub use words::Remedy;
 use canopen::od::{Access, DataType, DefaultValue};
 use canopen::pdo::{EventTrigger, TpdoForm};
 use canopen::{Mux, NmtState};
-use cia402::ModeOfOperation;
+use cia402::{ModeOfOperation, object};
 
 use crate::axis::{AxisDescription, BitPattern, HomingStart, NewSetPoint, PowerStyle};
 use crate::catalogue::Catalogue;
@@ -221,7 +221,7 @@ const STANDARD_BITS: u16 = !(1 << 8 | 1 << 14 | 1 << 15);
 
 fn of_homing(axis: &AxisDescription) -> [Option<Departure>; 2] {
     let Some(rules) = axis.homing else { return [None; 2] };
-    let (mode, statusword) = (axis.object(Mux::new(0x6060, 0)), axis.object(Mux::new(0x6041, 0)));
+    let (mode, statusword) = (axis.object(object::MODES_OF_OPERATION), axis.object(object::STATUSWORD));
     let (attained, failed) = (rules.attained, rules.failed);
     let standard = attained.mask & HOMING_BITS == HOMING_BITS
         && attained.value & HOMING_BITS == ATTAINED

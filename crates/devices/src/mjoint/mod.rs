@@ -16,7 +16,7 @@ use can::Bitrate;
 use canopen::od::DataType;
 use canopen::pdo::{EventTrigger, MappingRules, TpdoForm};
 use canopen::{Mux, NmtState, NodeId};
-use cia402::{ModeOfOperation, Statusword};
+use cia402::{ModeOfOperation, Statusword, object};
 
 use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
 use crate::description::{
@@ -96,7 +96,7 @@ const fn joint(name: &'static str, title: &'static str) -> Description {
 
 /// 606Ch in TPDO3: 32 bits of r/min (5.10.2), of the 16 bits of 0.1 r/min that SDO shows (5.04).
 static IN_TPDO: [TpdoForm; 1] =
-    [TpdoForm { object: Mux::new(0x606C, 0), data_type: DataType::Integer32, unit: "r/min", divisor: 10 }];
+    [TpdoForm { object: object::VELOCITY_ACTUAL_VALUE, data_type: DataType::Integer32, unit: "r/min", divisor: 10 }];
 
 const AXIS: AxisDescription = AxisDescription {
     placement: Placement::FIRST,
@@ -106,7 +106,7 @@ const AXIS: AxisDescription = AxisDescription {
         ModeOfOperation::HOMING,
         ModeOfOperation::INTERPOLATED_POSITION,
     ],
-    mode_display: Mux::new(0x6060, 0),
+    mode_display: object::MODES_OF_OPERATION,
     power: PowerStyle::EchoesControlword { following: 0b10_0111, live: LIVE, alarm: Statusword::FAULT },
     new_set_point: NewSetPoint::ClearsItself,
     statusword_bits: STATUSWORD_BITS,
@@ -166,7 +166,7 @@ const STATUSWORD_BITS: &[(u16, &str)] = &[
     (HOMING_ERROR, "homing error"),
 ];
 
-const HOMING_METHOD: Mux = Mux::new(0x6098, 0);
+const HOMING_METHOD: Mux = object::HOMING_METHOD;
 
 const HOMING: HomingRules = HomingRules {
     method: HOMING_METHOD,
@@ -209,8 +209,8 @@ const UNITS: Units = Units {
     actual_velocity: Some(Quantity::speed(0x606C, 0, 0.1)),
     profile_velocity: Some(Quantity::speed(0x6081, 0, 1.0)),
     ramps: Some(Ramps::Rates {
-        acceleration: Mux::new(0x6083, 0),
-        deceleration: Mux::new(0x6083, 0),
+        acceleration: object::PROFILE_ACCELERATION,
+        deceleration: object::PROFILE_ACCELERATION,
         quick_stop: None,
         scale: Scale::Shaft(1.0),
         none_from: Some(NO_RAMP_FROM),

@@ -8,7 +8,7 @@ pub mod objects;
 pub mod variations;
 
 use canopen::Mux;
-use cia402::{ModeOfOperation, Statusword};
+use cia402::{ModeOfOperation, Statusword, object};
 
 use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
 use crate::description::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Section};
@@ -48,7 +48,7 @@ pub static CIA402: Description = Description {
 
 /// How a CiA 402 drive reports its faults: by the codes of the standard.
 pub const FAULTS: Faults = Faults {
-    code: Some(Mux::new(0x603F, 0)),
+    code: Some(object::ERROR_CODE),
     bit_field: false,
     table: &faults::FAULTS,
     section: "error codes of 603Fh",
@@ -73,7 +73,7 @@ pub const fn axis(placement: Placement, modes: &'static [ModeOfOperation]) -> Ax
     AxisDescription {
         placement: Placement::FIRST,
         modes,
-        mode_display: Mux::new(0x6061, 0),
+        mode_display: object::MODES_OF_OPERATION_DISPLAY,
         power: PowerStyle::Cia402,
         new_set_point: NewSetPoint::Handshake,
         statusword_bits: &[],
@@ -91,8 +91,8 @@ const SECTIONS: &[Section] =
 const HOMING_BITS: u16 = Statusword::HOMING_ATTAINED | Statusword::HOMING_ERROR | Statusword::TARGET_REACHED;
 
 const HOMING: HomingRules = HomingRules {
-    method: Mux::new(0x6098, 0),
-    search_speed: Some(Quantity { object: Mux::new(0x6099, 1), scale: Scale::Positions(1.0) }),
+    method: object::HOMING_METHOD,
+    search_speed: Some(Quantity { object: object::SPEED_DURING_SEARCH_FOR_SWITCH, scale: Scale::Positions(1.0) }),
     start: HomingStart::ControlwordBit4,
     attained: BitPattern { mask: HOMING_BITS, value: Statusword::HOMING_ATTAINED | Statusword::TARGET_REACHED },
     failed: BitPattern { mask: HOMING_BITS & !Statusword::TARGET_REACHED, value: Statusword::HOMING_ERROR },
@@ -111,9 +111,9 @@ const UNITS: Units = Units {
     actual_velocity: Some(velocity(0x606C)),
     profile_velocity: Some(velocity(0x6081)),
     ramps: Some(Ramps::Rates {
-        acceleration: Mux::new(0x6083, 0),
-        deceleration: Mux::new(0x6084, 0),
-        quick_stop: Some(Mux::new(0x6085, 0)),
+        acceleration: object::PROFILE_ACCELERATION,
+        deceleration: object::PROFILE_DECELERATION,
+        quick_stop: Some(object::QUICK_STOP_DECELERATION),
         scale: Scale::Positions(1.0),
         none_from: None,
     }),

@@ -11,6 +11,7 @@ pub mod zlim42c;
 
 use canopen::pdo::{EventTrigger, MappingRules};
 use canopen::{EmcyErrorCode, Mux};
+use cia402::object;
 
 use crate::description::{Identity, ParameterStorage, PdoRules, Write};
 use crate::stated::Stated;
@@ -47,9 +48,9 @@ const PDO_RULES: PdoRules = PdoRules {
 
 /// 6083h to 6085h are times.
 const RAMPS: Ramps = Ramps::Times {
-    acceleration: Mux::new(0x6083, 0),
-    deceleration: Mux::new(0x6084, 0),
-    quick_stop: Mux::new(0x6085, 0),
+    acceleration: object::PROFILE_ACCELERATION,
+    deceleration: object::PROFILE_DECELERATION,
+    quick_stop: object::QUICK_STOP_DECELERATION,
 };
 
 /// Value of the register parameter setting that restores factory settings.
@@ -84,7 +85,7 @@ const fn parameter_storage(
 /// fault, not with it.
 const WARNING_IN_FAULT: Stated = Stated {
     key: "warning_bit_in_fault",
-    object: Mux::new(0x6041, 0),
+    object: object::STATUSWORD,
     what: "bit 7 is set in fault",
     remedy: "take it for a warning only while bit 3 is clear",
 };

@@ -13,7 +13,7 @@ use can::Bitrate;
 use canopen::od::Table;
 use canopen::pdo::MappingRules;
 use canopen::{Mux, NodeId};
-use cia402::ModeOfOperation;
+use cia402::{ModeOfOperation, object};
 
 use crate::axis::{AxisDescription, NewSetPoint, PowerStyle};
 use crate::description::{Description, Edition, HostWatch, NmtRules, PdoRules, Section};
@@ -54,12 +54,7 @@ const fn described(dictionary: &'static Table) -> Description {
         axes: &[AXIS],
         host_watch: HostWatch::Silence { time: Mux::new(0x2000, 0) },
         storage: zltech::parameter_storage(0x2009, 0x2010, RESTART, ADDRESS),
-        faults: Faults {
-            code: Some(Mux::new(0x603F, 0)),
-            bit_field: true,
-            table: &FAULTS,
-            section: "chapters 8 and 9",
-        },
+        faults: Faults { code: Some(object::ERROR_CODE), bit_field: true, table: &FAULTS, section: "chapters 8 and 9" },
         nmt: NmtRules::CIA_301,
         lss: false,
         sdo_block_transfer: false,
@@ -74,7 +69,7 @@ const fn described(dictionary: &'static Table) -> Description {
 const AXIS: AxisDescription = AxisDescription {
     placement: Placement::FIRST,
     modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::PROFILE_TORQUE],
-    mode_display: Mux::new(0x6061, 0),
+    mode_display: object::MODES_OF_OPERATION_DISPLAY,
     power: PowerStyle::Cia402,
     new_set_point: NewSetPoint::Handshake,
     statusword_bits: &[(IN_POSITION, "in position"), (RUNNING, "running"), (EXTERNAL_STOP, "external stop")],

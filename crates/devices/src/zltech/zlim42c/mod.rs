@@ -14,7 +14,7 @@ pub mod variations;
 
 use can::Bitrate;
 use canopen::{Mux, NodeId};
-use cia402::{ModeOfOperation, Statusword};
+use cia402::{ModeOfOperation, Statusword, object};
 
 use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
 use crate::description::{Description, HostWatch, NmtRules, Section};
@@ -52,7 +52,7 @@ const fn stepper(name: &'static str, title: &'static str) -> Description {
         axes: &[AXIS],
         host_watch: HostWatch::None,
         storage: zltech::parameter_storage(0x2010, 0x200C, RESTART, ADDRESS),
-        faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: false, table: &FAULTS, section: "3.4 and 5.4" },
+        faults: Faults { code: Some(object::ERROR_CODE), bit_field: false, table: &FAULTS, section: "3.4 and 5.4" },
         nmt: NmtRules::CIA_301,
         lss: false,
         sdo_block_transfer: false,
@@ -67,7 +67,7 @@ const fn stepper(name: &'static str, title: &'static str) -> Description {
 const AXIS: AxisDescription = AxisDescription {
     placement: Placement::FIRST,
     modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::HOMING],
-    mode_display: Mux::new(0x6061, 0),
+    mode_display: object::MODES_OF_OPERATION_DISPLAY,
     power: PowerStyle::Cia402,
     new_set_point: NewSetPoint::Handshake,
     statusword_bits: STATUSWORD_BITS,
@@ -113,7 +113,7 @@ const STATUSWORD_BITS: &[(u16, &str)] = &[
 const AT_THE_END: u16 = HOMING_ATTAINED | Statusword::TARGET_REACHED | RUNNING;
 
 const HOMING: HomingRules = HomingRules {
-    method: Mux::new(0x6098, 0),
+    method: object::HOMING_METHOD,
     search_speed: Some(Quantity::speed(0x6099, 1, 1.0)),
     start: HomingStart::ControlwordBit4,
     attained: BitPattern { mask: AT_THE_END, value: HOMING_ATTAINED | Statusword::TARGET_REACHED },
@@ -145,13 +145,13 @@ const DEPARTURES: &[Stated] = &[
     zltech::WARNING_IN_FAULT,
     Stated {
         key: "no_position_sensor",
-        object: Mux::new(0x6064, 0),
+        object: object::POSITION_ACTUAL_VALUE,
         what: "6064h and 606Ch are commanded values: nothing measures the rotor, and a stall is not seen",
         remedy: "home again after whatever may have made the motor lose steps",
     },
     Stated {
         key: "energised_when_switched_on",
-        object: Mux::new(0x6040, 0),
+        object: object::CONTROLWORD,
         what: "the motor is energised from switched on",
         remedy: "go to ready to switch on where the shaft has to be free",
     },
