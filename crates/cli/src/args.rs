@@ -5,8 +5,8 @@ use clap::{Parser, Subcommand};
 use crate::command::{
     boot, check, completions, conform, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, estop, events,
     explain, export, gateway, group, home, init, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan,
-    plot, read, readings, record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time, top, watch,
-    world,
+    plot, program, read, readings, record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time,
+    top, watch, world,
 };
 use crate::global::Global;
 
@@ -77,6 +77,7 @@ pub(crate) enum Command {
     Replay(replay::Replay),
     Save(store::Save),
     Restore(store::Restore),
+    Program(program::Program),
     Completions(completions::Completions),
     #[command(hide = true)]
     ManPages(man_pages::ManPages),

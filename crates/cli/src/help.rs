@@ -33,7 +33,10 @@ const GROUPS: &[CommandGroup] = &[
             "reset",
         ],
     },
-    CommandGroup { title: "Configure", commands: &["init", "write", "params", "dcf", "save", "restore", "lss"] },
+    CommandGroup {
+        title: "Configure",
+        commands: &["init", "write", "params", "dcf", "save", "restore", "lss", "program"],
+    },
     CommandGroup {
         title: "Network",
         commands: &[

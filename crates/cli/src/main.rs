@@ -267,6 +267,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Torque(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Save(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Restore(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Program(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Home(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Objects(objects) => list_objects(global, format, objects),
         Command::Latency(command) => on_bus(global, format, async |context| command.run(context).await),

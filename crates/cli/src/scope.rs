@@ -252,6 +252,7 @@ mod tests {
         "replay a.log",
         "reset 4",
         "restore 4",
+        "program 4 firmware.bin",
         "run a.toml",
         "save 4",
         "scan",

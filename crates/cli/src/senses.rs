@@ -194,10 +194,7 @@ const ACTING: &[Row] = &[
     },
     Row { words: &["store", "save_configuration", "persist"], tips: &["save 4"] },
     Row { words: &["rollback", "roll-back", "undo"], tips: &["params rollback 4"] },
-    Row {
-        words: &["flash", "firmware", "update", "upgrade", "program", "bootloader"],
-        tips: &["write 4 1F50:01 --from firmware.bin"],
-    },
+    Row { words: &["flash", "firmware", "update", "upgrade", "bootloader"], tips: &["program 4 firmware.bin"] },
     Row { words: &["params set", "params write"], tips: &["write 4 6081 120", "params apply 4 drive.toml"] },
     Row { words: &["params load", "params import"], tips: &["params plan 4 drive.toml", "params apply 4 drive.toml"] },
     Row {
@@ -483,7 +480,7 @@ mod tests {
             ("follow", "group move 1=90deg"),
             ("E-STOP", "estop"),
             ("rollback", "params rollback 4"),
-            ("flash", "write 4 1F50:01 --from firmware.bin"),
+            ("flash", "program 4 firmware.bin"),
         ] {
             assert_eq!(first(line, 0).as_deref(), Some(&*format!("ferrodrive {tip}")), "{line}");
         }
@@ -524,7 +521,7 @@ mod tests {
             ("--bus can0 fault 7", 2, "--bus can0 explain 7"),
             ("--bus sim fault 7", 2, "--bus sim explain 7"),
             ("canplayer mine.log", 0, "replay mine.log --skip-motion"),
-            ("flash 5 fw.bin", 0, "write 5 1F50:01 --from fw.bin"),
+            ("flash 5 fw.bin", 0, "program 5 fw.bin"),
             // What makes no sense there is left out.
             ("get it", 0, "read 4 6064"),
         ] {

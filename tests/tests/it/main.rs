@@ -13,6 +13,7 @@ mod files_of_makers;
 mod io_and_encoders;
 mod laws_hold_for_seeded_input;
 mod lss;
+mod program_download;
 mod realism;
 mod tables_of_cia402;
 mod tables_of_the_drives;

@@ -33,6 +33,7 @@ pub(crate) mod params;
 pub(crate) mod pdo;
 pub(crate) mod plan;
 pub(crate) mod plot;
+pub(crate) mod program;
 pub(crate) mod read;
 pub(crate) mod readings;
 pub(crate) mod record;

@@ -19,6 +19,7 @@ mod on_sim;
 mod output;
 mod params;
 mod plan;
+mod program;
 mod recording;
 mod run;
 mod serving;

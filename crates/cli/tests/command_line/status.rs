@@ -54,6 +54,7 @@ const LINES: &[&str] = &[
     "params backup 4",
     "pdo show 4",
     "plan",
+    "program 4 a.bin",
     "quick-stop 4",
     "read 4 6064",
     "record 4 6064 -o a.csv",
@@ -108,6 +109,7 @@ fn a_machine_file_that_is_missing_or_bad_is_a_1_of_every_command_that_takes_one(
 const INPUTS: &[&str] = &[
     "boot FOLDER/m.toml",
     "boot FOLDER/m.dcf",
+    "program 4 FOLDER/m.bin",
     "supervise FOLDER/m.toml",
     "plan FOLDER/m.toml",
     "check FOLDER/m.toml",

@@ -10,6 +10,7 @@ use devices::variant::Variant;
 
 use super::lss::{Lss, Wanted};
 use super::memory::is_makers_mark;
+use super::program::{self, Changed};
 use super::services::{Services, Written};
 use super::{Memory, error_behaviour};
 use crate::engine::device::{Application, Device, Reset};
@@ -88,7 +89,25 @@ impl<S: Storage> DescribedDevice<S> {
             self.lss = Some(lss);
         }
         self.services.start(&mut self.device, |_| true);
+        self.start_programs();
         self.stopped = false;
+    }
+
+    fn start_programs(&mut self) {
+        let memory = self.services.memory().0;
+        program::start(self.device.values_mut(), |object| memory.program(object));
+    }
+
+    /// A peer wrote to an object of a program; false if it is not one.
+    fn take_program(&mut self, slot: Slot, raw: u32) -> bool {
+        let Some(changed) = program::written(self.device.values_mut(), slot, raw) else { return false };
+        let values = self.device.values();
+        let number = values.table().row(slot).sub_index;
+        let data = program::data_rows(values.table()).find(|(_, row)| row.sub_index == number);
+        if let (Changed::Data, Some((data, row))) = (changed, data) {
+            self.services.store_program(row.mux(), values.view().long_bytes(data));
+        }
+        true
     }
 
     /// With the table's values, and the numbers that its maker has given it.
@@ -122,8 +141,11 @@ impl<S: Storage> DescribedDevice<S> {
             Some(Some(node_id)) => self.device.set_node_id(node_id),
             None => {}
         }
+        let programs = program::states(self.device.values());
         self.device.restart_communication(now);
         self.services.start(&mut self.device, Entry::is_communication);
+        self.start_programs();
+        program::restore_states(self.device.values_mut(), programs);
         self.stopped = false;
         self.device.boot(now);
     }
@@ -217,6 +239,9 @@ pub(crate) trait Described<S: Storage>: Application<S> {
     /// A peer wrote to `slot`; true if it was an object of the services.
     fn service_written(&mut self, slot: Slot, raw: u32, now: Instant) -> bool {
         let base = self.base_mut();
+        if base.take_program(slot, raw) {
+            return true;
+        }
         match base.services.written(&mut base.device, slot, raw) {
             Written::Elsewhere => return false,
             Written::Service => {}

@@ -9,6 +9,7 @@ use canopen::Mux;
 use canopen::object::SERIAL_NUMBER;
 use canopen::od::{Access, Dictionary, Entry, Slot, Storage, Table};
 
+use super::program::is_of_program;
 use crate::engine::storage::crc32;
 
 const MAGIC: [u8; 4] = *b"FDN2";
@@ -24,6 +25,8 @@ const LSS_KEY: u32 = u32::MAX;
 const SERIAL_KEY: u32 = u32::MAX - 1;
 const MARK_KEY: u32 = 1 << 30;
 const MARK_SIZE: usize = 4;
+/// Records of programs: this and the multiplexor of their data.
+const PROGRAM_KEY: u32 = 1 << 29;
 /// Node-ID and index of the bit rate.
 const LSS_SIZE: usize = 2;
 
@@ -48,8 +51,10 @@ pub fn image_size(table: &Table) -> usize {
     let records = table.rows().iter().filter(|row| is_storable(row)).map(|row| RECORD_HEADER_SIZE + most_bytes(row));
     // Room for a serial number is there in any case.
     let marks = table.rows().iter().filter(|row| is_makers_mark(row) && row.mux() != SERIAL_NUMBER).count() + 1;
+    let programs = table.rows().iter().filter(|row| is_of_program(row) && row.stored_bytes() > 0);
+    let programs = programs.map(|row| RECORD_HEADER_SIZE + row.stored_bytes() as usize);
     let no_object = RECORD_HEADER_SIZE + LSS_SIZE + marks * (RECORD_HEADER_SIZE + MARK_SIZE);
-    HEADER_SIZE + records.sum::<usize>() + no_object + CRC_SIZE
+    HEADER_SIZE + records.sum::<usize>() + programs.sum::<usize>() + no_object + CRC_SIZE
 }
 
 impl<S: Storage> Memory<S> {
@@ -114,6 +119,16 @@ impl<S: Storage> Memory<S> {
     pub fn store_mark(&mut self, object: Mux, number: u32) {
         let key = if object == SERIAL_NUMBER { SERIAL_KEY } else { MARK_KEY | object.key() };
         self.store_record(key, &number.to_le_bytes());
+    }
+
+    /// The program whose data goes to this object; empty where it was cleared. `None` if it is the one as delivered.
+    pub(super) fn program(&self, object: Mux) -> Option<&[u8]> {
+        records(self.checked()?).find(|(key, _)| *key == PROGRAM_KEY | object.key()).map(|(_, program)| program)
+    }
+
+    /// Stores a program; all else stays.
+    pub(super) fn store_program(&mut self, object: Mux, program: &[u8]) {
+        self.store_record(PROGRAM_KEY | object.key(), program);
     }
 
     /// The record of no object that has this key.
@@ -236,7 +251,7 @@ impl<'a> Writer<'a> {
 
 /// A row whose value can be in the store at all: it can be written, and has bytes.
 pub const fn is_storable(row: &Entry) -> bool {
-    matches!(row.access, Access::ReadWrite) && most_bytes(row) > 0
+    matches!(row.access, Access::ReadWrite) && most_bytes(row) > 0 && !is_of_program(row)
 }
 
 /// What the maker writes of one device, and no host: the serial number, and of what can only be read 1000h, 1018h, and the modes of

@@ -11,17 +11,23 @@ mod io;
 mod lss;
 mod memory;
 mod profile;
+mod program;
 mod services;
 
 pub use described::{DescribedDevice, Loss};
 pub use device::DescribedNode;
 pub use memory::{Memory, image_size, is_makers_mark, is_storable};
 pub use profile::profile_conditions;
-pub use services::{Services, Written, conditions};
+pub use services::{Services, Written};
 
 use canopen::Mux;
 use canopen::object::COMMUNICATION_ERROR;
-use canopen::od::{Dictionary, Storage};
+use canopen::od::{Condition, Dictionary, Slot, Storage, Table};
+
+/// What a device with these objects refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).
+pub fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
+    services::conditions(table).chain(program::conditions(table))
+}
 
 /// Whether these services do something with an object.
 pub const fn acts_on(mux: Mux) -> bool {
@@ -53,7 +59,7 @@ pub const fn acts_on(mux: Mux) -> bool {
                 | 0x1019
                 | 0x1029
                 | 0x1200
-                | 0x1400..=0x1BFF
+                | 0x1400..=0x1BFF | 0x1F50 | 0x1F51 | 0x1F56 | 0x1F57
         )
 }
 

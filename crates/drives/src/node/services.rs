@@ -83,6 +83,12 @@ impl<S: Storage> Services<S> {
         self.generation = self.generation.wrapping_add(1);
     }
 
+    /// A program that was downloaded, or cleared.
+    pub fn store_program(&mut self, object: Mux, program: &[u8]) {
+        self.memory.store_program(object, program);
+        self.generation = self.generation.wrapping_add(1);
+    }
+
     /// The memory can be read.
     pub fn is_sound(&self) -> bool {
         self.memory.is_sound()
@@ -212,7 +218,7 @@ impl<S: Storage> Services<S> {
 }
 
 /// What a device with these objects refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).
-pub fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
+pub(super) fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
     table.iter().filter_map(|(slot, row)| {
         let check: fn(&View<'_>, u32) -> Result<(), AbortCode> = match (row.index, row.sub_index) {
             (HISTORY, 0) => only_zero,

@@ -13,6 +13,8 @@ use crate::{AccessType, Eds, Number, Object, Value, Variable};
 /// Bytes that a string or DOMAIN that can be written holds, unless the default has more.
 const STRING_CAPACITY: usize = 64;
 const DOMAIN_CAPACITY: usize = 1_024;
+/// The same of a program (1F50h). A guess: the flash of small microcontrollers.
+const PROGRAM_CAPACITY: usize = 131_072;
 
 /// A row whose texts are not kept yet: of a file that makes no table nothing is.
 pub(super) struct DraftRow {
@@ -69,7 +71,8 @@ impl Storing {
     /// Parameters are stored. What can be mapped and is not a drive's is process data: a drive's speeds and limits can
     /// be mapped too, and are parameters all the same.
     const fn stores(self, row: &Entry) -> bool {
-        self.on_command && is_parameter(row) && (self.is_drive || !row.pdo.is_allowed())
+        let is_program = matches!(row.index, 0x1F50..=0x1F57);
+        self.on_command && !is_program && is_parameter(row) && (self.is_drive || !row.pdo.is_allowed())
     }
 }
 
@@ -100,14 +103,18 @@ fn row(object: &Object, variable: &Variable, name: String, storing: Storing) -> 
         (true, _) => PdoMapping::Yes,
     };
     if data_type.kind() == Kind::Bytes && access.is_writable() {
-        row.capacity = capacity(data_type, bytes.as_ref().map_or(0, Vec::len));
+        row.capacity = capacity(object.index, data_type, bytes.as_ref().map_or(0, Vec::len));
     }
     row.saved = storing.stores(&row);
     DraftRow { entry: row, name, title: title.clone(), bytes }
 }
 
-fn capacity(data_type: DataType, length: usize) -> u32 {
-    let least = if data_type == DataType::Domain { DOMAIN_CAPACITY } else { STRING_CAPACITY };
+fn capacity(index: u16, data_type: DataType, length: usize) -> u32 {
+    let least = match (data_type, index) {
+        (DataType::Domain, 0x1F50) => PROGRAM_CAPACITY,
+        (DataType::Domain, _) => DOMAIN_CAPACITY,
+        _ => STRING_CAPACITY,
+    };
     u32::try_from(length.max(least)).unwrap_or(u32::MAX)
 }
 

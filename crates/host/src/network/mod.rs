@@ -11,6 +11,7 @@ pub mod heard;
 pub mod init;
 pub mod params;
 pub mod plan;
+pub mod program;
 pub mod scan;
 pub mod supervise;
 

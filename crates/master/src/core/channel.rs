@@ -158,7 +158,7 @@ impl Channel {
     pub(super) fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         let Some(active) = &mut self.active else { return };
         // Segments of blocks do not say what they are.
-        if self.client.bytes_done().is_none() {
+        if !self.client.takes_segments() {
             let about = mux_of(&Reply::parse(frame.padded()));
             if about.is_some() && about != Some(active.mux) && about == self.given_up {
                 return;
@@ -208,6 +208,11 @@ impl Channel {
             active.sent = true;
         }
         Some(frame)
+    }
+
+    /// How many bytes of the transfer on the wire are done.
+    pub(super) fn bytes_done(&self) -> Option<usize> {
+        self.client.bytes_done()
     }
 
     pub(super) fn poll_timeout(&self) -> Option<Instant> {

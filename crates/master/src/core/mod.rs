@@ -207,6 +207,11 @@ impl Core {
         &self.member(node).facts
     }
 
+    /// How many bytes of the SDO transfer on the wire to a node are done; `None` where there is none, or one of a single frame.
+    pub fn bytes_done(&self, node: NodeId) -> Option<usize> {
+        self.member(node).channel.bytes_done()
+    }
+
     /// The nodes whose facts or PDOs have changed since the last call.
     pub const fn take_changed(&mut self) -> NodeSet {
         core::mem::replace(&mut self.changed, NodeSet::EMPTY)

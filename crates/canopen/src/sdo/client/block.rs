@@ -31,11 +31,18 @@ impl Client {
         true
     }
 
-    /// How many bytes of an upload or download in blocks are done for certain; `None` if none is under way.
+    /// True while segments of an upload in blocks come: they do not say what they are.
+    pub const fn takes_segments(&self) -> bool {
+        matches!(self.state, State::UploadBlocks { .. })
+    }
+
+    /// How many bytes of a transfer in more than one frame are done for certain; `None` if none is under way.
     pub fn bytes_done(&self) -> Option<usize> {
         match &self.state {
             State::UploadBlocks { receiver, .. } => Some(receiver.written()),
             State::DownloadBlocks { sender, .. } => Some(sender.confirmed_bytes()),
+            State::UploadSegments { received, .. } => Some(*received),
+            State::DownloadSegments { sent, .. } => Some(sent.saturating_sub(wire::MAX_SEGMENT)),
             _ => None,
         }
     }
