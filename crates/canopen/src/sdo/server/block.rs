@@ -88,7 +88,8 @@ impl Server {
         };
         self.transfer = Transfer::BlockUpload { mux, source, sender, phase: Phase::Agreed };
         self.restart_timeout(now);
-        self.answer_block(Reply::InitiateUpload { mux, checksum: true, size: Some(length as u32) });
+        // That it could form one is said to a client only that can, too: some look at this bit alone.
+        self.answer_block(Reply::InitiateUpload { mux, checksum, size: Some(length as u32) });
     }
 
     fn start_block_upload(&mut self, now: Instant) {
@@ -142,7 +143,7 @@ impl Server {
                 self.transfer = Transfer::BlockDownload { mux, slot, facts, room, declared, receiver };
                 self.takes_segments = true;
                 self.restart_half_timeout(now);
-                self.answer_block(Reply::InitiateDownload { mux, checksum: true, block_size: self.block_size });
+                self.answer_block(Reply::InitiateDownload { mux, checksum, block_size: self.block_size });
             }
         }
     }

@@ -73,7 +73,7 @@ fn an_upload_of_8_bytes_is_two_segments_and_their_checksum() {
     talk(&mut node, &[("604#A2027F0000000000", &expected)]);
     assert!(answer(&mut node, "604#A100000000000000").is_empty());
     // Without a checksum where the client cannot form one.
-    talk(&mut node, &[("604#A00920007F000000", "584#C609200008000000")]);
+    talk(&mut node, &[("604#A00920007F000000", "584#C209200008000000")]);
     answer(&mut node, "604#A300000000000000");
     talk(&mut node, &[("604#A2027F0000000000", "584#D900000000000000")]);
 }

@@ -239,7 +239,7 @@ impl<A: Assembly> Station for Machine<A> {
             self.firmware.poll_transmit()
         } else {
             let needed = self.store_needed();
-            self.own_time.as_mut()?.chip.next_frame(needed, || self.firmware.poll_transmit())
+            self.own_time.as_mut()?.next_frame(needed, || self.firmware.poll_transmit())
         }?;
         self.disturb();
         Some(frame)

@@ -14,6 +14,7 @@ use drives::engine::device::ResetTimes;
 
 use super::chip::Chip;
 use crate::Prng;
+use crate::nmt_reset::is_sdo_answer;
 
 /// Whether devices take the time that such devices take.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,6 +47,9 @@ pub(crate) struct OwnTime {
     timing: Timing,
     prng: Prng,
     waiting: VecDeque<WaitingFrame>,
+    /// The server has agreed to an SDO download in blocks: segments come as fast as the bus carries them, and a device that offers
+    /// that takes them where they come in.
+    takes_segments: bool,
     pub(crate) chip: Chip,
 }
 
@@ -69,7 +73,8 @@ enum MailboxKind {
 impl OwnTime {
     /// Nothing waits; the chip holds `image`.
     pub(crate) fn new(timing: Timing, seed: u64, image: &[u8], generation: u64) -> Self {
-        Self { timing, prng: Prng::new(seed), waiting: VecDeque::new(), chip: Chip::new(image, generation) }
+        let chip = Chip::new(image, generation);
+        Self { timing, prng: Prng::new(seed), waiting: VecDeque::new(), takes_segments: false, chip }
     }
 
     /// How long this boot takes.
@@ -95,6 +100,7 @@ impl OwnTime {
         let kind = kind(frame);
         let span = match kind {
             MailboxKind::Management => return Some(*frame),
+            MailboxKind::Request if self.takes_segments => return Some(*frame),
             MailboxKind::Request => self.timing.sdo_answer,
             MailboxKind::Process => self.timing.pdo_reaction,
         };
@@ -118,6 +124,20 @@ impl OwnTime {
         self.waiting.remove(next.0).map(|waiting| waiting.frame)
     }
 
+    /// The next frame that may go out: [`Chip::next_frame`].
+    pub(crate) fn next_frame(&mut self, needed: u64, poll: impl FnMut() -> Option<Frame>) -> Option<Frame> {
+        let frame = self.chip.next_frame(needed, poll)?;
+        if is_sdo_answer(&frame) {
+            self.takes_segments = match *frame.padded() {
+                [0xA0 | 0xA4, ..] => true,
+                // A confirmation of a block.
+                [0xA2, ..] => self.takes_segments,
+                _ => false,
+            };
+        }
+        Some(frame)
+    }
+
     /// When a frame or the chip is due.
     pub(crate) fn next_due(&self) -> Option<Instant> {
         let frame = self.next().map(|(_, due)| due);
@@ -135,6 +155,7 @@ impl OwnTime {
     /// The supply is gone, and with it what waited.
     pub(crate) fn power_off(&mut self) {
         self.waiting.clear();
+        self.takes_segments = false;
     }
 
     /// The first due, among equals the one that came first.
@@ -223,5 +244,25 @@ mod tests {
             assert!((10_000_000..=30_000_000).contains(&resets.communication_ns));
             assert!((5_000_000..=15_000_000).contains(&store_ns));
         }
+    }
+
+    #[test]
+    fn segments_of_a_download_in_blocks_are_taken_where_they_come_in() {
+        let mut own = own(1);
+        let sends = |own: &mut OwnTime, text: &str| {
+            let mut frames = [frame(text)].into_iter();
+            own.next_frame(0, || frames.next());
+        };
+        let now = Instant::ZERO;
+        assert_eq!(own.take_in(&frame("604#C609200000010000"), now), None);
+        sends(&mut own, "584#A40920007F000000");
+        for number in 1..=100 {
+            let segment = frame(&format!("604#{number:02X}01020304050607"));
+            assert_eq!(own.take_in(&segment, now), Some(segment));
+        }
+        sends(&mut own, "584#A2647F0000000000");
+        assert!(own.take_in(&frame("604#C112340000000000"), now).is_some());
+        sends(&mut own, "584#A100000000000000");
+        assert_eq!(own.take_in(&frame("604#4041600000000000"), now), None);
     }
 }

@@ -220,7 +220,7 @@ impl Station for NodeMachine {
         let needed = u64::from(self.firmware.memory().1);
         match &mut self.own_time {
             None => self.firmware.poll_transmit(),
-            Some(own_time) => own_time.chip.next_frame(needed, || self.firmware.poll_transmit()),
+            Some(own_time) => own_time.next_frame(needed, || self.firmware.poll_transmit()),
         }
     }
 
