@@ -112,6 +112,23 @@ fn a_default_beyond_ascii_goes_over_the_bus_byte_for_byte() {
     assert_eq!(Bench::new().send("609#4008100000000000"), ["589#430810005072FC66"]);
 }
 
+/// CiA 301, 7.5.2.33 and 7.5.2.34: what would have no effect is refused with 0609 0030h.
+#[test]
+fn a_further_sdo_channel_cannot_be_made_valid() {
+    let channel = |index: &str| {
+        format!(
+            "[{index}]\nParameterName=SDO\nObjectType=9\nSubNumber=3\n[{index}sub0]\nParameterName=n\nDataType=5\nAccessType=ro\n\
+             DefaultValue=2\n[{index}sub1]\nParameterName=to server\nDataType=7\nAccessType=rw\nDefaultValue=0x80000000\n\
+             [{index}sub2]\nParameterName=to client\nDataType=7\nAccessType=rw\nDefaultValue=0x80000000\n"
+        )
+    };
+    let mut bench = Bench::of(&[SHEET, channel("1201").as_bytes(), channel("1280").as_bytes()].concat());
+    for object in ["011201", "011202", "801201", "801202"] {
+        assert_eq!(bench.send(&format!("609#23{object}40060000")), [format!("589#80{object}30000906")]);
+        assert_eq!(bench.send(&format!("609#23{object}40060080")), [format!("589#60{object}00000000")]);
+    }
+}
+
 /// CiA 301, 7.2.4.3.9: the label in two segments.
 #[test]
 fn a_text_is_written_in_blocks() {

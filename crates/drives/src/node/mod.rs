@@ -12,6 +12,7 @@ mod lss;
 mod memory;
 mod profile;
 mod program;
+mod sdo_parameters;
 mod services;
 
 pub use described::{DescribedDevice, Loss};
@@ -26,7 +27,7 @@ use canopen::od::{Condition, Dictionary, Slot, Storage, Table};
 
 /// What a device with these objects refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).
 pub fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
-    services::conditions(table).chain(program::conditions(table))
+    services::conditions(table).chain(program::conditions(table)).chain(sdo_parameters::conditions(table))
 }
 
 /// Whether these services do something with an object.
