@@ -15,6 +15,7 @@ mod logs;
 mod master_core;
 mod modbus;
 mod node;
+mod program_download;
 mod scenario;
 mod sdo_blocks;
 mod selected_frame;
@@ -45,6 +46,7 @@ pub const ALL: &[Law] = &[
     Law { name: "socketcand", holds: stream::socketcand, samples: stream::SOCKETCAND_SAMPLES },
     Law { name: "slcan", holds: stream::slcan, samples: stream::SLCAN_SAMPLES },
     Law { name: "sdo_wire", holds: node::sdo_wire, samples: node::SDO_WIRE_SAMPLES },
+    Law { name: "program_download", holds: program_download::program_download, samples: program_download::SAMPLES },
     Law { name: "sdo_blocks", holds: sdo_blocks::sdo_blocks, samples: sdo_blocks::SAMPLES },
     Law { name: "node", holds: node::node, samples: node::NODE_SAMPLES },
     Law { name: "modbus", holds: modbus::modbus, samples: modbus::SAMPLES },

@@ -26,6 +26,8 @@ laws_hold! {
     a_socketcand_stream_decodes_alike_however_it_is_cut: "socketcand";
     an_slcan_stream_decodes_alike_however_it_is_cut: "slcan";
     sdo_bytes_read_back_as_written: "sdo_wire";
+    // Each run is two boots.
+    a_program_belongs_to_its_identification_and_is_there_after_a_power_failure_whatever_is_requested: "program_download" 1_500;
     a_block_transfer_under_any_frames_changes_only_what_it_confirms_and_ends: "sdo_blocks";
     a_node_under_any_frames_keeps_its_dictionary_lawful: "node";
     an_mjoint_under_any_frames_and_sensors_keeps_its_objects_lawful_and_its_duty_cycles_shares: "mjoint";
