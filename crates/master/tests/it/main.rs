@@ -24,6 +24,7 @@ mod plan;
 mod process_data;
 mod random;
 mod sdo;
+mod sdo_blocks;
 mod stopping;
 mod supervise;
 mod support;
