@@ -15,6 +15,8 @@ impl CobId {
     pub const NO_RTR: u32 = 1 << 30;
     /// Bit 30 of the SYNC and TIME COB-IDs: the device generates the message.
     pub const GENERATES: u32 = 1 << 30;
+    /// Bit 31 of the TIME COB-ID: the device consumes the message.
+    pub const CONSUMES: u32 = 1 << 31;
     /// Bit 29: 29-bit identifier.
     pub const EXTENDED: u32 = 1 << 29;
 
@@ -31,6 +33,11 @@ impl CobId {
     /// True if the device generates the message (SYNC, TIME).
     pub const fn generates(self) -> bool {
         self.0 & Self::GENERATES != 0
+    }
+
+    /// True if the device consumes the message (TIME).
+    pub const fn consumes(self) -> bool {
+        self.0 & Self::CONSUMES != 0
     }
 
     /// False when bit 31 is set.

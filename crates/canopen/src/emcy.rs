@@ -29,6 +29,8 @@ impl EmcyErrorCode {
     pub const PDO_NOT_PROCESSED: Self = Self(0x8210);
     /// 8220h: PDO length exceeded.
     pub const PDO_TOO_LONG: Self = Self(0x8220);
+    /// 8230h: MPDO in destination address mode not processed, destination object not available.
+    pub const DESTINATION_NOT_AVAILABLE: Self = Self(0x8230);
     /// 8240h: unexpected SYNC data length.
     pub const SYNC_LENGTH: Self = Self(0x8240);
     /// 8250h: RPDO timeout.

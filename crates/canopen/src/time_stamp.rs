@@ -1,4 +1,4 @@
-//! TIME (CiA 301, 7.2.6): the frame that carries the time of day. No drive here consumes it.
+//! TIME (CiA 301, 7.2.6): the frame that carries the time of day.
 
 use core::fmt;
 use core::time::Duration;
@@ -19,6 +19,7 @@ const MILLIS_MASK: u32 = 0x0FFF_FFFF;
 /// Days from 1 January 1970, where Unix counts from, to 1 January 1984: 14 years, three of them leap years.
 const UNIX_DAYS_TO_1984: u64 = 14 * 365 + 3;
 const SECONDS_A_DAY: u64 = 24 * 3600;
+const MILLIS_A_DAY: u128 = SECONDS_A_DAY as u128 * 1000;
 
 impl TimeOfDay {
     /// Reads a frame of at least six bytes; `None` for a shorter one. The identifier is the caller's to check.
@@ -33,6 +34,13 @@ impl TimeOfDay {
         let (days, seconds) = (since_1970.as_secs() / SECONDS_A_DAY, since_1970.as_secs() % SECONDS_A_DAY);
         let days = u16::try_from(days.checked_sub(UNIX_DAYS_TO_1984)?).ok()?;
         Some(Self { millis: seconds as u32 * 1000 + since_1970.subsec_millis(), days })
+    }
+
+    /// The time of day so much later; in 2163 the days begin at 0 again.
+    pub const fn after(self, time: Duration) -> Self {
+        let millis = self.millis as u128 + time.as_millis();
+        let days = (millis / MILLIS_A_DAY) as u64;
+        Self { millis: (millis % MILLIS_A_DAY) as u32, days: self.days.wrapping_add(days as u16) }
     }
 
     /// Year, month and day of month.
@@ -92,6 +100,15 @@ mod tests {
         assert_eq!((civil_date(0), civil_date(11_016)), ((1970, 1, 1), (2000, 2, 29)));
         assert_eq!(TimeOfDay::from_unix(Duration::from_secs(5113 * 86_400 - 1)), None);
         assert_eq!(TimeOfDay::from_unix(Duration::from_secs(5113 * 86_400)), Some(TimeOfDay { millis: 0, days: 0 }));
+    }
+
+    #[test]
+    fn time_goes_on_over_midnight() {
+        let evening = TimeOfDay { millis: 86_399_500, days: 58 };
+        assert_eq!(evening.after(Duration::from_millis(499)), TimeOfDay { millis: 86_399_999, days: 58 });
+        assert_eq!(evening.after(Duration::from_millis(500)), TimeOfDay { millis: 0, days: 59 });
+        assert_eq!(evening.after(Duration::from_secs(3 * 86_400)), TimeOfDay { millis: 86_399_500, days: 61 });
+        assert_eq!(TimeOfDay { millis: 0, days: u16::MAX }.after(Duration::from_secs(86_400)).days, 0);
     }
 
     #[test]

@@ -241,8 +241,7 @@ fn what_nothing_acts_on_and_what_contradicts_is_refused_with_the_standards_codes
     assert_eq!(refused(0x1016, 3, 4, 0x0006_01F4), None);
     assert_eq!(refused(0x1016, 1, 4, 0), None);
     assert_eq!(refused(0x1016, 2, 4, 0x0005_01F4), None, "no other entry watches it any more");
-    // There is no clock.
-    assert_eq!(refused(0x1012, 0, 4, 0x8000_0100), Some(0x0609_0030));
+    // It has no clock to produce TIME from.
     assert_eq!(refused(0x1012, 0, 4, 0x4000_0100), Some(0x0609_0030));
     assert_eq!(refused(0x1012, 0, 4, 0x100), None);
     // CiA 301, 7.5.2.22: 0 or 2 to 240, while 1006h is 0.

@@ -6,6 +6,7 @@ mod data_of_the_mjoint;
 mod data_of_the_zlim42c;
 mod departures_of_the_drives;
 mod described_node;
+mod described_services;
 mod documented;
 mod eds_of_the_drives;
 mod every_drive;

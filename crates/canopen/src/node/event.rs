@@ -40,6 +40,9 @@ pub enum NodeEvent {
     RpdoTooShort(PdoNumber),
     /// An RPDO has the length of its mapping again.
     RpdoFits(PdoNumber),
+    /// A multiplexed RPDO in destination address mode named an object that is not there, or cannot be mapped or written. Its value is
+    /// not used.
+    DestinationMissing(PdoNumber),
     /// An RPDO has stayed away for the time of its event timer (CiA 301, 7.5.2.35). Reported once, until
     /// [`RpdoInTime`](Self::RpdoInTime).
     RpdoTimedOut(PdoNumber),
@@ -62,7 +65,8 @@ pub(super) fn most_of_a_frame(table: &Table) -> usize {
         Some((PdoId { direction: Direction::Rpdo, .. }, true)) => Some(usize::from(row.sub_index) <= MAX_OBJECTS),
         _ => None,
     });
-    1 + rpdos.filter(|counts| *counts).count()
+    // And the state that a boot entered, if the owner has not polled since.
+    2 + rpdos.filter(|counts| *counts).count()
 }
 
 /// What waits for the owner, in the order of arrival. When full, the oldest are lost, and that is reported in their place.

@@ -36,6 +36,7 @@
 mod cycle;
 mod event;
 mod identifiers;
+mod multiplex;
 mod objects;
 mod pdo_set;
 mod pdos;
@@ -261,7 +262,12 @@ impl<S: Storage> Node<S> {
 
     /// The identifier of TPDO `number`, if it is valid and maps something.
     pub fn tpdo_id(&self, number: PdoNumber) -> Option<CanId> {
-        self.pdos.tpdos.as_ref().get(number.position()).filter(|tpdo| tpdo.is_active()).map(Tpdo::can_id)
+        self.pdos
+            .tpdos
+            .as_ref()
+            .get(number.position())
+            .filter(|tpdo| tpdo.is_active() || tpdo.address_mode().is_some())
+            .map(Tpdo::can_id)
     }
 
     /// The identifier of RPDO `number`, if it is valid.

@@ -4,13 +4,13 @@ use super::receive::number_at;
 use super::{Node, NodeEvent, Via};
 use crate::heartbeat;
 use crate::object::{
-    COB_ID_EMCY, COMMUNICATION_CYCLE_PERIOD, INHIBIT_TIME_EMCY, PRODUCER_HEARTBEAT_TIME,
+    COB_ID_EMCY, COB_ID_TIME_STAMP_OBJECT, COMMUNICATION_CYCLE_PERIOD, INHIBIT_TIME_EMCY, PRODUCER_HEARTBEAT_TIME,
     SYNCHRONOUS_COUNTER_OVERFLOW_VALUE,
 };
 use crate::od::{Refusal, RowFacts, Slot, Storage, View};
 use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, SYNC_START_VALUE, TRANSMISSION_TYPE};
 use crate::pdo::{
-    Direction, Mapping, MappingRecord, Parameter, PdoId, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING,
+    AddressMode, Direction, Mapping, MappingRecord, Parameter, PdoId, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING,
     TPDO_PARAMETER, Tpdo, TransmissionType,
 };
 use crate::{AbortCode, CobId, Mux, NmtState, connection_set, sync};
@@ -40,12 +40,27 @@ impl<S: Storage> Node<S> {
         };
         match checked {
             Err(Refusal::Abort(code)) => return Err(code.into()),
-            _ if summary.is_communication() => self.check_communication(row.mux(), raw)?,
+            _ if summary.is_communication() => {
+                if !(self.profile.acts_on)(row.mux()) && self.changes(slot, raw) {
+                    return Err(AbortCode::INVALID_VALUE.into());
+                }
+                self.check_communication(row.mux(), raw)?;
+            }
             _ => {}
         }
         checked?;
         self.commit(slot, raw);
         Ok(())
+    }
+
+    /// What a client wants to write is not what is there.
+    fn changes(&self, slot: Slot, raw: u32) -> bool {
+        let values = self.dictionary.view();
+        if values.table().summary(slot).is_long() {
+            values.staged(raw as usize) != values.long_bytes(slot)
+        } else {
+            values.raw(slot) != raw
+        }
     }
 
     /// A client's checked value is stored, takes effect and is reported to the owner.
@@ -77,12 +92,24 @@ impl<S: Storage> Node<S> {
                 let period_us = self.object(COMMUNICATION_CYCLE_PERIOD).unwrap_or(0);
                 sync::check_overflow(present, raw as u8, period_us)
             }
+            (0x1012, _) => self.check_time_cob_id(CobId(raw)),
+            (0x1028, _) if mux.sub_index > 0 => {
+                CobId(self.object(mux).unwrap_or(CobId::INVALID)).check_change(CobId(raw), false)
+            }
             (0x1016, _) if mux.sub_index > 0 => heartbeat::check_watched_once(&values, mux, raw),
             (0x1014, _) => self.emcy_cob_id().check_change(CobId(raw), self.profile.pdo_changes_while_valid),
             (_, Some((pdo, false))) => self.check_parameter(&values, mux, raw, pdo.direction),
             (_, Some((pdo, true))) => self.check_mapping(&values, mux, raw, pdo),
             _ => Ok(()),
         }
+    }
+
+    /// 1012h: the identifier stays while TIME is consumed (bit 31) or generated (CiA 301, 7.5.2.15).
+    fn check_time_cob_id(&self, new: CobId) -> Result<(), AbortCode> {
+        CobId(new.0 & !CobId::INVALID).check_identifier()?;
+        let present = CobId(self.object(COB_ID_TIME_STAMP_OBJECT).unwrap_or(0));
+        let in_use = present.consumes() || present.generates();
+        if in_use && present.can_id() != new.can_id() { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
     }
 
     fn check_parameter(&self, values: &View<'_>, mux: Mux, raw: u32, direction: Direction) -> Result<(), AbortCode> {
@@ -195,14 +222,20 @@ impl<S: Storage> Node<S> {
         self.emcy.set_inhibit_time(self.object(INHIBIT_TIME_EMCY).unwrap_or(0) as u16);
     }
 
+    /// Of a multiplexed PDO.
+    fn address_mode(&self, mapping: u16) -> Option<AddressMode> {
+        self.profile.mapping.address_mode(self.object(Mux::new(mapping, 0))? as u8)
+    }
+
     fn configure_rpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, RPDO_PARAMETER + position as u16);
         let mapping =
             Mapping::read(&self.dictionary, RPDO_MAPPING + position as u16, Direction::Rpdo, self.profile.mapping);
         // A mapping that does not resolve (a store of another firmware) maps nothing.
+        let multiplexed = self.address_mode(RPDO_MAPPING + position as u16);
         let timer_unit_ns = if self.profile.rpdo_deadline { self.profile.event_timer_unit_ns } else { 0 };
-        let rpdo = Rpdo::configure(&parameter, mapping.unwrap_or(None), timer_unit_ns);
+        let rpdo = Rpdo::configure(&parameter, mapping.unwrap_or(None), multiplexed, timer_unit_ns);
         if self.pdos.rpdos.as_ref()[position].is_late() {
             self.push(NodeEvent::RpdoInTime(number_at(position)));
         }
@@ -219,6 +252,7 @@ impl<S: Storage> Node<S> {
         let tpdo = Tpdo::configure(
             &parameter,
             mapping.unwrap_or(None),
+            self.address_mode(TPDO_MAPPING + position as u16),
             self.profile.event_trigger,
             self.profile.inhibit_unit_ns,
             self.profile.event_timer_unit_ns,

@@ -3,7 +3,7 @@ use crate::od::{Conditions, Dictionary, Storage, Table};
 use crate::pdo::{EventTrigger, MappingRules};
 use crate::sdo::block::MAX_BLOCK_SIZE;
 use crate::sdo::server::FrameLength;
-use crate::{NmtState, NodeId};
+use crate::{Mux, NmtState, NodeId};
 
 /// What differs between devices in their communication. Constant data.
 ///
@@ -14,6 +14,9 @@ pub struct NodeProfile {
     pub table: &'static Table,
     /// What downloads have to pass besides their rows.
     pub conditions: &'static Conditions,
+    /// Which communication objects (1000h to 1FFFh) have an effect. Of the others a client may write the value that is there, and
+    /// no other (0609 0030h).
+    pub acts_on: fn(Mux) -> bool,
     /// NMT state entered after boot-up.
     pub start_state: NmtState,
     /// The device sends EMCY messages.
@@ -57,6 +60,7 @@ impl NodeProfile {
         Self {
             table,
             conditions: Conditions::NONE,
+            acts_on: all,
             start_state: NmtState::PreOperational,
             emcy: true,
             inhibit_unit_ns: 100_000,
@@ -72,6 +76,10 @@ impl NodeProfile {
             sdo_block_size: MAX_BLOCK_SIZE,
         }
     }
+}
+
+const fn all(_: Mux) -> bool {
+    true
 }
 
 impl NodeProfile {

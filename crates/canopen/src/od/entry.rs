@@ -54,6 +54,11 @@ impl PdoMapping {
     pub const fn is_allowed(self) -> bool {
         !matches!(self, Self::No)
     }
+
+    /// Into TPDOs.
+    pub const fn is_transmittable(self) -> bool {
+        matches!(self, Self::Yes | Self::Transmit)
+    }
 }
 
 /// The value after a factory reset.

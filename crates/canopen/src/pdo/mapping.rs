@@ -1,6 +1,6 @@
 //! What a PDO carries (CiA 301, 7.5.2.36 and 7.5.2.38): records 1600h and 1A00h, resolved to rows.
 
-use super::{Direction, TpdoForm};
+use super::{AddressMode, Direction, TpdoForm};
 use crate::od::{DataType, Dictionary, MAX_NUMBER, PdoMapping, ResolvedWrite, Slot, Storage, View};
 use crate::{AbortCode, Mux};
 
@@ -21,16 +21,28 @@ pub struct MappingRules {
     pub dummy_entries: u8,
     /// The objects that TPDOs show in another form than SDO does.
     pub tpdo_forms: &'static [TpdoForm],
+    /// Sub-index 00h may be FEh or FFh: a multiplexed PDO.
+    pub multiplexed: bool,
 }
 
 impl MappingRules {
     /// All dummy entries, nothing beyond the standard.
-    pub const CIA_301: Self =
-        Self { longer_entries: false, empty_entries: false, dummy_entries: 0b1111_1110, tpdo_forms: &[] };
+    pub const CIA_301: Self = Self {
+        longer_entries: false,
+        empty_entries: false,
+        dummy_entries: 0b1111_1110,
+        tpdo_forms: &[],
+        multiplexed: true,
+    };
 
     /// The form of an object in TPDOs, where it is another than SDO shows.
     pub fn tpdo_form(&self, object: Mux) -> Option<&'static TpdoForm> {
         form_of(self.tpdo_forms, object)
+    }
+
+    /// The mode of the multiplexed PDO that a sub-index 00h of this value makes, if it makes one.
+    pub fn address_mode(&self, count: u8) -> Option<AddressMode> {
+        AddressMode::from_count(count).filter(|_| self.multiplexed)
     }
 
     /// The type that an entry for this place stands in for, if RPDOs take it.
@@ -148,7 +160,8 @@ impl Mapping {
         }
     }
 
-    /// The mapping that the record's entries make if sub-index 00h is `count`; `None` for nothing, not even dummy entries.
+    /// The mapping that the record's entries make if sub-index 00h is `count`; `None` for nothing, not even dummy entries, and for a
+    /// multiplexed PDO.
     ///
     /// # Errors
     /// 0604 0042h for more entries than the record has or more than 64 bits, else as [`MappingRecord::resolve`].
@@ -160,6 +173,9 @@ impl Mapping {
         count: u8,
     ) -> Result<Option<Self>, AbortCode> {
         let view = values.view();
+        if let Some(mode) = rules.address_mode(count) {
+            return mode.check(view.table(), direction).map(|()| None);
+        }
         if usize::from(count) > MAX_OBJECTS {
             return Err(AbortCode::PDO_TOO_LONG);
         }

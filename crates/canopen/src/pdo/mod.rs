@@ -5,6 +5,7 @@
 
 mod form;
 pub mod mapping;
+pub mod multiplex;
 mod number;
 pub mod parameter;
 mod rpdo;
@@ -12,6 +13,7 @@ mod tpdo;
 
 pub use form::TpdoForm;
 pub use mapping::{MAX_OBJECTS, Mapping, MappingRecord, MappingRules};
+pub use multiplex::{AddressMode, Mpdo};
 pub use number::{Direction, PdoId, PdoNumber};
 pub use parameter::{Parameter, TransmissionType};
 pub use rpdo::{Reception, Rpdo};

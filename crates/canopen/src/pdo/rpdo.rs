@@ -1,6 +1,6 @@
 use can::{Frame, Instant};
 
-use super::{Mapping, Parameter};
+use super::{AddressMode, Mapping, Mpdo, Parameter};
 
 /// A receive PDO: to the device. Source: CiA 301, 7.2.2.5.1.
 #[derive(Clone, Copy, Debug)]
@@ -8,6 +8,8 @@ pub struct Rpdo {
     id: Option<u16>,
     synchronous: bool,
     mapping: Option<Mapping>,
+    /// In place of a mapping.
+    multiplexed: Option<AddressMode>,
     latched: Option<u64>,
     deadline: Deadline,
 }
@@ -34,6 +36,8 @@ pub enum Reception {
     Latch(u64),
     /// Fewer bytes than mapped: nothing of it is used.
     TooShort,
+    /// One object, which the frame names, as this mode has it. It takes effect now, whatever the transmission type is.
+    Multiplexed(Mpdo, AddressMode),
     /// No object is mapped.
     NothingMapped,
 }
@@ -41,15 +45,21 @@ pub enum Reception {
 impl Rpdo {
     /// Not valid.
     pub const INVALID: Self =
-        Self { id: None, synchronous: false, mapping: None, latched: None, deadline: Deadline::OFF };
+        Self { id: None, synchronous: false, mapping: None, multiplexed: None, latched: None, deadline: Deadline::OFF };
 
     /// Takes a changed record; what was latched is dropped. The event timer, in units of `timer_unit_ns`, is a deadline from
     /// the next reception on; a unit of 0 is a device whose event timers do nothing here.
-    pub fn configure(parameter: &Parameter, mapping: Option<Mapping>, timer_unit_ns: u64) -> Self {
+    pub fn configure(
+        parameter: &Parameter,
+        mapping: Option<Mapping>,
+        multiplexed: Option<AddressMode>,
+        timer_unit_ns: u64,
+    ) -> Self {
         Self {
             id: parameter.standard_id(),
             synchronous: parameter.transmission_type.is_synchronous(),
             mapping,
+            multiplexed,
             latched: None,
             deadline: Deadline { time_ns: u64::from(parameter.event_timer) * timer_unit_ns, ..Deadline::OFF },
         }
@@ -68,12 +78,21 @@ impl Rpdo {
     /// A frame with the PDO's identifier arrived while operational. Bytes beyond the mapping are ignored.
     #[inline]
     pub fn receive(&mut self, frame: &Frame) -> Reception {
-        let Some(mapping) = &self.mapping else { return Reception::NothingMapped };
+        let Some(mapping) = &self.mapping else { return self.receive_multiplexed(frame) };
         if frame.dlc() < mapping.length() {
             return Reception::TooShort;
         }
         let data = u64::from_le_bytes(*frame.padded());
         if self.synchronous { Reception::Latch(data) } else { Reception::Apply(data) }
+    }
+
+    #[cold]
+    fn receive_multiplexed(&self, frame: &Frame) -> Reception {
+        match (self.multiplexed, Mpdo::parse(frame)) {
+            (None, _) => Reception::NothingMapped,
+            (Some(_), None) => Reception::TooShort,
+            (Some(mode), Some(mpdo)) => Reception::Multiplexed(mpdo, mode),
+        }
     }
 
     /// It has an event timer.

@@ -1,6 +1,6 @@
 use can::{CanId, Frame, Instant};
 
-use super::{Mapping, Parameter, TransmissionType};
+use super::{AddressMode, Mapping, Mpdo, Parameter, TransmissionType};
 use crate::od::{Dictionary, Storage};
 
 /// What makes a device send a TPDO of type 254 or 255, apart from its event timer.
@@ -23,6 +23,8 @@ pub enum EventTrigger {
 pub struct Tpdo {
     id: CanId,
     mapping: Option<Mapping>,
+    /// In place of a mapping.
+    multiplexed: Option<AddressMode>,
     schedule: Schedule,
     due: Option<Cause>,
     answers_rpdo: bool,
@@ -66,6 +68,7 @@ impl Tpdo {
     pub const INVALID: Self = Self {
         id: CanId::standard(0),
         mapping: None,
+        multiplexed: None,
         schedule: Schedule::Event { on_change: false },
         due: None,
         answers_rpdo: false,
@@ -83,6 +86,7 @@ impl Tpdo {
     pub fn configure(
         parameter: &Parameter,
         mapping: Option<Mapping>,
+        multiplexed: Option<AddressMode>,
         trigger: EventTrigger,
         inhibit_unit_ns: u64,
         timer_unit_ns: u64,
@@ -105,6 +109,7 @@ impl Tpdo {
         Self {
             id: CanId::standard(id),
             mapping,
+            multiplexed: multiplexed.filter(|_| is_event_driven),
             schedule,
             answers_rpdo,
             allows_rtr: parameter.cob_id.allows_rtr(),
@@ -123,6 +128,22 @@ impl Tpdo {
     /// True if it is valid and maps something.
     pub const fn is_active(&self) -> bool {
         self.mapping.is_some()
+    }
+
+    /// The mode of its addresses, if it is multiplexed: such a TPDO is of type 254 or 255, and sends what it is
+    /// [given](Self::multiplex) only.
+    pub const fn address_mode(&self) -> Option<AddressMode> {
+        self.multiplexed
+    }
+
+    /// Of a multiplexed TPDO while operational: this is to be sent. False if what it was given before has not been sent yet.
+    pub const fn multiplex(&mut self, mpdo: &Mpdo) -> bool {
+        let takes = self.due.is_none();
+        if takes {
+            self.data = mpdo.bits();
+            self.due = Some(Cause::Event);
+        }
+        takes
     }
 
     /// True if SYNC is what sends it; else events do.
@@ -298,7 +319,7 @@ impl Tpdo {
     /// The frame to offer at `now`. The inhibit time counts from here until the runner reports the transmission.
     #[inline]
     pub fn take<S: Storage>(&mut self, values: &Dictionary<S>, now: Instant) -> Option<Frame> {
-        let mapping = self.mapping.as_ref()?;
+        let Some(mapping) = self.mapping.as_ref() else { return self.take_multiplexed(now) };
         let cause = self.due.take();
         if let Schedule::Event { .. } = self.schedule {
             self.data = mapping.gather(values);
@@ -308,6 +329,13 @@ impl Tpdo {
         }
         self.inhibited_until = now.plus_nanos(self.inhibit_ns);
         Some(Frame::of_bits(self.id, self.data, mapping.length()))
+    }
+
+    #[cold]
+    fn take_multiplexed(&mut self, now: Instant) -> Option<Frame> {
+        self.due.take()?;
+        self.inhibited_until = now.plus_nanos(self.inhibit_ns);
+        self.multiplexed.map(|_| Frame::of_bits(self.id, self.data, 8))
     }
 
     /// The wire took the frame at `now`: the inhibit time counts from here.

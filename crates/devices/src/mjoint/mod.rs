@@ -136,7 +136,7 @@ const PDO_RULES: PdoRules = PdoRules {
     remap_while_valid: true,
     fixed_mapping: true,
     first_in_manual: 1,
-    mapping: MappingRules { dummy_entries: 0, tpdo_forms: &IN_TPDO, ..MappingRules::CIA_301 },
+    mapping: MappingRules { dummy_entries: 0, tpdo_forms: &IN_TPDO, multiplexed: false, ..MappingRules::CIA_301 },
     event_trigger: EventTrigger::AnswersRpdo,
     // It has no EMCY.
     short_rpdo: None,

@@ -39,7 +39,7 @@ const PDO_RULES: PdoRules = PdoRules {
     remap_while_valid: true,
     fixed_mapping: false,
     first_in_manual: 0,
-    mapping: MappingRules { dummy_entries: 0, ..MappingRules::CIA_301 },
+    mapping: MappingRules { dummy_entries: 0, multiplexed: false, ..MappingRules::CIA_301 },
     // Event-driven PDOs as the ZLAC8030L's manual has them (6.1); the ZLIM42-C's gives no more than the object table.
     event_trigger: EventTrigger::ChangeOr255ByTimer,
     // The manuals are silent; CiA 301 asks it of a device with EMCY.

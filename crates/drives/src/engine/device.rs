@@ -228,6 +228,11 @@ impl<S: Storage> Device<S> {
         self.node.boot(now);
     }
 
+    /// See [`Node::send_by_source`].
+    pub fn send_by_source(&mut self, slot: Slot, now: Instant) -> bool {
+        self.node.send_by_source(slot, now)
+    }
+
     /// What happened since, in the order of arrival.
     #[inline]
     pub fn poll_event(&mut self) -> Option<NodeEvent> {
@@ -503,6 +508,7 @@ pub(crate) trait Application<S: Storage> {
             NodeEvent::ResetCommunication => self.reset(Reset::Communication, now),
             NodeEvent::RpdoTooShort(_) => self.device().report_rpdo_length(false, now),
             NodeEvent::RpdoFits(_) => self.device().report_rpdo_length(true, now),
+            NodeEvent::DestinationMissing(_) => self.device().report_missing_destination(now),
             NodeEvent::EventsLost => self.device().report_lost_events(now),
             NodeEvent::RpdoTimedOut(number) => self.rpdo_deadline(number, false, now),
             NodeEvent::RpdoInTime(number) => self.rpdo_deadline(number, true, now),

@@ -3,7 +3,7 @@
 //! [`Described`] is the one station of all of them; a firmware says what a lost connection means to it.
 
 use can::{Frame, Instant, Station};
-use canopen::node::NodeProfile;
+use canopen::node::{NodeProfile, Via};
 use canopen::od::{Entry, Slot, Storage};
 use canopen::{NmtCommand, NmtState, NodeId};
 use devices::variant::Variant;
@@ -237,12 +237,12 @@ pub(crate) trait Described<S: Storage>: Application<S> {
     }
 
     /// A peer wrote to `slot`; true if it was an object of the services.
-    fn service_written(&mut self, slot: Slot, raw: u32, now: Instant) -> bool {
+    fn service_written(&mut self, slot: Slot, raw: u32, via: Via, now: Instant) -> bool {
         let base = self.base_mut();
         if base.take_program(slot, raw) {
             return true;
         }
-        match base.services.written(&mut base.device, slot, raw) {
+        match base.services.written(&mut base.device, slot, raw, via) {
             Written::Elsewhere => return false,
             Written::Service => {}
             Written::WatchEnded => self.connection(Loss::Silence, false, now),
@@ -279,7 +279,7 @@ pub(crate) trait Described<S: Storage>: Application<S> {
         }
         if base.device.is_running() && base.services.wants(frame) {
             let state = base.device.node().state();
-            if base.services.handle_frame(frame, state, now) {
+            if base.services.handle_frame(frame, base.device.values(), state, now) {
                 self.connection(Loss::Silence, false, now);
             }
         }
@@ -302,6 +302,8 @@ pub(crate) trait Described<S: Storage>: Application<S> {
         }
         if self.base_mut().device.is_task_due(now) {
             self.communication_task(now);
+            let base = self.base_mut();
+            base.services.run_task(&mut base.device, now);
         }
     }
 

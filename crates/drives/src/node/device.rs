@@ -9,9 +9,9 @@ use canopen::{AbortCode, Mux, NmtState, NodeId};
 use devices::Description;
 use devices::variant::Variant;
 
-use super::Memory;
 use super::described::{Described, DescribedDevice, Loss, described_station};
 use super::profile::Profile;
+use super::{Memory, Overheard};
 use crate::engine::device::{Application, Device, ResetTimes};
 
 /// The firmware of a described device that is not a drive.
@@ -97,6 +97,11 @@ impl<S: Storage> DescribedNode<S> {
         self.base.device.node().state()
     }
 
+    /// What it has heard of others: TIME and their EMCY messages.
+    pub const fn overheard(&self) -> &Overheard {
+        self.base.services.overheard()
+    }
+
     /// Supplied and started.
     pub const fn is_running(&self) -> bool {
         self.base.device.is_running()
@@ -155,8 +160,8 @@ impl<S: Storage> Application<S> for DescribedNode<S> {
         &mut self.base.device
     }
 
-    fn written(&mut self, slot: Slot, raw: u32, _via: Via, now: Instant) -> bool {
-        if !self.service_written(slot, raw, now) {
+    fn written(&mut self, slot: Slot, raw: u32, via: Via, now: Instant) -> bool {
+        if !self.service_written(slot, raw, via, now) {
             let mux = self.base.device.values().table().row(slot).mux();
             if let Some((slot, raw)) = self.profile.written(self.base.device.values_mut(), mux) {
                 self.base.device.write_own(slot, raw);

@@ -10,14 +10,17 @@ mod encoder;
 mod io;
 mod lss;
 mod memory;
+mod overheard;
 mod profile;
 mod program;
+mod scanner;
 mod sdo_parameters;
 mod services;
 
 pub use described::{DescribedDevice, Loss};
 pub use device::DescribedNode;
 pub use memory::{Memory, image_size, is_makers_mark, is_storable};
+pub use overheard::Overheard;
 pub use profile::profile_conditions;
 pub use services::{Services, Written};
 
@@ -41,6 +44,7 @@ pub const fn acts_on(mux: Mux) -> bool {
             mux.index,
             0x1000
                 | 0x1001
+                | 0x1002
                 | 0x1003
                 | 0x1005
                 | 0x1006
@@ -51,6 +55,7 @@ pub const fn acts_on(mux: Mux) -> bool {
                 | 0x100C
                 | 0x100D
                 | 0x1010
+                | 0x1012
                 | 0x1011
                 | 0x1014
                 | 0x1015
@@ -58,15 +63,27 @@ pub const fn acts_on(mux: Mux) -> bool {
                 | 0x1017
                 | 0x1018
                 | 0x1019
+                | 0x1020
+                | 0x1028
                 | 0x1029
                 | 0x1200
-                | 0x1400..=0x1BFF | 0x1F50 | 0x1F51 | 0x1F56 | 0x1F57
+                | 0x1400..=0x1BFF
+                | 0x1F50
+                | 0x1F51
+                | 0x1F56
+                | 0x1F57
+                | 0x1FA0..=0x1FFF
         )
 }
 
 /// Whether a device that is not a drive does something with an object, by CiA 301 or by its profile.
 pub fn device_acts_on(description: &devices::Description, mux: Mux) -> bool {
     acts_on(mux) || profile::acts_on(description, mux)
+}
+
+/// Which communication objects take a value from a client: those that have an effect here, and SDO parameters.
+pub const fn takes(mux: Mux) -> bool {
+    acts_on(mux) || matches!(mux.index, 0x1200..=0x12FF)
 }
 
 /// 1029h:01, where the device has it (CiA 301, 7.5.2.32): 0 to pre-operational, 1 no change, 2 stopped.

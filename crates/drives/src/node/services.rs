@@ -1,14 +1,22 @@
 //! Services of CiA 301 that a described device has by its objects, beside those of [`Device`]: the error history (1003h),
-//! consumers of heartbeats (1016h), node and life guarding (100Ch, 100Dh), and the store of parameters (1010h, 1011h).
+//! consumers of heartbeats (1016h), TIME (1012h) and EMCY (1028h), node and life guarding (100Ch, 100Dh), the store of parameters
+//! (1010h, 1011h) with the date of its configuration (1020h), and the scanning of objects for a multiplexed PDO (1FA0h).
 
 use can::{Frame, Instant};
 use canopen::guarding::Guarding;
 use canopen::heartbeat::{Consumer, ConsumerEvent};
-use canopen::object::{COB_ID_EMCY, GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME};
+use canopen::node::Via;
+use canopen::object::{
+    COB_ID_EMCY, COB_ID_TIME_STAMP_OBJECT, CONFIGURATION_DATE, CONFIGURATION_TIME, EMERGENCY_CONSUMER_OBJECT,
+    GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME,
+};
 use canopen::od::{Condition, Dictionary, Entry, Slot, Storage, Table, View};
-use canopen::{AbortCode, Mux, NmtState, NodeId};
+use canopen::pdo::{AddressMode, PdoNumber, TPDO_MAPPING};
+use canopen::{AbortCode, CobId, Mux, NmtState, NodeId};
 
 use super::memory::Memory;
+use super::overheard::Overheard;
+use super::scanner::Scanner;
 use crate::engine::device::Device;
 
 /// Most nodes that are watched.
@@ -24,7 +32,9 @@ const HISTORY: u16 = 0x1003;
 const STORE: u16 = 0x1010;
 const RESTORE: u16 = 0x1011;
 const WATCH: u16 = 0x1016;
-const TIME_COB_ID: u16 = 0x1012;
+const TIME_COB_ID: u16 = COB_ID_TIME_STAMP_OBJECT.index;
+const EMCY_CONSUMER: u16 = EMERGENCY_CONSUMER_OBJECT.index;
+const LAST_TPDO_MAPPING: u16 = TPDO_MAPPING + PdoNumber::MAX - 1;
 
 /// The services of one device.
 #[derive(Clone, Debug)]
@@ -37,8 +47,12 @@ pub struct Services<S: Storage> {
     /// Whose remote frames guard.
     node_id: NodeId,
     answer: Option<Frame>,
+    overheard: Overheard,
+    scanner: Scanner<S>,
     memory: Memory<S>,
     generation: u32,
+    /// A parameter was written after the date of the configuration.
+    changed: bool,
 }
 
 /// What a peer's write was to these services.
@@ -62,14 +76,28 @@ impl<S: Storage> Services<S> {
             guarding: None,
             node_id: NodeId::MIN,
             answer: None,
+            overheard: Overheard::NOTHING,
+            scanner: Scanner::NONE,
             memory,
             generation: 0,
+            changed: false,
         }
     }
 
     /// The supply is back: the memory is as it was left.
     pub fn power_on(&mut self, memory: Memory<S>) {
         self.memory = memory;
+        self.overheard = Overheard::NOTHING;
+    }
+
+    /// What it has heard of others.
+    pub const fn overheard(&self) -> &Overheard {
+        &self.overheard
+    }
+
+    /// Once each run of the communication task.
+    pub fn run_task(&mut self, device: &mut Device<impl Storage>, now: Instant) {
+        self.scanner.run(device, now);
     }
 
     /// Contents of the memory, and a number that changes with them.
@@ -105,6 +133,9 @@ impl<S: Storage> Services<S> {
         }
         self.node_id = device.node().node_id();
         self.answer = None;
+        self.changed = false;
+        self.overheard.configure(device.values());
+        self.scanner = Scanner::of(device.values().table());
         self.configure_guarding(device);
     }
 
@@ -121,9 +152,15 @@ impl<S: Storage> Services<S> {
     }
 
     /// A peer wrote to `slot`.
-    pub fn written(&mut self, device: &mut Device<impl Storage>, slot: Slot, raw: u32) -> Written {
+    pub fn written(&mut self, device: &mut Device<impl Storage>, slot: Slot, raw: u32, via: Via) -> Written {
         let mux = device.values().table().row(slot).mux();
+        if mux.index == CONFIGURATION_DATE.index {
+            self.changed = false;
+        } else if via == Via::Sdo && device.values().table().row(slot).is_kept() {
+            self.changed = true;
+        }
         match (mux.index, mux.sub_index) {
+            (TIME_COB_ID | EMCY_CONSUMER, _) => self.overheard.configure(device.values()),
             (WATCH, sub_index @ 1..=CONSUMERS) => {
                 let position = usize::from(sub_index) - 1;
                 self.consumers[position] = Consumer::from_raw(raw);
@@ -135,6 +172,9 @@ impl<S: Storage> Services<S> {
             (HISTORY, 0) => forget_history(device.values_mut()),
             (STORE, sub_index) => {
                 if raw == SAVE {
+                    if core::mem::take(&mut self.changed) {
+                        forget_configuration(device.values_mut());
+                    }
                     self.memory.save(device.values(), |row| row.is_kept() && is_in_group(row.mux(), sub_index));
                     self.generation = self.generation.wrapping_add(1);
                 }
@@ -142,7 +182,7 @@ impl<S: Storage> Services<S> {
             }
             (RESTORE, sub_index) => {
                 if raw == LOAD {
-                    self.memory.forget(|mux| is_in_group(mux, sub_index));
+                    self.memory.forget(|mux| is_in_group(mux, sub_index) || mux.index == CONFIGURATION_DATE.index);
                     self.generation = self.generation.wrapping_add(1);
                 }
                 restore_default(device, slot);
@@ -161,13 +201,23 @@ impl<S: Storage> Services<S> {
     #[inline]
     pub fn wants(&self, frame: &Frame) -> bool {
         self.consumers.iter().flatten().any(|consumer| consumer.can_id() == frame.id())
+            || self.overheard.wants(frame)
             || (self.guarding.is_some() && Guarding::is_request(frame, self.node_id))
     }
 
     /// A frame arrived at a node in this state; true if what is watched has come again, and nothing else is missing. A boot-up
     /// message is not a heartbeat yet: the node has lost its state.
-    pub fn handle_frame(&mut self, frame: &Frame, state: NmtState, now: Instant) -> bool {
+    pub fn handle_frame(
+        &mut self,
+        frame: &Frame,
+        values: &Dictionary<impl Storage>,
+        state: NmtState,
+        now: Instant,
+    ) -> bool {
         let mut heard = false;
+        if self.overheard.wants(frame) && state.allows_sdo() {
+            self.overheard.handle_frame(frame, values, now);
+        }
         if let Some(guarding) = self.guarding.as_mut().filter(|_| Guarding::is_request(frame, self.node_id)) {
             self.answer = Some(guarding.answer(self.node_id, state, now));
             heard = guarding.take_return();
@@ -225,20 +275,38 @@ pub(super) fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, C
             (STORE, 1..) => only_save,
             (RESTORE, 1..) => only_load,
             (WATCH, FIRST_UNWATCHED..) => only_nobody,
-            (TIME_COB_ID, 0) => no_time,
+            (TIME_COB_ID, 0) => no_time_producer,
+            (TPDO_MAPPING..=LAST_TPDO_MAPPING, 0) => no_destinations,
             _ => return None,
         };
         Some((slot, Condition::Check(check)))
     })
 }
 
+/// 1020h: another command than the tool's that has written it changes what the device starts with (CiA 301, 7.5.2.23: it is 0 then).
+fn forget_configuration(values: &mut Dictionary<impl Storage>) {
+    for object in [CONFIGURATION_DATE, CONFIGURATION_TIME] {
+        if let Ok(slot) = values.table().find(object) {
+            values.set_raw(slot, 0);
+        }
+    }
+}
+
 fn only_zero(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if raw == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
 }
 
-/// 1012h: these devices have no clock, to consume TIME (bit 31) or to produce it (bit 30; CiA 301, 7.5.2.15).
-fn no_time(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
-    if raw >> 30 == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
+/// 1012h: these devices have no clock of their own, to produce TIME (bit 30; CiA 301, 7.5.2.15).
+fn no_time_producer(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    if CobId(raw).generates() { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
+}
+
+/// A TPDO in destination address mode: these devices have no application that writes to objects of others.
+fn no_destinations(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    match AddressMode::from_count(raw as u8) {
+        Some(AddressMode::Destination) => Err(AbortCode::PDO_TOO_LONG),
+        _ => Ok(()),
+    }
 }
 
 /// More nodes than can be watched: an entry for one is refused, as it would have no effect.

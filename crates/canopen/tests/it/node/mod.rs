@@ -6,6 +6,7 @@ mod configuration;
 mod device;
 mod emcy;
 mod events;
+mod multiplex;
 mod nmt;
 mod robustness;
 mod rpdo;

@@ -107,7 +107,13 @@ const fn input(name: &'static str, bit: u8) -> Input {
 
 /// Working robots map 6077h with 32 bits; the maker's EDS counts empty entries in.
 const PDO_RULES: PdoRules = PdoRules {
-    mapping: MappingRules { longer_entries: true, empty_entries: true, dummy_entries: 0, tpdo_forms: &[] },
+    mapping: MappingRules {
+        longer_entries: true,
+        empty_entries: true,
+        dummy_entries: 0,
+        tpdo_forms: &[],
+        multiplexed: false,
+    },
     ..zltech::PDO_RULES
 };
 

@@ -86,6 +86,12 @@ impl<S: Storage> Device<S> {
         self.report_end_of_error(now);
     }
 
+    /// A multiplexed PDO named an object that it cannot be stored in (CiA 301, 7.2.3.2.1): that is reported, and over.
+    pub(super) fn report_missing_destination(&mut self, now: Instant) {
+        self.report_error(EmcyErrorCode::DESTINATION_NOT_AVAILABLE, now);
+        self.report_end_of_error(now);
+    }
+
     /// A heartbeat that is watched, or the master's guarding, has stayed away, or is heard again (CiA 301, 7.2.8.2).
     pub fn report_heartbeat(&mut self, heard: bool, now: Instant) {
         if !heard {

@@ -26,7 +26,7 @@ impl<S: Storage> Application<S> for ServoDrive<S> {
     }
 
     fn written(&mut self, slot: Slot, raw: u32, via: Via, now: Instant) -> bool {
-        if self.service_written(slot, raw, now) {
+        if self.service_written(slot, raw, via, now) {
             return false;
         }
         let mut reset = false;

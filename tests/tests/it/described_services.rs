@@ -1,0 +1,315 @@
+//! Services of CiA 301 that a device has by the objects of its file: TIME and EMCY of others, multiplexed PDOs, the date of its
+//! configuration, and that nothing is taken that has no effect.
+
+use can::{Bitrate, Instant, Station};
+use canopen::od::{Access, Conditions, Kind, condition_numbers};
+use canopen::time_stamp::TimeOfDay;
+use canopen::{Mux, NodeId, NodeProfile};
+use drives::communication::communication;
+use drives::node::{DescribedNode, Memory, acts_on, conditions, takes};
+use sim::machine::Boxed;
+
+/// Rows of a table `(index, sub-index, type, access, default, mappable)` as a file.
+fn sheet(rows: &[(u16, u8, u16, &str, u64, bool)]) -> Vec<u8> {
+    let mut text =
+        "[FileInfo]\nFileName=services.eds\n[DeviceInfo]\nVendorName=None\nProductName=Services\n".to_owned();
+    let mut records: Vec<u16> = rows.iter().filter(|row| row.1 > 0).map(|row| row.0).collect();
+    records.dedup();
+    for record in records {
+        let highest = rows.iter().filter(|row| row.0 == record).map(|row| row.1).max().unwrap_or(0);
+        text += &format!("[{record:X}]\nParameterName=R{record:X}\nObjectType=9\nSubNumber={}\n", highest + 1);
+    }
+    for (index, sub_index, data_type, access, default, mappable) in rows {
+        let is_record = rows.iter().any(|row| row.0 == *index && row.1 > 0);
+        let section = if is_record { format!("{index:X}sub{sub_index:X}") } else { format!("{index:X}") };
+        text += &format!(
+            "[{section}]\nParameterName=O{index:X}_{sub_index}\nDataType={data_type}\nAccessType={access}\n\
+             DefaultValue={default}\nPDOMapping={}\n",
+            u8::from(*mappable)
+        );
+    }
+    text.into_bytes()
+}
+
+const U8: u16 = 5;
+const U16: u16 = 6;
+const U32: u16 = 7;
+const U64: u16 = 0x1B;
+
+struct Bench {
+    node: DescribedNode<Boxed>,
+    memory: Memory<Boxed>,
+    now: Instant,
+}
+
+impl Bench {
+    /// Node 9, switched on, its boot-up message taken away.
+    fn new(rows: &[(u16, u8, u16, &str, u64, bool)]) -> Self {
+        let model = eds::keep(&eds::Eds::load(&sheet(rows)).expect("it is read").eds).expect("it is kept");
+        let list: &'static _ = conditions(model.dictionary).collect::<Vec<_>>().leak();
+        let numbers: &'static [u16; 256] = Box::leak(Box::new(condition_numbers(list)));
+        let conditions: &'static Conditions = Box::leak(Box::new(Conditions::new(list, numbers)));
+        let profile = NodeProfile { conditions, acts_on: takes, ..communication(model) };
+        let node = NodeId::new(9).expect("a node-ID");
+        let node = DescribedNode::new(model, Box::leak(Box::new(profile)), node, Bitrate::M1);
+        let mut bench = Self { node, memory: Memory::empty(model.dictionary), now: Instant::ZERO };
+        bench.power_on();
+        bench
+    }
+
+    fn power_on(&mut self) {
+        self.node.power_on(self.memory.clone(), self.now);
+        assert_eq!(self.drain(), ["709#00"]);
+    }
+
+    fn power_cycle(&mut self) {
+        self.memory = self.node.memory().0.clone();
+        self.node.power_off();
+        self.power_on();
+    }
+
+    fn drain(&mut self) -> Vec<String> {
+        let mut sent = Vec::new();
+        while let Some(frame) = self.node.poll_transmit() {
+            self.node.handle_transmitted(&frame, self.now);
+            sent.push(frame.to_string());
+        }
+        sent
+    }
+
+    fn send(&mut self, frame: &str) -> Vec<String> {
+        self.node.handle_frame(&frame.parse().unwrap(), self.now);
+        self.drain()
+    }
+
+    fn run(&mut self, ms: u64) -> Vec<String> {
+        let end = Instant::from_nanos(self.now.as_nanos() + ms * 1_000_000);
+        let mut sent = Vec::new();
+        while let Some(due) = self.node.poll_timeout().filter(|due| *due <= end) {
+            self.now = due.max(self.now);
+            self.node.handle_timeout(self.now);
+            sent.extend(self.drain());
+        }
+        self.now = end;
+        sent
+    }
+
+    /// The code of an abort; `None` where it is taken.
+    fn write(&mut self, index: u16, sub_index: u8, bytes: u8, value: u32) -> Option<u32> {
+        let [low, high] = index.to_le_bytes();
+        let [a, b, c, d] = value.to_le_bytes();
+        let command = 0x23 | (4 - bytes) << 2;
+        let request = format!("609#{command:02X}{low:02X}{high:02X}{sub_index:02X}{a:02X}{b:02X}{c:02X}{d:02X}");
+        let answer = self.send(&request).into_iter().find(|frame| frame.starts_with("589#")).expect("it answers");
+        let code = u32::from_str_radix(&answer[12..20], 16).unwrap().swap_bytes();
+        answer.starts_with("589#80").then_some(code)
+    }
+
+    fn value(&self, index: u16, sub_index: u8) -> i64 {
+        self.node.values().view().value(Mux::new(index, sub_index)).expect("it is there")
+    }
+
+    fn set(&mut self, index: u16, sub_index: u8, bytes: &[u8]) {
+        let slot = self.node.find(Mux::new(index, sub_index)).expect("it is there");
+        self.node.set(slot, bytes, self.now).expect("it fits");
+    }
+}
+
+/// 23:59:59.900 of 2 January 1984: 86399900 ms and 1 day (CiA 301, 7.1.6.5).
+const EVENING: &str = "9C5B26050100";
+
+#[test]
+fn time_is_consumed_with_bit_31_of_1012h_and_goes_on() {
+    let mut bench = Bench::new(&[(0x1000, 0, U32, "ro", 0, false), (0x1012, 0, U32, "rw", 0x100, false)]);
+    let clock = |bench: &Bench| bench.node.overheard().time_of_day(bench.now);
+    bench.send(&format!("100#{EVENING}"));
+    assert_eq!(clock(&bench), None, "bit 31 is not set");
+    assert_eq!(bench.write(0x1012, 0, 4, 0xC000_0100), Some(0x0609_0030), "it has no clock to produce TIME from");
+    assert_eq!(bench.write(0x1012, 0, 4, 0x8000_0100), None);
+    assert_eq!(bench.write(0x1012, 0, 4, 0x8000_0101), Some(0x0609_0030), "a restricted identifier");
+    assert_eq!(bench.write(0x1012, 0, 4, 0x8000_0200), Some(0x0609_0030), "the identifier stays while it is consumed");
+    bench.send("100#0102");
+    assert_eq!(clock(&bench), None, "too short");
+    bench.send(&format!("100#{EVENING}"));
+    assert_eq!(clock(&bench), Some(TimeOfDay { millis: 86_399_900, days: 1 }));
+    bench.run(350);
+    assert_eq!(clock(&bench), Some(TimeOfDay { millis: 250, days: 2 }), "the next day");
+    bench.send("000#0209");
+    bench.send(&format!("100#{EVENING}"));
+    assert_eq!(clock(&bench), Some(TimeOfDay { millis: 250, days: 2 }), "not while stopped");
+}
+
+#[test]
+fn the_emcy_messages_of_1028h_are_heard() {
+    let consumers = [0x8000_0000, 0x82, 0x8000_0083].into_iter().zip(1..);
+    let mut rows = vec![(0x1000, 0, U32, "ro", 0, false), (0x1028, 0, U8, "ro", 3, false)];
+    rows.extend(consumers.map(|(cob_id, node)| (0x1028, node, U32, "rw", cob_id, false)));
+    let mut bench = Bench::new(&rows);
+    let heard = |bench: &Bench| bench.node.overheard().last_emcy().map(|(node, emcy)| (node.raw(), emcy.code.0));
+    bench.send("083#1081010000000000");
+    bench.send("081#1081010000000000");
+    assert_eq!(heard(&bench), None, "bit 31 of their entries is set");
+    bench.send("082#3081110000000000");
+    assert_eq!(heard(&bench), Some((2, 0x8130)));
+    assert_eq!(bench.write(0x1028, 2, 4, 0x92), Some(0x0609_0030), "a valid entry keeps its identifier");
+    assert_eq!(bench.write(0x1028, 1, 4, 0x601), Some(0x0609_0030), "restricted");
+    assert_eq!((bench.write(0x1028, 2, 4, 0x8000_0092), bench.write(0x1028, 2, 4, 0x92)), (None, None));
+    bench.send("082#0010010000000000");
+    assert_eq!(heard(&bench), Some((2, 0x8130)));
+    bench.send("092#0010010000000000");
+    assert_eq!(heard(&bench), Some((2, 0x1000)));
+}
+
+#[test]
+fn the_manufacturers_status_is_what_the_application_sets_and_no_client_writes_it() {
+    let mut bench = Bench::new(&[(0x1000, 0, U32, "ro", 0, false), (0x1002, 0, U32, "ro", 0, true)]);
+    bench.set(0x1002, 0, &0x1234_5678_u32.to_le_bytes());
+    assert_eq!(bench.send("609#4002100000000000"), ["589#4302100078563412"]);
+    assert_eq!(bench.write(0x1002, 0, 4, 0), Some(0x0601_0002));
+}
+
+/// CiA 301, 7.5.2.23: 1020h is 0 once something else than the tool that wrote it has changed what the device starts with.
+#[test]
+fn the_date_of_the_configuration_is_kept_until_another_configuration_is_stored() {
+    const SAVE: u32 = u32::from_le_bytes(*b"save");
+    const LOAD: u32 = u32::from_le_bytes(*b"load");
+    let mut bench = Bench::new(&[
+        (0x1000, 0, U32, "ro", 0, false),
+        (0x1010, 0, U8, "ro", 1, false),
+        (0x1010, 1, U32, "rw", 1, false),
+        (0x1011, 0, U8, "ro", 3, false),
+        (0x1011, 1, U32, "rw", 1, false),
+        (0x1011, 2, U32, "rw", 1, false),
+        (0x1011, 3, U32, "rw", 1, false),
+        (0x1017, 0, U16, "rw", 0, false),
+        (0x1020, 0, U8, "ro", 2, false),
+        (0x1020, 1, U32, "rw", 0, false),
+        (0x1020, 2, U32, "rw", 0, false),
+    ]);
+    let configure = |bench: &mut Bench, heartbeat, date| {
+        assert_eq!(bench.write(0x1017, 0, 2, heartbeat), None);
+        if let Some(date) = date {
+            assert_eq!((bench.write(0x1020, 1, 4, date), bench.write(0x1020, 2, 4, date + 1)), (None, None));
+        }
+    };
+    let date = |bench: &Bench| (bench.value(0x1020, 1), bench.value(0x1020, 2), bench.value(0x1017, 0));
+    configure(&mut bench, 60_000, Some(0x3A2F));
+    assert_eq!(bench.write(0x1010, 1, 4, SAVE), None);
+    bench.power_cycle();
+    assert_eq!(date(&bench), (0x3A2F, 0x3A30, 60_000));
+    // What is written and not stored is gone with the supply: the device starts as it did.
+    configure(&mut bench, 50_000, None);
+    bench.power_cycle();
+    assert_eq!(date(&bench), (0x3A2F, 0x3A30, 60_000));
+    configure(&mut bench, 50_000, None);
+    assert_eq!(bench.write(0x1010, 1, 4, SAVE), None);
+    assert_eq!(date(&bench), (0, 0, 50_000));
+    bench.power_cycle();
+    assert_eq!(date(&bench), (0, 0, 50_000));
+    // Restored parameters, of whatever group.
+    configure(&mut bench, 50_000, Some(0x3A2F));
+    assert_eq!(bench.write(0x1010, 1, 4, SAVE), None);
+    assert_eq!(bench.write(0x1011, 3, 4, LOAD), None);
+    bench.power_cycle();
+    assert_eq!(date(&bench), (0, 0, 50_000));
+}
+
+#[test]
+fn changed_objects_of_the_scanning_list_are_sent_in_source_address_mode_in_turn() {
+    let mut bench = Bench::new(&[
+        (0x1000, 0, U32, "ro", 0, false),
+        (0x1800, 0, U8, "ro", 3, false),
+        (0x1800, 1, U32, "rw", 0x189, false),
+        (0x1800, 2, U8, "rw", 254, false),
+        (0x1A00, 0, U8, "rw", 0xFE, false),
+        (0x1A00, 1, U32, "rw", 0, false),
+        (0x1FA0, 0, U8, "ro", 2, false),
+        // Two sub-indices of 6000h from 1 on, and 2000h.
+        (0x1FA0, 1, U32, "rw", 0x0260_0001, false),
+        (0x1FA0, 2, U32, "rw", 0x0120_0000, false),
+        (0x2000, 0, U16, "ro", 0, true),
+        (0x6000, 0, U8, "ro", 2, false),
+        (0x6000, 1, U8, "ro", 7, true),
+        (0x6000, 2, U8, "ro", 0, true),
+    ]);
+    bench.set(0x2000, 0, &[1, 0]);
+    assert_eq!(bench.run(10), [""; 0], "not before operational");
+    bench.send("000#0109");
+    assert_eq!(bench.run(10), [""; 0], "what it begins with is no change");
+    bench.set(0x6000, 2, &[0xA5]);
+    bench.set(0x2000, 0, &[0x34, 0x12]);
+    bench.set(0x6000, 1, &[8]);
+    assert_eq!(bench.run(10), ["189#0900600108000000", "189#09006002A5000000", "189#0900200034120000"]);
+    assert_eq!(bench.run(10), [""; 0]);
+    // One that changes always does not keep the others waiting.
+    let mut sent = Vec::new();
+    for n in 0..4_u8 {
+        bench.set(0x6000, 1, &[20 + n]);
+        bench.set(0x6000, 2, &[30 + n]);
+        sent.extend(bench.run(1));
+    }
+    let subs: Vec<&str> = sent.iter().map(|frame| &frame[10..12]).collect();
+    assert_eq!(subs, ["01", "02", "01", "02"]);
+    assert_eq!(bench.write(0x1800, 1, 4, 0x8000_0189), None);
+    assert_eq!(bench.write(0x1A00, 0, 1, 0xFF), Some(0x0604_0042), "no application addresses others");
+}
+
+#[test]
+fn a_multiplexed_rpdo_is_stored_and_a_missing_destination_is_emcy_8230h() {
+    let mut bench = Bench::new(&[
+        (0x1000, 0, U32, "ro", 0, false),
+        (0x1001, 0, U8, "ro", 0, false),
+        (0x1014, 0, U32, "rw", 0x89, false),
+        (0x1400, 0, U8, "ro", 2, false),
+        (0x1400, 1, U32, "rw", 0x209, false),
+        (0x1400, 2, U8, "rw", 255, false),
+        (0x1600, 0, U8, "rw", 0xFF, false),
+        (0x1600, 1, U32, "rw", 0, false),
+        (0x1FD0, 0, U8, "ro", 1, false),
+        (0x1FD0, 1, U64, "rw", 0, false),
+        (0x6200, 0, U8, "rw", 0, true),
+    ]);
+    bench.send("000#0109");
+    assert_eq!(bench.send("209#890062005A000000"), [""; 0]);
+    assert_eq!(bench.value(0x6200, 0), 0x5A);
+    assert_eq!(bench.send("209#8901620001000000"), ["089#3082000000000000", "089#0000000000000000"]);
+}
+
+/// Every communication object that a file has and that has no effect here keeps its value: the value itself is taken, another is
+/// 0609 0030h. Those of SDO servers, clients and program download have rules of their own.
+#[test]
+fn what_has_no_effect_takes_its_own_value_and_no_other() {
+    const AT_ONCE: u16 = 100;
+    let others = (0x1000..=0x1FFF_u16).filter(|index| !takes(Mux::new(*index, 0))).collect::<Vec<_>>();
+    assert!(others.len() > 1000 && others.contains(&0x1013) && others.contains(&0x1F81));
+    for indices in others.chunks(AT_ONCE.into()) {
+        let mut rows = vec![(0x1000, 0, U32, "ro", 0, false)];
+        rows.extend(indices.iter().map(|index| (*index, 0, U32, "rw", 5, false)));
+        let mut bench = Bench::new(&rows);
+        for index in indices {
+            assert_eq!(bench.write(*index, 0, 4, 6), Some(0x0609_0030), "{index:04X}h");
+            assert_eq!(bench.write(*index, 0, 4, 5), None, "{index:04X}h");
+            assert_eq!(bench.value(*index, 0), 5);
+        }
+    }
+    // A text, and an object of a record of which other entries act.
+    let mut bench = Bench::new(&[
+        (0x1000, 0, U32, "ro", 0, false),
+        (0x1029, 0, U8, "ro", 2, false),
+        (0x1029, 1, U8, "rw", 0, false),
+        (0x1029, 2, U8, "rw", 0, false),
+        (0x1FFE, 0, U64, "rw", 3, false),
+    ]);
+    assert!(acts_on(Mux::new(0x1029, 1)) && !acts_on(Mux::new(0x1029, 2)));
+    assert_eq!((bench.write(0x1029, 1, 1, 1), bench.write(0x1029, 2, 1, 1)), (None, Some(0x0609_0030)));
+}
+
+/// The built-in servo has no writable communication object without an effect.
+#[test]
+fn the_built_in_servo_acts_on_every_communication_object_that_can_be_written() {
+    let rows = devices::servo::CIA402.dictionary.rows().iter();
+    let writable = rows.filter(|row| row.is_communication() && !matches!(row.access, Access::ReadOnly | Access::Const));
+    for row in writable.filter(|row| row.data_type.kind() != Kind::Bytes) {
+        assert!(takes(row.mux()), "{}", row.mux());
+    }
+}
