@@ -12,9 +12,11 @@ mod eeprom;
 mod firmware;
 mod frame;
 mod logs;
+mod lss;
 mod master_core;
 mod modbus;
 mod node;
+mod pdo_mapping;
 mod program_download;
 mod scenario;
 mod sdo_blocks;
@@ -49,6 +51,8 @@ pub const ALL: &[Law] = &[
     Law { name: "program_download", holds: program_download::program_download, samples: program_download::SAMPLES },
     Law { name: "sdo_blocks", holds: sdo_blocks::sdo_blocks, samples: sdo_blocks::SAMPLES },
     Law { name: "node", holds: node::node, samples: node::NODE_SAMPLES },
+    Law { name: "pdo_mapping", holds: pdo_mapping::pdo_mapping, samples: pdo_mapping::SAMPLES },
+    Law { name: "lss", holds: lss::lss, samples: lss::SAMPLES },
     Law { name: "modbus", holds: modbus::modbus, samples: modbus::SAMPLES },
     Law { name: "mjoint", holds: any_frames::mjoint, samples: any_frames::MJOINT_SAMPLES },
     Law { name: "zlac8030l", holds: any_frames::zlac8030l, samples: any_frames::ZLAC8030L_SAMPLES },

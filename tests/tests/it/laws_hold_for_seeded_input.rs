@@ -30,6 +30,8 @@ laws_hold! {
     a_program_belongs_to_its_identification_and_is_there_after_a_power_failure_whatever_is_requested: "program_download" 1_500;
     a_block_transfer_under_any_frames_changes_only_what_it_confirms_and_ends: "sdo_blocks";
     a_node_under_any_frames_keeps_its_dictionary_lawful: "node";
+    a_pdo_carries_the_bits_of_its_objects_or_its_mapping_is_refused: "pdo_mapping";
+    lss_requests_get_their_answers_and_read_back_as_written: "lss";
     an_mjoint_under_any_frames_and_sensors_keeps_its_objects_lawful_and_its_duty_cycles_shares: "mjoint";
     modbus_bytes_get_well_formed_responses_or_silence_and_the_next_request_its_answer: "modbus";
     a_zlac8030l_under_any_frames_and_sensors_keeps_its_objects_lawful: "zlac8030l";
