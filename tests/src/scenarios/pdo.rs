@@ -215,15 +215,22 @@ pub fn a_stored_mapping_works_after_a_power_cycle<S: PowerSubject>() {
     bench.hears_of("48n#", &[&format!("48n#00000000{:04X}", S::BOOTED.swap_bytes())]);
 }
 
-/// Table 77: 241 to 253 are reserved or for remote frames.
+/// Tables 72 and 77: 241 to 251 are reserved, 252 and 253 are for remote frames, and of TPDOs only.
 pub fn a_reserved_transmission_type_is_refused<S: Subject>() {
     let mut bench = Bench::<S>::new();
     for record in (0x1400..0x1404).chain(0x1800..0x1804) {
         for kind in [0, 1, 240, 254, 255] {
             bench.set((record, 2), kind);
         }
-        for kind in [241, 251, 252, 253] {
+        for kind in [241, 251] {
             bench.refuses((record, 2), kind, INVALID_VALUE);
+        }
+        for kind in [252, 253] {
+            if record >= 0x1800 && devices::model(S::MODEL).is_some_and(|model| model.pdo.remote_requests) {
+                bench.set((record, 2), kind);
+            } else {
+                bench.refuses((record, 2), kind, INVALID_VALUE);
+            }
         }
     }
 }

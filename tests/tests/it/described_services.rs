@@ -7,34 +7,8 @@ use canopen::time_stamp::TimeOfDay;
 use canopen::{Mux, NodeId, NodeProfile};
 use drives::communication::communication;
 use drives::node::{DescribedNode, Memory, acts_on, conditions, takes};
+use ferrodrive_tests::sheet::{SheetRow, U8, U16, U32, U64, sheet};
 use sim::machine::Boxed;
-
-/// Rows of a table `(index, sub-index, type, access, default, mappable)` as a file.
-fn sheet(rows: &[(u16, u8, u16, &str, u64, bool)]) -> Vec<u8> {
-    let mut text =
-        "[FileInfo]\nFileName=services.eds\n[DeviceInfo]\nVendorName=None\nProductName=Services\n".to_owned();
-    let mut records: Vec<u16> = rows.iter().filter(|row| row.1 > 0).map(|row| row.0).collect();
-    records.dedup();
-    for record in records {
-        let highest = rows.iter().filter(|row| row.0 == record).map(|row| row.1).max().unwrap_or(0);
-        text += &format!("[{record:X}]\nParameterName=R{record:X}\nObjectType=9\nSubNumber={}\n", highest + 1);
-    }
-    for (index, sub_index, data_type, access, default, mappable) in rows {
-        let is_record = rows.iter().any(|row| row.0 == *index && row.1 > 0);
-        let section = if is_record { format!("{index:X}sub{sub_index:X}") } else { format!("{index:X}") };
-        text += &format!(
-            "[{section}]\nParameterName=O{index:X}_{sub_index}\nDataType={data_type}\nAccessType={access}\n\
-             DefaultValue={default}\nPDOMapping={}\n",
-            u8::from(*mappable)
-        );
-    }
-    text.into_bytes()
-}
-
-const U8: u16 = 5;
-const U16: u16 = 6;
-const U32: u16 = 7;
-const U64: u16 = 0x1B;
 
 struct Bench {
     node: DescribedNode<Boxed>,
@@ -44,7 +18,7 @@ struct Bench {
 
 impl Bench {
     /// Node 9, switched on, its boot-up message taken away.
-    fn new(rows: &[(u16, u8, u16, &str, u64, bool)]) -> Self {
+    fn new(rows: &[SheetRow]) -> Self {
         let model = eds::keep(&eds::Eds::load(&sheet(rows)).expect("it is read").eds).expect("it is kept");
         let list: &'static _ = conditions(model.dictionary).collect::<Vec<_>>().leak();
         let numbers: &'static [u16; 256] = Box::leak(Box::new(condition_numbers(list)));
@@ -312,4 +286,43 @@ fn the_built_in_servo_acts_on_every_communication_object_that_can_be_written() {
     for row in writable.filter(|row| row.data_type.kind() != Kind::Bytes) {
         assert!(takes(row.mux()), "{}", row.mux());
     }
+}
+
+/// CiA 301, 7.2.8.2.1 and 7.3.2.2: it boots again, and answers; reset communication leaves what is not communication.
+#[test]
+fn nmt_resets_leave_the_node_alive() {
+    let mut bench = Bench::new(&[
+        (0x1000, 0, U32, "ro", 0x191, false),
+        (0x1017, 0, U16, "rw", 0, false),
+        (0x6200, 0, U8, "rw", 0, true),
+    ]);
+    for (command, kept) in [("000#8209", 0x5A), ("000#8200", 0x5A), ("000#8109", 0), ("000#8100", 0)] {
+        assert_eq!((bench.write(0x1017, 0, 2, 60_000), bench.write(0x6200, 0, 1, 0x5A)), (None, None));
+        assert_eq!(bench.send(command), ["709#00"]);
+        assert_eq!((bench.value(0x1017, 0), bench.value(0x6200, 0)), (0, kept), "{command}");
+        assert_eq!(bench.send("609#4000100000000000"), ["589#4300100091010000"]);
+        assert_eq!(bench.send("000#0100"), [""; 0]);
+    }
+}
+
+/// CiA 301, 7.2.8.2: a device does one of the two. The heartbeat counts while it is on.
+#[test]
+fn guarding_is_answered_while_no_heartbeat_is_produced() {
+    let mut bench = Bench::new(&[
+        (0x1000, 0, U32, "ro", 0, false),
+        (0x1001, 0, U8, "ro", 0, false),
+        (0x100C, 0, U16, "rw", 100, false),
+        (0x100D, 0, U8, "rw", 2, false),
+        (0x1014, 0, U32, "rw", 0x89, false),
+        (0x1017, 0, U16, "rw", 0, false),
+    ]);
+    assert_eq!(bench.send("709#R1"), ["709#7F"]);
+    assert_eq!(bench.send("709#R1"), ["709#FF"]);
+    bench.write(0x1017, 0, 2, 1000);
+    assert_eq!(bench.send("709#R1"), [""; 0]);
+    assert_eq!(bench.run(3000), ["709#7F", "709#7F", "709#7F"], "heartbeats alone, and the life time is not watched");
+    bench.write(0x1017, 0, 2, 0);
+    assert_eq!(bench.send("709#R1"), ["709#7F"], "the toggle bit begins with 0");
+    assert_eq!(bench.run(1000), ["089#3081110000000000"], "200 ms later the master has gone");
+    assert_eq!(bench.send("709#R1"), ["709#FF", "089#0000000000000000"]);
 }

@@ -15,6 +15,7 @@ mod io_and_encoders;
 mod laws_hold_for_seeded_input;
 mod lss;
 mod program_download;
+mod random_frames;
 mod realism;
 mod tables_of_cia402;
 mod tables_of_the_drives;

@@ -1,0 +1,202 @@
+//! Random frames against every kind of node: each virtual drive, the servo of CiA 402, and a device whose file has every service of
+//! CiA 301 that a described device acts on.
+//!
+//! `cargo run -p ferrodrive-tests --example random_frames -- 10000000` does it for as many frames as are said; a short form
+//! is among the tests.
+
+use can::{Bitrate, CanId, Frame, Instant};
+use canopen::NodeId;
+use canopen::od::Entry;
+use devices::{AxisId, Description};
+use sim::VirtualDrive;
+use sim::machine::{Order, models, order};
+
+use crate::seeded::Seeded;
+use crate::sheet::{SheetRow, U8, U16, U32, U64, sheet};
+
+/// After so many frames a node is replaced by another of its kind: LSS or a write may have taken it out of hearing.
+const FRAMES_OF_A_NODE: u64 = 5_000;
+const NODE: u8 = 5;
+/// What one call may leave to be sent: every TPDO, EMCY, and a frame of each other service.
+const MOST_AT_ONCE: usize = 64;
+
+/// What a run saw.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Seen {
+    /// Frames sent to nodes.
+    pub frames: u64,
+    /// Answers of SDO servers.
+    pub answers: u64,
+    /// Other frames of the nodes.
+    pub others: u64,
+}
+
+/// Every kind: the models that are built in, and the device of [`everything`].
+///
+/// # Panics
+/// If the file makes no description.
+#[must_use]
+pub fn kinds() -> Vec<&'static Description> {
+    let read = eds::Eds::load(&everything()).expect("the file is read");
+    let described = eds::keep(&read.eds).expect("the file makes a description");
+    models().chain([described]).collect()
+}
+
+/// `frames` frames to a kind of node, all from one seed.
+///
+/// # Panics
+/// If the node panics, sends without end, or never answers.
+pub fn survives(model: &'static Description, frames: u64, seed: u64) -> Seen {
+    let mut seeded = Seeded::new(seed);
+    let mut seen = Seen::default();
+    while seen.frames < frames {
+        let count = FRAMES_OF_A_NODE.min(frames - seen.frames);
+        one_node(model, count, &mut seeded, &mut seen);
+    }
+    assert!(seen.answers > 0 && seen.others > 0, "{} is not heard: {seen:?}", model.name);
+    seen
+}
+
+fn one_node(model: &'static Description, count: u64, seeded: &mut Seeded, seen: &mut Seen) {
+    let node = NodeId::new(NODE).expect("a node-ID");
+    let mut drive = order(model, &Order::new(model, node, Bitrate::M1)).expect("as delivered");
+    let mut now = Instant::ZERO;
+    drive.apply(AxisId::FIRST, &"power on".parse().expect("a stimulus"), now).expect("every machine has a supply");
+    for _ in 0..count {
+        // A frame of 130 bits at 1 Mbit/s, and now and then a pause.
+        let pause_us = if seeded.below(200) == 0 { 5_000 } else { 130 };
+        now = now.plus_nanos(pause_us * 1000);
+        while let Some(due) = drive.poll_timeout().filter(|due| *due <= now) {
+            drive.handle_timeout(due);
+            take(&mut *drive, due, seen);
+        }
+        drive.advance(now);
+        let frame = frame(seeded, model.dictionary.rows());
+        seen.frames += 1;
+        drive.handle_frame(&frame, now);
+        take(&mut *drive, now, seen);
+    }
+}
+
+fn take(drive: &mut dyn VirtualDrive, now: Instant, seen: &mut Seen) {
+    for count in 0.. {
+        let Some(frame) = drive.poll_transmit() else { return };
+        assert!(count < MOST_AT_ONCE, "{} sends without end, at last {frame}", drive.model());
+        drive.handle_transmitted(&frame, now);
+        let is_answer = frame.id() == canopen::connection_set::sdo_reply(NodeId::new(NODE).expect("a node-ID"));
+        *(if is_answer { &mut seen.answers } else { &mut seen.others }) += 1;
+    }
+}
+
+/// Any frame, most of them for a service that the node may have.
+fn frame(seeded: &mut Seeded, rows: &[Entry]) -> Frame {
+    let length = if seeded.below(4) == 0 { seeded.below(9) } else { 8 };
+    let data = seeded.bits().to_le_bytes();
+    let of = |id: u16, data: &[u8]| Frame::new(CanId::standard(id), data);
+    match seeded.below(100) {
+        0..45 => of(0x600 + u16::from(NODE), &request(seeded, rows)[..length]),
+        45..60 => {
+            let base = 0x180 + 0x80 * seeded.below(8) as u16;
+            of(base + u16::from(NODE), &data[..length])
+        }
+        60..68 => {
+            // Resets are rare, or it would never come far.
+            let command = [1, 1, 1, 2, 128, 129, 130, data[0]][if seeded.below(20) == 0 { seeded.below(8) } else { 0 }];
+            of(0, &[command, if seeded.below(2) == 0 { NODE } else { 0 }][..length.min(2)])
+        }
+        68..78 => of(0x080, &data[..length.min(1)]),
+        78..84 => {
+            let id = [0x185, 0x285, 0x385, 0x485, 0x705, 0x085][seeded.below(6)];
+            Frame::remote(CanId::standard(id), length as u8)
+        }
+        84..88 => of(0x7E5, &data[..length]),
+        88..92 => of([0x100, 0x701, 0x77F, 0x081, 0x082][seeded.below(5)], &data[..length]),
+        92..94 => Frame::new(CanId::extended(seeded.bits() as u32 & CanId::MAX_EXTENDED), &data[..length]),
+        _ => of(seeded.below(0x800) as u16, &data[..length]),
+    }
+}
+
+/// An SDO request about an object that is there, as a rule.
+fn request(seeded: &mut Seeded, rows: &[Entry]) -> [u8; 8] {
+    const COMMANDS: [u8; 18] =
+        [0x40, 0x40, 0x2F, 0x2F, 0x2B, 0x2B, 0x27, 0x23, 0x23, 0x22, 0x21, 0x20, 0x60, 0x70, 0x00, 0x0D, 0x80, 0xA4];
+    let row = &rows[seeded.below(rows.len())];
+    let [low, high] = row.index.to_le_bytes();
+    let mut data = seeded.bits().to_le_bytes();
+    // Small values are within the limits of most objects.
+    if seeded.below(2) == 0 {
+        data[5..].fill(0);
+    }
+    let command = if seeded.below(20) == 0 { data[0] } else { COMMANDS[seeded.below(COMMANDS.len())] };
+    let sub_index = if seeded.below(20) == 0 { data[3] } else { row.sub_index };
+    if seeded.below(20) == 0 {
+        return data;
+    }
+    [command, low, high, sub_index, data[4], data[5], data[6], data[7]]
+}
+
+/// Every service that a described device has by its objects, with PDOs of every sort: synchronous, on request, at the bit,
+/// multiplexed both ways.
+fn everything() -> Vec<u8> {
+    let mut rows: Vec<SheetRow> = vec![(0x1000, 0, U32, "ro", 0x0003_0191, false), (0x1001, 0, U8, "ro", 0, true)];
+    rows.extend([(0x1002, 0, U32, "ro", 0, true), (0x1003, 0, U8, "rw", 0, false), (0x1003, 1, U32, "ro", 0, false)]);
+    let numbers = [
+        (0x1005, U32, 0x80),
+        (0x1006, U32, 0),
+        (0x1007, U32, 0),
+        (0x100C, U16, 0),
+        (0x100D, U8, 0),
+        (0x1012, U32, 0x100),
+        (0x1014, U32, 0x85),
+        (0x1015, U16, 0),
+        (0x1017, U16, 0),
+        (0x1019, U8, 0),
+    ];
+    rows.extend(numbers.map(|(index, data_type, default)| (index, 0, data_type, "rw", default, false)));
+    for (index, entries, data_type, default) in [
+        (0x1010, 3, U32, 1),
+        (0x1011, 3, U32, 1),
+        (0x1016, 3, U32, 0),
+        (0x1020, 2, U32, 0),
+        (0x1028, 3, U32, 0x8000_0081),
+        (0x1029, 1, U8, 0),
+        (0x1FA0, 2, U32, 0x0260_0001),
+        (0x1FD0, 2, U64, 0x0162_0001_6000_0101),
+    ] {
+        rows.push((index, 0, U8, "ro", u64::from(entries), false));
+        rows.extend((1..=entries).map(|sub_index| (index, sub_index, data_type, "rw", default, false)));
+    }
+    for (n, (transmission_type, mapped)) in [(255, 2), (1, 3), (255, 0xFF), (255, 0xFE)].into_iter().enumerate() {
+        pdo(&mut rows, [0x1400, 0x1600], n as u16, 0x205, transmission_type, mapped, 0x6200_0108);
+    }
+    for (n, (transmission_type, mapped)) in [(254, 1), (2, 3), (252, 2), (254, 0xFE)].into_iter().enumerate() {
+        pdo(&mut rows, [0x1800, 0x1A00], n as u16, 0x185, transmission_type, mapped, 0x6000_0108);
+    }
+    for (index, access) in [(0x6000, "ro"), (0x6200, "rw")] {
+        rows.push((index, 0, U8, "ro", 4, false));
+        rows.extend((1..=4).map(|sub_index| (index, sub_index, U8, access, 0, true)));
+    }
+    rows.sort_by_key(|row| (row.0, row.1));
+    let text = String::from_utf8(sheet(&rows)).expect("a text");
+    text.replacen("[DeviceInfo]\n", "[DeviceInfo]\nLSS_Supported=1\n", 1).into_bytes()
+}
+
+fn pdo(
+    rows: &mut Vec<SheetRow>,
+    [parameter, mapping]: [u16; 2],
+    n: u16,
+    cob_id: u64,
+    transmission_type: u64,
+    mapped: u64,
+    first: u64,
+) {
+    let (parameter, mapping) = (parameter + n, mapping + n);
+    rows.push((parameter, 0, U8, "ro", 6, false));
+    rows.push((parameter, 1, U32, "rw", cob_id + 0x100 * u64::from(n), false));
+    rows.push((parameter, 2, U8, "rw", transmission_type, false));
+    rows.push((parameter, 3, U16, "rw", 0, false));
+    rows.push((parameter, 5, U16, "rw", 0, false));
+    rows.push((parameter, 6, U8, "rw", 0, false));
+    rows.push((mapping, 0, U8, "rw", mapped, false));
+    rows.extend((0..4).map(|entry| (mapping, entry as u8 + 1, U32, "rw", first + (entry << 8), false)));
+}
