@@ -209,7 +209,7 @@ fn changed_objects_of_the_scanning_list_are_sent_in_source_address_mode_in_turn(
     bench.set(0x2000, 0, &[1, 0]);
     assert_eq!(bench.run(10), [""; 0], "not before operational");
     bench.send("000#0109");
-    assert_eq!(bench.run(10), [""; 0], "what it begins with is no change");
+    assert_eq!(bench.run(10), [""; 0], "what it begins with does not count");
     bench.set(0x6000, 2, &[0xA5]);
     bench.set(0x2000, 0, &[0x34, 0x12]);
     bench.set(0x6000, 1, &[8]);

@@ -345,11 +345,17 @@ impl<S: Storage> Station for Node<S> {
 
     #[inline]
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        self.now = now;
         match frame.standard_data_id() {
-            Some(id) if self.received.contain(id) => self.receive(frame, id),
+            Some(id) if self.received.contain(id) => {
+                self.now = now;
+                self.receive(frame, id);
+            }
+            // As one that it [ignores](Station::ignores).
             Some(_) => {}
-            None => self.receive_remote(frame),
+            None => {
+                self.now = now;
+                self.receive_remote(frame);
+            }
         }
     }
 

@@ -52,7 +52,9 @@ impl<S: Storage> Node<S> {
     /// Stores the one object that the frame names. One of another node or mode, and one that no dispatching list leads to, is not
     /// for this node.
     #[cold]
-    pub(super) fn receive_multiplexed(&mut self, position: usize, mpdo: &Mpdo, mode: AddressMode) {
+    pub(super) fn receive_multiplexed(&mut self, position: usize, data: u64) {
+        let mpdo = Mpdo::from_bits(data);
+        let Some(mode) = self.pdos.rpdos.as_ref()[position].address_mode() else { return };
         let Some(object) = mpdo.destination(&self.dictionary.view(), self.node_id, mode) else { return };
         match self.write_multiplexed(object, &mpdo.data) {
             Ok(slot) => {

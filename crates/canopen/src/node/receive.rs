@@ -153,7 +153,7 @@ impl<S: Storage> Node<S> {
         match reception {
             Reception::Apply(data) => self.apply_rpdo(position, data),
             Reception::Latch(data) => self.latch_rpdo(position, data),
-            Reception::Multiplexed(mpdo, mode) => self.receive_multiplexed(position, &mpdo, mode),
+            Reception::Multiplexed(data) => self.receive_multiplexed(position, data),
             Reception::TooShort => return self.refuse_short_rpdo(position),
             Reception::NothingMapped => return,
         }

@@ -73,10 +73,15 @@ pub struct Mpdo {
 impl Mpdo {
     /// Reads a frame of eight bytes; `None` for any other. The identifier is the caller's to check.
     pub fn parse(frame: &Frame) -> Option<Self> {
-        let [address, low, high, sub_index, data @ ..] = <[u8; 8]>::try_from(frame.data()).ok()?;
+        <[u8; 8]>::try_from(frame.data()).ok().map(|bytes| Self::from_bits(u64::from_le_bytes(bytes)))
+    }
+
+    /// The reverse of [`bits`](Self::bits).
+    pub const fn from_bits(bits: u64) -> Self {
+        let [address, low, high, sub_index, a, b, c, d] = bits.to_le_bytes();
         let mode = if address & DESTINATION == 0 { AddressMode::Source } else { AddressMode::Destination };
         let object = Mux::new(u16::from_le_bytes([low, high]), sub_index);
-        Some(Self { mode, node: address & !DESTINATION, object, data })
+        Self { mode, node: address & !DESTINATION, object, data: [a, b, c, d] }
     }
 
     /// The eight bytes, as a number with the first byte lowest.

@@ -36,8 +36,8 @@ pub enum Reception {
     Latch(u64),
     /// Fewer bytes than mapped: nothing of it is used.
     TooShort,
-    /// One object, which the frame names, as this mode has it. It takes effect now, whatever the transmission type is.
-    Multiplexed(Mpdo, AddressMode),
+    /// One object, which the data names ([`Mpdo::from_bits`]). It takes effect now, whatever the transmission type is.
+    Multiplexed(u64),
     /// No object is mapped.
     NothingMapped,
 }
@@ -70,6 +70,11 @@ impl Rpdo {
         self.id
     }
 
+    /// The mode of its addresses, if it is multiplexed.
+    pub const fn address_mode(&self) -> Option<AddressMode> {
+        self.multiplexed
+    }
+
     /// What is mapped.
     pub const fn mapping(&self) -> Option<&Mapping> {
         self.mapping.as_ref()
@@ -91,7 +96,7 @@ impl Rpdo {
         match (self.multiplexed, Mpdo::parse(frame)) {
             (None, _) => Reception::NothingMapped,
             (Some(_), None) => Reception::TooShort,
-            (Some(mode), Some(mpdo)) => Reception::Multiplexed(mpdo, mode),
+            (Some(_), Some(mpdo)) => Reception::Multiplexed(mpdo.bits()),
         }
     }
 

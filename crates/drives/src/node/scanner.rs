@@ -37,7 +37,7 @@ impl<S: Storage> Scanner<S> {
         let Some(sent) = &mut self.sent else { return };
         let operational = device.node().state() == NmtState::Operational;
         if !core::mem::replace(&mut self.running, operational) || !operational {
-            // What it begins with is no change.
+            // What it begins with does not count as a change.
             for (slot, _) in device.values().table().iter() {
                 sent.as_mut()[slot.position()] = device.values().raw(slot);
             }
