@@ -1,6 +1,7 @@
 //! So many random frames (the first argument; 1000000 without one) over every kind of node, from a seed (the second; 1).
 
 use std::error::Error;
+use std::io::Write;
 
 use ferrodrive_tests::random_frames::{kinds, survives};
 
@@ -12,10 +13,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let each = frames.div_ceil(kinds.len() as u64);
     for model in kinds {
         let seen = survives(model, each, seed);
-        println!(
+        writeln!(
+            std::io::stdout(),
             "{:14} {:>10} frames, {:>10} SDO answers, {:>10} other frames",
-            model.name, seen.frames, seen.answers, seen.others
-        );
+            model.name,
+            seen.frames,
+            seen.answers,
+            seen.others
+        )?;
     }
     Ok(())
 }
