@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use can::Bitrate;
-use canopen::NodeId;
+use canopen::{NmtState, NodeId};
+use master::Network;
+use master::boot::{BootPlan, Expectation};
 use sim::machine::{Order, order};
 use sim::{StationId, World};
 
@@ -251,4 +253,39 @@ fn what_nothing_acts_on_and_what_contradicts_is_refused_with_the_standards_codes
     assert_eq!(refused(0x1006, 0, 4, 1000), None);
     assert_eq!(refused(0x1019, 0, 1, 4), Some(0x0800_0022));
     assert_eq!(refused(0x1019, 0, 1, 240), None, "as it is");
+}
+
+/// A device whose file has 100Ch and 100Dh, and no 1017h, is watched by node guarding (CiA 301, 7.2.8.2.1), and so is its master by it.
+#[test]
+fn a_device_without_a_heartbeat_is_guarded_by_the_master_that_boots_it() {
+    let without = String::from_utf8_lossy(SHEET)
+        .replace("[1017]\nParameterName=Heartbeat\nDataType=6\n", "[2010]\nParameterName=X\nDataType=6\n");
+    let guard = "[100C]\nParameterName=Guard time\nDataType=6\nAccessType=rw\nDefaultValue=50\n\
+                 [100D]\nParameterName=Life time factor\nDataType=5\nAccessType=rw\nDefaultValue=4\n";
+    let read = eds::Eds::load((without + guard).as_bytes()).expect("it is read");
+    let model = eds::keep(&read.eds).expect("it makes a description");
+    let (node, network) = (NodeId::new(9).unwrap(), Network::new());
+    let mut world = World::new(Bitrate::M1, 1);
+    world.add_station(network.clone());
+    world.add_drive(9, order(model, &Order::new(model, node, Bitrate::M1)).unwrap()).unwrap();
+    world.run_for(Duration::from_millis(100));
+    let plan = BootPlan::new([(node, Expectation { vendor_id: None, ..Expectation::of(model) })]);
+    let report = sim::block_on(&mut world, network.boot(&plan)).unwrap().nodes.remove(0);
+    assert!(!report.has_failed() && report.state == Some(NmtState::Operational), "{report}");
+    let watch = |network: &Network| network.node(node).facts().heartbeat_watch.expect("it is watched");
+    assert_eq!((watch(&network).time, watch(&network).asked), (Duration::from_millis(200), true));
+    world.run_for(Duration::from_secs(5));
+    assert!(!watch(&network).lost);
+    while network.poll_event().is_some() {}
+    for line in ["9 cable cut", "9 cable join"] {
+        assert!(sim::command::answer(&mut world, line).unwrap().json.starts_with("{\"ok\":true"));
+        world.run_for(Duration::from_secs(1));
+        assert_eq!(watch(&network).lost, line.ends_with("cut"), "{line}");
+    }
+    let said: Vec<String> = std::iter::from_fn(|| network.poll_event()).map(|(_, event)| event.to_string()).collect();
+    assert!(said.contains(&"node 9: no answer to node guarding for 200 ms".to_owned()), "{said:?}");
+    // Its own life time was over as well: life guarding error, and its end.
+    for expected in ["emergency 8130h", "emergency 0000h", "it is heard again"] {
+        assert!(said.iter().any(|event| event.contains(expected)), "{expected}: {said:?}");
+    }
 }
