@@ -36,13 +36,16 @@ pub struct Execution {
     seed: u64,
     host: StationId,
     /// The hosts at work; `None` for one that is through.
-    tasks: Vec<Option<Task<Pin<Box<dyn Future<Output = ()>>>>>>,
+    tasks: Vec<Option<Task<HostFuture>>>,
     shared: Rc<RefCell<HostBoard>>,
     script: Script,
     next_sample: Instant,
     frames: VecDeque<(Instant, can::Frame)>,
     finished: bool,
 }
+
+/// A host as it goes through its lines.
+type HostFuture = Pin<Box<dyn Future<Output = ()>>>;
 
 impl Execution {
     /// The world of a scenario at time zero, with the power just come on, and its execution. Without a seed it is that of the scenario,
@@ -66,7 +69,7 @@ impl Execution {
         let tasks = scenario.hosts.iter().enumerate().map(|(number, it)| {
             let (machine, shared) = (Rc::clone(&machine), Rc::clone(&shared));
             let task = HostTask { number, name: it.name.clone(), network: network.clone(), machine, shared };
-            let future: Pin<Box<dyn Future<Output = ()>>> = Box::pin(run(task, it.start, it.lines.clone()));
+            let future: HostFuture = Box::pin(run(task, it.start, it.lines.clone()));
             Some(Task::new(future))
         });
         let tasks = tasks.collect();

@@ -4,6 +4,26 @@
 //! [`world::ServedWorld`] is the world behind a [`transport::Hub`]; [`pacer`] says how fast its time passes; [`service`] answers what is
 //! asked of it between two steps, and [`control`] has the sockets of the control connection. [`world_bus::WorldBus`] is a world as the bus
 //! of this very program.
+//!
+//! What the clock shows is an argument: without a hub and its sockets a served world is moved by a test as well.
+//!
+//! ```
+//! use can::{Bitrate, Instant};
+//! use serve::messages::Messages;
+//! use serve::pacer::{Clock, Pacer, Speed};
+//! use serve::world::ServedWorld;
+//! use sim::World;
+//! use sim::machine::zlac8030l;
+//! use transport::RealTimeWorld;
+//!
+//! let mut world = World::new(Bitrate::K500, 1);
+//! world.add_drive(4, Box::new(zlac8030l(4, 1))).unwrap();
+//! let pacer = Pacer::new(Clock::Real, Speed::Times(10.0));
+//! let mut served = ServedWorld::new(world, pacer, false, Messages::of_warnings());
+//! let target = served.target(Instant::from_millis(50));
+//! served.advance_to(target);
+//! assert_eq!(served.now(), Instant::from_millis(500));
+//! ```
 
 pub mod control;
 pub mod eeprom;

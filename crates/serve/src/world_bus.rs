@@ -1,6 +1,6 @@
 //! The embedded world as a bus that passes with the clock, for a command that serves people: they live in its time.
 //!
-//! The world is moved whenever its bus is used, and at least once in [`STEP`]. One that falls far behind (the machine slept)
+//! The world is moved whenever its bus is used, and at least once a millisecond. One that falls far behind (the machine slept)
 //! does not hurry after: the time between is left out.
 
 use std::time::Duration;

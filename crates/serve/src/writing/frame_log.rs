@@ -13,7 +13,7 @@ use words::failure::Failure;
 /// Frames, and when the bus carried them.
 type Batch = Vec<(Instant, Frame)>;
 
-/// See the [module](self).
+/// The log of `sim --log`, which a thread of its own writes.
 pub struct FrameLog(Background<Batch>);
 
 /// A log whose times are counted from this one.

@@ -19,7 +19,7 @@ fn moved_by_hand_time_stands_until_a_run_and_comes_to_where_it_says() {
     let mut bench = Bench::new(world(SERVO), by_hand());
     let mut ask = |line: &str| {
         // Time of the clock in which that of the drives stands.
-        bench.clock = bench.clock + Duration::from_secs(50);
+        bench.clock += Duration::from_secs(50);
         bench.turn();
         bench.ask(line)
     };
@@ -112,9 +112,9 @@ fn as_fast_as_it_can_it_serves_clients_between_its_steps() {
     // Without a client it goes with the clock.
     bench.leave(1);
     let stood = bench.served.now();
-    bench.clock = bench.clock + Duration::from_millis(5);
+    bench.clock += Duration::from_millis(5);
     bench.turn();
-    bench.clock = bench.clock + Duration::from_millis(5);
+    bench.clock += Duration::from_millis(5);
     bench.turn();
     assert_eq!(bench.served.now(), stood + Duration::from_millis(5));
 }
