@@ -237,6 +237,9 @@ fn remedy(error: &master::Error) -> Option<&'static str> {
         Error::BadAnswer { .. } => "try again; ferrodrive scan shows whether two devices have this node-ID",
         Error::WrongLength { .. } => "ferrodrive scan shows what the node is; name its model if it is another one",
         Error::QueueFull { .. } => "wait for the requests that are under way, then send the next one",
+        Error::NoSuchAxis { axes: 0, .. } => {
+            "name the node of a drive; `ferrodrive write` sets the outputs of other devices"
+        }
         Error::NoSuchAxis { .. } => "name an axis that the model has; the first is number 1",
         Error::NoSuchQuantity { .. } => "ferrodrive objects NODE lists what the model has",
         Error::NoFeed { .. } => {

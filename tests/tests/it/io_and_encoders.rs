@@ -4,9 +4,11 @@
 use std::time::Duration;
 
 use can::{Bitrate, Frame};
-use canopen::{AbortCode, NodeId};
+use canopen::{AbortCode, Mux, NodeId};
+use master::units::Degrees;
+use master::{Drive, MotionOptions, Network};
 use sim::machine::{Order, order};
-use sim::{Place, StationId, Stimulus, World};
+use sim::{Place, StationId, Stimulus, World, block_on};
 use words::models::resolve;
 
 struct Bench {
@@ -331,4 +333,24 @@ fn objects_of_the_profile_that_nothing_acts_on_take_no_writes() {
     assert_eq!(bench.write(20, 0x6200, 1, 1, 5), Ok(()));
     assert_eq!(bench.write(20, 0x2000, 0, 1, 5), Ok(()), "the maker's own are stored and answered");
     assert_eq!(bench.world.report(20).unwrap().outputs.bits, 5);
+}
+
+#[test]
+fn what_is_not_a_drive_is_not_moved_and_is_known_by_its_device_type() {
+    let mut world = World::new(Bitrate::M1, 1);
+    let network = Network::new();
+    world.add_station(network.clone());
+    for (name, number) in [("io401", MODULE), ("encoder406", ENCODER)] {
+        let (model, node) = (resolve(name).unwrap(), NodeId::new(number).unwrap());
+        world.add_drive(number, order(model, &Order::new(model, node, Bitrate::M1)).unwrap()).unwrap();
+        world.run_for(Duration::from_millis(300));
+        let drive = Drive::new(network.node(node), model);
+        let moved = block_on(&mut world, drive.move_relative(Degrees(90.0), MotionOptions::default())).unwrap();
+        assert_eq!(
+            moved.unwrap_err().to_string(),
+            format!("node {number}: the Ferrodrive {name} is not a drive: it has nothing that moves")
+        );
+        let device_type = block_on(&mut world, drive.node().read::<u32>(Mux::new(0x1000, 0))).unwrap().unwrap();
+        assert_eq!(device_type & 0xFFFF, if name == "io401" { 0x0191 } else { 0x0196 });
+    }
 }

@@ -146,8 +146,8 @@ pub enum Error {
         /// The object that the model has.
         object: Mux,
     },
-    /// The drive has no axis of this number.
-    #[error("node {node}: the {model} has {axes} axes, and no axis {}", axis.0)]
+    /// The drive has no axis of this number, or the device is not a drive.
+    #[error("node {node}: the {model} {}", no_such_axis(*axis, *axes))]
     NoSuchAxis {
         /// The node.
         node: NodeId,
@@ -247,6 +247,14 @@ pub enum Error {
         /// An object that makes the counts finer.
         finer: Option<Setting>,
     },
+}
+
+/// What is there in place of an axis.
+fn no_such_axis(axis: AxisId, axes: usize) -> String {
+    match axes {
+        0 => "is not a drive: it has nothing that moves".to_owned(),
+        axes => format!("has {axes} axes, and no axis {}", axis.0),
+    }
 }
 
 impl Error {
