@@ -324,15 +324,20 @@ fn objects_of_the_profile_that_nothing_acts_on_take_no_writes() {
         [6003]\nParameterName=Filter\nObjectType=8\nSubNumber=2\n[6003sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=1\n\
         [6003sub1]\nParameterName=Filter 1\nDataType=5\nAccessType=rw\n\
         [2000]\nParameterName=Own\nDataType=5\nAccessType=rw\n";
-    let description = eds::keep(&eds::Eds::load(sheet.as_bytes()).unwrap().eds).unwrap();
-    let mut bench = Bench::new();
-    let node = NodeId::new(20).unwrap();
-    bench.world.add_drive(20, order(description, &Order::new(description, node, Bitrate::M1)).unwrap()).unwrap();
-    bench.run_ms(300);
-    assert_eq!(bench.write(20, 0x6003, 1, 1, 5), Err(AbortCode::READ_ONLY));
-    assert_eq!(bench.write(20, 0x6200, 1, 1, 5), Ok(()));
-    assert_eq!(bench.write(20, 0x2000, 0, 1, 5), Ok(()), "the maker's own are stored and answered");
-    assert_eq!(bench.world.report(20).unwrap().outputs.bits, 5);
+    // Of a profile that is not CiA 401 they are stored and answered; where 1000h is left open, the objects decide.
+    for (device_type, acts) in [("0x00030191", true), ("0", true), ("0x00030194", false)] {
+        let sheet = sheet.replace("0x00030191", device_type);
+        let description = eds::keep(&eds::Eds::load(sheet.as_bytes()).unwrap().eds).unwrap();
+        let mut bench = Bench::new();
+        let node = NodeId::new(20).unwrap();
+        bench.world.add_drive(20, order(description, &Order::new(description, node, Bitrate::M1)).unwrap()).unwrap();
+        bench.run_ms(300);
+        let refused = bench.write(20, 0x6003, 1, 1, 5) == Err(AbortCode::READ_ONLY);
+        assert_eq!(refused, acts, "{device_type}");
+        assert_eq!(bench.write(20, 0x6200, 1, 1, 5), Ok(()));
+        assert_eq!(bench.write(20, 0x2000, 0, 1, 5), Ok(()), "the maker's own are stored and answered");
+        assert_eq!(bench.world.report(20).unwrap().outputs.bits, if acts { 5 } else { 0 }, "{device_type}");
+    }
 }
 
 #[test]

@@ -61,6 +61,11 @@ impl<S: Storage> DescribedNode<S> {
         }
     }
 
+    /// It is an encoder (CiA 406), which [sees](Self::see_shaft) a shaft.
+    pub const fn is_encoder(&self) -> bool {
+        self.profile.is_encoder()
+    }
+
     /// The shaft that an encoder sits on (CiA 406) is at so many turns, and turns so fast, in turns a second.
     pub fn see_shaft(&mut self, turns: f64, turns_s: f64) {
         self.profile.see_shaft(self.base.device.values_mut(), turns, turns_s);

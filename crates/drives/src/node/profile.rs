@@ -40,8 +40,7 @@ pub fn profile_conditions(description: &'static Description) -> impl Iterator<It
         let of_profile = (0x6000..=0x67FF).contains(&row.index);
         has_profile && of_profile && row.access.is_writable() && !acts_on(description, row.mux())
     });
-    let is_encoder = matches!(Profile::of(description), Profile::Encoder(_));
-    let own = is_encoder.then(|| encoder::conditions(table)).into_iter().flatten();
+    let own = Profile::of(description).is_encoder().then(|| encoder::conditions(table)).into_iter().flatten();
     rows.map(|(slot, _)| (slot, Condition::Check(refused))).chain(own)
 }
 
@@ -51,13 +50,23 @@ fn refused(_: &View<'_>, _: u32) -> Result<(), AbortCode> {
 }
 
 impl Profile {
-    /// By the low word of 1000h, of a device that is not a drive.
-    pub(super) const fn of(description: &Description) -> Self {
+    /// By the low word of 1000h, of a device that is not a drive. Makers leave its value open: then the objects decide.
+    pub(super) fn of(description: &Description) -> Self {
+        let has = |index, sub_index| description.row(Mux::new(index, sub_index)).is_some();
+        let is_left_open = description.identity.device_type & 0xFFFF == 0;
+        let channels = || [0x6000, 0x6200, 0x6401, 0x6411].into_iter().any(|index| has(index, 1));
         match description.identity.device_type & 0xFFFF {
-            401 if description.axes.is_empty() => Self::Io(Io::NONE),
-            406 if description.axes.is_empty() => Self::Encoder(Encoder::NONE),
+            _ if !description.axes.is_empty() => Self::None,
+            406 => Self::Encoder(Encoder::NONE),
+            401 => Self::Io(Io::NONE),
+            _ if is_left_open && has(0x6004, 0) && has(0x6501, 0) => Self::Encoder(Encoder::NONE),
+            _ if is_left_open && channels() => Self::Io(Io::NONE),
             _ => Self::None,
         }
+    }
+
+    pub(super) const fn is_encoder(&self) -> bool {
+        matches!(self, Self::Encoder(_))
     }
 
     pub(super) fn restart(&mut self, values: &mut Dictionary<impl Storage>) {

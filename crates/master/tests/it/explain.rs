@@ -313,7 +313,7 @@ const CONDITIONS: &[Row] = &[
     Row("software_limit", &["cia402"], soft_limits),
     Row("homing_not_started", &["zlim42c", "cia402"], |bench| bench.enable(6)),
     Row("shaft_held", &["m4230e17b50"], |bench| hold_shaft(bench, 50)),
-    Row("mode_not_taken", &["zlac8030l", "zlim42c", "cia402"], change_mode_while_turning),
+    Row("mode_not_taken", &["zlac8030l", "zlim42c"], change_mode_while_turning),
     Row("profile_velocity_zero", &["cia402"], no_profile_velocity),
     Row("homing_failed", &["zlim42c", "cia402"], interrupt_homing),
     Row("emergency_stop", &["zlac8030l", "zlim42c"], press_emergency_stop),

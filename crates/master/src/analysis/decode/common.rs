@@ -71,7 +71,7 @@ const TYPES: [(u16, DataType); 7] = [
 ];
 
 /// Arrays and records of the standards that none of the models has: what stands in them differs by sub-index.
-const RECORDS: [u16; 6] = [0x1020, 0x1021, 0x1022, 0x1028, 0x607B, 0x6090];
+const RECORDS: [u16; 5] = [0x1020, 0x1021, 0x1022, 0x1028, 0x6090];
 
 #[cfg(test)]
 mod tests {
@@ -85,7 +85,7 @@ mod tests {
             assert!(!all().iter().any(has), "{index:04X}h: a model's own row speaks for it");
             assert!(common_name(Mux::new(index, 0)).is_some(), "{index:04X}h");
         }
-        assert_eq!(common_name(Mux::new(0x607B, 1)), Some("position_range_limit"));
+        assert_eq!(common_name(Mux::new(0x6090, 1)), Some("velocity_encoder_resolution"));
         assert_eq!(
             (common_name(Mux::new(0x60FA, 0)), common_name(Mux::new(0x60FA, 1))),
             (Some("control_effort"), None)
@@ -117,7 +117,7 @@ mod tests {
         assert_eq!(data_type(0x6040, 0), Some(DataType::Unsigned16));
         assert_eq!([0x607A, 0x60FA].map(|index| data_type(index, 0)), [Some(I32); 2]);
         assert_eq!((data_type(0x6081, 0), data_type(0x1017, 0)), (Some(U32), Some(DataType::Unsigned16)));
-        assert_eq!([(0x2000, 0), (0x6060, 1), (0x607B, 1)].map(|(index, sub)| data_type(index, sub)), [None; 3]);
+        assert_eq!([(0x2000, 0), (0x6060, 1), (0x6090, 1)].map(|(index, sub)| data_type(index, sub)), [None; 3]);
         let mode = standard_row(Mux::new(0x6060, 0)).unwrap();
         assert_eq!(mode.meaning(6), Some("homing"));
         assert!(standard_row(Mux::new(0x60FF, 0)).unwrap().unit.is_empty(), "the unit is the node's own");

@@ -18,9 +18,6 @@ use crate::{Levels, PowerPhase, Refused, Report, Source, VirtualDrive};
 /// Supply that such devices have. Assumed: the 24 V of control cabinets.
 const SUPPLY_V: f64 = 24.0;
 
-/// Low word of 1000h of an encoder (CiA 406).
-const ENCODER: u32 = 406;
-
 /// Digital inputs of CiA 401, the first line first.
 #[rustfmt::skip]
 const INPUTS: [&str; 64] = [
@@ -313,7 +310,7 @@ impl VirtualDrive for NodeMachine {
     }
 
     fn reads_a_shaft(&self) -> bool {
-        self.firmware.description().identity.device_type & 0xFFFF == ENCODER
+        self.firmware.is_encoder()
     }
 
     fn see_shaft(&mut self, turns: f64, turns_s: f64) {
