@@ -109,11 +109,11 @@ impl PositionMove {
     /// The way to a peak and on to the end.
     fn way(&self, from: &JerkPlan, sign: f64, peak: f64, end_speed: f64) -> f64 {
         let mut plan = *from;
-        self.to_peak_and_end(&mut plan, sign, peak, 0.0, end_speed);
+        self.over_peak(&mut plan, sign, peak, 0.0, end_speed);
         (plan.position - from.position) * sign
     }
 
-    fn to_peak_and_end(&self, plan: &mut JerkPlan, sign: f64, peak: f64, plateau_s: f64, end_speed: f64) {
+    fn over_peak(&self, plan: &mut JerkPlan, sign: f64, peak: f64, plateau_s: f64, end_speed: f64) {
         plan.change_to(sign * peak, &self.up, &self.down);
         plan.push(plateau_s, 0.0);
         plan.change_to(sign * end_speed.min(peak), &self.up, &self.down);
@@ -124,7 +124,7 @@ impl PositionMove {
         let (sign, length) = (1_f64.copysign(left), left.abs());
         let full = self.way(plan, sign, max_speed, end_speed);
         if full <= length {
-            return self.to_peak_and_end(plan, sign, max_speed, (length - full) / max_speed, end_speed);
+            return self.over_peak(plan, sign, max_speed, (length - full) / max_speed, end_speed);
         }
         let relaxed = (relaxed_velocity(plan, &self.up, &self.down) * sign).max(0.0);
         let (mut low, mut high) = (if relaxed > end_speed { end_speed } else { relaxed }, max_speed);
@@ -132,7 +132,7 @@ impl PositionMove {
             let middle = 0.5 * (low + high);
             if self.way(plan, sign, middle, end_speed) <= length { low = middle } else { high = middle }
         }
-        self.to_peak_and_end(plan, sign, low, 0.0, end_speed);
+        self.over_peak(plan, sign, low, 0.0, end_speed);
     }
 }
 

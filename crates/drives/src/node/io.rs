@@ -62,7 +62,7 @@ pub(super) struct Io {
     /// Digital outputs as their objects have them, behind 6208h and before 6202h.
     outputs: u64,
     /// The analogue values that were last worth an event.
-    sent: [i64; MOST_CHANNELS],
+    sent: [i32; MOST_CHANNELS],
     /// A TPDO on an event is due as far as this profile is asked.
     event: bool,
 }
@@ -159,13 +159,14 @@ impl Io {
         }
         let Some(now) = value(values, ANALOGUE_INPUT, mux.sub_index) else { return };
         let sent = self.sent.get_mut(usize::from(mux.sub_index - 1));
-        let before = sent.as_ref().map_or(now, |sent| **sent);
+        let before = sent.as_ref().map_or(now, |sent| i64::from(**sent));
         if values.view().value(ANALOGUE_INTERRUPTS) == Ok(0) || !is_triggered(values, mux.sub_index, before, now) {
             return;
         }
         self.event = true;
         if let Some(sent) = sent {
-            *sent = now;
+            // A channel of more bits than 32 counts with its ends.
+            *sent = now.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
         }
     }
 
