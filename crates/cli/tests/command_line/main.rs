@@ -3,6 +3,7 @@
 mod boot;
 mod broken_pipe;
 mod completion;
+mod conform;
 mod cycles;
 mod dump;
 mod eds;

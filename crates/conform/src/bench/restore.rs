@@ -84,10 +84,10 @@ impl Restorer {
 
     /// Puts everything back; what could not be.
     pub async fn restore(&self) -> Vec<String> {
+        // Forgotten only when all is done: this too may be given up, and is then begun anew.
         let (parameters, was_reset, commanded) = {
-            let mut journal = self.lock();
-            let was_reset = std::mem::take(&mut journal.was_reset);
-            (journal.parameters.clone(), was_reset, std::mem::take(&mut journal.commanded))
+            let journal = self.lock();
+            (journal.parameters.clone(), journal.was_reset, journal.commanded)
         };
         if was_reset {
             self.wait_for_answer().await;
@@ -113,6 +113,8 @@ impl Restorer {
             };
             self.command(back).await;
         }
+        let mut journal = self.lock();
+        (journal.was_reset, journal.commanded) = (false, false);
         left
     }
 
@@ -146,11 +148,12 @@ impl Restorer {
 
     /// Puts back what was written; what could not be.
     pub(super) async fn undo(&self) -> Vec<String> {
-        let undo: Vec<_> = self.lock().undo.drain(..).rev().collect();
+        let undo: Vec<_> = self.lock().undo.iter().rev().cloned().collect();
         if undo.is_empty() {
             return Vec::new();
         }
         let undone = roll_back(&self.node, &undo, |_| None).await;
+        self.lock().undo.clear();
         undone.not_put_back.iter().map(|left| format!("{}: {}", left.object, left.why)).collect()
     }
 

@@ -58,7 +58,7 @@ async fn read_long(bench: &mut Bench, with_crc: bool) -> Verdict {
     read(bench, mux, with_crc).await
 }
 
-/// A block upload. A server that answers with an ordinary one (protocol switch) has done it too.
+/// A block upload. The threshold for a change to the ordinary protocol is 0: the server may not change (CiA 301, 7.2.4.3.13).
 async fn upload(bench: &mut Bench, mux: Mux, with_crc: bool, block: u8) -> Result<Block<Vec<u8>>, Finding> {
     let [low, high] = mux.index.to_le_bytes();
     let command = 0xA0 | if with_crc { WITH_CRC } else { 0 };

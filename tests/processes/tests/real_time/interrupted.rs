@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use processes::{Simulator, command, done, ferrodrive, is_heard, wait_until};
+use processes::{Simulator, command, done, ferrodrive, is_heard, scratch, wait_until};
 
 const DRIVES: [(&str, &str, &str); 4] = [
     ("4", "zlac8030l", "4=zlac8030l"),
@@ -211,4 +211,30 @@ fn a_bus_lost_in_a_move_is_reported_with_what_was_moving_and_what_to_do() {
     ] {
         assert!(said.contains(part), "{part:?} in {said}");
     }
+}
+
+/// A conformance test writes many objects; whenever it is interrupted, they have again what they had.
+#[test]
+fn a_conformance_test_that_is_interrupted_puts_back_what_it_wrote() {
+    let mut simulator = bench();
+    let bus = simulator.bus("socketcand");
+    let value = |object: &str| {
+        done(&["--bus", &bus, "--model", "5=cia402", "read", "5", object, "--json"]).json()["value"].clone()
+    };
+    done(&["--bus", &bus, "--model", "5=cia402", "write", "5", "1017", "777"]);
+    let folder = scratch("interrupted_conformance");
+    let log = folder.join("frames.log");
+    let before = [value("1017"), value("1800:02"), value("1A00:01")];
+    let path = log.to_str().unwrap();
+    let testing = start(&bus, "5=cia402", &["--log", path, "conform", "5", "--only", "PDO"]);
+    wait_until("a mapping is changed", || {
+        std::fs::read_to_string(&log).is_ok_and(|text| text.contains("605#2F001A00"))
+    });
+    send("INT", &testing);
+    let ended = testing.wait_with_output().unwrap();
+    let said = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(ended.status.code(), Some(130), "{said}");
+    assert!(said.contains("what had been written was put back"), "{said}");
+    assert_eq!([value("1017"), value("1800:02"), value("1A00:01")], before);
+    assert!(simulator.is_running());
 }

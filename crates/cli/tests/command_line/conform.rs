@@ -1,0 +1,76 @@
+//! `ferrodrive conform`: what it prints and writes, and what it ends with.
+
+use std::path::PathBuf;
+
+use processes::{done, ferrodrive, page};
+
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("conform").join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder for files");
+    folder
+}
+
+#[test]
+fn a_model_passes_and_its_departures_are_cited() {
+    let report = done(&["conform", "4", "--json"]).json();
+    let of = |id: &str| report["cases"].as_array().unwrap().iter().find(|case| case["id"] == id).unwrap().clone();
+    assert_eq!((&report["ok"], &report["summary"]["fail"]), (&true.into(), &0.into()));
+    let count =
+        |result: &str| report["cases"].as_array().unwrap().iter().filter(|case| case["result"] == result).count();
+    for result in ["pass", "fail", "expected", "not_applicable"] {
+        assert_eq!(report["summary"][result], count(result), "{result}");
+    }
+    // ZLAC8030L quick start guide, chapter 9: no 1010h, and times of PDOs in 0.5 ms.
+    assert_eq!(of("OTHER 01")["result"], "expected");
+    assert!(of("PDO 05")["why"].as_str().unwrap().contains("chapter 9"), "{}", of("PDO 05"));
+    assert_eq!(of("402-32")["result"], "not_applicable", "no motor is energised without leave");
+}
+
+#[test]
+fn a_sheet_that_is_not_the_devices_fails_with_status_1_in_every_form() {
+    let folder = folder("wrong");
+    let sheet = done(&["eds", "zlac8030l"]).out.replace("DefaultValue=0x00040192", "DefaultValue=0x00020192");
+    let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    std::fs::write(path("wrong.eds"), &sheet).unwrap();
+    let (eds, junit, html) = (path("wrong.eds"), path("report.xml"), path("report.html"));
+    let arguments = ["conform", "4", "--eds", &eds, "--only", "SDO 01,SDO 05", "--junit", &junit, "--html", &html];
+    let ended = ferrodrive(&arguments);
+    assert_eq!(ended.status, Some(1), "{}{}", ended.out, ended.err);
+    assert!(ended.err.contains("1 of 2 cases failed") && ended.err.contains("SDO 01"), "{}", ended.err);
+    assert!(ended.out.contains("584#4300100092010400"), "the frames show it: {}", ended.out);
+    let junit = std::fs::read_to_string(junit).unwrap();
+    assert!(junit.contains("tests=\"2\" failures=\"1\"") && junit.contains("<failure message=\""), "{junit}");
+    let html = std::fs::read_to_string(html).unwrap();
+    assert!(html.contains("1 case failed") && html.contains("584#4300100092010400"), "{html}");
+    assert!(!html.contains("http") && !html.contains("<script"), "the page needs nothing else");
+    let json = ferrodrive(&["conform", "4", "--eds", &eds, "--only", "SDO 01", "--json"]).json();
+    assert_eq!((&json["ok"], &json["error"]["kind"]), (&false.into(), &"conformance".into()), "{json}");
+}
+
+#[test]
+fn cases_are_chosen_by_number_and_group() {
+    let ids = |arguments: &[&str]| {
+        let report = done(&[&["conform", "--list", "--json"], arguments].concat()).json();
+        let cases = report["cases"].as_array().unwrap().clone();
+        cases.iter().map(|case| case["id"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(ids(&["--only", "sdo07,402-01"]), ["SDO 07", "402-01"]);
+    assert!(ids(&["--only", "SYNC", "--skip", "SYNC 01"]).iter().all(|id| id.starts_with("SYNC") && id != "SYNC 01"));
+    let unknown = ferrodrive(&["conform", "4", "--only", "SDO 99"]);
+    assert_eq!(unknown.status, Some(2));
+    assert!(unknown.err.contains("got 'SDO 99'"), "{}", unknown.err);
+}
+
+#[test]
+fn the_page_lists_every_case() {
+    let listed = done(&["conform", "--list", "--json"]).json();
+    let page = page("conformance.md");
+    for case in listed["cases"].as_array().unwrap() {
+        let cell = |name: &str| case[name].as_str().unwrap().to_owned();
+        let row = format!("| {} | {} | {} |", cell("id"), cell("title"), cell("clause"));
+        assert!(page.contains(&row), "docs/conformance.md lacks: {row}");
+    }
+    let rows = page.lines().filter(|line| line.starts_with("| ") && line.contains("| CiA ")).count();
+    assert_eq!(rows, listed["cases"].as_array().unwrap().len(), "no other cases are listed");
+}
