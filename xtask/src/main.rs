@@ -6,6 +6,7 @@
 
 mod bare_metal;
 mod browser;
+mod conform_peers;
 mod debian;
 mod defects;
 mod dist;
@@ -50,6 +51,7 @@ The project's own chores.
   cargo xtask dist               what is released, in dist/: an archive of the program, the wheel, checksums
   cargo xtask pgo                the binary to release, optimised by what a training run does
   cargo xtask times [ROW..]      how long the first commands, the tests and pip take, each from a fresh clone
+  cargo xtask conform-peers      the conformance suite against stacks of other people, as a table
   cargo xtask idle [SECONDS]     what a simulator costs that waits, in per cent of a core
 ";
 
@@ -63,6 +65,7 @@ fn main() -> ExitCode {
         ["dist"] => dist::command(),
         ["wheel"] => wheel::command(),
         ["pgo"] => pgo::command(),
+        ["conform-peers"] => conform_peers::command(),
         ["vcan-test"] => vcan::command(),
         ["idle", rest @ ..] => idle::command(rest),
         ["times", rest @ ..] => times::command(rest),
