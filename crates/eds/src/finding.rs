@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::Rule;
+
 /// How bad a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
@@ -30,6 +32,8 @@ pub struct Finding {
     pub section: String,
     /// The key, if one is meant.
     pub key: Option<String>,
+    /// What is wrong with it, as a rule.
+    pub rule: Rule,
     /// How bad it is.
     pub severity: Severity,
     /// What is wrong.
@@ -38,7 +42,7 @@ pub struct Finding {
     pub taken_instead: Option<String>,
 }
 
-/// `12: [1018] SubNumber: error: ...; taken: ...`
+/// `12: [1018] SubNumber: error EDS204: ...; taken: ...`
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.line > 0 {
@@ -50,7 +54,7 @@ impl fmt::Display for Finding {
         if let Some(key) = &self.key {
             write!(f, "{key}: ")?;
         }
-        write!(f, "{}: {}", self.severity.name(), self.what)?;
+        write!(f, "{} {}: {}", self.severity.name(), self.rule.id(), self.what)?;
         self.taken_instead.as_ref().map_or(Ok(()), |taken| write!(f, "; taken: {taken}"))
     }
 }

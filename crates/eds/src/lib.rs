@@ -32,6 +32,7 @@ mod finding;
 mod model;
 mod parameter_values;
 mod read;
+mod rule;
 mod value;
 mod write;
 
@@ -48,6 +49,7 @@ pub use model::{
 };
 pub use parameter_values::{NotHeld, parameter_values};
 pub use read::Reading;
+pub use rule::Rule;
 pub use value::{Number, Value};
 pub use write::write;
 

@@ -122,7 +122,7 @@ fn not_run(error: &SuiteError, node: NodeId) -> Failure {
         SuiteError::NoAnswer(_) => {
             failure.of_kind("no_answer").next("check node-ID, bit rate and cable; `ferrodrive scan` shows who answers")
         }
-        SuiteError::Enabled => failure.of_kind("state").next(format!("ferrodrive disable {node}")),
+        SuiteError::Enabled => failure.of_kind("at_work").next(format!("ferrodrive disable {node}")),
     }
 }
 

@@ -3,6 +3,7 @@
 use super::fields::Fields;
 use super::places::{ObjectSection, Role};
 use super::reader::Reader;
+use crate::Rule;
 use crate::document::{Entry, Section};
 use crate::value::Number;
 use crate::{AccessType, TypeCode, Value, Variable};
@@ -73,7 +74,7 @@ impl Reader {
         let sub_index = entry.key.parse::<u8>().ok().filter(|sub_index| *sub_index > 0);
         let found = sub_index.and_then(|sub_index| variables.get_mut(usize::from(sub_index)));
         if found.is_none() {
-            self.error(section, entry, "there is no such compact sub-object", "nothing");
+            self.error(Rule::CompactEntry, section, entry, "there is no such compact sub-object", "nothing");
         }
         found
     }

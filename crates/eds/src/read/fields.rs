@@ -1,6 +1,7 @@
 //! The entries of one object's section, each found once.
 
 use super::reader::{Reader, shortened};
+use crate::Rule;
 use crate::document::{Entry, Section};
 
 /// What an object's section may have.
@@ -57,9 +58,15 @@ impl Reader {
                 Some(place @ None) => *place = Some(entry),
                 Some(Some(first)) => {
                     let what = format!("the key stands twice, first in line {}", first.line);
-                    self.warn(section, entry, what, Some(shortened(first.value)));
+                    self.warn(Rule::KeyTwice, section, entry, what, Some(shortened(first.value)));
                 }
-                None => self.warn(section, entry, "CiA 306 has no such key of an object", Some("nothing".into())),
+                None => self.warn(
+                    Rule::UnknownKey,
+                    section,
+                    entry,
+                    "CiA 306 has no such key of an object",
+                    Some("nothing".into()),
+                ),
             }
         }
         fields

@@ -2,6 +2,7 @@
 
 use super::places::{Info, is_about_modules};
 use super::reader::{Reader, shortened};
+use crate::Rule;
 use crate::document::{Entry, Section};
 use crate::{BIT_RATES, DynamicChannel, KeptSection, TypeCode};
 
@@ -23,7 +24,7 @@ impl Reader {
                 Info::DynamicChannels => self.dynamic_channel(entry),
             };
             if !known {
-                self.warn(section, entry, "CiA 306 has no such key here", Some("nothing".into()));
+                self.warn(Rule::UnknownKey, section, entry, "CiA 306 has no such key here", Some("nothing".into()));
             }
         }
         if which == Info::Commissioning {
@@ -38,7 +39,7 @@ impl Reader {
         } else {
             ("CiA 306 has no such section", "nothing; it is kept as it is")
         };
-        self.warn_section(section, what, Some(taken.into()));
+        self.warn_section(Rule::UnknownSection, section, what, Some(taken.into()));
         let entries = section.entries().map(|entry| (entry.key.to_owned(), entry.value.to_owned())).collect();
         self.eds.kept.push(KeptSection { line: section.line(), name: section.name().to_owned(), entries });
     }
@@ -143,7 +144,7 @@ impl Reader {
                 read.node_id = self.count(section, entry).filter(|id| (1..=127).contains(id));
                 if read.node_id.is_none() && !entry.value.is_empty() {
                     let what = format!("no node-ID (1 to 127): {:?}", shortened(entry.value));
-                    self.error(section, entry, what, "none");
+                    self.error(Rule::NodeId, section, entry, what, "none");
                 }
             }
             "nodename" => entry.value.clone_into(&mut read.node_name),

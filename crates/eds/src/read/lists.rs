@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::reader::{Reader, shortened};
 use crate::List;
+use crate::Rule;
 use crate::document::{Document, Entry, Section};
 
 /// Reads the lists and notes in each object where it stands.
@@ -15,7 +16,12 @@ pub(super) fn read(document: &Document, reader: &mut Reader) {
             continue;
         };
         for other in sections {
-            reader.error_section(other, "two sections of this name", format!("the one in line {}", section.line()));
+            reader.error_section(
+                Rule::SectionTwice,
+                other,
+                "two sections of this name",
+                format!("the one in line {}", section.line()),
+            );
         }
         reader.list(list, section, &mut seen);
     }
@@ -32,7 +38,13 @@ impl Reader {
                 continue;
             }
             if entry.key.is_empty() || !entry.key.bytes().all(|digit| digit.is_ascii_digit()) {
-                self.warn(section, entry, "not the number of a line of the list", Some("nothing".into()));
+                self.warn(
+                    Rule::ListLine,
+                    section,
+                    entry,
+                    "not the number of a line of the list",
+                    Some("nothing".into()),
+                );
                 continue;
             }
             count += 1;
@@ -43,33 +55,53 @@ impl Reader {
         match said {
             Some((entry, said)) if said != count => {
                 let what = format!("SupportedObjects is {said}, but {count} are listed");
-                self.warn(section, entry, what, Some("those that are listed".into()));
+                self.warn(Rule::ListCount, section, entry, what, Some("those that are listed".into()));
             }
-            None => self.warn_section(section, "no SupportedObjects", Some("those that are listed".into())),
+            None => {
+                self.warn_section(Rule::ListCount, section, "no SupportedObjects", Some("those that are listed".into()))
+            }
             _ => {}
         }
     }
 
     fn supported_objects<'a>(&mut self, section: Section<'_>, entry: Entry<'a>) -> Option<(Entry<'a>, usize)> {
         if entry.value.starts_with("0x") || entry.value.starts_with("0X") {
-            self.warn(section, entry, "a count is decimal (CiA 306): strict tools refuse the file", None);
+            self.warn(
+                Rule::ListCount,
+                section,
+                entry,
+                "a count is decimal (CiA 306): strict tools refuse the file",
+                None,
+            );
         }
         self.count(section, entry).map(|count| (entry, count))
     }
 
     fn listed(&mut self, list: List, section: Section<'_>, entry: Entry<'_>, index: u16, seen: &mut HashMap<u16, u32>) {
         if let Some(line) = seen.insert(index, entry.line) {
-            self.warn(section, entry, format!("{index:04X}h is listed twice, first in line {line}"), None);
+            self.warn(
+                Rule::ListedTwice,
+                section,
+                entry,
+                format!("{index:04X}h is listed twice, first in line {line}"),
+                None,
+            );
             return;
         }
         if List::of(index) != list {
-            self.warn(section, entry, format!("{index:04X}h belongs into [{}]", List::of(index).section()), None);
+            self.warn(
+                Rule::WrongList,
+                section,
+                entry,
+                format!("{index:04X}h belongs into [{}]", List::of(index).section()),
+                None,
+            );
         }
         match self.eds.objects.binary_search_by_key(&index, |object| object.index) {
             Ok(at) => self.eds.objects[at].list = Some(list),
             Err(_) => {
                 let what = format!("there is no section [{}]", shortened(&format!("{index:04X}")));
-                self.error(section, entry, what, "no such object");
+                self.error(Rule::ListedWithoutSection, section, entry, what, "no such object");
             }
         }
     }
@@ -85,7 +117,7 @@ impl Reader {
         for (line, index) in lines {
             let what = format!("the object stands in none of the lists: [{}] misses it", List::of(index).section());
             let taken = Some("an object like the others".into());
-            self.find(crate::Severity::Warning, &format!("{index:04X}"), None, line, what, taken);
+            self.find(Rule::Unlisted, crate::Severity::Warning, &format!("{index:04X}"), None, line, what, taken);
         }
     }
 }

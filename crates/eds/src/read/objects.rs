@@ -3,6 +3,7 @@
 use super::fields::Fields;
 use super::places::{ObjectSection, Role};
 use super::reader::{Reader, shortened};
+use crate::Rule;
 use crate::document::{Entry, Section};
 use crate::{Object, ObjectType, Refusal, TypeCode, Value, Variable};
 
@@ -52,7 +53,12 @@ impl Reader {
         };
         if !subs.is_empty() {
             if compact.is_some() {
-                self.warn_section(section, "CompactSubObj and sections of sub-objects", Some("the sections".into()));
+                self.warn_section(
+                    Rule::CompactAndSections,
+                    section,
+                    "CompactSubObj and sections of sub-objects",
+                    Some("the sections".into()),
+                );
                 object.compact = None;
             }
             object.variables = self.subs(&subs)?;
@@ -100,7 +106,7 @@ impl Reader {
             match kept.last() {
                 Some(first) if first.key == part.key => {
                     let taken = format!("the one in line {}", first.section.line());
-                    self.error_section(part.section, "two sections of this name", taken);
+                    self.error_section(Rule::SectionTwice, part.section, "two sections of this name", taken);
                 }
                 _ => kept.push(*part),
             }
@@ -114,10 +120,20 @@ impl Reader {
         let subs: Vec<ObjectSection<'_>> =
             parts.iter().copied().filter(|part| matches!(part.key.role, Role::Sub(_))).collect();
         if subs.is_empty() {
-            self.error_section(section, format!("there is no section [{index:04X}]"), "nothing");
+            self.error_section(
+                Rule::SubWithoutObject,
+                section,
+                format!("there is no section [{index:04X}]"),
+                "nothing",
+            );
             return Ok(None);
         }
-        self.error_section(section, format!("there is no section [{index:04X}]"), "a RECORD without a name");
+        self.error_section(
+            Rule::SubWithoutObject,
+            section,
+            format!("there is no section [{index:04X}]"),
+            "a RECORD without a name",
+        );
         Ok(Some(Object {
             line: section.line(),
             index,
@@ -135,12 +151,18 @@ impl Reader {
         let Some(entry) = fields.object_type.filter(|entry| !entry.value.is_empty()) else {
             // Without the key it is a VAR (CiA 306-1).
             if has_subs {
-                self.error_section(section, "no ObjectType, which makes a VAR, but sub-objects", inferred.name());
+                self.error_section(
+                    Rule::ObjectType,
+                    section,
+                    "no ObjectType, which makes a VAR, but sub-objects",
+                    inferred.name(),
+                );
             }
             return inferred;
         };
         let Some(kind) = self.count::<u16>(section, entry).and_then(ObjectType::of) else {
             self.error(
+                Rule::ObjectType,
                 section,
                 entry,
                 format!("expected a type of object, got {:?}", shortened(entry.value)),
@@ -149,7 +171,13 @@ impl Reader {
             return inferred;
         };
         if has_subs && !kind.has_sub_objects() && kind != ObjectType::DefType {
-            self.error(section, entry, format!("a {} has no sub-objects, but there are some", kind.name()), "RECORD");
+            self.error(
+                Rule::ObjectType,
+                section,
+                entry,
+                format!("a {} has no sub-objects, but there are some", kind.name()),
+                "RECORD",
+            );
             return ObjectType::Record;
         }
         kind
@@ -160,7 +188,7 @@ impl Reader {
         match fields.parameter_name {
             Some(entry) => entry.value.to_owned(),
             None => {
-                self.warn_section(section, "no ParameterName", None);
+                self.warn_section(Rule::Name, section, "no ParameterName", None);
                 String::new()
             }
         }
@@ -174,7 +202,12 @@ impl Reader {
             let fields = self.fields(part.section);
             let kind = self.object_type(part.section, &fields, false);
             if kind.has_sub_objects() {
-                self.error_section(part.section, format!("a sub-object cannot be a {}", kind.name()), "VAR");
+                self.error_section(
+                    Rule::ObjectType,
+                    part.section,
+                    format!("a sub-object cannot be a {}", kind.name()),
+                    "VAR",
+                );
             }
             let name = self.name(part.section, &fields);
             variables.push(self.variable(part.section, &fields, kind == ObjectType::Domain, sub_index, name));
@@ -190,10 +223,10 @@ impl Reader {
         if object.object_type.has_sub_objects() {
             let what = format!("a {} without sub-objects", object.object_type.name());
             if fields.data_type.is_none() {
-                self.error_section(section, what, "an object without values");
+                self.error_section(Rule::NoSubObjects, section, what, "an object without values");
                 return;
             }
-            self.error_section(section, what, "VAR");
+            self.error_section(Rule::NoSubObjects, section, what, "VAR");
             object.object_type = ObjectType::Var;
         }
         let is_domain = object.object_type == ObjectType::Domain;
@@ -243,20 +276,32 @@ impl Reader {
         if let Some(entry) = at[0]
             && is_above(&variable.low, &variable.high)
         {
-            self.error(section, entry, "the low limit lies above the high limit", "no limits");
+            self.error(Rule::LimitsCrossed, section, entry, "the low limit lies above the high limit", "no limits");
             (variable.low, variable.high) = (None, None);
             return;
         }
         if let Some(entry) = at[0]
             && is_above(&variable.low, &variable.default)
         {
-            self.error(section, entry, "the low limit lies above the default value", "no low limit");
+            self.error(
+                Rule::DefaultOutside,
+                section,
+                entry,
+                "the low limit lies above the default value",
+                "no low limit",
+            );
             variable.low = None;
         }
         if let Some(entry) = at[1]
             && is_above(&variable.default, &variable.high)
         {
-            self.error(section, entry, "the high limit lies below the default value", "no high limit");
+            self.error(
+                Rule::DefaultOutside,
+                section,
+                entry,
+                "the high limit lies below the default value",
+                "no high limit",
+            );
             variable.high = None;
         }
     }
@@ -265,19 +310,20 @@ impl Reader {
     pub(super) fn check_value(&mut self, section: Section<'_>, at: Option<Entry<'_>>, variable: &Variable) {
         let Some(entry) = at else { return };
         if is_above(&variable.low, &variable.value) || is_above(&variable.value, &variable.high) {
-            self.warn(section, entry, "the value lies outside of the limits", None);
+            self.warn(Rule::ValueOutside, section, entry, "the value lies outside of the limits", None);
         }
     }
 
     fn check_sub_number(&mut self, section: Section<'_>, fields: &Fields<'_>, object: &Object) {
         let Some(entry) = fields.sub_number else {
-            self.warn_section(section, "no SubNumber", None);
+            self.warn_section(Rule::SubNumber, section, "no SubNumber", None);
             return;
         };
         let Some(said) = self.count::<usize>(section, entry) else { return };
         let there = object.variables.len();
         if said != there {
             self.warn(
+                Rule::SubNumber,
                 section,
                 entry,
                 format!("SubNumber is {said}, but there are {there} sub-objects"),

@@ -1,6 +1,8 @@
 //! What has been read so far, and how findings are put down.
 
 use super::places::{self, ObjectSection, SectionPlace};
+
+use crate::Rule;
 use crate::document::{Document, Entry, LineKind, Section};
 use crate::{Eds, Finding, Findings, Refusal, Severity};
 
@@ -32,6 +34,7 @@ impl Reader {
                 line,
                 section: String::new(),
                 key: None,
+                rule: Rule::Stray,
                 severity: Severity::Warning,
                 what: format!("{what}: {:?}", shortened(text.trim())),
                 taken_instead: Some("nothing".into()),
@@ -44,7 +47,7 @@ impl Reader {
     pub(super) fn section<'a>(&mut self, section: Section<'a>, parts: &mut Vec<ObjectSection<'a>>) {
         if !section.is_well_formed() {
             let what = "the heading is not [name] and nothing else";
-            self.warn_section(section, what, Some(format!("[{}]", section.name())));
+            self.warn_section(Rule::Heading, section, what, Some(format!("[{}]", section.name())));
         }
         match places::place(section.name()) {
             SectionPlace::Part(key) => parts.push(ObjectSection { key, section }),
@@ -56,6 +59,7 @@ impl Reader {
 
     pub(super) fn find(
         &mut self,
+        rule: Rule,
         severity: Severity,
         section: &str,
         entry: Option<Entry<'_>>,
@@ -67,6 +71,7 @@ impl Reader {
             line: entry.map_or(line, |entry| entry.line),
             section: shortened(section),
             key: entry.map(|entry| shortened(entry.key)),
+            rule,
             severity,
             what,
             taken_instead: taken,
@@ -75,30 +80,44 @@ impl Reader {
 
     pub(super) fn warn(
         &mut self,
+        rule: Rule,
         section: Section<'_>,
         entry: Entry<'_>,
         what: impl Into<String>,
         taken: Option<String>,
     ) {
-        self.find(Severity::Warning, section.name(), Some(entry), 0, what.into(), taken);
+        self.find(rule, Severity::Warning, section.name(), Some(entry), 0, what.into(), taken);
     }
 
     pub(super) fn error(
         &mut self,
+        rule: Rule,
         section: Section<'_>,
         entry: Entry<'_>,
         what: impl Into<String>,
         taken: impl Into<String>,
     ) {
-        self.find(Severity::Error, section.name(), Some(entry), 0, what.into(), Some(taken.into()));
+        self.find(rule, Severity::Error, section.name(), Some(entry), 0, what.into(), Some(taken.into()));
     }
 
-    pub(super) fn warn_section(&mut self, section: Section<'_>, what: impl Into<String>, taken: Option<String>) {
-        self.find(Severity::Warning, section.name(), None, section.line(), what.into(), taken);
+    pub(super) fn warn_section(
+        &mut self,
+        rule: Rule,
+        section: Section<'_>,
+        what: impl Into<String>,
+        taken: Option<String>,
+    ) {
+        self.find(rule, Severity::Warning, section.name(), None, section.line(), what.into(), taken);
     }
 
-    pub(super) fn error_section(&mut self, section: Section<'_>, what: impl Into<String>, taken: impl Into<String>) {
-        self.find(Severity::Error, section.name(), None, section.line(), what.into(), Some(taken.into()));
+    pub(super) fn error_section(
+        &mut self,
+        rule: Rule,
+        section: Section<'_>,
+        what: impl Into<String>,
+        taken: impl Into<String>,
+    ) {
+        self.find(rule, Severity::Error, section.name(), None, section.line(), what.into(), Some(taken.into()));
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::fields::Fields;
 use super::reader::{Reader, shortened};
+use crate::Rule;
 use crate::data_type::Form;
 use crate::document::{Entry, Section};
 use crate::value::{Number, number};
@@ -19,7 +20,13 @@ impl Reader {
         let found = self.number(section, entry).filter(|number| !number.plus_node_id);
         let fitting = found.and_then(|number| T::try_from(number.base).ok());
         if fitting.is_none() {
-            self.error(section, entry, format!("no number that fits here: {:?}", shortened(entry.value)), NOTHING);
+            self.error(
+                Rule::NotANumber,
+                section,
+                entry,
+                format!("no number that fits here: {:?}", shortened(entry.value)),
+                NOTHING,
+            );
         }
         fitting
     }
@@ -30,7 +37,7 @@ impl Reader {
             Some(0) | None => false,
             Some(1) => true,
             Some(_) => {
-                self.warn(section, entry, "neither 0 nor 1", Some("1".into()));
+                self.warn(Rule::NotANumber, section, entry, "neither 0 nor 1", Some("1".into()));
                 true
             }
         }
@@ -42,9 +49,9 @@ impl Reader {
         if let Some(oddity) = oddity {
             let taken = number.to_string();
             if oddity.is_clear() {
-                self.warn(section, entry, oddity.text(), Some(taken));
+                self.warn(Rule::OddNumber, section, entry, oddity.text(), Some(taken));
             } else {
-                self.error(section, entry, oddity.text(), taken);
+                self.error(Rule::OddNumber, section, entry, oddity.text(), taken);
             }
         }
         Some(number)
@@ -79,10 +86,10 @@ impl Reader {
         let is_pattern =
             if low < 0 { found.base > high } else { found.base < 0 && found.base >= -span / 2 && !is_low_limit };
         if !found.plus_node_id && is_pattern && fits(same_bits) {
-            self.warn(section, entry, what, Some(same_bits.to_string()));
+            self.warn(Rule::SameBits, section, entry, what, Some(same_bits.to_string()));
             return Some(Number::plain(same_bits));
         }
-        self.error(section, entry, what, NOTHING);
+        self.error(Rule::BeyondType, section, entry, what, NOTHING);
         None
     }
 
@@ -99,10 +106,10 @@ impl Reader {
         let Some(value) =
             value.filter(|value| data_type.range().is_some_and(|(low, high)| (low..=high).contains(value)))
         else {
-            self.error(section, entry, what, NOTHING);
+            self.error(Rule::NotANumber, section, entry, what, NOTHING);
             return None;
         };
-        self.warn(section, entry, what, Some(value.to_string()));
+        self.warn(Rule::OddNumber, section, entry, what, Some(value.to_string()));
         Some(Number::plain(value))
     }
 
@@ -118,7 +125,7 @@ impl Reader {
         let Some((pattern, _)) = number(entry.value).filter(|(number, _)| !number.plus_node_id && number.base >= 0)
         else {
             let what = format!("no number with a decimal point: {:?}", shortened(entry.value));
-            self.error(section, entry, what, NOTHING);
+            self.error(Rule::NotANumber, section, entry, what, NOTHING);
             return None;
         };
         let real = match bits {
@@ -126,12 +133,12 @@ impl Reader {
             _ => u64::try_from(pattern.base).ok().map(f64::from_bits),
         };
         let Some(real) = real.filter(|real| real.is_finite()) else {
-            self.error(section, entry, "no bits of a number with a decimal point", NOTHING);
+            self.error(Rule::NotANumber, section, entry, "no bits of a number with a decimal point", NOTHING);
             return None;
         };
         if pattern.base != 0 {
             let what = "hexadecimal digits for a number with a decimal point: other tools may read another value";
-            self.warn(section, entry, what, Some(format!("{real:?}, which these bits are")));
+            self.warn(Rule::RealBits, section, entry, what, Some(format!("{real:?}, which these bits are")));
         }
         Some(Value::Real(real))
     }
@@ -141,18 +148,24 @@ impl Reader {
         let instead = if is_domain { TypeCode::DOMAIN } else { TypeCode::UNSIGNED32 };
         let Some(entry) = fields.data_type.filter(|entry| !entry.value.is_empty()) else {
             if !is_domain {
-                self.error_section(section, "no DataType", instead.to_string());
+                self.error_section(Rule::DataType, section, "no DataType", instead.to_string());
             }
             return instead;
         };
         let code = self.number(section, entry).filter(|number| !number.plus_node_id);
         let Some(code) = code.and_then(|number| u16::try_from(number.base).ok()).map(TypeCode) else {
             let what = format!("no code of a data type: {:?}", shortened(entry.value));
-            self.error(section, entry, what, instead.to_string());
+            self.error(Rule::DataType, section, entry, what, instead.to_string());
             return instead;
         };
         if !code.is_known() {
-            self.error(section, entry, format!("{code} is not the data type of a value"), instead.to_string());
+            self.error(
+                Rule::DataType,
+                section,
+                entry,
+                format!("{code} is not the data type of a value"),
+                instead.to_string(),
+            );
             return instead;
         }
         code
@@ -162,12 +175,12 @@ impl Reader {
     pub(super) fn access(&mut self, section: Section<'_>, fields: &Fields<'_>, is_domain: bool) -> AccessType {
         let Some(entry) = fields.access_type.filter(|entry| !entry.value.is_empty()) else {
             let instead = if is_domain { AccessType::ReadWrite } else { AccessType::ReadOnly };
-            self.error_section(section, "no AccessType", instead.name());
+            self.error_section(Rule::AccessType, section, "no AccessType", instead.name());
             return instead;
         };
         AccessType::of(entry.value).unwrap_or_else(|| {
             let what = format!("no access type: {:?}", shortened(entry.value));
-            self.error(section, entry, what, AccessType::ReadOnly.name());
+            self.error(Rule::AccessType, section, entry, what, AccessType::ReadOnly.name());
             AccessType::ReadOnly
         })
     }

@@ -57,6 +57,7 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["objects", "zlim42c", "--departures"], "departures"),
     (&["readings", "m4230e17b50"], "readings"),
     (&["eds", "zlac8030l"], "eds"),
+    (&["eds", "lint", "--list"], "eds_rules"),
     (&["dcf", "4"], "dcf"),
     (&["init", "--drive", "zlac8030l@4"], "init"),
     (&["init", "--bus", "sim"], "init"),

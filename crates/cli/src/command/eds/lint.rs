@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use eds::{Finding, Severity};
+use eds::{Finding, Rule, Severity};
 use serde::Serialize;
 
 use super::source;
@@ -13,17 +13,24 @@ use plot::Paint;
 use plot::Table;
 use words::counted;
 
+/// The column of severities.
+const SEVERITY: usize = 2;
+
 /// Check EDS and DCF files: report errors with their lines, and what is used instead
 ///
 /// Errors are what had to be guessed or left out, and what strict tools refuse; warnings can still be read.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  ferrodrive eds lint vendor.eds\n  ferrodrive eds lint left.dcf right.dcf --strict"
+    after_help = "Examples:\n  ferrodrive eds lint vendor.eds\n  ferrodrive eds lint left.dcf right.dcf --strict\n  \
+    ferrodrive eds lint --list --json"
 )]
 pub(crate) struct Lint {
     /// EDS or DCF files
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required_unless_present = "list", value_name = "FILE")]
     files: Vec<PathBuf>,
+    /// List the rules
+    #[arg(long, conflicts_with = "files")]
+    pub(super) list: bool,
     /// Fail on warnings too
     #[arg(long)]
     pub(super) strict: bool,
@@ -67,6 +74,7 @@ struct FindingRow {
     line: u32,
     section: String,
     key: Option<String>,
+    rule: &'static str,
     severity: &'static str,
     what: String,
     taken_instead: Option<String>,
@@ -147,16 +155,16 @@ impl OfFile {
         if self.findings.is_empty() {
             return head;
         }
-        let mut table = Table::new(&["line", "severity", "section", "key", "what", "taken instead"]);
+        let mut table = Table::new(&["line", "rule", "severity", "section", "key", "what", "taken instead"]);
         for row in &self.findings {
             let line = if row.line > 0 { row.line.to_string() } else { String::new() };
             let texts = [&row.section, row.key.as_ref().unwrap_or(&String::new()), &row.what].map(|text| plain(text));
             let [section, key, what] = texts;
             let taken = row.taken_instead.as_deref().map(plain).unwrap_or_default();
-            table.row([line, row.severity.to_owned(), section, key, what, taken]);
+            table.row([line, row.rule.to_owned(), row.severity.to_owned(), section, key, what, taken]);
         }
         let error = |_: usize, column: usize, cell: &str| {
-            (column == 1 && cell == Severity::Error.name()).then(|| paint.bad(cell))
+            (column == SEVERITY && cell == Severity::Error.name()).then(|| paint.bad(cell))
         };
         let beyond = match self.beyond {
             0 => String::new(),
@@ -172,6 +180,7 @@ impl FindingRow {
             line: finding.line,
             section: finding.section.clone(),
             key: finding.key.clone(),
+            rule: finding.rule.id(),
             severity: finding.severity.name(),
             what: finding.what.clone(),
             taken_instead: finding.taken_instead.clone(),
@@ -182,5 +191,33 @@ impl FindingRow {
 impl Report for LintReport {
     fn text(&self, paint: Paint) -> String {
         self.files.iter().map(|file| file.text(paint)).collect::<Vec<_>>().join("\n\n")
+    }
+}
+
+/// The rules, for people and programs.
+#[derive(Debug, Serialize)]
+pub(crate) struct RuleList {
+    rules: Vec<RuleRow>,
+}
+
+#[derive(Debug, Serialize)]
+struct RuleRow {
+    id: &'static str,
+    title: &'static str,
+    taken_instead: &'static str,
+}
+
+impl RuleList {
+    pub(super) fn all() -> Self {
+        let row = |rule: &Rule| RuleRow { id: rule.id(), title: rule.title(), taken_instead: rule.taken() };
+        Self { rules: Rule::ALL.iter().map(row).collect() }
+    }
+}
+
+impl Report for RuleList {
+    fn text(&self, paint: Paint) -> String {
+        let mut table = Table::new(&["rule", "finding", "taken instead"]);
+        self.rules.iter().for_each(|rule| table.row([rule.id, rule.title, rule.taken_instead]));
+        table.plain(paint)
     }
 }

@@ -39,6 +39,7 @@ impl Eds {
     /// Does it, and prints what came of it.
     pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
         match &self.what {
+            Some(EdsCommand::Lint(lint)) if lint.list => print(format, &lint::RuleList::all()),
             Some(EdsCommand::Lint(lint)) => {
                 let report = lint.run();
                 format.print_judged(&report, report.failure(lint.strict))
