@@ -1,6 +1,6 @@
 //! `cargo xtask conform-peers`: the conformance suite against stacks of other people, and the table of docs/conformance.md.
 //!
-//! Each stack runs as a program on the bus of `ferrodrive sim`, with the objects of `tests/peers/stacks/stack.eds`. What a
+//! Each stack runs as a program on the bus of `ferrodrive sim`, with the objects of an EDS in `tests/peers/stacks`. What a
 //! stack leaves to the application stays undone. A row of the table goes to standard output, then each failed case.
 
 use std::io::{BufRead, BufReader};
@@ -9,9 +9,8 @@ use std::process::{Child, ChildStdout, Command, ExitCode, Stdio};
 
 use serde_json::Value;
 
-use crate::{program, python, workspace};
+use crate::{process, program, python, workspace};
 
-const EDS: &str = "tests/peers/stacks/stack.eds";
 const NODE: &str = "5";
 /// On the same bus, so that there is one: `sim` has a drive at least.
 const BYSTANDER: &str = "zlim42c@15";
@@ -19,15 +18,53 @@ const BYSTANDER: &str = "zlim42c@15";
 /// A stack of other people, and how a node of it is started.
 struct Stack {
     name: &'static str,
-    requirements: &'static str,
-    script: &'static str,
+    eds: &'static str,
+    program: Program,
 }
 
-const STACKS: &[Stack] = &[Stack {
-    name: "canopen-python 2.4.1, LocalNode",
-    requirements: "tests/peers/requirements.txt",
-    script: "tests/peers/stacks/canopen_python.py",
-}];
+/// What runs it: `PROGRAM HOST PORT NODE FILE.eds` prints `running` when it does.
+enum Program {
+    /// A script, in an environment with these requirements.
+    Python { requirements: &'static str, script: &'static str },
+    /// A package outside of the workspace, and its binary.
+    Cargo { folder: &'static str, binary: &'static str },
+}
+
+const STACKS: &[Stack] = &[
+    Stack {
+        name: "canopen-python 2.4.1, `LocalNode`",
+        eds: "tests/peers/stacks/stack.eds",
+        program: Program::Python {
+            requirements: "tests/peers/requirements.txt",
+            script: "tests/peers/stacks/canopen_python.py",
+        },
+    },
+    Stack {
+        name: "zencan-node 0.0.5",
+        eds: "tests/peers/stacks/zencan/stack.eds",
+        program: Program::Cargo { folder: "tests/peers/stacks/zencan", binary: "zencan_stack" },
+    },
+];
+
+impl Program {
+    fn command(&self) -> Result<Command, String> {
+        let root = workspace::root();
+        match self {
+            Self::Python { requirements, script } => {
+                let mut command = Command::new(python::environment("peers-venv", requirements)?);
+                command.arg(root.join(script));
+                Ok(command)
+            }
+            Self::Cargo { folder, binary } => {
+                let target = workspace::target().join("stacks");
+                let mut build = workspace::cargo();
+                build.args(["build", "--quiet"]).current_dir(root.join(folder)).env("CARGO_TARGET_DIR", &target);
+                process::output(&mut build)?;
+                Ok(Command::new(target.join("debug").join(format!("{binary}{}", std::env::consts::EXE_SUFFIX))))
+            }
+        }
+    }
+}
 
 pub(crate) fn command() -> ExitCode {
     match tables() {
@@ -78,16 +115,14 @@ fn started(command: &mut Command) -> Result<(Ends, String), String> {
 }
 
 fn report_of(stack: &Stack, program: &Path) -> Result<Value, String> {
-    let python = python::environment("peers-venv", stack.requirements)?;
+    let mut node = stack.program.command()?;
     let served = ["sim", "--drive", BYSTANDER, "--serve", "socketcand://127.0.0.1:0"];
     let (_bus, line) = started(Command::new(program).args(served))?;
     let address =
         line.strip_prefix("ready socketcand://").ok_or(format!("expected the bus's address, got '{line}'"))?;
     let (host, port) = address.rsplit_once(':').ok_or(format!("expected HOST:PORT, got '{address}'"))?;
-    let root = workspace::root();
-    let eds = root.join(EDS);
-    let mut node = Command::new(python);
-    node.arg(root.join(stack.script)).args([host, port, NODE]).arg(&eds);
+    let eds = workspace::root().join(stack.eds);
+    node.args([host, port, NODE]).arg(&eds);
     let (_node, line) = started(&mut node)?;
     if line != "running" {
         return Err(format!("{} does not run: {line}", stack.name));

@@ -119,6 +119,8 @@ impl fmt::Debug for Case {
 pub enum Need {
     /// An object of this index.
     Index(u16),
+    /// An object of this index that can be written.
+    Writable(u16),
     /// This sub-index of an object.
     Sub(u16, u8),
     /// A receive PDO.
@@ -145,6 +147,7 @@ impl Need {
         let axis = description.first_axis();
         match self {
             Self::Index(index) => description.has_index(index),
+            Self::Writable(index) => subject.row(index, 0).is_some_and(|row| row.access.is_writable()),
             Self::Sub(index, sub_index) => subject.row(index, sub_index).is_some(),
             Self::Rpdo => subject.pdos(0x1400).next().is_some(),
             Self::Tpdo => subject.pdos(0x1800).next().is_some(),
@@ -160,7 +163,7 @@ impl Need {
     /// The object by which a description shows it.
     pub(crate) const fn index(self) -> Option<u16> {
         match self {
-            Self::Index(index) | Self::Sub(index, _) => Some(index),
+            Self::Index(index) | Self::Writable(index) | Self::Sub(index, _) => Some(index),
             Self::PowerStates => Some(0x6041),
             _ => None,
         }
@@ -172,6 +175,7 @@ impl fmt::Display for Need {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Index(index) => write!(f, "the device has no object {index:04X}h"),
+            Self::Writable(index) => write!(f, "the device has no object {index:04X}h that can be written"),
             Self::Sub(index, sub_index) => write!(f, "the device has no object {index:04X}h:{sub_index:02X}"),
             Self::Rpdo => f.write_str("the device has no receive PDO"),
             Self::Tpdo => f.write_str("the device has no transmit PDO"),

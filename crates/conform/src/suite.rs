@@ -8,7 +8,7 @@ use cia402::{PowerState, Statusword};
 use devices::Departure;
 use master::Network;
 
-use crate::bench::{Bench, Restorer};
+use crate::bench::{Bench, Restorer, SILENCE};
 use crate::capture::Capture;
 use crate::case::{Case, Finding, Need};
 use crate::cases;
@@ -195,6 +195,10 @@ impl Suite {
         self.bench.begin();
         let verdict = (case.run)(&mut self.bench).await;
         let frames = self.bench.evidence();
+        if verdict.is_err() {
+            // An answer that is late is not taken for that of another request.
+            self.bench.pause(SILENCE).await;
+        }
         let mut left = Vec::new();
         if case.needs.contains(&Need::PowerStates) {
             left.extend(self.bench.let_go().await);

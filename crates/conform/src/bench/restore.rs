@@ -100,7 +100,9 @@ impl Restorer {
         if let Some(wanted) = parameters.filter(|_| was_reset) {
             let current = self.read_parameters().await;
             for step in in_order(Some(self.subject.description), &current, &wanted, false) {
-                if let Err(error) = self.node.download(step.object, &step.value).await {
+                if let Err(error) = self.node.download(step.object, &step.value).await
+                    && !self.is_unused(step.object).await
+                {
                     left.push(format!("{}: {error}", step.object));
                 }
             }
@@ -154,7 +156,19 @@ impl Restorer {
         }
         let undone = roll_back(&self.node, &undo, |_| None).await;
         self.lock().undo.clear();
-        undone.not_put_back.iter().map(|left| format!("{}: {}", left.object, left.why)).collect()
+        let mut left = Vec::new();
+        for object in undone.not_put_back {
+            if !self.is_unused(object.object).await {
+                left.push(format!("{}: {}", object.object, object.why));
+            }
+        }
+        left
+    }
+
+    /// An entry of a mapping beyond those that count: devices that check entries do not take back a 0.
+    async fn is_unused(&self, mux: Mux) -> bool {
+        let is_entry = matches!(mux.index, 0x1600..=0x17FF | 0x1A00..=0x1BFF) && mux.sub_index > 0;
+        is_entry && self.node.read::<u8>(Mux::new(mux.index, 0)).await.is_ok_and(|count| count < mux.sub_index)
     }
 
     async fn command(&self, command: NmtCommand) {

@@ -20,13 +20,13 @@ pub(crate) const CASES: &[Case] = &[
     case!("GUARD 04", "Remote frames to other nodes are not answered", "CiA 301, 7.2.8.3.1", [Need::Index(0x100C)], [], other_nodes),
     case!("GUARD 05", "100Ch and 100Dh can be written", "CiA 301, 7.5.2.11", [Need::Index(0x100C), Need::Index(0x100D)], [], writable),
     case!("GUARD 06", "A master that stays away is reported", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Index(0x100D), Need::Index(0x1014)], [], life_guarding),
-    case!("HBG 01", "Heartbeat and guarding are both there", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Index(0x1017)], [], both_there),
-    case!("HBG 02", "1017h = 0 stops the heartbeat", "CiA 301, 7.5.2.20", [Need::Index(0x100C), Need::Index(0x1017)], [], heartbeat_off),
-    case!("HBG 03", "Guarding works with the heartbeat off", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Index(0x1017)], [], guarding_alone),
-    case!("HBG 04", "Heartbeats come with guarding off", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Index(0x1017)], [], |bench| heartbeats(bench, false, false)),
-    case!("HBG 05", "Remote frames do not disturb heartbeats", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Index(0x1017)], [], |bench| heartbeats(bench, false, true)),
-    case!("HBG 06", "With both set heartbeats come", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Index(0x1017)], [], |bench| heartbeats(bench, true, false)),
-    case!("HBG 07", "With both set remote frames are not answered with the toggle bit", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Index(0x1017)], [], |bench| heartbeats(bench, true, true)),
+    case!("HBG 01", "Heartbeat and guarding are both there", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Writable(0x1017)], [], both_there),
+    case!("HBG 02", "1017h = 0 stops the heartbeat", "CiA 301, 7.5.2.20", [Need::Index(0x100C), Need::Writable(0x1017)], [], heartbeat_off),
+    case!("HBG 03", "Guarding works with the heartbeat off", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Writable(0x1017)], [], guarding_alone),
+    case!("HBG 04", "Heartbeats come with guarding off", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Writable(0x1017)], [], |bench| heartbeats(bench, false, false)),
+    case!("HBG 05", "Remote frames do not disturb heartbeats", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Writable(0x1017)], [], |bench| heartbeats(bench, false, true)),
+    case!("HBG 06", "With both set heartbeats come", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Writable(0x1017)], [], |bench| heartbeats(bench, true, false)),
+    case!("HBG 07", "With both set remote frames are not answered with the toggle bit", "CiA 301, 7.2.8.2.2", [Need::Index(0x100C), Need::Writable(0x1017)], [], |bench| heartbeats(bench, true, true)),
 ];
 
 async fn readable(bench: &mut Bench) -> Verdict {

@@ -11,14 +11,14 @@ const CONSUMER: Need = Need::Index(0x1016);
 
 #[rustfmt::skip]
 pub(crate) const CASES: &[Case] = &[
-    case!("HB 01", "1017h can be written", "CiA 301, 7.5.2.20", [Need::Index(0x1017)], [], writable),
-    case!("HB 02", "101 heartbeats in 10 s with 1017h = 100 ms", "CiA 301, 7.2.8.3.2", [Need::Index(0x1017)], [], counted),
-    case!("HB 03", "No heartbeat with 1017h = 0", "CiA 301, 7.5.2.20", [Need::Index(0x1017)], [], off),
+    case!("HB 01", "1017h can be written", "CiA 301, 7.5.2.20", [Need::Writable(0x1017)], [], writable),
+    case!("HB 02", "101 heartbeats in 10 s with 1017h = 100 ms", "CiA 301, 7.2.8.3.2", [Need::Writable(0x1017)], [], counted),
+    case!("HB 03", "No heartbeat with 1017h = 0", "CiA 301, 7.5.2.20", [Need::Writable(0x1017)], [], off),
     case!("HB 04", "Refuse a node twice in 1016h", "CiA 301, 7.5.2.19", [CONSUMER], [], twice),
     case!("HB 05", "A producer in time is not missed", "CiA 301, 7.2.8.3.2", [CONSUMER, Need::Index(0x1014)], [], in_time),
     case!("HB 06", "A producer that is late is missed", "CiA 301, 7.2.8.3.2", [CONSUMER, Need::Index(0x1014)], [], late),
-    case!("HB 07", "The producer's time after a reset is the stored one", "CiA 301, 7.3.2.2.1", [Need::Index(0x1017)], [], after_reset),
-    case!("HB 51", "The heartbeat says the NMT state", "CiA 301, 7.2.8.3.2", [Need::Index(0x1017)], ["heartbeat_tells_alarm"], says_state),
+    case!("HB 07", "The producer's time after a reset is the stored one", "CiA 301, 7.3.2.2.1", [Need::Writable(0x1017)], [], after_reset),
+    case!("HB 51", "The heartbeat says the NMT state", "CiA 301, 7.2.8.3.2", [Need::Writable(0x1017)], ["heartbeat_tells_alarm"], says_state),
     case!("HB 52", "A consumer waits for the first heartbeat", "CiA 301, 7.2.8.3.2", [CONSUMER, Need::Index(0x1014)], [], waits_for_first),
 ];
 

@@ -21,7 +21,7 @@ pub(crate) const CASES: &[Case] = &[
     case!("OTHER 09", "1020h is kept by save, and is 0 once the configuration has changed", "CiA 301, 7.5.2.23", [Need::Index(0x1020), STORE, Need::Store], [], configuration_date),
     case!("OTHER 10", "Refuse identifiers that nothing may use", "CiA 301, 7.3.5", [], [], restricted),
     case!("OTHER 51", "1010h says how it stores, with bit 0 or 1", "CiA 301, 7.5.2.13", [Need::Sub(0x1010, 1)], [], says_how),
-    case!("OTHER 52", "Saved values are there after a reset, and delivered ones after a restore", "CiA 301, 7.5.2.14", [STORE, Need::Index(0x1017), Need::Store], [], save_and_reset),
+    case!("OTHER 52", "Saved values are there after a reset, and delivered ones after a restore", "CiA 301, 7.5.2.14", [STORE, Need::Writable(0x1017), Need::Store], [], save_and_reset),
 ];
 
 async fn wrong_signature(bench: &mut Bench, index: u16, sub_index: u8, signature: [u8; 4]) -> Verdict {

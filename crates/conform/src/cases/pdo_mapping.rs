@@ -238,7 +238,13 @@ async fn wrong_length(bench: &mut Bench) -> Verdict {
     };
     let raw = entry(row) & !0xFF | u32::from(row.data_type.bits()) - 1;
     let answer = map_one(bench, 0x1400, raw).await?;
-    let codes = [AbortCode::NOT_MAPPABLE, AbortCode::LENGTH_MISMATCH, AbortCode::PDO_TOO_LONG, GENERAL];
+    let codes = [
+        AbortCode::NOT_MAPPABLE,
+        AbortCode::LENGTH_MISMATCH,
+        AbortCode::PDO_TOO_LONG,
+        AbortCode::PARAMETER_INCOMPATIBLE,
+        GENERAL,
+    ];
     refused(
         &format!("{} bits of {}, which has {}", row.data_type.bits() - 1, row.mux(), row.data_type.bits()),
         &answer,

@@ -15,15 +15,15 @@ const DEVICE_TYPE: Mux = Mux::new(0x1000, 0);
 #[rustfmt::skip]
 pub(crate) const CASES: &[Case] = &[
     case!("SDO 19", "Read 1000h as a block without CRC, or refuse it", "CiA 301, 7.2.4.3.12", [], [], |bench| read(bench, DEVICE_TYPE, false)),
-    case!("SDO 20", "Write 100Ch as a block without CRC, or refuse it", "CiA 301, 7.2.4.3.8", [Need::Index(0x100C)], [], |bench| write(bench, GUARD_TIME, false)),
-    case!("SDO 21", "Write 1017h as a block without CRC, or refuse it", "CiA 301, 7.2.4.3.8", [Need::Index(0x1017)], [], |bench| write(bench, HEARTBEAT_TIME, false)),
+    case!("SDO 20", "Write 100Ch as a block without CRC, or refuse it", "CiA 301, 7.2.4.3.8", [Need::Writable(0x100C)], [], |bench| write(bench, GUARD_TIME, false)),
+    case!("SDO 21", "Write 1017h as a block without CRC, or refuse it", "CiA 301, 7.2.4.3.8", [Need::Writable(0x1017)], [], |bench| write(bench, HEARTBEAT_TIME, false)),
     case!("SDO 22", "Read a long object as a block, or refuse it", "CiA 301, 7.2.4.3.12", [], [], |bench| read_long(bench, false)),
     case!("SDO 23", "Read a long object as a block with CRC, or refuse it", "CiA 301, 7.2.4.3.16", [], [], |bench| read_long(bench, true)),
-    case!("SDO 24", "Write 100Ch as a block with CRC, or refuse it", "CiA 301, 7.2.4.3.16", [Need::Index(0x100C)], [], |bench| write(bench, GUARD_TIME, true)),
-    case!("SDO 25", "Write 1017h as a block with CRC, or refuse it", "CiA 301, 7.2.4.3.16", [Need::Index(0x1017)], [], |bench| write(bench, HEARTBEAT_TIME, true)),
+    case!("SDO 24", "Write 100Ch as a block with CRC, or refuse it", "CiA 301, 7.2.4.3.16", [Need::Writable(0x100C)], [], |bench| write(bench, GUARD_TIME, true)),
+    case!("SDO 25", "Write 1017h as a block with CRC, or refuse it", "CiA 301, 7.2.4.3.16", [Need::Writable(0x1017)], [], |bench| write(bench, HEARTBEAT_TIME, true)),
     case!("SDO 26", "Refuse a block of 128 segments", "CiA 301, 7.2.4.3.13", [], [], block_size),
     case!("SDO 27", "Refuse a sequence number beyond the block", "CiA 301, 7.2.4.3.14", [], [], sequence_number),
-    case!("SDO 60", "Refuse a block download whose CRC is wrong, and keep the value", "CiA 301, 7.2.4.3.16", [Need::Index(0x1017)], [], wrong_crc),
+    case!("SDO 60", "Refuse a block download whose CRC is wrong, and keep the value", "CiA 301, 7.2.4.3.16", [Need::Writable(0x1017)], [], wrong_crc),
 ];
 
 const UNKNOWN: AbortCode = AbortCode::UNKNOWN_COMMAND;
@@ -78,7 +78,7 @@ async fn upload(bench: &mut Bench, mux: Mux, with_crc: bool, block: u8) -> Resul
         let (last, count) = sub_block(bench, &mut data, block).await?;
         let end = bench.exchange_or_none([0xA2, count, block, 0, 0, 0, 0, 0], last).await?;
         if let Some(end) = end {
-            return finish(bench, mux, data, end, crc && with_crc, size);
+            return finish(bench, mux, data, end, crc && with_crc, size).await;
         }
     }
 }
@@ -102,8 +102,8 @@ async fn sub_block(bench: &mut Bench, data: &mut Vec<u8>, block: u8) -> Result<(
     Ok((false, block))
 }
 
-fn finish(
-    bench: &Bench,
+async fn finish(
+    bench: &mut Bench,
     mux: Mux,
     mut data: Vec<u8>,
     end: [u8; 8],
@@ -115,7 +115,10 @@ fn finish(
     }
     let unused = usize::from(end[0] >> 2 & 0b111);
     data.truncate(data.len().saturating_sub(unused));
-    bench.send(request(bench, [0xA1, 0, 0, 0, 0, 0, 0, 0]));
+    let confirmation = request(bench, [0xA1, 0, 0, 0, 0, 0, 0, 0]);
+    if let Some(answer) = bench.ask_briefly(confirmation).await {
+        fail!("the client's confirmation of the end of a block upload is answered with {answer}");
+    }
     if let Some(size) = size.filter(|size| *size as usize != data.len()) {
         fail!("{mux} was announced with {size} bytes and came with {}", data.len());
     }
