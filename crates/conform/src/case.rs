@@ -7,8 +7,9 @@ use cia402::ModeOfOperation;
 use devices::PowerStyle;
 
 use crate::bench::Bench;
+use crate::finding::Verdict;
+use crate::options::Options;
 use crate::subject::Subject;
-use crate::suite::Options;
 
 /// One case of the suite.
 #[derive(Clone, Copy)]
@@ -27,18 +28,6 @@ pub struct Case {
 }
 
 pub(crate) type Run = for<'a> fn(&'a mut Bench) -> Pin<Box<dyn Future<Output = Verdict> + 'a>>;
-
-/// What was seen where it is right; else what is wrong, or why the case says nothing.
-pub(crate) type Verdict = Result<String, Finding>;
-
-/// Why a case was not passed.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Finding {
-    /// The node does something else.
-    Fail(String),
-    /// The device does not have what is asked about.
-    NotApplicable(String),
-}
 
 /// A part of the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -205,15 +194,3 @@ macro_rules! case {
     };
 }
 pub(crate) use case;
-
-/// Ends a case: the node does something else.
-macro_rules! fail {
-    ($($text:tt)*) => { return Err($crate::case::Finding::Fail(format!($($text)*))) };
-}
-pub(crate) use fail;
-
-/// Ends a case that says nothing about this device.
-macro_rules! not_applicable {
-    ($($text:tt)*) => { return Err($crate::case::Finding::NotApplicable(format!($($text)*))) };
-}
-pub(crate) use not_applicable;

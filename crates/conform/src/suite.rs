@@ -10,37 +10,12 @@ use master::Network;
 
 use crate::bench::{Bench, Restorer, SILENCE};
 use crate::capture::Capture;
-use crate::case::{Case, Finding, Need};
+use crate::case::{Case, Need};
 use crate::cases;
+use crate::finding::Finding;
+use crate::options::Options;
 use crate::report::{CaseResult, Outcome, Report};
 use crate::subject::Subject;
-
-/// What a run is to do.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Run cases in which a motor is energised and moves.
-    pub allow_motion: bool,
-    /// Run cases that store parameters in the device's memory.
-    pub allow_store: bool,
-    /// These cases or groups only; all if empty.
-    pub only: Vec<String>,
-    /// Not these cases or groups.
-    pub skip: Vec<String>,
-    /// Longest wait for the answer to a frame.
-    pub timeout: Duration,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            allow_motion: false,
-            allow_store: false,
-            only: Vec::new(),
-            skip: Vec::new(),
-            timeout: master::DEFAULT_TIMEOUT,
-        }
-    }
-}
 
 /// Why there was no run.
 #[derive(Clone, Debug, PartialEq, Eq)]

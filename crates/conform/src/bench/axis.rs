@@ -8,7 +8,7 @@ use devices::{AxisDescription, CountsPerTurn, PowerStyle, Scale};
 use master::core::NodeSet;
 
 use super::{Bench, ms};
-use crate::case::{Finding, fail, not_applicable};
+use crate::finding::{Finding, fail, not_applicable};
 use crate::subject::bytes_of;
 
 /// Longest time for a change of state: brakes and contactors take some.

@@ -20,9 +20,9 @@ pub use restore::Restorer;
 pub(crate) use sdo::{SdoResult, hex, refused};
 
 use crate::capture::Capture;
-use crate::case::Finding;
+use crate::finding::Finding;
+use crate::options::Options;
 use crate::subject::Subject;
-use crate::suite::Options;
 
 /// Frames that a result shows: the last ones that were about the node.
 const EVIDENCE: usize = 16;

@@ -10,7 +10,7 @@ use canopen::{Mux, NmtCommand, NmtState, connection_set};
 
 use super::restore::SETTLING;
 use super::{Bench, ms, silent};
-use crate::case::{Finding, fail};
+use crate::finding::{Finding, fail};
 
 /// Longest time from a reset to the boot-up message. CiA 301 states none; devices with a self-test take seconds.
 pub(crate) const BOOT: Duration = Duration::from_secs(10);

@@ -6,7 +6,7 @@ use canopen::pdo::PdoId;
 use canopen::{CobId, Mux, connection_set};
 
 use super::{Bench, SdoResult, ms};
-use crate::case::{Finding, not_applicable};
+use crate::finding::{Finding, not_applicable};
 use crate::subject::{bytes_of, number_of};
 
 /// A transmit PDO that a case has set up.

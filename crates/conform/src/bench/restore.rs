@@ -16,7 +16,7 @@ pub(crate) const SETTLING: Duration = Duration::from_millis(60);
 /// Looks at a node that starts, each as long as an answer is waited for.
 const BOOT_LOOKS: usize = 10;
 
-/// Puts back what a case has touched. A clone outlives a run that is given up, for whoever ends it.
+/// Puts back what a case has touched. A clone outlives a run that is given up, for the caller that ends it.
 #[derive(Clone, Debug)]
 pub struct Restorer {
     node: Node,

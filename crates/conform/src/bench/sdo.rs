@@ -6,7 +6,7 @@ use canopen::sdo::wire::{Payload, Reply, Request, Segment};
 use canopen::{AbortCode, Mux, connection_set};
 
 use super::{Bench, SILENCE, ms};
-use crate::case::{Finding, Verdict, fail};
+use crate::finding::{Finding, Verdict, fail};
 use crate::subject::number_of;
 
 /// What a server made of a request: it did it, or aborted.
@@ -49,7 +49,7 @@ impl Bench {
         self.further_answer().await
     }
 
-    /// A frame of the server that nobody has asked for.
+    /// A frame of the server that was not asked for.
     pub(crate) async fn further_answer(&mut self) -> Option<Frame> {
         let reply = connection_set::sdo_reply(self.node());
         self.wait_for(SILENCE, |frame| frame.id() == reply).await.map(|passed| passed.frame)
@@ -177,7 +177,7 @@ impl Bench {
         Ok(written)
     }
 
-    /// What an object has now comes back after the case: for whoever writes it frame by frame.
+    /// What an object has now comes back after the case: for a case that writes it frame by frame.
     pub(crate) async fn touch(&mut self, mux: Mux) -> Result<(), Finding> {
         let readable = self.subject.description.row(mux).is_none_or(|row| row.access.is_readable());
         if readable && let Ok(before) = self.upload(mux).await? {

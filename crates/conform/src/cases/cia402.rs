@@ -7,7 +7,8 @@ use cia402::{ModeOfOperation, PowerCommand, PowerState, Statusword};
 use devices::{AxisDescription, HomingStart};
 
 use crate::bench::{Bench, CHANGE, hex, refused};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 use crate::subject::bytes_of;
 
 const STATES: Need = Need::PowerStates;

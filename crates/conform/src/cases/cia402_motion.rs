@@ -8,7 +8,8 @@ use cia402::{Controlword, ModeOfOperation, PowerCommand, PowerState, Statusword}
 use super::cia402::transition;
 use super::emcy::{TIME_MS, absent_node, beat, consume};
 use crate::bench::{Bench, CHANGE, MOTION, ms};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 const AXIS: Need = Need::Axis;
 const STATES: Need = Need::PowerStates;

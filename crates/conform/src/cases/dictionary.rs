@@ -5,7 +5,8 @@ use canopen::{AbortCode, Mux, NmtCommand};
 
 use super::sdo::limits;
 use crate::bench::{Bench, hex, refused};
-use crate::case::{Case, Finding, Verdict, case, fail, not_applicable};
+use crate::case::{Case, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 use crate::subject::{bytes_of, has_number};
 
 #[rustfmt::skip]

@@ -5,7 +5,8 @@ use canopen::emcy::Emcy;
 use canopen::{Mux, NmtCommand, NodeId};
 
 use crate::bench::{Bench, ms, silent};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 const REGISTER: Mux = Mux::new(0x1001, 0);
 const HISTORY: Mux = Mux::new(0x1003, 0);

@@ -5,7 +5,8 @@ use canopen::emcy::Emcy;
 use canopen::{Mux, NmtCommand, connection_set};
 
 use crate::bench::{Bench, SILENCE, ms, silent};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 const TIME: Mux = Mux::new(0x100C, 0);
 const FACTOR: Mux = Mux::new(0x100D, 0);

@@ -4,7 +4,8 @@ use canopen::{AbortCode, Mux, NmtCommand};
 
 use super::emcy::{TIME_MS, absent_node, beat, consume};
 use crate::bench::{Bench, SILENCE, ms, refused, silent};
-use crate::case::{Case, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Verdict, fail, not_applicable};
 
 const PERIOD: Mux = Mux::new(0x1017, 0);
 const CONSUMER: Need = Need::Index(0x1016);

@@ -7,7 +7,8 @@ use canopen::connection_set::{LSS_MASTER, LSS_SLAVE};
 use canopen::{Mux, NmtCommand};
 
 use crate::bench::{Bench, SILENCE, hex, ms, silent};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 #[rustfmt::skip]
 pub(crate) const CASES: &[Case] = &[

@@ -6,7 +6,8 @@ use canopen::sdo::wire::Request;
 use canopen::{Mux, NmtCommand, NmtState, connection_set};
 
 use crate::bench::{Bench, SILENCE, hex, ms};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 const DEVICE_TYPE: Mux = Mux::new(0x1000, 0);
 const PRODUCER: Need = Need::Index(0x1017);

@@ -3,7 +3,8 @@
 use canopen::{AbortCode, CobId, Mux, NmtCommand};
 
 use crate::bench::{Bench, refused};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 const STORE: Need = Need::Index(0x1010);
 const RESTORE: Need = Need::Index(0x1011);

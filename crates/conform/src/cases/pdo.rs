@@ -6,7 +6,8 @@ use can::{BusFrame, Frame};
 use canopen::{AbortCode, CobId, Mux, NmtCommand};
 
 use crate::bench::{Bench, SILENCE, Tpdo, another, entry, hex, ms, refused, silent};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 use crate::subject::{bytes_of, number_of};
 
 #[rustfmt::skip]

@@ -4,7 +4,8 @@ use canopen::od::{Access, DataType, Entry, PdoMapping};
 use canopen::{AbortCode, CobId, Mux, NmtCommand};
 
 use crate::bench::{Bench, SdoResult, entry, is_mappable, refused};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 #[rustfmt::skip]
 pub(crate) const CASES: &[Case] = &[
@@ -29,7 +30,7 @@ const UNSUPPORTED: AbortCode = AbortCode::UNSUPPORTED_ACCESS;
 const GENERAL: AbortCode = AbortCode::GENERAL;
 const MAPPING_CODES: [AbortCode; 4] =
     [UNSUPPORTED, AbortCode::NO_SUCH_OBJECT, AbortCode::NOT_MAPPABLE, AbortCode::PDO_TOO_LONG];
-/// A device whose mapping cannot be changed says so.
+/// What a device answers whose mapping cannot be changed.
 const CONSTANT: [AbortCode; 2] = [AbortCode::READ_ONLY, UNSUPPORTED];
 
 async fn default_mapping(bench: &mut Bench) -> Verdict {

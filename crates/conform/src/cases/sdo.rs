@@ -6,7 +6,8 @@ use canopen::sdo::wire::{Payload, Reply, Request};
 use canopen::{AbortCode, Mux, NmtCommand, connection_set};
 
 use crate::bench::{Bench, SdoResult, hex, refused};
-use crate::case::{Case, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Verdict, fail, not_applicable};
 use crate::subject::{Subject, bytes_of};
 
 #[rustfmt::skip]

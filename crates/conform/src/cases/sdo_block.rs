@@ -6,7 +6,8 @@ use canopen::{AbortCode, Mux, connection_set};
 
 use super::sdo_transfer::aborted;
 use crate::bench::{Bench, hex, refused};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 const GUARD_TIME: Mux = Mux::new(0x100C, 0);
 const HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);

@@ -6,7 +6,8 @@ use canopen::sdo::wire::{Payload, Reply, Request, Segment};
 use canopen::{AbortCode, Mux};
 
 use crate::bench::{Bench, SdoResult, hex, refused};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 #[rustfmt::skip]
 pub(crate) const CASES: &[Case] = &[

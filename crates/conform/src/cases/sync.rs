@@ -4,7 +4,8 @@ use can::{BusFrame, CanId, Frame};
 use canopen::{AbortCode, Mux, NmtCommand};
 
 use crate::bench::{Bench, hex, ms, refused};
-use crate::case::{Case, Finding, Need, Verdict, case, fail, not_applicable};
+use crate::case::{Case, Need, case};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 const COB_ID: Mux = Mux::new(0x1005, 0);
 const PERIOD: Mux = Mux::new(0x1006, 0);

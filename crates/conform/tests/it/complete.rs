@@ -65,7 +65,7 @@ fn sheet(further: &[Row]) -> String {
     all.sort_by_key(|row| (row.0, row.1));
     let mut out = String::from(
         "[FileInfo]\nFileName=complete.eds\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0\nDescription=\nCreatedBy=\n\
-         [DeviceInfo]\nVendorName=Nobody\nVendorNumber=0x11\nProductName=Complete\nProductNumber=0x22\nRevisionNumber=0x33\n\
+         [DeviceInfo]\nVendorName=Example\nVendorNumber=0x11\nProductName=Complete\nProductNumber=0x22\nRevisionNumber=0x33\n\
          BaudRate_500=1\nSimpleBootUpSlave=1\nGranularity=8\nNrOfRXPDO=1\nNrOfTXPDO=1\nLSS_Supported=1\n\
          [DummyUsage]\nDummy0005=1\n",
     );

@@ -11,17 +11,7 @@ fn passes(name: &str) {
     let mut world = World::new(Bitrate::K500, 1);
     world.add_drive(5, drive(model)).unwrap();
     let options = Options { allow_motion: true, allow_store: true, ..Options::default() };
-    let started = std::time::Instant::now();
     let report = run_in(&mut world, Subject::of_model(node(), model), options);
-    if std::env::var("SHOW").is_ok() {
-        eprintln!(
-            "{name} {:?} virtual {} real {:?}\n{}",
-            report.summary,
-            world.now(),
-            started.elapsed(),
-            shown(&report, |_| true)
-        );
-    }
     assert!(report.ok, "{name}: {:?}\n{}", report.not_restored, shown(&report, failed));
 }
 

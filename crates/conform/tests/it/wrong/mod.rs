@@ -78,9 +78,6 @@ fn without_drives() -> Options {
 #[test]
 fn the_complete_device_passes() {
     let report = report_of(complete(), Kind::Right, without_drives());
-    if std::env::var("SHOW").is_ok() {
-        eprintln!("{:?}\n{}", report.summary, shown(&report, |_| true));
-    }
     assert!(report.ok, "{:?}\n{}", report.not_restored, shown(&report, crate::bench::failed));
 }
 
@@ -90,10 +87,8 @@ const EXTENDED: &[&str] = &["OTHER 09", "PDO 08", "PDO 14", "PDO 20"];
 /// In parts, so that they run side by side.
 fn part(number: usize) {
     const PARTS: usize = 4;
-    let only = std::env::var("ONLY").unwrap_or_default();
     let chosen: Vec<_> =
         all_defects().enumerate().filter(|(place, _)| place % PARTS == number).map(|(_, defect)| defect).collect();
-    let chosen: Vec<_> = chosen.into_iter().filter(|defect| only.is_empty() || only == defect.fails).collect();
     let (extended_ones, plain): (Vec<_>, Vec<_>) =
         chosen.into_iter().partition(|defect| EXTENDED.contains(&defect.fails));
     check(&plain, complete(), &without_drives());
@@ -123,19 +118,14 @@ fn each_defect_fails_its_case_4() {
 #[test]
 fn each_defect_of_a_drive_fails_its_case() {
     let options = Options { allow_motion: true, only: vec!["402".into()], ..Options::default() };
-    let only = std::env::var("ONLY").unwrap_or_default();
-    let chosen: Vec<_> = drive::DEFECTS.iter().filter(|defect| only.is_empty() || only == defect.fails).collect();
+    let chosen: Vec<_> = drive::DEFECTS.iter().collect();
     check(&chosen, devices::model("cia402").unwrap(), &options);
 }
-
-/// Cases that no node of ours can fail yet are named here with the reason.
-const WITHOUT_DEFECT: &[(&str, &str)] = &[];
 
 #[test]
 fn every_case_has_a_defect_that_fails_it() {
     let meant: Vec<&str> = all_defects().chain(drive::DEFECTS).map(|defect| defect.fails).collect();
-    let named = |id: &str| meant.contains(&id) || WITHOUT_DEFECT.iter().any(|(known, _)| *known == id);
-    let without: Vec<&str> = all().map(|case| case.id).filter(|id| !named(id)).collect();
+    let without: Vec<&str> = all().map(|case| case.id).filter(|id| !meant.contains(id)).collect();
     assert_eq!(without, [""; 0]);
     let unknown: Vec<&&str> = meant.iter().filter(|id| !all().any(|case| case.id == **id)).collect();
     assert!(unknown.is_empty(), "{unknown:?}");

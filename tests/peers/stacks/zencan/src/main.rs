@@ -19,6 +19,7 @@ fn main() -> io::Result<()> {
     let [host, port, node, _eds] = &arguments[..] else { panic!("expected HOST PORT NODE FILE.eds") };
     let mut stream = TcpStream::connect(format!("{host}:{port}"))?;
     stream.set_nodelay(true)?;
+    // A node of another stack lives in real time.
     stream.set_read_timeout(Some(Duration::from_millis(1)))?;
     let mut text = String::new();
     for command in ["< open can0 >", "< rawmode >"] {
@@ -31,6 +32,7 @@ fn main() -> io::Result<()> {
     zencan::OBJECT1018.set_serial(1);
     let mut node = Node::new(id, Callbacks::new(), &zencan::NODE_MBOX, &zencan::NODE_STATE, &zencan::OD_TABLE);
     println!("running");
+    // Its timers count from here.
     let started = Instant::now();
     loop {
         receive(&mut stream, &mut text)?;
