@@ -98,7 +98,7 @@ impl Conform {
     async fn subject(&self, context: &Context, node: NodeId) -> Result<Subject, Failure> {
         let description = match self.eds {
             Some(description) => description,
-            None => match context.known_drive(node).await?.description() {
+            None => match context.known_drive(node).await.map_err(with_sheet)?.description() {
                 Some(description) => description,
                 None => return Err(Failure::unknown_model(node)),
             },
@@ -108,6 +108,15 @@ impl Conform {
         } else {
             Subject::of_model(node, description)
         })
+    }
+}
+
+/// A device whose model is not known here has a sheet of its own.
+fn with_sheet(failure: Failure) -> Failure {
+    if failure.kind == "unknown_model" {
+        failure.next("or give the EDS of the device: --eds FILE.eds")
+    } else {
+        failure
     }
 }
 
