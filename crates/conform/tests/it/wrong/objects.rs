@@ -9,8 +9,8 @@ const GARBAGE: u32 = 0x0606_0000;
 
 #[rustfmt::skip]
 pub(crate) static DEFECTS: &[Defect] = &[
-    defect("1000h says another device type", "SDO 01", &["SDO 56", "OD 08"], Alter(|m, a| if reads(&m.request, 0x1000, 0) { answer(&a, 0x43, 0x0004_0192) } else { a })),
-    defect("1000h comes in segments of a size that is not its own", "SDO 13", &["SDO 01", "SDO 56", "OD 01", "OD 07", "OD 08"], Alter(|m, a| if reads(&m.request, 0x1000, 0) { answer(&a, 0x4B, 0x191) } else { a })),
+    defect("1000h says another device type", "SDO 01", &["SDO 56", "OD 08", "SDO 19"], Alter(|m, a| if reads(&m.request, 0x1000, 0) { answer(&a, 0x43, 0x0004_0192) } else { a })),
+    defect("1000h comes in segments of a size that is not its own", "SDO 13", &["SDO 01", "SDO 56", "OD 01", "OD 07", "OD 08", "SDO 19"], Alter(|m, a| if reads(&m.request, 0x1000, 0) { answer(&a, 0x4B, 0x191) } else { a })),
     defect("1017h is confirmed and not written", "SDO 02", &["SDO 15", "OTHER 52", "OD 09", "SDO 59", "SDO 58", "HBG 02", "HBG 04", "HBG 05", "HBG 06", "HBG 07", "HB 01", "HB 02", "HB 03", "HB 51", "STATE 02", "STATE 03", "STATE 04", "TRANS 02", "TRANS 03", "TRANS 04", "TRANS 51", "TRANS 52", "TRANS 53"], Answer(|_, r| (r[0] == 0x2B && writes(&r, 0x1017, 0)).then(|| confirm(&r)))),
     defect("a write to 1000h is confirmed", "SDO 03", &["OD 03"], Answer(|_, r| writes(&r, 0x1000, 0).then(|| confirm(&r)))),
     defect("a write to 1000h is refused as missing", "SDO 03", &["OD 03"], Alter(|m, a| { let so = writes(&m.request, 0x1000, 0); code_if(a, so, 0x0602_0000) })),
