@@ -252,8 +252,8 @@ async fn write_back(bench: &mut Bench) -> Verdict {
     bench.nmt(NmtCommand::EnterPreOperational).await;
     let subject = bench.subject;
     let mut findings = Findings::default();
-    // A mapping is written by its procedure only, an inhibit time while the PDO is off (CiA 301, 7.5.2.37).
-    let is_bound = |row: &Entry| matches!((row.index, row.sub_index), (0x1600..=0x17FF | 0x1A00..=0x1BFF, _) | (0x1400..=0x19FF, 3));
+    // A mapping is written by its procedure only, an inhibit time and a SYNC start value while the PDO is off (CiA 301, 7.5.2.37).
+    let is_bound = |row: &Entry| matches!((row.index, row.sub_index), (0x1600..=0x17FF | 0x1A00..=0x1BFF, _) | (0x1400..=0x19FF, 3 | 6));
     for row in subject.rows().filter(|row| subject.is_setting(row) && !is_bound(row)) {
         let Ok(data) = bench.upload(row.mux()).await? else { continue };
         if data.is_empty() {

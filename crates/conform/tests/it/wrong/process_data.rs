@@ -93,7 +93,7 @@ pub(crate) static DEFECTS: &[Defect] = &[
     defect("remote frames are answered in stopped", "PDO 09", &["PDO 15"], Replace(|m, f| takes_253(m, f, true))),
     defect("remote frames are answered in pre-operational", "PDO 15", &["PDO 09"], Replace(|m, f| takes_253(m, f, true))),
     defect("a change is not sent", "PDO 04", &["PDO 51"], Say(|m, f| { let by_change = m.pdo_type == 255 && m.pdo_timer == 0 && m.request[0] >> 5 == 1; if is_tpdo(&f) && by_change { vec![] } else { vec![f] } })),
-    defect("a change is sent twice", "PDO 04", &["PDO 05", "PDO 06", "PDO 07", "PDO 51", "SYNC 03", "SYNC 51"], Say(|_, f| if is_tpdo(&f) { vec![f, f] } else { vec![f] })),
+    defect("a change is sent twice", "PDO 04", &["PDO 05", "PDO 06", "PDO 07", "PDO 51", "SYNC 03", "SYNC 51", "PDO 03"], Say(|_, f| if is_tpdo(&f) { vec![f, f] } else { vec![f] })),
     defect("the event timer runs at half its period", "PDO 05", &[], Ask(|_, r| if writes(&r, 0x1800, 5) { answer(&r, r[0], written(&r) / 2) } else { r })),
     defect("the event timer does not run", "PDO 05", &["OD 09"], Answer(|_, r| (writes(&r, 0x1800, 5)).then(|| confirm(&r)))),
     defect("every nth SYNC is every SYNC", "PDO 06", &[], Ask(|_, r| if writes(&r, 0x1800, 2) && r[4] == 2 { answer(&r, r[0], 1) } else { r })),
