@@ -68,6 +68,8 @@ fn a_whole_run_leaves_values_and_nmt_state_as_they_were() {
     world.run_for(Duration::from_secs(1));
     assert_eq!(values(&mut world, &network, complete()), before);
     assert_eq!(state(&network), Some(NmtState::Operational));
+    // The cases send requests as frames: their answers are not a second device's.
+    assert_eq!(network.facts(node()).twins, None);
 }
 
 #[test]

@@ -187,7 +187,17 @@ impl Core {
                 self.show_presence();
             }
             Command::KeepFed(node, period, allowed) => self.presence.set_feed(node, period, allowed, self.now),
-            Command::Transmit(frame) => self.push_frame(frame),
+            Command::Transmit(frame) => {
+                // A request or an NMT command that is sent as a frame is followed by what follows any other.
+                match Service::of(frame.id()) {
+                    Some(Service::SdoRequest(node)) if !frame.is_remote() => {
+                        self.member_mut(node).answers.asked(&frame, now);
+                    }
+                    Some(Service::Nmt) => self.handle_nmt(&frame),
+                    _ => {}
+                }
+                self.push_frame(frame);
+            }
         }
         self.find_due();
     }
