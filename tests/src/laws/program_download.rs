@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use can::{Bitrate, Frame, Instant, Station};
+use can::{Bitrate, Frame, Instant};
 use canopen::{Mux, NodeId, connection_set};
 use devices::Description;
 use sim::VirtualDrive;
