@@ -248,7 +248,7 @@ pub(super) const DEFECTS: &[Defect] = &[
     },
     Defect {
         file: "crates/master/src/core/facts.rs",
-        text: "watch.deadline = (!booted).then(|| now + watch.time);",
+        text: "watch.deadline = (!booted || watch.asked).then(|| now + watch.time);",
         instead: "watch.deadline = Some(now + watch.time);",
         noticed_by: MASTER,
     },

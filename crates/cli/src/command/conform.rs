@@ -24,7 +24,7 @@ use words::node::node;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive conform 4\n  \
     ferrodrive conform 4 --only SDO,PDO --skip 'SDO 30'\n  \
-    ferrodrive --bus can0 conform 5 --eds device.eds --html report.html --junit report.xml\n  \
+    ferrodrive --bus can0 conform 5 --html report.html --junit report.xml\n  \
     ferrodrive conform --list")]
 pub(crate) struct Conform {
     /// Node-ID
