@@ -31,7 +31,7 @@ pub struct Seen {
     pub others: u64,
 }
 
-/// Every kind: the models that are built in, and the device of [`everything`].
+/// Every kind: the models that are built in, and the device of `everything`.
 ///
 /// # Panics
 /// If the file makes no description.

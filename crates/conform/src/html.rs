@@ -41,9 +41,9 @@ pub fn html(report: &Report) -> String {
             table(&mut out, group, &results);
         }
     }
-    let _ = write!(
+    let _ = writeln!(
         out,
-        "<footer>Made by ferrodrive conform {}. Case numbers up to 50 are those that CiA's conformance test prints; numbers from 51 on and 402 are the suite's own. This is a report of a test, not a certificate of CiA.</footer></body></html>\n",
+        "<footer>Made by ferrodrive conform {}. Case numbers up to 50 are those that CiA's conformance test prints; numbers from 51 on and 402 are the suite's own. This is a report of a test, not a certificate of CiA.</footer></body></html>",
         env!("CARGO_PKG_VERSION")
     );
     out

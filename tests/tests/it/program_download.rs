@@ -168,7 +168,7 @@ fn a_power_failure_in_the_midst_of_the_data_leaves_what_was_stored_before() {
 #[test]
 fn what_is_there_already_is_not_sent_again() {
     let mut bench = Bench::new();
-    let program: Vec<u8> = (0..20_000_u32).map(|at| (at * 7 >> 3) as u8).collect();
+    let program: Vec<u8> = (0..20_000_u32).map(|at| ((at * 7) >> 3) as u8).collect();
     let first = bench.send(&program).unwrap();
     assert!(first.sent && first.verified && first.running == Some(true) && first.note.is_none(), "{first:?}");
     assert_eq!((first.identification, first.flash_status), (Some(first.checksum), Some(0)));

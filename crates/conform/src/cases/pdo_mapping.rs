@@ -237,7 +237,7 @@ async fn wrong_length(bench: &mut Bench) -> Verdict {
     let Some(row) = first(bench, |row| is_mappable(row, PdoMapping::Receive) && row.data_type.bits() < 32) else {
         not_applicable!("no object shorter than 32 bits can be mapped");
     };
-    let raw = entry(row) & !0xFF | u32::from(row.data_type.bits()) - 1;
+    let raw = (entry(row) & !0xFF) | (u32::from(row.data_type.bits()) - 1);
     let answer = map_one(bench, 0x1400, raw).await?;
     let codes = [
         AbortCode::NOT_MAPPABLE,

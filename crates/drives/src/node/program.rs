@@ -1,9 +1,10 @@
 //! Program download (CiA 302-3): the programs of a described device by 1F50h (data), 1F51h (control), 1F56h (software identification)
 //! and 1F57h (flash status).
 //!
-//! A program is stopped before its data comes, and started after it: its old data stays until all of the new has come. The figures of
-//! 1F51h and 1F57h are those that makers print (TR-Electronic, CM_-36 user manual TR-ECE-BA-DGB-0128, 7.19); CiA 302-3 itself is
-//! not public. No program is executed here: what a device does is in its firmware.
+//! A program is stopped before its data comes, and started after it: its old data stays until all of the new has come. CiA 302-3
+//! itself is not public: the values of 1F51h and 1F57h are those of another implementation of it (Zephyr RTOS, its CANopen program
+//! download), and 1F57h is also printed by TR-Electronic (TR-ECE-BA-DGB-0128, 7.19). No program is executed here: what a device does
+//! is in its firmware.
 
 use canopen::od::{Check, Condition, Dictionary, Entry, Slot, Storage, Table, View};
 use canopen::{AbortCode, Mux};

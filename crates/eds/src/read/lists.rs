@@ -117,7 +117,7 @@ impl Reader {
         for (line, index) in lines {
             let what = format!("the object stands in none of the lists: [{}] misses it", List::of(index).section());
             let taken = Some("an object like the others".into());
-            self.find(Rule::Unlisted, crate::Severity::Warning, &format!("{index:04X}"), None, line, what, taken);
+            self.find(Rule::Unlisted, crate::Severity::Warning, (&format!("{index:04X}"), None, line), what, taken);
         }
     }
 }

@@ -57,13 +57,12 @@ impl Reader {
         }
     }
 
+    /// At an entry, or where there is none at a line of a section.
     pub(super) fn find(
         &mut self,
         rule: Rule,
         severity: Severity,
-        section: &str,
-        entry: Option<Entry<'_>>,
-        line: u32,
+        (section, entry, line): (&str, Option<Entry<'_>>, u32),
         what: String,
         taken: Option<String>,
     ) {
@@ -86,7 +85,7 @@ impl Reader {
         what: impl Into<String>,
         taken: Option<String>,
     ) {
-        self.find(rule, Severity::Warning, section.name(), Some(entry), 0, what.into(), taken);
+        self.find(rule, Severity::Warning, (section.name(), Some(entry), 0), what.into(), taken);
     }
 
     pub(super) fn error(
@@ -97,7 +96,7 @@ impl Reader {
         what: impl Into<String>,
         taken: impl Into<String>,
     ) {
-        self.find(rule, Severity::Error, section.name(), Some(entry), 0, what.into(), Some(taken.into()));
+        self.find(rule, Severity::Error, (section.name(), Some(entry), 0), what.into(), Some(taken.into()));
     }
 
     pub(super) fn warn_section(
@@ -107,7 +106,7 @@ impl Reader {
         what: impl Into<String>,
         taken: Option<String>,
     ) {
-        self.find(rule, Severity::Warning, section.name(), None, section.line(), what.into(), taken);
+        self.find(rule, Severity::Warning, (section.name(), None, section.line()), what.into(), taken);
     }
 
     pub(super) fn error_section(
@@ -117,7 +116,7 @@ impl Reader {
         what: impl Into<String>,
         taken: impl Into<String>,
     ) {
-        self.find(rule, Severity::Error, section.name(), None, section.line(), what.into(), Some(taken.into()));
+        self.find(rule, Severity::Error, (section.name(), None, section.line()), what.into(), Some(taken.into()));
     }
 }
 

@@ -358,7 +358,7 @@ fn a_wheel_that_its_load_drives_was_not_brought_to_rest() {
     let Err(BaseError::NotAtRest(why)) = &stopped else { panic!("{stopped:?}") };
     let NotAtRest::StillTurns { node: turning, rpm, .. } = why else { panic!("{why:?}") };
     assert_eq!(*turning, node(RIGHT));
-    let true_rpm = f64::from(bench.world.report(RIGHT).unwrap().velocity_rpm);
+    let true_rpm = bench.world.report(RIGHT).unwrap().velocity_rpm;
     assert!(rpm.abs() > 2.0 && (rpm.abs() - true_rpm.abs()).abs() < 0.2 * true_rpm.abs(), "{rpm} for {true_rpm} r/min");
     assert!(why.to_string().contains("node 2 still turns at"), "{why}");
 }

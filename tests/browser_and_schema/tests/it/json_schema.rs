@@ -271,9 +271,15 @@ fn sources(folder: &std::path::Path, found: &mut Vec<String>) {
 fn the_page_lists_every_kind_of_the_code_and_no_other() {
     let crates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../crates");
     let mut texts = Vec::new();
-    for folder in
-        ["cli/src", "master/src/error", "sim/src/command", "host/src/control", "host/src/network", "words/src"]
-    {
+    for folder in [
+        "cli/src",
+        "master/src/error",
+        "sim/src/command",
+        "host/src/control",
+        "host/src/network",
+        "serve/src",
+        "words/src",
+    ] {
         sources(&crates.join(folder), &mut texts);
     }
     texts.push(std::fs::read_to_string(crates.join("sim/src/command.rs")).expect("UTF-8"));

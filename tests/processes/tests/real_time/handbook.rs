@@ -85,7 +85,7 @@ fn follow_in(name: &str, folder: &Path) -> usize {
 const FOLLOWED: [(&str, usize); 18] = [
     ("install.md", 2),
     ("first-steps.md", 18),
-    ("simulate.md", 10),
+    ("simulate.md", 14),
     ("ci.md", 1),
     ("test-your-software.md", 10),
     ("logs.md", 11),
