@@ -93,7 +93,7 @@ fn sheet(further: &[Row]) -> String {
 fn list<'a>(out: &mut String, name: &str, indexes: impl Iterator<Item = &'a u16> + Clone) {
     let _ = write!(out, "[{name}]\nSupportedObjects={}\n", indexes.clone().count());
     for (place, index) in (1..).zip(indexes) {
-        let _ = write!(out, "{place}=0x{index:04X}\n");
+        let _ = writeln!(out, "{place}=0x{index:04X}");
     }
 }
 

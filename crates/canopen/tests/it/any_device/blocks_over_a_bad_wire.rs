@@ -50,7 +50,12 @@ impl Line {
     }
 
     fn take(&mut self, now: Instant) -> Option<Frame> {
-        self.under_way.pop_front_if(|(at, _)| *at <= now).map(|(_, frame)| frame)
+        self.under_way
+            .front()
+            .is_some_and(|(at, _)| *at <= now)
+            .then(|| self.under_way.pop_front())
+            .flatten()
+            .map(|(_, frame)| frame)
     }
 }
 
