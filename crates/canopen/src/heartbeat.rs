@@ -3,6 +3,7 @@
 use can::{CanId, Frame, Instant};
 
 use crate::od::View;
+use crate::period::Period;
 use crate::{AbortCode, Mux, NmtState, NodeId, connection_set};
 
 const NANOS_PER_MILLI: u64 = 1_000_000;
@@ -48,45 +49,30 @@ impl Heartbeat {
 
 /// When the next heartbeat is due. A producer that is served late skips what it missed.
 #[derive(Clone, Copy, Debug)]
-pub struct Producer {
-    period_ns: u64,
-    next: Instant,
-}
+pub struct Producer(Period);
 
 impl Producer {
     /// A producer that never sends.
-    pub const OFF: Self = Self { period_ns: 0, next: Instant::FAR_FUTURE };
+    pub const OFF: Self = Self(Period::OFF);
 
     /// Starts with the boot-up message at `now`, which counts as the first heartbeat. 0 ms is off.
     pub const fn from_boot_up(period_ms: u16, now: Instant) -> Self {
-        if period_ms == 0 {
-            return Self::OFF;
-        }
-        let period_ns = period_ms as u64 * NANOS_PER_MILLI;
-        Self { period_ns, next: now.plus_nanos(period_ns) }
+        Self(Period::new(period_ms as u64 * NANOS_PER_MILLI).after(now))
     }
 
     /// Starts at once, with a heartbeat due at `now`: 1017h was written. 0 ms is off.
     pub const fn from_write(period_ms: u16, now: Instant) -> Self {
-        if period_ms == 0 {
-            return Self::OFF;
-        }
-        Self { period_ns: period_ms as u64 * NANOS_PER_MILLI, next: now }
+        Self(Period::new(period_ms as u64 * NANOS_PER_MILLI).due(now))
     }
 
     /// When a heartbeat is next due; [`Instant::FAR_FUTURE`] for never.
     pub const fn deadline(&self) -> Instant {
-        self.next
+        self.0.deadline()
     }
 
     /// True if a heartbeat is due at `now`; the next one is then set on the grid of the period.
     pub fn handle_timeout(&mut self, now: Instant) -> bool {
-        if now < self.next || self.period_ns == 0 {
-            return false;
-        }
-        let missed = now.nanos_since(self.next) / self.period_ns;
-        self.next = self.next.plus_nanos((missed + 1).saturating_mul(self.period_ns));
-        true
+        self.0.handle_timeout(now)
     }
 }
 

@@ -65,6 +65,7 @@ mod node_id;
 pub mod object;
 pub mod od;
 pub mod pdo;
+mod period;
 pub mod sdo;
 pub mod sync;
 pub mod time_stamp;

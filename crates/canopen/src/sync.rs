@@ -3,6 +3,7 @@
 use can::{CanId, Frame, Instant};
 
 use crate::AbortCode;
+use crate::period::Period;
 
 const NANOS_PER_MICRO: u64 = 1_000;
 /// The largest value of the counter (CiA 301, 7.5.2.22).
@@ -46,47 +47,39 @@ impl Sync {
 /// When the next SYNC is due, and its counter. A producer that is served late skips what it missed.
 #[derive(Clone, Copy, Debug)]
 pub struct Producer {
-    period_ns: u64,
+    period: Period,
     overflow: u8,
     counter: u8,
-    next: Instant,
 }
 
 impl Producer {
     /// A producer that never sends.
-    pub const OFF: Self = Self { period_ns: 0, overflow: 0, counter: 1, next: Instant::FAR_FUTURE };
+    pub const OFF: Self = Self { period: Period::OFF, overflow: 0, counter: 1 };
 
     /// At rest, with the period of 1006h and the counter overflow value of 1019h. A period of 0 is off.
     pub const fn new(period_us: u32, overflow: u8) -> Self {
-        Self { period_ns: period_us as u64 * NANOS_PER_MICRO, overflow, ..Self::OFF }
+        Self { period: Period::new(period_us as u64 * NANOS_PER_MICRO), overflow, ..Self::OFF }
     }
 
     /// SYNC is sent from now on, the first one after a period: no later than CiA 301 allows (7.5.2.5, 7.5.2.6).
     pub const fn start(&mut self, now: Instant) {
-        if self.period_ns != 0 {
-            self.next = now.plus_nanos(self.period_ns);
-        }
+        self.period = self.period.after(now);
     }
 
     /// Nothing is sent from now on, and the counter begins at 1 again (CiA 301, 7.2.5.1: on leaving NMT stopped).
     pub const fn stop(&mut self) {
-        self.next = Instant::FAR_FUTURE;
+        self.period.stop();
         self.counter = 1;
     }
 
     /// When a SYNC is next due; [`Instant::FAR_FUTURE`] for never.
     pub const fn deadline(&self) -> Instant {
-        self.next
+        self.period.deadline()
     }
 
     /// True if a SYNC is due at `now`; the next one is then set on the grid of the period.
     pub fn handle_timeout(&mut self, now: Instant) -> bool {
-        if now < self.next || self.period_ns == 0 {
-            return false;
-        }
-        let missed = now.nanos_since(self.next) / self.period_ns;
-        self.next = self.next.plus_nanos((missed + 1).saturating_mul(self.period_ns));
-        true
+        self.period.handle_timeout(now)
     }
 
     /// The SYNC to send, and the counter goes on: 1 follows the overflow value.

@@ -67,7 +67,7 @@ pub(super) const DEFECTS: &[Defect] = &[
         noticed_by: CAN,
     },
     Defect {
-        file: "crates/canopen/src/heartbeat.rs",
+        file: "crates/canopen/src/period.rs",
         text: "self.next = self.next.plus_nanos((missed + 1).saturating_mul(self.period_ns));",
         instead: "self.next = now.plus_nanos(self.period_ns + 0 * missed);",
         noticed_by: CANOPEN,
