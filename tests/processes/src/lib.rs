@@ -277,6 +277,25 @@ pub fn scratch(name: &str) -> Scratch {
     Scratch(path)
 }
 
+impl Scratch {
+    /// The path of a file in it, as text for a command line.
+    pub fn path(&self, name: &str) -> String {
+        self.join(name).to_str().expect("UTF-8").to_owned()
+    }
+
+    /// Writes a file; its path.
+    pub fn write(&self, name: &str, text: &str) -> String {
+        let path = self.path(name);
+        std::fs::write(&path, text).expect("a file");
+        path
+    }
+
+    /// Writes a file of parameters with these values.
+    pub fn values(&self, name: &str, values: &str) -> String {
+        self.write(name, &format!("[values]\n{values}"))
+    }
+}
+
 impl std::ops::Deref for Scratch {
     type Target = Path;
 

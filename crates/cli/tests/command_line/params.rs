@@ -1,33 +1,10 @@
 //! `ferrodrive params` on the embedded bus: files of every form, refusals before and during the writes.
 
-use processes::{Scratch, done, ferrodrive, scratch};
-
-struct Folder(Scratch);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        Self(scratch(name))
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().expect("UTF-8").to_owned()
-    }
-
-    fn write(&self, name: &str, text: &str) -> String {
-        let path = self.path(name);
-        std::fs::write(&path, text).expect("a file");
-        path
-    }
-
-    /// Values for node 4, a ZLAC8030L.
-    fn values(&self, name: &str, values: &str) -> String {
-        self.write(name, &format!("[values]\n{values}"))
-    }
-}
+use processes::{done, ferrodrive, scratch};
 
 #[test]
 fn a_backup_in_any_form_is_what_the_node_has() {
-    let folder = Folder::new("params_backup");
+    let folder = scratch("params_backup");
     for extension in ["toml", "dcf", "bin"] {
         let file = folder.path(&format!("wheel.{extension}"));
         let report = done(&["params", "backup", "4", "-o", &file, "--json"]).json();
@@ -46,7 +23,7 @@ fn a_backup_in_any_form_is_what_the_node_has() {
 
 #[test]
 fn what_is_written_is_read_back_stored_and_there_after_a_start() {
-    let folder = Folder::new("params_apply");
+    let folder = scratch("params_apply");
     let file = folder.values("wheel.toml", "1017 = 200\n\"1800:02\" = 1\nprofile_acceleration = 150\n");
     let ended = done(&["params", "apply", "4", &file, "--save", "--prove"]);
     assert!(ended.out.contains("stored in the drive's memory"), "{}", ended.out);
@@ -61,7 +38,7 @@ fn what_is_written_is_read_back_stored_and_there_after_a_start() {
 
 #[test]
 fn what_cannot_be_written_is_told_with_its_place_and_nothing_is_written() {
-    let folder = Folder::new("params_refused");
+    let folder = scratch("params_refused");
     let refused = |file: &str| {
         let ended = ferrodrive(&["params", "apply", "4", file]);
         assert_eq!(ended.status, Some(1), "{}{}", ended.out, ended.err);
@@ -104,7 +81,7 @@ fn what_cannot_be_written_is_told_with_its_place_and_nothing_is_written() {
 
 #[test]
 fn commands_in_a_file_are_left_out_with_the_reason() {
-    let folder = Folder::new("params_commands");
+    let folder = scratch("params_commands");
     let planned = |node: &str, name: &str, values: &str| {
         let file = folder.values(name, values);
         let report = done(&["params", "plan", node, &file, "--json"]).json();

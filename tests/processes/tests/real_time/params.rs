@@ -6,40 +6,17 @@ use std::time::Duration;
 
 use processes::{Ended, Scratch, Simulator, command, scratch, wait_until};
 
-struct Folder(Scratch);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        Self(scratch(name))
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().expect("UTF-8").to_owned()
-    }
-
-    fn write(&self, name: &str, text: &str) -> String {
-        let path = self.path(name);
-        std::fs::write(&path, text).expect("a file");
-        path
-    }
-
-    /// Values for node 4, a ZLAC8030L.
-    fn values(&self, name: &str, values: &str) -> String {
-        self.write(name, &format!("[values]\n{values}"))
-    }
-}
-
 struct Served {
     simulator: Simulator,
     bus: String,
-    folder: Folder,
+    folder: Scratch,
 }
 
 impl Served {
     fn new(name: &str, options: &[&str]) -> Self {
         let simulator = Simulator::start(&[options, &["--serve", "socketcand://127.0.0.1:0"]].concat());
         let bus = simulator.bus("socketcand");
-        let served = Self { simulator, bus, folder: Folder::new(name) };
+        let served = Self { simulator, bus, folder: scratch(name) };
         wait_until("the drive boots", || served.run(&["read", served.node(), "1000"]).status == Some(0));
         served
     }
@@ -55,7 +32,7 @@ impl Served {
     fn command(&self, arguments: &[&str]) -> std::process::Command {
         let mut command = command(&[&["--bus", &self.bus, "--timeout", "10s"], arguments].concat());
         // Where journals are kept.
-        command.current_dir(&self.folder.0).stdin(Stdio::null());
+        command.current_dir(&self.folder).stdin(Stdio::null());
         command
     }
 
@@ -73,7 +50,7 @@ impl Served {
     }
 
     fn journal(&self) -> PathBuf {
-        self.folder.0.join("ferrodrive-node4.journal")
+        self.folder.join("ferrodrive-node4.journal")
     }
 }
 
