@@ -4,18 +4,14 @@
 use std::cell::RefCell;
 use std::error::Error;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Duration;
 
-use can::{Instant, Station, Tap};
-use host::stopping::{Account, make_sure};
+use can::Tap;
+use host::stopping::{Account, make_sure, stop};
 use host::{Wire, WorldDoor};
 use master::Network;
-use tokio::sync::Notify;
 use transport::realtime::{self, RealTimeError};
-use transport::{
-    AnyBus, BusError, BusNotes, BusSpec, BusThread, BusThreadError, Note, WallClock, run_station, waker_of,
-};
+use transport::{BusNotes, BusSpec, BusThreadError, Note, WallClock};
 
 use crate::context::Context;
 use crate::embedded::{self, Embedded, EmbeddedDrives};
@@ -29,7 +25,7 @@ use crate::recording::{LogPath, interface_of};
 use crate::signals::asked_to_end;
 use crate::wire;
 use machine::file::Machine;
-use serve::world_bus::WorldBus;
+use serve::live::{LiveBus, LostBus};
 use serve::writing::{CommandLog, Pace};
 use words::failure::causes;
 
@@ -116,77 +112,31 @@ fn virtual_bus<R>(
     })?
 }
 
-/// Where the master of a command runs.
-#[allow(clippy::large_enum_variant, reason = "there is one, for as long as the command takes")]
-enum Runner {
-    /// In the thread of the command.
-    Here(AnyBus),
-    /// In a thread of its own, in real time.
-    Thread(BusThread),
-    /// In the thread of the command, on a world of its own.
-    World(WorldBus),
-}
-
-impl Runner {
-    /// The bus of the command line; of an embedded one which drives are on it, and where their world can be asked.
-    async fn open(
-        global: &Global,
-        wire: Wire,
-    ) -> Result<(Self, WallClock, Option<(EmbeddedDrives, WorldDoor)>), Failure> {
-        if let BusSpec::Sim { file } = &global.bus {
-            let (world, drives) = virtual_world(file.as_deref())?;
-            let clock = start_clock(global)?;
-            let (bus, door) = WorldBus::new(world, &clock, wire);
-            return Ok((Self::World(bus), clock, Some((drives, door))));
-        }
-        let (runner, clock) = Self::open_real(global).await?;
-        Ok((runner, clock, None))
+/// Opens the bus of the command line; of an embedded one also which drives are on it, and where their world can be asked.
+async fn open(global: &Global, wire: Wire) -> Result<(LiveBus, Option<(EmbeddedDrives, WorldDoor)>), Failure> {
+    if let BusSpec::Sim { file } = &global.bus {
+        let (world, drives) = virtual_world(file.as_deref())?;
+        let (bus, door) = LiveBus::of_world(world, start_clock(global)?, wire);
+        return Ok((bus, Some((drives, door))));
     }
-
-    async fn open_real(global: &Global) -> Result<(Self, WallClock), Failure> {
-        if global.realtime {
-            let opened = BusThread::open(global.bus.clone()).await;
-            return opened.map(|(thread, clock)| (Self::Thread(thread), clock)).map_err(|error| match error {
-                BusThreadError::RealTime(error) => no_real_time(&error),
-                error => bus_failure(global, &error),
-            });
-        }
-        let clock = WallClock::start();
-        let bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
-        Ok((Self::Here(bus), clock))
-    }
-
-    /// Runs `station`, which is `network`, until `until` completes.
-    async fn run<U: Future>(
-        self,
-        network: &Network,
-        mut station: impl Station + Send + 'static,
-        clock: &WallClock,
-        until: U,
-        report: impl FnMut(Instant, &Note),
-    ) -> Result<U::Output, BusError> {
-        let wakeup = Arc::new(Notify::new());
-        match self {
-            Self::Here(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, report).await,
-            Self::World(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, report).await,
-            Self::Thread(thread) => {
-                network.on_activity(waker_of(Arc::clone(&wakeup)));
-                thread.run(station, wakeup, until, report).await
-            }
-        }
-    }
+    let opened = LiveBus::open(&global.bus, global.realtime).await;
+    let bus = opened.map_err(|error| match error {
+        BusThreadError::RealTime(error) => no_real_time(&error),
+        error => bus_failure(global, &error),
+    })?;
+    Ok((bus, None))
 }
 
 async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
     let log = global.log.as_ref().map(LogPath::create).transpose()?;
     let health = Wire::default();
-    let (runner, clock, embedded) = Runner::open(global, health.clone()).await?;
+    let (bus, embedded) = open(global, health.clone()).await?;
     let (embedded, world) = embedded.unzip();
-    let (log, writing) = CommandLog::start(log, interface_of(&global.bus), clock.unix_zero(), Pace::RealTime);
+    let (log, writing) = CommandLog::start(log, interface_of(&global.bus), bus.clock().unix_zero(), Pace::RealTime);
     let network = Network::new();
     let progress = Progress::new(global.json);
     progress.spin();
-    let traffic = Traffic::since(clock.unix_zero());
+    let traffic = Traffic::since(bus.clock().unix_zero());
     if global.verbose {
         traffic.show(decoder(global, &[]), Stamps::default(), progress.clone());
     }
@@ -225,16 +175,15 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
             context.wire.tell(&text);
         }
     };
-    let ended = runner.run(&network, station, &clock, until, report).await;
+    let ended = bus.run((&network, THIS), station, until, report).await;
     progress.clear();
     context.remember_nodes();
     context.note_twins();
     if let (Err(torn), Some(log)) = (writing.finish(), &global.log) {
         log.lacks(torn);
     }
-    ended.map_err(|error| {
-        let failure = bus_failure(global, &error);
-        let failure = Account::of_lost_bus(&network, THIS).iter().fold(failure, with_account);
+    ended.map_err(|LostBus { error, moving }| {
+        let failure = moving.iter().fold(bus_failure(global, &error), with_account);
         failure.next(format!("find out why {} was lost, and restart it", global.bus))
     })?
 }
@@ -279,11 +228,7 @@ pub(crate) fn exit_on_signal() {
 
 /// Stops every node that this command has set in motion; the failure then says what was seen of that.
 async fn stop_what_moves(context: &Context, failure: Failure) -> Failure {
-    let stopped = context.network.stop_and_release().await;
-    let failure = stopped
-        .iter()
-        .map(|stopped| Account::of_stop(stopped, THIS))
-        .fold(failure, |failure, account| with_account(failure, &account));
+    let failure = stop(&context.network, THIS).await.iter().fold(failure, with_account);
     match context.restore().await {
         Some(left) if left.is_empty() => failure.because("what had been written was put back"),
         Some(left) => left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}"))),

@@ -16,6 +16,11 @@ pub struct Account {
     pub because: Vec<String>,
 }
 
+/// Stops what `network` has set in motion and releases the guards of what stands; `who` lets go of the drives.
+pub async fn stop(network: &Network, who: &str) -> Vec<Account> {
+    network.stop_and_release().await.iter().map(|stopped| Account::of_stop(stopped, who)).collect()
+}
+
 impl Account {
     /// Of a stop; `who` lets go of the drive: "this command".
     pub fn of_stop(stopped: &Stopped, who: &str) -> Self {

@@ -4,15 +4,15 @@
 //! motion is quick-stopped, and the guards of those that stand are released.
 
 use can::Tap;
-use host::stopping::{Account, still_moving};
+use host::stopping::{still_moving, stop};
 use master::Network;
-use master::drive::Stopped;
+use serve::live::{LiveBus, LostBus};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
-use tokio::sync::{Notify, mpsc};
+use tokio::sync::mpsc;
 use tokio::task::{JoinSet, LocalSet};
-use transport::{BusNotes, BusSpec, Note, WallClock, run_station, waker_of};
+use transport::{BusNotes, BusSpec, Note};
 use words::failure::with_causes;
 
 use crate::master::tap::Traffic;
@@ -141,34 +141,25 @@ fn run(
     };
     let local = LocalSet::new();
     runtime.block_on(local.run_until(async {
-        let clock = WallClock::start();
-        let mut bus = match spec.open(&clock).await {
+        let bus = match LiveBus::open(spec, false).await {
             Ok(bus) => bus,
             Err(error) => return report(Err(with_causes(&error))),
         };
         report(Ok(()));
-        let mut station = Tap::new(network.clone(), traffic);
-        let wakeup = Arc::new(Notify::new());
-        let work = work_through(network.clone(), incoming, Arc::clone(&wakeup));
-        let ended = run_station(&mut bus, &mut station, &clock, &wakeup, work, |_, note| said.note(note));
-        match ended.await {
+        let station = Tap::new(network.clone(), traffic);
+        let work = work_through(&network, incoming);
+        match bus.run((&network, THIS), station, work, |_, note| said.note(note)).await {
             Ok(moving) => said.lock().moving = moving,
-            Err(error) => {
-                let moving = still_moving(Account::of_lost_bus(&network, THIS));
+            Err(LostBus { error, moving }) => {
                 let mut words = said.lock();
-                (words.moving, words.ended) = (moving, Some(with_causes(&error)));
+                (words.moving, words.ended) = (still_moving(moving), Some(with_causes(&error)));
             }
         }
     }));
 }
 
 /// Does the jobs that come, side by side, until no sender is left; then drops them and stops what moves.
-async fn work_through(
-    network: Network,
-    mut incoming: mpsc::UnboundedReceiver<Job>,
-    wakeup: Arc<Notify>,
-) -> Vec<String> {
-    network.on_activity(waker_of(wakeup));
+async fn work_through(network: &Network, mut incoming: mpsc::UnboundedReceiver<Job>) -> Vec<String> {
     let mut running = JoinSet::new();
     loop {
         tokio::select! {
@@ -181,13 +172,13 @@ async fn work_through(
         }
     }
     running.shutdown().await;
-    not_seen_to_stand(&network.stop_and_release().await)
+    stop_what_moves(network).await
 }
 
 /// Who lets go of drives here.
 const THIS: &str = "this program";
 
-/// What was not seen to stand, in words.
-pub(crate) fn not_seen_to_stand(stopped: &[Stopped]) -> Vec<String> {
-    still_moving(stopped.iter().map(|stopped| Account::of_stop(stopped, THIS)))
+/// Stops what moves; what was not seen to stand, in words.
+pub(crate) async fn stop_what_moves(network: &Network) -> Vec<String> {
+    still_moving(stop(network, THIS).await)
 }

@@ -38,7 +38,7 @@ use tap::Traffic;
 use value::Value;
 
 use crate::failure::{bad_value, raised, wrong_use};
-use crate::live::{Live, not_seen_to_stand};
+use crate::live::{Live, stop_what_moves};
 use crate::sheets::{model_of, node_id};
 use crate::world::World;
 
@@ -98,7 +98,7 @@ impl Network {
             shared.lock(py)?.jobs.cancel_all_of(self.owner());
         }
         let job = self.begin(py, async move {
-            let moving = not_seen_to_stand(&core.stop_and_release().await);
+            let moving = stop_what_moves(&core).await;
             core.fall_silent();
             Ok(Value::List(moving.into_iter().map(Value::Text).collect()))
         });

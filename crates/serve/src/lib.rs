@@ -2,8 +2,8 @@
 //! commanded by lines and over sockets, and whose stores, logs and records reach the disk without holding the bus up.
 //!
 //! [`world::ServedWorld`] is the world behind a [`transport::Hub`]; [`pacer`] says how fast its time passes; [`service`] answers what is
-//! asked of it between two steps, and [`control`] has the sockets of the control connection. [`world_bus::WorldBus`] is a world as the bus
-//! of this very program.
+//! asked of it between two steps, and [`control`] has the sockets of the control connection. [`live::LiveBus`] is the other side:
+//! the bus on which a program has its master, which may be a world of this very program.
 //!
 //! What the clock shows is an argument: without a hub and its sockets a served world is moved by a test as well.
 //!
@@ -31,6 +31,7 @@ pub mod files;
 mod input;
 mod kept;
 mod lag;
+pub mod live;
 pub mod messages;
 pub mod pacer;
 mod registers;
@@ -39,7 +40,7 @@ pub mod service;
 pub mod store_writer;
 mod stores;
 pub mod world;
-pub mod world_bus;
+mod world_bus;
 pub mod writing;
 
 /// An empty directory of a test's own.

@@ -18,7 +18,7 @@ const STEP: Duration = Duration::from_millis(1);
 const MOST_BEHIND: Duration = Duration::from_millis(250);
 
 /// See the [module](self).
-pub struct WorldBus {
+pub(crate) struct WorldBus {
     world: World,
     probe: StationId,
     clock: WallClock,
@@ -29,7 +29,7 @@ pub struct WorldBus {
 
 impl WorldBus {
     /// A bus of this world, whose time begins now, and where the world can be asked.
-    pub fn new(mut world: World, clock: &WallClock, wire: Wire) -> (Self, WorldDoor) {
+    pub(crate) fn new(mut world: World, clock: &WallClock, wire: Wire) -> (Self, WorldDoor) {
         let probe = world.add_probe();
         let pace = Pace::real_time(world.now()).rebased(elapsed(clock), world.now());
         let (door, asks) = host::world_door();

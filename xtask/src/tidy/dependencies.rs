@@ -30,7 +30,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("recording", &["can", "plot", "sim", "words"]),
     ("scenario", &["can", "canopen", "cia402", "devices", "machine", "master", "sim", "words"]),
     ("host", &["can", "canopen", "cia402", "devices", "eds", "machine", "master", "plot", "sim", "words"]),
-    ("serve", &["can", "canlog", "host", "recording", "scenario", "sim", "transport", "words"]),
+    ("serve", &["can", "canlog", "host", "master", "recording", "scenario", "sim", "transport", "words"]),
     ("studio", &["can", "canopen", "cia402", "host", "machine", "master", "recording", "words"]),
     (
         "python",
@@ -45,6 +45,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "master",
             "recording",
             "scenario",
+            "serve",
             "sim",
             "transport",
             "words",
