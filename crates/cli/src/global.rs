@@ -1,9 +1,11 @@
 //! What every command takes from the command line.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use canopen::NodeId;
+use sim::World;
 use transport::BusSpec;
 
 use crate::failure::Failure;
@@ -68,6 +70,10 @@ pub(crate) struct Global {
     /// What it says.
     #[arg(skip)]
     pub(crate) machine: Option<Machine>,
+
+    /// A bus in virtual time that outlives the command, whatever `--bus` says: that of a program which gives several.
+    #[arg(skip)]
+    pub(crate) shared: Option<Arc<Mutex<World>>>,
 
     /// Where the machine file is, and whether the command line names it.
     #[arg(skip)]

@@ -29,6 +29,8 @@ mod served;
 mod session;
 mod signals;
 mod status;
+#[cfg(test)]
+mod tests;
 mod wire;
 mod word_order;
 
@@ -203,22 +205,21 @@ fn show_usage(error: &clap::Error) -> ExitCode {
 /// Says why: to people on standard error, to programs as a line of JSON on standard output. Who sent a signal knows,
 /// unless there is more to report.
 fn complain(format: Format, failure: &Failure) {
+    let Some(line) = complaint(format, Paint::for_stream(&io::stderr()), failure) else { return };
+    // The reader may have gone; the exit status remains.
+    let _ = if format.json { writeln!(io::stdout(), "{line}") } else { writeln!(io::stderr(), "{line}") };
+}
+
+/// What is said of a failure, where anything is.
+fn complaint(format: Format, paint: Paint, failure: &Failure) -> Option<String> {
     if failure.reported {
-        return;
+        return None;
     }
     if format.json {
-        // The reader may have gone; the exit status remains.
-        if let Ok(line) = sim::json::to_string(&FailureReport::from(failure)) {
-            let _ = writeln!(io::stdout(), "{}", short(&line));
-        }
-        return;
+        return sim::json::to_string(&FailureReport::from(failure)).ok().map(|line| short(&line));
     }
-    if failure.status.is_signal() && failure.because.is_empty() {
-        return;
-    }
-    let error = Paint::for_stream(&io::stderr()).bad("error:");
-    // The reader may have gone; the exit status remains.
-    let _ = writeln!(io::stderr(), "{error} {}", short(&plain(&failure.to_string())));
+    let is_silent = failure.status.is_signal() && failure.because.is_empty();
+    (!is_silent).then(|| format!("{} {}", paint.bad("error:"), short(&plain(&failure.to_string()))))
 }
 
 /// What was given on the command line, not by the environment.

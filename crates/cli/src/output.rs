@@ -1,6 +1,6 @@
 //! What a command has to say: one value, printed as text for people or as JSON for programs.
 
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -88,9 +88,60 @@ pub(crate) fn print_line(text: &str) -> io::Result<()> {
 /// Bytes on standard output, at once. A reader that has gone away is not an error: it has seen what it wanted
 /// (`ferrodrive dump | head`).
 pub(crate) fn print(bytes: &[u8]) -> io::Result<()> {
+    #[cfg(test)]
+    if kept::is_kept(kept::Stream::Out, bytes) {
+        return Ok(());
+    }
     let mut out = io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => std::process::exit(0),
         other => other,
+    }
+}
+
+/// A line on standard error.
+pub(crate) fn print_error(line: &str) {
+    let line = format!("{line}\n");
+    #[cfg(test)]
+    if kept::is_kept(kept::Stream::Error, line.as_bytes()) {
+        return;
+    }
+    // The reader may have gone.
+    let _ = io::stderr().write_all(line.as_bytes());
+}
+
+/// True if a person reads standard error.
+pub(crate) fn has_reader() -> bool {
+    // The terminal of a test is not that of the commands in it.
+    !cfg!(test) && io::stderr().is_terminal()
+}
+
+/// What a command prints, for a test that runs it in its own thread.
+#[cfg(test)]
+pub(crate) mod kept {
+    use std::cell::RefCell;
+
+    thread_local! {
+        /// Standard output and standard error of this thread, while they are kept.
+        static KEPT: RefCell<Option<[Vec<u8>; 2]>> = const { RefCell::new(None) };
+    }
+
+    #[derive(Clone, Copy)]
+    pub(crate) enum Stream {
+        Out,
+        Error,
+    }
+
+    /// True if these bytes are kept, and nothing is to be printed.
+    pub(super) fn is_kept(stream: Stream, bytes: &[u8]) -> bool {
+        KEPT.with_borrow_mut(|kept| kept.as_mut().map(|kept| kept[stream as usize].extend_from_slice(bytes)).is_some())
+    }
+
+    /// Keeps what is printed by `work`: standard output, standard error, and what `work` returns.
+    pub(crate) fn keep<T>(work: impl FnOnce() -> T) -> ((String, String), T) {
+        KEPT.set(Some(Default::default()));
+        let done = work();
+        let [out, err] = KEPT.take().expect("set above").map(|bytes| String::from_utf8(bytes).expect("UTF-8"));
+        ((out, err), done)
     }
 }

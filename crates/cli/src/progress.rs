@@ -1,6 +1,6 @@
 //! What is going on, on a terminal only.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use terminal_size::Width;
 
+use crate::output::{has_reader, print_error};
 use crate::plain::plain;
 
 /// How often a long count is shown where standard error is a file or a pipe.
@@ -42,7 +43,7 @@ impl Lines {
 impl Progress {
     /// A line that shows nothing yet. `quiet` keeps it so.
     pub(crate) fn new(quiet: bool) -> Self {
-        let piped = !io::stderr().is_terminal();
+        let piped = !has_reader();
         if quiet || piped {
             let lines = || Arc::new(Mutex::new(Lines { last: Duration::ZERO }));
             return Self { bar: ProgressBar::hidden(), piped: (piped && !quiet).then(lines) };
@@ -79,14 +80,12 @@ impl Progress {
 
     /// A line on standard error that stays, terminal or not.
     pub(crate) fn note(&self, text: &str) {
-        // The reader may have gone.
-        self.bar.suspend(|| drop(writeln!(io::stderr(), "note: {}", plain(text))));
+        self.line(&format!("note: {}", plain(text)));
     }
 
     /// A line on standard error as it is, terminal or not.
     pub(crate) fn line(&self, text: &str) {
-        // The reader may have gone.
-        self.bar.suspend(|| drop(writeln!(io::stderr(), "{text}")));
+        self.bar.suspend(|| print_error(text));
     }
 
     /// Keeps the line moving while nothing changes.

@@ -4,11 +4,12 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
 use canopen::NodeId;
 use serde::{Deserialize, Serialize};
+
+use crate::output::has_reader;
 
 /// Buses that are remembered; the one that was used longest ago goes first.
 const MAX_BUSES: usize = 32;
@@ -42,7 +43,7 @@ struct RememberedBus {
 impl Remembered {
     /// What is remembered where a person reads what the program says; nothing, and nothing is kept, where not.
     pub(crate) fn by_people() -> Self {
-        if io::stderr().is_terminal() { Self::of(path()) } else { Self::default() }
+        if has_reader() { Self::of(path()) } else { Self::default() }
     }
 
     /// What is remembered, for a shell that completes a line.

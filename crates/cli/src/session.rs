@@ -4,12 +4,14 @@
 use std::cell::RefCell;
 use std::error::Error;
 use std::path::Path;
+use std::sync::PoisonError;
 use std::time::Duration;
 
 use can::Tap;
 use host::stopping::{Account, make_sure, stop};
 use host::{Wire, WorldDoor};
 use master::Network;
+use sim::World;
 use transport::realtime::{self, RealTimeError};
 use transport::{BusNotes, BusSpec, BusThreadError, Note, WallClock};
 
@@ -32,8 +34,14 @@ use words::failure::causes;
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.
 const VIRTUAL_LIMIT: Duration = Duration::from_secs(24 * 3600);
 
+/// How long a command stays on a shared bus when it has ended.
+const PARTING: Duration = Duration::from_millis(10);
+
 /// Runs `command` on the bus of the command line.
 pub(crate) fn run<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
+    if let Some(world) = &global.shared {
+        return shared_bus(global, &mut world.lock().unwrap_or_else(PoisonError::into_inner), command);
+    }
     match &global.bus {
         BusSpec::Sim { file } => virtual_bus(global, file.as_deref(), command),
         BusSpec::Log { path } => Err(Failure::usage(format!("{} is a log: no node can answer", path.display()))
@@ -79,6 +87,7 @@ pub(crate) fn read_machine(path: &Path) -> Result<Machine, Failure> {
     Ok(host::network::read_machine(path)?)
 }
 
+/// On a bus of the command's own, whose drives boot first.
 fn virtual_bus<R>(
     global: &Global,
     file: Option<&Path>,
@@ -86,22 +95,54 @@ fn virtual_bus<R>(
 ) -> Result<R, Failure> {
     exit_on_signal();
     let (mut world, drives) = virtual_world(file)?;
+    in_virtual_time(global, &mut world, Some(&drives), async |context| {
+        embedded::wait_until_booted(&context.network, &drives).await?;
+        if global.verbose {
+            context.traffic.show(decoder(global, &drives), Stamps::default(), context.progress.clone());
+        }
+        command(context).await
+    })
+}
+
+/// On a bus that goes on without the command, as on a real one: its drives are not known, and what moves is stopped where the
+/// command fails.
+fn shared_bus<R>(
+    global: &Global,
+    world: &mut World,
+    command: impl AsyncFnOnce(&Context) -> Result<R, Failure>,
+) -> Result<R, Failure> {
+    in_virtual_time(global, world, None, async |context| {
+        if global.verbose {
+            context.traffic.show(decoder(global, &[]), Stamps::default(), context.progress.clone());
+        }
+        let ended = match command(context).await {
+            Ok(done) => Ok(done),
+            Err(failure) => Err(stop_what_moves(context, failure).await),
+        };
+        context.note_twins();
+        ended
+    })
+}
+
+fn in_virtual_time<R>(
+    global: &Global,
+    world: &mut World,
+    drives: Option<&EmbeddedDrives>,
+    command: impl AsyncFnOnce(&Context) -> Result<R, Failure>,
+) -> Result<R, Failure> {
     let network = Network::new();
     let log = global.log.as_ref().map(LogPath::create).transpose()?;
     let (log, writing) = CommandLog::start(log, interface_of(&global.bus), Duration::ZERO, Pace::Free);
     let progress = Progress::new(global.json);
     let traffic = Traffic::default();
-    let context = Context::new(global, network.clone(), Some(&drives), progress.clone(), traffic.clone());
-    let tapped = Tap::new(network.clone(), traffic.clone());
-    world.add_station(Tap::new(tapped, log));
-    let whole = async {
-        embedded::wait_until_booted(&network, &drives).await?;
-        if global.verbose {
-            traffic.show(decoder(global, &drives), Stamps::default(), progress.clone());
-        }
-        command(&context).await
-    };
-    let ended = sim::block_on_for(&mut world, VIRTUAL_LIMIT, whole);
+    let context = Context::new(global, network.clone(), drives.map(Vec::as_slice), progress.clone(), traffic.clone());
+    let station = world.add_station(Tap::new(Tap::new(network, traffic), log));
+    let ended = sim::block_on_for(world, VIRTUAL_LIMIT, command(&context));
+    if drives.is_none() {
+        // What it still had to send goes out, as it does on a real bus.
+        world.run_for(PARTING);
+        world.remove(station);
+    }
     progress.clear();
     if let (Err(torn), Some(log)) = (writing.finish(), &global.log) {
         log.lacks(torn);

@@ -30,10 +30,12 @@ impl Source {
         }
     }
 
-    /// The crate's folder name if this is a file of `crates/NAME/src`, and not the program of a crate that is a library else.
+    /// The crate's folder name if this is a file of `crates/NAME/src`, and neither its tests in a folder of their own nor the
+    /// program of a crate that is a library else.
     pub(crate) fn library(&self) -> Option<&str> {
         let (name, rest) = self.path.strip_prefix("crates/")?.split_once('/')?;
-        (rest.starts_with("src/") && (name == "cli" || rest != "src/main.rs")).then_some(name)
+        let ships = rest.starts_with("src/") && !rest.starts_with("src/tests/");
+        (ships && (name == "cli" || rest != "src/main.rs")).then_some(name)
     }
 
     /// The 1-based line of a byte offset.
@@ -237,6 +239,13 @@ mod tests {
         assert!(source.code.contains("fn b"));
         let source = Source::new("a.rs", "#[cfg(all(test, unix))]\nfn a() {}\n#[cfg(not(test))]\nfn b() {}\n");
         assert!(!source.shipped.contains("fn a") && source.shipped.contains("fn b"));
+    }
+
+    #[test]
+    fn a_folder_of_tests_does_not_ship() {
+        let library = |path: &str| Source::new(path, "").library().map(str::to_owned);
+        assert_eq!(library("crates/sim/src/world/tests.rs").as_deref(), Some("sim"));
+        assert_eq!(library("crates/sim/src/tests/world.rs"), None);
     }
 
     #[test]

@@ -35,3 +35,27 @@ fn a_line_that_is_no_frame_is_told_with_its_number_and_passed_over() {
     assert_eq!(shown.status, Some(1));
     assert!(shown.err.contains("no frame, and 1000 places skipped") && shown.err.lines().count() < 30, "{}", shown.err);
 }
+
+#[test]
+fn objects_that_all_models_name_alike_are_named_without_a_model_and_have_no_unit_that_they_do_not_share() {
+    let directory = scratch("names");
+    let log = directory.join("trace.log");
+    // Uploads of 6041h, 606Ch, 6064h, 6061h, 60F4h and 200Ah.
+    let frames = ["4B41600037020000", "436C6000C4FFFFFF", "43646000007D0000", "4F61600003000000", "43F46000FFFFFFFF"];
+    let lines: String = frames.iter().map(|frame| format!("(1.0) can0 584#{frame}\n")).collect();
+    std::fs::write(&log, lines + "(1.0) can0 584#4B0A2000E8030000\n").unwrap();
+    let text = dump(&log, &[]).out;
+    for part in [
+        "6041h:00 statusword = 0237h (Operation enabled)",
+        "606Ch:00 velocity_actual_value = -60\n",
+        "6064h:00 position_actual_value = 32000\n",
+        "6061h:00 modes_of_operation_display = 3 (profile velocity)",
+        "60F4h:00 following_error_actual_value = -1\n",
+        // The motor's largest speed on one model, the way of stopping at a limit on another.
+        "200Ah:00 = 03E8h (1000)",
+    ] {
+        assert!(text.contains(part), "{part:?} in {text}");
+    }
+    let known = dump(&log, &["--model", "4=zlac8030l"]).out;
+    assert!(known.contains("606Ch:00 velocity_actual_value = -60 [0.1 r/min]"), "{known}");
+}

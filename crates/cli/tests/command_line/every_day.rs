@@ -158,3 +158,18 @@ fn words_in_another_order_are_understood_where_that_does_no_harm() {
         assert!(refused.err.contains(&format!("did you mean: {meant}")), "{typed:?}: {}", refused.err);
     }
 }
+
+#[test]
+fn several_objects_are_read_at_once() {
+    let all = lines(&done(&["--json", "read", "4", "1018:*", "6060..6061", "statusword"]).out);
+    let objects: Vec<&str> = all.iter().map(|line| line["object"].as_str().unwrap()).collect();
+    let expected = ["1018h:00", "1018h:01", "1018h:02", "1018h:03", "6060h:00", "6061h:00", "6041h:00"];
+    assert_eq!(objects, expected);
+}
+
+#[test]
+fn a_motion_that_takes_longer_than_it_may_is_given_up() {
+    let late = ferrodrive(&["--json", "velocity", "4", "60rpm", "--within", "1ms"]);
+    assert_eq!((late.status, &late.json()["error"]["kind"]), (Some(1), &json!("not_reached")));
+    assert_eq!(done(&["--json", "velocity", "4", "60rpm", "--within", "10s"]).json()["reached"], true);
+}

@@ -44,3 +44,23 @@ fn what_would_be_nothing_is_a_usage_error() {
     let ended = ferrodrive(&["velocity", "4", "60rpm", "--acceleration", "0rpm/s"]);
     assert!(ended.status == Some(2) && ended.err.contains("rate of zero"), "{}", ended.err);
 }
+
+#[test]
+fn the_limit_in_force_and_what_it_follows_from_are_named() {
+    // "ZLAC8030L quick start guide V1.00", chapter 9: -1000 to 1000 r/min; 5.3: times the resolution.
+    let ended = ferrodrive(&["write", "4", "60FF", "1001"]);
+    assert_eq!(ended.status, Some(1));
+    let takes = "60FFh:00 target_velocity takes -1000 to 1000 in units of r/min, by 202Fh:05 set_speed_resolution = 1";
+    assert!(ended.err.contains(takes), "{}", ended.err);
+    let ended = ferrodrive(&["velocity", "4", "9999rpm"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("takes -1000 to 1000 in units of r/min"), "{}", ended.err);
+    assert!(!ended.err.contains("10000"), "{}", ended.err);
+    let accepts = |whose| {
+        let rows = done(&["objects", whose, "60FF"]).out;
+        rows.lines().last().unwrap().split_once("r/min  ").unwrap().1.to_owned()
+    };
+    assert_eq!(accepts("zlac8030l"), "-1000 to 1000, times 202Fh:05; acts up to 200Ah:00");
+    assert!(accepts("4").starts_with("-1000 to 1000 in units of r/min, by 202Fh:05 set_speed_resolution = 1"));
+    assert_eq!(accepts("zlim42c"), "-3000 to 3000");
+}

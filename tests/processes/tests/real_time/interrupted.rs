@@ -123,17 +123,6 @@ fn a_command_that_is_to_outlive_its_terminal_does() {
 }
 
 #[test]
-fn a_joint_that_looks_for_its_reference_can_be_disabled() {
-    let mut simulator = bench();
-    let bus = simulator.bus("socketcand");
-    let on =
-        |arguments: &[&str]| done(&[&["--bus", &bus, "--json", "--model", "1=m4230e17b50"], arguments].concat()).json();
-    on(&["home", "1", "--method", "17", "--no-wait"]);
-    wait_until_it_turns(&mut simulator, "1");
-    assert_eq!(on(&["disable", "1"])["state"], "Switch on disabled");
-}
-
-#[test]
 fn a_simulator_that_is_asked_to_end_does_so_without_a_word() {
     let signals = [("HUP", 129), ("INT", 130), ("QUIT", 131), ("TERM", 143)];
     for (signal, status) in signals.into_iter().filter(|(signal, _)| is_heard(signal)) {

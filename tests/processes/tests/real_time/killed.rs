@@ -10,7 +10,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use processes::{Simulator, command, done, wait_until};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 const JOINT: (&str, &str) = ("1", "1=m4230e17b50");
 const STEPPER: (&str, &str) = ("2", "2=zlim42c");
@@ -103,62 +103,6 @@ fn a_servo_stops_a_second_after_its_master_was_killed() {
     let child = bench.moving(SERVO, &[]);
     assert_eq!(bench.kill(child), "");
     bench.stops("4", Duration::from_millis(1000) + SLACK);
-}
-
-/// Before anything moves. What has a watch that is armed has nothing to be said.
-#[test]
-fn what_nothing_would_stop_is_said_before_it_moves() {
-    let drives = ["--drive", "m4230e17b50@1", "--drive", "zlim42c@2", "--drive", "zlac8030l@4", "--drive", "cia402@5"];
-    let switched_off = ["--drive", "zlac8030l@6,2000=0"];
-    let served = ["--serve", "socketcand://127.0.0.1:0"];
-    let simulator = Simulator::start(&[&drives[..], &switched_off, &served].concat());
-    let bus = simulator.bus("socketcand");
-    let bench = Bench::booted(simulator, bus);
-    for ((node, model), options, parts) in [
-        (SERVO, &[][..], &[][..]),
-        (JOINT, &[], &[]),
-        (("5", "5=cia402"), &[], &[]),
-        (STEPPER, &[], &["node 2: if this command dies, nothing stops it", "no watch over its host", "emergency stop"]),
-        (JOINT, &["--no-guard"], &["node 1: if this command dies, nothing stops it"]),
-        (JOINT, &["--guard", "off"], &["node 1: if this command dies, nothing stops it"]),
-        (("5", "5=cia402"), &["--no-guard"], &["node 5: if this command dies", "emergency stop"]),
-        (("6", "6=zlac8030l"), &[], &["node 6: if this command dies", "2000h:00) is set to 0; --guard gives it"]),
-        (("6", "6=zlac8030l"), &["--guard"], &[]),
-    ] {
-        let motion = ["velocity", node, "60rpm", "--for", "100ms"];
-        let said = done(&[&["--bus", &bench.bus, "--model", model], &motion[..], options].concat()).err;
-        assert_eq!(said.contains("if this command dies"), !parts.is_empty(), "{node} {options:?}: {said}");
-        for part in parts {
-            assert!(said.contains(part), "{node} {options:?}: {part:?} in {said}");
-        }
-    }
-    // The time that --guard gave it is taken back.
-    assert_eq!(bench.json(("6", "6=zlac8030l"), &["read", "6", "2000"])["value"], 0);
-}
-
-#[test]
-fn a_command_that_leaves_a_motor_turning_says_what_happens_then() {
-    let mut bench = Bench::new();
-    for (drive, armed, after_ms, object, then) in [
-        (SERVO, true, json!(1000), json!("2000h:00"), "it stops by itself 1000 ms after"),
-        (JOINT, true, json!(2000), json!("1016h:01"), "it keeps moving until it is stopped"),
-        (STEPPER, false, Value::Null, Value::Null, "it keeps moving until it is stopped"),
-    ] {
-        let (node, _) = drive;
-        let said = bench.json(drive, &["velocity", node, "60rpm"]);
-        let guard = &said["guard"];
-        assert_eq!((&guard["armed"], &guard["stops_after_ms"], &guard["object"]), (&json!(armed), &after_ms, &object));
-        assert!(said["notes"][0].as_str().unwrap().contains(then), "{said}");
-        assert!(bench.turns(node));
-    }
-    // Beyond the time of either watch.
-    bench.simulator.pass(Duration::from_secs(4));
-    assert!(!bench.turns("4"));
-    assert!(bench.turns("1") && bench.turns("2"));
-    assert_eq!(bench.json(JOINT, &["state", "1"])["fault_code"], 0);
-    // A motion that has come to its end leaves nothing to say.
-    let moved = bench.json(STEPPER, &["velocity", "2", "60rpm", "--for", "200ms"]);
-    assert_eq!((&moved["notes"], &moved["guard"]["armed"]), (&json!([]), &json!(false)));
 }
 
 /// Whatever program moves the drives: `supervise` feeds their watches, and they stop when it dies. The ZLIM42-C has none, which it

@@ -1,21 +1,18 @@
 //! `ferrodrive params rollback`, and the journal of an `apply`.
 
-use std::io::Write;
-
 pub(in crate::command) use host::network::params::journal::{Kept, default_path};
 use host::network::params::journal::{RollbackReport, read, roll_back_by};
 use words::counted;
 
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::Report;
+use crate::output::{Report, print_error};
 use crate::plain::plain;
 use plot::Paint;
 
 /// A note that a journal stays. The command may be ending by a signal.
 pub(in crate::command) fn note_kept(text: &str) {
-    // The reader may have gone.
-    let _ = writeln!(std::io::stderr(), "note: {text}");
+    print_error(&format!("note: {text}"));
 }
 
 impl super::Rollback {

@@ -1,43 +1,18 @@
 //! Identification of models: a scan of drives that answer the same, and what is refused until the model is given.
 
-use processes::{Ended, Simulator, done, ferrodrive, scratch};
+use processes::scratch;
 use serde_json::{Value, json};
 
+use super::bench::{Bench, without_bus};
+
 /// Both ZL drives and a joint, on a bus that does not say which they are.
-struct Bench {
-    simulator: Simulator,
-    bus: String,
-}
-
 fn bench() -> Bench {
-    let drives = ["--drive", "zlac8030l@4", "--drive", "zlim42c@2", "--drive", "m4230e17b50@1"];
-    let simulator = Simulator::start(&[&drives[..], &["--serve", "socketcand://127.0.0.1:0"]].concat());
-    let bus = simulator.bus("socketcand");
-    Bench { simulator, bus }
+    Bench::of(&["zlac8030l@4", "zlim42c@2", "m4230e17b50@1"])
 }
 
-impl Bench {
-    fn run(&self, arguments: &[&str]) -> Ended {
-        ferrodrive(&[&["--bus", &self.bus], arguments].concat())
-    }
-
-    fn json(&self, arguments: &[&str]) -> Value {
-        done(&[&["--bus", &self.bus, "--json"], arguments].concat()).json()
-    }
-
-    #[track_caller]
-    fn refused(&self, arguments: &[&str], parts: &[&str]) {
-        let ended = self.run(arguments);
-        assert_eq!(ended.status, Some(1), "{arguments:?}: {}{}", ended.out, ended.err);
-        for part in parts {
-            assert!(ended.err.contains(part), "{arguments:?} should say {part:?}, but says: {}", ended.err);
-        }
-    }
-
-    /// 2009h of the ZLIM42-C: its bit rate, 1 for 500 kbit/s.
-    fn stepper_bit_rate(&self) -> Value {
-        self.json(&["--model", "2=zlim42c", "read", "2", "2009"])["value"].clone()
-    }
+/// 2009h of the ZLIM42-C: its bit rate, 1 for 500 kbit/s.
+fn stepper_bit_rate(bench: &Bench) -> Value {
+    bench.json(&["--model", "2=zlim42c", "read", "2", "2009"])["value"].clone()
 }
 
 #[test]
@@ -90,13 +65,13 @@ fn storing_is_refused_until_the_model_is_said() {
     assert_eq!(bench.json(&["--model", "4=zlac8030l", "save", "4"])["object"], "2009h:00");
     assert_eq!(bench.json(&["--model", "2=zlim42c", "save", "2"])["object"], "2010h:00");
     assert_eq!(bench.json(&["--model", "1=m4230e17b50", "save", "1"])["object"], "2614h:00");
-    assert_eq!(bench.stepper_bit_rate(), 1);
+    assert_eq!(stepper_bit_rate(&bench), 1);
 }
 
 #[test]
 fn a_wrong_model_is_refused_before_anything_is_changed() {
-    let mut bench = bench();
-    let before = bench.simulator.ask("4 get");
+    let bench = bench();
+    let before = bench.report(4);
     let wrong = ["--model", "4=zlim42c"];
     for command in [
         &["save", "4"][..],
@@ -108,9 +83,9 @@ fn a_wrong_model_is_refused_before_anything_is_changed() {
         bench.refused(&[&wrong[..], command].concat(), &["it has no 2069h:00", "scan"]);
     }
     bench.refused(&["--model", "2=zlac8030l", "save", "2"], &["it has no 2029h:00"]);
-    assert_eq!(bench.stepper_bit_rate(), 1);
-    let after = bench.simulator.ask("4 get");
-    assert_eq!((&before["statusword"], &before["position"]), (&after["statusword"], &after["position"]));
+    assert_eq!(stepper_bit_rate(&bench), 1);
+    let after = bench.report(4);
+    assert_eq!((before.statusword, before.position), (after.statusword, after.position));
 }
 
 #[test]
@@ -118,7 +93,7 @@ fn a_write_that_means_something_else_on_the_other_model_is_refused() {
     let bench = bench();
     bench.refused(&["write", "2", "2009", "2"], &["write 2009h:00", "--model 2=zlim42c"]);
     bench.refused(&["write", "4", "2010", "1"], &["write 2010h:00", "--model 4=zlac8030l"]);
-    assert_eq!(bench.stepper_bit_rate(), 1);
+    assert_eq!(stepper_bit_rate(&bench), 1);
     let written = bench.run(&["write", "4", "6083", "300"]);
     assert_eq!(written.status, Some(0), "{}", written.err);
     assert!(
@@ -195,10 +170,10 @@ fn a_data_sheet_stands_for_a_model_wherever_one_is_asked_for() {
     let sheet = folder.join("wheel.eds");
     std::fs::write(&sheet, SHEET).unwrap();
     let sheet = sheet.to_str().unwrap();
-    let listed = done(&["--json", "objects", sheet]).json();
+    let bench = bench();
+    let listed = without_bus(&["--json", "objects", sheet]).json();
     assert_eq!((&listed["model"], listed["objects"].as_array().unwrap().len()), (&json!("wheel"), 4));
 
-    let bench = bench();
     let stated = format!("4={sheet}");
     let read = bench.json(&["--model", &stated, "read", "4", "rail_voltage"]);
     assert_eq!((&read["object"], &read["value"]), (&json!("2029h:00"), &json!(4800)));
@@ -213,7 +188,7 @@ fn a_data_sheet_stands_for_a_model_wherever_one_is_asked_for() {
     );
 
     std::fs::write(sheet, "no data sheet").unwrap();
-    let ended = ferrodrive(&["objects", sheet]);
+    let ended = without_bus(&["objects", sheet]);
     assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("wheel.eds"), "{}", ended.err);
 }

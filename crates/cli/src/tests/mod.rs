@@ -1,0 +1,12 @@
+//! Commands on a bus that outlives them, in virtual time: what a simulator of another program would show, without a process and
+//! without a clock. What only processes show (signals, sockets, terminals) is in `tests/processes`.
+
+mod bench;
+mod guards;
+mod latency;
+mod limits;
+mod looks;
+mod lss;
+mod models;
+mod params;
+mod records;

@@ -1,0 +1,70 @@
+//! `ferrodrive params` on a bus that goes on: refusals during the writes, and the way back.
+
+use processes::scratch;
+
+use super::bench::Bench;
+
+fn bench() -> Bench {
+    Bench::of(&["zlac8030l@4"])
+}
+
+#[test]
+fn a_refusal_at_the_third_value_puts_the_first_two_back() {
+    let (bench, folder) = (bench(), scratch("params_rollback"));
+    let [before, journal] = ["before.toml", "node4.journal"].map(|name| folder.path(name));
+    bench.done(&["params", "backup", "4", "-o", &before]);
+    // 6060h may be mapped into an RPDO, 1017h into nothing: only the drive knows by its refusal.
+    let wanted = "1017 = 200\nprofile_acceleration = 150\n\"1A00:00\" = 1\n\"1A00:01\" = 0x10170010\n";
+    let file = folder.values("wanted.toml", wanted);
+    let ended = bench.run(&["params", "apply", "4", &file, "--journal", &journal, "--json"]);
+    let failure = ended.json();
+    assert_eq!((ended.status, failure["error"]["kind"].as_str()), (Some(1), Some("rolled_back")), "{failure}");
+    assert_eq!(failure["error"]["abort"], 0x0604_0041);
+    assert!(failure["error"]["object"].as_str().is_some_and(|object| object.starts_with("1A00h")), "{failure}");
+    assert!(failure["error"]["message"].as_str().is_some_and(|text| text.contains("read as before")), "{failure}");
+    bench.done(&["params", "verify", "4", &before]);
+    assert!(!std::path::Path::new(&journal).exists(), "nothing is left to go back to");
+}
+
+#[test]
+fn a_drive_at_work_is_left_alone_and_the_way_out_is_said() {
+    let (bench, folder) = (bench(), scratch("params_at_work"));
+    let file = folder.values("wanted.toml", "1017 = 200\n");
+    let apply = ["params", "apply", "4", &file, "--journal", &folder.path("node4.journal")];
+    bench.done(&["enable", "4"]);
+    bench.refused(&apply, &["Operation enabled", "ferrodrive disable 4"]);
+    bench.done(&["disable", "4"]);
+    bench.done(&apply);
+    bench.done(&["params", "verify", "4", &file]);
+}
+
+#[test]
+fn a_journal_of_another_device_or_half_a_one_is_refused() {
+    let (bench, folder) = (bench(), scratch("params_journal"));
+    let journal = "node = 4\nvendor_id = 0x100\nproduct_code = 0xABC\nundo = [\n  [\"1017:00\", \"0000\"],\n]\n";
+    let file = folder.write("node4.journal", journal);
+    bench.refused(&["params", "rollback", "4", &file], &["not written to its end"]);
+    folder.write("node4.journal", &format!("{journal}whole = true\n"));
+    bench.refused(&["params", "rollback", "4", &file], &["product ABCh"]);
+    bench.refused(&["params", "rollback", "5", &file], &["belongs to node 4"]);
+}
+
+#[test]
+fn a_pdo_that_was_set_up_comes_and_before_it_was_said_why_not() {
+    let bench = Bench::of(&["zlac8030l@4", "cia402@5"]);
+    let shown = |part: &str| {
+        let ended = bench.done(&["pdo", "show", "4"]);
+        assert!(ended.out.contains(part), "{part}: {}", ended.out);
+    };
+    shown("node 4 TPDO1, TPDO2, TPDO3, TPDO4, RPDO2, RPDO3, RPDO4: nothing is mapped into it");
+    shown("node 4 RPDO1: no node was heard sending it");
+    bench.done(&["pdo", "apply", "4", "tpdo1=statusword,position_actual_value", "tpdo2=off", "--type", "1"]);
+    shown("TPDO2: off: bit 31 of its COB-ID is set");
+    shown("TPDO1: it waits for SYNC, and none was heard");
+    bench.done(&["nmt", "4", "start"]);
+    // Another node sends SYNC.
+    bench.apply(5, "bus babble 080# 20");
+    let shown = bench.json(&["pdo", "show", "4"]);
+    let tpdo = &shown["nodes"][0]["pdos"][0];
+    assert_eq!((&tpdo["pdo"], &tpdo["silent"]), (&"TPDO1".into(), &serde_json::json!([])), "{shown}");
+}
