@@ -288,9 +288,9 @@ mod tests {
     }
 
     /// Whether a line with an option is taken, on this bus.
-    fn is_taken(line: &[&str], bus: &[&str], option: &str) -> bool {
+    fn is_taken(parser: &mut clap::Command, line: &[&str], bus: &[&str], option: &str) -> bool {
         let all = [&["ferrodrive"], bus, line].concat();
-        let matches = command_line().try_get_matches_from(&all).unwrap_or_else(|e| panic!("{all:?}: {e}"));
+        let matches = parser.try_get_matches_from_mut(&all).unwrap_or_else(|e| panic!("{all:?}: {e}"));
         let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| panic!("{all:?}: {e}"));
         let refused = refuse_unheeded(&cli.global, &cli.command, &matches).err();
         let said = refused.as_ref().map(|failure| failure.what.as_str());
@@ -309,6 +309,8 @@ mod tests {
             .map(|argument| argument.get_id().to_string())
             .collect();
         assert_eq!(options.len(), ALL.len(), "{options:?}");
+        // Made once: that takes longer than to parse a line.
+        let mut parser = command_line();
         for its in built.get_subcommands().filter(|its| !["help", help::OPTIONS].contains(&its.get_name())) {
             let name = its.get_name();
             let line = LINES.iter().find(|line| line.split(' ').next() == Some(name));
@@ -321,7 +323,7 @@ mod tests {
                 let bus: &[&str] = if shows(BUS) && option != BUS { &["--bus", REAL_BUS] } else { &[] };
                 let typed = typed(option);
                 for line in [[&words[..], &typed[..]].concat(), [&typed[..], &words[..]].concat()] {
-                    assert_eq!(is_taken(&line, bus, option), shows(option), "{line:?}");
+                    assert_eq!(is_taken(&mut parser, &line, bus, option), shows(option), "{line:?}");
                 }
             }
         }

@@ -8,5 +8,6 @@ mod limits;
 mod looks;
 mod lss;
 mod models;
+mod pages;
 mod params;
 mod records;

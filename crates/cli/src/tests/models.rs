@@ -192,3 +192,18 @@ fn a_data_sheet_stands_for_a_model_wherever_one_is_asked_for() {
     assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("wheel.eds"), "{}", ended.err);
 }
+
+#[test]
+fn every_model_can_be_simulated_and_a_scan_from_outside_says_what_it_cannot_tell() {
+    let drives = ["zlac8030l@4", "zlim42c@2", "zlim42c-82@3", "m4230e17b50@10", "m4230e17b80@11", "m8025e25b50@12"];
+    let bench = Bench::of(&[&drives[..], &["m8025e25b80@13"]].concat());
+    let found = bench.json(&["--model", "4=zlac8030l", "scan"]);
+    let answered: Vec<_> = found["nodes"].as_array().unwrap().iter().map(|node| node["node"].clone()).collect();
+    assert_eq!(answered, [2, 3, 4, 10, 11, 12, 13]);
+    let node = |id: u64| found["nodes"].as_array().unwrap().iter().find(|node| node["node"] == id).unwrap();
+    assert_eq!((&node(4)["model"], &node(4)["remark"]), (&"zlac8030l".into(), &Value::Null));
+    assert!(node(2)["model"].is_null() && node(12)["model"].is_null());
+    assert!(node(2)["remark"].as_str().unwrap().contains("--model 2=zlim42c"), "{found}");
+    // The 82 mm stepper is distinguished from the ZLAC8030L and not from the one of 70 mm.
+    assert!(node(3)["remark"].as_str().unwrap().contains("--model 3=zlim42c (or zlim42c-82)"), "{found}");
+}

@@ -162,3 +162,12 @@ fn what_is_no_terminal_is_told_what_to_use() {
     assert_eq!(json.status, Some(2));
     assert!(format!("{}{}", json.out, json.err).contains("for programs"), "{}{}", json.out, json.err);
 }
+
+#[test]
+fn a_place_that_cannot_be_served_is_reported_before_it_is_ready() {
+    let ended = ferrodrive(&["sim", "--drive", "m4230e17b50@2", "--modbus", "tcp://here"]);
+    assert_eq!(ended.status, Some(2), "{}", ended.err);
+    let ended = ferrodrive(&["sim", "--drive", "m4230e17b50@2", "--modbus", "rtu:///dev/no-such-line"]);
+    assert_eq!((ended.status, ended.out.as_str()), (Some(1), ""), "{}", ended.err);
+    assert!(ended.err.contains("cannot serve rtu:///dev/no-such-line"), "{}", ended.err);
+}

@@ -14,6 +14,9 @@ const DRIVES: [(&str, &str, &str); 4] = [
     ("5", "cia402", "5=cia402"),
 ];
 
+/// How long a command asks a drive that is gone: the whole of it passes.
+const LOSS: &str = "2s";
+
 fn bench() -> Simulator {
     let specs = DRIVES.map(|(node, model, _)| format!("{model}@{node}"));
     let mut arguments: Vec<&str> = specs.iter().flat_map(|spec| ["--drive", spec]).collect();
@@ -165,7 +168,7 @@ fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
         BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut ready).unwrap();
         let read = |node: &str| ferrodrive(&["--bus", &bus, "--timeout", "10s", "read", node, "1000"]);
         wait_until("node 4 answers", || read("4").status == Some(0));
-        let moving = start(&bus, "4=zlac8030l", &["velocity", "4", "100rpm", "--for", "1h"]);
+        let moving = start(&bus, "4=zlac8030l", &["velocity", "4", "100rpm", "--for", "1h", "--timeout", LOSS]);
         // It drives for a while.
         std::thread::sleep(Duration::from_secs(1));
         send(signal, &child);
@@ -184,7 +187,8 @@ fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
 fn a_bus_lost_in_a_move_is_reported_with_what_was_moving_and_what_to_do() {
     let mut simulator = bench();
     let bus = simulator.bus("socketcand");
-    let moving = start(&bus, "4=zlac8030l", &["move", "4", "200turn", "--relative", "--profile-velocity", "100rpm"]);
+    let motion = ["move", "4", "200turn", "--relative", "--profile-velocity", "100rpm", "--timeout", LOSS];
+    let moving = start(&bus, "4=zlac8030l", &motion);
     wait_until_it_turns(&mut simulator, "4");
     simulator.kill();
     let ended = moving.wait_with_output().unwrap();

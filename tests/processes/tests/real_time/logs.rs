@@ -30,6 +30,9 @@ fn a_log_of_a_killed_simulator_can_be_read_in_every_form() {
         simulator.signal("-KILL");
         drop(simulator);
         let frames = frames(&log);
-        assert!(frames.iter().any(|(frame, _)| frame.starts_with("584#43181001")), "{extension}: {frames:?}");
+        // Boot-up, request and answer.
+        for part in ["704#00", "604#4018100100000000", "584#43181001"] {
+            assert!(frames.iter().any(|(frame, _)| frame.starts_with(part)), "{extension}: {part} in {frames:?}");
+        }
     }
 }

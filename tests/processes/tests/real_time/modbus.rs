@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use processes::{PATIENCE, Simulator, done, ferrodrive};
+use processes::{PATIENCE, Simulator, done};
 use tokio_modbus::client::Context;
 use tokio_modbus::prelude::*;
 
@@ -138,13 +138,4 @@ async fn clients_share_a_joint_and_one_that_leaves_does_not_stop_it() {
     write(&mut second, CONTROLWORD, &[0x0F]).await;
     drop(first);
     until("the speed", 950..=1050, async || i32::from(read(&mut second, SPEED).await as i16)).await;
-}
-
-#[test]
-fn a_place_that_cannot_be_served_is_reported_before_it_is_ready() {
-    let ended = ferrodrive(&["sim", "--drive", "m4230e17b50@2", "--modbus", "tcp://here"]);
-    assert_eq!(ended.status, Some(2), "{}", ended.err);
-    let ended = ferrodrive(&["sim", "--drive", "m4230e17b50@2", "--modbus", "rtu:///dev/no-such-line"]);
-    assert_eq!((ended.status, ended.out.as_str()), (Some(1), ""), "{}", ended.err);
-    assert!(ended.err.contains("cannot serve rtu:///dev/no-such-line"), "{}", ended.err);
 }

@@ -47,7 +47,7 @@ fn a_host_outside_meets_what_the_scenario_does_to_its_drive_and_the_end_is_that_
     let served = start(&file, &[&SERVE[..], &["--json"]].concat());
     assert!(served.ready.starts_with("ready socketcand://127.0.0.1:"), "{}", served.ready);
     let bus = served.bus("socketcand");
-    let host = ferrodrive(&["--bus", &bus, "--model", "4=zlac8030l", "velocity", "4", "60rpm"]);
+    let host = ferrodrive(&["--bus", &bus, "--timeout", "2s", "--model", "4=zlac8030l", "velocity", "4", "60rpm"]);
     let (status, report) = end(served);
     assert_eq!(status, Some(0), "{report:#} {} {}", host.out, host.err);
     assert_eq!(report["ok"], true);

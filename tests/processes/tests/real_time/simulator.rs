@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 use std::time::Duration;
 
-use processes::{Simulator, command, done, scratch, wait_until};
+use processes::{Simulator, command, done, scratch};
 
 const DRIVE: [&str; 2] = ["--drive", "zlac8030l@4"];
 const SERVE: [&str; 4] = ["--serve", "socketcand://127.0.0.1:0", "--serve", "slcan://127.0.0.1:0"];
@@ -131,75 +131,4 @@ fn what_was_saved_is_there_after_quit_and_only_then() {
     let fresh = simulator(&[]);
     let bus = fresh.bus("socketcand");
     assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"], 1000);
-}
-
-#[test]
-fn a_kill_at_any_moment_leaves_an_old_or_a_new_image() {
-    let directory = scratch("kill");
-    let state = ["--state", directory.to_str().unwrap()];
-    let mut before = 1000;
-    for round in 0..6 {
-        let mut simulator = simulator(&state);
-        let bus = simulator.bus("socketcand");
-        let found = done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"].as_i64().unwrap();
-        assert!(found == before || found == 900 + round - 1, "round {round}: {found} is neither {before} nor newer");
-        before = found;
-        done(&["--bus", &bus, "--model", "4=zlac8030l", "write", "4", "200A", &(900 + round).to_string()]);
-        // The image reaches the disk within 1.5 s; the process dies somewhere on the way.
-        std::thread::sleep(Duration::from_millis(23 * round as u64));
-        simulator.kill();
-    }
-}
-
-#[test]
-fn an_image_is_on_the_disk_before_the_simulator_ends() {
-    let directory = scratch("soon");
-    let state = ["--state", directory.to_str().unwrap()];
-    let mut first = simulator(&state);
-    let bus = first.bus("socketcand");
-    let image = || std::fs::read(directory.join("zlac8030l@4.eeprom")).ok();
-    let before = image();
-    done(&["--bus", &bus, "--model", "4=zlac8030l", "write", "4", "200A", "700"]);
-    wait_until("another image", || image() != before);
-    first.kill();
-    let second = simulator(&state);
-    let bus = second.bus("socketcand");
-    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"], 700);
-    drop(second);
-}
-
-#[test]
-fn every_frame_is_in_the_log() {
-    let directory = scratch("log");
-    let log = directory.join("bus.log");
-    let mut simulator = simulator(&["--log", log.to_str().unwrap()]);
-    let bus = simulator.bus("slcan");
-    done(&["--bus", &bus, "read", "4", "200B"]);
-    simulator.ask("quit");
-    assert_eq!(simulator.wait(), Some(0));
-    let text = std::fs::read_to_string(&log).unwrap();
-    for frame in ["can0 704#00", "can0 604#400B200000000000", "can0 584#4B0B200000040000"] {
-        assert!(text.contains(frame), "{frame} in {text}");
-    }
-}
-
-#[test]
-fn every_model_can_be_simulated_and_a_scan_from_outside_says_what_it_cannot_tell() {
-    let drives = ["zlac8030l@4", "zlim42c@2", "zlim42c-82@3", "m4230e17b50@10", "m4230e17b80@11", "m8025e25b50@12"];
-    let mut arguments: Vec<&str> = drives.iter().flat_map(|drive| ["--drive", drive]).collect();
-    arguments.extend(["--drive", "m8025e25b80@13", "--serve", "socketcand://127.0.0.1:0"]);
-    let mut simulator = Simulator::start(&arguments);
-    for node in [4, 2, 3, 10, 11, 12, 13] {
-        assert_eq!(simulator.ask(&format!("{node} get"))["node"], node);
-    }
-    let bus = simulator.bus("socketcand");
-    let found = done(&["--bus", &bus, "--json", "--model", "4=zlac8030l", "scan"]).json();
-    let node = |id: u64| found["nodes"].as_array().unwrap().iter().find(|node| node["node"] == id).unwrap();
-    assert_eq!((&node(4)["model"], &node(4)["remark"]), (&"zlac8030l".into(), &serde_json::Value::Null));
-    assert!(node(2)["model"].is_null() && node(12)["model"].is_null());
-    assert!(node(2)["remark"].as_str().unwrap().contains("--model 2=zlim42c"), "{found}");
-    // The 82 mm stepper is distinguished from the ZLAC8030L and not from the one of 70 mm.
-    assert!(node(3)["remark"].as_str().unwrap().contains("--model 3=zlim42c (or zlim42c-82)"), "{found}");
-    simulator.ask("quit");
-    assert_eq!(simulator.wait(), Some(0));
 }
