@@ -46,7 +46,7 @@ pub struct Machine<A: Assembly> {
     supply: Supply,
     life: Life,
     /// What it takes between bus and firmware; none if it takes no time.
-    own_time: Option<OwnTime>,
+    own_time: Option<Box<OwnTime>>,
     /// Its control periods are run by the machine that it is coupled to.
     coupled: bool,
     rest: Rest<A::Firmware>,
@@ -246,7 +246,7 @@ impl<A: Assembly> Station for Machine<A> {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let own = self.own_time.as_ref().and_then(OwnTime::next_due);
+        let own = self.own_time.as_ref().and_then(|own_time| own_time.next_due());
         let firmware = || self.firmware_timeout().into_iter().chain(own).min();
         match (self.life, self.supply) {
             (Life::Running, Supply::On) => firmware(),
@@ -351,8 +351,8 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         self.disturb();
         let (image, generation) = (self.nvm_image(), self.nvm_generation());
         let timing = A::description(&self.firmware, &self.assembly).map_or(Timing::GUESSED, |model| model.timing);
-        self.own_time = (mode == TimingMode::Device).then(|| OwnTime::new(timing, seed, &image, generation));
-        let times = self.own_time.as_mut().map(OwnTime::reset_times).unwrap_or_default();
+        self.own_time = (mode == TimingMode::Device).then(|| Box::new(OwnTime::new(timing, seed, &image, generation)));
+        let times = self.own_time.as_mut().map(|own_time| own_time.reset_times()).unwrap_or_default();
         A::set_reset_times(&mut self.firmware, times);
     }
 

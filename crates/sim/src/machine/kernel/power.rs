@@ -5,7 +5,6 @@ use devices::AxisId;
 use drives::Firmware;
 
 use super::assembly::Assembly;
-use super::timing::OwnTime;
 use super::{Life, Machine, Supply};
 use crate::PowerPhase;
 use crate::stimulus::Power;
@@ -64,7 +63,7 @@ impl<A: Assembly> Machine<A> {
     /// There is voltage: the firmware follows, at once or when it has booted.
     fn wake(&mut self, at: Instant) {
         self.assembly.set_supplied(true);
-        let boot_ns = self.own_time.as_mut().map_or(0, OwnTime::boot_ns);
+        let boot_ns = self.own_time.as_mut().map_or(0, |own_time| own_time.boot_ns());
         self.life = Life::Booting(at.plus_nanos(boot_ns));
     }
 

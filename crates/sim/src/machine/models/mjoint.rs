@@ -4,6 +4,8 @@
 //! In go the firmware's power stage, brake and outputs, out come its sensors and the report for people. Figures of the
 //! motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
+use std::sync::Arc;
+
 use can::Bitrate;
 use devices::AxisId;
 use devices::Description;
@@ -64,7 +66,8 @@ pub(super) fn ordered(model: &Description, order: &Order) -> Result<Box<dyn Virt
 pub struct Joint {
     model: &'static Model,
     motor: JointMotor,
-    image: StoredImage,
+    /// Shared by all copies of a world until one of them loses power.
+    image: Arc<StoredImage>,
     bitrate: Bitrate,
     pulses: PulseSource,
     last: Actuation,
@@ -92,7 +95,7 @@ impl Joint {
         Self {
             model,
             motor,
-            image,
+            image: Arc::new(image),
             bitrate,
             pulses: PulseSource::default(),
             last: Actuation::default(),
@@ -167,7 +170,7 @@ impl Assembly for Joint {
 
     /// A broken EEPROM reads as a blank one; what is in it comes back when it is mended.
     fn hardware(&self) -> Hardware {
-        let eeprom = if self.eeprom_broken { StoredImage::from_bytes(&[]) } else { self.image };
+        let eeprom = if self.eeprom_broken { StoredImage::from_bytes(&[]) } else { *self.image };
         Hardware { eeprom, bitrate: self.bitrate }
     }
 
@@ -314,7 +317,7 @@ impl Assembly for Joint {
     /// A blank image is what a firmware has that found the EEPROM broken: nothing was written then.
     fn keep_image(&mut self, image: &[u8]) {
         if image.iter().any(|byte| *byte != 0xFF) {
-            self.image = StoredImage::from_bytes(image);
+            self.image = Arc::new(StoredImage::from_bytes(image));
         }
     }
 

@@ -51,7 +51,7 @@ pub struct NodeMachine {
     memory: Memory<Boxed>,
     supply: Supply,
     /// What it takes between bus and firmware; none if it takes no time.
-    own_time: Option<OwnTime>,
+    own_time: Option<Box<OwnTime>>,
 }
 
 /// The switch in front of it. There is no capacitor that would let it live on.
@@ -91,7 +91,7 @@ impl NodeMachine {
         }
         self.supply = Supply::Off;
         if on {
-            let boot_ns = self.own_time.as_mut().map_or(0, OwnTime::boot_ns);
+            let boot_ns = self.own_time.as_mut().map_or(0, |own_time| own_time.boot_ns());
             self.supply = Supply::Booting(now.plus_nanos(boot_ns));
             self.boot_if_due(now);
         }
@@ -225,7 +225,7 @@ impl Station for NodeMachine {
         if let Supply::Booting(due) = self.supply {
             return Some(due);
         }
-        let own = self.own_time.as_ref().and_then(OwnTime::next_due);
+        let own = self.own_time.as_ref().and_then(|own_time| own_time.next_due());
         self.firmware.poll_timeout().into_iter().chain(own).min()
     }
 
@@ -281,8 +281,9 @@ impl VirtualDrive for NodeMachine {
     fn set_timing(&mut self, mode: TimingMode, seed: u64, _now: Instant) {
         let (image, generation) = (self.nvm_image(), self.nvm_generation());
         let timing = self.firmware.description().timing;
-        self.own_time = (mode == TimingMode::Device).then(|| OwnTime::new(timing, seed, &image, generation));
-        self.firmware.set_reset_times(self.own_time.as_mut().map(OwnTime::reset_times).unwrap_or_default());
+        self.own_time = (mode == TimingMode::Device).then(|| Box::new(OwnTime::new(timing, seed, &image, generation)));
+        self.firmware
+            .set_reset_times(self.own_time.as_mut().map(|own_time| own_time.reset_times()).unwrap_or_default());
     }
 
     fn bitrate(&self) -> Option<Bitrate> {

@@ -3,6 +3,8 @@
 //! In go the power stage, bleeder, outputs and brake of the firmware, out come its sensors and the report for people.
 //! Figures of the motor are those of `plant`; what is assumed of the surroundings is a constant below.
 
+use std::sync::Arc;
+
 use canopen::Mux;
 use devices::variant::Variant;
 use devices::zltech::ZLAC8030L;
@@ -75,7 +77,8 @@ const fn dip_address(node: u8) -> u8 {
 pub struct HubWheel {
     motor: HubMotor,
     dip_address: u8,
-    image: StoredImage,
+    /// Shared by all copies of a world until one of them loses power.
+    image: Arc<StoredImage>,
     eeprom_broken: bool,
     reference_broken: bool,
     dead_time: bool,
@@ -93,7 +96,7 @@ impl HubWheel {
         Self {
             motor,
             dip_address,
-            image,
+            image: Arc::new(image),
             eeprom_broken: false,
             reference_broken: false,
             dead_time: false,
@@ -126,7 +129,7 @@ impl Assembly for HubWheel {
     const INPUTS: &'static [&'static str] = &["X0", "X1"];
 
     fn hardware(&self) -> Hardware {
-        Hardware { dip_address: self.dip_address, eeprom: self.image }
+        Hardware { dip_address: self.dip_address, eeprom: *self.image }
     }
 
     fn set_reset_times(firmware: &mut Self::Firmware, times: ResetTimes) {
@@ -235,7 +238,7 @@ impl Assembly for HubWheel {
     }
 
     fn keep_image(&mut self, image: &[u8]) {
-        self.image = StoredImage::from_bytes(image);
+        self.image = Arc::new(StoredImage::from_bytes(image));
     }
 
     fn set_rotor_locked(&mut self, _axis: AxisId, locked: bool) {

@@ -4,6 +4,8 @@
 //! know where its rotor is; the report has both, the commanded position and the rotor's in the same pulses. Figures of
 //! the motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
+use std::sync::Arc;
+
 use canopen::Mux;
 use devices::AxisId;
 use devices::Description;
@@ -95,7 +97,8 @@ const fn dip_address(node: u8) -> u8 {
 pub struct Stepper<const LENGTH_MM: u16> {
     motor: StepperMotor,
     dip_address: u8,
-    image: StoredImage,
+    /// Shared by all copies of a world until one of them loses power.
+    image: Arc<StoredImage>,
     eeprom_broken: bool,
     reference_broken: bool,
     dead_time: bool,
@@ -113,7 +116,7 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
         Self {
             motor,
             dip_address,
-            image,
+            image: Arc::new(image),
             eeprom_broken: false,
             reference_broken: false,
             dead_time: false,
@@ -175,7 +178,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         Quantity { what: "load inertia", expected: "0 to 100 kg·m²", least: 0.0, greatest: 100.0 };
 
     fn hardware(&self) -> Hardware {
-        Hardware { dip_address: self.dip_address, eeprom: self.image }
+        Hardware { dip_address: self.dip_address, eeprom: *self.image }
     }
 
     fn set_reset_times(firmware: &mut Self::Firmware, times: ResetTimes) {
@@ -293,7 +296,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     }
 
     fn keep_image(&mut self, image: &[u8]) {
-        self.image = StoredImage::from_bytes(image);
+        self.image = Arc::new(StoredImage::from_bytes(image));
         self.zero = None;
     }
 
