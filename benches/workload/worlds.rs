@@ -7,11 +7,11 @@ use std::time::Duration;
 use can::{Bitrate, CanId, Frame};
 use drives::mjoint::Model;
 use plant::coupled::DifferentialDriveModel;
-use sim::machine::{mjoint, zlac8030l, zlim42c};
+use sim::machine::{Realism, mjoint, zlac8030l, zlim42c};
 use sim::{CoupledShaft, Coupling, Place, StationId, VirtualDrive, World};
 
 /// Names of the worlds.
-pub(crate) const WORLDS: [&str; 15] = [
+pub(crate) const WORLDS: [&str; 17] = [
     "1 hub servo turning, silent bus",
     "1 hub servo turning, busy bus",
     "1 hub servo not enabled",
@@ -27,6 +27,8 @@ pub(crate) const WORLDS: [&str; 15] = [
     "127 hub servos not enabled",
     "6 hub servos turning, silent bus",
     "16 hub servos turning, silent bus",
+    "1 hub servo turning, as on a bench",
+    "1 joint turning, as on a bench",
 ];
 
 /// Drives by their node-ID.
@@ -42,6 +44,8 @@ pub(crate) fn world(name: &str) -> Option<World> {
         "127 hub servos not enabled" => not_enabled(127),
         "6 hub servos turning, silent bus" => turning(hub_servos(6)).0,
         "16 hub servos turning, silent bus" => turning(hub_servos(16)).0,
+        "1 hub servo turning, as on a bench" => moving(hub_servos(1), |world| make_real(world, 1)).0,
+        "1 joint turning, as on a bench" => moving(vec![joint(1)], |world| make_real(world, 1)).0,
         "1 joint turning, silent bus" => turning(vec![joint(1)]).0,
         "1 stepper turning, silent bus" => turning(vec![stepper(2)]).0,
         "one of each turning, silent bus" => {
@@ -79,6 +83,11 @@ fn not_enabled(count: u8) -> World {
     }
     world.run_for(Duration::from_secs(1));
     world
+}
+
+/// With noise, dead time and cogging.
+fn make_real(world: &mut World, node: u8) {
+    world.set_realism(node, Realism::Full).expect("it was added");
 }
 
 /// The wheels of a base of 30 kg.

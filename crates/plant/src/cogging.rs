@@ -6,9 +6,7 @@
 //!
 //! It takes nothing over a turn and gives nothing. A motor has none unless it is asked for.
 
-use core::f64::consts::TAU;
-
-use crate::angle::Angle;
+use crate::angle::{Angle, Axis};
 
 /// How much a motor cogs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,22 +21,23 @@ impl Cogging {
     /// Torque on the rotor at an angle.
     #[cold]
     pub fn torque_nm(&self, angle: Angle) -> f64 {
-        -self.amplitude_nm * libm::sin(self.phase_rad(angle))
+        -self.amplitude_nm * self.phase(angle).sin
     }
 
     /// Energy stored at an angle, none at a place of rest.
     pub fn energy_j(&self, angle: Angle) -> f64 {
-        self.amplitude_nm / f64::from(self.per_turn) * (1.0 - libm::cos(self.phase_rad(angle)))
+        self.amplitude_nm / f64::from(self.per_turn) * (1.0 - self.phase(angle).cos)
     }
 
-    fn phase_rad(&self, angle: Angle) -> f64 {
-        let periods = angle.fraction() * f64::from(self.per_turn);
-        (periods - libm::floor(periods)) * TAU
+    fn phase(&self, angle: Angle) -> Axis {
+        Axis::at_turns(angle.fraction() * f64::from(self.per_turn))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use core::f64::consts::TAU;
+
     use super::*;
 
     #[test]

@@ -66,15 +66,18 @@ impl Noise {
 
     /// What a converter with steps of `step` makes of `value`, off by up to one step more.
     pub(crate) fn flicker(&mut self, value: f32, step: f32) -> f32 {
-        (value / step + self.share()).round() * step
+        nearest(value / step + self.share()) * step
     }
 
     /// A count too many or too few, where an edge of `counts_per_turn` is near that stands off its place.
     pub(crate) fn misplaced_edge(&self, angle: Angle, counts_per_turn: u32) -> i16 {
         let counts = angle.fraction() * f64::from(counts_per_turn);
-        let nearest = (counts + 0.5).floor();
-        let past = counts - nearest;
-        let edge = nearest as u64 % u64::from(counts_per_turn);
+        let nearest = (counts + 0.5) as u32;
+        let past = counts - f64::from(nearest);
+        if past.abs() > MISPLACED_COUNTS {
+            return 0; // Between two edges, where most periods find it.
+        }
+        let edge = u64::from(if nearest == counts_per_turn { 0 } else { nearest });
         let share = Prng::new(self.disc ^ edge).next_u64() as f64 / 2_f64.powi(63) - 1.0;
         i16::from(past >= MISPLACED_COUNTS * share) - i16::from(past >= 0.0)
     }
@@ -83,6 +86,13 @@ impl Noise {
     fn share(&mut self) -> f32 {
         (self.prng.next_u64() >> 40) as f32 / (1_u32 << 23) as f32 - 1.0
     }
+}
+
+/// `round` without a call, for what a converter reads: halves away from zero, exact below 2^23.
+fn nearest(value: f32) -> f32 {
+    // The largest number below a half: a half itself would lift what is just below it.
+    const ALMOST_HALF: f32 = 0.499_999_97;
+    (value + ALMOST_HALF.copysign(value)) as i32 as f32
 }
 
 /// Duty cycles as they arrive at the motor: the pause takes voltage from where current flows out of the bridge.
@@ -104,6 +114,19 @@ mod tests {
         }
         let mean = readings.iter().map(|reading| f64::from(*reading)).sum::<f64>() / 20_000.0;
         assert!((mean - 48.01).abs() < 2e-3, "{mean}");
+    }
+
+    #[test]
+    fn the_nearest_whole_number_is_what_round_gives() {
+        let mut prng = Prng::new(4);
+        let random = (0..100_000).map(|_| (prng.below(1 << 34) as f32 / 2048.0) - 4_194_304.0);
+        let halves = (-4000..4000).flat_map(|half: i16| {
+            let half = f32::from(half) * 0.5;
+            [half, half.next_up(), half.next_down()]
+        });
+        for value in random.chain(halves) {
+            assert_eq!(nearest(value), value.round(), "{value}");
+        }
     }
 
     #[test]
