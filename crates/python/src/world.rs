@@ -264,6 +264,12 @@ impl World {
         Ok(())
     }
 
+    /// How many threads compute its drives; the same to the last bit on any number.
+    fn set_threads(&self, py: Python<'_>, threads: usize) -> PyResult<()> {
+        self.shared.lock(py)?.world.set_threads(threads);
+        Ok(())
+    }
+
     /// Becomes the world that a machine file describes; data sheets that it names are looked for beside it.
     fn become_machine(&self, py: Python<'_>, path: PathBuf, seed: Option<u64>, timing: Option<&str>) -> PyResult<()> {
         let mut machine = file::read(&path).map_err(|reason| bad_value(named(&path, reason)))?;

@@ -1,8 +1,10 @@
 //! Drives, stations and the bus between them, moved from event to event in virtual time.
 
 mod access;
+mod ahead;
 mod bodies;
 mod body;
+mod crew;
 mod digest;
 mod due;
 mod ledger;
@@ -31,10 +33,10 @@ use crate::stimulus::Place;
 use crate::wire::{Bus, ControllerOptions};
 use crate::{Prng, VirtualDrive};
 use body::CoupledBody;
+use crew::{Crew, Found};
 use due::DueTimes;
 use ledger::Ledger;
 use member::{Member, Vacant};
-use probe::Probe;
 use watch::WorldWatch;
 
 /// Distinguishes the seeds of a drive's timing from those of its noise.
@@ -64,6 +66,9 @@ pub struct World {
     bodies: Vec<CoupledBody>,
     /// What sits on the shafts of others: the station, and the place of the shaft.
     mounted: Vec<(usize, Place)>,
+    crew: Crew,
+    /// Stations that the crew has done its last job with, and what they want.
+    done_ahead: Vec<(usize, Found)>,
 }
 
 /// Names one station of one world: what `add_*` returned.
@@ -113,6 +118,8 @@ impl World {
             watch: None,
             bodies: Vec::new(),
             mounted: Vec::new(),
+            crew: Crew::ALONE,
+            done_ahead: Vec::new(),
         }
     }
 
@@ -166,7 +173,7 @@ impl World {
 
     /// Adds a CAN adapter that is written and read from outside: [`send`](Self::send), [`poll_received`](Self::poll_received).
     pub fn add_probe(&mut self) -> StationId {
-        let id = self.add(Member::Probe(Probe::default()), ControllerOptions::ADAPTER);
+        let id = self.add(Member::Probe(Box::default()), ControllerOptions::ADAPTER);
         self.bus.restart(id.0, Some(self.bus.bitrate()), self.now);
         id
     }

@@ -120,6 +120,12 @@ pub(crate) struct Sim {
     /// Random seed (default: the machine file's, or 1)
     #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 0..=u64::MAX))]
     seed: Option<u64>,
+    /// Threads that compute the drives
+    ///
+    /// The bus does the same on any number of them. It pays from some 20 turning drives on; with fewer, or with drives
+    /// at rest, the others sleep.
+    #[arg(long, value_name = "N", default_value = "1", hide_short_help = true, value_parser = |text: &str| whole(text, 1..=64_u8))]
+    threads: u8,
     /// Simulate drives as calculated (ideal), or with the imperfections of real ones (full): noise of encoder, current,
     /// voltage and temperature, dead time, cogging (default: the machine file's, or ideal)
     #[arg(long, value_name = "ideal|full", hide_short_help = true)]
@@ -200,6 +206,7 @@ impl Sim {
         }
         machine.join(&mut world).map_err(unusable)?;
         machine.make_real(&mut world);
+        world.set_threads(self.threads.into());
         let log = global.log.as_ref().map(LogPath::create).transpose()?;
         let record = self.recording.start(&mut world, self.pace(), warnings.clone())?;
         let pacer = Pacer::new(Clock::from(self.clock), self.speed.unwrap_or(Speed::Times(1.0)));

@@ -88,6 +88,14 @@ class World:
         """Puts a drive onto the bus that is described as for ``ferrodrive sim --drive``; returns its node-ID."""
     def set_timing(self, timing: str) -> None:
         """How long boot, answers and stores take from here on: ``ideal``, or ``device``."""
+    def set_threads(self, threads: int) -> None:
+        """How many threads compute the drives from here on. What happens is the same to the last bit on any number; it pays from some 20
+        turning drives on.
+
+        :param threads: 1 to 64, the caller's among them
+
+        >>> world.set_threads(2)
+        """
     def become_machine(self, path: str, seed: Optional[int], timing: Optional[str]) -> None: ...
     def run_ns(self, ns: int) -> None:
         """Moves on by so many ns."""

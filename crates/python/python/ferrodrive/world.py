@@ -38,6 +38,7 @@ class World(_native.World):
     :param timing: ``device``: boot, answers and stores take the time that such a device takes, as on the desk; ``ideal``: none beyond the
         wire
     :param channel: a name under which ``can.Bus(interface="ferrodrive", channel=...)`` finds this world
+    :param threads: how many compute the drives, which makes no difference but of speed, and pays from some 20 turning drives on
 
     >>> world = ferrodrive.World(bitrate=500_000, seed=1)
     >>> servo = world.add("cia402", node=5)
@@ -50,9 +51,10 @@ class World(_native.World):
     _watched = False
     _keeps_trail = False
 
-    def __new__(cls, bitrate: Union[int, str] = 500_000, seed: int = 1, timing: str = "device", *, channel: Optional[str] = None) -> Self:
+    def __new__(cls, bitrate: Union[int, str] = 500_000, seed: int = 1, timing: str = "device", *, channel: Optional[str] = None, threads: int = 1) -> Self:
         world = super().__new__(cls, str(bitrate), seed)
         world.set_timing(timing)
+        world.set_threads(threads)
         if channel is not None:
             _by_channel[channel] = world
         return world

@@ -30,6 +30,11 @@ impl DueTimes {
         }
     }
 
+    /// When a station is due.
+    pub(super) fn of(&self, station: usize) -> Instant {
+        self.times[station]
+    }
+
     /// The station that is due next, and when.
     pub(super) fn first(&self) -> Option<(Instant, usize)> {
         let station = *self.heap.first()?;

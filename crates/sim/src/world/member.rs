@@ -42,7 +42,7 @@ impl Clone for Box<dyn AnyStation> {
 pub(super) enum Member {
     Drive { number: u8, drive: Box<dyn VirtualDrive> },
     Station(Box<dyn AnyStation>),
-    Probe(Probe),
+    Probe(Box<Probe>),
     Gone(Vacant),
 }
 
@@ -51,7 +51,7 @@ impl Member {
         match self {
             Self::Drive { drive, .. } => &mut **drive,
             Self::Station(station) => &mut **station,
-            Self::Probe(probe) => probe,
+            Self::Probe(probe) => &mut **probe,
             Self::Gone(vacant) => vacant,
         }
     }

@@ -1,7 +1,9 @@
 //! One event after the other.
 
 use can::Instant;
+use canopen::connection_set::Service;
 
+use super::crew::Job;
 use super::member::Member;
 use super::{StationId, World};
 use crate::Report;
@@ -50,6 +52,7 @@ impl World {
         if let Some(mut recorder) = self.recorder.take() {
             while let Some(due) = recorder.due_by(at) {
                 self.now = self.now.max(due);
+                self.work_ahead(Job::Advance, |_, _| true);
                 recorder.sample(due, self, Self::measure, Self::body);
             }
             self.recorder = Some(recorder);
@@ -75,6 +78,10 @@ impl World {
 
     fn deliver(&mut self, passed: &Delivered) {
         self.digest.frame(&passed.frame, passed.end);
+        // What most drives take, each of which computes its periods up to now first.
+        if matches!(Service::of(passed.frame.id()), Some(Service::Nmt | Service::Sync | Service::Time)) {
+            self.work_ahead(Job::Advance, |_, _| true);
+        }
         for i in 0..self.members.len() {
             let role = self.bus.conclude(i, passed);
             if role != Role::Nothing {
@@ -95,10 +102,24 @@ impl World {
     }
 
     fn time_out(&mut self) {
+        if self.due.first().is_none_or(|(at, _)| at > self.now) {
+            return;
+        }
+        self.work_ahead(Job::TimeOut, |world, i| world.due.of(i) <= world.now);
+        // Who was due is due in the order of numbers; what is due once more in this instant comes after it.
+        let mut done = 0;
         while let Some((_, i)) = self.due.first().filter(|(at, _)| *at <= self.now) {
-            self.settle(i);
-            self.members[i].station().handle_timeout(self.now);
-            self.serve(i);
+            match self.done_ahead.get(done) {
+                Some(&(station, found)) if station == i => {
+                    done += 1;
+                    self.serve_found(i, found);
+                }
+                _ => {
+                    self.settle(i);
+                    self.members[i].station().handle_timeout(self.now);
+                    self.serve(i);
+                }
+            }
             self.look_at(i);
             if self.due.first().is_some_and(|(at, first)| first == i && at <= self.now) {
                 self.due.set(i, self.now.plus_nanos(OVERDUE_RETRY_NS));

@@ -13,4 +13,5 @@ mod faults;
 mod loads;
 mod rest;
 mod stores;
+mod threads;
 mod turmoil;

@@ -54,6 +54,11 @@ pub(crate) struct Run {
     /// Number of runs at once, of a sweep or of several files (default: one for each core)
     #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=1024_u16))]
     jobs: Option<u16>,
+    /// Threads that compute the drives of one run; the result is the same on any number of them (default: 1)
+    ///
+    /// It pays from some 20 turning drives on. Several runs share the cores by --jobs.
+    #[arg(long, value_name = "N", conflicts_with = "seeds", value_parser = |text: &str| whole(text, 1..=64_u8))]
+    threads: Option<u8>,
     /// Also write the result as JUnit XML, as build servers read it
     #[arg(long, value_name = "FILE", conflicts_with = "seeds", value_parser = file_path)]
     junit: Option<PathBuf>,
@@ -105,6 +110,7 @@ impl Run {
             (self.seeds.is_some(), "--seeds"),
             (self.recording.path().is_some(), "--record"),
             (self.serving.is_asked_for(), "--serve and --control"),
+            (self.threads.is_some(), "--threads"),
         ];
         match given.iter().find(|(is_given, _)| *is_given) {
             None => Ok(()),
@@ -118,7 +124,7 @@ impl Run {
     /// One run, with what is written about it.
     fn once(&self, scenario: &Scenario, file: &Path, format: Format) -> Result<(), Failure> {
         let (outcome, ended) = if self.serving.is_asked_for() {
-            self.serving.run(scenario, self.seed, &self.recording, file)?
+            self.serving.run(scenario, self.seed, self.threads(), &self.recording, file)?
         } else {
             (self.in_virtual_time(scenario, file, format)?, Ok(()))
         };
@@ -130,10 +136,15 @@ impl Run {
         ended.and(judged)
     }
 
+    fn threads(&self) -> usize {
+        self.threads.unwrap_or(1).into()
+    }
+
     fn in_virtual_time(&self, scenario: &Scenario, file: &Path, format: Format) -> Result<Outcome, Failure> {
         exit_on_signal();
         let progress = Progress::new(format.json);
         let mut runner = Runner::new(scenario, self.seed).map_err(|bad| unbuildable(file, bad))?;
+        runner.world_mut().set_threads(self.threads());
         let warnings = Messages::of_warnings();
         let mut record = self.recording.start(runner.world_mut(), Pace::Free, warnings.clone())?;
         if record.is_some() {

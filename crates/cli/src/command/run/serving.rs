@@ -62,10 +62,12 @@ impl ServeOptions {
         &self,
         scenario: &Scenario,
         seed: Option<u64>,
+        threads: usize,
         recording: &RecordOptions,
         file: &Path,
     ) -> Result<(Outcome, Result<(), Failure>), Failure> {
         let (mut world, execution) = Execution::begin(scenario, seed).map_err(|bad| unbuildable(file, bad))?;
+        world.set_threads(threads);
         let warnings = Messages::of_warnings();
         let real_time = self.clock == ClockArg::Real && self.speed.is_none();
         let pace = if real_time { Pace::RealTime } else { Pace::Free };
