@@ -1,4 +1,4 @@
-//! Machines that several motors move together: two wheels and a body, motors on one shaft, a serial arm.
+//! Machines that several motors move together: two wheels and a body, motors on one shaft, a serial arm, and what somebody else moves.
 //!
 //! Each motor says what it does to its shaft in a step ([`Push`]); the machine moves all its coordinates together, and says what
 //! became of each shaft ([`Motion`]). The shafts are stiff: a coordinate is a motor's angle times a fixed number of turns. All dry
@@ -8,6 +8,7 @@
 pub mod arm;
 pub mod common_shaft;
 pub mod differential_drive;
+pub mod external;
 pub mod friction;
 mod vector;
 
@@ -15,6 +16,7 @@ use crate::shaft::{Motion, Push};
 pub use arm::{ArmData, ArmModel, Link};
 pub use common_shaft::{CommonShaftData, CommonShaftModel};
 pub use differential_drive::{DifferentialDriveData, DifferentialDriveModel};
+pub use external::{ExternalData, ExternalModel, Rule};
 pub use friction::MOST;
 
 /// A machine and its state.
@@ -28,6 +30,8 @@ pub enum Body {
     CommonShaft(CommonShaftModel, CommonShaftData),
     /// A motor for each joint, from the base on.
     Arm(ArmModel, ArmData),
+    /// Shafts that somebody else moves, each for itself.
+    External(ExternalModel, ExternalData),
 }
 
 impl Body {
@@ -37,6 +41,7 @@ impl Body {
             Self::DifferentialDrive(..) => (2, 2),
             Self::CommonShaft(..) => (2, MOST),
             Self::Arm(model, _) => (model.links().len(), model.links().len()),
+            Self::External(model, _) => (model.count(), model.count()),
         }
     }
 
@@ -60,6 +65,7 @@ impl Body {
             },
             Self::CommonShaft(model, data) => model.step(data, dt_s, seen),
             Self::Arm(model, data) => model.step(data, dt_s, seen),
+            Self::External(model, data) => model.step(data, dt_s, seen),
         };
         for ((motion, moved), turns) in motions.iter_mut().zip(moved).zip(turns) {
             *motion = moved.felt_through(*turns);

@@ -3,6 +3,7 @@
 mod attachment;
 mod coupled;
 mod driven_stepper;
+mod external;
 mod free_run;
 mod gear;
 mod hub_motor;
