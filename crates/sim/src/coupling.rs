@@ -5,7 +5,7 @@
 //! when the whole machine does. The world brings all drives of a machine up to a moment together, before it lets anything into
 //! one of them, so that the order in which they are asked makes no difference.
 
-use plant::coupled::{ArmModel, Body, CommonShaftData, CommonShaftModel, MOST};
+use plant::coupled::{ArmModel, Body, CommonShaftData, CommonShaftModel, ExternalModel, MOST};
 use plant::coupled::{DifferentialDriveData, DifferentialDriveModel};
 use serde::Serialize;
 
@@ -22,6 +22,8 @@ pub enum Coupling {
     CommonShaft(CommonShaftModel),
     /// One to seven joints, the base first.
     Arm(Box<ArmModel>),
+    /// One to seven shafts that a physics engine outside moves: [`World::exchange`](crate::World::exchange).
+    External(ExternalModel),
 }
 
 /// A drive of a machine.
@@ -128,6 +130,15 @@ pub enum BodyKind {
         /// The tool's point in the frame of the base, m.
         tool_m: [f64; 3],
     },
+    /// Shafts that a physics engine outside moves.
+    External {
+        /// Angles of its joints, degrees.
+        joints_deg: Vec<f64>,
+        /// Their velocities, degrees/s.
+        joints_deg_s: Vec<f64>,
+        /// Torque of each drive at its joint less its friction, the mean of the last exchange, N·m.
+        torque_nm: Vec<f64>,
+    },
 }
 
 impl BodyKind {
@@ -135,6 +146,10 @@ impl BodyKind {
     pub fn signals(&self) -> Vec<(String, f64)> {
         let plain =
             |signals: &[(&str, f64)]| signals.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+        let numbered = |unit: &'static str, values: &[f64]| {
+            let named = values.iter().enumerate().map(|(i, value)| (format!("joint{}_{unit}", i + 1), *value));
+            named.collect::<Vec<_>>()
+        };
         match self {
             Self::DifferentialDrive { x_m, y_m, heading_deg, speed_m_s, yaw_rate_deg_s, slip_m, slips: _ } => plain(&[
                 ("x_m", *x_m),
@@ -149,13 +164,12 @@ impl BodyKind {
                 plain(&[("angle_deg", *angle_deg), ("speed_rpm", *speed_rpm)])
             }
             Self::Arm { joints_deg, joints_deg_s, tool_m } => {
-                let numbered = |unit: &'static str, values: &[f64]| {
-                    let named = values.iter().enumerate().map(|(i, value)| (format!("joint{}_{unit}", i + 1), *value));
-                    named.collect::<Vec<_>>()
-                };
                 let [x, y, z] = *tool_m;
                 let tool: Vec<(String, f64)> = plain(&[("tool_x_m", x), ("tool_y_m", y), ("tool_z_m", z)]);
                 [numbered("deg", joints_deg), numbered("deg_s", joints_deg_s), tool].concat()
+            }
+            Self::External { joints_deg, joints_deg_s, torque_nm } => {
+                [numbered("deg", joints_deg), numbered("deg_s", joints_deg_s), numbered("nm", torque_nm)].concat()
             }
         }
     }
@@ -188,6 +202,9 @@ const LINK_LENGTH: Quantity =
     Quantity { what: "length at a link", expected: "-100 to 100 m", least: -100.0, greatest: 100.0 };
 const LINK_ANGLE: Quantity =
     Quantity { what: "first angle of a joint", expected: "-360 to 360 degrees", least: -360.0, greatest: 360.0 };
+/// Beyond that an angle in rad has no room for a step of an encoder.
+pub(crate) const JOINT_ANGLE: Quantity =
+    Quantity { what: "angle of a joint", expected: "-1e6 to 1e6 rad", least: -1e6, greatest: 1e6 };
 const LINK_AXIS: Quantity =
     Quantity { what: "length of a joint's axis", expected: "1", least: 1.0 - 1e-6, greatest: 1.0 + 1e-6 };
 const TURNS: Quantity = Quantity {
@@ -204,6 +221,7 @@ impl Coupling {
             Self::DifferentialDrive(_) => "differential-drive",
             Self::CommonShaft(_) => "common-shaft",
             Self::Arm(_) => "arm",
+            Self::External(_) => "external",
         }
     }
 
@@ -222,6 +240,13 @@ impl Coupling {
             Self::Arm(model) => {
                 check_arm(model)?;
                 Ok(Body::Arm(**model, model.at_rest()))
+            }
+            Self::External(model) => {
+                for (first_rad, inertia_kg_m2) in model.joints() {
+                    JOINT_ANGLE.check(first_rad)?;
+                    SHAFT.check(inertia_kg_m2)?;
+                }
+                Ok(Body::External(*model, model.at_rest()))
             }
         }
     }
@@ -275,7 +300,7 @@ pub(crate) fn change(body: &mut Body, name: &str, stimulus: &BodyStimulus) -> Re
         (Body::Arm(model, _), BodyStimulus::Payload(payload_kg)) => model.payload_kg = PAYLOAD.check(payload_kg)?,
         (Body::DifferentialDrive(..), _) => return Err(lacks(name, "slope, grip and mass")),
         (Body::Arm(..), _) => return Err(lacks(name, "payload")),
-        (Body::CommonShaft(..), _) => return Err(lacks(name, "nothing")),
+        (Body::CommonShaft(..) | Body::External(..), _) => return Err(lacks(name, "nothing")),
     }
     Ok(())
 }
@@ -307,6 +332,14 @@ pub(crate) fn state(name: &str, body: &Body) -> BodyState {
                 joints_deg: degrees(&data.angle_rad),
                 joints_deg_s: degrees(&data.velocity_rad_s),
                 tool_m: model.tool_at_m(data),
+            }
+        }
+        Body::External(model, data) => {
+            let shafts = || (0..model.count()).map(|joint| data.shaft(joint));
+            BodyKind::External {
+                joints_deg: shafts().map(|(angle_rad, _)| angle_rad.to_degrees()).collect(),
+                joints_deg_s: shafts().map(|(_, velocity_rad_s)| velocity_rad_s.to_degrees()).collect(),
+                torque_nm: (0..model.count()).map(|joint| data.torque_nm(joint)).collect(),
             }
         }
     };

@@ -64,4 +64,6 @@ pub use refused::Refused;
 pub use stimulus::{
     BodyStimulus, Component, LoadPart, Place, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor,
 };
-pub use world::{AnyStation, Digest, FrameLog, StationId, StoredImage, World, WorldError};
+pub use world::{
+    AnyStation, Digest, ExchangeError, ExternalShaft, FrameLog, Given, StationId, StoredImage, World, WorldError,
+};

@@ -7,6 +7,7 @@ mod body;
 mod crew;
 mod digest;
 mod due;
+mod external;
 mod ledger;
 mod log;
 mod member;
@@ -22,6 +23,7 @@ use core::time::Duration;
 use can::{Bitrate, Frame, Instant, Station};
 
 pub use digest::Digest;
+pub use external::{ExchangeError, ExternalShaft, Given};
 pub use log::FrameLog;
 pub use member::AnyStation;
 pub use stores::StoredImage;

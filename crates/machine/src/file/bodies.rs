@@ -1,12 +1,12 @@
 //! Machines that drives of a file move together: `[[body]]`.
 
-use plant::coupled::{ArmModel, CommonShaftModel, DifferentialDriveModel, Link, MOST};
+use plant::coupled::{ArmModel, CommonShaftModel, DifferentialDriveModel, ExternalModel, Link, MOST, Rule};
 use sim::{CoupledShaft, Coupling, Place, World};
 
 use words::document::reader::{Field, Table};
 use words::document::{BadFile, Located, Problem};
 
-const KIND: &str = "\"differential-drive\", \"common-shaft\" or \"arm\"";
+const KIND: &str = "\"differential-drive\", \"common-shaft\", \"arm\" or \"external\"";
 const NUMBER: &str = "a number";
 const DRIVES: &str = "a list of nodes, e.g. [4, 5], or [\"5.1\", \"5.2\"] for two axes of one";
 const VECTOR: &str = "a list of three numbers, [x, y, z]";
@@ -25,6 +25,7 @@ const BASE_KEYS: &[&str] = &[
 ];
 const SHAFT_KEYS: &[&str] = &["inertia_kg_m2", "coulomb_nm", "viscous_nm_s"];
 const ARM_KEYS: &[&str] = &["link", "tool_m", "payload_kg", "gravity_m_s2"];
+const EXTERNAL_KEYS: &[&str] = &["rule", "first_deg", "inertia_kg_m2"];
 const LINK_KEYS: &[&str] = &["offset_m", "axis", "mass_kg", "center_m", "inertia_kg_m2", "first_deg"];
 
 /// A machine that drives move together.
@@ -44,6 +45,7 @@ impl Joined {
             "differential-drive" => (Coupling::DifferentialDrive(base(&table)?), BASE_KEYS),
             "common-shaft" => (Coupling::CommonShaft(shaft(&table)?), SHAFT_KEYS),
             "arm" => (Coupling::Arm(Box::new(arm(&table)?)), ARM_KEYS),
+            "external" => (Coupling::External(external(&table)?), EXTERNAL_KEYS),
             _ => return Err(kind.wrong(KIND)),
         };
         table.takes_only(&[&["name", "kind", "drives", "turns"], own].concat())?;
@@ -133,6 +135,27 @@ fn arm(table: &Table<'_>) -> Result<ArmModel, Problem> {
     Ok(model)
 }
 
+fn external(table: &Table<'_>) -> Result<ExternalModel, Problem> {
+    let drives = table.need("drives", DRIVES)?;
+    let count = drives.list(DRIVES)?.len();
+    let rule = match table.get("rule") {
+        None => Rule::default(),
+        Some(field) => field.text(Rule::NAMES)?.parse().map_err(|()| field.wrong(Rule::NAMES))?,
+    };
+    let (first_deg, inertia) = (numbers(table, "first_deg", count)?, numbers(table, "inertia_kg_m2", count)?);
+    let joints: Vec<_> = first_deg.into_iter().map(f64::to_radians).zip(inertia).collect();
+    ExternalModel::new(rule, &joints)
+        .ok_or_else(|| drives.problem(format!("{count} drives; an external body has one to {MOST}")))
+}
+
+/// A number for each of so many drives, 0 where nothing is said.
+fn numbers(table: &Table<'_>, name: &str, count: usize) -> Result<Vec<f64>, Problem> {
+    let expected = "a list of numbers, one for each drive";
+    let Some(field) = table.get(name) else { return Ok(vec![0.0; count]) };
+    let numbers = field.list(expected)?.iter().map(|number| number.number(expected)).collect::<Result<Vec<_>, _>>()?;
+    if numbers.len() == count { Ok(numbers) } else { Err(field.wrong(expected)) }
+}
+
 fn link(field: &Field<'_>) -> Result<Link, Problem> {
     let table = field.table("a link", "a table of its own for each link, begun by [[body.link]]")?;
     table.takes_only(LINK_KEYS)?;
@@ -165,7 +188,9 @@ mod tests {
         let arm = "[[body]]\nname = 'arm'\nkind = 'arm'\ndrives = [4, '5']\ntool_m = [0.3, 0, 0]\npayload_kg = 1\n\
                    [[body.link]]\naxis = [0, -1, 0]\nmass_kg = 2\ncenter_m = [0.2, 0, 0]\n\
                    [[body.link]]\naxis = [0, -1, 0]\nmass_kg = 1\noffset_m = [0.4, 0, 0]\nfirst_deg = 30\n";
-        for (text, name) in [(base, "base"), (shaft, "axle"), (arm, "arm")] {
+        let external = "[[body]]\nname = 'hands'\nkind = 'external'\ndrives = [4, 5]\nturns = [1, -1]\nrule = 'hold'\n\
+                        first_deg = [90, 0]\ninertia_kg_m2 = [0.1, 0.2]\n";
+        for (text, name) in [(base, "base"), (shaft, "axle"), (arm, "arm"), (external, "hands")] {
             let machine = Machine::parse(&format!("{DRIVES}{text}")).unwrap_or_else(|bad| panic!("{bad}"));
             let mut world = machine.build().unwrap_or_else(|bad| panic!("{bad}"));
             assert!(world.body(name).is_some() && world.body_of(sim::Place::node(5)).is_some(), "{name}");
@@ -191,6 +216,12 @@ mod tests {
         assert!(with(&format!("{shaft}[4, 5]\ninertia_kg_m2 = -1")).contains("must be 0 to 1e6"));
         assert!(with(&format!("{shaft}[4, 5]\nwheel_radius_m = 1")).contains("has no 'wheel_radius_m'"));
         assert!(with("kind = 'arm'\ndrives = [4]\nlink = []").contains("0 links; an arm has one to 7"));
+        let external = "kind = 'external'\ndrives = ";
+        assert!(with(&format!("{external}[]")).contains("0 drives; an external body has one to 7"));
+        assert!(with(&format!("{external}[4]\nfirst_deg = [1, 2]")).contains("a list of numbers, one for each drive"));
+        assert!(
+            with(&format!("{external}[4]\nrule = 'guess'")).contains("expected hold, interpolate, integrate or torque")
+        );
         assert!(
             with("kind = 'arm'\ndrives = [4]\n[[body.link]]\naxis = [0, 1]\nmass_kg = 1").contains("three numbers")
         );

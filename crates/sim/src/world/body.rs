@@ -65,6 +65,7 @@ impl CoupledBody {
             Body::DifferentialDrive(_, data) => [data.x_m, data.y_m, data.heading_rad].map(f64::to_bits).to_vec(),
             Body::CommonShaft(_, data) => vec![data.angle.as_turns().to_bits()],
             Body::Arm(_, data) => data.angle_rad.iter().map(|rad| rad.to_bits()).collect(),
+            Body::External(model, data) => (0..model.count()).map(|joint| data.shaft(joint).0.to_bits()).collect(),
         }
     }
 }

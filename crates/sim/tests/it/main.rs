@@ -9,6 +9,7 @@ mod crowd;
 mod device_timing;
 mod energies;
 mod events;
+mod external;
 mod faults;
 mod loads;
 mod rest;
