@@ -7,6 +7,7 @@
 //! A world is behind a lock of its own: two threads may use it in turn. A process that was forked refuses the worlds of its
 //! parent, whose lock another thread may have held.
 
+mod external;
 mod failure;
 mod frames;
 mod live;
@@ -22,6 +23,13 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<world::World>()?;
+    module.add_class::<external::Worlds>()?;
+    module.add_function(wrap_pyfunction!(external::couple_external, module)?)?;
+    module.add_function(wrap_pyfunction!(external::exchange, module)?)?;
+    module.add_function(wrap_pyfunction!(external::exchange_torque, module)?)?;
+    module.add_function(wrap_pyfunction!(external::begin_exchange, module)?)?;
+    module.add_function(wrap_pyfunction!(external::exchanged, module)?)?;
+    module.add_function(wrap_pyfunction!(external::external_shafts, module)?)?;
     module.add_class::<master::Network>()?;
     module.add_class::<master::Job>()?;
     module.add_class::<master::axes::Group>()?;

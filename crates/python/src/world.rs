@@ -58,7 +58,7 @@ pub(crate) fn stimulus_words(name: &str, values: &Bound<'_, PyTuple>) -> PyResul
     of_node().or_else(|_| of_body()).or_else(of_wire)
 }
 
-fn place_of(text: &str) -> PyResult<Place> {
+pub(crate) fn place_of(text: &str) -> PyResult<Place> {
     text.parse().map_err(|()| bad_value(format!("{text:?} is not a node; expected 1 to 127")))
 }
 
@@ -112,7 +112,7 @@ impl Shared {
         Ok(self.state.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner))
     }
 
-    fn check_process(&self) -> PyResult<()> {
+    pub(crate) fn check_process(&self) -> PyResult<()> {
         if process::id() == self.process {
             return Ok(());
         }
@@ -121,8 +121,17 @@ impl Shared {
         ))
     }
 
+    /// The lock of the state, for a caller that has looked at the process.
+    pub(crate) fn state(&self) -> &Mutex<WorldState> {
+        &self.state
+    }
+
     /// Works with the state while other Python threads run.
-    fn detached<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut WorldState) -> T + Send) -> PyResult<T> {
+    pub(crate) fn detached<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut WorldState) -> T + Send,
+    ) -> PyResult<T> {
         self.check_process()?;
         Ok(py.detach(|| work(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))))
     }
@@ -158,7 +167,7 @@ impl WorldState {
         self.keep_record();
     }
 
-    fn keep_record(&mut self) {
+    pub(crate) fn keep_record(&mut self) {
         self.recordings.keep_up(&mut self.world);
     }
 

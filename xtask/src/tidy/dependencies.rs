@@ -43,6 +43,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "host",
             "machine",
             "master",
+            "plant",
             "recording",
             "scenario",
             "serve",

@@ -40,6 +40,7 @@ from .errors import (
     TimeInUse,
 )
 from .drive import AsyncDrive, Drive
+from .external import ExternalShaft, Worlds
 from .master import Network, check
 from .parameters import Parameters
 from .scenario import Outcome, Row, Sweep, SweepSummary, run
@@ -59,6 +60,7 @@ __all__ = [
     "BusWarning",
     "Control",
     "Drive",
+    "ExternalShaft",
     "FerrodriveError",
     "Group",
     "MasterError",
@@ -78,6 +80,7 @@ __all__ = [
     "TimeInUse",
     "VirtualDrive",
     "World",
+    "Worlds",
     "__version__",
     "check",
     "eds",

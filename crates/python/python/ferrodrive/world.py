@@ -6,12 +6,13 @@ import contextlib
 import json
 import os
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 from . import _native
 from .body import Body
 from .errors import Refused
+from .external import ExternalShaft
 from .virtual_drive import VirtualDrive
 from .turns import taking_part
 
@@ -143,6 +144,83 @@ class World(_native.World):
         <Body base>
         """
         return Body(self, name)
+
+    def external(
+        self,
+        drives: Sequence[Union[int, str]],
+        *,
+        angle_rad: Union[float, Sequence[float]] = 0.0,
+        turns: Union[float, Sequence[float]] = 1.0,
+        inertia_kg_m2: Union[float, Sequence[float]] = 0.0,
+        rule: str = "integrate",
+        name: str = "external",
+    ) -> None:
+        """From now on a physics engine moves the shafts of these drives, by :meth:`exchange`. In a machine file: a ``[[body]]`` of the kind
+        ``external``. Needs NumPy.
+
+        :param drives: one to seven of them, ``"5.2"`` for an axis; more by a second call with another name
+        :param angle_rad: where the joints stand in the engine now
+        :param turns: turns of the joint for one turn of the drive's output, negative for a motor that sits the other way round
+        :param inertia_kg_m2: what the engine has at each joint beside the drive, if that is known; with ``torque`` what the drive moves
+        :param rule: what a shaft does between two exchanges: ``integrate``, ``hold``, ``interpolate``, or ``torque`` for the other form
+            (:meth:`exchange_torque`). What each is off by is in the handbook, "In your physics engine"
+        :param name: of the body that they become
+        :raises Refused: a drive is not there, is part of a body, or has a gear of its own; nothing has changed
+        :raises ValueError: the rule is not one, or there are not as many values as drives
+        :raises ImportError: NumPy is not installed
+
+        >>> world.external([5])
+        """
+        count = len(drives)
+        columns = [_each("turns", turns, count), _each("angle_rad", angle_rad, count), _each("inertia_kg_m2", inertia_kg_m2, count)]
+        _native.couple_external(self, name, rule, list(zip([str(drive) for drive in drives], *columns)))
+
+    def external_shafts(self) -> list[ExternalShaft]:
+        """The shafts that a physics engine moves, in the order of :meth:`exchange`: that in which they were joined.
+
+        >>> world.external([5])
+        >>> [shaft.place for shaft in world.external_shafts()]
+        ['5']
+        """
+        return [ExternalShaft(*shaft) for shaft in _native.external_shafts(self)]
+
+    def exchange(self, dt_s: float, angle_rad: Any, velocity_rad_s: Any) -> Any:
+        """Moves on by a step of the engine: where its joints are goes in, and for each the torque that its drive gives comes out, to be
+        applied in the engine's next step. In a thread that takes part in the virtual time it waits for that time.
+
+        The torque is the mean over the step at the joint, less the drive's friction; the engine has the drive's inertia as the armature
+        of the joint (:meth:`external_shafts`). Time that passes outside of an exchange finds the shafts held fast.
+
+        :param dt_s: the step in s, a whole number of control periods of the drives (50 us; 100 us of a stepper drive)
+        :param angle_rad: an array of the joints' angles in rad, many turns; ``velocity_rad_s`` one of their velocities
+        :returns: a new array of torques in N m
+        :raises ValueError: a length, a value or the step is wrong, or a joint has come further than its velocities explain; nothing is
+            stored then, and no time passes
+
+        >>> world.external([5])
+        >>> world.exchange(0.001, [0.0], [0.0]).shape
+        (1,)
+        """
+        if (time := taking_part(self)) is None:
+            return _native.exchange(self, dt_s, angle_rad, velocity_rad_s)
+        time.sleep_ns(_native.begin_exchange(self, dt_s, angle_rad, velocity_rad_s))
+        return _native.exchanged(self)[0]
+
+    def exchange_torque(self, dt_s: float, torque_nm: Any) -> tuple[Any, Any]:
+        """The other form, of shafts that were joined with the rule ``torque``: the engine's torque at each joint goes in, for one that moves
+        the drive in positive direction above 0; the joints' angles in rad and velocities in rad/s at the end of the step come out.
+
+        :raises ValueError: as :meth:`exchange`
+
+        >>> world = ferrodrive.World()
+        >>> wheel = world.add("zlac8030l", node=4)
+        >>> world.external([4], rule="torque", inertia_kg_m2=0.2)
+        >>> angle_rad, velocity_rad_s = world.exchange_torque(0.001, [0.5])
+        """
+        if (time := taking_part(self)) is None:
+            return _native.exchange_torque(self, dt_s, torque_nm)
+        time.sleep_ns(_native.begin_exchange(self, dt_s, torque_nm, None))
+        return _native.exchanged(self)[1:]
 
     @property
     def now(self) -> float:
@@ -324,6 +402,14 @@ def nanoseconds(seconds: float) -> int:
     if ns < 0:
         raise ValueError(f"expected a time of 0 s or more, got {seconds} s")
     return ns
+
+
+def _each(what: str, values: Union[float, Sequence[float]], count: int) -> list[float]:
+    """A value for each of so many drives; a single one is that of all."""
+    each = [float(value) for value in values] if isinstance(values, Iterable) else [float(values)] * count
+    if len(each) != count:
+        raise ValueError(f"{what}: {len(each)} values for {count} drives")
+    return each
 
 
 def at_channel(channel: object) -> World:
