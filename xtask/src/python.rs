@@ -22,7 +22,7 @@ pub(crate) const VENV: &str = "python-venv";
 const FURTHER_REQUIREMENTS: &str = "crates/python/tests/further_requirements.txt";
 
 /// The tests, of the package and of what users copy from.
-const TESTS: &[&str] = &["crates/python/tests", "examples/mobile_base_tests", "examples/arm_tests"];
+const TESTS: &[&str] = &["crates/python/tests", "examples/mobile_base_tests", "examples/arm_tests", "examples/mujoco"];
 
 /// The python step of `cargo xtask test`.
 pub(crate) fn step() -> Tally {
