@@ -106,6 +106,7 @@ const NOT_FOLLOWED: [(&str, &str); 11] = [
     ("faq.md", "it has no commands"),
     ("library.md", "its command is cargo's: the examples' step"),
     ("gateway.md", "it serves until a signal, and a client speaks to it: gateway.rs"),
+    ("physics-engine.md", "its programs are Python's: examples/mujoco, which holds the page to them"),
     ("python-can.md", "it has no commands: tests/peers"),
     ("socketcan.md", "it needs CAN interfaces of Linux: socketcan.rs, in a virtual machine"),
     ("studio.md", "it serves a browser: studio.rs, and tests/browser_and_schema"),
