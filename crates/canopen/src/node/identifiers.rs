@@ -44,6 +44,11 @@ impl<S: Storage> Identifiers<S> {
         }
     }
 
+    /// One identifier more, until the next [`listen`](Self::listen).
+    pub(super) const fn hear(&mut self, id: u16) {
+        self.heard[id as usize / 32 % WORDS] |= 1 << (id % 32);
+    }
+
     /// Takes effect with [`listen`](Self::listen).
     pub(super) fn set_sync(&mut self, id: Option<u16>) {
         self.sync = id.unwrap_or(UNUSED);

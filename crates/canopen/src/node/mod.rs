@@ -1,6 +1,6 @@
 //! A CANopen device's communication: NMT slave, heartbeat producer, SYNC consumer and producer, EMCY producer, SDO server,
 //! RPDOs and TPDOs over one object dictionary (CiA 301).
-//! As many PDOs as the dictionary has records for, up to 512 each way.
+//! As many PDOs as the dictionary has records for, up to 512 each way, and as many SDO servers, up to 128.
 //!
 //! [`Node`] is what a firmware owns. Frames and time go in as [`can::Station`] says. Out come frames, a deadline, and
 //! [`NodeEvent`]s: which entries a peer wrote, NMT changes, reset requests. The node never acts on the application;
@@ -33,6 +33,7 @@
 //! assert!(matches!(node.poll_event(), Some(NodeEvent::Written { raw: 6, .. })));
 //! ```
 
+mod channels;
 mod cycle;
 mod event;
 mod identifiers;
@@ -48,6 +49,7 @@ mod transmit;
 
 use can::{CanId, Frame, Instant, Station};
 
+use channels::Channel;
 use event::EventQueue;
 pub use event::{NodeEvent, Ticket, Via};
 pub use profile::NodeProfile;
@@ -89,8 +91,11 @@ pub struct Node<S: Storage> {
     emcy: emcy::Producer,
     emcy_id: Option<CanId>,
     sdo: Server,
+    /// The latest question to the owner for the client of this server.
+    asked: Ticket,
+    channels: S::Channels<Channel>,
     sync: NodeSync,
-    /// The latest question to the owner.
+    /// The latest question to the owner for any client.
     ticket: Ticket,
     pdos: Pdos<S>,
 }
@@ -99,10 +104,11 @@ impl<S: Storage> Node<S> {
     /// A device with factory values, not booted yet.
     ///
     /// # Panics
-    /// If the storage has not enough room for the profile's table: rows, longer values, PDOs, and the events that one frame
-    /// can make.
+    /// If the storage has not enough room for the profile's table: rows, longer values, PDOs, SDO servers, and the events that one
+    /// frame can make.
     pub fn new(profile: &'static NodeProfile, node_id: NodeId) -> Self {
         let pdos = Pdos::of(profile.table);
+        let sdo = Server::new(profile.sdo_frame_length, profile.sdo_timeout_ns, profile.sdo_block_size);
         Self {
             profile,
             node_id,
@@ -118,7 +124,9 @@ impl<S: Storage> Node<S> {
             heartbeat_state: None,
             emcy: emcy::Producer::new(),
             emcy_id: None,
-            sdo: Server::new(profile.sdo_frame_length, profile.sdo_timeout_ns, profile.sdo_block_size),
+            channels: channels::of::<S>(profile.table, &sdo),
+            sdo,
+            asked: Ticket(0),
             sync: NodeSync::NONE,
             ticket: Ticket(0),
             pdos,
@@ -132,6 +140,7 @@ impl<S: Storage> Node<S> {
         self.now = now;
         self.sdo.reset();
         self.emcy = emcy::Producer::new();
+        self.reset_channels();
         self.pending.clear();
         self.events.clear();
         self.last_addressed = None;
@@ -175,6 +184,7 @@ impl<S: Storage> Node<S> {
         self.pending.clear();
         self.deadline = Instant::FAR_FUTURE;
         self.sdo.reset();
+        self.reset_channels();
         self.stop_pdos();
         self.follow_nmt_with_sync();
         self.events.clear();
@@ -306,6 +316,7 @@ impl<S: Storage> Node<S> {
             self.offer_emcy();
         } else {
             self.sdo.reset();
+            self.reset_channels();
             self.pending.remove(Source::SdoReply);
             self.pending.remove(Source::Emcy);
         }

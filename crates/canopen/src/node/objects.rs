@@ -13,14 +13,14 @@ use crate::pdo::{
     AddressMode, Direction, Mapping, MappingRecord, Parameter, PdoId, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING,
     TPDO_PARAMETER, Tpdo, TransmissionType,
 };
-use crate::{AbortCode, CobId, Mux, NmtState, connection_set, sync};
+use crate::{AbortCode, CobId, Mux, NmtState, connection_set, sdo, sync};
 
 impl<S: Storage> Node<S> {
-    /// A client's write: checks, stores, takes effect, is reported to the owner, unless the owner is to be asked before.
+    /// A write of a server's client: checks, stores, takes effect, is reported to the owner, unless the owner is to be asked before.
     #[inline(always)]
-    pub(super) fn write(&mut self, slot: Slot, facts: &RowFacts, raw: u32) -> Result<(), Refusal> {
+    pub(super) fn write(&mut self, server: u8, slot: Slot, facts: &RowFacts, raw: u32) -> Result<(), Refusal> {
         if facts.summary.is_special() {
-            return self.write_special(slot, raw);
+            return self.write_special(server, slot, raw);
         }
         let raw = self.dictionary.write_or_ask(slot, facts, raw)?;
         self.push(NodeEvent::Written { slot, raw, via: Via::Sdo });
@@ -29,19 +29,19 @@ impl<S: Storage> Node<S> {
 
     /// Of a communication object, or a value that is longer than a cell and waits in the dictionary.
     #[inline(never)]
-    fn write_special(&mut self, slot: Slot, raw: u32) -> Result<(), Refusal> {
+    fn write_special(&mut self, server: u8, slot: Slot, raw: u32) -> Result<(), Refusal> {
         let table = self.dictionary.table();
         let (row, summary) = (table.row(slot), table.summary(slot));
         let raw = if summary.is_long() { raw } else { raw & row.data_type.mask() };
         let checked = if summary.is_long() {
-            self.dictionary.check_staged(slot, raw as usize)
+            self.dictionary.check_staged(server, slot, raw as usize)
         } else {
             self.dictionary.check_or_ask(slot, raw)
         };
         match checked {
             Err(Refusal::Abort(code)) => return Err(code.into()),
             _ if summary.is_communication() => {
-                if !(self.profile.acts_on)(row.mux()) && self.changes(slot, raw) {
+                if !(self.profile.acts_on)(row.mux()) && self.changes(server, slot, raw) {
                     return Err(AbortCode::INVALID_VALUE.into());
                 }
                 self.check_communication(row.mux(), raw)?;
@@ -49,25 +49,25 @@ impl<S: Storage> Node<S> {
             _ => {}
         }
         checked?;
-        self.commit(slot, raw);
+        self.commit(server, slot, raw);
         Ok(())
     }
 
     /// What a client wants to write is not what is there.
-    fn changes(&self, slot: Slot, raw: u32) -> bool {
+    fn changes(&self, server: u8, slot: Slot, raw: u32) -> bool {
         let values = self.dictionary.view();
         if values.table().summary(slot).is_long() {
-            values.staged(raw as usize) != values.long_bytes(slot)
+            values.staged(server, raw as usize) != values.long_bytes(slot)
         } else {
             values.raw(slot) != raw
         }
     }
 
     /// A client's checked value is stored, takes effect and is reported to the owner.
-    pub(super) fn commit(&mut self, slot: Slot, raw: u32) {
+    pub(super) fn commit(&mut self, server: u8, slot: Slot, raw: u32) {
         let table = self.dictionary.table();
         if table.summary(slot).is_long() {
-            self.dictionary.store_staged(slot, raw as usize);
+            self.dictionary.store_staged(server, slot, raw as usize);
         } else {
             self.dictionary.set_raw(slot, raw);
         }
@@ -96,6 +96,7 @@ impl<S: Storage> Node<S> {
             (0x1028, _) if mux.sub_index > 0 => {
                 CobId(self.object(mux).unwrap_or(CobId::INVALID)).check_change(CobId(raw), false)
             }
+            (0x1201..=0x12FF, _) => sdo::parameter::check(&values, mux, raw),
             (0x1016, _) if mux.sub_index > 0 => heartbeat::check_watched_once(&values, mux, raw),
             (0x1014, _) => self.emcy_cob_id().check_change(CobId(raw), self.profile.pdo_changes_while_valid),
             (_, Some((pdo, false))) => self.check_parameter(&values, mux, raw, pdo.direction),
@@ -158,6 +159,10 @@ impl<S: Storage> Node<S> {
                 self.listen();
             }
             (0x1007, _) => self.configure_window(),
+            (0x1201..=0x127F, _) => {
+                self.configure_channels();
+                self.listen();
+            }
             (0x1014 | 0x1015, _) => self.configure_emcy(),
             (0x1017, _) => {
                 self.heartbeat = heartbeat::Producer::from_write(self.heartbeat_period_ms(), self.now);
@@ -193,7 +198,9 @@ impl<S: Storage> Node<S> {
             self.configure_tpdo(position);
         }
         self.configure_window();
+        self.configure_channels();
         self.received.listen(self.node_id);
+        self.listen_to_channels();
     }
 
     pub(super) fn heartbeat_period_ms(&self) -> u16 {
@@ -208,6 +215,7 @@ impl<S: Storage> Node<S> {
     fn listen(&mut self) {
         if self.state != NmtState::Initialising {
             self.received.listen(self.node_id);
+            self.listen_to_channels();
         }
     }
 

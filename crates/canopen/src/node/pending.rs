@@ -10,6 +10,8 @@ pub(super) enum Source {
     Heartbeat,
     BootUp,
     Sync,
+    /// SDO servers beside the default one.
+    Channel,
 }
 
 const EMCY: u8 = 1 << 0;
@@ -19,6 +21,7 @@ const HEARTBEAT: u8 = 1 << 2;
 const TPDOS: u8 = 1 << 3;
 const BOOT_UP: u8 = 1 << 4;
 const SYNC: u8 = 1 << 5;
+const CHANNEL: u8 = 1 << 6;
 
 impl Source {
     const fn bit(self) -> u8 {
@@ -29,11 +32,13 @@ impl Source {
             Self::Tpdo(_) => TPDOS,
             Self::BootUp => BOOT_UP,
             Self::Sync => SYNC,
+            Self::Channel => CHANNEL,
         }
     }
 }
 
-const SINGLE: [Source; 5] = [Source::Emcy, Source::SdoReply, Source::Heartbeat, Source::BootUp, Source::Sync];
+const SINGLE: [Source; 6] =
+    [Source::Emcy, Source::SdoReply, Source::Heartbeat, Source::BootUp, Source::Sync, Source::Channel];
 
 /// Which services have a frame that may be sent now.
 #[derive(Clone)]

@@ -10,6 +10,9 @@ use crate::od::{Refusal, Storage};
 use crate::pdo::{PdoNumber, Reception, Tpdo};
 use crate::sdo::server::Write;
 
+/// The number of the server that every device has: 1200h.
+const DEFAULT_SERVER: u8 = 0;
+
 impl<S: Storage> Node<S> {
     /// A data frame with an identifier that a service here listens to. SDO, NMT and SYNC do not share theirs; two
     /// RPDOs may have the same.
@@ -62,9 +65,9 @@ impl<S: Storage> Node<S> {
             return;
         }
         if let Some(write) = self.sdo.handle_frame(frame, &mut self.dictionary, self.now) {
-            match self.write(write.slot, write.facts, write.raw) {
+            match self.write(DEFAULT_SERVER, write.slot, write.facts, write.raw) {
                 Ok(()) => self.sdo.finish(write, Ok(())),
-                Err(refusal) => self.refuse(write, refusal),
+                Err(refusal) => self.refuse(DEFAULT_SERVER, write, refusal),
             }
         }
         if self.sdo.has_reply() {
@@ -77,13 +80,17 @@ impl<S: Storage> Node<S> {
 
     /// A download is refused, or the owner is asked.
     #[cold]
-    fn refuse(&mut self, write: Write, refusal: Refusal) {
+    pub(super) fn refuse(&mut self, server: u8, write: Write, refusal: Refusal) {
+        let now = self.now;
         match refusal {
-            Refusal::Abort(code) => self.sdo.finish(write, Err(code)),
+            Refusal::Abort(code) => self.server_mut(server).finish(write, Err(code)),
             Refusal::Ask => {
                 self.ticket = Ticket(self.ticket.0.wrapping_add(1));
-                self.sdo.defer(write, self.now);
-                let raw = self.asked_raw().unwrap_or(write.raw);
+                self.server_mut(server).defer(write, now);
+                *self.asked_mut(server) = self.ticket;
+                let row = self.table().row(write.slot);
+                let is_long = write.facts.summary.is_long();
+                let raw = if is_long { write.raw } else { write.raw & row.data_type.mask() };
                 self.push(NodeEvent::Asked { slot: write.slot, raw, ticket: self.ticket });
             }
         }
@@ -95,33 +102,26 @@ impl<S: Storage> Node<S> {
     /// is over, or communication was stopped.
     pub fn answer(&mut self, ticket: Ticket, verdict: Result<(), AbortCode>, now: Instant) -> bool {
         self.now = now;
-        if ticket != self.ticket {
-            return false;
-        }
-        let Some(write) = self.sdo.take_deferred() else { return false };
+        let Some(server) = self.questions().position(|(asked, _)| asked == ticket) else { return false };
+        let server = server as u8;
+        let Some(write) = self.server_mut(server).take_deferred() else { return false };
         if verdict.is_ok() {
-            self.commit(write.slot, write.raw);
+            self.commit(server, write.slot, write.raw);
         }
-        self.sdo.finish(write, verdict);
-        self.pending.insert(Source::SdoReply);
+        self.server_mut(server).finish(write, verdict);
+        if self.sdo.has_reply() {
+            self.pending.insert(Source::SdoReply);
+        }
+        self.offer_channels();
         self.reschedule();
         true
     }
 
-    /// What is asked about.
-    fn asked_raw(&self) -> Option<u32> {
-        let write = self.sdo.deferred()?;
-        Some(if write.facts.summary.is_long() {
-            write.raw
-        } else {
-            write.raw & self.table().row(write.slot).data_type.mask()
-        })
-    }
-
-    /// Of a value longer than a cell, the bytes that [`NodeEvent::Asked`] asks about; none when nothing is asked.
-    pub fn asked_bytes(&self) -> &[u8] {
-        let length = self.sdo.deferred().map_or(0, |write| write.raw as usize);
-        self.dictionary.view().staged(length)
+    /// Of a value longer than a cell, the bytes that [`NodeEvent::Asked`] asks about; none when that is not asked any more.
+    pub fn asked_bytes(&self, ticket: Ticket) -> &[u8] {
+        let mut questions = (0..).zip(self.questions()).filter(|(_, (asked, _))| *asked == ticket);
+        let asked = questions.find_map(|(number, (_, server))| Some((number, server.deferred()?)));
+        asked.map_or(&[], |(number, write)| self.dictionary.view().staged(number, write.raw as usize))
     }
 
     #[inline(never)]
@@ -133,6 +133,9 @@ impl<S: Storage> Node<S> {
                     return;
                 }
             }
+        }
+        if !self.channels.as_ref().is_empty() {
+            self.receive_channel(frame, id);
         }
     }
 

@@ -19,6 +19,7 @@ impl<S: Storage> Node<S> {
         if self.sdo.has_reply() {
             self.pending.insert(Source::SdoReply);
         }
+        self.serve_channel_deadlines();
         for tpdo in self.pdos.tpdos.as_mut() {
             tpdo.handle_timeout(self.now);
         }
@@ -34,7 +35,7 @@ impl<S: Storage> Node<S> {
     pub(super) fn reschedule(&mut self) {
         let rpdos = self.pdos.rpdos.as_ref().iter().map(Rpdo::deadline);
         let services = self.heartbeat.deadline().min(self.sdo.deadline()).min(self.sync.deadline());
-        self.deadline = rpdos.fold(services, Instant::min);
+        self.deadline = rpdos.fold(services.min(self.channel_deadline()), Instant::min);
         self.offer_emcy();
         for position in 0..self.pdos.tpdos.as_ref().len() {
             self.offer_tpdo(position);
@@ -64,6 +65,7 @@ impl<S: Storage> Node<S> {
             Source::Emcy => self.emcy_id.map_or(u32::MAX, CanId::raw),
             Source::Tpdo(position) => self.pdos.tpdos.as_ref()[position].can_id().raw(),
             Source::SdoReply => connection_set::sdo_reply(self.node_id).raw(),
+            Source::Channel => self.channel_id(),
             Source::Heartbeat => connection_set::heartbeat(self.node_id).raw(),
         }
     }
@@ -81,6 +83,7 @@ impl<S: Storage> Node<S> {
                 Some(bytes) => Some(Frame::full(connection_set::sdo_reply(self.node_id), bytes)),
                 None => self.take_segment(),
             },
+            Source::Channel => self.take_of_channel(),
             Source::Tpdo(position) => {
                 let tpdo = &mut self.pdos.tpdos.as_mut()[position];
                 let frame = tpdo.take(&self.dictionary, self.now);

@@ -291,31 +291,31 @@ impl<S: Storage> Dictionary<S> {
         Ok(self.raw(slot))
     }
 
-    /// Where a value waits until it is complete: as many bytes as the longest needs.
-    pub(crate) fn staging_mut(&mut self) -> &mut [u8] {
-        let range = self.view().staging_place();
+    /// Where a value of an SDO server waits until it is complete: as many bytes as the longest needs. Server 0 is the default one.
+    pub(crate) fn staging_mut(&mut self, server: u8) -> &mut [u8] {
+        let range = self.table.staging_place(server);
         &mut self.bytes.as_mut()[range]
     }
 
-    /// Copies the value of a row to where values wait. Returns how many bytes.
-    pub(crate) fn stage(&mut self, slot: Slot) -> usize {
-        let (from, to) = (self.table.gate(slot).long_place(), self.view().staging_place());
+    /// Copies the value of a row to where values of a server wait. Returns how many bytes.
+    pub(crate) fn stage(&mut self, server: u8, slot: Slot) -> usize {
+        let (from, to) = (self.table.gate(slot).long_place(), self.table.staging_place(server));
         let length = self.view().long_bytes(slot).len().min(to.len());
         self.bytes.as_mut().copy_within(from.start..from.start + length, to.start);
         length
     }
 
-    /// The row takes what waits, its first `length` bytes: no access or range is checked.
-    pub(crate) fn store_staged(&mut self, slot: Slot, length: usize) {
-        let (from, to) = (self.view().staging_place(), self.table.gate(slot).long_place());
+    /// The row takes what waits at a server, its first `length` bytes: no access or range is checked.
+    pub(crate) fn store_staged(&mut self, server: u8, slot: Slot, length: usize) {
+        let (from, to) = (self.table.staging_place(server), self.table.gate(slot).long_place());
         let length = length.min(to.len()).min(from.len());
         self.bytes.as_mut().copy_within(from.start..from.start + length, to.start);
         self.cells.as_mut()[slot.position()] = length as u32;
     }
 
-    /// Whether a peer may write what waits, its first `length` bytes.
-    pub(crate) fn check_staged(&self, slot: Slot, length: usize) -> Result<(), Refusal> {
-        self.check_bytes_or_ask(slot, self.view().staged(length))
+    /// Whether a peer may write what waits at a server, its first `length` bytes.
+    pub(crate) fn check_staged(&self, server: u8, slot: Slot, length: usize) -> Result<(), Refusal> {
+        self.check_bytes_or_ask(slot, self.view().staged(server, length))
     }
 
     /// Stores what fits of `bytes`, from the lowest on.

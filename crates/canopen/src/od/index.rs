@@ -29,8 +29,24 @@ pub const FREE_PLACES: Places = [FREE; 2];
 pub struct Index<const N: usize> {
     pub(super) facts: [RowFacts; N],
     pub(super) places: [Places; N],
-    pub(super) byte_count: u32,
+    pub(super) room: Room,
+}
+
+/// The bytes of a dictionary: those of long values, and behind them for each SDO server a place in which a value waits.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Room {
+    /// Of all long values.
+    pub(super) values: u32,
+    /// Of the longest: one place.
     pub(super) staging: u32,
+    /// SDO servers beside the default one.
+    pub(super) channels: u8,
+}
+
+impl Room {
+    pub(super) const fn byte_count(self) -> u32 {
+        self.values + self.staging * (1 + self.channels as u32)
+    }
 }
 
 impl<const N: usize> Index<N> {
@@ -51,20 +67,19 @@ impl<const N: usize> Index<N> {
     pub const fn of_amended(rows: &[Entry; N], base: usize) -> Self {
         let (mut facts, mut places) = ([RowFacts::NONE; N], [FREE_PLACES; N]);
         match fill(rows, base, &mut facts, &mut places) {
-            Ok((byte_count, staging)) => Self { facts, places, byte_count, staging },
+            Ok(room) => Self { facts, places, room },
             Err(_) => panic!("object rows must ascend by index and sub-index"),
         }
     }
 }
 
-/// Fills `facts` and `places`, which are as long as `rows`. Gives the bytes of all long values, and of the longest. The rows
-/// before position `base` ascend, and those from there on.
+/// Fills `facts` and `places`, which are as long as `rows`. The rows before position `base` ascend, and those from there on.
 pub(super) const fn fill(
     rows: &[Entry],
     base: usize,
     facts: &mut [RowFacts],
     places: &mut [Places],
-) -> Result<(u32, u32), TableError> {
+) -> Result<Room, TableError> {
     if rows.len() > MAX_ROWS {
         return Err(TableError::TooManyRows);
     }
@@ -78,7 +93,7 @@ pub(super) const fn fill(
         places[place] = FREE;
         place += 1;
     }
-    let (mut offset, mut staging, mut position) = (0_u32, 0, 0);
+    let (mut offset, mut staging, mut channels, mut position) = (0_u32, 0, 0, 0);
     while position < rows.len() {
         let row = &rows[position];
         let key = row.mux().key();
@@ -97,15 +112,21 @@ pub(super) const fn fill(
                 None => return Err(TableError::TooManyBytes),
             };
         }
+        if matches!(row.index, 0x1201..=0x127F) && row.sub_index == 1 {
+            channels += 1;
+        }
         facts[position] = RowFacts { key, gate, summary };
         insert(places, key, position as u16);
         position += 1;
     }
-    match offset.checked_add(staging) {
-        Some(byte_count) => Ok((byte_count, staging)),
-        None => Err(TableError::TooManyBytes),
+    let room = Room { values: offset, staging, channels };
+    match offset as u64 + staging as u64 * (1 + channels as u64) {
+        0..=MAX_BYTES => Ok(room),
+        _ => Err(TableError::TooManyBytes),
     }
 }
+
+const MAX_BYTES: u64 = u32::MAX as u64;
 
 /// Whether a row with this key is in the directory.
 const fn has(facts: &[RowFacts], places: &[u16], key: u32) -> bool {

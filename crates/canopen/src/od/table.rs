@@ -1,6 +1,6 @@
 use core::marker::PhantomData;
 
-use super::index::{FREE, fill, first_place, next_place};
+use super::index::{FREE, Room, fill, first_place, next_place};
 use super::{Entry, Gate, Held, Index, Places, RowFacts, Slot, Summary, TableError};
 use crate::{AbortCode, Mux};
 
@@ -42,8 +42,7 @@ pub struct Table {
     rows: &'static [Entry],
     facts: &'static [RowFacts],
     places: &'static [u16],
-    byte_count: u32,
-    staging: u32,
+    room: Room,
 }
 
 /// A row known at compile time to exist and to hold a `T`.
@@ -102,15 +101,8 @@ impl Table {
         ascending: &'static [Entry; N],
         index: &'static Index<N>,
     ) -> Self {
-        let Index { facts, places, byte_count, staging } = index;
-        Self {
-            by_slot: rows,
-            rows: ascending,
-            facts,
-            places: places.as_flattened(),
-            byte_count: *byte_count,
-            staging: *staging,
-        }
+        let Index { facts, places, room } = index;
+        Self { by_slot: rows, rows: ascending, facts, places: places.as_flattened(), room: *room }
     }
 
     /// Whether rows make a table, before they are kept for it. `facts` and `places` are as long as the rows, whatever is in
@@ -132,8 +124,8 @@ impl Table {
         facts: &'static mut [RowFacts],
         places: &'static mut [Places],
     ) -> Result<Self, TableError> {
-        let (byte_count, staging) = fill(rows, rows.len(), facts, places)?;
-        Ok(Self { by_slot: rows, rows, facts, places: places.as_flattened(), byte_count, staging })
+        let room = fill(rows, rows.len(), facts, places)?;
+        Ok(Self { by_slot: rows, rows, facts, places: places.as_flattened(), room })
     }
 
     /// All rows, ascending by index and sub-index. Where a row lies here is not its slot: [`iter`](Self::iter) has both.
@@ -146,14 +138,21 @@ impl Table {
         &self.by_slot[slot.position()]
     }
 
-    /// Bytes that a dictionary of this table needs for values longer than a cell, and to take one of them in.
+    /// Bytes that a dictionary of this table needs for values longer than a cell, and to take one of them in by each SDO server.
     pub const fn byte_count(&self) -> usize {
-        self.byte_count as usize
+        self.room.byte_count() as usize
     }
 
-    /// Of these, the bytes at the end in which a value waits until it is complete.
-    pub(super) const fn staging(&self) -> usize {
-        self.staging as usize
+    /// Of these, the bytes in which a value of one SDO server waits until it is complete; server 0 is the default one.
+    pub(super) const fn staging_place(&self, server: u8) -> core::ops::Range<usize> {
+        let length = self.room.staging as usize;
+        let start = self.room.values as usize + server as usize * length;
+        start..start + length
+    }
+
+    /// SDO servers beside the default one: records 1201h to 127Fh.
+    pub(crate) const fn channel_count(&self) -> usize {
+        self.room.channels as usize
     }
 
     /// The row of a slot of this table in short.

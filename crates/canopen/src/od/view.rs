@@ -106,14 +106,9 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The first `length` bytes of what waits until it is complete; fewer if there is no room for as many.
-    pub(crate) fn staged(&self, length: usize) -> &'a [u8] {
-        let staging = &self.bytes[self.staging_place()];
+    /// The first `length` bytes of what an SDO server holds until it is complete; fewer if there is no room for as many.
+    pub(crate) fn staged(&self, server: u8, length: usize) -> &'a [u8] {
+        let staging = &self.bytes[self.table.staging_place(server)];
         &staging[..length.min(staging.len())]
-    }
-
-    pub(super) const fn staging_place(&self) -> core::ops::Range<usize> {
-        let end = self.table.byte_count();
-        end - self.table.staging()..end
     }
 }

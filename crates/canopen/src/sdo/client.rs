@@ -120,9 +120,14 @@ enum State {
 impl Client {
     /// The default channel of `server`. `timeout` is for each reply.
     pub const fn new(server: NodeId, timeout: Duration) -> Self {
+        Self::on(connection_set::sdo_request(server), connection_set::sdo_reply(server), timeout)
+    }
+
+    /// A channel under these identifiers: another one of a server that has several (CiA 301, 7.5.2.33).
+    pub const fn on(request_id: CanId, reply_id: CanId, timeout: Duration) -> Self {
         Self {
-            request_id: connection_set::sdo_request(server),
-            reply_id: connection_set::sdo_reply(server),
+            request_id,
+            reply_id,
             timeout,
             state: State::Idle,
             deadline: Instant::FAR_FUTURE,

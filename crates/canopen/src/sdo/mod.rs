@@ -5,6 +5,7 @@
 
 pub mod block;
 pub mod client;
+pub mod parameter;
 pub mod server;
 pub mod wire;
 

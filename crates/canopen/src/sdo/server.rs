@@ -54,6 +54,8 @@ pub struct Server {
     frame_length: FrameLength,
     /// Segments of the blocks that it takes; 0 for no block transfer.
     block_size: u8,
+    /// Which of the node's servers it is: where a long value waits.
+    number: u8,
     /// A download of blocks has begun: what comes may be a segment of it, and not what its bytes say. Set somewhat longer.
     takes_segments: bool,
 }
@@ -152,8 +154,15 @@ impl Server {
             timeout_ns,
             frame_length,
             block_size,
+            number: 0,
             takes_segments: false,
         }
+    }
+
+    /// The same as another server of its node: values longer than a cell wait at a place of its own.
+    pub(crate) const fn numbered(mut self, number: u8) -> Self {
+        self.number = number;
+        self
     }
 
     /// A request arrived. Returns the write that the owner has to carry out, if it completes a download.
@@ -192,7 +201,10 @@ impl Server {
         match request {
             Request::Unknown { .. } if self.block_size > 0 => self.take_block_request(frame.padded(), values, now),
             Request::UploadSegment { toggle } => self.upload_segment(toggle, &values.view(), now),
-            Request::DownloadSegment(segment) => return self.download_segment(segment, values.staging_mut(), now),
+            Request::DownloadSegment(segment) => {
+                let staging = values.staging_mut(self.number);
+                return self.download_segment(segment, staging, now);
+            }
             Request::Abort(..) => self.end(),
             Request::Unknown { mux, .. } | Request::InitiateUpload(mux) | Request::InitiateDownload(mux, _) => {
                 let mux = self.transfer_mux().unwrap_or(mux);
@@ -315,9 +327,9 @@ impl Server {
         if !facts.summary.is_readable() {
             return self.refuse(mux, AbortCode::WRITE_ONLY);
         }
-        let source = Source::of_long(slot, values);
+        let source = Source::of_long(self.number, slot, values);
         let view = values.view();
-        let data = source.bytes(&view);
+        let data = source.bytes(self.number, &view);
         if let Some(payload) = Payload::expedited(data) {
             return self.answer(Reply::InitiateUpload(mux, payload));
         }
@@ -334,7 +346,7 @@ impl Server {
             let mux = *mux;
             return self.refuse(mux, AbortCode::TOGGLE_BIT);
         }
-        let rest = &source.bytes(values)[*sent..];
+        let rest = &source.bytes(self.number, values)[*sent..];
         let (data, after) = rest.split_at(rest.len().min(MAX_SEGMENT));
         let last = after.is_empty();
         (*sent, *expected) = (*sent + data.len(), !toggle);
@@ -439,7 +451,7 @@ impl Server {
         match payload {
             Payload::Expedited { bytes, .. } => {
                 let length = declared.unwrap_or(0).min(MAX_EXPEDITED);
-                values.staging_mut()[..length].copy_from_slice(&bytes[..length]);
+                values.staging_mut(self.number)[..length].copy_from_slice(&bytes[..length]);
                 Some(Write { slot, raw: length as u32, facts, mux, confirm: Confirm::Expedited })
             }
             Payload::Segmented { size: declared } => {
@@ -548,18 +560,18 @@ impl Server {
 
 impl Source {
     /// Of a value that is longer than a cell.
-    fn of_long<S: Storage>(slot: Slot, values: &mut Dictionary<S>) -> Self {
+    fn of_long<S: Storage>(server: u8, slot: Slot, values: &mut Dictionary<S>) -> Self {
         match values.table().row(slot).constant_bytes() {
             Some(constant) => Self::Constant(constant),
-            None => Self::Staged(values.stage(slot)),
+            None => Self::Staged(values.stage(server, slot)),
         }
     }
 
-    fn bytes<'a>(&'a self, values: &View<'a>) -> &'a [u8] {
+    fn bytes<'a>(&'a self, server: u8, values: &View<'a>) -> &'a [u8] {
         match self {
             Self::Constant(bytes) => bytes,
             Self::Cell(bytes, length) => &bytes[..usize::from(*length)],
-            Self::Staged(length) => values.staged(*length),
+            Self::Staged(length) => values.staged(server, *length),
         }
     }
 }

@@ -8,6 +8,7 @@
 use canopen::Mux;
 use canopen::object::SERIAL_NUMBER;
 use canopen::od::{Access, Dictionary, Entry, Slot, Storage, Table};
+use canopen::sdo::parameter;
 
 use super::program::is_of_program;
 use crate::engine::storage::crc32;
@@ -172,7 +173,7 @@ impl<S: Storage> Memory<S> {
         }
     }
 
-    /// Stores the values of the rows that `wanted` names; the other records stay.
+    /// Stores the values of the rows that `wanted` names, but for dynamic COB-IDs of SDO channels; the other records stay.
     pub fn save<V: Storage>(&mut self, values: &Dictionary<V>, wanted: impl Fn(&Entry) -> bool) {
         let before = self.clone();
         // Both are in ascending order: one pass over each.
@@ -181,7 +182,9 @@ impl<S: Storage> Memory<S> {
         for (slot, row) in values.table().iter().filter(|(_, row)| is_storable(row)) {
             let key = row.mux().key();
             if wanted(row) {
-                writer.put_value(key, values, slot);
+                if !is_dynamic(values, slot) {
+                    writer.put_value(key, values, slot);
+                }
                 continue;
             }
             while stored.next_if(|(known, _)| *known < key).is_some() {}
@@ -247,6 +250,11 @@ impl<'a> Writer<'a> {
         put_word(self.image, self.end, crc);
         self.image[self.end + CRC_SIZE..].fill(0xFF);
     }
+}
+
+/// A COB-ID of an SDO channel that was given until the next start (CiA 301, 7.5.2.33: bit 30).
+fn is_dynamic(values: &Dictionary<impl Storage>, slot: Slot) -> bool {
+    parameter::is_cob_id(values.table().row(slot).mux()) && values.raw(slot) & parameter::DYNAMIC != 0
 }
 
 /// A row whose value can be in the store at all: it can be written, and has bytes.

@@ -14,7 +14,6 @@ mod overheard;
 mod profile;
 mod program;
 mod scanner;
-mod sdo_parameters;
 mod services;
 
 pub use described::{DescribedDevice, Loss};
@@ -30,7 +29,7 @@ use canopen::od::{Condition, Dictionary, Slot, Storage, Table};
 
 /// What a device with these objects refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).
 pub fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
-    services::conditions(table).chain(program::conditions(table)).chain(sdo_parameters::conditions(table))
+    services::conditions(table).chain(program::conditions(table))
 }
 
 /// Whether these services do something with an object.
@@ -66,7 +65,7 @@ pub const fn acts_on(mux: Mux) -> bool {
                 | 0x1020
                 | 0x1028
                 | 0x1029
-                | 0x1200
+                | 0x1200..=0x127F
                 | 0x1400..=0x1BFF
                 | 0x1F50
                 | 0x1F51
@@ -81,9 +80,10 @@ pub fn device_acts_on(description: &devices::Description, mux: Mux) -> bool {
     acts_on(mux) || profile::acts_on(description, mux)
 }
 
-/// Which communication objects take a value from a client: those that have an effect here, and SDO parameters.
+/// Which communication objects take a value from a client: those that have an effect here, and the SDO channels on which the device
+/// is the client (CiA 301, 7.5.2.34). What it would ask for there is its application's, which no description knows.
 pub const fn takes(mux: Mux) -> bool {
-    acts_on(mux) || matches!(mux.index, 0x1200..=0x12FF)
+    acts_on(mux) || matches!(mux.index, 0x1280..=0x12FF)
 }
 
 /// 1029h:01, where the device has it (CiA 301, 7.5.2.32): 0 to pre-operational, 1 no change, 2 stopped.

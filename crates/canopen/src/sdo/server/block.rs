@@ -19,7 +19,7 @@ impl Server {
     pub fn take_segment(&mut self, values: &View<'_>) -> Option<[u8; LENGTH]> {
         match &mut self.transfer {
             Transfer::BlockUpload { source, sender, phase: Phase::Segments, .. } => {
-                sender.segment(source.bytes(values))
+                sender.segment(source.bytes(self.number, values))
             }
             _ => None,
         }
@@ -78,11 +78,11 @@ impl Server {
             return self.initiate_upload(mux, values, now);
         }
         let source = if facts.summary.is_long() {
-            Source::of_long(slot, values)
+            Source::of_long(self.number, slot, values)
         } else {
             Source::Cell(values.raw(slot).to_le_bytes(), facts.summary.size())
         };
-        let length = source.bytes(&values.view()).len();
+        let length = source.bytes(self.number, &values.view()).len();
         let Some(sender) = Sender::new(length, checksum, block_size) else {
             return self.refuse(mux, AbortCode::INVALID_BLOCK_SIZE);
         };
@@ -184,7 +184,7 @@ impl Server {
 
     fn take_segment_of_block<S: Storage>(&mut self, raw: &[u8; LENGTH], values: &mut Dictionary<S>, now: Instant) {
         let Transfer::BlockDownload { mux, room, declared, receiver, .. } = &mut self.transfer else { return };
-        let (mux, taken) = (*mux, receiver.take(raw, room.bytes(*declared, values.staging_mut())));
+        let (mux, taken) = (*mux, receiver.take(raw, room.bytes(*declared, values.staging_mut(self.number))));
         match taken {
             Ok(confirmation) => {
                 self.restart_half_timeout(now);
@@ -207,7 +207,7 @@ impl Server {
         else {
             return Taken::Another;
         };
-        match finish(&receiver, &mut room, declared, end, values.staging_mut()) {
+        match finish(&receiver, &mut room, declared, end, values.staging_mut(self.number)) {
             Ok(raw) => Taken::Here(Some(Write { slot, raw, facts, mux, confirm: Confirm::Block })),
             Err(code) => {
                 self.refuse(mux, code);

@@ -143,10 +143,10 @@ fn the_owner_sees_a_long_value_before_it_is_stored() {
     );
     node.handle_frame(&"604#1D74000000000000".parse().unwrap(), Instant::ZERO);
     let Some(NodeEvent::Asked { slot, raw: 8, ticket }) = node.poll_event() else { panic!("not asked") };
-    assert_eq!(node.asked_bytes(), b"new text");
+    assert_eq!(node.asked_bytes(ticket), b"new text");
     assert_eq!(node.dictionary().view().long_bytes(slot), b"old");
     assert!(node.answer(ticket, Ok(()), Instant::ZERO));
     assert_eq!(sent(&mut node), ["584#3000000000000000"]);
     assert_eq!(node.dictionary().view().long_bytes(slot), b"new text");
-    assert_eq!(node.asked_bytes(), b"");
+    assert_eq!(node.asked_bytes(ticket), b"");
 }

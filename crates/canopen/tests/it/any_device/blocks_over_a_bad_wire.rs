@@ -16,24 +16,24 @@ const OBJECT: Mux = Mux::new(0x2009, 0);
 const CAPACITY: u32 = 4000;
 
 /// A frame of 130 bits at 1 Mbit/s.
-const FRAME_NS: u64 = 130_000;
+pub(super) const FRAME_NS: u64 = 130_000;
 
 /// In thousandths: frames that are lost, and frames that come twice; and the longest delay on the way.
 #[derive(Clone, Copy, Debug)]
-struct Wire {
-    lost: usize,
-    repeated: usize,
-    delay_ns: u64,
+pub(super) struct Wire {
+    pub(super) lost: usize,
+    pub(super) repeated: usize,
+    pub(super) delay_ns: u64,
 }
 
 /// One direction of a wire. CAN keeps the order of the frames of one identifier.
 #[derive(Default)]
-struct Line {
+pub(super) struct Line {
     under_way: VecDeque<(Instant, Frame)>,
 }
 
 impl Line {
-    fn send(&mut self, frame: Frame, wire: Wire, numbers: &mut Numbers, now: Instant) {
+    pub(super) fn send(&mut self, frame: Frame, wire: Wire, numbers: &mut Numbers, now: Instant) {
         let delay_ns = if wire.delay_ns == 0 { 0 } else { numbers.next() % wire.delay_ns };
         let before = self.under_way.back().map_or(Instant::ZERO, |(at, _)| *at);
         let at = now.plus_nanos(FRAME_NS + delay_ns).max(before);
@@ -45,11 +45,11 @@ impl Line {
         self.under_way.extend(std::iter::repeat_n((at, frame), copies));
     }
 
-    fn next(&self) -> Option<Instant> {
+    pub(super) fn next(&self) -> Option<Instant> {
         self.under_way.front().map(|(at, _)| *at)
     }
 
-    fn take(&mut self, now: Instant) -> Option<Frame> {
+    pub(super) fn take(&mut self, now: Instant) -> Option<Frame> {
         self.under_way
             .front()
             .is_some_and(|(at, _)| *at <= now)

@@ -17,6 +17,7 @@ impl Storage for Boxed {
     type Pdos<P: Copy> = Box<[P]>;
     type Words = Box<[u64]>;
     type Events<E: Copy> = Box<[E]>;
+    type Channels<C: Clone> = Box<[C]>;
 
     fn cells(count: usize) -> Self::Cells {
         vec![0; count].into()
@@ -31,6 +32,9 @@ impl Storage for Boxed {
         vec![0; count.div_ceil(64)].into()
     }
     fn events<E: Copy>(count: usize, empty: E) -> Self::Events<E> {
+        vec![empty; count].into()
+    }
+    fn channels<C: Clone>(count: usize, empty: C) -> Self::Channels<C> {
         vec![empty; count].into()
     }
 }
