@@ -20,6 +20,7 @@ mod pdo_mapping;
 mod program_download;
 mod scenario;
 mod sdo_blocks;
+mod sdo_channels;
 mod selected_frame;
 mod stream;
 mod world_command;
@@ -50,6 +51,7 @@ pub const ALL: &[Law] = &[
     Law { name: "sdo_wire", holds: node::sdo_wire, samples: node::SDO_WIRE_SAMPLES },
     Law { name: "program_download", holds: program_download::program_download, samples: program_download::SAMPLES },
     Law { name: "sdo_blocks", holds: sdo_blocks::sdo_blocks, samples: sdo_blocks::SAMPLES },
+    Law { name: "sdo_channels", holds: sdo_channels::sdo_channels, samples: sdo_channels::SAMPLES },
     Law { name: "node", holds: node::node, samples: node::NODE_SAMPLES },
     Law { name: "pdo_mapping", holds: pdo_mapping::pdo_mapping, samples: pdo_mapping::SAMPLES },
     Law { name: "lss", holds: lss::lss, samples: lss::SAMPLES },

@@ -29,6 +29,7 @@ laws_hold! {
     // Each run is two boots.
     a_program_belongs_to_its_identification_and_is_there_after_a_power_failure_whatever_is_requested: "program_download" 1_500;
     a_block_transfer_under_any_frames_changes_only_what_it_confirms_and_ends: "sdo_blocks";
+    to_each_client_of_several_servers_it_is_as_if_it_were_alone: "sdo_channels";
     a_node_under_any_frames_keeps_its_dictionary_lawful: "node";
     a_pdo_carries_the_bits_of_its_objects_or_its_mapping_is_refused: "pdo_mapping";
     lss_requests_get_their_answers_and_read_back_as_written: "lss";

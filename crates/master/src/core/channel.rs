@@ -6,7 +6,7 @@ use canopen::sdo::wire::Reply;
 use canopen::{AbortCode, Mux, NodeId};
 
 use super::payload::Payload;
-use super::request::{Failure, Outcome, Request, Ticket, Transfer};
+use super::request::{Failure, Outcome, Request, SdoServer, Ticket, Transfer};
 
 /// Requests that may wait for one node.
 const QUEUE: usize = 64;
@@ -29,6 +29,11 @@ pub(super) const UPLOAD_BLOCKS_FROM: usize = 256;
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     client: Client,
+    /// The server that the client asks, and the default one.
+    server: SdoServer,
+    default: SdoServer,
+    /// Another one from the next request on.
+    next_server: Option<SdoServer>,
     active: Option<Active>,
     queue: VecDeque<(Ticket, Request)>,
     ended: Option<Ended>,
@@ -71,6 +76,9 @@ impl Channel {
         let client = Client::new(node, core::time::Duration::ZERO);
         Self {
             client,
+            server: SdoServer::default_of(node),
+            default: SdoServer::default_of(node),
+            next_server: None,
             active: None,
             queue: VecDeque::new(),
             ended: None,
@@ -79,6 +87,16 @@ impl Channel {
             refuses_blocks: false,
             has_refused: false,
         }
+    }
+
+    /// It asks the default server.
+    pub(super) fn is_default(&self) -> bool {
+        self.server == self.default
+    }
+
+    /// Requests that have not begun go to this server.
+    pub(super) fn use_server(&mut self, server: SdoServer) {
+        self.next_server = Some(server);
     }
 
     /// True once after the node has refused block transfer.
@@ -119,6 +137,10 @@ impl Channel {
             return;
         }
         let Some((ticket, request)) = self.queue.pop_front() else { return };
+        if let Some(server) = self.next_server.take().filter(|server| *server != self.server) {
+            self.server = server;
+            self.client = Client::on(server.request, server.reply, request.timeout);
+        }
         let Request { mux, transfer, timeout, .. } = request;
         self.client.set_timeout(timeout);
         self.buffer.clear();
@@ -156,7 +178,7 @@ impl Channel {
     }
 
     pub(super) fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        let Some(active) = &mut self.active else { return };
+        let Some(active) = self.active.as_mut().filter(|_| frame.id() == self.server.reply) else { return };
         // Segments of blocks do not say what they are.
         if !self.client.takes_segments() {
             let about = mux_of(&Reply::parse(frame.padded()));

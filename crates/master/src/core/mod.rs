@@ -27,7 +27,7 @@ mod twins;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use can::{Frame, Instant, Station};
+use can::{CanId, Frame, Instant, Station};
 use canopen::connection_set::Service;
 use canopen::{Mux, NodeId};
 use cia402::object::STATUSWORD;
@@ -41,7 +41,7 @@ pub use image::{ProcessImage, Received, RpdoTrigger};
 pub use node_set::NodeSet;
 pub use payload::Payload;
 pub use pdo_map::PdoMap;
-pub use request::{Command, Failure, Finished, Outcome, Request, Ticket, Transfer};
+pub use request::{Command, Failure, Finished, Outcome, Request, SdoServer, Ticket, Transfer};
 pub use supervision::CycleLoss;
 pub(crate) use supervision::{Cadence, CycleRules, WatchId};
 pub use twins::Twins;
@@ -70,6 +70,10 @@ const SHORTEST_FEED_TIMEOUT: Duration = Duration::from_millis(50);
 pub struct Core {
     now: Instant,
     members: Vec<Member>,
+    /// The node that the last SDO frame went to.
+    served: NodeId,
+    /// Replies of servers that are not the default ones of their nodes.
+    further_servers: Vec<(u16, NodeId)>,
     /// Nodes with a transfer on the wire.
     busy: NodeSet,
     /// Nodes whose SDO channel may have a frame to send.
@@ -120,6 +124,8 @@ impl Core {
         Self {
             now: Instant::ZERO,
             members: NodeId::all().map(member).collect(),
+            served: NodeId::MAX,
+            further_servers: Vec::new(),
             busy: NodeSet::EMPTY,
             sending: NodeSet::EMPTY,
             changed: NodeSet::EMPTY,
@@ -187,6 +193,7 @@ impl Core {
                 self.show_presence();
             }
             Command::KeepFed(node, period, allowed) => self.presence.set_feed(node, period, allowed, self.now),
+            Command::UseSdoServer(node, server) => self.use_sdo_server(node, server),
             Command::Transmit(frame) => {
                 // A request or an NMT command that is sent as a frame is followed by what follows any other.
                 match Service::of(frame.id()) {
@@ -266,6 +273,20 @@ impl Core {
         }
     }
 
+    /// What a frame is to this master, which may use other SDO servers than the default ones.
+    fn service_of(&self, id: u16) -> Option<Service> {
+        let further = self.further_servers.iter().find(|(reply, _)| *reply == id);
+        further.map_or_else(|| Service::of(CanId::standard(id)), |(_, node)| Some(Service::SdoReply(*node)))
+    }
+
+    fn use_sdo_server(&mut self, node: NodeId, server: SdoServer) {
+        self.further_servers.retain(|(_, of)| *of != node);
+        if let Some(reply) = server.reply.as_standard().filter(|_| server != SdoServer::default_of(node)) {
+            self.further_servers.push((reply, node));
+        }
+        self.member_mut(node).channel.use_server(server);
+    }
+
     /// Not while SYNC is produced: the segments of a block wait for no answer, and a hundred of them would stand before SYNC and RPDOs
     /// in the queue of an adapter.
     fn may_use_blocks(&self) -> bool {
@@ -343,15 +364,19 @@ impl Core {
         self.outbox.push_back(frame);
     }
 
+    /// Nodes take turns, frame by frame: a block of up to 127 segments to one keeps the others waiting for one of them.
     fn poll_sdo(&mut self) -> Option<Frame> {
-        while let Some(node) = self.sending.first() {
+        while let Some(node) = self.sending.next_after(self.served) {
             match self.member_mut(node).channel.poll_transmit() {
                 Some(frame) => {
+                    self.served = node;
                     self.presence.note_sent(node, self.now);
                     let now = self.now;
                     let member = self.member_mut(node);
                     member.facts.talked_to_at = Some(now);
-                    member.answers.asked(&frame, now);
+                    if member.channel.is_default() {
+                        member.answers.asked(&frame, now);
+                    }
                     return Some(frame);
                 }
                 None => self.sending.remove(node),
@@ -382,7 +407,7 @@ impl Station for Core {
             self.changed.insert(node);
             return;
         }
-        let node = match Service::of(frame.id()) {
+        let node = match self.service_of(id) {
             Some(Service::SdoReply(node)) => {
                 self.handle_sdo_reply(node, frame);
                 node

@@ -47,6 +47,12 @@ impl NodeSet {
         NodeId::new(self.0.trailing_zeros() as u8)
     }
 
+    /// The next node-ID of the set above this one, or from the smallest on.
+    pub fn next_after(self, node: NodeId) -> Option<NodeId> {
+        let above = Self(self.0 & !1 << node.raw());
+        above.first().or_else(|| self.first())
+    }
+
     /// All nodes, ascending.
     pub fn iter(self) -> impl Iterator<Item = NodeId> {
         let mut rest = self;
@@ -76,5 +82,9 @@ mod tests {
         assert_eq!((set, set.len()), (NodeSet::ALL, 127));
         assert!(set.iter().eq(NodeId::all()));
         assert_eq!(NodeSet::EMPTY.first(), None);
+        let two: NodeSet = [3, 127].into_iter().filter_map(NodeId::new).collect();
+        let after = [1, 3, 126, 127].map(|raw| two.next_after(NodeId::new(raw).unwrap()).unwrap().raw());
+        assert_eq!(after, [3, 127, 127, 3]);
+        assert_eq!(NodeSet::EMPTY.next_after(NodeId::MAX), None);
     }
 }

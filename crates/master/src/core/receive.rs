@@ -2,7 +2,7 @@ use can::Frame;
 use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
 use canopen::nmt::NmtRequest;
-use canopen::{Mux, NmtState, NodeId};
+use canopen::{Mux, NmtState, NodeId, connection_set};
 
 use super::Core;
 use super::answers::ENOUGH;
@@ -34,7 +34,9 @@ impl Core {
     pub(super) fn handle_sdo_reply(&mut self, node: NodeId, frame: &Frame) {
         let now = self.now;
         let member = self.member_mut(node);
-        if let Some(second) = member.answers.answered(frame, now) {
+        // Two devices are seen by the answers of their default server, to whoever asked it.
+        let is_default = frame.id() == connection_set::sdo_reply(node);
+        if is_default && let Some(second) = member.answers.answered(frame, now) {
             member.facts.second_answers = second;
             if second == ENOUGH {
                 self.note_twins(node, Twins::Answers);

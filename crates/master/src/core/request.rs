@@ -1,9 +1,9 @@
 use std::time::Duration;
 
-use can::Frame;
+use can::{CanId, Frame};
 use canopen::nmt::NmtTarget;
 use canopen::sdo::client;
-use canopen::{AbortCode, Mux, NmtCommand, NodeId};
+use canopen::{AbortCode, Mux, NmtCommand, NodeId, connection_set};
 
 use super::payload::Payload;
 
@@ -59,8 +59,26 @@ pub enum Command {
     /// Ask the node for its statusword (6041h) whenever nothing else was sent to it for this long, or stop; not after it was left
     /// without a frame for the last time, if there is one.
     KeepFed(NodeId, Option<Duration>, Option<Duration>),
+    /// From the next request on, ask this SDO server of the node.
+    UseSdoServer(NodeId, SdoServer),
     /// Send a frame as it is.
     Transmit(Frame),
+}
+
+/// Identifiers of one of a node's SDO servers: the default one (1200h), or a further one (1201h to 127Fh). Source: CiA 301, 7.5.2.33.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SdoServer {
+    /// From the client to the server.
+    pub request: CanId,
+    /// And back.
+    pub reply: CanId,
+}
+
+impl SdoServer {
+    /// That of the predefined connection set.
+    pub const fn default_of(node: NodeId) -> Self {
+        Self { request: connection_set::sdo_request(node), reply: connection_set::sdo_reply(node) }
+    }
 }
 
 impl Command {

@@ -84,6 +84,17 @@ pub enum Error {
         /// The node asked.
         node: NodeId,
     },
+    /// A further SDO server of the node does not exist.
+    #[error(
+        "node {node} has no SDO server by {record:04X}h: bit 31 of one of its COB-IDs is set, or they have 29 bits. Write both COB-IDs \
+             (sub-indices 1 and 2) first"
+    )]
+    NoSdoServer {
+        /// The node.
+        node: NodeId,
+        /// The record, 1201h to 127Fh.
+        record: u16,
+    },
     /// A node did not send its boot-up message.
     #[error("node {node} did not boot within {} ms. {hints}", waited.as_millis())]
     NoBootUp {
@@ -266,6 +277,7 @@ impl Error {
             Self::BadAnswer { .. } => "bad_answer",
             Self::WrongLength { .. } => "wrong_length",
             Self::QueueFull { .. } => "queue_full",
+            Self::NoSdoServer { .. } => "no_sdo_server",
             Self::NoBootUp { .. } => "no_boot_up",
             Self::NotReached(_) => "not_reached",
             Self::UnknownModel { .. } => "unknown_model",
@@ -292,6 +304,7 @@ impl Error {
             | Self::BadAnswer { node, .. }
             | Self::WrongLength { node, .. }
             | Self::QueueFull { node }
+            | Self::NoSdoServer { node, .. }
             | Self::NoBootUp { node, .. }
             | Self::UnknownModel { node, .. }
             | Self::GuessedModel { node, .. }

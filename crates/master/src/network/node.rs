@@ -1,12 +1,14 @@
 use std::time::Duration;
 
+use can::CanId;
 use canopen::nmt::NmtTarget;
 use canopen::od::Scalar;
-use canopen::{Mux, NmtCommand, NodeId};
+use canopen::sdo::parameter;
+use canopen::{CobId, Mux, NmtCommand, NodeId};
 
 use super::future::{Elapsed, NodeView, Pending, Wait};
 use super::handle::Network;
-use crate::core::{Command, Failure, NodeFacts, Payload, Request, Transfer};
+use crate::core::{Command, Failure, NodeFacts, Payload, Request, SdoServer, Transfer};
 use crate::error::{Access, Error, Hints};
 
 /// How long an SDO answer is waited for. Drives answer within milliseconds; a loaded bus at 100 kbit/s may add
@@ -54,6 +56,22 @@ impl Node {
     /// What has been seen of it.
     pub fn facts(&self) -> NodeFacts {
         self.network.facts(self.id)
+    }
+
+    /// Asks another of its SDO servers from the next request on, whatever handle makes it: two masters that each have one ask the same
+    /// device at the same time, and neither takes the other's answers. Its record, 1201h to 127Fh, is read through the server in use.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read); [`Error::NoSdoServer`] where it does not exist.
+    pub async fn use_sdo_server(&self, record: u16) -> Result<SdoServer, Error> {
+        let request = CobId(self.read(Mux::new(record, 1)).await?);
+        let reply = CobId(self.read(Mux::new(record, 2)).await?);
+        let Some((request, reply)) = parameter::identifiers(request, reply) else {
+            return Err(Error::NoSdoServer { node: self.id, record });
+        };
+        let server = SdoServer { request: CanId::standard(request), reply };
+        self.network.submit(Command::UseSdoServer(self.id, server));
+        Ok(server)
     }
 
     /// SDO upload: the bytes of an object, as they came.

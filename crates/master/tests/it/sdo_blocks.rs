@@ -1,4 +1,4 @@
-//! When a master sends a long value in blocks, and what is reported of a node that has none.
+//! When a master sends a long value in blocks, what is reported of a node that has none, and that other nodes do not wait for it.
 
 use std::time::Duration;
 
@@ -59,4 +59,24 @@ fn a_node_without_block_transfer_is_reported_once_and_gets_its_value_in_segments
     core.download(node(), NAME, &[7; 80], TIMEOUT, Instant::ZERO);
     assert_eq!(requests(&mut core), ["604#2108100050000000"], "it is not asked again");
     assert!(core.poll_event().is_none());
+}
+
+/// CiA 301, 7.2.4.3.9: the segments of a block wait for no answer. They take turns with what others are asked for.
+#[test]
+fn a_block_keeps_the_request_to_another_node_waiting_for_one_frame() {
+    let mut core = Core::new();
+    core.download(node(), NAME, &[7; 2000], TIMEOUT, Instant::ZERO);
+    assert_eq!(requests(&mut core), ["604#C6081000D0070000"]);
+    core.handle_frame(&"584#A40810007F000000".parse().unwrap(), Instant::ZERO);
+    let first = core.poll_transmit().unwrap();
+    assert_eq!(first.to_string(), "604#0107070707070707");
+    // Two nodes, one with a smaller and one with a larger node-ID.
+    for other in [2, 9] {
+        core.upload(NodeId::new(other).unwrap(), NAME, TIMEOUT, Instant::ZERO);
+    }
+    let sent: Vec<String> =
+        std::iter::from_fn(|| core.poll_transmit()).take(4).map(|frame| frame.to_string()).collect();
+    let expected = ["609#4008100000000000", "602#4008100000000000", "604#0207070707070707", "604#0307070707070707"];
+    assert_eq!(sent, expected);
+    assert_eq!(requests(&mut core).len(), 127 - 3, "and then the rest of the block");
 }
