@@ -45,6 +45,9 @@ impl Bench {
             not_applicable!("nothing can be mapped into the transmit PDO {index:04X}h");
         }
         self.count(id);
+        if matches!(transmission, 252 | 253) {
+            self.allow_remote_frames(index).await?;
+        }
         self.switch_on(index, id).await?;
         self.watch(id);
         Ok(Tpdo { index, id, mapped })
@@ -67,11 +70,24 @@ impl Bench {
         }
     }
 
-    /// The COB-ID without bits 30 and 31, where the object can be written.
+    /// The COB-ID without bit 31, where the object can be written. Bit 30 stays: a device need not have remote frames, and
+    /// refuses to clear it then (CiA 301, 7.5.2.37).
     pub(crate) async fn switch_on(&mut self, index: u16, id: CanId) -> Result<(), Finding> {
         let row = self.subject.row(index, 1);
         if row.is_some_and(|row| row.access.is_writable()) {
-            self.write(Mux::new(index, 1), &id.raw().to_le_bytes()).await?;
+            let kept = self.number(Mux::new(index, 1)).await? as u32 & CobId::NO_RTR;
+            self.write(Mux::new(index, 1), &(id.raw() | kept).to_le_bytes()).await?;
+        }
+        Ok(())
+    }
+
+    /// Bit 30 of a PDO that is off is cleared.
+    async fn allow_remote_frames(&mut self, index: u16) -> Result<(), Finding> {
+        let cob = self.number(Mux::new(index, 1)).await? as u32;
+        if cob & CobId::NO_RTR != 0
+            && let Err(code) = self.try_write(Mux::new(index, 1), &(cob & !CobId::NO_RTR).to_le_bytes()).await?
+        {
+            not_applicable!("the device has no remote frames: bit 30 of {index:04X}h:01 stays set ({code})");
         }
         Ok(())
     }

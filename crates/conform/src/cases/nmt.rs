@@ -38,8 +38,9 @@ async fn initialisation(bench: &mut Bench) -> Verdict {
     let mux = row.mux();
     let stored = bench.read(mux).await?;
     let mut other = stored.clone();
+    // Of a period 64 ms and not 1 ms, which would fill the bus.
     if let Some(low) = other.first_mut() {
-        *low ^= 1;
+        *low ^= 0x40;
     }
     bench.write(mux, &other).await?;
     bench.reset(NmtCommand::ResetNode).await?;
