@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use canopen::NodeId;
+use canopen::{Mux, NodeId};
 use conform::{Capture, Case, CaseResult, Options, Outcome, Subject, Suite, SuiteError, all, html, junit, selected};
 use serde::Serialize;
 
@@ -76,6 +76,9 @@ impl Conform {
 
     async fn test(&self, context: &Context, node: NodeId) -> Result<conform::Report, Failure> {
         let subject = self.subject(context, node).await?;
+        if self.eds.is_some() {
+            warn_of_another(context, subject).await;
+        }
         let capture = Capture::new();
         context.traffic.hand_on(capture.clone());
         let options = Options {
@@ -108,6 +111,27 @@ impl Conform {
         } else {
             Subject::of_model(node, description)
         })
+    }
+}
+
+/// Warns if the node says by 1018h that it is not the device of the file, before minutes are spent on it.
+async fn warn_of_another(context: &Context, subject: Subject) {
+    let (node, identity) = (context.node(subject.node), subject.description.identity);
+    let numbers = [("vendor-ID", identity.vendor_id), ("product code", identity.product_code)];
+    for (sub_index, (what, of_file)) in (1..).zip(numbers.into_iter().chain([("revision", identity.revision_number)])) {
+        let object = Mux::new(0x1018, sub_index);
+        if subject.description.row(object).is_none() {
+            continue;
+        }
+        // A node that does not answer is reported by the suite.
+        let Ok(says) = node.upload(object).await.map(|value| value.raw()) else { continue };
+        if says != of_file {
+            context.note(&format!(
+                "node {} has {what} {says:08X}h, the file is of {of_file:08X}h (1018h:{sub_index:02X}): what follows is judged by the \
+                 file of another device",
+                subject.node
+            ));
+        }
     }
 }
 

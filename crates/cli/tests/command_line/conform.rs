@@ -39,6 +39,7 @@ fn a_sheet_that_is_not_the_devices_fails_with_status_1_in_every_form() {
     assert_eq!(ended.status, Some(1), "{}{}", ended.out, ended.err);
     assert!(ended.err.contains("1 of 2 cases failed") && ended.err.contains("SDO 01"), "{}", ended.err);
     assert!(ended.out.contains("584#4300100092010400"), "the frames show it: {}", ended.out);
+    assert!(!ended.err.contains("another device"), "its 1018h is that of the file: {}", ended.err);
     let junit = std::fs::read_to_string(junit).unwrap();
     assert!(junit.contains("tests=\"2\" failures=\"1\"") && junit.contains("<failure message=\""), "{junit}");
     let html = std::fs::read_to_string(html).unwrap();
@@ -46,6 +47,21 @@ fn a_sheet_that_is_not_the_devices_fails_with_status_1_in_every_form() {
     assert!(!html.contains("http") && !html.contains("<script"), "the page needs nothing else");
     let json = ferrodrive(&["conform", "4", "--eds", &eds, "--only", "SDO 01", "--json"]).json();
     assert_eq!((&json["ok"], &json["error"]["kind"]), (&false.into(), &"conformance".into()), "{json}");
+}
+
+#[test]
+fn a_sheet_of_another_device_is_warned_of() {
+    let folder = folder("another");
+    let sheet = done(&["eds", "zlac8030l"]).out;
+    let (before, after) = sheet.split_once("[1018sub2]").expect("a product code");
+    let (row, after) = after.split_once("DefaultValue=").expect("its number");
+    let (_, after) = after.split_once('\n').expect("a line");
+    let path = folder.join("another.eds");
+    std::fs::write(&path, format!("{before}[1018sub2]{row}DefaultValue=0x77\n{after}")).unwrap();
+    let ended = ferrodrive(&["conform", "4", "--eds", path.to_str().unwrap(), "--only", "SDO 05"]);
+    let said = &ended.err;
+    assert!(said.contains("product code") && said.contains("the file is of 00000077h (1018h:02)"), "{said}");
+    assert_eq!(said.matches("another device").count(), 1, "one number differs: {said}");
 }
 
 #[test]

@@ -179,6 +179,8 @@ fn help_has_a_help_of_its_own() {
 #[test]
 fn words_of_other_tools_are_answered_with_the_command_that_does_it() {
     refused(&["candump", "can0"], &["tip: ferrodrive --bus can0 dump"]);
+    refused(&["conformance", "5"], &["tip: ferrodrive conform 5"]);
+    refused(&["cct", "5"], &["tip: ferrodrive conform 5"]);
     refused(&["get", "5", "2000"], &["tip: ferrodrive read 5 2000"]);
     refused(&["eds", "check", "my.eds"], &["tip: ferrodrive eds lint my.eds"]);
     refused(&["pdo", "5"], &["tip: ferrodrive pdo show 5"]);
