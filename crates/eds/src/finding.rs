@@ -34,12 +34,17 @@ pub struct Finding {
     pub key: Option<String>,
     /// What is wrong with it, as a rule.
     pub rule: Rule,
-    /// How bad it is.
-    pub severity: Severity,
     /// What is wrong.
     pub what: String,
     /// What was taken instead; `None` if the value was taken as it stands.
     pub taken_instead: Option<String>,
+}
+
+impl Finding {
+    /// How bad it is.
+    pub const fn severity(&self) -> Severity {
+        self.rule.explanation().severity
+    }
 }
 
 /// `12: [1018] SubNumber: error EDS204: ...; taken: ...`
@@ -54,7 +59,7 @@ impl fmt::Display for Finding {
         if let Some(key) = &self.key {
             write!(f, "{key}: ")?;
         }
-        write!(f, "{} {}: {}", self.severity.name(), self.rule.id(), self.what)?;
+        write!(f, "{} {}: {}", self.severity().name(), self.rule.id(), self.what)?;
         self.taken_instead.as_ref().map_or(Ok(()), |taken| write!(f, "; taken: {taken}"))
     }
 }
@@ -96,7 +101,7 @@ impl Findings {
 
     /// How many of this severity were kept.
     pub fn count(&self, severity: Severity) -> usize {
-        self.list.iter().filter(|finding| finding.severity == severity).count()
+        self.list.iter().filter(|finding| finding.severity() == severity).count()
     }
 
     pub(crate) fn sort(&mut self) {

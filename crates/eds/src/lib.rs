@@ -14,7 +14,7 @@
 //! let reading = Eds::load(file.as_bytes())?;
 //! assert_eq!(reading.eds.object(0x1000).map(|object| object.name.as_str()), Some("Device type"));
 //! let first = reading.findings.iter().find(|finding| finding.line > 0).expect("the limit is wrong");
-//! assert_eq!((first.line, first.severity), (12, Severity::Error));
+//! assert_eq!((first.line, first.severity()), (12, Severity::Error));
 //! assert_eq!(first.taken_instead.as_deref(), Some("no low limit"));
 //! # Ok::<(), eds::Refusal>(())
 //! ```
@@ -49,7 +49,7 @@ pub use model::{
 };
 pub use parameter_values::{NotHeld, parameter_values};
 pub use read::Reading;
-pub use rule::Rule;
+pub use rule::{Explanation, Rule};
 pub use value::{Number, Value};
 pub use write::write;
 

@@ -6,7 +6,7 @@ mod pdo;
 mod records;
 
 use crate::document::Document;
-use crate::{Eds, Finding, Findings, Rule, Severity, Value};
+use crate::{Eds, Finding, Findings, Rule, Value};
 
 /// All checks.
 pub(crate) fn all(document: &Document, eds: &Eds, findings: &mut Findings) {
@@ -30,7 +30,6 @@ fn mandatory(eds: &Eds, findings: &mut Findings) {
                 section: String::new(),
                 key: None,
                 rule: Rule::Mandatory,
-                severity: Severity::Error,
                 what: format!("the mandatory object {index:04X}h is missing"),
                 taken_instead: Some("a device without it".into()),
             });
@@ -51,7 +50,7 @@ fn modes(eds: &Eds, findings: &mut Findings) {
         };
         if is_open {
             let what = "says no mode of operation: tools that take the modes from it have none".to_owned();
-            let mut found = at::finding(Rule::Modes, Severity::Warning, said.line, 0x6502 + offset, None, what);
+            let mut found = at::finding(Rule::Modes, said.line, 0x6502 + offset, None, what);
             found.taken_instead = Some("the modes whose objects are there".into());
             findings.push(found);
         }

@@ -2,7 +2,7 @@
 
 use super::at::finding;
 use crate::document::{Document, Encoding};
-use crate::{Finding, Findings, Object, Rule, Severity};
+use crate::{Finding, Findings, Object, Rule};
 
 /// Letters beyond ASCII, reported once a file.
 pub(super) fn letters(document: &Document, findings: &mut Findings) {
@@ -15,7 +15,6 @@ pub(super) fn letters(document: &Document, findings: &mut Findings) {
         section: String::new(),
         key: None,
         rule: Rule::Letters,
-        severity: Severity::Warning,
         what: "letters beyond ASCII, which CiA 306 does not have".into(),
         taken_instead: Some(document.encoding().name().into()),
     });
@@ -24,19 +23,12 @@ pub(super) fn letters(document: &Document, findings: &mut Findings) {
 /// Characters at which common readers of such files cut a line.
 pub(super) fn object(object: &Object, findings: &mut Findings) {
     if object.name.contains(CUTTING) {
-        findings.push(finding(Rule::CutName, Severity::Warning, object.line, object.index, None, text(&object.name)));
+        findings.push(finding(Rule::CutName, object.line, object.index, None, text(&object.name)));
     }
     for variable in object.variables.iter().filter(|variable| variable.line != object.line) {
         if variable.name.contains(CUTTING) {
             let (line, sub_index) = (variable.line, variable.sub_index);
-            findings.push(finding(
-                Rule::CutName,
-                Severity::Warning,
-                line,
-                object.index,
-                Some(sub_index),
-                text(&variable.name),
-            ));
+            findings.push(finding(Rule::CutName, line, object.index, Some(sub_index), text(&variable.name)));
         }
     }
 }

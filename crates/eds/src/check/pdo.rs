@@ -2,7 +2,7 @@
 
 use super::at::finding;
 use crate::value::Number;
-use crate::{Eds, Findings, Rule, Severity, TypeCode, Value};
+use crate::{Eds, Findings, Rule, TypeCode, Value};
 
 /// Identifiers that depend on the node-ID (the pre-defined connection set) and are written without it.
 pub(super) fn identifiers(eds: &Eds, findings: &mut Findings) {
@@ -13,7 +13,7 @@ pub(super) fn identifiers(eds: &Eds, findings: &mut Findings) {
         if value & 0x1FFF_FFFF == i128::from(base) {
             let what = format!("{base:X}h without $NODEID: every node would have the same identifier");
             let sub_index = (index != 0x1014).then_some(sub_index);
-            findings.push(finding(Rule::Identifier, Severity::Warning, variable.line, index, sub_index, what));
+            findings.push(finding(Rule::Identifier, variable.line, index, sub_index, what));
         }
     }
 }
@@ -42,12 +42,12 @@ pub(super) fn mappings(eds: &Eds, findings: &mut Findings) {
             bits += mapped & 0xFF;
             if let Some(what) = wrong(eds, mapped, is_rpdo) {
                 let sub_index = Some(variable.sub_index);
-                findings.push(finding(Rule::Mapping, Severity::Warning, variable.line, object.index, sub_index, what));
+                findings.push(finding(Rule::Mapping, variable.line, object.index, sub_index, what));
             }
         }
         if bits > 64 {
             let what = format!("{bits} bits are mapped as delivered; a PDO has 64");
-            findings.push(finding(Rule::MappingLength, Severity::Warning, object.line, object.index, None, what));
+            findings.push(finding(Rule::MappingLength, object.line, object.index, None, what));
         }
     }
 }

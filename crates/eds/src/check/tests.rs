@@ -6,7 +6,7 @@ fn whats(text: &str) -> Vec<(u32, Severity, String)> {
     let reading = Eds::load(text.as_bytes()).expect("a small file");
     let of_lines =
         reading.findings.iter().filter(|finding| finding.line > 0 && !finding.what.contains("none of the lists"));
-    of_lines.map(|finding| (finding.line, finding.severity, finding.what.clone())).collect()
+    of_lines.map(|finding| (finding.line, finding.severity(), finding.what.clone())).collect()
 }
 
 const TARGET: &str = "[607A]\nParameterName=Target position\nDataType=4\nAccessType=rww\nPDOMapping=1\n[6064]\nParameterName=Position\nDataType=4\nAccessType=ro\nPDOMapping=0\n";

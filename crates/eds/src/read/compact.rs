@@ -41,7 +41,7 @@ impl Reader {
         }));
         let is_dcf = self.eds.commissioning.is_some();
         for part in beside {
-            for entry in part.section.entries() {
+            for entry in self.entries(part.section) {
                 let Some(variable) = self.compact_entry(part.section, entry, &mut variables) else { continue };
                 match part.key.role {
                     Role::Names => entry.value.clone_into(&mut variable.name),
@@ -74,7 +74,7 @@ impl Reader {
         let sub_index = entry.key.parse::<u8>().ok().filter(|sub_index| *sub_index > 0);
         let found = sub_index.and_then(|sub_index| variables.get_mut(usize::from(sub_index)));
         if found.is_none() {
-            self.error(Rule::CompactEntry, section, entry, "there is no such compact sub-object", "nothing");
+            self.found(Rule::CompactEntry, section, entry, "there is no such compact sub-object", "nothing");
         }
         found
     }

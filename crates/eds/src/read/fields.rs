@@ -1,6 +1,6 @@
 //! The entries of one object's section, each found once.
 
-use super::reader::{Reader, shortened};
+use super::reader::Reader;
 use crate::Rule;
 use crate::document::{Entry, Section};
 
@@ -57,16 +57,10 @@ impl Reader {
             match fields.of(entry.key) {
                 Some(place @ None) => *place = Some(entry),
                 Some(Some(first)) => {
-                    let what = format!("the key stands twice, first in line {}", first.line);
-                    self.warn(Rule::KeyTwice, section, entry, what, Some(shortened(first.value)));
+                    let first = *first;
+                    self.key_twice(section, entry, first);
                 }
-                None => self.warn(
-                    Rule::UnknownKey,
-                    section,
-                    entry,
-                    "CiA 306 has no such key of an object",
-                    Some("nothing".into()),
-                ),
+                None => self.found(Rule::UnknownKey, section, entry, "CiA 306 has no such key of an object", "nothing"),
             }
         }
         fields

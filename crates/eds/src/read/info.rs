@@ -14,7 +14,7 @@ const MODULES: &str = "objects of modules are not read: write those that are plu
 
 impl Reader {
     pub(super) fn info(&mut self, which: Info, section: Section<'_>) {
-        for entry in section.entries() {
+        for entry in self.entries(section) {
             let known = match which {
                 Info::File => self.file_info(section, entry),
                 Info::Device => self.device_info(section, entry),
@@ -24,7 +24,7 @@ impl Reader {
                 Info::DynamicChannels => self.dynamic_channel(entry),
             };
             if !known {
-                self.warn(Rule::UnknownKey, section, entry, "CiA 306 has no such key here", Some("nothing".into()));
+                self.found(Rule::UnknownKey, section, entry, "CiA 306 has no such key here", "nothing");
             }
         }
         if which == Info::Commissioning {
@@ -39,7 +39,7 @@ impl Reader {
         } else {
             ("CiA 306 has no such section", "nothing; it is kept as it is")
         };
-        self.warn_section(Rule::UnknownSection, section, what, Some(taken.into()));
+        self.found_in(Rule::UnknownSection, section, what, taken);
         let entries = section.entries().map(|entry| (entry.key.to_owned(), entry.value.to_owned())).collect();
         self.eds.kept.push(KeptSection { line: section.line(), name: section.name().to_owned(), entries });
     }
@@ -144,7 +144,7 @@ impl Reader {
                 read.node_id = self.count(section, entry).filter(|id| (1..=127).contains(id));
                 if read.node_id.is_none() && !entry.value.is_empty() {
                     let what = format!("no node-ID (1 to 127): {:?}", shortened(entry.value));
-                    self.error(Rule::NodeId, section, entry, what, "none");
+                    self.found(Rule::NodeId, section, entry, what, "none");
                 }
             }
             "nodename" => entry.value.clone_into(&mut read.node_name),

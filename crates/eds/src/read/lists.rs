@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::reader::{Reader, shortened};
+use super::reader::{AS_IT_STANDS, Reader, shortened};
 use crate::List;
 use crate::Rule;
 use crate::document::{Document, Entry, Section};
@@ -16,12 +16,7 @@ pub(super) fn read(document: &Document, reader: &mut Reader) {
             continue;
         };
         for other in sections {
-            reader.error_section(
-                Rule::SectionTwice,
-                other,
-                "two sections of this name",
-                format!("the one in line {}", section.line()),
-            );
+            reader.section_twice(other, section.line());
         }
         reader.list(list, section, &mut seen);
     }
@@ -32,19 +27,13 @@ impl Reader {
     fn list(&mut self, list: List, section: Section<'_>, seen: &mut HashMap<u16, u32>) {
         let mut said = None;
         let mut count = 0_usize;
-        for entry in section.entries() {
+        for entry in self.entries(section) {
             if entry.key.eq_ignore_ascii_case("SupportedObjects") {
                 said = self.supported_objects(section, entry);
                 continue;
             }
             if entry.key.is_empty() || !entry.key.bytes().all(|digit| digit.is_ascii_digit()) {
-                self.warn(
-                    Rule::ListLine,
-                    section,
-                    entry,
-                    "not the number of a line of the list",
-                    Some("nothing".into()),
-                );
+                self.found(Rule::ListLine, section, entry, "not the number of a line of the list", "nothing");
                 continue;
             }
             count += 1;
@@ -55,23 +44,21 @@ impl Reader {
         match said {
             Some((entry, said)) if said != count => {
                 let what = format!("SupportedObjects is {said}, but {count} are listed");
-                self.warn(Rule::ListCount, section, entry, what, Some("those that are listed".into()));
+                self.found(Rule::ListCount, section, entry, what, "those that are listed");
             }
-            None => {
-                self.warn_section(Rule::ListCount, section, "no SupportedObjects", Some("those that are listed".into()))
-            }
+            None => self.found_in(Rule::ListCount, section, "no SupportedObjects", "those that are listed"),
             _ => {}
         }
     }
 
     fn supported_objects<'a>(&mut self, section: Section<'_>, entry: Entry<'a>) -> Option<(Entry<'a>, usize)> {
         if entry.value.starts_with("0x") || entry.value.starts_with("0X") {
-            self.warn(
+            self.found(
                 Rule::ListCount,
                 section,
                 entry,
                 "a count is decimal (CiA 306): strict tools refuse the file",
-                None,
+                AS_IT_STANDS,
             );
         }
         self.count(section, entry).map(|count| (entry, count))
@@ -79,29 +66,29 @@ impl Reader {
 
     fn listed(&mut self, list: List, section: Section<'_>, entry: Entry<'_>, index: u16, seen: &mut HashMap<u16, u32>) {
         if let Some(line) = seen.insert(index, entry.line) {
-            self.warn(
+            self.found(
                 Rule::ListedTwice,
                 section,
                 entry,
                 format!("{index:04X}h is listed twice, first in line {line}"),
-                None,
+                AS_IT_STANDS,
             );
             return;
         }
         if List::of(index) != list {
-            self.warn(
+            self.found(
                 Rule::WrongList,
                 section,
                 entry,
                 format!("{index:04X}h belongs into [{}]", List::of(index).section()),
-                None,
+                AS_IT_STANDS,
             );
         }
         match self.eds.objects.binary_search_by_key(&index, |object| object.index) {
             Ok(at) => self.eds.objects[at].list = Some(list),
             Err(_) => {
                 let what = format!("there is no section [{}]", shortened(&format!("{index:04X}")));
-                self.error(Rule::ListedWithoutSection, section, entry, what, "no such object");
+                self.found(Rule::ListedWithoutSection, section, entry, what, "no such object");
             }
         }
     }
@@ -117,7 +104,7 @@ impl Reader {
         for (line, index) in lines {
             let what = format!("the object stands in none of the lists: [{}] misses it", List::of(index).section());
             let taken = Some("an object like the others".into());
-            self.find(Rule::Unlisted, crate::Severity::Warning, (&format!("{index:04X}"), None, line), what, taken);
+            self.push((line, &format!("{index:04X}"), None), Rule::Unlisted, what, taken);
         }
     }
 }

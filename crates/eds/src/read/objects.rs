@@ -2,7 +2,7 @@
 
 use super::fields::Fields;
 use super::places::{ObjectSection, Role};
-use super::reader::{Reader, shortened};
+use super::reader::{AS_IT_STANDS, Reader, shortened};
 use crate::Rule;
 use crate::document::{Entry, Section};
 use crate::{Object, ObjectType, Refusal, TypeCode, Value, Variable};
@@ -53,11 +53,11 @@ impl Reader {
         };
         if !subs.is_empty() {
             if compact.is_some() {
-                self.warn_section(
+                self.found_in(
                     Rule::CompactAndSections,
                     section,
                     "CompactSubObj and sections of sub-objects",
-                    Some("the sections".into()),
+                    "the sections",
                 );
                 object.compact = None;
             }
@@ -105,8 +105,7 @@ impl Reader {
         for part in parts {
             match kept.last() {
                 Some(first) if first.key == part.key => {
-                    let taken = format!("the one in line {}", first.section.line());
-                    self.error_section(Rule::SectionTwice, part.section, "two sections of this name", taken);
+                    self.section_twice(part.section, first.section.line());
                 }
                 _ => kept.push(*part),
             }
@@ -120,15 +119,10 @@ impl Reader {
         let subs: Vec<ObjectSection<'_>> =
             parts.iter().copied().filter(|part| matches!(part.key.role, Role::Sub(_))).collect();
         if subs.is_empty() {
-            self.error_section(
-                Rule::SubWithoutObject,
-                section,
-                format!("there is no section [{index:04X}]"),
-                "nothing",
-            );
+            self.found_in(Rule::SubWithoutObject, section, format!("there is no section [{index:04X}]"), "nothing");
             return Ok(None);
         }
-        self.error_section(
+        self.found_in(
             Rule::SubWithoutObject,
             section,
             format!("there is no section [{index:04X}]"),
@@ -151,7 +145,7 @@ impl Reader {
         let Some(entry) = fields.object_type.filter(|entry| !entry.value.is_empty()) else {
             // Without the key it is a VAR (CiA 306-1).
             if has_subs {
-                self.error_section(
+                self.found_in(
                     Rule::ObjectType,
                     section,
                     "no ObjectType, which makes a VAR, but sub-objects",
@@ -161,7 +155,7 @@ impl Reader {
             return inferred;
         };
         let Some(kind) = self.count::<u16>(section, entry).and_then(ObjectType::of) else {
-            self.error(
+            self.found(
                 Rule::ObjectType,
                 section,
                 entry,
@@ -171,7 +165,7 @@ impl Reader {
             return inferred;
         };
         if has_subs && !kind.has_sub_objects() && kind != ObjectType::DefType {
-            self.error(
+            self.found(
                 Rule::ObjectType,
                 section,
                 entry,
@@ -188,7 +182,7 @@ impl Reader {
         match fields.parameter_name {
             Some(entry) => entry.value.to_owned(),
             None => {
-                self.warn_section(Rule::Name, section, "no ParameterName", None);
+                self.found_in(Rule::Name, section, "no ParameterName", AS_IT_STANDS);
                 String::new()
             }
         }
@@ -202,7 +196,7 @@ impl Reader {
             let fields = self.fields(part.section);
             let kind = self.object_type(part.section, &fields, false);
             if kind.has_sub_objects() {
-                self.error_section(
+                self.found_in(
                     Rule::ObjectType,
                     part.section,
                     format!("a sub-object cannot be a {}", kind.name()),
@@ -223,10 +217,10 @@ impl Reader {
         if object.object_type.has_sub_objects() {
             let what = format!("a {} without sub-objects", object.object_type.name());
             if fields.data_type.is_none() {
-                self.error_section(Rule::NoSubObjects, section, what, "an object without values");
+                self.found_in(Rule::NoSubObjects, section, what, "an object without values");
                 return;
             }
-            self.error_section(Rule::NoSubObjects, section, what, "VAR");
+            self.found_in(Rule::NoSubObjects, section, what, "VAR");
             object.object_type = ObjectType::Var;
         }
         let is_domain = object.object_type == ObjectType::Domain;
@@ -276,14 +270,14 @@ impl Reader {
         if let Some(entry) = at[0]
             && is_above(&variable.low, &variable.high)
         {
-            self.error(Rule::LimitsCrossed, section, entry, "the low limit lies above the high limit", "no limits");
+            self.found(Rule::LimitsCrossed, section, entry, "the low limit lies above the high limit", "no limits");
             (variable.low, variable.high) = (None, None);
             return;
         }
         if let Some(entry) = at[0]
             && is_above(&variable.low, &variable.default)
         {
-            self.error(
+            self.found(
                 Rule::DefaultOutside,
                 section,
                 entry,
@@ -295,7 +289,7 @@ impl Reader {
         if let Some(entry) = at[1]
             && is_above(&variable.default, &variable.high)
         {
-            self.error(
+            self.found(
                 Rule::DefaultOutside,
                 section,
                 entry,
@@ -310,24 +304,24 @@ impl Reader {
     pub(super) fn check_value(&mut self, section: Section<'_>, at: Option<Entry<'_>>, variable: &Variable) {
         let Some(entry) = at else { return };
         if is_above(&variable.low, &variable.value) || is_above(&variable.value, &variable.high) {
-            self.warn(Rule::ValueOutside, section, entry, "the value lies outside of the limits", None);
+            self.found(Rule::ValueOutside, section, entry, "the value lies outside of the limits", AS_IT_STANDS);
         }
     }
 
     fn check_sub_number(&mut self, section: Section<'_>, fields: &Fields<'_>, object: &Object) {
         let Some(entry) = fields.sub_number else {
-            self.warn_section(Rule::SubNumber, section, "no SubNumber", None);
+            self.found_in(Rule::SubNumber, section, "no SubNumber", AS_IT_STANDS);
             return;
         };
         let Some(said) = self.count::<usize>(section, entry) else { return };
         let there = object.variables.len();
         if said != there {
-            self.warn(
+            self.found(
                 Rule::SubNumber,
                 section,
                 entry,
                 format!("SubNumber is {said}, but there are {there} sub-objects"),
-                Some(there.to_string()),
+                there.to_string(),
             );
         }
     }

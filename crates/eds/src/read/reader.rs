@@ -1,16 +1,21 @@
 //! What has been read so far, and how findings are put down.
 
-use super::places::{self, ObjectSection, SectionPlace};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry::{Occupied, Vacant};
+
+use super::places::{self, Info, ObjectSection, SectionPlace};
 
 use crate::Rule;
 use crate::document::{Document, Entry, LineKind, Section};
-use crate::{Eds, Finding, Findings, Refusal, Severity};
+use crate::{Eds, Finding, Findings, Refusal};
 
 /// What has been read so far.
 #[derive(Default)]
 pub(super) struct Reader {
     pub(super) eds: Eds,
     pub(super) findings: Findings,
+    /// Sections about the file and the device, and their lines.
+    infos: Vec<(Info, u32)>,
     pub(super) variables: usize,
     pub(super) repeated: usize,
     /// Where `CompactPDO` stands.
@@ -35,7 +40,6 @@ impl Reader {
                 section: String::new(),
                 key: None,
                 rule: Rule::Stray,
-                severity: Severity::Warning,
                 what: format!("{what}: {:?}", shortened(text.trim())),
                 taken_instead: Some("nothing".into()),
             });
@@ -47,76 +51,100 @@ impl Reader {
     pub(super) fn section<'a>(&mut self, section: Section<'a>, parts: &mut Vec<ObjectSection<'a>>) {
         if !section.is_well_formed() {
             let what = "the heading is not [name] and nothing else";
-            self.warn_section(Rule::Heading, section, what, Some(format!("[{}]", section.name())));
+            self.found_in(Rule::Heading, section, what, format!("[{}]", section.name()));
         }
         match places::place(section.name()) {
             SectionPlace::Part(key) => parts.push(ObjectSection { key, section }),
             SectionPlace::List => {}
-            SectionPlace::Info(which) => self.info(which, section),
+            SectionPlace::Info(which) => match self.infos.iter().find(|(other, _)| *other == which) {
+                Some((_, first)) => self.section_twice(section, *first),
+                None => {
+                    self.infos.push((which, section.line()));
+                    self.info(which, section);
+                }
+            },
             SectionPlace::Module | SectionPlace::Unknown => self.keep(section),
         }
     }
 
-    /// At an entry, or where there is none at a line of a section.
-    pub(super) fn find(
+    /// The entries of a section; of two lines of one key the first.
+    pub(super) fn entries<'a>(&mut self, section: Section<'a>) -> Vec<Entry<'a>> {
+        let mut seen = HashMap::new();
+        let mut kept = Vec::new();
+        for entry in section.entries() {
+            match seen.entry(entry.key.to_ascii_lowercase()) {
+                Vacant(place) => {
+                    place.insert(entry);
+                    kept.push(entry);
+                }
+                Occupied(first) => self.key_twice(section, entry, *first.get()),
+            }
+        }
+        kept
+    }
+
+    pub(super) fn key_twice(&mut self, section: Section<'_>, entry: Entry<'_>, first: Entry<'_>) {
+        let what = format!("the key stands twice, first in line {}", first.line);
+        self.found(Rule::KeyTwice, section, entry, what, shortened(first.value));
+    }
+
+    /// A section of which one stands in `first` already.
+    pub(super) fn section_twice(&mut self, section: Section<'_>, first: u32) {
+        let taken = format!("the one in line {first}");
+        self.found_in(Rule::SectionTwice, section, "two sections of this name", taken);
+    }
+
+    /// At an entry.
+    pub(super) fn found(
         &mut self,
         rule: Rule,
-        severity: Severity,
-        (section, entry, line): (&str, Option<Entry<'_>>, u32),
+        section: Section<'_>,
+        entry: Entry<'_>,
+        what: impl Into<String>,
+        taken: impl Into<Taken>,
+    ) {
+        let key = Some(shortened(entry.key));
+        self.push((entry.line, section.name(), key), rule, what.into(), taken.into().0);
+    }
+
+    /// At the heading of a section.
+    pub(super) fn found_in(
+        &mut self,
+        rule: Rule,
+        section: Section<'_>,
+        what: impl Into<String>,
+        taken: impl Into<Taken>,
+    ) {
+        self.push((section.line(), section.name(), None), rule, what.into(), taken.into().0);
+    }
+
+    /// At a line, a section and a key.
+    pub(super) fn push(
+        &mut self,
+        (line, section, key): (u32, &str, Option<String>),
+        rule: Rule,
         what: String,
-        taken: Option<String>,
+        taken_instead: Option<String>,
     ) {
-        self.findings.push(Finding {
-            line: entry.map_or(line, |entry| entry.line),
-            section: shortened(section),
-            key: entry.map(|entry| shortened(entry.key)),
-            rule,
-            severity,
-            what,
-            taken_instead: taken,
-        });
+        self.findings.push(Finding { line, section: shortened(section), key, rule, what, taken_instead });
     }
+}
 
-    pub(super) fn warn(
-        &mut self,
-        rule: Rule,
-        section: Section<'_>,
-        entry: Entry<'_>,
-        what: impl Into<String>,
-        taken: Option<String>,
-    ) {
-        self.find(rule, Severity::Warning, (section.name(), Some(entry), 0), what.into(), taken);
+/// What is taken instead of what was found.
+pub(super) struct Taken(Option<String>);
+
+/// Nothing else: the value is taken as it stands.
+pub(super) const AS_IT_STANDS: Taken = Taken(None);
+
+impl From<&str> for Taken {
+    fn from(taken: &str) -> Self {
+        Self(Some(taken.to_owned()))
     }
+}
 
-    pub(super) fn error(
-        &mut self,
-        rule: Rule,
-        section: Section<'_>,
-        entry: Entry<'_>,
-        what: impl Into<String>,
-        taken: impl Into<String>,
-    ) {
-        self.find(rule, Severity::Error, (section.name(), Some(entry), 0), what.into(), Some(taken.into()));
-    }
-
-    pub(super) fn warn_section(
-        &mut self,
-        rule: Rule,
-        section: Section<'_>,
-        what: impl Into<String>,
-        taken: Option<String>,
-    ) {
-        self.find(rule, Severity::Warning, (section.name(), None, section.line()), what.into(), taken);
-    }
-
-    pub(super) fn error_section(
-        &mut self,
-        rule: Rule,
-        section: Section<'_>,
-        what: impl Into<String>,
-        taken: impl Into<String>,
-    ) {
-        self.find(rule, Severity::Error, (section.name(), None, section.line()), what.into(), Some(taken.into()));
+impl From<String> for Taken {
+    fn from(taken: String) -> Self {
+        Self(Some(taken))
     }
 }
 

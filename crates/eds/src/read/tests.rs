@@ -25,8 +25,9 @@ fn of_2000(section: &str) -> Reading {
 
 /// The findings in short: severity, key, what was taken.
 fn short(reading: &Reading) -> Vec<(Severity, String, Option<String>)> {
-    let one =
-        |finding: &Finding| (finding.severity, finding.key.clone().unwrap_or_default(), finding.taken_instead.clone());
+    let one = |finding: &Finding| {
+        (finding.severity(), finding.key.clone().unwrap_or_default(), finding.taken_instead.clone())
+    };
     reading.findings.iter().map(one).collect()
 }
 

@@ -20,7 +20,7 @@ impl Reader {
         let found = self.number(section, entry).filter(|number| !number.plus_node_id);
         let fitting = found.and_then(|number| T::try_from(number.base).ok());
         if fitting.is_none() {
-            self.error(
+            self.found(
                 Rule::NotANumber,
                 section,
                 entry,
@@ -37,7 +37,7 @@ impl Reader {
             Some(0) | None => false,
             Some(1) => true,
             Some(_) => {
-                self.warn(Rule::NotANumber, section, entry, "neither 0 nor 1", Some("1".into()));
+                self.found(Rule::OddNumber, section, entry, "neither 0 nor 1", "1");
                 true
             }
         }
@@ -47,12 +47,9 @@ impl Reader {
     fn number(&mut self, section: Section<'_>, entry: Entry<'_>) -> Option<Number> {
         let (number, oddity) = number(entry.value)?;
         if let Some(oddity) = oddity {
-            let taken = number.to_string();
-            if oddity.is_clear() {
-                self.warn(Rule::OddNumber, section, entry, oddity.text(), Some(taken));
-            } else {
-                self.error(Rule::OddNumber, section, entry, oddity.text(), taken);
-            }
+            // Where the spelling leaves a doubt the number is not one (a leading zero before 8 or 9).
+            let rule = if oddity.is_clear() { Rule::OddNumber } else { Rule::NotANumber };
+            self.found(rule, section, entry, oddity.text(), number.to_string());
         }
         Some(number)
     }
@@ -86,10 +83,10 @@ impl Reader {
         let is_pattern =
             if low < 0 { found.base > high } else { found.base < 0 && found.base >= -span / 2 && !is_low_limit };
         if !found.plus_node_id && is_pattern && fits(same_bits) {
-            self.warn(Rule::SameBits, section, entry, what, Some(same_bits.to_string()));
+            self.found(Rule::SameBits, section, entry, what, same_bits.to_string());
             return Some(Number::plain(same_bits));
         }
-        self.error(Rule::BeyondType, section, entry, what, NOTHING);
+        self.found(Rule::BeyondType, section, entry, what, NOTHING);
         None
     }
 
@@ -106,10 +103,10 @@ impl Reader {
         let Some(value) =
             value.filter(|value| data_type.range().is_some_and(|(low, high)| (low..=high).contains(value)))
         else {
-            self.error(Rule::NotANumber, section, entry, what, NOTHING);
+            self.found(Rule::NotANumber, section, entry, what, NOTHING);
             return None;
         };
-        self.warn(Rule::OddNumber, section, entry, what, Some(value.to_string()));
+        self.found(Rule::OddNumber, section, entry, what, value.to_string());
         Some(Number::plain(value))
     }
 
@@ -125,7 +122,7 @@ impl Reader {
         let Some((pattern, _)) = number(entry.value).filter(|(number, _)| !number.plus_node_id && number.base >= 0)
         else {
             let what = format!("no number with a decimal point: {:?}", shortened(entry.value));
-            self.error(Rule::NotANumber, section, entry, what, NOTHING);
+            self.found(Rule::NotANumber, section, entry, what, NOTHING);
             return None;
         };
         let real = match bits {
@@ -133,12 +130,12 @@ impl Reader {
             _ => u64::try_from(pattern.base).ok().map(f64::from_bits),
         };
         let Some(real) = real.filter(|real| real.is_finite()) else {
-            self.error(Rule::NotANumber, section, entry, "no bits of a number with a decimal point", NOTHING);
+            self.found(Rule::NotANumber, section, entry, "no bits of a number with a decimal point", NOTHING);
             return None;
         };
         if pattern.base != 0 {
             let what = "hexadecimal digits for a number with a decimal point: other tools may read another value";
-            self.warn(Rule::RealBits, section, entry, what, Some(format!("{real:?}, which these bits are")));
+            self.found(Rule::RealBits, section, entry, what, format!("{real:?}, which these bits are"));
         }
         Some(Value::Real(real))
     }
@@ -148,18 +145,18 @@ impl Reader {
         let instead = if is_domain { TypeCode::DOMAIN } else { TypeCode::UNSIGNED32 };
         let Some(entry) = fields.data_type.filter(|entry| !entry.value.is_empty()) else {
             if !is_domain {
-                self.error_section(Rule::DataType, section, "no DataType", instead.to_string());
+                self.found_in(Rule::DataType, section, "no DataType", instead.to_string());
             }
             return instead;
         };
         let code = self.number(section, entry).filter(|number| !number.plus_node_id);
         let Some(code) = code.and_then(|number| u16::try_from(number.base).ok()).map(TypeCode) else {
             let what = format!("no code of a data type: {:?}", shortened(entry.value));
-            self.error(Rule::DataType, section, entry, what, instead.to_string());
+            self.found(Rule::DataType, section, entry, what, instead.to_string());
             return instead;
         };
         if !code.is_known() {
-            self.error(
+            self.found(
                 Rule::DataType,
                 section,
                 entry,
@@ -175,12 +172,12 @@ impl Reader {
     pub(super) fn access(&mut self, section: Section<'_>, fields: &Fields<'_>, is_domain: bool) -> AccessType {
         let Some(entry) = fields.access_type.filter(|entry| !entry.value.is_empty()) else {
             let instead = if is_domain { AccessType::ReadWrite } else { AccessType::ReadOnly };
-            self.error_section(Rule::AccessType, section, "no AccessType", instead.name());
+            self.found_in(Rule::AccessType, section, "no AccessType", instead.name());
             return instead;
         };
         AccessType::of(entry.value).unwrap_or_else(|| {
             let what = format!("no access type: {:?}", shortened(entry.value));
-            self.error(Rule::AccessType, section, entry, what, AccessType::ReadOnly.name());
+            self.found(Rule::AccessType, section, entry, what, AccessType::ReadOnly.name());
             AccessType::ReadOnly
         })
     }

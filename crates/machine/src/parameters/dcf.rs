@@ -28,7 +28,7 @@ pub(super) fn refused(refusal: &Refusal) -> String {
 pub(super) fn of_reading(reading: Reading, node: NodeId, name: &str) -> Result<Parameters, String> {
     // What the reader had to guess or to leave out of values and of lists of objects: the file is not whole.
     let is_broken = |finding: &&eds::Finding| {
-        finding.severity == Severity::Error
+        finding.severity() == Severity::Error
             && (finding.key.as_deref().is_some_and(|key| key.eq_ignore_ascii_case("ParameterValue"))
                 || finding.section.ends_with("Value")
                 || finding.section.ends_with("Objects"))

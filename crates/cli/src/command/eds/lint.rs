@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use eds::{Finding, Rule, Severity};
+use eds::{Explanation, Finding, Rule, Severity};
 use serde::Serialize;
 
 use super::source;
@@ -22,15 +22,18 @@ const SEVERITY: usize = 2;
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive eds lint vendor.eds\n  ferrodrive eds lint left.dcf right.dcf --strict\n  \
-    ferrodrive eds lint --list --json"
+    ferrodrive eds lint --list --json\n  ferrodrive eds lint --explain EDS216"
 )]
 pub(crate) struct Lint {
     /// EDS or DCF files
-    #[arg(required_unless_present = "list", value_name = "FILE")]
+    #[arg(required_unless_present_any = ["list", "explain"], value_name = "FILE")]
     files: Vec<PathBuf>,
     /// List the rules
     #[arg(long, conflicts_with = "files")]
-    pub(super) list: bool,
+    list: bool,
+    /// Explain a rule: why it matters, wrong lines and right ones
+    #[arg(long, value_name = "RULE", value_parser = rule, conflicts_with_all = ["files", "list"])]
+    explain: Option<Rule>,
     /// Fail on warnings too
     #[arg(long)]
     pub(super) strict: bool,
@@ -80,7 +83,18 @@ struct FindingRow {
     taken_instead: Option<String>,
 }
 
+fn rule(text: &str) -> Result<Rule, String> {
+    Rule::of(text).ok_or_else(|| "expected a rule such as EDS216; `ferrodrive eds lint --list` has them".into())
+}
+
 impl Lint {
+    /// The rules that are asked for, if it is not files that are.
+    pub(super) fn rules(&self) -> Option<RuleList> {
+        let asked = self.explain.as_ref().map(std::slice::from_ref).or_else(|| self.list.then_some(Rule::ALL))?;
+        let rules = asked.iter().map(|rule| RuleRow::of(rule.explanation())).collect();
+        Some(RuleList { rules, in_full: self.explain.is_some() })
+    }
+
     /// Looks into all files.
     pub(super) fn run(&self) -> LintReport {
         let mut report = LintReport { ok: true, files: self.files.iter().map(|path| OfFile::of(path)).collect() };
@@ -170,7 +184,8 @@ impl OfFile {
             0 => String::new(),
             more => format!("\nand {more} more"),
         };
-        format!("{head}\n\n{}{beyond}", table.text(paint, error))
+        let more = format!("`ferrodrive eds lint --explain {}` explains a rule", self.findings[0].rule);
+        format!("{head}\n\n{}{beyond}\n{more}", table.text(paint, error))
     }
 }
 
@@ -181,7 +196,7 @@ impl FindingRow {
             section: finding.section.clone(),
             key: finding.key.clone(),
             rule: finding.rule.id(),
-            severity: finding.severity.name(),
+            severity: finding.severity().name(),
             what: finding.what.clone(),
             taken_instead: finding.taken_instead.clone(),
         }
@@ -194,30 +209,50 @@ impl Report for LintReport {
     }
 }
 
-/// The rules, for people and programs.
+/// Rules, for people and programs.
 #[derive(Debug, Serialize)]
 pub(crate) struct RuleList {
     rules: Vec<RuleRow>,
+    /// As text: all that is said, not a line each.
+    #[serde(skip)]
+    in_full: bool,
 }
 
 #[derive(Debug, Serialize)]
 struct RuleRow {
     id: &'static str,
+    severity: &'static str,
     title: &'static str,
     taken_instead: &'static str,
+    clause: &'static str,
+    why: &'static str,
+    wrong: &'static str,
+    right: &'static str,
 }
 
-impl RuleList {
-    pub(super) fn all() -> Self {
-        let row = |rule: &Rule| RuleRow { id: rule.id(), title: rule.title(), taken_instead: rule.taken() };
-        Self { rules: Rule::ALL.iter().map(row).collect() }
+impl RuleRow {
+    fn of(rule: &Explanation) -> Self {
+        let Explanation { id, severity, title, taken: taken_instead, clause, why, wrong, right } = *rule;
+        Self { id, severity: severity.name(), title, taken_instead, clause, why, wrong, right }
+    }
+
+    fn text(&self, paint: Paint) -> String {
+        let Self { id, severity, title, taken_instead, clause, why, wrong, right } = self;
+        let lines = |text: &str| text.lines().map(|line| format!("  {line}")).collect::<Vec<_>>().join("\n");
+        let (wrong, right) = (paint.bad(&lines(wrong)), paint.good(&lines(right)));
+        format!(
+            "{id} ({severity}): {title}\n{clause}\n\n{why}\nTaken instead: {taken_instead}.\n\nwrong:\n{wrong}\nright:\n{right}"
+        )
     }
 }
 
 impl Report for RuleList {
     fn text(&self, paint: Paint) -> String {
-        let mut table = Table::new(&["rule", "finding", "taken instead"]);
-        self.rules.iter().for_each(|rule| table.row([rule.id, rule.title, rule.taken_instead]));
+        if self.in_full {
+            return self.rules.iter().map(|rule| rule.text(paint)).collect::<Vec<_>>().join("\n\n");
+        }
+        let mut table = Table::new(&["rule", "finding", "severity", "taken instead"]);
+        self.rules.iter().for_each(|rule| table.row([rule.id, rule.title, rule.severity, rule.taken_instead]));
         table.plain(paint)
     }
 }

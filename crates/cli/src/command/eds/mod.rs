@@ -39,11 +39,13 @@ impl Eds {
     /// Does it, and prints what came of it.
     pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
         match &self.what {
-            Some(EdsCommand::Lint(lint)) if lint.list => print(format, &lint::RuleList::all()),
-            Some(EdsCommand::Lint(lint)) => {
-                let report = lint.run();
-                format.print_judged(&report, report.failure(lint.strict))
-            }
+            Some(EdsCommand::Lint(lint)) => match lint.rules() {
+                Some(rules) => print(format, &rules),
+                None => {
+                    let report = lint.run();
+                    format.print_judged(&report, report.failure(lint.strict))
+                }
+            },
             Some(EdsCommand::Show(show)) => print(format, &show.run()?),
             Some(EdsCommand::Diff(diff)) => print(format, &diff.run()?),
             None => print(format, &self.sheet.run()?),
