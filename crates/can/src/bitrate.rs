@@ -25,7 +25,7 @@ impl Bitrate {
         if in_range && 1_000_000_000 % bits_per_second == 0 { Some(Self(bits_per_second)) } else { None }
     }
 
-    /// Bits per second.
+    /// The nominal bit rate in bit/s: 1 Mbit/s is 1,000,000.
     pub const fn bits_per_second(self) -> u32 {
         self.0
     }

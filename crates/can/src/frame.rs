@@ -57,7 +57,7 @@ impl Frame {
         Self { data: [0; MAX_DATA_LENGTH], id, length, kind: FrameKind::Remote }
     }
 
-    /// The identifier.
+    /// The identifier, of 11 or 29 bits.
     pub const fn id(&self) -> CanId {
         self.id
     }
@@ -70,7 +70,7 @@ impl Frame {
         }
     }
 
-    /// Data or remote.
+    /// Whether it is a data frame or a remote frame (RTR).
     pub const fn kind(&self) -> FrameKind {
         self.kind
     }

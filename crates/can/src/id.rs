@@ -25,7 +25,7 @@ impl CanId {
         Self((raw & Self::MAX_EXTENDED) | EXTENDED_FLAG)
     }
 
-    /// The 11 or 29 bits.
+    /// The identifier as a number, right aligned, without flags.
     pub const fn raw(self) -> u32 {
         self.0 & Self::MAX_EXTENDED
     }

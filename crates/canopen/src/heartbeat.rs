@@ -41,7 +41,7 @@ impl Heartbeat {
         frame.data().first().map(|state| Self { node, state: *state })
     }
 
-    /// The frame.
+    /// The frame on 700h + node-ID, with one byte (CiA 301, 7.2.8.3.2.2).
     pub fn emit(self) -> Frame {
         Frame::new(connection_set::heartbeat(self.node), &[self.state])
     }

@@ -117,7 +117,7 @@ impl PowerCommand {
         })
     }
 
-    /// In words.
+    /// The command as the standard names it, in lower case: `quick stop`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Shutdown => "shutdown",

@@ -38,7 +38,7 @@ pub enum SwitchEdge {
     Falling,
 }
 
-/// One method.
+/// One method of homing by a switch, as a row of CiA 402-2, clause 11.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HomingRow {
     /// Value of 6098h.
@@ -169,7 +169,7 @@ impl HomingMethod {
 }
 
 impl Direction {
-    /// The other one.
+    /// The opposite direction.
     #[must_use]
     pub const fn reversed(self) -> Self {
         match self {
@@ -178,7 +178,7 @@ impl Direction {
         }
     }
 
-    /// -1 or 1.
+    /// -1 for the negative direction, 1 for the positive one: a factor for speeds.
     pub const fn sign(self) -> i8 {
         match self {
             Negative => -1,

@@ -55,7 +55,7 @@ impl Ratio {
         self.times(other.inverse())
     }
 
-    /// One over it.
+    /// The reciprocal: numerator and denominator change places.
     #[must_use]
     pub const fn inverse(self) -> Self {
         Self { numerator: self.denominator, denominator: self.numerator }

@@ -65,7 +65,7 @@ impl Dwell {
         }
     }
 
-    /// Starts over.
+    /// Forgets how long the condition has held: the time of the window starts at 0 again.
     pub fn restart(&mut self) {
         *self = Self::default();
     }

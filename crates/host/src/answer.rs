@@ -61,7 +61,7 @@ impl Answer {
         self.error.as_ref().map_or("", |error| error.kind)
     }
 
-    /// As JSON.
+    /// One JSON object without a line break, as `docs/control.md` describes it.
     pub fn json(&self) -> String {
         // Only strings, numbers and flags: serialising cannot fail.
         serde_json::to_string(self).unwrap_or_default()

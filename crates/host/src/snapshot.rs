@@ -42,7 +42,7 @@ pub struct Snapshot {
     pub nodes: Vec<NodeView>,
 }
 
-/// The bus.
+/// The bus as the state shows it: its bit rate in bit/s, how much of it is used, and whether it works.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct BusView {
     /// Its name.
@@ -57,7 +57,7 @@ pub struct BusView {
     pub health: Health,
 }
 
-/// A node.
+/// A node of the bus as the state shows it: what it is, what it does, and why its values are unknown if they are.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct NodeView {
     /// Node-ID.
@@ -104,7 +104,7 @@ pub struct NodeView {
     pub drive: Option<Box<DriveView>>,
 }
 
-/// A drive.
+/// A drive as the state shows it, in physical units; each value is absent where the model has no object for it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DriveView {
     /// When it was read, in the time of the bus.

@@ -57,7 +57,7 @@ impl Account {
         (!self.stands).then(|| make_sure(self.node))
     }
 
-    /// In one line.
+    /// One line for people: which node stands, or may still be moving, and what it does by itself.
     pub fn text(&self) -> String {
         self.because.join("; ")
     }

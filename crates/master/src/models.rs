@@ -21,7 +21,7 @@ impl Models {
         Self(core::iter::once(description).chain(others).collect())
     }
 
-    /// To look in.
+    /// The models, to look one up by its name or by what a node answers.
     pub fn catalogue(&self) -> Catalogue<'_> {
         Catalogue::of(&self.0)
     }

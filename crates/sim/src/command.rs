@@ -163,7 +163,7 @@ impl CommandError {
         }
     }
 
-    /// What to do.
+    /// What to do about it, in a clause.
     pub const fn next(&self) -> &'static str {
         match self {
             Self::Unknown(_) | Self::BadNode(_) | Self::NoAction(_) | Self::Stimulus(_) => {

@@ -40,7 +40,7 @@ pub struct Event {
     pub kind: EventKind,
 }
 
-/// What happened.
+/// What happened in the world, or to one of its drives.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EventKind {
     /// The drive's supply, and what its firmware makes of it, has changed.

@@ -19,7 +19,7 @@ pub struct Corruption {
 }
 
 impl Corruption {
-    /// No disturbance.
+    /// A wire on which no frame is destroyed.
     pub fn none() -> Self {
         Self::default()
     }

@@ -187,7 +187,7 @@ impl World {
         self.due.set(id.0, Instant::FAR_FUTURE);
     }
 
-    /// The present.
+    /// The present in virtual time, counted from the start of the world.
     pub fn now(&self) -> Instant {
         self.now
     }

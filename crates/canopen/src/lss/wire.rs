@@ -207,7 +207,7 @@ impl Request {
         })
     }
 
-    /// The frame.
+    /// The frame of eight bytes: a master's on 7E5h, a slave's on 7E4h (CiA 305).
     pub fn emit(self) -> Frame {
         let short = |specifier, a, b| [specifier, a, b, 0, 0, 0, 0, 0];
         let raw = match self {
@@ -278,7 +278,7 @@ impl Reply {
         })
     }
 
-    /// The frame.
+    /// The frame of eight bytes: a master's on 7E5h, a slave's on 7E4h (CiA 305).
     pub fn emit(self) -> Frame {
         let short = |specifier, a, b| [specifier, a, b, 0, 0, 0, 0, 0];
         let raw = match self {

@@ -242,7 +242,7 @@ impl<S: Storage> Node<S> {
         self.heartbeat_state = state;
     }
 
-    /// The values.
+    /// The values of its object dictionary, to read; writes go through the node.
     #[inline]
     pub const fn dictionary(&self) -> &Dictionary<S> {
         &self.dictionary
@@ -255,12 +255,12 @@ impl<S: Storage> Node<S> {
         &mut self.dictionary
     }
 
-    /// The rows.
+    /// The rows of its object dictionary: types, access, limits, defaults.
     pub const fn table(&self) -> &'static Table {
         self.profile.table
     }
 
-    /// The node-ID.
+    /// The node-ID that its identifiers are made of; one set by LSS acts from the next reset of communication on (CiA 305).
     pub const fn node_id(&self) -> NodeId {
         self.node_id
     }

@@ -61,7 +61,7 @@ impl<S: Storage> Dictionary<S> {
             && self.resolution == other.resolution
     }
 
-    /// The rows.
+    /// The rows whose values these are: types, access, limits, defaults.
     #[inline]
     pub const fn table(&self) -> &'static Table {
         self.table

@@ -50,12 +50,12 @@ pub enum PdoMapping {
 }
 
 impl PdoMapping {
-    /// Into PDOs of one direction at least.
+    /// True if it may be mapped into PDOs of one direction at least.
     pub const fn is_allowed(self) -> bool {
         !matches!(self, Self::No)
     }
 
-    /// Into TPDOs.
+    /// True if it may be mapped into TPDOs.
     pub const fn is_transmittable(self) -> bool {
         matches!(self, Self::Yes | Self::Transmit)
     }
@@ -170,7 +170,7 @@ impl Entry {
         self
     }
 
-    /// Factory value.
+    /// Sets the value as delivered, in counts; 0 without it.
     pub const fn default(mut self, value: i64) -> Self {
         self.default = DefaultValue::Value(value);
         self
@@ -237,7 +237,7 @@ impl Entry {
         self
     }
 
-    /// Unit of one count.
+    /// Sets the physical unit of one count, such as `0.1 r/min`.
     pub const fn unit(mut self, unit: &'static str) -> Self {
         self.unit = unit;
         self

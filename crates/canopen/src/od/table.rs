@@ -61,7 +61,7 @@ impl<T> Clone for Object<T> {
 impl<T> Copy for Object<T> {}
 
 impl<T> Object<T> {
-    /// The row.
+    /// The place of the row in its table.
     pub const fn slot(self) -> Slot {
         self.slot
     }

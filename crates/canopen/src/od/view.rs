@@ -12,7 +12,7 @@ pub struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    /// The rows.
+    /// The rows whose values these are: types, access, limits, defaults.
     #[inline]
     pub const fn table(&self) -> &'static Table {
         self.table

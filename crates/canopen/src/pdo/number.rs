@@ -63,7 +63,7 @@ impl PdoNumber {
         if position < Self::MAX as usize { Self::new(position as u16 + 1) } else { None }
     }
 
-    /// 1 to 512.
+    /// The number of the PDO, 1 to 512 (CiA 301, 7.5.2.35).
     pub const fn number(self) -> u16 {
         self.0.get()
     }

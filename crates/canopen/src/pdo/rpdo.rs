@@ -75,7 +75,7 @@ impl Rpdo {
         self.multiplexed
     }
 
-    /// What is mapped.
+    /// What is mapped into it, in order; `None` where nothing is.
     pub const fn mapping(&self) -> Option<&Mapping> {
         self.mapping.as_ref()
     }

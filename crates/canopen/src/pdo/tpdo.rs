@@ -120,7 +120,7 @@ impl Tpdo {
         }
     }
 
-    /// The identifier.
+    /// The identifier that it is sent with.
     pub const fn can_id(&self) -> CanId {
         self.id
     }

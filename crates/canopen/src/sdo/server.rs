@@ -277,7 +277,7 @@ impl Server {
         self.reply.is_some()
     }
 
-    /// Takes the reply.
+    /// Takes the reply that waits to be sent, eight bytes; `None` if there is none.
     pub const fn take_reply(&mut self) -> Option<[u8; LENGTH]> {
         self.reply.take()
     }

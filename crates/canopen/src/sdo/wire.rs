@@ -41,7 +41,7 @@ impl Segment {
         Self { toggle, last, length: length as u8, bytes }
     }
 
-    /// The data bytes.
+    /// The data of the segment, up to seven bytes.
     pub fn data(&self) -> &[u8] {
         &self.bytes[..usize::from(self.length).min(MAX_SEGMENT)]
     }

@@ -101,7 +101,7 @@ pub struct BaseJog {
 }
 
 impl BaseJog {
-    /// Its motion.
+    /// Its motion: m/s forwards and rad/s to the left.
     pub const fn twist(&self) -> Twist {
         Twist { linear_m_s: self.linear_m_s, angular_rad_s: self.angular_rad_s }
     }

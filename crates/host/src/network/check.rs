@@ -10,7 +10,7 @@ use words::document::{BadFile, read_text};
 use words::failure::{Failure, FailureBody};
 use words::plain;
 
-/// What was found.
+/// What is wrong with a machine file, what is predicted of its bus, and how the nodes differ from it.
 #[derive(Debug, Serialize)]
 pub struct CheckReport {
     /// False if the command fails.

@@ -3,7 +3,7 @@
 use master::explain::{Explained, Finding, PdoSeen, Weight};
 use serde::Serialize;
 
-/// What was found.
+/// What a drive shows, and why it does not move as commanded.
 #[derive(Debug, Serialize)]
 pub struct ExplainReport {
     /// Its node-ID.
@@ -30,7 +30,7 @@ pub struct ExplainReport {
     pub pdos: Vec<PdoRow>,
 }
 
-/// A finding.
+/// One reason why a drive does not move, or may not: what is expected, what was found, what to do.
 #[derive(Debug, Serialize)]
 pub struct ExplainRow {
     /// The name of the rule.
@@ -49,7 +49,7 @@ pub struct ExplainRow {
     pub remedy: String,
 }
 
-/// A PDO of the drive.
+/// A PDO of the drive as it is set up there: identifier, mapping, and why it is silent if it is.
 #[derive(Debug, Serialize)]
 pub struct PdoRow {
     /// Which one.

@@ -11,7 +11,7 @@ use serde::Serialize;
 /// Kinds of frames that are distinguished; further ones are counted as one.
 const MOST: usize = 200;
 
-/// Frames of one kind.
+/// Frames of one service and node that others have sent, counted.
 #[derive(Clone, Debug, Serialize, PartialEq, Eq)]
 pub struct Heard {
     /// Its service, as `dump --service` takes it.
@@ -165,7 +165,7 @@ impl Counted {
 }
 
 impl Heard {
-    /// In a line.
+    /// One line for people: `heard: ` with what it means, and how many frames.
     pub fn line(&self) -> String {
         let times = if self.count == 1 { String::new() } else { format!(" ({} frames)", self.count) };
         format!("heard: {}{times}", self.text)

@@ -28,7 +28,7 @@ use words::plain;
 const LIMITS: [(&str, &str); 4] =
     [("speed", "\"100rpm\""), ("torque", "\"50%\""), ("current", "\"1A\""), ("position", "[-10000, 10000]")];
 
-/// What came of it.
+/// The machine file that was made of a bus, and which nodes it has.
 #[derive(Debug, Serialize)]
 pub struct InitReport {
     /// False if a drive is commented out.

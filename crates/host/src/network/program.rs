@@ -38,7 +38,7 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(500);
 /// Most axes of a device, whose blocks of the profile area begin at each 800h (CiA 402-1).
 const AXES: u16 = 8;
 
-/// What was done.
+/// How a program was downloaded to a node (CiA 302-3: 1F50h, 1F51h): what was sent, and what the node says of it.
 #[derive(Debug, Serialize)]
 pub struct ProgramReport {
     /// The node.

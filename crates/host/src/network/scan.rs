@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::heard::Heard;
 use words::failure::Failure;
 
-/// All nodes found.
+/// All nodes that answered or were heard on a bus, by node-ID.
 #[derive(Debug, Serialize)]
 pub struct ScanReport {
     /// A row each.

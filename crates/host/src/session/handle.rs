@@ -62,7 +62,7 @@ impl From<Snapshot> for StateUpdate {
 }
 
 impl StateUpdate {
-    /// The state.
+    /// The state as it was when the update was made; cheap to clone.
     pub fn snapshot(&self) -> Arc<Snapshot> {
         Arc::clone(&self.snapshot)
     }

@@ -53,12 +53,12 @@ pub(super) struct Chunk {
 }
 
 impl Trace {
-    /// Counts a save.
+    /// Notes that the frames kept here were saved as a log once more.
     pub fn note_saved(&self) {
         self.logs_saved.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The number of saves.
+    /// How often the frames kept here were saved as a log.
     pub fn logs_saved(&self) -> u64 {
         self.logs_saved.load(Ordering::Relaxed)
     }

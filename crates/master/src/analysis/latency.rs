@@ -92,7 +92,7 @@ impl Meter {
         }
     }
 
-    /// The next sample.
+    /// The next time that was measured; `None` when there is none yet.
     pub fn poll_sample(&mut self) -> Option<Sample> {
         self.samples.pop_front()
     }

@@ -136,7 +136,7 @@ impl ErrorStatus {
         self.row().2
     }
 
-    /// What to do.
+    /// What to do about it, in a clause.
     pub fn advice(self) -> &'static str {
         self.row().3
     }

@@ -52,7 +52,7 @@ pub enum StepKind {
     Start,
 }
 
-/// What should be.
+/// What a step of the boot (CiA 302-2, boot-up of a slave) expects of the node.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Expected {
     /// This number.
@@ -77,7 +77,7 @@ pub enum Expected {
     Listed,
 }
 
-/// What is.
+/// What a step of the boot has found where something was [`Expected`].
 #[derive(Clone, Debug)]
 pub enum Found {
     /// This number.
@@ -141,7 +141,7 @@ pub enum Verdict {
 }
 
 impl StepKind {
-    /// Its name.
+    /// Its name in lower case, for messages: `device type`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Assignment => "assignment",

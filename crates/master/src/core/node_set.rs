@@ -10,7 +10,7 @@ impl NodeSet {
     /// All 127 nodes.
     pub const ALL: Self = Self(!0 << 1);
 
-    /// Adds a node.
+    /// Adds a node; one that is in the set already stays.
     pub const fn insert(&mut self, node: NodeId) {
         self.0 |= 1 << node.raw();
     }
@@ -22,7 +22,7 @@ impl NodeSet {
         self
     }
 
-    /// Takes a node out.
+    /// Takes a node out; nothing happens if it is not in the set.
     pub const fn remove(&mut self, node: NodeId) {
         self.0 &= !(1 << node.raw());
     }

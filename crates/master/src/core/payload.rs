@@ -27,7 +27,7 @@ impl Payload {
         Self(PayloadForm::Short(short, bytes.len() as u8))
     }
 
-    /// The bytes.
+    /// The bytes as an SDO carries them: little endian, without padding.
     pub fn as_bytes(&self) -> &[u8] {
         match &self.0 {
             PayloadForm::Short(bytes, length) => &bytes[..usize::from(*length)],

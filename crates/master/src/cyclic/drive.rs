@@ -84,7 +84,7 @@ impl CyclicProgress {
 }
 
 impl CyclicDrive {
-    /// Its node.
+    /// Node-ID of the drive.
     pub const fn node(&self) -> NodeId {
         self.node
     }

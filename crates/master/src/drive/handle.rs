@@ -104,7 +104,7 @@ impl Drive {
         self.description?.axes.get(usize::from(self.axis.0))
     }
 
-    /// Its node.
+    /// The node that the axis is on, for requests of one's own.
     pub const fn node(&self) -> &Node {
         &self.node
     }

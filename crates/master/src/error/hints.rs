@@ -35,7 +35,7 @@ pub struct Hints {
 }
 
 impl Hints {
-    /// What to do.
+    /// What to check where a node does not answer, in a clause: interface, cable, node-ID, NMT state.
     pub const fn check(&self) -> &'static str {
         match (self.unsent, self.nmt_state, self.silent_for) {
             (true, ..) => {

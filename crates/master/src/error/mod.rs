@@ -383,7 +383,7 @@ pub struct Explanation {
     pub advice: String,
 }
 
-/// One thing seen.
+/// One thing that the drive showed when a motion failed; an explanation is drawn from them.
 #[derive(Clone, Debug)]
 pub enum Fact {
     /// 6041h, and the state that it shows.

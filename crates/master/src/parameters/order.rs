@@ -47,7 +47,7 @@ impl fmt::Display for Purpose {
     }
 }
 
-/// One write.
+/// One SDO write of a plan, in its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParameterStep {
     /// The object.

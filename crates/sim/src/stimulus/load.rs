@@ -57,7 +57,7 @@ pub enum LoadPart {
     None,
 }
 
-/// Friction of a load.
+/// Friction of a load, as torques at the motor's shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Friction {
     /// N·m in motion.

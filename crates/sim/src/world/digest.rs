@@ -10,7 +10,7 @@ const OFFSET_BASIS: u64 = 0xCBF2_9CE4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01B3;
 
 impl Digest {
-    /// The hash so far.
+    /// The hash of all that was added so far: two runs that are alike have the same.
     pub fn value(self) -> u64 {
         self.0
     }

@@ -20,7 +20,7 @@ use words::failure::Failure;
 /// How long after its boot-up message a drive is left alone.
 const SETTLED: Duration = Duration::from_millis(100);
 
-/// What was done.
+/// How the parameters of a file were written to a node: how many, which the drive rounded or the file left out, and whether they are stored.
 #[derive(Debug, Serialize)]
 pub struct ApplyReport {
     /// Its node-ID.

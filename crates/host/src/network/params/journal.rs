@@ -94,7 +94,7 @@ fn sync_folder(path: &Path) -> std::io::Result<()> {
     }
 }
 
-/// What was put back.
+/// What a rollback has put back: as many objects as the transaction had changed.
 #[derive(Debug, Serialize)]
 pub struct RollbackReport {
     /// Its node-ID.

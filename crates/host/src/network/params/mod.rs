@@ -23,7 +23,7 @@ use machine::parameters::{Form, sheet, to_concise, to_dcf};
 use words::failure::Failure;
 use words::models::name_its_model;
 
-/// What was read.
+/// The parameters that were read from a node, as a file or as its text.
 #[derive(Debug, Serialize)]
 pub struct BackupReport {
     /// Its node-ID.
@@ -116,7 +116,7 @@ pub struct PlanReport {
     pub notes: Vec<String>,
 }
 
-/// A write.
+/// A write of a plan, in the order in which they are made: the object, what it has and what it is to get.
 #[derive(Debug, Serialize)]
 pub struct PlannedWrite {
     /// The object, such as `6083h:00`.
@@ -153,7 +153,7 @@ impl LeftOut {
         plan.left.iter().map(left).collect()
     }
 
-    /// In a line.
+    /// One line for people: `6083h:00 profile_acceleration is left out: ` and the reason.
     pub fn text(&self) -> String {
         format!("{} {} is left out: {}", self.object, self.name.unwrap_or_default(), self.why)
     }

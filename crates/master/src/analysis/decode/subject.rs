@@ -86,7 +86,7 @@ const fn node_of(service: Service) -> Option<NodeId> {
 }
 
 impl Decoded {
-    /// Its service.
+    /// The service of CiA 301 or 305 that the frame belongs to.
     pub const fn service(&self) -> ServiceKind {
         match self {
             Self::Nmt(_) => ServiceKind::Nmt,

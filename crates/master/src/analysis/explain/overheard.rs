@@ -89,7 +89,7 @@ impl Overheard {
         self.under(SYNC)
     }
 
-    /// NMT commands.
+    /// NMT commands that others have sent to the node or to all; `None` if there were none.
     pub fn nmt(&self) -> Option<&HeardFrames> {
         self.under(NMT)
     }
