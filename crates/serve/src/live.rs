@@ -18,13 +18,13 @@ use crate::world_bus::WorldBus;
 
 /// A bus that is open, and the clock of its times.
 pub struct LiveBus {
-    place: Place,
+    bus: OpenBus,
     clock: WallClock,
 }
 
 /// Where the bus is.
 #[allow(clippy::large_enum_variant, reason = "there is one, for as long as it is used")]
-enum Place {
+enum OpenBus {
     /// In the thread that asks.
     Here(AnyBus),
     /// In a thread of its own, in real time.
@@ -50,17 +50,17 @@ impl LiveBus {
     pub async fn open(spec: &BusSpec, in_real_time: bool) -> Result<Self, BusThreadError> {
         if in_real_time {
             let (thread, clock) = BusThread::open(spec.clone()).await?;
-            return Ok(Self { place: Place::Thread(thread), clock });
+            return Ok(Self { bus: OpenBus::Thread(thread), clock });
         }
         let clock = WallClock::start();
         let bus = spec.open(&clock).await.map_err(BusThreadError::Bus)?;
-        Ok(Self { place: Place::Here(bus), clock })
+        Ok(Self { bus: OpenBus::Here(bus), clock })
     }
 
     /// The bus of a world whose time begins now, and where that world can be asked.
     pub fn of_world(world: World, clock: WallClock, wire: Wire) -> (Self, WorldDoor) {
         let (bus, door) = WorldBus::new(world, &clock, wire);
-        (Self { place: Place::World(bus), clock }, door)
+        (Self { bus: OpenBus::World(bus), clock }, door)
     }
 
     /// The clock of the bus.
@@ -80,14 +80,14 @@ impl LiveBus {
         until: U,
         report: impl FnMut(Instant, &Note),
     ) -> Result<U::Output, LostBus> {
-        let Self { place, clock } = self;
+        let Self { bus, clock } = self;
         let wakeup = Arc::new(Notify::new());
         // What asks from another thread or task: a job, or all of it where the bus has a thread of its own.
         network.on_activity(waker_of(Arc::clone(&wakeup)));
-        let ended = match place {
-            Place::Here(mut bus) => run_station(&mut bus, &mut station, &clock, &wakeup, until, report).await,
-            Place::World(mut bus) => run_station(&mut bus, &mut station, &clock, &wakeup, until, report).await,
-            Place::Thread(thread) => thread.run(station, wakeup, until, report).await,
+        let ended = match bus {
+            OpenBus::Here(mut bus) => run_station(&mut bus, &mut station, &clock, &wakeup, until, report).await,
+            OpenBus::World(mut bus) => run_station(&mut bus, &mut station, &clock, &wakeup, until, report).await,
+            OpenBus::Thread(thread) => thread.run(station, wakeup, until, report).await,
         };
         ended.map_err(|error| LostBus { error, moving: Account::of_lost_bus(network, who) })
     }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::bench::Bench;
+use super::virtual_bus::VirtualBus;
 
 const JOINT: (&str, &str) = ("1", "1=m4230e17b50");
 const STEPPER: (&str, &str) = ("2", "2=zlim42c");
@@ -17,7 +17,7 @@ const SERVO: (&str, &str) = ("4", "4=zlac8030l");
 /// Before anything moves. What has a watch that is armed has nothing to be said.
 #[test]
 fn what_nothing_would_stop_is_said_before_it_moves() {
-    let bench = Bench::of(&["m4230e17b50@1", "zlim42c@2", "zlac8030l@4", "cia402@5", "zlac8030l@6,2000=0"]);
+    let bench = VirtualBus::of(&["m4230e17b50@1", "zlim42c@2", "zlac8030l@4", "cia402@5", "zlac8030l@6,2000=0"]);
     for ((node, model), options, parts) in [
         (SERVO, &[][..], &[][..]),
         (JOINT, &[], &[]),
@@ -42,7 +42,7 @@ fn what_nothing_would_stop_is_said_before_it_moves() {
 
 #[test]
 fn a_command_that_leaves_a_motor_turning_says_what_happens_then() {
-    let bench = Bench::of(&["m4230e17b50@1", "zlim42c@2", "zlac8030l@4"]);
+    let bench = VirtualBus::of(&["m4230e17b50@1", "zlim42c@2", "zlac8030l@4"]);
     let json = |(_, model): (&str, &str), words: &[&str]| bench.json(&[&["--model", model], words].concat());
     // By its way, since the rotor of a stepper swings about its speed: at 60 r/min several hundred counts in this time.
     let turns = |node: u8| {
@@ -74,7 +74,7 @@ fn a_command_that_leaves_a_motor_turning_says_what_happens_then() {
 
 #[test]
 fn a_joint_that_looks_for_its_reference_can_be_disabled() {
-    let bench = Bench::of(&["m4230e17b50@1"]).with(&["--model", "1=m4230e17b50"]);
+    let bench = VirtualBus::of(&["m4230e17b50@1"]).with(&["--model", "1=m4230e17b50"]);
     bench.json(&["home", "1", "--method", "17", "--no-wait"]);
     bench.pass(Duration::from_secs(1));
     assert!(bench.report(1).velocity_rpm.abs() > 50.0, "it looks for its switch");

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::bench::Bench;
+use super::virtual_bus::VirtualBus;
 
 fn figure(report: &Value, what: &str, figure: &str) -> f64 {
     report[what][figure].as_f64().unwrap_or_else(|| panic!("{what} {figure} in {report}"))
@@ -10,7 +10,7 @@ fn figure(report: &Value, what: &str, figure: &str) -> f64 {
 
 #[test]
 fn a_tpdo_that_follows_sync_is_measured_and_is_no_faster_than_its_wire() {
-    let bench = Bench::of(&["zlac8030l@4"]);
+    let bench = VirtualBus::of(&["zlac8030l@4"]);
     // TPDO1 with 6041h behind each SYNC (1800h:02 = 1).
     for (object, value) in [("1A00:01", "0x60410010"), ("1A00:00", "1"), ("1800:02", "1")] {
         bench.done(&["--model", "4=zlac8030l", "write", "4", object, value]);
@@ -28,7 +28,7 @@ fn a_tpdo_that_follows_sync_is_measured_and_is_no_faster_than_its_wire() {
 
 #[test]
 fn a_bus_with_a_motor_switched_on_is_sent_no_sync() {
-    let bench = Bench::of(&["zlac8030l@4"]);
+    let bench = VirtualBus::of(&["zlac8030l@4"]);
     bench.done(&["--model", "4=zlac8030l", "enable", "4"]);
     // Not only the node that is asked counts.
     let report = bench.json(&["latency", "4", "--count", "10"]);
@@ -38,7 +38,7 @@ fn a_bus_with_a_motor_switched_on_is_sent_no_sync() {
 
 #[test]
 fn answers_and_sync_are_measured_on_any_bus_and_the_text_has_its_bars() {
-    let bench = Bench::of(&["zlac8030l@4"]);
+    let bench = VirtualBus::of(&["zlac8030l@4"]);
     let report = bench.json(&["latency", "4", "--count", "30"]);
     assert_eq!(figure(&report, "sdo", "count"), 30.0);
     assert!(figure(&report, "sync", "count") >= 30.0, "{report}");

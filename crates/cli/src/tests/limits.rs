@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use super::bench::Bench;
+use super::virtual_bus::VirtualBus;
 
 #[test]
 fn limits_follow_what_is_written_to_the_objects_that_move_them() {
-    let bench = Bench::of(&["zlac8030l@4"]).with(&["--model", "4=zlac8030l"]);
+    let bench = VirtualBus::of(&["zlac8030l@4"]).with(&["--model", "4=zlac8030l"]);
     let on_bus = |words: &[&str]| bench.run(words);
     let ended = on_bus(&["write", "4", "200A", "500"]);
     assert_eq!(ended.status, Some(0), "{}", ended.err);

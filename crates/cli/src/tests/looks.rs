@@ -5,7 +5,7 @@ use std::time::Duration;
 use processes::scratch;
 use serde_json::{Value, json};
 
-use super::bench::{Bench, without_bus};
+use super::virtual_bus::{VirtualBus, without_bus};
 
 fn lines(text: &str) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).expect("a JSON value a line")).collect()
@@ -22,7 +22,7 @@ fn letter(report: &Value, node: u64) -> Option<String> {
 fn the_data_sheet_of_another_device_is_told_with_what_differs_and_nothing_is_written() {
     let folder = scratch("boot_wrong_eds");
     let [sheet, machine] = ["other.eds", "machine.toml"].map(|name| folder.join(name));
-    let bench = Bench::of(&["zlac8030l@4"]);
+    let bench = VirtualBus::of(&["zlac8030l@4"]);
     std::fs::write(&sheet, &without_bus(&["eds", "cia402"]).out).expect("an EDS");
     std::fs::write(&machine, "[[drive]]\nmodel = \"other.eds\"\nnode = 4\n[drive.start_up]\n1017 = 200\n")
         .expect("a file");
@@ -38,7 +38,7 @@ fn the_data_sheet_of_another_device_is_told_with_what_differs_and_nothing_is_wri
 
 #[test]
 fn a_scan_tells_who_beats_each_second_who_never_and_who_has_not_been_heard_yet() {
-    let bench = Bench::of(&["m4230e17b50@1", "zlac8030l@4"]);
+    let bench = VirtualBus::of(&["m4230e17b50@1", "zlac8030l@4"]);
     let on_bus = |words: &[&str]| bench.done(words);
     let found = on_bus(&["--json", "--timeout", "1s", "scan"]).json();
     let said = |place: usize| {
@@ -58,7 +58,7 @@ fn a_scan_tells_who_beats_each_second_who_never_and_who_has_not_been_heard_yet()
 
 #[test]
 fn several_objects_of_an_unknown_node_are_found_by_asking() {
-    let bench = Bench::of(&["zlac8030l@4"]);
+    let bench = VirtualBus::of(&["zlac8030l@4"]);
     let read = |options: &[&str]| lines(&bench.done(&[options, &["--json", "read", "4", "1000..1018"]].concat()).out);
     let (found, listed) = (read(&[]), read(&["--model", "4=zlac8030l"]));
     let of =
@@ -68,7 +68,7 @@ fn several_objects_of_an_unknown_node_are_found_by_asking() {
 
 #[test]
 fn a_motion_that_takes_longer_than_it_may_is_given_up_and_stopped() {
-    let bench = Bench::of(&["zlac8030l@4"]).with(&["--model", "4=zlac8030l"]);
+    let bench = VirtualBus::of(&["zlac8030l@4"]).with(&["--model", "4=zlac8030l"]);
     let late = bench.run(&["move", "4", "200turn", "--relative", "--profile-velocity", "60rpm", "--within", "2s"]);
     assert_eq!(late.status, Some(1), "{}", late.err);
     assert!(late.err.contains("node 4 was moving and has been quick-stopped"), "{}", late.err);
@@ -78,7 +78,7 @@ fn a_motion_that_takes_longer_than_it_may_is_given_up_and_stopped() {
 
 #[test]
 fn errors_that_a_node_remembers_are_shown_with_their_meaning() {
-    let bench = Bench::of(&["cia402@5"]);
+    let bench = VirtualBus::of(&["cia402@5"]);
     let on = |words: &[&str]| bench.json(words);
     assert_eq!(on(&["emcy", "show", "5"])["errors"], json!([]));
     // CiA 301, 7.5.2.19: node 7Fh within 100 ms. One heartbeat begins the watch, and none follows.
@@ -94,7 +94,7 @@ fn errors_that_a_node_remembers_are_shown_with_their_meaning() {
 
 #[test]
 fn pdos_that_come_are_shown_with_their_objects() {
-    let bench = Bench::of(&["cia402@5"]);
+    let bench = VirtualBus::of(&["cia402@5"]);
     // CiA 301, 7.5.2.37: an event timer of 50 ms.
     bench.done(&["write", "5", "1800:05", "50"]);
     bench.done(&["nmt", "5", "start"]);
@@ -111,7 +111,7 @@ fn pdos_that_come_are_shown_with_their_objects() {
 /// Of what cannot be heard it is never said that it stands.
 #[test]
 fn an_emergency_stop_that_was_not_seen_ends_with_1() {
-    let bench = Bench::of(&["cia402@5"]);
+    let bench = VirtualBus::of(&["cia402@5"]);
     bench.apply(5, "cable cut");
     for command in [&["estop"][..], &["estop", "all"], &["quick-stop", "all"], &["stop", "all"]] {
         for (known, kind) in [(&[][..], "no_node"), (&["--model", "5=cia402"], "not_stopped")] {
@@ -128,7 +128,7 @@ fn an_emergency_stop_that_was_not_seen_ends_with_1() {
 
 #[test]
 fn what_is_on_a_bus_is_shown_as_it_comes() {
-    let bench = Bench::of(&["m4230e17b50@1"]);
+    let bench = VirtualBus::of(&["m4230e17b50@1"]);
     // EMCY of node 9, over-current by its class (CiA 301, table 26), here sent by another node.
     bench.apply(1, "bus babble 089#1023020000000000 100");
     let reported = lines(&bench.done(&["--json", "emcy", "watch", "--for", "1s"]).out);

@@ -3,12 +3,12 @@
 use processes::Ended;
 use serde_json::{Value, json};
 
-use super::bench::Bench;
+use super::virtual_bus::VirtualBus;
 
 /// 1018h of the standard's servo, in hexadecimal: no vendor, product 402, revision 1.0, serial number 1.
 const ADDRESS: &str = "0:192:10000:1";
 
-fn refused(bench: &Bench, words: &[&str]) -> Ended {
+fn refused(bench: &VirtualBus, words: &[&str]) -> Ended {
     let ended = bench.run(&[&["--json"], words].concat());
     assert_ne!(ended.status, Some(0), "{words:?}: {}", ended.out);
     ended
@@ -16,7 +16,7 @@ fn refused(bench: &Bench, words: &[&str]) -> Ended {
 
 #[test]
 fn a_device_without_a_node_id_is_found_and_becomes_a_node() {
-    let bus = Bench::of(&["cia402@4,node-id=none", "zlac8030l@5"]);
+    let bus = VirtualBus::of(&["cia402@4,node-id=none", "zlac8030l@5"]);
     // No device is node 4: the device sends nothing and answers no SDO.
     assert_eq!(refused(&bus, &["nmt", "4", "start", "--wait", "1s"]).status, Some(1));
     let found = &bus.json(&["lss", "--within", "1s", "scan"])["devices"];
@@ -39,7 +39,7 @@ fn a_device_without_a_node_id_is_found_and_becomes_a_node() {
 
 #[test]
 fn a_new_node_id_waits_for_reset_communication_and_what_is_not_stored_is_forgotten() {
-    let bus = Bench::of(&["cia402@4"]);
+    let bus = VirtualBus::of(&["cia402@4"]);
     let set = bus.json(&["lss", "--within", "5s", "set", ADDRESS, "--node-id", "10"]);
     // NMT reset communication is 82h (CiA 301, 7.2.8.2.1).
     assert!(set["pending"].as_str().unwrap().contains("send 000#8204"), "{set}");
@@ -58,7 +58,7 @@ fn a_new_node_id_waits_for_reset_communication_and_what_is_not_stored_is_forgott
 
 #[test]
 fn what_is_no_node_id_or_bit_rate_is_refused_and_a_stranger_is_not_configured() {
-    let bus = Bench::of(&["cia402@4"]);
+    let bus = VirtualBus::of(&["cia402@4"]);
     let stranger = refused(&bus, &["lss", "set", "0:192:10000:2", "--node-id", "9"]);
     assert!(stranger.out.contains("0:192:10000:2 does not answer LSS"), "{}", stranger.out);
     assert_eq!(bus.json(&["read", "4", "1018:04"])["value"], json!(1));
@@ -74,7 +74,7 @@ fn what_is_no_node_id_or_bit_rate_is_refused_and_a_stranger_is_not_configured() 
 
 #[test]
 fn a_device_is_found_by_its_make_and_a_listener_reads_it_in_words() {
-    let bus = Bench::of(&["cia402@4,1018:04=0xDEADBEEF"]);
+    let bus = VirtualBus::of(&["cia402@4,1018:04=0xDEADBEEF"]);
     let found = &bus.json(&["lss", "--within", "2s", "identify", "0:192:10000"])["devices"];
     assert_eq!((found.as_array().map(Vec::len), &found[0]["node_id"]), (Some(1), &json!(4)), "{found}");
     assert_eq!(found[0]["address"], json!("0:192:10000:DEADBEEF"));

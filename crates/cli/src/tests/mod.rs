@@ -1,7 +1,6 @@
 //! Commands on a bus that outlives them, in virtual time: what a simulator of another program would show, without a process and
 //! without a clock. What only processes show (signals, sockets, terminals) is in `tests/processes`.
 
-mod bench;
 mod guards;
 mod latency;
 mod limits;
@@ -11,3 +10,4 @@ mod models;
 mod pages;
 mod params;
 mod records;
+mod virtual_bus;

@@ -3,15 +3,15 @@
 use processes::scratch;
 use serde_json::{Value, json};
 
-use super::bench::{Bench, without_bus};
+use super::virtual_bus::{VirtualBus, without_bus};
 
 /// Both ZL drives and a joint, on a bus that does not say which they are.
-fn bench() -> Bench {
-    Bench::of(&["zlac8030l@4", "zlim42c@2", "m4230e17b50@1"])
+fn bench() -> VirtualBus {
+    VirtualBus::of(&["zlac8030l@4", "zlim42c@2", "m4230e17b50@1"])
 }
 
 /// 2009h of the ZLIM42-C: its bit rate, 1 for 500 kbit/s.
-fn stepper_bit_rate(bench: &Bench) -> Value {
+fn stepper_bit_rate(bench: &VirtualBus) -> Value {
     bench.json(&["--model", "2=zlim42c", "read", "2", "2009"])["value"].clone()
 }
 
@@ -196,7 +196,7 @@ fn a_data_sheet_stands_for_a_model_wherever_one_is_asked_for() {
 #[test]
 fn every_model_can_be_simulated_and_a_scan_from_outside_says_what_it_cannot_tell() {
     let drives = ["zlac8030l@4", "zlim42c@2", "zlim42c-82@3", "m4230e17b50@10", "m4230e17b80@11", "m8025e25b50@12"];
-    let bench = Bench::of(&[&drives[..], &["m8025e25b80@13"]].concat());
+    let bench = VirtualBus::of(&[&drives[..], &["m8025e25b80@13"]].concat());
     let found = bench.json(&["--model", "4=zlac8030l", "scan"]);
     let answered: Vec<_> = found["nodes"].as_array().unwrap().iter().map(|node| node["node"].clone()).collect();
     assert_eq!(answered, [2, 3, 4, 10, 11, 12, 13]);

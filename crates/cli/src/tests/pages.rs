@@ -1,7 +1,7 @@
 //! The commands of pages of the handbook on the bus that the page has `ferrodrive sim` serve. Other pages, whose commands need no bus or
 //! speak to the simulator's terminal, are followed in `tests/processes/tests/real_time/handbook.rs`.
 
-use super::bench::{Bench, without_bus};
+use super::virtual_bus::{VirtualBus, without_bus};
 use crate::scope::command_line;
 
 /// What the pages call the simulator's bus.
@@ -44,7 +44,7 @@ fn follow(page: &str) -> usize {
         if words[0] == "sim" {
             let taken = command_line().try_get_matches_from(std::iter::once("ferrodrive").chain(words.iter().copied()));
             assert!(taken.is_ok(), "{page}: {line}: {taken:?}");
-            bench = Some(Bench::of(&drives(&words)));
+            bench = Some(VirtualBus::of(&drives(&words)));
             continue;
         }
         let ended = match (line.strip_prefix(SERVED), &bench) {

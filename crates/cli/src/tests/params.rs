@@ -2,10 +2,10 @@
 
 use processes::scratch;
 
-use super::bench::Bench;
+use super::virtual_bus::VirtualBus;
 
-fn bench() -> Bench {
-    Bench::of(&["zlac8030l@4"])
+fn bench() -> VirtualBus {
+    VirtualBus::of(&["zlac8030l@4"])
 }
 
 #[test]
@@ -51,7 +51,7 @@ fn a_journal_of_another_device_or_half_a_one_is_refused() {
 
 #[test]
 fn a_pdo_that_was_set_up_comes_and_before_it_was_said_why_not() {
-    let bench = Bench::of(&["zlac8030l@4", "cia402@5"]);
+    let bench = VirtualBus::of(&["zlac8030l@4", "cia402@5"]);
     let shown = |part: &str| {
         let ended = bench.done(&["pdo", "show", "4"]);
         assert!(ended.out.contains(part), "{part}: {}", ended.out);

@@ -5,7 +5,7 @@ use std::path::Path;
 use processes::scratch;
 use recording::{Kind, Recorded, read};
 
-use super::bench::Bench;
+use super::virtual_bus::VirtualBus;
 
 fn recorded(path: &Path) -> Recorded {
     let kind = Kind::of_name(path.to_str().unwrap()).unwrap();
@@ -17,7 +17,7 @@ fn the_master_records_objects_by_sdo_and_by_the_pdos_that_carry_them() {
     let place = scratch("master-record");
     for name in ["run.mcap", "run.csv"] {
         let path = place.join(name);
-        let bench = Bench::of(&["zlac8030l@4"]).with(&["--model", "4=zlac8030l"]);
+        let bench = VirtualBus::of(&["zlac8030l@4"]).with(&["--model", "4=zlac8030l"]);
         let master = |words: &[&str]| bench.done(words);
         let report = |time: &str| {
             let record = ["record", "4", "statusword", "position_actual_value", "--for", time, "--json", "--out"];
@@ -62,8 +62,8 @@ fn a_replay_does_to_a_drive_what_was_done_when_the_log_was_written() {
     let log = directory.join("enable.blf");
     let log = log.to_str().unwrap();
     let model = ["--model", "4=zlac8030l"];
-    Bench::of(&["zlac8030l@4"]).with(&model).done(&["enable", "4", "--log", log]);
-    let second = Bench::of(&["zlac8030l@4"]);
+    VirtualBus::of(&["zlac8030l@4"]).with(&model).done(&["enable", "4", "--log", log]);
+    let second = VirtualBus::of(&["zlac8030l@4"]);
     let state = || second.json(&[&model[..], &["state", "4"]].concat())["state"].clone();
     assert_ne!(state(), "Operation enabled");
     second.done(&["replay", log, "--only", "sent", "--allow-motion"]);

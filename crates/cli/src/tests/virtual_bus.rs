@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use can::Bitrate;
 use clap::FromArgMatches;
 use processes::Ended;
 use serde_json::Value;
@@ -17,35 +18,28 @@ use machine::file::{Machine, Placed};
 use plot::Paint;
 use words::drive::drive_spec;
 
-/// What the bus of a bench is called on a command line. It is not opened.
-const BUS: &str = "socketcand://bench:29536/can0";
+/// What the bus is called on a command line. It is not opened.
+const BUS: &str = "socketcand://virtual:29536/can0";
 
 /// Longer than any of them takes to boot, and than a ZL drive ignores its inputs then.
 const BOOT: Duration = Duration::from_secs(1);
 
-/// A bus in virtual time, which passes while a command runs and by [`Bench::pass`].
-pub(super) struct Bench {
+/// A bus in virtual time, which passes while a command runs and by [`VirtualBus::pass`].
+pub(super) struct VirtualBus {
     world: Arc<Mutex<World>>,
     options: Vec<String>,
 }
 
-impl Bench {
+impl VirtualBus {
     /// Drives as `--drive` of `ferrodrive sim` takes them, which have booted; they take no time for what they do.
     #[track_caller]
     pub(super) fn of(drives: &[&str]) -> Self {
-        Self::at("500k", drives)
-    }
-
-    /// The same at another bit rate.
-    #[track_caller]
-    pub(super) fn at(bitrate: &str, drives: &[&str]) -> Self {
         let specs = drives.iter().map(|drive| Placed::from(drive_spec(drive).expect("a drive")));
-        let bitrate = Some(bitrate.parse().expect("a bit rate"));
         let mut machine = Machine::default();
-        (machine.bitrate, machine.drives) = (bitrate, specs.collect());
-        let bench = Self { world: Arc::new(Mutex::new(machine.build().expect("a machine"))), options: Vec::new() };
-        bench.pass(BOOT);
-        bench
+        (machine.bitrate, machine.drives) = (Some(Bitrate::K500), specs.collect());
+        let bus = Self { world: Arc::new(Mutex::new(machine.build().expect("a machine"))), options: Vec::new() };
+        bus.pass(BOOT);
+        bus
     }
 
     /// Every command is given these options too.
@@ -65,14 +59,14 @@ impl Bench {
     /// What is true of a drive, whatever it says.
     #[track_caller]
     pub(super) fn report(&self, drive: u8) -> Report {
-        self.world().report(drive).expect("a drive of this bench")
+        self.world().report(drive).expect("a drive of this bus")
     }
 
     /// Does to a drive what a world command would: `load torque -1`.
     #[track_caller]
     pub(super) fn apply(&self, drive: u8, stimulus: &str) {
         let stimulus = stimulus.parse().expect("a stimulus");
-        let taken = self.world().apply(Place::node(drive), &stimulus).expect("a drive of this bench");
+        let taken = self.world().apply(Place::node(drive), &stimulus).expect("a drive of this bus");
         taken.expect("the drive takes it");
     }
 
