@@ -246,7 +246,7 @@ impl Service {
         let frames = world.take_carried();
         if let Some(record) = &mut self.record {
             let (recorded, events) = (world.take_recorded(), world.take_events());
-            record.write(Batch { recorded, frames: frames.clone(), events });
+            record.write(Batch::of_world(recorded, frames.clone(), &events));
         }
         if let Some(log) = &mut self.log {
             log.write(frames);

@@ -3,11 +3,9 @@
 mod background;
 mod command_log;
 mod frame_log;
-mod object_record;
 mod record_file;
 
 pub use background::{Pace, ROOM};
 pub use command_log::{CommandLog, NewLog, Writing};
 pub use frame_log::FrameLog;
-pub use object_record::{ObjectBatch, ObjectRecord};
 pub use record_file::{Batch, RecordFile};

@@ -29,7 +29,7 @@ use crate::output::Report;
 use plot::Paint;
 use serve::files::create_record;
 use serve::messages::Messages;
-use serve::writing::{ObjectBatch, ObjectRecord};
+use serve::writing::{Batch, Pace, RecordFile};
 
 /// Record objects of a node over time
 ///
@@ -152,7 +152,8 @@ impl Record {
         let cannot = |error: std::io::Error| Failure::of_writing("the record", path, &error);
         let file = if is_stdout(path) { stdout_file() } else { create_record(path, *kind) };
         let file = file.map_err(cannot)?;
-        let mut file = ObjectRecord::start(*kind, file, &columns, Messages::of_warnings()).map_err(cannot)?;
+        let mut file =
+            RecordFile::start(*kind, file, &columns, Pace::RealTime, Messages::of_warnings()).map_err(cannot)?;
         let mut report = RecordReport {
             file: path.display().to_string(),
             node: self.node.raw(),
@@ -177,14 +178,14 @@ impl Record {
         context: &Context,
         node: &Node,
         sources: &[RecordedObject],
-        file: &mut ObjectRecord,
+        file: &mut RecordFile,
         report: &mut RecordReport,
     ) {
         let network = &context.network;
         let begin = network.now();
         let end = self.duration.or(context.is_embedded().then_some(EMBEDDED_DURATION)).map(|time| begin + time);
         let mut heard = context.traffic.of_others();
-        let mut batch = ObjectBatch::default();
+        let mut batch = Batch::default();
         let (mut due, mut handed) = (begin, begin);
         while end.is_none_or(|end| due < end) {
             let now = network.now();

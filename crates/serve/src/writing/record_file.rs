@@ -1,4 +1,4 @@
-//! The file of `--record`.
+//! A record: of a world (`--record`), or of objects of nodes on any bus (`ferrodrive record`).
 
 use std::fs::File;
 use std::io;
@@ -16,12 +16,28 @@ use words::failure::Failure;
 /// What happened since the batch before, each kind in the order of its times.
 #[derive(Default)]
 pub struct Batch {
-    /// Samples.
+    /// Samples of a world.
     pub recorded: Option<Recorder>,
+    /// Samples of anything else: the values of all columns.
+    pub rows: Vec<(Instant, Vec<f64>)>,
     /// What the bus carried.
     pub frames: Vec<(Instant, Frame)>,
     /// What happened.
-    pub events: Vec<Event>,
+    pub marks: Vec<Mark>,
+}
+
+impl Batch {
+    /// Of a world.
+    pub fn of_world(recorded: Option<Recorder>, frames: Vec<(Instant, Frame)>, events: &[Event]) -> Self {
+        // A frame's event has the frame's time, which may be before that of an event that was found first.
+        let mut marks: Vec<Mark> = events.iter().map(Mark::from).collect();
+        marks.sort_by_key(|mark| mark.at);
+        Self { recorded, rows: Vec::new(), frames, marks }
+    }
+
+    fn samples(&self) -> usize {
+        self.rows.len() + self.recorded.as_ref().map_or(0, |recorded| recorded.times().len())
+    }
 }
 
 /// A record that a thread of its own writes.
@@ -37,10 +53,10 @@ impl RecordFile {
         Ok(Self(Background::start(record, WaitingRules::of(pace), Some(messages))))
     }
 
-    /// Takes a batch.
+    /// Takes a batch; one that the disk has no time for is left out and reported, where the clock does not wait.
     pub fn write(&mut self, batch: Batch) {
-        let samples = batch.recorded.as_ref().map_or(0, |recorded| recorded.times().len());
-        self.0.write(batch, samples as u64);
+        let samples = batch.samples() as u64;
+        self.0.write(batch, samples);
     }
 
     /// Waits until everything is written, at most for `patience`.
@@ -59,11 +75,9 @@ impl Output<Batch> for Record {
     /// Writes samples, frames and marks in the order of their times, and hands them to the system.
     fn write(&mut self, batch: Batch) -> io::Result<()> {
         let mut frames = batch.frames.iter().peekable();
-        // A frame's event has the frame's time, which may be before that of an event that was found first.
-        let mut marks: Vec<Mark> = batch.events.iter().map(Mark::from).collect();
-        marks.sort_by_key(|mark| mark.at);
-        let mut marks = marks.iter().peekable();
-        for (at, values) in batch.recorded.iter().flat_map(Recorder::rows) {
+        let mut marks = batch.marks.iter().peekable();
+        let rows = batch.rows.iter().map(|(at, values)| (*at, values.as_slice()));
+        for (at, values) in batch.recorded.iter().flat_map(Recorder::rows).chain(rows) {
             while let Some((ended, frame)) = frames.next_if(|(ended, _)| *ended <= at) {
                 self.frame(*ended, frame)?;
             }

@@ -175,7 +175,7 @@ impl Run {
 /// What has happened since the batch before.
 fn batch(runner: &mut Runner) -> Batch {
     let Kept { frames, events } = runner.take_kept();
-    Batch { recorded: runner.world_mut().take_recorded(), frames, events }
+    Batch::of_world(runner.world_mut().take_recorded(), frames, &events)
 }
 
 /// `torque=1.5`.
