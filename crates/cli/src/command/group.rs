@@ -205,6 +205,17 @@ impl Planned {
             is_base: false,
         }
     }
+
+    /// Says which axes will not move evenly, as `check` says it of a file.
+    fn note_uneven(&self, context: &Context) {
+        let cycle = self.cycle();
+        for AxisSetup { drive, mode, .. } in &self.axes {
+            let uneven = drive.axis_description().and_then(|axis| cycle.uneven(axis, Some(*mode)));
+            if let Some((what, own)) = uneven {
+                context.note(&format!("node {}: {what}: give --period {own:?}", drive.node().id()));
+            }
+        }
+    }
 }
 
 /// What was seen on the way.
@@ -248,6 +259,7 @@ impl Move {
         let planned = self.plan(context).await?;
         let drives: Vec<_> = planned.axes.iter().map(|axis| &axis.drive).collect();
         refuse_too_full(context, &planned.cycle(), &drives).await?;
+        planned.note_uneven(context);
         let mut guards = Vec::new();
         for axis in &planned.axes {
             guards.push(self.guard.begin(context, &axis.drive).await?);

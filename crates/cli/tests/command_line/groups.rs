@@ -55,11 +55,25 @@ fn a_group_of_the_file_holds_the_axes_that_are_not_named_and_keeps_to_its_softwa
     refused(&["group", "move", &file, "1=90deg", "--within", "10ms"], 1, "give more time, or raise a limit");
 }
 
+/// M Robot Joint Motor CanOpen Manual, 5.10.3: an interpolation cycle each 2 ms. The ZLAC8030L is moved by speeds.
+#[test]
+fn a_period_in_which_a_joint_does_not_move_evenly_is_said() {
+    const WARNING: &str = "node 1: it takes 2ms from one point to the next";
+    let move_both = |options: &[&str]| done(&[&["group", "move", "1=2deg", "4=2deg"][..], options].concat()).err;
+    for (options, uneven) in [(&[][..], true), (&["--period", "4ms"], true), (&["--period", "2ms"], false)] {
+        let said = move_both(options);
+        assert_eq!(said.contains(WARNING), uneven, "{options:?}: {said}");
+        assert_eq!(said.contains("give --period 2ms"), uneven, "{options:?}: {said}");
+        assert!(!said.contains("node 4: it takes"), "{options:?}: {said}");
+    }
+}
+
 #[test]
 fn what_is_no_group_move_is_refused() {
     refused(&["group", "move", "1=90deg", "1=0deg"], 2, "two positions for node 1");
     refused(&["group", "move", "90deg"], 2, "expected a machine file, FILE.toml, or NODE=POSITION");
     refused(&["group", "move", "4=NaN"], 2, "does not begin with a number");
+    refused(&["group", "move", "4=30"], 2, "'30' has no unit: expected an angle, e.g. 30deg");
     refused(&["group", "move", "4=1turn", "--acceleration", "300ms"], 2, "expected a rate above 0");
     refused(&["group", "move", "4=1turn", "--velocity", "9000rpm"], 1, "the drive does 1000 r/min at most");
     refused(&["group", "move", "/no/such/file.toml", "4=1turn"], 1, "cannot use the machine file");

@@ -7,7 +7,6 @@ use can::Bitrate;
 use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use canopen::pdo::{Direction, PdoNumber};
 use canopen::{Mux, NodeId};
-use cia402::ModeOfOperation;
 use devices::HostWatch;
 use master::boot::{BootPlan, Expectation};
 
@@ -74,8 +73,6 @@ pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     let nodes = intended.nodes.iter().map(row).collect();
     Ok(Checked { nodes, findings: found.into_sorted(), intended: Ok(intended), machine: Some(machine) })
 }
-
-const CSP: ModeOfOperation = ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION;
 
 fn located(field: &Field<'_>) -> Place {
     let at = field.problem("").locate(field.source_text());
@@ -144,20 +141,13 @@ fn intended(machine: &Machine, places: &BTreeMap<u8, Places>, periods: &[Place])
     }
 }
 
-/// A drive whose interpolation takes a time of its own stands between two points of a longer cycle, and is cut short by a shorter one.
+/// See [`CyclePlan::uneven`](crate::file::CyclePlan::uneven).
 fn interpolation(moved: &MovedAt, nodes: &BTreeMap<NodeId, IntendedNode>, report: &mut Reporter<'_>) {
     report.rule = "interpolation";
     for (node, said) in &moved.cycle.nodes {
         let axis = nodes.get(node).and_then(|node| node.description.first_axis());
-        let Some((axis, own)) = axis.and_then(|axis| Some((axis, axis.interpolation?))) else { continue };
-        // As a group chooses where the file does not: positions for each cycle before interpolated ones.
-        let is_ip = said.map_or(!axis.modes.contains(&CSP), |mode| mode == ModeOfOperation::INTERPOLATED_POSITION);
-        let period = moved.cycle.period;
-        if is_ip && !moved.cycle.is_base && period != own {
+        if let Some((what, own)) = axis.and_then(|axis| moved.cycle.uneven(axis, *said)) {
             report.node = Some(*node);
-            let what = format!(
-                "it takes {own:?} from one point to the next whatever the cycle is: in a cycle of {period:?} it does not move evenly"
-            );
             report.say(Severity::Warning, moved.at, what, format!("set `period = \"{own:?}\"`"));
         }
     }

@@ -7,6 +7,7 @@ use can::Bitrate;
 use canopen::NodeId;
 use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use cia402::ModeOfOperation;
+use devices::AxisDescription;
 use master::group::{AxisSetup, GroupError};
 use master::plan::{NodeTraffic, Plan, Settings, plan, shortest_cycle};
 use master::units::Shown;
@@ -64,6 +65,19 @@ impl From<&BasePlan> for CyclePlan {
 }
 
 impl CyclePlan {
+    /// Why one of its drives does not move evenly, and in which period it would. A drive whose interpolation takes a time of its own
+    /// stands between two points of a longer cycle, and is cut short by a shorter one.
+    pub fn uneven(&self, axis: &AxisDescription, said: Option<ModeOfOperation>) -> Option<(String, Duration)> {
+        const CSP: ModeOfOperation = ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION;
+        let (own, period) = (axis.interpolation?, self.period);
+        // As a group chooses where nothing is said: positions for each cycle before interpolated ones.
+        let is_ip = said.map_or(!axis.modes.contains(&CSP), |mode| mode == ModeOfOperation::INTERPOLATED_POSITION);
+        let what = format!(
+            "it takes {own:?} from one point to the next whatever the cycle is: in a cycle of {period:?} it does not move evenly"
+        );
+        (is_ip && !self.is_base && period != own).then_some((what, own))
+    }
+
     /// The mode in which one of its drives is moved: as the file says, else the best that it has.
     ///
     /// # Errors
