@@ -9,6 +9,8 @@ mod alarm;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::pin::Pin;
+#[cfg(all(test, target_os = "linux"))]
+use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -128,21 +130,34 @@ impl Drop for Sleep {
 #[derive(Clone, Copy, Debug)]
 struct Face {
     zero: Duration,
+    /// How long the machine of a test has slept, in ns.
+    #[cfg(test)]
+    slept_ns: &'static AtomicU64,
 }
 
 #[cfg(target_os = "linux")]
 impl Face {
     fn new() -> Self {
-        Self { zero: Self::since_boot() }
+        Self {
+            zero: Self::since_boot(),
+            #[cfg(test)]
+            slept_ns: Box::leak(Box::default()),
+        }
     }
 
     fn now(self) -> Instant {
-        Instant::ZERO + (Self::since_boot() - self.zero)
+        let shown = Instant::ZERO + (Self::since_boot() - self.zero);
+        #[cfg(test)]
+        let shown = shown.plus_nanos(self.slept_ns.load(SeqCst));
+        shown
     }
 
     /// When `at` is, by CLOCK_BOOTTIME.
     fn absolute(self, at: Instant) -> Duration {
-        self.zero + (at - Instant::ZERO)
+        let since_boot = self.zero + (at - Instant::ZERO);
+        #[cfg(test)]
+        let since_boot = since_boot.saturating_sub(Duration::from_nanos(self.slept_ns.load(SeqCst)));
+        since_boot
     }
 
     fn since_boot() -> Duration {
@@ -325,6 +340,30 @@ mod tests {
         assert_eq!(order.recv().await, Some(()));
         assert!(!far.is_finished());
         far.abort();
+    }
+
+    /// The system's clock that goes on while a machine sleeps is ahead when it wakes, and so is what was due meanwhile: a master
+    /// that is handed this time finds that it was held up (`ferrodrive_master`, `core::presence`).
+    #[cfg(target_os = "linux")]
+    #[tokio::test]
+    async fn the_time_in_which_the_machine_slept_has_passed_and_what_was_due_in_it_is_late() {
+        const HOUR: Duration = Duration::from_secs(3600);
+        let clock = WallClock::start();
+        let (due, far) = (clock.sleep(HOUR / 2), clock.sleep(HOUR * 2));
+        let (mut due, mut far) = (std::pin::pin!(due), std::pin::pin!(far));
+        tokio::select! {
+            () = &mut due => unreachable!("half an hour has not passed"),
+            () = clock.sleep(Duration::from_millis(1)) => {}
+        }
+        clock.face.slept_ns.store(HOUR.as_nanos() as u64, SeqCst);
+        // The kernel's timer goes off when the machine wakes; here another one does.
+        clock.timer.queue.alarm.set(Some(Duration::ZERO));
+        due.await;
+        assert!(clock.now() >= Instant::ZERO + HOUR, "{:?}", clock.now());
+        tokio::select! {
+            () = &mut far => unreachable!("two hours have not passed"),
+            () = clock.sleep(Duration::from_millis(1)) => {}
+        }
     }
 
     #[tokio::test]
