@@ -182,6 +182,11 @@ impl Context {
         self.restorer.replace(Some(restorer));
     }
 
+    /// The command may have written what is to be put back.
+    pub(crate) fn is_to_restore(&self) -> bool {
+        self.restorer.borrow().is_some()
+    }
+
     /// Puts back what the command has written, if it has; what could not be.
     pub(crate) async fn restore(&self) -> Option<Vec<String>> {
         let restorer = self.restorer.take()?;

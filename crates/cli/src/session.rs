@@ -24,7 +24,7 @@ use crate::frames::tap::Traffic;
 use crate::global::Global;
 use crate::progress::Progress;
 use crate::recording::{LogPath, interface_of};
-use crate::signals::asked_to_end;
+use crate::signals::{Signals, asked_to_end};
 use crate::wire;
 use machine::file::Machine;
 use serve::live::{LiveBus, LostBus};
@@ -117,7 +117,7 @@ fn shared_bus<R>(
         }
         let ended = match command(context).await {
             Ok(done) => Ok(done),
-            Err(failure) => Err(stop_what_moves(context, failure).await),
+            Err(failure) => Err(stop_what_moves(context, failure, std::future::pending()).await),
         };
         context.note_twins();
         ended
@@ -191,6 +191,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     }
     let notes = RefCell::new(BusNotes::of(&global.bus));
     let until = async {
+        let mut signals = Signals::listen();
         let failure = tokio::select! {
             result = async {
                 embedded::wait_until_booted(&context.network, embedded.as_deref().unwrap_or_default()).await?;
@@ -199,9 +200,9 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
                 Ok(done) => return Ok(done),
                 Err(failure) => failure,
             },
-            signal = asked_to_end() => Failure::ended_by(signal),
+            signal = signals.next() => Failure::ended_by(signal),
         };
-        let failure = stop_what_moves(&context, failure).await;
+        let failure = stop_what_moves(&context, failure, asked_again(&context, signals)).await;
         let notes = notes.borrow();
         // People have read them when they came; programs have only the final report.
         let failure = notes.troubles().filter(|_| global.json).fold(failure, Failure::because);
@@ -267,10 +268,35 @@ pub(crate) fn exit_on_signal() {
     });
 }
 
-/// Stops every node that this command has set in motion; the failure then says what was seen of that.
-async fn stop_what_moves(context: &Context, failure: Failure) -> Failure {
-    let failure = stop(&context.network, THIS).await.iter().fold(failure, with_account);
-    match context.restore().await {
+/// What a terminal and the programs about this one send within this time is one wish to end: a shell, `make` and the like pass
+/// Ctrl-C on to a process that has had it already. By then the quick stops are out.
+const ONE_WISH: Duration = Duration::from_millis(250);
+
+/// Until a further signal comes that is a wish of its own.
+async fn asked_again(context: &Context, mut signals: Signals) {
+    let began = context.network.now();
+    while context.network.now() - began < ONE_WISH {
+        signals.next().await;
+    }
+}
+
+/// Stops every node that this command has set in motion; the failure then says what was seen of that. When `again` is done, the wait
+/// for it ends at once: drives that were not seen to stand may still be moving.
+async fn stop_what_moves(context: &Context, failure: Failure, again: impl Future<Output = ()>) -> Failure {
+    if !context.network.moved().is_empty() {
+        context.progress.show("stopping; Ctrl-C again ends without seeing the drives stand");
+    }
+    let writes = context.is_to_restore();
+    let (accounts, restored) = tokio::select! {
+        done = async { (stop(&context.network, THIS).await, context.restore().await) } => done,
+        () = again => {
+            let failure = Account::of_unawaited(&context.network, THIS).iter().fold(failure, with_account);
+            let left = writes.then_some("not all that had been written was put back: the command was interrupted again");
+            return left.into_iter().fold(failure, Failure::because);
+        }
+    };
+    let failure = accounts.iter().fold(failure, with_account);
+    match restored {
         Some(left) if left.is_empty() => failure.because("what had been written was put back"),
         Some(left) => left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}"))),
         None => failure,

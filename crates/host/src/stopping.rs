@@ -47,6 +47,17 @@ impl Account {
         network.moved().iter().map(lost).collect()
     }
 
+    /// Of the drives that have their quick stop, and that nobody waits for to stand.
+    pub fn of_unawaited(network: &Network, who: &str) -> Vec<Self> {
+        let left = |node| {
+            let text = format!(
+                "node {node} may still be moving: its quick stop has been sent, and the wait for its standstill was interrupted"
+            );
+            Self::moving(node, text, network.guarded(node), who)
+        };
+        network.moved().iter().map(left).collect()
+    }
+
     fn moving(node: NodeId, text: String, loss: Option<HostLoss>, who: &str) -> Self {
         let by_itself = loss.map(|loss| format!("without {who} {loss}"));
         Self { node, stands: false, because: [text].into_iter().chain(by_itself).collect() }
