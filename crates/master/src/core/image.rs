@@ -281,6 +281,13 @@ impl ProcessImage {
         pdo.at.map(|_| self.cycle.saturating_sub(pdo.cycle))
     }
 
+    /// The bits of a place in a TPDO, and how many cycles have begun since they came; as [`at`](Self::at).
+    #[inline]
+    pub(super) fn aged(&self, place: ImagePlace) -> Option<(u64, u64)> {
+        let pdo = self.tpdos.get(usize::from(place.slot)).filter(|pdo| pdo.generation == place.generation)?;
+        pdo.at.map(|_| (place.of(pdo.data), self.cycle.saturating_sub(pdo.cycle)))
+    }
+
     /// Puts bits into a place of an RPDO and queues it by its trigger. False after a new mapping.
     #[inline]
     pub(super) fn put(&mut self, place: ImagePlace, raw: u64) -> bool {

@@ -172,7 +172,16 @@ impl Presence {
         heartbeats.or_else(|| self.feeds.iter().filter(|feed| feed.node == node).find_map(|feed| feed.patience.lapse))
     }
 
+    #[inline]
     pub(super) fn poll_transmit(&mut self) -> Option<Frame> {
+        if self.pending.is_empty() && self.asked.is_empty() {
+            return None;
+        }
+        self.next_frame()
+    }
+
+    #[inline(never)]
+    fn next_frame(&mut self) -> Option<Frame> {
         if let Some(node) = self.pending.first() {
             self.pending.remove(node);
             return Some(Heartbeat { node, state: NmtState::Operational.heartbeat_byte() }.emit());

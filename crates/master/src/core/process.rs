@@ -45,6 +45,12 @@ impl Core {
         self.image.at(signal.place).map(|Received { raw, .. }| T::from_field(raw, &signal.field))
     }
 
+    /// The same, with the cycles that have begun since it came.
+    #[inline]
+    pub(crate) fn read_aged<T: Sample>(&self, signal: &Signal<T>) -> Option<(T, u64)> {
+        self.image.aged(signal.place).map(|(raw, age)| (T::from_field(raw, &signal.field), age))
+    }
+
     /// Cycles that have begun since the value came: 0 in its own. `None` where there is none.
     pub fn cycles_since<T>(&self, signal: &Signal<T>) -> Option<u64> {
         self.image.cycles_since(signal.place)

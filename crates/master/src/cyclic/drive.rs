@@ -72,6 +72,10 @@ pub(super) struct CyclicProgress {
     odd_step: bool,
     /// Its power stage was on in the step before.
     had_power: bool,
+    /// What was sent was not what holds it where it is.
+    asked_to_turn: bool,
+    /// Where it was noted that it is in motion.
+    noted_at: usize,
     pub(super) standstill: Standstill,
 }
 
@@ -79,7 +83,16 @@ impl CyclicProgress {
     /// Of a shaft that stands below this speed, in r/min of the output.
     pub(super) const fn new(standstill_rpm: f64) -> Self {
         let standstill = Standstill::new(standstill_rpm);
-        Self { spoken: false, followed: false, latched: None, odd_step: false, had_power: true, standstill }
+        Self {
+            spoken: false,
+            followed: false,
+            latched: None,
+            odd_step: false,
+            had_power: true,
+            asked_to_turn: false,
+            noted_at: 0,
+            standstill,
+        }
     }
 }
 
@@ -133,7 +146,7 @@ impl CyclicDrive {
 
     /// How long its shaft has to stand until it is taken to.
     pub(crate) const fn stands_after(&mut self, time: Duration) {
-        self.progress.standstill.time = time;
+        self.progress.standstill.set_time(time);
     }
 
     /// Whether its shaft stands is to be seen from here on. See [`at_rest`](super::at_rest).
@@ -142,13 +155,18 @@ impl CyclicDrive {
     }
 
     fn look_for_rest(&mut self, io: &mut Exchange<'_>, seen: &CyclicState) {
-        let had_power = core::mem::replace(&mut self.progress.had_power, !seen.is_without_power());
-        if had_power && seen.is_without_power() {
+        if self.progress.asked_to_turn && seen.power == Some(PowerState::OperationEnabled) {
+            // Whether it stands is not asked until it is to hold.
+            return self.begin_rest();
+        }
+        let is_without_power = seen.is_without_power();
+        let had_power = core::mem::replace(&mut self.progress.had_power, !is_without_power);
+        if had_power && is_without_power {
             // What its motor has held stands until then: the load may turn it from here on.
             self.begin_rest();
         }
         self.progress.standstill.look(seen, io.now());
-        if seen.is_without_power() && self.progress.standstill.stands() {
+        if is_without_power && self.progress.standstill.stands() {
             io.note_stands(&self.axis);
         }
     }
@@ -190,7 +208,8 @@ impl CyclicDrive {
             Ok(self.target.rest(self.actual(io)))
         };
         // The last speed or current, sent again, would be followed without end.
-        let raw = wish.unwrap_or_else(|_| self.target.hold());
+        let held = self.target.hold();
+        let raw = wish.unwrap_or(held);
         if io.write(self.target.set_point, raw) {
             self.target.last_sent = raw;
         } else if demand.wants_power() {
@@ -204,8 +223,9 @@ impl CyclicDrive {
         self.send_controlword(io, word, seen.power);
         let follows = enabled && self.progress.latched.is_none();
         self.progress.followed = follows;
+        self.progress.asked_to_turn = follows && raw != held;
         if follows {
-            io.note_moving(self.axis, self.watch);
+            self.progress.noted_at = io.note_moving(&self.axis, self.watch, self.progress.noted_at);
         } else {
             io.note_resting(self.watch);
         }
@@ -233,7 +253,8 @@ impl CyclicDrive {
 
     fn look(&self, io: &Exchange<'_>) -> CyclicState {
         let cycles = self.patience(io);
-        let statusword = io.read_fresh(self.statusword, cycles).map(Statusword);
+        let newest = io.read_aged(&self.statusword);
+        let statusword = newest.filter(|(_, age)| *age <= cycles).map(|(raw, _)| Statusword(raw));
         CyclicState {
             statusword,
             power: statusword.and_then(|statusword| self.style.state(statusword)),
@@ -241,7 +262,7 @@ impl CyclicDrive {
             position: self.position.and_then(|signal| io.read_fresh(signal, cycles)),
             velocity: self.velocity.and_then(|signal| io.read_fresh(signal, cycles)),
             current: self.current.and_then(|signal| io.read_fresh(signal, cycles)),
-            age: io.cycles_since(self.statusword),
+            age: newest.map(|(_, age)| age),
             refused: None,
         }
     }

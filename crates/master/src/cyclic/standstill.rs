@@ -16,7 +16,9 @@ pub(super) struct Standstill {
     /// Slower than this it stands, r/min of the output.
     limit_rpm: f64,
     /// How long it has to stand.
-    pub(super) time: Duration,
+    time: Duration,
+    /// As far as it may go in that time, in turns.
+    way_turns: f64,
     /// The newest look.
     now: Instant,
     stood_since: Option<Instant>,
@@ -30,7 +32,13 @@ impl Standstill {
     /// Of a shaft that stands below this speed.
     pub(super) const fn new(limit_rpm: f64) -> Self {
         let (now, stood_since) = (Instant::ZERO, None);
-        Self { limit_rpm, time: STANDS_FOR, now, stood_since, from_turns: 0.0, turned_rpm: None }
+        let way_turns = way_turns(limit_rpm, STANDS_FOR);
+        Self { limit_rpm, time: STANDS_FOR, way_turns, now, stood_since, from_turns: 0.0, turned_rpm: None }
+    }
+
+    /// It has to stand for so long.
+    pub(super) const fn set_time(&mut self, time: Duration) {
+        (self.time, self.way_turns) = (time, way_turns(self.limit_rpm, time));
     }
 
     /// It has to stand from here on: that it stood before says nothing of what comes.
@@ -39,6 +47,7 @@ impl Standstill {
     }
 
     /// What its drive shows now.
+    #[inline]
     pub(super) fn look(&mut self, shown: &CyclicState, now: Instant) {
         self.now = now;
         let position = shown.position.map(|Turns(turns)| turns);
@@ -47,7 +56,7 @@ impl Standstill {
             (None, Some(turns), Some(since)) => {
                 let gone = turns - self.from_turns;
                 // Further than it may go in the whole time: the speed that brought it there is a mean.
-                if (gone * 60.0).abs() < self.limit_rpm * self.time.as_secs_f64() {
+                if gone.abs() < self.way_turns {
                     return;
                 }
                 gone * 60.0 / (now - since).as_secs_f64().min(self.time.as_secs_f64())
@@ -74,6 +83,10 @@ impl Standstill {
     pub(super) fn stands(&self) -> bool {
         self.stood_since.is_some_and(|since| self.now - since >= self.time)
     }
+}
+
+const fn way_turns(limit_rpm: f64, time: Duration) -> f64 {
+    limit_rpm / 60.0 * time.as_secs_f64()
 }
 
 #[cfg(test)]

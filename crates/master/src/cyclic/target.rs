@@ -41,9 +41,9 @@ impl Target {
             | (Demand::Current(Amperes(value)), TargetKind::Current { per_count }) => whole(value / per_count)?,
             _ => return Err(Refusal::WrongKind),
         };
-        let limits = self.limits;
+        let limits = &self.limits;
         if !limits.take(raw) || limits.holding_back(raw).is_some() {
-            return Err(Refusal::OutOfLimits { asked: raw, bound: limits.into() });
+            return Err(Refusal::OutOfLimits { asked: raw, bound: self.limits.into() });
         }
         self.check_step(raw, period)?;
         Ok(raw)
@@ -78,8 +78,32 @@ impl Target {
     }
 }
 
-/// The nearest count.
+/// The nearest count, half a count away from zero: [`f64::round`] without its call in each cycle.
 fn whole(value: f64) -> Result<i64, Refusal> {
-    // No object of 64 bits goes beyond this.
-    if value.abs() < 9e18 { Ok(value.round() as i64) } else { Err(Refusal::NoNumber) }
+    // No object of 64 bits goes beyond this, and what is not a number is not below it.
+    if value.abs() < 9e18 {
+        let whole = value as i64;
+        // Exact: there are no more digits than before.
+        let rest = value - whole as f64;
+        Ok(whole + i64::from(rest >= 0.5) - i64::from(rest <= -0.5))
+    } else {
+        Err(Refusal::NoNumber)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_count_is_rounded_as_the_standard_library_rounds() {
+        let near =
+            [0.0, 0.25, 0.499_999_999_999_999_94, 0.5, 0.75, 1.5, 2.5, 1e6 + 0.5, 1e15 + 0.5, 4.5e15 + 0.5, 8.9e18];
+        for value in near.into_iter().flat_map(|value: f64| [value, -value, value.next_up(), value.next_down()]) {
+            assert_eq!(whole(value), Ok(value.round() as i64), "{value}");
+        }
+        for value in [9e18, -9e18, f64::INFINITY, f64::NAN] {
+            assert_eq!(whole(value), Err(Refusal::NoNumber), "{value}");
+        }
+    }
 }

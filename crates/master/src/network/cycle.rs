@@ -114,8 +114,13 @@ impl Exchange<'_> {
     /// As [`read`](Self::read), if the value is not older than this many cycles: 0 for one that came in this cycle.
     #[inline]
     pub fn read_fresh<T: Sample>(&self, signal: Signal<T>, cycles: u64) -> Option<T> {
-        let fresh = self.core.cycles_since(&signal)? <= cycles;
-        if fresh { self.core.read(&signal) } else { None }
+        self.read_aged(&signal).filter(|(_, age)| *age <= cycles).map(|(value, _)| value)
+    }
+
+    /// As [`read`](Self::read), with the cycles that have begun since the value came.
+    #[inline]
+    pub(crate) fn read_aged<T: Sample>(&self, signal: &Signal<T>) -> Option<(T, u64)> {
+        self.core.read_aged(signal)
     }
 
     /// Cycles that have begun since the value came. `None` where there is no value.
@@ -130,10 +135,12 @@ impl Exchange<'_> {
         self.core.write(&set_point, value)
     }
 
-    /// A set-point was given in this cycle: the axis with this controlword is in motion.
-    pub(crate) fn note_moving(&mut self, axis: MovedAxis, watch: WatchId) {
+    /// A set-point was given in this cycle: the axis is in motion. It is noted at a place, which is returned; `place` is the one of the
+    /// cycle before.
+    #[inline]
+    pub(crate) fn note_moving(&mut self, axis: &MovedAxis, watch: WatchId, place: usize) -> usize {
         self.core.note_moving(watch);
-        self.moved.insert(axis);
+        self.moved.insert_at(axis, place)
     }
 
     /// Nothing was given in this cycle that moves the node.

@@ -187,7 +187,7 @@ impl Network {
     }
 
     pub(crate) fn note_axis_moved(&self, axis: MovedAxis) {
-        self.lock().moved.insert(axis);
+        self.lock().moved.insert(&axis);
     }
 
     /// Notes that it was seen to stand.

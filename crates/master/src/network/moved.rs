@@ -34,13 +34,22 @@ impl Default for Moved {
 }
 
 impl Moved {
-    /// Notes an axis; what is known of it stays known.
-    pub(super) fn insert(&mut self, axis: MovedAxis) {
-        match self.0.iter_mut().find(|known| known.is(axis.node, axis.controlword)) {
-            Some(known) if known.description.is_none() => *known = axis,
+    /// Notes an axis, and returns its place; what is known of it stays known.
+    pub(super) fn insert(&mut self, axis: &MovedAxis) -> usize {
+        let place = self.0.iter().position(|known| known.is(axis.node, axis.controlword));
+        match place.and_then(|place| self.0.get_mut(place)) {
+            Some(known) if known.description.is_none() => *known = *axis,
             Some(_) => {}
-            None => self.0.push(axis),
+            None => self.0.push(*axis),
         }
+        place.unwrap_or(self.0.len() - 1)
+    }
+
+    /// The same for an axis of a known model that may still be where it was: no cycle looks through all of them.
+    #[inline]
+    pub(super) fn insert_at(&mut self, axis: &MovedAxis, place: usize) -> usize {
+        let is_there = |known: &MovedAxis| known.is(axis.node, axis.controlword) && known.description.is_some();
+        if self.0.get(place).is_some_and(is_there) { place } else { self.insert(axis) }
     }
 
     pub(super) fn remove(&mut self, node: NodeId, controlword: Mux) {
