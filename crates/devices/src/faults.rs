@@ -28,12 +28,19 @@ pub struct FaultRow {
     pub error_register: u8,
     /// Error code of the EMCY message.
     pub emcy: EmcyErrorCode,
+    /// The sensor of the shaft is at fault: the position and the speed that the drive shows are not the shaft's.
+    pub hides_motion: bool,
 }
 
 impl FaultRow {
     /// A fault whose EMCY error code is the value of the drive's fault code object.
     pub const fn new(code: u16, name: &'static str, error_register: u8, remedy: &'static str) -> Self {
-        Self { code, name, remedy, error_register, emcy: EmcyErrorCode(code) }
+        Self { code, name, remedy, error_register, emcy: EmcyErrorCode(code), hides_motion: false }
+    }
+
+    /// The same, of the sensor of the shaft.
+    pub const fn hiding_motion(self) -> Self {
+        Self { hides_motion: true, ..self }
     }
 }
 

@@ -41,5 +41,5 @@ pub static ALARMS: [FaultRow; ALARM_COUNT] = [
 
 /// EMCY codes are not used: the drive sends none.
 const fn alarm(code: u16, name: &'static str, remedy: &'static str) -> FaultRow {
-    FaultRow { code, name, remedy, error_register: 0, emcy: EmcyErrorCode::NO_ERROR }
+    FaultRow { code, name, remedy, error_register: 0, emcy: EmcyErrorCode::NO_ERROR, hides_motion: false }
 }

@@ -48,7 +48,7 @@ pub static FAULTS: [FaultRow; FAULT_COUNT] = [
     fault(ErrorCode::DEVICE_OVER_TEMPERATURE, "Power stage too hot", TEMPERATURE, "Let it cool; look after its ventilation."),
     fault(ErrorCode::DRIVE_OVER_TEMPERATURE, "Motor too hot", TEMPERATURE, "Let it cool; relieve it."),
     fault(ErrorCode::DATA_STORAGE, "Parameter store", 0, "Restore the default parameters (1011h) and store them (1010h)."),
-    fault(ErrorCode::ENCODER_1, "Encoder", PROFILE, "Look after the encoder's cable."),
+    fault(ErrorCode::ENCODER_1, "Encoder", PROFILE, "Look after the encoder's cable.").hiding_motion(),
     fault(ErrorCode::LIFE_GUARD_OR_HEARTBEAT, "Heartbeat lost", COMMUNICATION, "Look after the node that is watched (1016h); then reset."),
     fault(ErrorCode::FOLLOWING_ERROR, "Following error", PROFILE, "Ask for less speed or acceleration, or widen 6065h and 6066h."),
     fault(ErrorCode::RECOVERED_FROM_BUS_OFF, "Bus-off", COMMUNICATION, "Look after cable, termination and bit rates; then reset."),

@@ -2,7 +2,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use can::Instant;
-use canopen::emcy::Emcy;
+use canopen::emcy::{Emcy, EmcyErrorCode};
 use canopen::{NmtCommand, NmtState};
 use devices::Description;
 
@@ -70,6 +70,12 @@ impl NodeFacts {
     /// The emergency messages kept, oldest first, with the time each came.
     pub fn emcys(&self) -> impl DoubleEndedIterator<Item = &(Instant, Emcy)> {
         self.emcys.iter()
+    }
+
+    /// True if an error with such a code has come since the node has last reported that it has none.
+    pub(crate) fn has_shown(&self, is_meant: impl Fn(EmcyErrorCode) -> bool) -> bool {
+        let codes = self.emcys.iter().rev().map(|(_, emcy)| emcy.code);
+        codes.take_while(|code| *code != EmcyErrorCode::NO_ERROR).any(is_meant)
     }
 
     /// The newest emergency message.

@@ -165,7 +165,13 @@ impl CyclicDrive {
             // What its motor has held stands until then: the load may turn it from here on.
             self.begin_rest();
         }
-        self.progress.standstill.look(seen, io.now());
+        let faulted = matches!(seen.power, Some(PowerState::Fault | PowerState::FaultReactionActive));
+        if faulted && io.is_blind(&self.axis) {
+            // What it shows is not its shaft's.
+            self.begin_rest();
+        } else {
+            self.progress.standstill.look(seen, io.now());
+        }
         if is_without_power && self.progress.standstill.stands() {
             io.note_stands(&self.axis);
         }

@@ -23,6 +23,8 @@ pub(crate) enum Trigger {
     Mode(ModeOfOperation),
     /// The shaft does not come to rest; speed in r/min.
     StillTurning(f64),
+    /// The sensor of its shaft is at fault, with this name, so that the speed it shows is none; and what to do about that.
+    Unseen { sensor: &'static str, remedy: &'static str },
     /// Operation ended in the middle of a motion.
     LostOperation,
     /// The set-point was not acknowledged (bit 12).
@@ -63,6 +65,7 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
     match trigger {
         Trigger::Silent(error) => return silent(error),
         Trigger::HeldUp(time) => return held_up(*time),
+        Trigger::Unseen { sensor, remedy } => return unseen(sensor, remedy),
         _ => {}
     }
     // A drive without the state machine has alarms that stop it and leave it enabled.
@@ -165,6 +168,7 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
             .to_owned(),
         ),
         Trigger::Elsewhere { at, target, unit, by } => elsewhere(*at, *target, unit, by),
+        Trigger::Unseen { sensor, remedy } => unseen(sensor, remedy),
         Trigger::Fault | Trigger::LostOperation | Trigger::HeldUp(_) | Trigger::Silent(_) => text(
             "The drive is no longer where it was a moment ago",
             "Read its state again: it changes while it is read",
@@ -180,6 +184,15 @@ fn held_up(time: Duration) -> (String, String) {
             time.as_secs_f64()
         ),
         "Check where it stands, then start the motion again".to_owned(),
+    )
+}
+
+fn unseen(sensor: &str, remedy: &str) -> (String, String) {
+    (
+        format!(
+            "The drive is at fault ({sensor}) and has taken the power off its motor. It does not see its shaft, which may coast on"
+        ),
+        format!("See for yourself that it stands, or use the emergency stop. {remedy}"),
     )
 }
 

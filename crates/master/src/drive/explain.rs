@@ -14,6 +14,18 @@ pub fn faults_in(description: &Description, code: u16) -> Vec<&'static FaultRow>
     description.faults.table.iter().filter(matches).collect()
 }
 
+/// The fault among these codes by which a drive does not see its shaft. Of an unknown model it is by CiA 402-2, table of error codes:
+/// 7300h to 730Fh are its sensors.
+pub(super) fn blinding(description: Option<&Description>, code: u16) -> Option<(&'static str, &'static str)> {
+    match description {
+        Some(description) => {
+            let mut rows = faults_in(description, code).into_iter();
+            rows.find(|row| row.hides_motion).map(|row| (row.name, row.remedy))
+        }
+        None => (code & 0xFFF0 == 0x7300).then_some(("a sensor of its shaft", "Look after its cable.")),
+    }
+}
+
 impl Drive {
     /// Looks at everything that may explain why `intent` failed.
     pub(crate) async fn not_reached(&self, intent: &'static str, trigger: Trigger) -> Error {

@@ -12,6 +12,7 @@ use cia402::{Controlword, PowerCommand, PowerState, Statusword};
 use devices::PowerStyle;
 
 use super::conclude::Trigger;
+use super::explain::blinding;
 use super::handle::{Drive, POLL};
 use super::power::{STANDSTILL_LOOKS, STANDSTILL_RPM};
 use crate::core::{Command, Core, NodeSet, Payload, Request, Transfer};
@@ -168,6 +169,8 @@ impl Network {
 struct Rest {
     looks: u32,
     position: Option<i64>,
+    /// The drive is at fault.
+    at_fault: bool,
 }
 
 impl Drive {
@@ -194,10 +197,13 @@ impl Drive {
         let began = network.now();
         let (mut stop_sent, mut heard, mut silence) = (None, began, silence);
         let mut limit = None;
-        let mut rest = Rest { looks: 0, position: None };
+        let mut rest = Rest { looks: 0, position: None, at_fault: false };
         loop {
             match self.look_at_rest(&mut stop_sent, &mut rest).await {
                 Ok(true) => {
+                    if rest.at_fault {
+                        self.check_sight(INTENT).await?;
+                    }
                     self.note_stopped();
                     return Ok(network.now() - began);
                 }
@@ -240,6 +246,7 @@ impl Drive {
             *stop_sent = Some(network.now());
         }
         let statusword = self.statusword().await?;
+        rest.at_fault = self.power_style().is_faulted(statusword);
         if self.power_state(statusword) == Some(PowerState::OperationEnabled) {
             rest.looks = 0;
             if stop_sent.is_some_and(|at| network.now() - at >= REPEAT) {
@@ -260,6 +267,20 @@ impl Drive {
         };
         rest.looks = if stands { rest.looks + 1 } else { 0 };
         Ok(rest.looks >= STANDSTILL_LOOKS)
+    }
+
+    /// Fails where a fault keeps the drive from seeing its shaft: the speed that it shows is none.
+    async fn check_sight(&self, intent: &'static str) -> Result<(), Error> {
+        let code = match self.node.upload(self.fault_code()).await {
+            Ok(payload) => payload.raw() as u16,
+            // Such a drive has no fault codes.
+            Err(Error::Aborted { .. }) => return Ok(()),
+            Err(error) => return self.answered(intent, Err(error)).await,
+        };
+        match blinding(self.description, code) {
+            Some((sensor, remedy)) => Err(self.not_reached(intent, Trigger::Unseen { sensor, remedy }).await),
+            None => Ok(()),
+        }
     }
 
     /// True of a drive that a quick stop may give power: one without the state machine, or of an unknown model.

@@ -340,6 +340,7 @@ mod tests {
             ("[1] 4 w 0x6040 0 u16 15", true),
             ("[1] 4 w 0x6040 0 x16 0x010F", true),
             ("[1] 4 w 0x60FF 0 i32 0", true),
+            ("[1] 4 w 0x6042 0 i16 0", true),
             ("[1] 4 w 0x6083 0 u32 100", false),
             ("[1] 4 stop", false),
         ] {

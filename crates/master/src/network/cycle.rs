@@ -158,6 +158,13 @@ impl Exchange<'_> {
         self.moved.remove(axis.node, axis.controlword);
     }
 
+    /// True if the axis has reported a fault by which its drive does not see its shaft, and not that it has ended.
+    pub(crate) fn is_blind(&self, axis: &MovedAxis) -> bool {
+        let rows = axis.description.map_or(&[][..], |description| description.faults.table);
+        let hides = |code| rows.iter().any(|row| row.hides_motion && row.emcy == code);
+        self.core.facts(axis.node).has_shown(hides)
+    }
+
     /// Why the drive was stopped, until it was commanded to switch off.
     pub(crate) fn cycle_loss(&self, watch: WatchId) -> Option<CycleLoss> {
         self.core.cycle_loss(watch)

@@ -68,7 +68,7 @@ pub static FAULTS: [FaultRow; FAULT_COUNT] = [
     FaultRow::new(0x0800, "driver over-temperature", TEMPERATURE,
         "Lower the current and let the drive cool; the limit is 2013h:02."),
     FaultRow::new(0x1000, "encoder", MANUFACTURER,
-        "Check the encoder's cable; check 200Bh (lines) and 200Ch (pole pairs) against the motor."),
+        "Check the encoder's cable; check 200Bh (lines) and 200Ch (pole pairs) against the motor.").hiding_motion(),
     FaultRow::new(0x2000, "speed setting", PROFILE,
         "Firmware 2.01 only. Ask for no more than 200Ah with 60FFh, then reset the fault."),
 ];

@@ -5,8 +5,10 @@
 //! V1.00, chapter 9; user manual V1.03, 5.4), 2000 (r/min)/s and more of the others.
 
 mod another_master;
+mod blind;
 mod everything;
 mod second_try;
+mod stream;
 
 use std::time::Duration;
 
@@ -153,11 +155,20 @@ enum Motion {
     Torque,
     Home,
     GroupMove,
+    /// A stream of points, as of a recorded path.
+    GroupFollow,
     Base,
 }
 
-const MOTIONS: [Motion; 6] =
-    [Motion::Velocity, Motion::Move, Motion::Torque, Motion::Home, Motion::GroupMove, Motion::Base];
+const MOTIONS: [Motion; 7] = [
+    Motion::Velocity,
+    Motion::Move,
+    Motion::Torque,
+    Motion::Home,
+    Motion::GroupMove,
+    Motion::GroupFollow,
+    Motion::Base,
+];
 
 enum Moving {
     Alone,
@@ -175,7 +186,7 @@ impl Bench {
             Motion::Move => self.run(drive.move_relative(Turns(100.0), options())).map(drop),
             Motion::Torque => self.run(drive.torque(Amperes(0.5))).map(drop),
             Motion::Home => self.start_homing(&drive),
-            Motion::GroupMove => return Some(Moving::Group(Box::new(self.group()))),
+            Motion::GroupMove | Motion::GroupFollow => return Some(Moving::Group(Box::new(self.group(motion)))),
             Motion::Base => return self.base().map(|base| Moving::Base(Box::new(base))),
         };
         match moved {
@@ -193,7 +204,7 @@ impl Bench {
             .map(drop)
     }
 
-    fn group(&mut self) -> Group {
+    fn group(&mut self, motion: Motion) -> Group {
         self.moving = NODES.to_vec();
         let axes = self.drives.clone().map(|drive| {
             let mode = AxisSetup::best_mode(&drive).unwrap();
@@ -208,8 +219,12 @@ impl Bench {
         });
         let mut group = self.run(Group::open(&axes, PERIOD, CyclicOptions::default())).unwrap();
         self.run(group.enable()).unwrap();
-        let to: Vec<_> = group.points().iter().map(|point| Turns(point.position_turns + 100.0)).collect();
-        group.start_move(&to, None).unwrap();
+        if motion == Motion::GroupFollow {
+            stream::start(&mut group);
+        } else {
+            let to: Vec<_> = group.points().iter().map(|point| Turns(point.position_turns + 100.0)).collect();
+            group.start_move(&to, None).unwrap();
+        }
         for _ in 0..150 {
             self.run(group.cycle()).unwrap();
         }
@@ -281,7 +296,7 @@ const FROZEN: Duration = Duration::from_secs(4);
 /// What software cannot stop: a model without a watch over its host, whose host no longer talks. A program that was frozen finds
 /// that it is late where it gives set-points in cycles.
 fn is_beyond_software(name: &str, motion: Motion, end: End) -> bool {
-    let in_cycles = matches!(motion, Motion::GroupMove | Motion::Base);
+    let in_cycles = matches!(motion, Motion::GroupMove | Motion::GroupFollow | Motion::Base);
     let silent = matches!(end, End::Killed | End::CableCut) || end == End::Frozen && !in_cycles;
     silent && model(name).unwrap().host_watch == HostWatch::None
 }
@@ -354,6 +369,7 @@ impl Motion {
             Self::Torque => "`torque`",
             Self::Home => "`home`",
             Self::GroupMove => "`group move`",
+            Self::GroupFollow => "a stream of points",
             Self::Base => "`drive-base`",
         }
     }
