@@ -62,7 +62,7 @@ fn rad_s(rpm: i64) -> f64 {
 fn above_the_corner_speed_the_motor_carries_what_voltage_and_setting_allow() {
     // The longer one has twice the inductance, and its corner at half the speed.
     let lengths: [(fn() -> Bench, _, _); 2] = [
-        (Bench::new, StepperMotorModel::ZLIM42_C_70, [700, 800, 1000, 1200]),
+        (Bench::new, StepperMotorModel::ZLIM42_C_70, [650, 700, 1000, 1200]),
         (Bench::long, StepperMotorModel::ZLIM42_C_82, [400, 500, 700, 1000]),
     ];
     for (new, model, speeds) in lengths {
