@@ -47,7 +47,7 @@ impl Account {
         network.moved().iter().map(lost).collect()
     }
 
-    /// Of the drives that have their quick stop, and that nobody waits for to stand.
+    /// Of the drives that have their quick stop, and whose standstill is not awaited.
     pub fn of_unawaited(network: &Network, who: &str) -> Vec<Self> {
         let left = |node| {
             let text = format!(
