@@ -327,19 +327,25 @@ impl HubMotor {
     #[inline]
     pub fn sense(&self) -> Sensors {
         let electrical = self.model.pmsm.electrical_turns(self.rotor.angle);
+        Sensors {
+            encoder_count: self.encoder.count,
+            hall: self.model.hall.state(electrical, self.hall_fault),
+            phase_current_a: self.phase_current_a(),
+            bus_v: self.rig.supply.bus_v,
+            winding_c: reading_c(self.rig.winding.temperature_c),
+            heat_sink_c: reading_c(self.rig.heat_sink.temperature_c),
+        }
+    }
+
+    /// Currents out of the bridges into the wires, with that of wires that touch.
+    #[inline]
+    pub fn phase_current_a(&self) -> [f64; 3] {
         let mut phase_current_a = self.model.pmsm.phase_current_a(&self.pmsm, self.axis);
         if self.wires_touch {
             phase_current_a[0] += self.short_a;
             phase_current_a[1] -= self.short_a;
         }
-        Sensors {
-            encoder_count: self.encoder.count,
-            hall: self.model.hall.state(electrical, self.hall_fault),
-            phase_current_a,
-            bus_v: self.rig.supply.bus_v,
-            winding_c: reading_c(self.rig.winding.temperature_c),
-            heat_sink_c: reading_c(self.rig.heat_sink.temperature_c),
-        }
+        phase_current_a
     }
 
     /// Energy stored now: in motion, in the winding's field and in the bus capacitor.

@@ -288,11 +288,17 @@ impl JointMotor {
             position_counts: self.model.encoder.position_counts(&self.encoder, self.rotor.angle),
             turns_lost: self.encoder.turns_lost,
             battery: self.model.encoder.battery_state(&self.encoder),
-            phase_current_a: self.model.pmsm.phase_current_a(&self.pmsm, self.axis),
+            phase_current_a: self.phase_current_a(),
             bus_v: self.rig.supply.bus_v,
             winding_c: reading_c(self.rig.winding.temperature_c),
             heat_sink_c: reading_c(self.rig.heat_sink.temperature_c),
         }
+    }
+
+    /// Currents out of the bridges into the wires.
+    #[inline]
+    pub fn phase_current_a(&self) -> [f64; 3] {
+        self.model.pmsm.phase_current_a(&self.pmsm, self.axis)
     }
 
     /// The output's angle: the truth behind the gear.

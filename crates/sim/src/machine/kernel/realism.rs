@@ -84,7 +84,8 @@ impl Noise {
 
     /// -1 to 1, each as likely as another.
     fn share(&mut self) -> f32 {
-        (self.prng.next_u64() >> 40) as f32 / (1_u32 << 23) as f32 - 1.0
+        // 24 bits, which any float holds: a signed number of 32 bits is turned into one by one instruction.
+        (self.prng.next_u64() >> 40) as i32 as f32 / (1_u32 << 23) as f32 - 1.0
     }
 }
 

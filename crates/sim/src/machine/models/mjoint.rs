@@ -260,7 +260,7 @@ impl Assembly for Joint {
             inverter: match actuation.power_stage {
                 PowerStage::Off => Inverter::Open,
                 PowerStage::Modulate { duty } if self.dead_time => {
-                    Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+                    Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.phase_current_a()))
                 }
                 PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
             },

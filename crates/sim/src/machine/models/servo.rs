@@ -353,9 +353,7 @@ impl Assembly for ServoBench {
         let AxisActuation { duty, brake_released, .. } = actuation.axes[axis];
         let inverter = match duty.map(|duty| duty.map(f64::from)) {
             None => Inverter::Open,
-            Some(duty) if self.dead_time => {
-                Inverter::Driven(with_dead_time(duty, self.motors[axis].sense().phase_current_a))
-            }
+            Some(duty) if self.dead_time => Inverter::Driven(with_dead_time(duty, self.motors[axis].phase_current_a())),
             Some(duty) => Inverter::Driven(duty),
         };
         hub_motor::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released }

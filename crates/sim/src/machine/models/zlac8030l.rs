@@ -200,7 +200,7 @@ impl Assembly for HubWheel {
             PowerStage::Off => Inverter::Open,
             PowerStage::Shorted => Inverter::Shorted,
             PowerStage::Modulate { duty } if self.dead_time => {
-                Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+                Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.phase_current_a()))
             }
             PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
         };
