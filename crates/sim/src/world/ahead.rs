@@ -9,13 +9,13 @@ use super::World;
 use super::crew::{Errand, Found, Job, OnBus};
 use super::member::{Member, Vacant};
 
-/// Fewer drives than that are no work for several threads: with ten control periods each it is some 8 us, and a hand-over takes 2 to 3.
-const WORTH_IT: usize = 10;
+/// Fewer drives than that are no work for several threads: with ten control periods each it is some 12 us, and a hand-over takes 3.
+const WORTH_IT: usize = 16;
 
 impl World {
     /// How many threads work on the drives, this one among them; 1 in a new world, and 64 at most. The run is the same to the last
     /// bit whatever their number. Drives that a body couples, encoders on the shafts of others with what they look at, and fewer
-    /// than 10 drives that are due at once stay with the caller's thread.
+    /// than 16 drives that are due at once stay with the caller's thread.
     pub fn set_threads(&mut self, threads: usize) {
         self.crew.set_threads(threads);
         self.done_ahead.clear();

@@ -57,7 +57,7 @@ pub(crate) struct Run {
     /// Threads that compute the drives of one run; the result is the same on any number of them (default: 1)
     ///
     /// It pays from some 20 turning drives on. Several runs share the cores by --jobs.
-    #[arg(long, value_name = "N", conflicts_with = "seeds", value_parser = |text: &str| whole(text, 1..=64_u8))]
+    #[arg(long, value_name = "N", conflicts_with = "seeds", hide_short_help = true, value_parser = |text: &str| whole(text, 1..=64_u8))]
     threads: Option<u8>,
     /// Also write the result as JUnit XML, as build servers read it
     #[arg(long, value_name = "FILE", conflicts_with = "seeds", value_parser = file_path)]
