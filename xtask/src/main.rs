@@ -5,6 +5,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a chore talks to a terminal")]
 
 mod bare_metal;
+mod bench;
 mod browser;
 mod conform_peers;
 mod debian;
@@ -50,6 +51,7 @@ The project's own chores.
   cargo xtask wheel              the Python package, in dist/: the library, the binary, the interface for python-can
   cargo xtask dist               what is released, in dist/: an archive of the program, the wheel, checksums
   cargo xtask pgo                the binary to release, optimised by what a training run does
+  cargo xtask bench [--compare COMMIT] [ROW..]    what frames, control periods and cycles cost, in instructions; paired with a commit
   cargo xtask times [ROW..]      how long the first commands, the tests and pip take, each from a fresh clone
   cargo xtask conform-peers      the conformance suite against stacks of other people, as a table
   cargo xtask idle [SECONDS]     what a simulator costs that waits, in per cent of a core
@@ -68,6 +70,7 @@ fn main() -> ExitCode {
         ["conform-peers"] => conform_peers::command(),
         ["vcan-test"] => vcan::command(),
         ["idle", rest @ ..] => idle::command(rest),
+        ["bench", rest @ ..] => bench::command(rest),
         ["times", rest @ ..] => times::command(rest),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");

@@ -111,7 +111,7 @@ fn pip(clone: &Path) -> Result<Command, String> {
 }
 
 /// Processor time of all that this program has started and that has ended, in ticks (proc(5), fields 16 and 17).
-fn ticks_of_children() -> Result<f64, String> {
+pub(crate) fn ticks_of_children() -> Result<f64, String> {
     let stat = fs::read_to_string("/proc/self/stat").map_err(|error| format!("/proc/self/stat: {error}"))?;
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
     let number = |place: usize| fields.get(place).and_then(|field| field.parse::<f64>().ok());
