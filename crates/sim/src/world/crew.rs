@@ -1,9 +1,9 @@
 //! Threads that work on the stations of a world at once, each station on one of them.
 //!
-//! Stations are handed over by value, in parcels behind locks that nobody waits for, and come back to where they were: which
+//! Stations are handed over by value, in parcels behind locks that no thread waits for, and come back to where they were: which
 //! thread had which makes no difference to any of them. Each thread begins with its own share, since the state of a station is
-//! then in its cache from the last time, and goes on with what others have not begun: a helper that the system lets wait holds up
-//! no more than one parcel. A helper without work looks for more for a moment, unless that was in vain the last times, and then
+//! then in its cache from the last time, and goes on with what others have not begun: a worker that the system lets wait holds up
+//! no more than one parcel. A worker without work looks for more for a moment, unless that was in vain the last times, and then
 //! sleeps.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -18,7 +18,7 @@ use super::member::Member;
 const MOST: usize = 64;
 /// Parcels that a batch is made into, for each thread: what one is late by is a part of its share.
 const PARCELS_EACH: usize = 8;
-/// Looks of a helper for new work before it sleeps: some 50 us.
+/// Looks of a worker for new work before it sleeps: some 50 us.
 const LOOKS: u32 = 2_000;
 /// After so many looks in vain it sleeps at once, and tries again only from time to time.
 const IN_VAIN: u32 = 4;
@@ -60,13 +60,13 @@ pub(super) enum Found {
     Sends(Frame),
 }
 
-/// The threads of a world. A copy of a world begins without helpers, and has its own when it needs them.
+/// The threads of a world. A copy of a world begins without workers, and has its own when it needs them.
 pub(super) struct Crew {
     threads: usize,
-    helpers: Option<Helpers>,
+    workers: Option<Workers>,
 }
 
-struct Helpers {
+struct Workers {
     shared: Arc<Shared>,
     handles: Vec<JoinHandle<()>>,
 }
@@ -86,7 +86,7 @@ struct Shared {
 }
 
 struct Parcel {
-    /// Whoever takes this has it.
+    /// The thread that takes this has it.
     open: AtomicBool,
     contents: Mutex<Contents>,
 }
@@ -107,11 +107,11 @@ impl Drop for Done<'_> {
 }
 
 impl Crew {
-    pub(super) const ALONE: Self = Self { threads: 1, helpers: None };
+    pub(super) const ALONE: Self = Self { threads: 1, workers: None };
 
     /// So many threads, the caller's among them; at least one, and 64 at most.
     pub(super) fn set_threads(&mut self, threads: usize) {
-        *self = Self { threads: threads.clamp(1, MOST), helpers: None };
+        *self = Self { threads: threads.clamp(1, MOST), workers: None };
     }
 
     pub(super) const fn threads(&self) -> usize {
@@ -120,7 +120,7 @@ impl Crew {
 
     /// Does the job on so many errands, several at once. [`take_back`](Self::take_back) follows.
     pub(super) fn work(&mut self, (job, now): (Job, Instant), count: usize, mut errands: impl Iterator<Item = Errand>) {
-        let shared = &self.helpers.get_or_insert_with(|| Helpers::start(self.threads)).shared;
+        let shared = &self.workers.get_or_insert_with(|| Workers::start(self.threads)).shared;
         let parcels = shared.parcels.len();
         // The same stations come to the same parcels as long as the same are due.
         let end_of = |parcel: usize| parcel * count / parcels;
@@ -140,7 +140,7 @@ impl Crew {
     /// # Panics
     /// If one of the stations has.
     pub(super) fn take_back(&mut self, mut back: impl FnMut(Errand)) {
-        for parcel in self.helpers.iter().flat_map(|helpers| &helpers.shared.parcels) {
+        for parcel in self.workers.iter().flat_map(|workers| &workers.shared.parcels) {
             let Ok(mut contents) = parcel.contents.lock() else { panic!("a drive has panicked on another thread") };
             contents.errands.drain(..).for_each(&mut back);
         }
@@ -149,11 +149,11 @@ impl Crew {
 
 impl Clone for Crew {
     fn clone(&self) -> Self {
-        Self { threads: self.threads, helpers: None }
+        Self { threads: self.threads, workers: None }
     }
 }
 
-impl Helpers {
+impl Workers {
     fn start(threads: usize) -> Self {
         let parcel = |_| {
             let contents = Contents { job: Job::Advance, now: Instant::ZERO, errands: Vec::new() };
@@ -179,7 +179,7 @@ impl Helpers {
     }
 }
 
-impl Drop for Helpers {
+impl Drop for Workers {
     fn drop(&mut self) {
         self.shared.closed.store(true, Ordering::SeqCst);
         self.shared.wake();
@@ -191,7 +191,7 @@ impl Shared {
     fn hand_out(&self, parcels: impl Iterator<Item = usize> + Clone) {
         self.left.store(parcels.clone().count(), Ordering::Relaxed);
         parcels.for_each(|number| self.parcels[number].open.store(true, Ordering::Release));
-        // In one order with `asleep`: a helper that goes to sleep now sees this, or is seen.
+        // In one order with `asleep`: a worker that goes to sleep now sees this, or is seen.
         self.batch.fetch_add(1, Ordering::SeqCst);
         if self.asleep.load(Ordering::SeqCst) > 0 {
             self.wake();
