@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::common::{Chatter, frame};
 use can::{Bitrate, Instant};
+use sim::machine::{MJointMachine, Zlac8030lMachine};
 use sim::{StationId, World};
 
 #[test]
@@ -42,4 +43,11 @@ fn a_station_that_never_serves_its_deadline_does_not_stop_the_world() {
 fn a_world_can_move_to_another_thread() {
     fn send<T: Send>(_: &T) {}
     send(&World::new(Bitrate::K500, 1));
+}
+
+/// A thousand worlds of one drive are to fit where a few megabytes do: what is not used often is behind a pointer.
+#[test]
+fn a_drive_on_its_hardware_takes_no_more_than_11_kilobytes() {
+    let sizes = [size_of::<Zlac8030lMachine>(), size_of::<MJointMachine>()];
+    assert!(sizes.iter().all(|size| *size <= 11 * 1024), "{sizes:?}");
 }
