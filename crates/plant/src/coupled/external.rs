@@ -1,4 +1,4 @@
-//! Shafts that somebody else moves: a physics engine that owns the masses behind them, at steps of its own.
+//! Shafts that a physics engine moves: it owns the masses behind them, and has steps of its own.
 //!
 //! Each shaft is a coordinate of its own, with the drive at one end and the engine at the other. At an exchange the engine says where its
 //! joint is, and the shaft is moved for one step of the engine, in as many control periods as fit into it; out comes the mean torque of

@@ -1,4 +1,4 @@
-//! Machines that several motors move together: two wheels and a body, motors on one shaft, a serial arm, and what somebody else moves.
+//! Machines that several motors move together: two wheels and a body, motors on one shaft, a serial arm, and what a physics engine moves.
 //!
 //! Each motor says what it does to its shaft in a step ([`Push`]); the machine moves all its coordinates together, and says what
 //! became of each shaft ([`Motion`]). The shafts are stiff: a coordinate is a motor's angle times a fixed number of turns. All dry
@@ -21,7 +21,6 @@ pub use friction::MOST;
 
 /// A machine and its state.
 // One of them is made for each machine of a world, and none is copied in a step.
-#[expect(clippy::large_enum_variant, reason = "without an allocator there is no box")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Body {
     /// Two wheels, left and right, and a body on them.
@@ -30,7 +29,7 @@ pub enum Body {
     CommonShaft(CommonShaftModel, CommonShaftData),
     /// A motor for each joint, from the base on.
     Arm(ArmModel, ArmData),
-    /// Shafts that somebody else moves, each for itself.
+    /// Shafts that a physics engine moves, each for itself.
     External(ExternalModel, ExternalData),
 }
 

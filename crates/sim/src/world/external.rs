@@ -153,7 +153,7 @@ impl World {
         Ok(())
     }
 
-    /// The half of an exchange before the time of its step passes, for programs whose world is moved by somebody else: `dt` has to pass
+    /// The half of an exchange before the time of its step passes, for programs whose world something else moves: `dt` has to pass
     /// now, and then the results are there.
     ///
     /// # Errors
@@ -275,7 +275,7 @@ impl World {
         let mut at = 0;
         for (body, model, data) in self.externals() {
             let period = Duration::from_nanos(body.period_ns);
-            if dt.is_zero() || dt.as_nanos() % period.as_nanos() != 0 || dt > Duration::from_secs(MOST_S) {
+            if dt.is_zero() || !dt.as_nanos().is_multiple_of(period.as_nanos()) || dt > Duration::from_secs(MOST_S) {
                 return Err(ExchangeError::Step { dt, period });
             }
             if data.periods_left() > 0 {
@@ -316,8 +316,8 @@ impl World {
 }
 
 fn check_values(what: &'static str, values: &[f64], most: f64) -> Result<(), ExchangeError> {
-    // One that is not a number is not within any limit.
-    match values.iter().position(|value| !(value.abs() <= most)) {
+    // What is not a number is not in any range.
+    match values.iter().position(|value| !(-most..=most).contains(value)) {
         None => Ok(()),
         Some(i) => Err(ExchangeError::Value { what, joint: i + 1, value: values[i], most }),
     }

@@ -229,3 +229,34 @@ fn shafts_of_several_bodies_and_behind_reducers_stand_in_one_row() {
         assert!(((turned - before) / ratio - 0.051).abs() < 0.002, "{}", (turned - before) / ratio);
     }
 }
+
+/// A wheel whose drive is not enabled carries a pendulum of the engine: what the engine loses in 10 s is heat of the drive's friction, to 0.5 % of what
+/// there was.
+#[test]
+fn energy_that_the_engine_loses_is_heat_of_the_drive() {
+    const WEIGHT_NM: f64 = 4.0;
+    for rule in [Rule::Integrate, Rule::Hold, Rule::Interpolate] {
+        let (mut world, _) = world(rule);
+        let inertia = WHEEL + world.external_shafts()[0].inertia_kg_m2;
+        let (mut angle_rad, mut velocity_rad_s, mut torque_nm) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        // The shafts are joined at 0: the weight hangs at 1 rad.
+        let energy_j =
+            |angle: f64, velocity: f64| 0.5 * inertia * velocity * velocity - WEIGHT_NM * (angle - 1.0).cos();
+        let before_j = energy_j(0.0, 0.0);
+        let heat_j = |world: &mut World| world.report(LEFT).unwrap().physics.unwrap().energy.friction_j;
+        let cold_j = heat_j(&mut world);
+        for _ in 0..10_000 {
+            world.exchange(DT, (&angle_rad, &velocity_rad_s), &mut torque_nm).unwrap();
+            // Half a kick, a drift, half a kick: the engine itself keeps its energy.
+            let kick = |angle: f64| 0.5 * DT_S * (torque_nm[0] - WEIGHT_NM * (angle - 1.0).sin()) / inertia;
+            velocity_rad_s[0] += kick(angle_rad[0]);
+            angle_rad[0] += velocity_rad_s[0] * DT_S;
+            velocity_rad_s[0] += kick(angle_rad[0]);
+        }
+        let lost_j = before_j - energy_j(angle_rad[0], velocity_rad_s[0]);
+        let swing_j = before_j + WEIGHT_NM;
+        let heat_j = heat_j(&mut world) - cold_j;
+        assert!(lost_j > 0.3 * swing_j, "{rule:?}: {lost_j}");
+        assert!((lost_j - heat_j).abs() < 0.005 * swing_j, "{rule:?}: lost {lost_j}, heat {heat_j} of {swing_j}");
+    }
+}
