@@ -1,5 +1,7 @@
 """Shafts that a physics engine moves: arrays in and out, several worlds at once, and what is refused."""
 
+import subprocess
+import sys
 import threading
 import time
 
@@ -72,8 +74,8 @@ def test_a_snapshot_goes_on_with_the_same_torques():
 
 
 def swing_on(world):
-    angle = world.external_shafts()[0].angle_rad
-    return numpy.array([world.exchange(0.001, [angle + 0.01 * step, 0], [10, 0]) for step in range(20)])
+    angles = numpy.array([shaft.angle_rad for shaft in world.external_shafts()])
+    return numpy.array([world.exchange(0.001, angles + (0.01 * step, 0), [10, 0]) for step in range(20)])
 
 
 def test_worlds_side_by_side_are_to_the_bit_what_each_is_alone():
@@ -185,3 +187,12 @@ def test_in_virtual_time_an_engine_steps_while_the_program_sleeps():
         stop.set()
         thread.join()
     assert all(step.shape == (2,) for step in steps)
+
+
+def test_without_numpy_the_rest_works_and_an_exchange_says_what_it_needs():
+    program = (
+        "import sys; sys.modules['numpy'] = None; import ferrodrive; world = ferrodrive.World(); world.add('zlac8030l', node=4)\n"
+        "world.run_for(0.1)\ntry:\n    world.external([4])\nexcept ImportError as error:\n    print(error)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "an exchange with a physics engine takes arrays: pip install numpy\n"
