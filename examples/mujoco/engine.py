@@ -21,12 +21,12 @@ class Engine:
         joints = [self.model.joint(name) for name in drives]
         self.angles = [joint.qposadr[0] for joint in joints]
         self.speeds = [joint.dofadr[0] for joint in joints]
-        if pose is not None:
-            self.data.qpos[self.angles] = pose
-        world.external(list(drives.values()), angle_rad=self.data.qpos[self.angles], turns=turns, rule=rule)
+        pose = self.data.qpos[self.angles] if pose is None else pose
+        world.external(list(drives.values()), angle_rad=pose, turns=turns, rule=rule)
         # What turns in the drives turns with the joints.
         self.model.dof_armature[self.speeds] = [shaft.inertia_kg_m2 for shaft in world.external_shafts()]
         mujoco.mj_setConst(self.model, self.data)
+        self.data.qpos[self.angles] = pose
         mujoco.mj_forward(self.model, self.data)
 
     def step(self):
@@ -74,5 +74,5 @@ class Engine:
             finally:
                 stopped.set()
                 thread.join()
-        if failed:
-            raise failed[0]
+                if failed:
+                    raise failed[0]

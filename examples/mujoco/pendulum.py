@@ -30,7 +30,7 @@ def of_mujoco(inertia_kg_m2):
     text = spec.to_xml().replace(
         "</mujoco>",
         f'<actuator><dcmotor joint="pivot" motorconst="{CONSTANT}" resistance="{RESISTANCE}" input="pos" '
-        f'controller="40 0 4" forcerange="-{PEAK_NM} {PEAK_NM}" forcelimited="true"/></actuator></mujoco>',
+        f'controller="80 60 6" saturation="{PEAK_NM} 0 0"/></actuator></mujoco>',
     )
     model = mujoco.MjModel.from_xml_string(text)
     model.dof_armature[:], model.dof_frictionloss[:], model.dof_damping[:] = inertia_kg_m2, DRY_NM, VISCOUS
@@ -93,7 +93,7 @@ def chart(title, unit, curves, top):
         x = at(second, low).split(",")[0]
         yield f'<text x="{x}" y="{top + HEIGHT + 16}" text-anchor="middle">{second} s</text>'
     for name, points in curves.items():
-        line = " ".join(at(*point) for point in points)
+        line = " ".join(at(*point) for point in points[::8])
         yield f'<polyline points="{line}" fill="none" stroke="{COLOURS[name]}" stroke-width="1.5"/>'
 
 

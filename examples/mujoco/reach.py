@@ -24,10 +24,9 @@ HEARTBEAT = 0x700 + 0x7F
 MOST_STEPS = 4000
 
 
-def enabled_arm(world, host, wait=None):
-    """Sets the joints up for positions in time (mode 7, led by SYNC) with a brake, and enables them."""
+def enable_arm(host):
+    """Sets the joints up for positions in time (mode 7, led by SYNC), and enables them."""
     for node in NODES:
-        host.write(node, 0x2619, 0, 7, 2)  # a brake is fitted
         host.write(node, 0x261C, 0, 1, 2)  # the stretch to a new point begins with SYNC
         host.write(node, 0x6060, 0, 7, 1)
         host.write(node, 0x6040, 0, 0x0F, 2)
@@ -54,7 +53,7 @@ class Reach(gymnasium.Env):
         self.world.wait_until_booted()
         self.engine = Engine("arm.xml", self.world, JOINTS)
         self.host.wait = self.engine.run
-        enabled_arm(self.world, self.host)
+        enable_arm(self.host)
         self.engine.run(0.5)
         list(self.world.events())
         self.begin = self.engine.state()
@@ -104,8 +103,8 @@ class Reach(gymnasium.Env):
         """What the first joint that has one says."""
         for node, statusword in zip(NODES, self.statusword):
             if statusword & FAULT:
-                said = [event["text"] for event in self.world.events() if event["kind"] == "fault"]
-                return said[0] if said else f"joint {node}: alarm {self.world[node].error_code:X}h"
+                said = [f"node {event['node']}: {event['text']}" for event in self.world.events() if event["kind"] == "fault"]
+                return said[0] if said else f"node {node}: alarm {self.world[node].error_code:X}h"
         return None
 
 

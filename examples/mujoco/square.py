@@ -18,14 +18,14 @@ TURNS = (1, -1)
 RADIUS_M, BASE_M, COUNTS_PER_TURN = 0.0865, 0.4, 4096
 PERIOD_S = 0.002
 MOST_RPM = 120
-CORNERS = ((1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0))
-CLOSE_M = 0.1
+CORNERS = ((0.5, 0.0), (0.5, 0.5), (0.0, 0.5), (0.0, 0.0))
+CLOSE_M = 0.05
 FAULT = 0x0008
-MOST_STEPS = 30_000
+MOST_STEPS = 15_000
 
 
 class Square(gymnasium.Env):
-    """Drives past the corners of a square of one metre.
+    """Drives past the corners of a square of half a metre.
 
     Action: the target velocity (60FFh) of each wheel in r/min, as its RPDO has it. Observation: for each wheel its position (6064h) in
     counts and its statusword (6041h), as TPDO1 has them, and the number of the next corner, twice. The reward is what the way to the
@@ -107,8 +107,8 @@ class Square(gymnasium.Env):
         """What the first wheel that has one says."""
         for node, statusword in zip(NODES, self.statusword):
             if statusword & FAULT:
-                said = [event["text"] for event in self.world.events() if event["kind"] == "fault"]
-                return said[0] if said else f"wheel {node}: fault {self.world[node].error_code:X}h"
+                said = [f"node {event['node']}: {event['text']}" for event in self.world.events() if event["kind"] == "fault"]
+                return said[0] if said else f"node {node}: fault {self.world[node].error_code:X}h"
         return None
 
 

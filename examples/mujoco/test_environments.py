@@ -62,13 +62,13 @@ def test_a_fault_ends_an_episode_with_its_reason(square):
             break
         if step == 200:
             square.world[4].set_fault("hall")
-    assert ended and "4" in info["fault"], info
+    assert ended and info["fault"] == "node 4: fault 0200h, Hall sensor"
     _, info = square.reset(seed=1)
     assert info == {} and not square.step([30, -30])[2], "the snapshot knows nothing of the fault"
 
 
 def test_steps_a_second(square, record_property):
-    """Told, and not asked of a machine that does other things besides: docs/performance.md has the figure."""
+    """Recorded, and not asked of a machine that does other things besides: docs/performance.md has the figure."""
     square.reset(seed=1)
     begin = time.process_time()
     for _ in range(500):
