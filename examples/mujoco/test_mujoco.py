@@ -236,6 +236,8 @@ def test_a_base_rolls_on_a_floor_as_far_as_its_wheels_turn():
             wheel_m_s2=0.5,
         ) as base:
             base.drive(0.3, 0.0, seconds=2)
+            # It returns when both drives were seen to stand, which is below 1 r/min, and their wheels do so in the engine.
+            assert numpy.abs(engine.data.qvel[engine.speeds]).max() < math.tau / 60
             went = engine.data.qpos[0] - begin
             rolled = (engine.data.qpos[engine.angles] - turned) * RADIUS_M
             counted = base.state()["x_m"]
