@@ -265,7 +265,7 @@ def test_the_lines_of_the_handbook_run():
     names = {"ferrodrive": ferrodrive, "mujoco": mujoco, "model": model, "data": mujoco.MjData(model)}
     exec(seven.replace("while True:", "for _ in range(100):"), names)
     assert names["world"].now == pytest.approx(0.1)
-    assert abs(names["data"].qvel[1]) > 0.01, "nobody holds it yet"
+    assert abs(names["data"].qvel[1]) > 0.01, "no drive holds it yet"
     pose = numpy.tile(names["data"].qpos, (64, 1)), numpy.tile(names["data"].qvel, (64, 1))
     names["angle_rad"], names["velocity_rad_s"] = pose
     exec(several, names)

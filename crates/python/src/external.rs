@@ -33,7 +33,7 @@ fn need_numpy(py: Python<'_>) -> PyResult<()> {
 
 fn step(dt_s: f64) -> PyResult<Duration> {
     let ns = (dt_s * 1e9).round();
-    if ns >= 1.0 && ns <= 1e18 {
+    if (1.0..=1e18).contains(&ns) {
         return Ok(Duration::from_nanos(ns as u64));
     }
     Err(bad_value(format!("expected a step of more than 0 s, got {dt_s}")))
@@ -132,7 +132,6 @@ pub(crate) fn begin_exchange<'py>(
 
 /// What came of the last exchange, of each shaft: torques, and where they are now with their velocities.
 #[pyfunction]
-#[expect(clippy::type_complexity, reason = "three arrays, in the order of their reading")]
 pub(crate) fn exchanged<'py>(
     py: Python<'py>,
     world: &Bound<'py, World>,
