@@ -6,6 +6,7 @@
 
 mod bare_metal;
 mod bench;
+mod bench_peers;
 mod browser;
 mod conform_peers;
 mod debian;
@@ -53,7 +54,8 @@ The project's own chores.
   cargo xtask pgo                the binary to release, optimised by what a training run does
   cargo xtask bench [--compare COMMIT] [ROW..]    what frames, control periods and cycles cost, in instructions; paired with a commit
   cargo xtask times [ROW..]      how long the first commands, the tests and pip take, each from a fresh clone
-  cargo xtask conform-peers      the conformance suite against stacks of other people, as a table
+  cargo xtask conform-peers [NAME]..    the conformance suite against stacks of other people; writes the table of docs/conformance.md
+  cargo xtask bench-peers        what a frame costs nodes of ours and of other people's stacks, as the tables of docs/performance.md
   cargo xtask idle [SECONDS]     what a simulator costs that waits, in per cent of a core
 ";
 
@@ -67,7 +69,8 @@ fn main() -> ExitCode {
         ["dist"] => dist::command(),
         ["wheel"] => wheel::command(),
         ["pgo"] => pgo::command(),
-        ["conform-peers"] => conform_peers::command(),
+        ["bench-peers"] => bench_peers::command(),
+        ["conform-peers", rest @ ..] => conform_peers::command(rest),
         ["vcan-test"] => vcan::command(),
         ["idle", rest @ ..] => idle::command(rest),
         ["bench", rest @ ..] => bench::command(rest),
