@@ -67,8 +67,6 @@ pub(crate) const RECEIVED: Cause =
     cause("They map an output into the receive PDO and send it.", &["PDO 52", "PDO 53", "PDO 54", "PDO 55"]);
 pub(crate) const SYNCHRONOUS: Cause =
     cause("They count the PDOs of type 1 that come with each SYNC.", &["SYNC 03", "SYNC 51"]);
-pub(crate) const COUNTED_SYNC: Cause =
-    cause("They look at the SYNC frames of the node as a producer.", &["SYNC 02", "SYNC 06", "SYNC 07"]);
 pub(crate) const MAPPING_REFUSED: Cause = cause(
     "They take the code of the refused mapping for their verdict.",
     &["PDO 23", "PDO 24", "PDO 25", "PDO 31", "PDO 32"],
