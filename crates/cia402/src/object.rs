@@ -9,6 +9,10 @@ canopen::objects! {
     CONTROLWORD = 0x6040, 0;
     /// Statusword (8.4.2).
     STATUSWORD = 0x6041, 0;
+    /// vl target velocity (velocity mode), in r/min of the motor while 604Bh and 604Ch are 1.
+    VL_TARGET_VELOCITY = 0x6042, 0;
+    /// vl velocity min max amount (velocity mode): the greatest speed, in units of 6044h.
+    VL_VELOCITY_MAX_AMOUNT = 0x6046, 2;
     /// Modes of operation: the mode that is asked for.
     MODES_OF_OPERATION = 0x6060, 0;
     /// Modes of operation display: the mode in effect.

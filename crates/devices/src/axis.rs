@@ -42,6 +42,18 @@ impl AxisDescription {
         self.placement.place(mux)
     }
 
+    /// The mode in which it turns at a speed until commanded otherwise: profile velocity, or velocity mode (vl) where it has neither
+    /// that nor cyclic velocities, as many frequency inverters do.
+    pub fn velocity_mode(&self) -> ModeOfOperation {
+        let has = |mode| self.modes.contains(&mode);
+        let others = has(ModeOfOperation::PROFILE_VELOCITY) || has(ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY);
+        if has(ModeOfOperation::VELOCITY) && !others {
+            ModeOfOperation::VELOCITY
+        } else {
+            ModeOfOperation::PROFILE_VELOCITY
+        }
+    }
+
     /// The power state that a statusword shows, or for a drive without the state machine the one that comes closest.
     pub const fn power_state(&self, statusword: Statusword) -> Option<PowerState> {
         self.power.state(statusword)

@@ -97,6 +97,22 @@ pub enum Scale {
     /// This many counts of position, for each second or each second squared: velocities and accelerations as CiA 402-2 has
     /// them in the absence of other units. Its physical unit is r/min, or (r/min)/s.
     Positions(f64),
+    /// This many r/min of the drive's shaft: the product of some objects over the product of others, of which one that is 0
+    /// counts as 1 (CiA 402-2, velocity mode: 604Bh and 604Ch).
+    Factors {
+        /// Those that multiply.
+        times: [Option<Mux>; 2],
+        /// Those that divide.
+        over: [Option<Mux>; 2],
+    },
+    /// A change of the shaft's speed by this factor, in the time that the object's next sub-index has in seconds: together
+    /// (r/min)/s (CiA 402-2, velocity mode: 6048h, 6049h and 604Ah with the factor 604Ch). A time of 0 is at once.
+    InTime {
+        /// What multiplies.
+        times: Option<Mux>,
+        /// What divides.
+        over: Option<Mux>,
+    },
     /// This many physical units times the value of another object: a share of something rated (CiA 402-2, torque in
     /// thousandths of 6076h).
     Rated {
@@ -111,6 +127,13 @@ impl Scale {
     const fn placed(self, placement: Placement) -> Self {
         match self {
             Self::Rated { rated, per_count } => Self::Rated { rated: placement.place(rated), per_count },
+            Self::Factors { times: [a, b], over: [c, d] } => Self::Factors {
+                times: [place_some(a, placement), place_some(b, placement)],
+                over: [place_some(c, placement), place_some(d, placement)],
+            },
+            Self::InTime { times, over } => {
+                Self::InTime { times: place_some(times, placement), over: place_some(over, placement) }
+            }
             scale => scale,
         }
     }

@@ -196,7 +196,9 @@ impl Bench {
         let counts = match target.scale {
             Scale::PerCount(rpm) | Scale::Shaft(rpm) => SPEED_RPM / rpm * resolution,
             Scale::Positions(factor) => SPEED_RPM / 60.0 * self.counts_per_turn().await? / factor,
-            Scale::Rated { .. } => not_applicable!("the unit of 60FFh is not known"),
+            Scale::Factors { .. } | Scale::InTime { .. } | Scale::Rated { .. } => {
+                not_applicable!("the unit of 60FFh is not known")
+            }
         };
         Ok(counts.round() as i32)
     }

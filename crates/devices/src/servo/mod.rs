@@ -124,6 +124,31 @@ const UNITS: Units = Units {
     driver_temperature: None,
 };
 
+/// What differs on an axis that turns in velocity mode (vl) alone: its target, what it measures, and its ramps, in r/min of the motor
+/// while 604Bh and 604Ch are 1. 6044h and the ramps are scaled by 604Ch alone.
+pub const VELOCITY_MODE: (Quantity, Quantity, Ramps) = {
+    (
+        Quantity {
+            object: Mux::new(0x6042, 0),
+            scale: Scale::Factors {
+                times: [Some(Mux::new(0x604B, 1)), Some(Mux::new(0x604C, 1))],
+                over: [Some(Mux::new(0x604B, 2)), Some(Mux::new(0x604C, 2))],
+            },
+        },
+        Quantity {
+            object: Mux::new(0x6044, 0),
+            scale: Scale::Factors { times: [Some(Mux::new(0x604C, 1)), None], over: [Some(Mux::new(0x604C, 2)), None] },
+        },
+        Ramps::Rates {
+            acceleration: Mux::new(0x6048, 1),
+            deceleration: Mux::new(0x6049, 1),
+            quick_stop: Some(Mux::new(0x604A, 1)),
+            scale: Scale::InTime { times: Some(Mux::new(0x604C, 1)), over: Some(Mux::new(0x604C, 2)) },
+            none_from: None,
+        },
+    )
+};
+
 const fn velocity(index: u16) -> Quantity {
     Quantity { object: Mux::new(index, 0), scale: Scale::Positions(1.0) }
 }

@@ -41,13 +41,53 @@ impl Objects {
                 .homing
                 .filter(is_there)
                 .map(|homing| HomingRules { search_speed: self.there(homing.search_speed), ..homing }),
-            units: self.units(standard.units),
+            units: match standard.velocity_mode() {
+                ModeOfOperation::VELOCITY => self.units_of_velocity_mode(self.units(standard.units)),
+                _ => self.units(standard.units),
+            },
             ..standard
         })
     }
 
     fn has(&self, index: u16, sub_index: u8) -> bool {
         self.table.find(self.placement.place(Mux::new(index, sub_index))).is_ok()
+    }
+
+    /// An axis without another mode for speeds turns by 6042h. Factors that the file does not have are 1.
+    fn units_of_velocity_mode(&self, units: Units) -> Units {
+        let (target, actual, ramps) = servo::VELOCITY_MODE;
+        let placed = |quantity: Quantity| Quantity {
+            object: self.placement.place(quantity.object),
+            scale: self.with_factors(quantity.scale),
+        };
+        let ramps = match ramps {
+            Ramps::Rates { acceleration, deceleration, quick_stop, scale, none_from } => Ramps::Rates {
+                acceleration: self.placement.place(acceleration),
+                deceleration: self.placement.place(deceleration),
+                quick_stop: quick_stop.map(|place| self.placement.place(place)),
+                scale: self.with_factors(scale),
+                none_from,
+            },
+            times => times,
+        };
+        Units {
+            target_velocity: self.there(Some(placed(target))),
+            actual_velocity: self.there(Some(placed(actual))).or(units.actual_velocity),
+            ramps: self.ramps(ramps),
+            ..units
+        }
+    }
+
+    /// A scale where this axis has it, without the factors that it does not have.
+    fn with_factors(&self, scale: Scale) -> Scale {
+        let there = |factor: Option<Mux>| {
+            factor.map(|mux| self.placement.place(mux)).filter(|mux| self.table.find(*mux).is_ok())
+        };
+        match scale {
+            Scale::Factors { times, over } => Scale::Factors { times: times.map(there), over: over.map(there) },
+            Scale::InTime { times, over } => Scale::InTime { times: there(times), over: there(over) },
+            scale => scale,
+        }
     }
 
     /// A quantity whose object is there, and the rated value too where it is a share of one.

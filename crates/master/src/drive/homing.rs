@@ -93,7 +93,7 @@ impl Drive {
             }
             HomingStart::ModeWrite => {
                 self.enable().await?;
-                self.release_halt().await?;
+                self.follow(ModeOfOperation::HOMING).await?;
                 self.note_moved();
                 self.node.write(self.place(MODES_OF_OPERATION), ModeOfOperation::HOMING.0).await?;
                 Ok(None)

@@ -4,6 +4,8 @@
 
 use canopen::Mux;
 use canopen::od::{Entry, HeldTo};
+use cia402::object::{VL_TARGET_VELOCITY, VL_VELOCITY_MAX_AMOUNT};
+use devices::Scale;
 
 use super::handle::Drive;
 use super::state::refused_is_none;
@@ -33,11 +35,31 @@ impl Drive {
                 let setting = refused_is_none(self.setting(object).await)?;
                 setting.map(|setting| (setting.value * counts * scale, setting))
             }
-            None => None,
+            None => self.greatest_amount(row.mux()).await?,
         };
         let (low, high) = row.limits_at(scale);
         let (object, Entry { name, unit, values: listed, .. }) = (row.mux(), *row);
         Ok(Limits { object, name, unit, low, high, listed, resolution, held_to })
+    }
+
+    /// What holds back the target of an axis that turns in velocity mode (vl): the greatest amount, 6046h:02, in counts of the
+    /// target; 0 limits nothing.
+    async fn greatest_amount(&self, target: Mux) -> Result<Option<(i64, Setting)>, Error> {
+        let amount = self.place(VL_VELOCITY_MAX_AMOUNT);
+        let Some(Scale::Factors { times, over }) = self.scale_of_velocity_mode(target) else { return Ok(None) };
+        if self.row(amount, "find out its limits").is_err() {
+            return Ok(None);
+        }
+        let setting = refused_is_none(self.setting(amount).await)?.filter(|setting| setting.value != 0);
+        let Some(setting) = setting else { return Ok(None) };
+        // Amounts lack the set-point factor (604Bh), which is the first of the target's.
+        let factor = self.product([times[0], None]).await? / self.product([over[0], None]).await?;
+        Ok(Some(((setting.value as f64 / factor.abs()) as i64, setting)))
+    }
+
+    fn scale_of_velocity_mode(&self, target: Mux) -> Option<Scale> {
+        let quantity = self.axis_description()?.units.target_velocity?;
+        (quantity.object == target && target == self.place(VL_TARGET_VELOCITY)).then_some(quantity.scale)
     }
 
     async fn setting(&self, object: Mux) -> Result<Setting, Error> {
@@ -65,7 +87,7 @@ impl Drive {
     /// back is refused too.
     pub(crate) async fn check_effect(&self, mux: Mux, value: i64) -> Result<&'static Entry, Error> {
         let row = self.check_number(mux, value).await?;
-        if row.held_to.is_none() || value == 0 {
+        if row.held_to.is_none() && self.scale_of_velocity_mode(mux).is_none() || value == 0 {
             return Ok(row);
         }
         let limits = self.limits_of(row).await?;

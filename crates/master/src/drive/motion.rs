@@ -73,6 +73,10 @@ impl fmt::Display for Note {
     }
 }
 
+/// The bits of velocity mode's ramp (CiA 402-2, velocity mode): enabled, unlocked, and given its target.
+const RAMP: u16 = Controlword::ENABLE_RAMP | Controlword::UNLOCK_RAMP | Controlword::REFERENCE_RAMP;
+const RUN_VELOCITY: Controlword = Controlword(0x0F | RAMP);
+
 /// Part of the target within which a speed or current counts as reached.
 const REACHED_SHARE: f64 = 0.05;
 
@@ -91,18 +95,19 @@ impl Drive {
         const INTENT: &str = "turn it at the wanted speed";
         let Rpm(requested) = speed.into();
         self.check_unclaimed(INTENT)?;
-        let units = self.motion(INTENT)?.units;
-        let target_velocity = self.has(units.target_velocity, "a target velocity")?;
+        let axis = self.motion(INTENT)?;
+        let target_velocity = self.has(axis.units.target_velocity, "a target velocity")?;
+        let mode = axis.velocity_mode();
         let speed = self.quantity(("speed", "r/min"), target_velocity, requested).await?;
         let Commanded { raw, commanded: target, .. } = speed;
         let change = target - self.ramp_start_rpm().await?;
         let ramps = self.write_ramps(options.acceleration, options.deceleration, change).await?;
         let commanded = [vec![speed], ramps].concat();
-        let stopped = self.set_mode(ModeOfOperation::PROFILE_VELOCITY).await?;
+        let stopped = self.set_mode(mode).await?;
         self.enable().await?;
         self.note_moved();
         self.write_number(target_velocity.object, raw).await?;
-        self.release_halt().await?;
+        self.follow(mode).await?;
         let notes = self.notes(stopped).await;
         if !options.wait {
             return Ok(MotionReport { reached_after: None, commanded, notes });
@@ -136,7 +141,7 @@ impl Drive {
         self.enable().await?;
         self.note_moved();
         self.write_number(target.object, commanded.raw).await?;
-        self.release_halt().await?;
+        self.follow(ModeOfOperation::PROFILE_TORQUE).await?;
         Ok(MotionReport { reached_after: None, commanded: vec![commanded], notes: self.notes(stopped).await })
     }
 
@@ -146,10 +151,18 @@ impl Drive {
     /// As [`velocity`](Self::velocity).
     pub async fn stop(&self) -> Result<(), Error> {
         const INTENT: &str = "stop it";
-        let units = self.motion(INTENT)?.units;
+        let axis = self.motion(INTENT)?;
+        let units = axis.units;
         if self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled) {
             match self.mode().await? {
-                ModeOfOperation::PROFILE_VELOCITY => self.write_zero(units.target_velocity).await?,
+                mode if mode == axis.velocity_mode() => {
+                    if mode == ModeOfOperation::VELOCITY {
+                        // Drives with a least speed (6046h:01) may raise a target of 0 to it: the ramp leads to standstill
+                        // without its reference, too (bit 6).
+                        self.write_controlword(Controlword(RUN_VELOCITY.0 & !Controlword::REFERENCE_RAMP)).await?;
+                    }
+                    self.write_zero(units.target_velocity).await?;
+                }
                 ModeOfOperation::PROFILE_TORQUE => self.write_zero(units.target_current).await?,
                 _ => self.write_controlword(Controlword(0x0F | Controlword::HALT)).await?,
             }
@@ -167,8 +180,9 @@ impl Drive {
     /// target velocity, or is given another one; when it turns at another speed at the end.
     pub async fn supervise(&self, duration: Duration) -> Result<(), Error> {
         const INTENT: &str = "keep it moving";
-        if let Some(target) = self.axis_description().and_then(|axis| axis.units.target_velocity)
-            && self.answered(INTENT, self.mode().await).await? == ModeOfOperation::PROFILE_VELOCITY
+        if let Some(axis) = self.axis_description()
+            && let Some(target) = axis.units.target_velocity
+            && self.answered(INTENT, self.mode().await).await? == axis.velocity_mode()
         {
             let raw = self.answered(INTENT, self.read_number(target.object).await).await?;
             let rpm = self.answered(INTENT, self.read_quantity(target).await).await?;
@@ -189,15 +203,15 @@ impl Drive {
         Ok(Held { quantity, target_rpm, band_rpm, sent })
     }
 
-    /// Takes a halt bit back that an earlier stop has left, now that the target is the new one.
-    pub(super) async fn release_halt(&self) -> Result<(), Error> {
+    /// Has it follow its target, now that the target is the new one: takes a halt bit back that an earlier stop has left, and in
+    /// velocity mode (vl) sets the bits of the ramp.
+    pub(super) async fn follow(&self, mode: ModeOfOperation) -> Result<(), Error> {
+        let run = if mode == ModeOfOperation::VELOCITY { RUN_VELOCITY } else { Controlword(0x0F) };
+        let open = Controlword(Controlword::HALT | run.0 & RAMP);
         // A controlword that cannot be read has no halt that this master could know of.
-        let halted = self
-            .node
-            .read::<u16>(self.place(CONTROLWORD))
-            .await
-            .is_ok_and(|raw| Controlword(raw).has(Controlword::HALT));
-        if halted { self.write_controlword(Controlword(0x0F)).await } else { Ok(()) }
+        let present = self.node.read::<u16>(self.place(CONTROLWORD)).await;
+        let waits = present.map_or(run.0 & RAMP != 0, |raw| raw & open.0 != run.0 & RAMP);
+        if waits { self.write_controlword(run).await } else { Ok(()) }
     }
 
     /// What to know about a motion, beside what was noted at its start.

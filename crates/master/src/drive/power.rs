@@ -234,7 +234,7 @@ impl Drive {
     async fn clear_targets(&self) -> Result<(), Error> {
         let Some(axis) = self.axis_description() else { return Ok(()) };
         match self.mode().await? {
-            ModeOfOperation::PROFILE_VELOCITY => self.write_zero(axis.units.target_velocity).await,
+            mode if mode == axis.velocity_mode() => self.write_zero(axis.units.target_velocity).await,
             ModeOfOperation::PROFILE_TORQUE => self.write_zero(axis.units.target_current).await,
             _ => Ok(()),
         }

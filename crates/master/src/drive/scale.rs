@@ -92,10 +92,13 @@ impl Drive {
     }
 
     /// The product of some objects that are never 0 by the standard; where a drive holds 0 nevertheless it counts as 1.
-    async fn product(&self, objects: [Option<Mux>; 2]) -> Result<f64, Error> {
+    pub(super) async fn product(&self, objects: [Option<Mux>; 2]) -> Result<f64, Error> {
         let mut product = 1.0;
         for object in objects.into_iter().flatten() {
-            product *= (self.read_number(object).await? as f64).max(1.0);
+            product *= match self.read_number(object).await? {
+                0 => 1.0,
+                factor => factor as f64,
+            };
         }
         Ok(product)
     }
@@ -156,18 +159,32 @@ impl Drive {
 
     /// Physical units in one count, by the resolution that is set on the drive.
     pub(crate) async fn step_of(&self, quantity: Quantity) -> Result<f64, Error> {
-        Ok(self.worth(quantity.scale).await? / self.resolution(quantity).await?)
+        Ok(self.worth(quantity).await? / self.resolution(quantity).await?)
     }
 
     /// Physical units in one count at a resolution of 1.
-    async fn worth(&self, scale: Scale) -> Result<f64, Error> {
+    async fn worth(&self, Quantity { object, scale }: Quantity) -> Result<f64, Error> {
         Ok(match scale {
             Scale::PerCount(worth) => worth,
             Scale::Shaft(rpm) => self.gear.at_output(rpm),
             // Counts of position in a second, as turns in a minute.
             Scale::Positions(counts) => counts * 60.0 / self.counts_per_turn().await?,
+            Scale::Factors { times, over } => {
+                self.gear.at_output(self.product(times).await? / self.product(over).await?)
+            }
+            // Infinitely much at once.
+            Scale::InTime { .. } => {
+                self.worth_in_a_second(scale).await? / self.read_number(time_of(object)).await? as f64
+            }
             Scale::Rated { rated, per_count } => per_count * self.read_number(rated).await? as f64,
         })
+    }
+
+    /// (r/min)/s in one count of a change in a time ([`Scale::InTime`]) of 1 s.
+    async fn worth_in_a_second(&self, scale: Scale) -> Result<f64, Error> {
+        let Scale::InTime { times, over } = scale else { return Ok(1.0) };
+        let factor = self.product([times, None]).await? / self.product([over, None]).await?;
+        Ok(self.gear.at_output(factor.abs()))
     }
 
     /// How many counts make one of the object's unit, by the resolution that is set on the drive.
@@ -191,7 +208,7 @@ impl Drive {
         if change_rpm < self.gear.at_output(LEAST_CHANGE_RPM) {
             return Ok(Vec::new());
         }
-        let mut sent = Vec::new();
+        let (mut sent, mut times_of_a_second) = (Vec::new(), Vec::new());
         match self.ramps("set its ramps")? {
             Ramps::Times { acceleration: up, deceleration: down, .. } => {
                 for (what, ramp) in wishes {
@@ -201,12 +218,19 @@ impl Drive {
                 }
             }
             Ramps::Rates { acceleration: up, deceleration: down, scale, none_from, .. } => {
-                let worth = self.worth(scale).await?;
-                let rates = wishes.clone().map(|(_, ramp)| ramp_counts(ramp, change_rpm, worth, none_from));
+                let worths = self.worth_of_rates([up, down], scale).await?;
+                let mut rates = Vec::new();
+                for (what, ramp) in wishes {
+                    let (object, mut worth) = if what == "acceleration" { (up, worths[0]) } else { (down, worths[1]) };
+                    if worth.is_infinite() {
+                        worth = self.worth_in_a_second(scale).await?;
+                        times_of_a_second.push(time_of(object));
+                    }
+                    rates.push((what, ramp, object, worth, ramp_counts(ramp, change_rpm, worth, none_from)));
+                }
                 // One object for both: the gentler of the two.
-                let gentler = if up == down { rates.clone().min() } else { None };
-                for ((what, ramp), own) in wishes.zip(rates) {
-                    let object = if what == "acceleration" { up } else { down };
+                let gentler = if up == down { rates.iter().map(|(.., own)| *own).min() } else { None };
+                for (what, ramp, object, worth, own) in rates {
                     let raw = gentler.unwrap_or(own);
                     let time_s = rate_time_s(raw, change_rpm, worth, none_from);
                     sent.push(self.ramp(what, ramp, change_rpm, object, raw, time_s).await?);
@@ -214,6 +238,9 @@ impl Drive {
             }
         }
         // Nothing is written before all of it has been found good.
+        for object in times_of_a_second {
+            self.write_number(object, 1).await?;
+        }
         for Commanded { object, raw, .. } in &sent {
             self.write_number(*object, *raw).await?;
         }
@@ -270,11 +297,24 @@ impl Drive {
                 Ok((self.seconds(acceleration).await?, self.seconds(deceleration).await?))
             }
             Ramps::Rates { acceleration, deceleration, scale, none_from, .. } => {
-                let (worth, change_rpm) = (self.worth(scale).await?, self.largest_change_rpm(change_rpm)?);
+                let worths = self.worth_of_rates([acceleration, deceleration], scale).await?;
+                let change_rpm = self.largest_change_rpm(change_rpm)?;
                 let (up, down) = (self.read_number(acceleration).await?, self.read_number(deceleration).await?);
-                Ok((rate_time_s(up, change_rpm, worth, none_from), rate_time_s(down, change_rpm, worth, none_from)))
+                Ok((
+                    rate_time_s(up, change_rpm, worths[0], none_from),
+                    rate_time_s(down, change_rpm, worths[1], none_from),
+                ))
             }
         }
+    }
+
+    /// (r/min)/s in one count of each rate: asked once where it is the same for all.
+    async fn worth_of_rates(&self, [up, down]: [Mux; 2], scale: Scale) -> Result<[f64; 2], Error> {
+        let worth = self.worth(Quantity { object: up, scale }).await?;
+        Ok(match scale {
+            Scale::InTime { .. } => [worth, self.worth(Quantity { object: down, scale }).await?],
+            _ => [worth; 2],
+        })
     }
 
     /// The objects of its ramps that are 0 although they are rates: by them no speed would ever change.
@@ -296,7 +336,8 @@ impl Drive {
         match self.ramps("read its ramps")? {
             Ramps::Times { quick_stop, .. } => self.seconds(quick_stop).await,
             Ramps::Rates { quick_stop: Some(rate), scale, none_from, .. } => {
-                let (worth, change_rpm) = (self.worth(scale).await?, self.largest_change_rpm(change_rpm)?);
+                let worth = self.worth(Quantity { object: rate, scale }).await?;
+                let change_rpm = self.largest_change_rpm(change_rpm)?;
                 Ok(rate_time_s(self.read_number(rate).await?, change_rpm, worth, none_from))
             }
             // Such a drive stops without a ramp.
@@ -314,7 +355,7 @@ impl Drive {
         Ok(match target.scale {
             Scale::Shaft(rpm) => span * self.gear.at_output(rpm),
             // The limits of the object are those of its type: what is to be changed counts.
-            Scale::PerCount(_) | Scale::Positions(_) | Scale::Rated { .. } => change_rpm.abs(),
+            _ => change_rpm.abs(),
         })
     }
 
@@ -326,6 +367,11 @@ impl Drive {
     async fn seconds(&self, object: Mux) -> Result<f64, Error> {
         Ok(self.read_number(object).await? as f64 * 1e-3)
     }
+}
+
+/// Where the time of a change of speed is, in s ([`Scale::InTime`]).
+const fn time_of(change: Mux) -> Mux {
+    Mux::new(change.index, change.sub_index + 1)
 }
 
 /// A change of the shaft's speed below this does not count: half a count of the speed objects.

@@ -300,6 +300,7 @@ const CONDITIONS: &[Row] = &[
     Row("no_mode", &["zlac8030l", "zlim42c", "cia402"], |bench| bench.enable(0)),
     Row("target_zero", &ALL, |bench| bench.enable(3)),
     Row("halt", &["zlac8030l", "zlim42c", "cia402"], |bench| command(bench, 3, 0x10F)),
+    Row("ramp_held", &["cia402"], |bench| bench.enable(2)),
     Row("ramp_zero", &["m4230e17b50", "cia402"], |bench| without(bench, mux(0x6083, 0))),
     Row("speed_limit_zero", &["cia402"], |bench| without(bench, mux(0x6080, 0))),
     Row("speed_limit_zero", &["cia402"], |bench| without(bench, mux(0x607F, 0))),

@@ -29,5 +29,6 @@ mod stopping;
 mod supervise;
 mod support;
 mod three_drives;
+mod velocity_mode;
 mod world;
 mod zlac8030l;

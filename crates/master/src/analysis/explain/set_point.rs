@@ -4,7 +4,7 @@ use canopen::Mux;
 use cia402::object::{
     MAX_CURRENT, MAX_MOTOR_SPEED, MAX_POSITION_LIMIT, MAX_PROFILE_VELOCITY, MAX_TORQUE, MIN_POSITION_LIMIT,
     NEGATIVE_TORQUE_LIMIT_VALUE, POSITION_ACTUAL_VALUE, POSITION_WINDOW, POSITIVE_TORQUE_LIMIT_VALUE,
-    PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
+    PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY, VL_TARGET_VELOCITY,
 };
 use cia402::{Controlword, ModeOfOperation, Statusword};
 use devices::{HomingStart, NewSetPoint};
@@ -20,6 +20,10 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
     match mode {
         ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => {
             findings.extend(zero(seen, "target_zero", target_velocity(seen), "A speed to turn at"));
+        }
+        ModeOfOperation::VELOCITY => {
+            findings.extend(zero(seen, "target_zero", seen.place(VL_TARGET_VELOCITY), "A speed to turn at"));
+            findings.extend(ramp_held(seen));
         }
         ModeOfOperation::PROFILE_TORQUE | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => {
             findings.extend(zero(seen, "target_zero", target_torque(seen), "A torque"));
@@ -62,6 +66,24 @@ fn zero(seen: &Observed, rule: &'static str, object: Mux, expected: &str) -> Opt
                 "It is 0".to_owned(),
                 "The drive stands because it is commanded to".to_owned(),
                 format!("Write {object}, by SDO or in the RPDO that carries it"),
+            ],
+        )
+    })
+}
+
+/// Controlword bits 4 to 6 of velocity mode: the ramp leads nowhere without them.
+fn ramp_held(seen: &Observed) -> Option<Finding> {
+    const RAMP: u16 = Controlword::ENABLE_RAMP | Controlword::UNLOCK_RAMP | Controlword::REFERENCE_RAMP;
+    let controlword = seen.controlword()?;
+    (controlword.0 & RAMP != RAMP).then(|| {
+        cause(
+            TOPIC,
+            "ramp_held",
+            [
+                "Controlword bits 4 to 6 (ramp enabled, unlocked, with its target) are 1".to_owned(),
+                format!("Controlword {controlword}"),
+                "In velocity mode (2) the speed stays as it is, or goes to 0, while one of them is 0".to_owned(),
+                "Write 7Fh to 6040h".to_owned(),
             ],
         )
     })

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant, Station};
 use cia402::ModeOfOperation;
-use devices::{HostWatch, model};
+use devices::{Description, HostWatch, model};
 use master::base::{Base, BaseLimits, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
 use master::drive::{HomingOptions, MotionOptions, StopGuard, SwitchedOff};
@@ -25,7 +25,7 @@ use sim::machine::{Order, order};
 
 use sim::{Place, StationId, Stimulus, World, block_on};
 
-use crate::support::node;
+use crate::support::{INVERTER, node};
 
 /// A program with its master, which may be killed, or frozen for a while.
 #[derive(Clone)]
@@ -87,7 +87,7 @@ impl Bench {
         let network = Network::new();
         let process = Process { network: network.clone(), killed: false, frozen_until: None, mailbox: Vec::new() };
         let process = world.add_station(process);
-        let description = model(name).unwrap();
+        let description = described(name);
         let drives = NODES.map(|number| {
             let id = node(number);
             world.add_drive(number, order(description, &Order::new(description, id, Bitrate::M1)).unwrap()).unwrap();
@@ -186,7 +186,7 @@ impl Bench {
             Motion::Move => self.run(drive.move_relative(Turns(100.0), options())).map(drop),
             Motion::Torque => self.run(drive.torque(Amperes(0.5))).map(drop),
             Motion::Home => self.start_homing(&drive),
-            Motion::GroupMove | Motion::GroupFollow => return Some(Moving::Group(Box::new(self.group(motion)))),
+            Motion::GroupMove | Motion::GroupFollow => return self.group(motion).map(|group| Moving::Group(Box::new(group))),
             Motion::Base => return self.base().map(|base| Moving::Base(Box::new(base))),
         };
         match moved {
@@ -204,8 +204,9 @@ impl Bench {
             .map(drop)
     }
 
-    fn group(&mut self, motion: Motion) -> Group {
+    fn group(&mut self, motion: Motion) -> Option<Group> {
         self.moving = NODES.to_vec();
+        AxisSetup::best_mode(&self.drives[0]).ok()?;
         let axes = self.drives.clone().map(|drive| {
             let mode = AxisSetup::best_mode(&drive).unwrap();
             let limits = AxisLimits {
@@ -229,18 +230,16 @@ impl Bench {
             self.run(group.cycle()).unwrap();
         }
         assert_eq!(group.state().cause, None, "{}", self.drives[0].description().unwrap().name);
-        group
+        Some(group)
     }
 
     fn base(&mut self) -> Option<Base> {
         self.moving = NODES.to_vec();
-        let wheels = self.drives.clone().map(|drive| {
-            let modes = drive.axis_description().unwrap().modes;
-            let mode = [ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY, ModeOfOperation::PROFILE_VELOCITY]
-                .into_iter()
-                .find(|mode| modes.contains(mode));
-            WheelSetup { drive, mode: mode.unwrap(), turns: 1.0 }
-        });
+        let modes = self.drives[0].axis_description().unwrap().modes;
+        let mode = [ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY, ModeOfOperation::PROFILE_VELOCITY]
+            .into_iter()
+            .find(|mode| modes.contains(mode))?;
+        let wheels = self.drives.clone().map(|drive| WheelSetup { drive, mode, turns: 1.0 });
         let geometry = Geometry { wheel_base_m: 0.4, wheel_radius_m: 0.1 };
         let limits = BaseLimits {
             linear_m_s: 0.8,
@@ -298,7 +297,12 @@ const FROZEN: Duration = Duration::from_secs(4);
 fn is_beyond_software(name: &str, motion: Motion, end: End) -> bool {
     let in_cycles = matches!(motion, Motion::GroupMove | Motion::GroupFollow | Motion::Base);
     let silent = matches!(end, End::Killed | End::CableCut) || end == End::Frozen && !in_cycles;
-    silent && model(name).unwrap().host_watch == HostWatch::None
+    silent && described(name).host_watch == HostWatch::None
+}
+
+/// A model, or an inverter.
+fn described(name: &str) -> &'static Description {
+    if name == INVERTER.name { *INVERTER } else { model(name).unwrap() }
 }
 
 fn models() -> impl Iterator<Item = &'static str> {
@@ -308,7 +312,7 @@ fn models() -> impl Iterator<Item = &'static str> {
 #[test]
 fn whatever_moves_stops_within_its_ramp_however_its_program_ends() {
     let mut times = Vec::new();
-    for name in models() {
+    for name in models().chain([INVERTER.name]) {
         for motion in MOTIONS {
             for end in ENDS {
                 let mut bench = Bench::new(name);
@@ -470,7 +474,7 @@ impl Bench {
             End::StopAll | End::StopGuard | End::Close | End::Everything => Duration::ZERO,
             // The patience of the master's own supervision: two cycles, and the one that has begun.
             End::Forgotten => 4 * PERIOD,
-            End::Frozen if model(name).unwrap().host_watch == HostWatch::None => FROZEN,
+            End::Frozen if described(name).host_watch == HostWatch::None => FROZEN,
             _ => Duration::from_secs(2),
         };
         if watch.is_zero() {

@@ -7,17 +7,37 @@ pub(crate) mod toy_drive;
 
 use std::future::Future;
 use std::pin::pin;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
 use std::task::{Context, Poll, Wake, Waker};
 
 use can::{CanId, Frame, Instant, Station};
 use canopen::{Mux, NodeId};
+use cia402::ModeOfOperation;
+use devices::servo::{self, CIA402};
+use devices::{AxisDescription, Description, Units};
 use master::Network;
 use toy::Toy;
 
 /// How long each frame takes, in nanoseconds: 128 bits at 500 kbit/s.
 const FRAME_NS: u64 = 256_000;
+
+/// The standard's servo as a frequency inverter: it turns in velocity mode (vl, 6042h) alone.
+pub(crate) static INVERTER: LazyLock<&'static Description> = LazyLock::new(|| {
+    let (target, actual, ramps) = servo::VELOCITY_MODE;
+    let standard = CIA402.axes[0];
+    let units = Units {
+        target_velocity: Some(target),
+        actual_velocity: Some(actual),
+        ramps: Some(ramps),
+        profile_velocity: None,
+        target_current: None,
+        ..standard.units
+    };
+    let axis = AxisDescription { modes: &[ModeOfOperation::VELOCITY], homing: None, units, ..standard };
+    let name = "an inverter (`velocity` in vl)";
+    Box::leak(Box::new(Description { name, axes: Box::leak(Box::new([axis])), ..CIA402 }))
+});
 
 pub(crate) fn node(raw: u8) -> NodeId {
     NodeId::new(raw).unwrap()
