@@ -33,6 +33,7 @@ mod model;
 mod parameter_values;
 mod read;
 mod rule;
+mod severity;
 mod value;
 mod write;
 
@@ -42,7 +43,7 @@ pub use configuration::{Configuration, SetError};
 pub use data_type::{Form, TypeCode};
 pub use describe::{Flavour, Sheet, Unkept, keep, keep_of};
 pub use diff::{Difference, diff};
-pub use finding::{Finding, Findings, Refusal, Severity};
+pub use finding::{Finding, Findings, Refusal};
 pub use model::{
     AccessType, Commissioning, DeviceInfo, DynamicChannel, Eds, FileInfo, KeptSection, List, Object, ObjectType,
     Variable,
@@ -50,6 +51,7 @@ pub use model::{
 pub use parameter_values::{NotHeld, parameter_values};
 pub use read::Reading;
 pub use rule::{Explanation, Rule};
+pub use severity::Severity;
 pub use value::{Number, Value};
 pub use write::write;
 

@@ -102,13 +102,13 @@ rules! {
     /// A key that CiA 306 does not have.
     UnknownKey = 105, Warning, "a key that CiA 306 does not have there", "nothing",
         "CiA 306-1, file information, general device information, object dictionary",
-        "A spelling mistake (`Defaultvalue1`) is not read by anybody, and the value is missing. Makers also \
+        "A spelling mistake (`Defaultvalue1`) is read by no tool, and the value is missing. Makers also \
         add keys of their own, which other tools do not know.",
         "Unit=r/min" => "; unit: r/min";
     /// A section that CiA 306 does not have, or of modules.
     UnknownSection = 106, Warning, "a section that CiA 306 does not have, or one about modules", "nothing; it is kept as it is",
         "CiA 306-1, basic structure; modules: 4.7",
-        "Nobody but its maker's tools knows what it means. Of modules (`[M1ModuleInfo]`, \
+        "Only its maker's tools know what it means. Of modules (`[M1ModuleInfo]`, \
         `[SupportedModules]`, ...) the file does not say which are plugged in, so that their objects are not \
         read; a coupler with modules has to have them as objects of the device.",
         "[Notes]\nLines=1\nLine1=Made for the left wheel" => "[Comments]\nLines=1\nLine1=Made for the left wheel";
@@ -146,7 +146,7 @@ rules! {
     /// An object that is listed and not there.
     ListedWithoutSection = 205, Error, "a listed object without a section", "no such object",
         "CiA 306-1, object dictionary",
-        "Its type, access and default are not said, so that nobody can read or write it by this file.",
+        "Its type, access and default are not said, so that no tool can read or write it by this file.",
         "[ManufacturerObjects]\nSupportedObjects=6\n6=0x20FF" => "[ManufacturerObjects]\nSupportedObjects=5";
     /// An object in no list.
     Unlisted = 206, Warning, "an object in no list", "an object like the others",
