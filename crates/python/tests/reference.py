@@ -21,7 +21,21 @@ WRITE = "FERRODRIVE_WRITE_PAGES=1 cargo xtask test --only python"
 #: The page's sections, and what of the package is in each.
 SECTIONS = {
     "Virtual drives": ["World", "VirtualDrive", "Body", "ExternalShaft", "Worlds", "virtual_time", "models", "eds", "stimulus_forms"],
-    "The master": ["Network", "Drive", "AsyncDrive", "Axis", "Group", "Base", "Supervisor", "Parameters", "check"],
+    "The master": [
+        "Network",
+        "Drive",
+        "AsyncDrive",
+        "Axis",
+        "Group",
+        "AsyncGroup",
+        "Base",
+        "AsyncBase",
+        "Supervisor",
+        "AsyncSupervisor",
+        "Parameters",
+        "AsyncParameters",
+        "check",
+    ],
     "Scenarios": ["run", "Outcome", "Row", "Sweep", "SweepSummary"],
     "A served simulator": ["Simulator", "Control"],
     "What goes wrong": [

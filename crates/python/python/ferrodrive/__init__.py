@@ -23,7 +23,7 @@ Quantities have their units in their names: ``velocity_rpm``, ``current_a``, ``s
 """
 
 from ._native import __version__, eds, models, stimulus_forms
-from .axes import Axis, Base, Group
+from .axes import AsyncBase, AsyncGroup, Axis, Base, Group
 from .body import Body
 from .control import Control
 from .errors import (
@@ -42,17 +42,21 @@ from .errors import (
 from .drive import AsyncDrive, Drive
 from .external import ExternalShaft, Worlds
 from .master import Network, check
-from .parameters import Parameters
+from .parameters import AsyncParameters, Parameters
 from .scenario import Outcome, Row, Sweep, SweepSummary, run
 from .simulator import Simulator
-from .supervisor import Supervisor
+from .supervisor import AsyncSupervisor, Supervisor
 from .virtual_drive import VirtualDrive
 from .turns import virtual_time
 from .world import World
 
 __all__ = [
     "Aborted",
+    "AsyncBase",
     "AsyncDrive",
+    "AsyncGroup",
+    "AsyncParameters",
+    "AsyncSupervisor",
     "Axis",
     "BadRequest",
     "Base",

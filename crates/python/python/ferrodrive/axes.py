@@ -61,7 +61,7 @@ class Axis:
     gear_ratio: Optional[float] = None
 
 
-class _Open:
+class _Powered:
     """What is open until it is closed: its drives have power."""
 
     def __init__(self, network: Network, native: Any) -> None:
@@ -69,9 +69,25 @@ class _Open:
         self._native = native
         self._closing: Optional[Job] = None
 
-    def _opened(self, job: Any) -> None:
-        self.network._finish(job)
+    def _keep(self) -> None:
         self._keeper = self._native.keep()
+
+    def _begin_close(self) -> Job:
+        # One that was interrupted (Ctrl-C, a coroutine that was cancelled) goes on, and the next call waits for its end.
+        job = self._closing = self._closing or self._native.close()
+        return job
+
+    def _end_close(self, job: Job) -> None:
+        if job.ended:
+            self._closing = None
+
+
+class _Open(_Powered):
+    """The same, with calls that wait."""
+
+    def _opened(self, job: Job) -> None:
+        self.network._finish(job)
+        self._keep()
 
     def stop(self) -> None:
         self.network._finish(self._native.stop())
@@ -79,13 +95,11 @@ class _Open:
     def close(self) -> None:
         if self.network.closed:
             return
-        # One that was interrupted (Ctrl-C) goes on, and the next call waits for its end.
-        job = self._closing = self._closing or self._native.close()
+        job = self._begin_close()
         try:
             self.network._finish(job, keep=True)
         finally:
-            if job.ended:
-                self._closing = None
+            self._end_close(job)
 
     def __exit__(
         self, kind: Optional[type[BaseException]], error: Optional[BaseException], traceback: Optional[TracebackType]
@@ -93,10 +107,42 @@ class _Open:
         try:
             self.close()
         except MasterError as moving:
-            if error is None:
-                raise
-            # What went wrong first is what is raised; that a drive may still be moving is a warning beside it.
-            warnings.warn(str(moving), BusWarning, stacklevel=2)
+            _raise_or_warn(moving, error)
+
+
+class _AsyncOpen(_Powered):
+    """The same, with coroutines."""
+
+    async def _opened(self, job: Job) -> None:
+        await self.network._finish_soon(job)
+        self._keep()
+
+    async def stop(self) -> None:
+        await self.network._finish_soon(self._native.stop())
+
+    async def close(self) -> None:
+        if self.network.closed:
+            return
+        job = self._begin_close()
+        try:
+            await self.network._finish_soon(job, keep=True)
+        finally:
+            self._end_close(job)
+
+    async def __aexit__(
+        self, kind: Optional[type[BaseException]], error: Optional[BaseException], traceback: Optional[TracebackType]
+    ) -> None:
+        try:
+            await self.close()
+        except MasterError as moving:
+            _raise_or_warn(moving, error)
+
+
+def _raise_or_warn(moving: MasterError, error: Optional[BaseException]) -> None:
+    if error is None:
+        raise moving
+    # What went wrong first is what is raised; that a drive may still be moving is a warning beside it.
+    warnings.warn(str(moving), BusWarning, stacklevel=3)
 
 
 class Group(_Open):
@@ -109,11 +155,7 @@ class Group(_Open):
 
     def __init__(self, network: Network, axes: Union[str, Sequence[Axis]], period: Optional[float], tolerance: int) -> None:
         super().__init__(network, NativeGroup(network._native))
-        if isinstance(axes, str):
-            self._opened(self._native.open_of_file(axes, period, tolerance))
-        else:
-            orders = [_order(axis) for axis in axes]
-            self._opened(self._native.open(orders, GROUP_PERIOD if period is None else period, tolerance))
+        self._opened(_open_group(self._native, axes, period, tolerance))
 
     def __enter__(self) -> Group:
         return self
@@ -191,10 +233,7 @@ class Base(_Open):
 
     def __init__(self, network: Network, order: Optional[dict[str, Any]], period: Optional[float], tolerance: int) -> None:
         super().__init__(network, NativeBase(network._native))
-        if order is None:
-            self._opened(self._native.open_of_file(period, tolerance))
-        else:
-            self._opened(self._native.open(order, BASE_PERIOD if period is None else period, tolerance))
+        self._opened(_open_base(self._native, order, period, tolerance))
 
     def __enter__(self) -> Base:
         return self
@@ -254,6 +293,106 @@ class Base(_Open):
         True
         """
         return cast(BaseState, self._native.state())
+
+
+class AsyncGroup(_AsyncOpen):
+    """:class:`Group` with coroutines. From :meth:`Network.async_group`; close it, or use it with ``async with``.
+
+    >>> async def main() -> float:
+    ...     axis = ferrodrive.Axis(5, "cia402", mode="csp", acceleration_rpm_s=300)
+    ...     async with await network.async_group([axis]) as group:
+    ...         return round(await group.move([90], within=2), 3)
+    >>> with ferrodrive.virtual_time(world):
+    ...     asyncio.run(main())
+    2.0
+    """
+
+    def __init__(self, network: Network) -> None:
+        super().__init__(network, NativeGroup(network._native))
+
+    async def _open(self, axes: Union[str, Sequence[Axis]], period: Optional[float], tolerance: int) -> AsyncGroup:
+        await self._opened(_open_group(self._native, axes, period, tolerance))
+        return self
+
+    async def __aenter__(self) -> AsyncGroup:
+        return self
+
+    async def stop(self) -> None:
+        """As :meth:`Group.stop`."""
+        await super().stop()
+
+    async def close(self) -> None:
+        """As :meth:`Group.close`."""
+        await super().close()
+
+    async def move(self, to_deg: Sequence[float], within: Optional[float] = None) -> float:
+        """As :meth:`Group.move`."""
+        time: float = await self.network._finish_soon(self._native.move_to(list(to_deg), within))
+        return time
+
+    async def follow(self, points_deg: Sequence[Sequence[float]]) -> None:
+        """As :meth:`Group.follow`."""
+        await self.network._finish_soon(self._native.follow([list(point) for point in points_deg]))
+
+    def state(self) -> GroupState:
+        """As :meth:`Group.state`, which waits for nothing."""
+        return cast(GroupState, self._native.state())
+
+
+class AsyncBase(_AsyncOpen):
+    """:class:`Base` with coroutines. From :meth:`Network.async_base`; close it, or use it with ``async with``.
+
+    >>> async def main(network: ferrodrive.Network) -> bool:
+    ...     await network.async_boot()
+    ...     async with await network.async_base() as base:
+    ...         return (await base.drive(0.2, 0.0, seconds=1))["limited"]
+    >>> machine = ferrodrive.World.machine("base.toml")
+    >>> with ferrodrive.virtual_time(machine), ferrodrive.Network(machine) as of_base:
+    ...     asyncio.run(main(of_base))
+    False
+    """
+
+    def __init__(self, network: Network) -> None:
+        super().__init__(network, NativeBase(network._native))
+
+    async def _open(self, order: Optional[dict[str, Any]], period: Optional[float], tolerance: int) -> AsyncBase:
+        await self._opened(_open_base(self._native, order, period, tolerance))
+        return self
+
+    async def __aenter__(self) -> AsyncBase:
+        return self
+
+    async def stop(self) -> None:
+        """As :meth:`Base.stop`."""
+        await super().stop()
+
+    async def close(self) -> None:
+        """As :meth:`Base.close`."""
+        await super().close()
+
+    def command(self, linear_m_s: float, angular_rad_s: float) -> BaseTwist:
+        """As :meth:`Base.command`, which waits for nothing."""
+        return cast(BaseTwist, self._native.command(linear_m_s, angular_rad_s))
+
+    async def drive(self, linear_m_s: float, angular_rad_s: float, seconds: float) -> BaseTwist:
+        """As :meth:`Base.drive`."""
+        return cast(BaseTwist, await self.network._finish_soon(self._native.drive(linear_m_s, angular_rad_s, seconds)))
+
+    def state(self) -> BaseState:
+        """As :meth:`Base.state`, which waits for nothing."""
+        return cast(BaseState, self._native.state())
+
+
+def _open_group(native: NativeGroup, axes: Union[str, Sequence[Axis]], period: Optional[float], tolerance: int) -> Job:
+    if isinstance(axes, str):
+        return native.open_of_file(axes, period, tolerance)
+    return native.open([_order(axis) for axis in axes], GROUP_PERIOD if period is None else period, tolerance)
+
+
+def _open_base(native: NativeBase, order: Optional[dict[str, Any]], period: Optional[float], tolerance: int) -> Job:
+    if order is None:
+        return native.open_of_file(period, tolerance)
+    return native.open(order, BASE_PERIOD if period is None else period, tolerance)
 
 
 def _order(axis: Axis) -> dict[str, Any]:

@@ -29,13 +29,13 @@ from typing import Any, Optional, Union, cast
 from . import _native
 from ._native import Job, model_name
 from ._native import Network as NativeNetwork
-from .axes import Axis, Base, Group
+from .axes import AsyncBase, AsyncGroup, Axis, Base, Group
 from .drive import AsyncDrive, Drive
 from .errors import BusWarning, MasterError, Stalled, made
-from .parameters import File, Parameters
+from .parameters import AsyncParameters, File, Parameters
 from .real_time import REAL
 from .reports import CheckReport
-from .supervisor import Supervisor, path_of
+from .supervisor import AsyncSupervisor, Supervisor, path_of
 from .turns import taking_part
 from .whole import Whole
 from .world import World
@@ -143,8 +143,8 @@ class Network(Whole):
             if came is not None and came[0] == "stalled":
                 raise Stalled("the master waits, and nothing is left to happen in the world")
 
-    async def _finish_soon(self, job: Job) -> Any:
-        """The result of a job, awaited."""
+    async def _finish_soon(self, job: Job, keep: bool = False) -> Any:
+        """The result of a job, awaited. One whose coroutine is cancelled is given up, unless it is to be kept."""
         loop = asyncio.get_running_loop()
         ended: asyncio.Future[None] = loop.create_future()
 
@@ -165,7 +165,8 @@ class Network(Whole):
         try:
             await ended
         except BaseException:
-            job.cancel()
+            if not keep:
+                job.cancel()
             raise
         return self._result(job)
 
@@ -234,6 +235,12 @@ class Network(Whole):
         """
         return Group(self, axes, period, tolerance)
 
+    async def async_group(
+        self, axes: Union[str, Sequence[Axis]], *, period: Optional[float] = None, tolerance: int = 2
+    ) -> AsyncGroup:
+        """As :meth:`group`, for ``async with await network.async_group(..) as group``."""
+        return await AsyncGroup(self)._open(axes, period, tolerance)
+
     def base(
         self,
         left: Optional[tuple[int, str]] = None,
@@ -280,28 +287,42 @@ class Network(Whole):
         True
         False
         """
-        lengths = {"wheel_base_m": wheel_base_m, "wheel_radius_m": wheel_radius_m}
-        speeds = {"linear_m_s": linear_m_s, "angular_rad_s": angular_rad_s, "wheel_m_s": wheel_m_s, "wheel_m_s2": wheel_m_s2}
-        if left is not None and right is not None:
-            of_left, of_right = (1.0, -1.0) if turns is None else turns
-            order = {
-                "wheels": ((*left, of_left), (*right, of_right)),
-                "mode": "pv" if mode is None else mode,
-                # What is not stated is refused with what is expected.
-                **{name: 0.0 if value is None else value for name, value in {**lengths, **speeds}.items()},
-                "watchdog_s": 0.3 if watchdog is None else watchdog,
-                "lag_m": lag_m,
-            }
-            return Base(self, order, period, tolerance)
-        if left is not None or right is not None:
-            raise ValueError("a base has two wheels: give left and right, or neither for the [base] of the machine file")
-        beside = {**lengths, **speeds, "turns": turns, "mode": mode, "watchdog": watchdog, "lag_m": lag_m}
-        if given := [name for name, value in beside.items() if value is not None]:
-            raise TypeError(
-                f"base() without wheels is the [base] of the machine file, which decides {', '.join(given)}: change it there, or give "
-                "the whole base, with left and right"
-            )
-        return Base(self, None, period, tolerance)
+        order = _order_of_base(
+            left,
+            right,
+            {"wheel_base_m": wheel_base_m, "wheel_radius_m": wheel_radius_m},
+            {"linear_m_s": linear_m_s, "angular_rad_s": angular_rad_s, "wheel_m_s": wheel_m_s, "wheel_m_s2": wheel_m_s2},
+            {"turns": turns, "mode": mode, "watchdog": watchdog, "lag_m": lag_m},
+        )
+        return Base(self, order, period, tolerance)
+
+    async def async_base(
+        self,
+        left: Optional[tuple[int, str]] = None,
+        right: Optional[tuple[int, str]] = None,
+        *,
+        wheel_base_m: Optional[float] = None,
+        wheel_radius_m: Optional[float] = None,
+        linear_m_s: Optional[float] = None,
+        angular_rad_s: Optional[float] = None,
+        wheel_m_s: Optional[float] = None,
+        wheel_m_s2: Optional[float] = None,
+        turns: Optional[tuple[float, float]] = None,
+        mode: Optional[str] = None,
+        watchdog: Optional[float] = None,
+        lag_m: Optional[float] = None,
+        period: Optional[float] = None,
+        tolerance: int = 2,
+    ) -> AsyncBase:
+        """As :meth:`base`, for ``async with await network.async_base(..) as base``."""
+        order = _order_of_base(
+            left,
+            right,
+            {"wheel_base_m": wheel_base_m, "wheel_radius_m": wheel_radius_m},
+            {"linear_m_s": linear_m_s, "angular_rad_s": angular_rad_s, "wheel_m_s": wheel_m_s, "wheel_m_s2": wheel_m_s2},
+            {"turns": turns, "mode": mode, "watchdog": watchdog, "lag_m": lag_m},
+        )
+        return await AsyncBase(self)._open(order, period, tolerance)
 
     def supervise(self, file: Optional[File] = None, *, nodes: Sequence[int] = (), own_node: int = 127) -> Supervisor:
         """Boots as :meth:`boot` does, has each drive stop by itself when this program dies, where its model has something for that, and
@@ -316,6 +337,12 @@ class Network(Whole):
         """
         return Supervisor(self, path_of(file), nodes, own_node)
 
+    async def async_supervise(
+        self, file: Optional[File] = None, *, nodes: Sequence[int] = (), own_node: int = 127
+    ) -> AsyncSupervisor:
+        """As :meth:`supervise`, for ``async with await network.async_supervise() as supervisor``."""
+        return await AsyncSupervisor(self)._open(path_of(file), nodes, own_node)
+
     def params(self, node: int, model: Optional[str] = None) -> Parameters:
         """The parameters of a node, to be kept, compared, written as a transaction and checked.
 
@@ -326,6 +353,14 @@ class Network(Whole):
         True
         """
         return Parameters(self, node, model if model is None else model_name(model))
+
+    def async_params(self, node: int, model: Optional[str] = None) -> AsyncParameters:
+        """As :meth:`params`, with coroutines.
+
+        >>> network.async_params(5).node
+        5
+        """
+        return AsyncParameters(self, node, model if model is None else model_name(model))
 
     def sleep(self, seconds: float) -> None:
         """Lets time pass on the bus, in s.
@@ -450,3 +485,31 @@ def _close_all() -> None:
     for network in list(_open):
         if network._world is None:
             network.close()
+
+
+def _order_of_base(
+    left: Optional[tuple[int, str]],
+    right: Optional[tuple[int, str]],
+    lengths: dict[str, Optional[float]],
+    speeds: dict[str, Optional[float]],
+    beside: dict[str, Any],
+) -> Optional[dict[str, Any]]:
+    """A base with these wheels; None for that of the machine file."""
+    if left is not None and right is not None:
+        of_left, of_right = (1.0, -1.0) if beside["turns"] is None else beside["turns"]
+        return {
+            "wheels": ((*left, of_left), (*right, of_right)),
+            "mode": "pv" if beside["mode"] is None else beside["mode"],
+            # What is not stated is refused with what is expected.
+            **{name: 0.0 if value is None else value for name, value in {**lengths, **speeds}.items()},
+            "watchdog_s": 0.3 if beside["watchdog"] is None else beside["watchdog"],
+            "lag_m": beside["lag_m"],
+        }
+    if left is not None or right is not None:
+        raise ValueError("a base has two wheels: give left and right, or neither for the [base] of the machine file")
+    if given := [name for name, value in {**lengths, **speeds, **beside}.items() if value is not None]:
+        raise TypeError(
+            f"base() without wheels is the [base] of the machine file, which decides {', '.join(given)}: change it there, or give "
+            "the whole base, with left and right"
+        )
+    return None

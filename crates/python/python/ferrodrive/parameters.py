@@ -14,7 +14,42 @@ if TYPE_CHECKING:
 File = Union[str, "os.PathLike[str]"]
 
 
-class Parameters:
+class _Jobs:
+    """What can be asked of a node's parameters, as jobs. Both kinds of parameters wait for these."""
+
+    def __init__(self, network: Network, node: int, model: Optional[str]) -> None:
+        self.network = network
+        #: Its node-ID, 1 to 127.
+        self.node = node
+        self._of = (network._native, node, model)
+
+    def _backup(self, file: Optional[File], force: bool) -> _native.Job:
+        path = _path(file)
+        if path is not None and not force and os.path.exists(path):
+            raise FileExistsError(f"{path} is there already; nothing was read. Name another file, or give force=True")
+        return _native.params_backup(*self._of, path)
+
+    def _kept(self, read: tuple[BackupReport, bytes], file: Optional[File], force: bool) -> BackupReport:
+        report, content = read
+        if file is not None:
+            with open(file, "wb" if force else "xb") as kept:
+                kept.write(content)
+        return report
+
+    def _compare(self, file: Optional[File], question: str) -> _native.Job:
+        return _native.params_compare(*self._of, _path(file), question)
+
+    def _plan(self, file: Optional[File], address: bool) -> _native.Job:
+        return self._compare(file, "plan with address" if address else "plan")
+
+    def _apply(self, file: Optional[File], journal: Optional[File], **order: Any) -> _native.Job:
+        return _native.params_apply(*self._of, _path(file), {**order, "journal": _path(journal)})
+
+    def _rollback(self, journal: Optional[File]) -> _native.Job:
+        return _native.params_rollback(*self._of, _path(journal))
+
+
+class Parameters(_Jobs):
     """The parameters of a node. From :meth:`Network.params`.
 
     A file is ``.toml`` (objects by number or name, values with units), ``.dcf`` (CiA 306) or ``.bin`` (concise DCF, CiA 302-3). Commands and
@@ -28,12 +63,6 @@ class Parameters:
     True
     """
 
-    def __init__(self, network: Network, node: int, model: Optional[str]) -> None:
-        self.network = network
-        #: Its node-ID, 1 to 127.
-        self.node = node
-        self._of = (network._native, node, model)
-
     def backup(self, file: Optional[File] = None, *, force: bool = False) -> BackupReport:
         """Reads all parameters of its model into a file, or without one into the ``parameters`` of the report, as TOML.
 
@@ -44,14 +73,7 @@ class Parameters:
         >>> parameters.backup()["parameters"].splitlines()[0][:1]
         '#'
         """
-        path = _path(file)
-        if path is not None and not force and os.path.exists(path):
-            raise FileExistsError(f"{path} is there already; nothing was read. Name another file, or give force=True")
-        report, content = self.network._finish(_native.params_backup(*self._of, path))
-        if path is not None:
-            with open(path, "wb" if force else "xb") as kept:
-                kept.write(content)
-        return cast(BackupReport, report)
+        return self._kept(self.network._finish(self._backup(file, force)), file, force)
 
     def diff(self, file: Optional[File] = None) -> DiffReport:
         """In what the node and a file differ; ``first`` is the node, ``second`` the file.
@@ -61,7 +83,7 @@ class Parameters:
         >>> parameters.diff("slow.toml")["differences"][0]["object"]
         '6081h:00'
         """
-        return cast(DiffReport, self._do(_native.params_compare(*self._of, _path(file), "diff")))
+        return cast(DiffReport, self.network._finish(self._compare(file, "diff")))
 
     def plan(self, file: Optional[File] = None, *, address: bool = False) -> ParametersPlan:
         """What :meth:`apply` would write, in its order; nothing is written.
@@ -72,8 +94,7 @@ class Parameters:
         >>> [step["object"] for step in parameters.plan("slow.toml")["steps"]]
         ['6081h:00']
         """
-        question = "plan with address" if address else "plan"
-        return cast(ParametersPlan, self._do(_native.params_compare(*self._of, _path(file), question)))
+        return cast(ParametersPlan, self.network._finish(self._plan(file, address)))
 
     def apply(
         self,
@@ -102,8 +123,8 @@ class Parameters:
         >>> parameters.apply("slow.toml")["writes"]
         1
         """
-        order = {"address": address, "save": save, "prove": prove, "within": within, "journal": _path(journal)}
-        return cast(ApplyReport, self._do(_native.params_apply(*self._of, _path(file), order)))
+        job = self._apply(file, journal, address=address, save=save, prove=prove, within=within)
+        return cast(ApplyReport, self.network._finish(job))
 
     def verify(self, file: Optional[File] = None) -> VerifyReport:
         """Whether the node has a file's parameters. That it has not is in the report, and raises nothing.
@@ -113,7 +134,7 @@ class Parameters:
         >>> parameters.verify("slow.toml")["deviations"][0]["wanted"]["text"]
         '100 inc/s'
         """
-        return cast(VerifyReport, self._do(_native.params_compare(*self._of, _path(file), "verify")))
+        return cast(VerifyReport, self.network._finish(self._compare(file, "verify")))
 
     def rollback(self, journal: Optional[File] = None) -> RollbackReport:
         """Goes back to how the node was before an :meth:`apply` that was broken off, and deletes the journal.
@@ -127,10 +148,50 @@ class Parameters:
         ...     error.kind
         'no_journal'
         """
-        return cast(RollbackReport, self._do(_native.params_rollback(*self._of, _path(journal))))
+        return cast(RollbackReport, self.network._finish(self._rollback(journal)))
 
-    def _do(self, job: _native.Job) -> Any:
-        return self.network._finish(job)
+
+class AsyncParameters(_Jobs):
+    """:class:`Parameters` with coroutines, for several nodes at the same time. From :meth:`Network.async_params`.
+
+    >>> with ferrodrive.virtual_time(world):
+    ...     asyncio.run(network.async_params(5).backup())["values"] > 10
+    True
+    """
+
+    async def backup(self, file: Optional[File] = None, *, force: bool = False) -> BackupReport:
+        """As :meth:`Parameters.backup`."""
+        return self._kept(await self.network._finish_soon(self._backup(file, force)), file, force)
+
+    async def diff(self, file: Optional[File] = None) -> DiffReport:
+        """As :meth:`Parameters.diff`."""
+        return cast(DiffReport, await self.network._finish_soon(self._compare(file, "diff")))
+
+    async def plan(self, file: Optional[File] = None, *, address: bool = False) -> ParametersPlan:
+        """As :meth:`Parameters.plan`."""
+        return cast(ParametersPlan, await self.network._finish_soon(self._plan(file, address)))
+
+    async def apply(
+        self,
+        file: Optional[File] = None,
+        *,
+        save: bool = False,
+        prove: Optional[str] = None,
+        within: float = 120.0,
+        address: bool = False,
+        journal: Optional[File] = None,
+    ) -> ApplyReport:
+        """As :meth:`Parameters.apply`."""
+        job = self._apply(file, journal, address=address, save=save, prove=prove, within=within)
+        return cast(ApplyReport, await self.network._finish_soon(job))
+
+    async def verify(self, file: Optional[File] = None) -> VerifyReport:
+        """As :meth:`Parameters.verify`."""
+        return cast(VerifyReport, await self.network._finish_soon(self._compare(file, "verify")))
+
+    async def rollback(self, journal: Optional[File] = None) -> RollbackReport:
+        """As :meth:`Parameters.rollback`."""
+        return cast(RollbackReport, await self.network._finish_soon(self._rollback(journal)))
 
 
 def _path(file: Optional[File]) -> Optional[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import AsyncIterator, Iterator, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Optional, Union, cast
 
@@ -16,7 +16,22 @@ if TYPE_CHECKING:
     from .master import Network
 
 
-class Supervisor:
+class _Watch:
+    """A watch over a network that is open until it is closed. Both kinds of supervisor are one."""
+
+    #: What came of the boot-up; that a mandatory node has failed is in it, and raises nothing.
+    report: BootReport
+
+    def __init__(self, network: Network) -> None:
+        self.network = network
+        self._native = NativeSupervisor(network._native)
+
+    def _watch(self, report: BootReport) -> None:
+        self.report = report
+        self._keeper = self._native.keep()
+
+
+class Supervisor(_Watch):
     """The watch over a network: lost heartbeats, states, emergency messages with fault and remedy, another master. From
     :meth:`Network.supervise`, which boots it before.
 
@@ -31,11 +46,8 @@ class Supervisor:
     """
 
     def __init__(self, network: Network, file: Optional[str], nodes: Sequence[int], own_node: int) -> None:
-        self.network = network
-        self._native = NativeSupervisor(network._native)
-        #: What came of the boot-up; that a mandatory node has failed is in it, and raises nothing.
-        self.report: BootReport = network._finish(self._native.open(file, list(nodes), own_node))
-        self._keeper = self._native.keep()
+        super().__init__(network)
+        self._watch(network._finish(self._native.open(file, list(nodes), own_node)))
 
     def __enter__(self) -> Supervisor:
         return self
@@ -87,9 +99,9 @@ class Supervisor:
         clock = self.network._now
         end = clock() + within
         while (left := end - clock()) > 0 and (event := self.next(left)) is not None:
-            if event["kind"] == kind and node in (None, event["node"]):
+            if _is_wanted(event, kind, node):
                 return event
-        raise TimeoutError(f"no event {kind!r} within {within} s")
+        raise _none_came(kind, within)
 
     def resume(self, node: int) -> None:
         """Lets a node that came back take part again (NMT start).
@@ -109,6 +121,71 @@ class Supervisor:
         """
         if not self.network.closed:
             self.network._finish(self._native.close())
+
+
+class AsyncSupervisor(_Watch):
+    """:class:`Supervisor` with coroutines. From :meth:`Network.async_supervise`; close it, or use it with ``async with``.
+
+    >>> async def main() -> None:
+    ...     async with await network.async_supervise() as supervisor:
+    ...         world[5].power_cycle()
+    ...         print((await supervisor.wait_for("boot_up", within=30))["node"])
+    >>> with ferrodrive.virtual_time(world):
+    ...     asyncio.run(main())
+    5
+    """
+
+    async def _open(self, file: Optional[str], nodes: Sequence[int], own_node: int) -> AsyncSupervisor:
+        self._watch(await self.network._finish_soon(self._native.open(file, list(nodes), own_node)))
+        return self
+
+    async def __aenter__(self) -> AsyncSupervisor:
+        return self
+
+    async def __aexit__(
+        self, kind: Optional[type[BaseException]], error: Optional[BaseException], traceback: Optional[TracebackType]
+    ) -> None:
+        try:
+            await self.close()
+        except MasterError as kept:
+            if error is None:
+                raise
+            warnings.warn(str(kept), BusWarning, stacklevel=2)
+
+    async def next(self, within: float = 1.0) -> Optional[WatchedEvent]:
+        """As :meth:`Supervisor.next`."""
+        return cast(Optional[WatchedEvent], await self.network._finish_soon(self._native.next(within)))
+
+    async def events(self, within: float = 1.0) -> AsyncIterator[WatchedEvent]:
+        """As :meth:`Supervisor.events`, for ``async for``."""
+        while (event := await self.next(within)) is not None:
+            yield event
+
+    async def wait_for(self, kind: str, node: Optional[int] = None, within: float = 5.0) -> WatchedEvent:
+        """As :meth:`Supervisor.wait_for`."""
+        clock = self.network._now
+        end = clock() + within
+        while (left := end - clock()) > 0 and (event := await self.next(left)) is not None:
+            if _is_wanted(event, kind, node):
+                return event
+        raise _none_came(kind, within)
+
+    async def resume(self, node: int) -> None:
+        """As :meth:`Supervisor.resume`."""
+        await self.network._finish_soon(self._native.resume(node))
+
+    async def close(self) -> None:
+        """As :meth:`Supervisor.close`."""
+        if not self.network.closed:
+            await self.network._finish_soon(self._native.close())
+
+
+def _is_wanted(event: WatchedEvent, kind: str, node: Optional[int]) -> bool:
+    return event["kind"] == kind and node in (None, event["node"])
+
+
+def _none_came(kind: str, within: float) -> TimeoutError:
+    return TimeoutError(f"no event {kind!r} within {within} s")
 
 
 def path_of(file: Optional[Union[str, os.PathLike[str]]]) -> Optional[str]:

@@ -23,7 +23,7 @@ class Whole:
     def _finish(self, job: Job) -> Any:
         raise NotImplementedError
 
-    async def _finish_soon(self, job: Job) -> Any:
+    async def _finish_soon(self, job: Job, keep: bool = False) -> Any:
         raise NotImplementedError
 
     def scan(self) -> ScanReport:
