@@ -43,7 +43,7 @@ pub struct DbcPdo {
 /// Who sends NMT, SYNC and RPDOs.
 const MASTER: &str = "master";
 
-/// Longest name of a message or signal that all tools take.
+/// Longest name that the format has; what is longer stands in an attribute, from which tools show it.
 const MAX_NAME: usize = 32;
 
 /// NMT command specifiers (CiA 301, 7.2.8.3.1).
@@ -57,13 +57,14 @@ const NMT_STATES: [(i64, &str); 4] = [(0, "boot-up"), (4, "stopped"), (5, "opera
 #[derive(Default)]
 struct Tail {
     comments: String,
+    long_names: String,
     value_types: String,
     values: String,
 }
 
 /// A signal of a message.
 struct DbcSignal {
-    name: String,
+    name: Name,
     at: u32,
     bits: u32,
     signed: bool,
@@ -75,25 +76,78 @@ struct DbcSignal {
     value_type: u8,
 }
 
+/// A name without doubles among its own, as it is in full and as the format has it.
+#[derive(Clone)]
+struct Name {
+    long: String,
+    short: String,
+}
+
+/// The names of all nodes, or of the signals of one message.
+#[derive(Default)]
+struct Names {
+    long: BTreeSet<String>,
+    short: BTreeSet<String>,
+}
+
+impl Names {
+    /// A name that is there already is numbered. One that is too long is cut, and where that is there already, numbered in its last
+    /// five letters, as Vector's tools and cantools have it.
+    fn name(&mut self, text: &str) -> Name {
+        let text = symbol(text);
+        let long = first_free(&mut self.long, text.clone(), |number| format!("{text}_{}", number + 1));
+        let cut = |most: usize| &long[..long.len().min(most)];
+        let numbered = |number| format!("{}_{number:04}", cut(MAX_NAME - 5));
+        Name { short: first_free(&mut self.short, cut(MAX_NAME).to_owned(), numbered), long }
+    }
+}
+
+/// The first of a name and its numbered forms, from 1 on, that is not taken; it is then.
+fn first_free(taken: &mut BTreeSet<String>, name: String, numbered: impl Fn(u32) -> String) -> String {
+    let free = std::iter::once(name).chain((1..).map(numbered)).find(|name| !taken.contains(name)).unwrap_or_default();
+    taken.insert(free.clone());
+    free
+}
+
+impl Name {
+    /// The attribute of a name that was cut.
+    fn attribute(&self, of: &str, attribute: &str) -> String {
+        let Self { long, short } = self;
+        if long == short { String::new() } else { format!("BA_ \"{attribute}\" {of} {short} \"{long}\";\n") }
+    }
+}
+
+/// The attributes with which Vector's tools keep long names, and what has them.
+const LONG_NAMES: [(&str, &str); 2] = [("BU_", "SystemNodeLongSymbol"), ("SG_", "SystemSignalLongSymbol")];
+
 /// The text of a DBC file of these nodes.
 pub fn print(nodes: &[DbcNode]) -> String {
     let mut out = String::from("VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: ");
     out.push_str(MASTER);
-    for node in nodes {
+    let mut names = Names::default();
+    names.name(MASTER);
+    let names: Vec<Name> = nodes.iter().map(|node| names.name(&node.name())).collect();
+    for name in &names {
         out.push(' ');
-        out.push_str(&node.name());
+        out.push_str(&name.short);
     }
     out.push_str("\n\n");
     let mut tail = Tail::default();
-    let all_nodes: Vec<String> = nodes.iter().map(DbcNode::name).collect();
-    let all_nodes = all_nodes.join(",");
+    tail.long_names.extend(names.iter().map(|name| name.attribute("BU_", LONG_NAMES[0].1)));
+    let all_nodes = names.iter().map(|name| &*name.short).collect::<Vec<_>>().join(",");
     let nmt = [DbcSignal::plain("command", 0, 8).valued(&NMT_COMMANDS), DbcSignal::plain("node", 8, 8)];
     message(&mut out, &mut tail, Head { id: 0, name: "NMT", length: 2, sender: MASTER, receiver: &all_nodes }, &nmt);
     message(&mut out, &mut tail, Head { id: 0x80, name: "SYNC", length: 0, sender: MASTER, receiver: &all_nodes }, &[]);
-    for node in nodes {
-        node.messages(&mut out, &mut tail);
+    for (node, name) in nodes.iter().zip(&names) {
+        node.messages(&name.short, &mut out, &mut tail);
     }
     out.push_str(&tail.comments);
+    if !tail.long_names.is_empty() {
+        let define = |(of, attribute)| format!("BA_DEF_ {of} \"{attribute}\" STRING ;\n");
+        let default = |(_, attribute)| format!("BA_DEF_DEF_ \"{attribute}\" \"\";\n");
+        out.extend(LONG_NAMES.map(define).into_iter().chain(LONG_NAMES.map(default)));
+        out.push_str(&tail.long_names);
+    }
     out.push('\n');
     out.push_str(&tail.values);
     out.push_str(&tail.value_types);
@@ -115,7 +169,9 @@ fn message(out: &mut String, tail: &mut Tail, head: Head<'_>, signals: &[DbcSign
     // Writing to a String does not fail.
     let _ = writeln!(out, "BO_ {id} {name}: {length} {sender}");
     for signal in signals {
-        let DbcSignal { name, at, bits, factor, unit, comment, .. } = signal;
+        let DbcSignal { name: full, at, bits, factor, unit, comment, .. } = signal;
+        let name = &full.short;
+        tail.long_names.push_str(&full.attribute(&format!("SG_ {id}"), LONG_NAMES[1].1));
         let sign = if signal.signed { '-' } else { '+' };
         let _ = writeln!(out, " SG_ {name} : {at}|{bits}@1{sign} ({factor},0) [0|0] \"{unit}\" {receiver}");
         if !comment.is_empty() {
@@ -135,16 +191,15 @@ fn message(out: &mut String, tail: &mut Tail, head: Head<'_>, signals: &[DbcSign
 impl DbcNode {
     /// `zlac8030l_4`, or `node_4`.
     fn name(&self) -> String {
-        symbol(&format!("{}_{}", self.model.map_or("node", |model| model.name), self.id))
+        format!("{}_{}", self.model.map_or("node", |model| model.name), self.id)
     }
 
-    fn messages(&self, out: &mut String, tail: &mut Tail) {
-        let name = self.name();
+    fn messages(&self, name: &str, out: &mut String, tail: &mut Tail) {
         // One that carries nothing is not sent (CiA 301, 7.5.2.36: its mapping is deactivated).
         for pdo in self.pdos.iter().filter(|pdo| pdo.map.bytes() > 0) {
             let (sender, receiver) = match pdo.pdo.direction {
-                Direction::Tpdo => (&*name, MASTER),
-                Direction::Rpdo => (MASTER, &*name),
+                Direction::Tpdo => (name, MASTER),
+                Direction::Rpdo => (MASTER, name),
             };
             let title = symbol(&format!("{}_{}", pdo.pdo, self.id));
             let length = pdo.map.bytes().min(can::MAX_DATA_LENGTH);
@@ -159,38 +214,25 @@ impl DbcNode {
             DbcSignal::plain("manufacturer", 24, 40),
         ];
         let title = format!("EMCY_{own}");
-        let head = Head { id: id(connection_set::emcy(own)), name: &title, length: 8, sender: &name, receiver: MASTER };
+        let head = Head { id: id(connection_set::emcy(own)), name: &title, length: 8, sender: name, receiver: MASTER };
         message(out, tail, head, &emcy);
         // The highest bit toggles in answers to node guarding.
         let heartbeat = [DbcSignal::plain("nmt_state", 0, 7).valued(&NMT_STATES)];
         let title = format!("heartbeat_{own}");
         let head =
-            Head { id: id(connection_set::heartbeat(own)), name: &title, length: 1, sender: &name, receiver: MASTER };
+            Head { id: id(connection_set::heartbeat(own)), name: &title, length: 1, sender: name, receiver: MASTER };
         message(out, tail, head, &heartbeat);
     }
 
     /// A signal for each object that is mapped and fits into a frame; dummy entries (CiA 301, 7.4.7.1) are gaps.
     fn signals(&self, pdo: &DbcPdo) -> Vec<DbcSignal> {
-        let mut names = BTreeSet::new();
+        let mut names = Names::default();
         let fields =
             pdo.map.fields().filter(|(object, bits)| object.mux.index >= 8 && bits.end <= 64 && !bits.is_empty());
-        fields
-            .map(|(object, bits)| {
-                let mut signal = self.signal(pdo.pdo.direction, &object, bits.start);
-                // An object may be mapped twice.
-                let base = signal.name.clone();
-                for count in 2.. {
-                    if names.insert(signal.name.clone()) {
-                        break;
-                    }
-                    signal.name = format!("{}_{count}", &base[..base.len().min(MAX_NAME - 3)]);
-                }
-                signal
-            })
-            .collect()
+        fields.map(|(object, bits)| self.signal(&mut names, pdo.pdo.direction, &object, bits.start)).collect()
     }
 
-    fn signal(&self, direction: Direction, object: &MappingRecord, at: u32) -> DbcSignal {
+    fn signal(&self, names: &mut Names, direction: Direction, object: &MappingRecord, at: u32) -> DbcSignal {
         let mux = object.mux;
         let row = self.model.and_then(|model| model.row(mux));
         let form =
@@ -214,7 +256,7 @@ impl DbcNode {
         };
         let values = row.map(|row| row.values).unwrap_or_default();
         DbcSignal {
-            name: symbol(&name),
+            name: names.name(&name),
             at,
             bits: u32::from(object.bits),
             signed: value_type != 0 || data_type.is_some_and(DataType::is_signed),
@@ -230,7 +272,7 @@ impl DbcNode {
 impl DbcSignal {
     fn plain(name: &str, at: u32, bits: u32) -> Self {
         Self {
-            name: name.to_owned(),
+            name: Name { long: name.to_owned(), short: name.to_owned() },
             at,
             bits,
             signed: false,
@@ -251,13 +293,12 @@ fn comment(mux: Mux, title: &str) -> String {
     if title.is_empty() { mux.to_string() } else { format!("{mux} {}", plain_text(title)) }
 }
 
-/// A name of letters, digits and underscores that begins with no digit, of at most [`MAX_NAME`] characters.
+/// A name of letters, digits and underscores that does not begin with a digit.
 fn symbol(text: &str) -> String {
     let mut name: String = text.chars().map(|char| if char.is_ascii_alphanumeric() { char } else { '_' }).collect();
     if name.starts_with(|first: char| first.is_ascii_digit()) {
         name.insert(0, '_');
     }
-    name.truncate(MAX_NAME);
     name
 }
 
@@ -326,5 +367,38 @@ mod tests {
             assert!(text.lines().any(|found| found == line), "{line:?} in {text}");
         }
         assert!(!text.contains("position_actual_value"), "it ends behind bit 64: {text}");
+        assert!(!text.contains("LongSymbol"), "all names are short: {text}");
+    }
+
+    #[test]
+    fn names_that_are_too_long_are_cut_to_names_of_their_own_and_kept_as_an_attribute() {
+        let mut names = Names::default();
+        let long = "motor_temperature_of_the_left_wheel";
+        let named = [long, long, "motor_temperature_of_the_left_whip", "motor"].map(|text| names.name(text));
+        let expected = [
+            ("motor_temperature_of_the_left_wheel", "motor_temperature_of_the_left_wh"),
+            ("motor_temperature_of_the_left_wheel_2", "motor_temperature_of_the_le_0001"),
+            ("motor_temperature_of_the_left_whip", "motor_temperature_of_the_le_0002"),
+            ("motor", "motor"),
+        ];
+        assert_eq!(named.each_ref().map(|Name { long, short }| (&**long, &**short)), expected);
+        assert_eq!(
+            named[0].attribute("SG_ 388", "SystemSignalLongSymbol"),
+            format!("BA_ \"SystemSignalLongSymbol\" SG_ 388 motor_temperature_of_the_left_wh \"{long}\";\n")
+        );
+        assert_eq!(named[3].attribute("SG_ 388", "SystemSignalLongSymbol"), "");
+        let text = print(&[node(&[(0x1400, 1, 32), (0x1400, 2, 8)])]);
+        let mut lines = text.lines();
+        for line in [
+            " SG_ rpdo_communication_parameter_1_c : 0|32@1+ (1,0) [0|0] \"\" master",
+            " SG_ rpdo_communication_parameter_1_t : 32|8@1+ (1,0) [0|0] \"\" master",
+            "BA_DEF_ SG_ \"SystemSignalLongSymbol\" STRING ;",
+            "BA_DEF_DEF_ \"SystemSignalLongSymbol\" \"\";",
+            "BA_ \"SystemSignalLongSymbol\" SG_ 388 rpdo_communication_parameter_1_t \
+             \"rpdo_communication_parameter_1_transmission_type_02\";",
+            "VAL_ 1796 nmt_state 0 \"boot-up\" 4 \"stopped\" 5 \"operational\" 127 \"pre-operational\" ;",
+        ] {
+            assert!(lines.any(|found| found == line), "{line:?}, in this order, in {text}");
+        }
     }
 }
