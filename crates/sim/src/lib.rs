@@ -47,6 +47,7 @@ pub mod pace;
 mod prng;
 pub mod recorder;
 mod refused;
+pub mod seeds;
 pub mod stimulus;
 pub mod task;
 pub mod wire;

@@ -33,16 +33,13 @@ use crate::machine::TimingMode;
 use crate::recorder::Recorder;
 use crate::stimulus::Place;
 use crate::wire::{Bus, ControllerOptions};
-use crate::{Prng, VirtualDrive};
+use crate::{Prng, VirtualDrive, seeds};
 use body::CoupledBody;
 use crew::{Crew, Found};
 use due::DueTimes;
 use ledger::Ledger;
 use member::{Member, Vacant};
 use watch::WorldWatch;
-
-/// Distinguishes the seeds of a drive's timing from those of its noise.
-const TIMING_SEED: u64 = 0x7469_6D69_6E67;
 
 /// A bus with everything on it.
 ///
@@ -137,7 +134,7 @@ impl World {
             return Err(WorldError::DuplicateDrive(number));
         }
         if self.timing == TimingMode::Device {
-            drive.set_timing(self.timing, self.seed_of(number, TIMING_SEED), self.now);
+            drive.set_timing(self.timing, seeds::timing_seed(self.seed, number), self.now);
             self.has_chance = true;
         }
         let id = self.add(Member::Drive { number, drive }, ControllerOptions::MICROCONTROLLER);
@@ -148,11 +145,6 @@ impl World {
     /// Whether its seed may have decided anything so far. If not, a world of any other seed has done the same.
     pub fn is_random(&self) -> bool {
         self.has_chance || self.bus.has_drawn()
-    }
-
-    /// The seed of what is random about the drive under `number`, one for each `purpose`.
-    fn seed_of(&self, number: u8, purpose: u64) -> u64 {
-        Prng::new(self.seed ^ purpose ^ u64::from(number) << 32).next_u64()
     }
 
     /// Adds a station at the bus's bit rate, with a microcontroller's CAN controller.

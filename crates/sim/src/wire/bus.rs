@@ -152,6 +152,13 @@ impl Bus {
         }
     }
 
+    /// Takes out of controller `i` what it offered and does not send at present, in the order given.
+    pub fn withdraw(&mut self, i: usize) -> Vec<Frame> {
+        let frames = self.controllers[i].withdraw();
+        self.update_start(i);
+        frames
+    }
+
     /// When something happens next if no node offers anything; `None` for never.
     pub fn next_event(&self) -> Option<Instant> {
         let main = match &self.main.transmission {

@@ -54,36 +54,36 @@ impl ErrorCounters {
     }
 
     /// A transmitter sent an error flag: TEC + 8 (rule 3).
-    pub(crate) fn transmit_error(&mut self) {
+    pub fn transmit_error(&mut self) {
         self.tec = (self.tec + 8).min(BUS_OFF_ABOVE + 1);
     }
 
     /// Not acknowledged. An error-passive transmitter that reads no dominant bit during its passive
     /// error flag keeps its counter: alone, a node never goes bus-off (rule 3, exception 1).
-    pub(crate) fn acknowledge_error(&mut self) {
+    pub fn acknowledge_error(&mut self) {
         if self.state() == ErrorState::ErrorActive {
             self.transmit_error();
         }
     }
 
     /// A frame was sent: TEC - 1 (rule 7).
-    pub(crate) fn transmit_success(&mut self) {
+    pub fn transmit_success(&mut self) {
         self.tec = self.tec.saturating_sub(1);
     }
 
     /// A receiver saw an error: REC + 1 (rule 1).
-    pub(crate) fn receive_error(&mut self) {
+    pub fn receive_error(&mut self) {
         self.rec = (self.rec + 1).min(REC_MAX);
     }
 
     /// A receiver was the first to see an error, and the others' flags answered its own: REC + 1, and
     /// + 8 for the dominant bit after its flag (rules 1 and 2).
-    pub(crate) fn first_receive_error(&mut self) {
+    pub fn first_receive_error(&mut self) {
         self.rec = (self.rec + 9).min(REC_MAX);
     }
 
     /// A frame was received: REC - 1, or back into 119..=127 (rule 8).
-    pub(crate) fn receive_success(&mut self) {
+    pub fn receive_success(&mut self) {
         self.rec = if self.rec > PASSIVE_ABOVE { RECEIVER_RETURN } else { self.rec.saturating_sub(1) };
     }
 }

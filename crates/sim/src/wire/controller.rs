@@ -147,6 +147,14 @@ impl Controller {
         self.offered += 1;
     }
 
+    /// Empties its mailboxes but for the one that is on the wire.
+    pub(crate) fn withdraw(&mut self) -> Vec<Frame> {
+        let on_wire = |mailbox: &Mailbox| self.sending == Some(Sending::Mailbox(mailbox.number));
+        let (kept, taken) = self.mailboxes.drain(..).partition(on_wire);
+        self.mailboxes = kept;
+        Vec::into_iter(taken).map(|mailbox: Mailbox| mailbox.frame).collect()
+    }
+
     /// When it would next start a frame on an idle wire; `FAR_FUTURE` if it has nothing to send or may not.
     pub(crate) fn next_start(&self) -> Instant {
         if !matches!(self.presence, Presence::Active { .. }) || self.faults.silent {

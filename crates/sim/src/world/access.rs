@@ -88,7 +88,7 @@ impl World {
 
     /// Makes the drive added under `number` as it is calculated, or as one on a bench. The world's seed decides its noise.
     pub fn set_realism(&mut self, number: u8, realism: Realism) -> Result<(), WorldError> {
-        let seed = self.seed_of(number, 0);
+        let seed = crate::seeds::noise_seed(self.seed, number);
         self.has_chance |= realism == Realism::Full;
         self.with_drive(number, |drive, now| drive.set_realism(realism, seed, now))
     }
