@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::command::{
     boot, check, completions, conform, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, estop, events,
-    explain, export, gateway, group, home, init, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan,
+    explain, export, fmu, gateway, group, home, init, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan,
     plot, program, read, readings, record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time,
     top, watch, world,
 };
@@ -68,6 +68,7 @@ pub(crate) enum Command {
     Latency(latency::Latency),
     Record(record::Record),
     Export(export::Export),
+    Fmu(fmu::Fmu),
     Gateway(gateway::Gateway),
     Studio(studio::Studio),
     Top(top::Top),

@@ -54,7 +54,7 @@ const GROUPS: &[CommandGroup] = &[
         ],
     },
     CommandGroup { title: "Record and replay", commands: &["record", "plot", "decode", "convert", "replay"] },
-    CommandGroup { title: "Tools", commands: &["eds", "export", "readings", "completions", "help"] },
+    CommandGroup { title: "Tools", commands: &["eds", "export", "fmu", "readings", "completions", "help"] },
 ];
 
 /// What the help of the whole command line is made of. Options are those of `help options`.

@@ -40,6 +40,7 @@
 //! | know what a device is: objects, units, faults | [`devices::Description`] |
 //! | read, check and write EDS and DCF files | [`eds::Eds`] |
 //! | test a device for conformance | [`conform::Suite`] |
+//! | put a drive or a bus into another simulator | [`fmu::instance`] |
 //! | put CANopen or CiA 402 into firmware of your own | [`canopen::node`], [`cia402`], [`motion`]; all `no_std` |
 //! | read or write frames | [`can::Frame`] |
 //!
@@ -52,6 +53,6 @@
 
 #[doc(inline)]
 pub use {
-    can, canlog, canopen, cia402, conform, devices, drives, eds, host, machine, master, motion, plant, plot, recording,
-    scenario, serve, showcase, sim, studio, transport, words,
+    can, canlog, canopen, cia402, conform, devices, drives, eds, fmu, host, machine, master, motion, plant, plot,
+    recording, scenario, serve, showcase, sim, studio, transport, words,
 };

@@ -31,7 +31,7 @@ const LOG: &str = "log";
 
 const ALL: &[&str] = &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG];
 
-const UNHEEDED: [Unheeded; 15] = [
+const UNHEEDED: [Unheeded; 16] = [
     Unheeded {
         command: "run",
         options: ALL,
@@ -87,6 +87,7 @@ const UNHEEDED: [Unheeded; 15] = [
         next: "omit it; the second file is the log that is written",
     },
     Unheeded { command: "plot", options: ALL, why: "it draws a file", next: "omit it" },
+    Unheeded { command: "fmu", options: ALL, why: "it packs a file, and asks no bus", next: "omit it" },
     Unheeded { command: "man-pages", options: ALL, why: "a manual page depends on none of them", next: "omit it" },
     Unheeded {
         command: "completions",
@@ -231,6 +232,7 @@ mod tests {
         "events --control 127.0.0.1:1",
         "explain 4",
         "export dbc",
+        "fmu zlac8030l@4 -o wheel.fmu",
         "gateway",
         "group move 4=90deg",
         "home 4 --method 17",

@@ -19,6 +19,7 @@ pub(crate) mod estop;
 pub(crate) mod events;
 pub(crate) mod explain;
 pub(crate) mod export;
+pub(crate) mod fmu;
 pub(crate) mod gateway;
 pub(crate) mod group;
 pub(crate) mod home;

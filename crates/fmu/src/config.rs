@@ -1,0 +1,127 @@
+//! What an FMU is of: written into its resources when it is packed, read when it is instantiated.
+
+use std::path::Path;
+
+use can::Bitrate;
+use serde::{Deserialize, Serialize};
+use words::drive::{DriveSpec, drive_spec};
+
+/// The name of the file in the FMU's resources.
+pub const FILE: &str = "ferrodrive.toml";
+/// The nodes that a bus FMU may have: one for each node-ID.
+pub const MAX_NODES: u8 = 127;
+
+/// What is in an FMU.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+pub enum Config {
+    /// One drive with its motor, load and supply.
+    Drive(DriveConfig),
+    /// A CAN bus.
+    Bus(BusConfig),
+}
+
+/// A drive.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriveConfig {
+    /// `MODEL@NODE,option=value`, as the command line takes it; a file is looked for in the resources.
+    pub drive: String,
+    /// Bit rate at the first start, in bit/s.
+    pub bitrate: u32,
+    /// How it announces what it has to send.
+    pub clock: TxClock,
+}
+
+/// A bus.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BusConfig {
+    /// How many nodes can be joined to it.
+    pub nodes: u8,
+    /// Its bit rate in bit/s, also of nodes that do not state one.
+    pub bitrate: u32,
+    /// How it announces what it has to deliver.
+    pub clock: TxClock,
+}
+
+/// The kind of the clock of what is sent (fmi-ls-bus, "Tx Clocks").
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TxClock {
+    /// The FMU states when the next frame is due, and the importer steps to that instant: exact times.
+    #[default]
+    Countdown,
+    /// Frames wait for the end of the importer's step.
+    Triggered,
+}
+
+/// Why there is no such FMU.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ConfigError {
+    /// The file in the resources is missing or torn.
+    #[error("{0}; pack the FMU anew with `ferrodrive fmu`")]
+    File(String),
+    /// A drive that is not known.
+    #[error("{0}")]
+    Drive(String),
+    /// A bit rate that the bus cannot have.
+    #[error("{0} bit/s is not a bit rate of CAN; expected 10000 to 1000000, e.g. 500000")]
+    Bitrate(u32),
+    /// A number of nodes that the bus cannot have.
+    #[error("a bus of {0} nodes is not possible; expected 2 to {MAX_NODES}")]
+    Nodes(u8),
+}
+
+impl Config {
+    /// Reads the file in a folder of resources.
+    ///
+    /// # Errors
+    /// That it is missing, or what of it makes no sense.
+    pub fn read(resources: &Path) -> Result<Self, ConfigError> {
+        let path = resources.join(FILE);
+        let text = std::fs::read_to_string(&path)
+            .map_err(|error| ConfigError::File(format!("cannot read {}: {error}", path.display())))?;
+        toml::from_str(&text).map_err(|error| ConfigError::File(format!("{}: {}", path.display(), error.message())))
+    }
+
+    /// The text of the file.
+    pub fn text(&self) -> String {
+        // A struct of numbers and texts always has a form in TOML.
+        toml::to_string(self).unwrap_or_default()
+    }
+
+    /// The kind of its clocks.
+    pub const fn clock(&self) -> TxClock {
+        match self {
+            Self::Drive(drive) => drive.clock,
+            Self::Bus(bus) => bus.clock,
+        }
+    }
+}
+
+impl DriveConfig {
+    /// The drive that is meant; files are looked for in `resources`.
+    ///
+    /// # Errors
+    /// What of it is not known.
+    pub fn spec(&self, resources: &Path) -> Result<DriveSpec, ConfigError> {
+        let is_file = self.file().is_some();
+        let text = if is_file { resources.join(&self.drive).display().to_string() } else { self.drive.clone() };
+        drive_spec(&text).map_err(|unresolved| ConfigError::Drive(unresolved.into()))
+    }
+
+    /// The file that describes it; `None` for a model that is built in.
+    pub fn file(&self) -> Option<&str> {
+        let (model, _) = self.drive.split_once('@')?;
+        Path::new(model).extension().map(|_| model)
+    }
+}
+
+/// A bit rate that a bus can have.
+///
+/// # Errors
+/// That it cannot.
+pub fn bitrate(bits_per_second: u32) -> Result<Bitrate, ConfigError> {
+    Bitrate::new(bits_per_second).ok_or(ConfigError::Bitrate(bits_per_second))
+}

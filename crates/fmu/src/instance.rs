@@ -1,0 +1,449 @@
+//! An instance of an FMU by the rules of FMI 3.0: in which mode what may be called, and what a call does. Without pointers:
+//! [`abi`](crate) has those.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::{Config, ConfigError, TxClock};
+use crate::state::SavedState;
+use crate::unit::{Action, Unit};
+use crate::variable::{Causality, Reference, Terminal, Value, Variable};
+
+const NANOS: f64 = 1e9;
+/// A century: beyond it nanoseconds since the begin do not fit 64 bits with certainty.
+const LATEST_S: f64 = 3.2e9;
+
+/// The state of an instance (FMI 3.0, 2.3 and 4.2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Mode {
+    /// Made; parameters may be set.
+    Instantiated,
+    /// Between entering and leaving initialization.
+    Initialization,
+    /// Clocks tick and clocked variables are exchanged.
+    Event,
+    /// Time may pass.
+    Step,
+    /// Over.
+    Terminated,
+}
+
+/// Why a call was not carried out: what, and what was expected.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct CallError(pub String);
+
+/// The result of a call.
+pub type Called<T> = Result<T, CallError>;
+
+fn refused<T>(what: impl Into<String>) -> Called<T> {
+    Err(CallError(what.into()))
+}
+
+/// What a step came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stepped {
+    /// Clocks have ticked: event mode should be entered.
+    pub needs_event: bool,
+    /// Where time stands, s.
+    pub time_s: f64,
+}
+
+/// When the clock of what is sent ticks next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interval {
+    /// Not known: nothing will be sent by itself.
+    NotKnown,
+    /// In so many nanoseconds.
+    In(u64),
+}
+
+/// One network, as the importer sees it now.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Port {
+    /// Set and not yet handed on.
+    received: Option<Vec<u8>>,
+    /// What the clock's last tick made visible.
+    visible: Vec<u8>,
+    /// The clock of what is sent has ticked.
+    ticked: bool,
+}
+
+/// What an instance is beside its unit.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Rest {
+    ports: Vec<Port>,
+    mode: Mode,
+    /// Time at the begin, s.
+    start_s: f64,
+    now_ns: u64,
+}
+
+/// An instance.
+#[derive(Clone)]
+pub struct Instance {
+    pub(crate) config: Config,
+    resources: PathBuf,
+    pub(crate) unit: Unit,
+    variables: Vec<Variable>,
+    terminals: Vec<Terminal>,
+    has_event_mode: bool,
+    rest: Rest,
+    /// What was done to the unit since its begin, so that its state can become bytes.
+    pub(crate) actions: Vec<Action>,
+}
+
+impl Instance {
+    /// An instance of what is described in a folder of resources.
+    ///
+    /// # Errors
+    /// That nothing is described there, or nothing that can be built.
+    pub fn new(resources: &Path, has_event_mode: bool) -> Result<Self, ConfigError> {
+        Self::of(Config::read(resources)?, resources, has_event_mode)
+    }
+
+    /// An instance of a configuration.
+    ///
+    /// # Errors
+    /// That it cannot be built.
+    pub fn of(config: Config, resources: &Path, has_event_mode: bool) -> Result<Self, ConfigError> {
+        let unit = Unit::new(&config, resources)?;
+        let (variables, terminals) = (unit.variables(), unit.terminals());
+        let ports = vec![Port::default(); terminals.len()];
+        let rest = Rest { ports, mode: Mode::Instantiated, start_s: 0.0, now_ns: 0 };
+        let resources = resources.to_owned();
+        Ok(Self { config, resources, unit, variables, terminals, has_event_mode, rest, actions: Vec::new() })
+    }
+
+    /// Its mode.
+    pub const fn mode(&self) -> Mode {
+        self.rest.mode
+    }
+
+    /// Its variables, but for those of its terminals and time.
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// Back to how it was made.
+    ///
+    /// # Errors
+    /// That a file of the resources has gone.
+    pub fn reset(&mut self) -> Called<()> {
+        let anew = Self::of(self.config.clone(), &self.resources, self.has_event_mode);
+        *self = anew.map_err(|error| CallError(error.to_string()))?;
+        Ok(())
+    }
+
+    /// Initialization begins at `start_s`.
+    ///
+    /// # Errors
+    /// The wrong mode, a time that is no number.
+    pub fn enter_initialization(&mut self, start_s: f64) -> Called<()> {
+        self.expect(&[Mode::Instantiated], "fmi3EnterInitializationMode")?;
+        if !start_s.is_finite() {
+            return refused(format!("the start time is {start_s}; expected a number of seconds"));
+        }
+        self.rest.start_s = start_s;
+        self.rest.mode = Mode::Initialization;
+        Ok(())
+    }
+
+    /// Initialization ends, and time begins.
+    ///
+    /// # Errors
+    /// The wrong mode.
+    pub fn exit_initialization(&mut self) -> Called<()> {
+        self.expect(&[Mode::Initialization], "fmi3ExitInitializationMode")?;
+        self.act(Action::Begin)?;
+        self.rest.mode = if self.has_event_mode { Mode::Event } else { Mode::Step };
+        self.tick_triggered()
+    }
+
+    /// Event mode begins.
+    ///
+    /// # Errors
+    /// The wrong mode, or event mode was not asked for.
+    pub fn enter_event(&mut self) -> Called<()> {
+        self.expect(&[Mode::Step], "fmi3EnterEventMode")?;
+        if !self.has_event_mode {
+            return refused("event mode was not asked for: fmi3InstantiateCoSimulation had eventModeUsed = false");
+        }
+        self.rest.mode = Mode::Event;
+        Ok(())
+    }
+
+    /// Event mode ends.
+    ///
+    /// # Errors
+    /// The wrong mode.
+    pub fn enter_step(&mut self) -> Called<()> {
+        self.expect(&[Mode::Event], "fmi3EnterStepMode")?;
+        self.hand_over()?;
+        self.rest.mode = Mode::Step;
+        Ok(())
+    }
+
+    /// The simulation is over.
+    ///
+    /// # Errors
+    /// The wrong mode.
+    pub fn terminate(&mut self) -> Called<()> {
+        self.expect(&[Mode::Event, Mode::Step], "fmi3Terminate")?;
+        self.rest.mode = Mode::Terminated;
+        Ok(())
+    }
+
+    /// One round of an event: takes in what was set, does what is due. True if clocks have ticked anew.
+    ///
+    /// # Errors
+    /// The wrong mode.
+    pub fn update(&mut self) -> Called<bool> {
+        self.expect(&[Mode::Event], "fmi3UpdateDiscreteStates")?;
+        self.clear_ticks();
+        self.hand_over()?;
+        self.act(Action::Serve)?;
+        self.tick_triggered()?;
+        Ok(self.rest.ports.iter().any(|port| port.ticked))
+    }
+
+    /// Time passes from `from_s` by `step_s`.
+    ///
+    /// # Errors
+    /// The wrong mode, a step that does not begin where time stands, or is not forward.
+    pub fn step(&mut self, from_s: f64, step_s: f64) -> Called<Stepped> {
+        self.expect(&[Mode::Step], "fmi3DoStep")?;
+        let to_s = from_s + step_s;
+        // A step of no time is no step by the standard; importers take one where a countdown ends at once.
+        if !(step_s >= 0.0 && to_s.is_finite() && to_s - self.rest.start_s < LATEST_S) {
+            return refused(format!("a step of {step_s} s is not possible; expected a time of 0 or more"));
+        }
+        let (from_ns, to_ns) = (self.nanos(from_s), self.nanos(to_s));
+        if from_ns != self.rest.now_ns {
+            let now_s = self.rest.start_s + self.rest.now_ns as f64 / NANOS;
+            return refused(format!(
+                "the step begins at {from_s} s, but time stands at {now_s} s; it does not go back"
+            ));
+        }
+        self.clear_ticks();
+        self.hand_over()?;
+        self.act(Action::Serve)?;
+        self.act(Action::Advance(to_ns))?;
+        self.rest.now_ns = to_ns;
+        // Without a countdown nobody comes back at this instant before the next step: what is due is sent now.
+        if self.config.clock() == TxClock::Triggered || !self.has_event_mode {
+            self.act(Action::Serve)?;
+        }
+        self.tick_triggered()?;
+        Ok(Stepped { needs_event: self.rest.ports.iter().any(|port| port.ticked), time_s: to_s })
+    }
+
+    /// The value of a variable.
+    ///
+    /// # Errors
+    /// There is none of this reference.
+    pub fn get(&mut self, reference: Reference) -> Called<Value> {
+        if reference == crate::xml::TIME {
+            return Ok(Value::Float64(self.rest.start_s + self.rest.now_ns as f64 / NANOS));
+        }
+        if let Some((_, port, is_rx)) = self.data(reference) {
+            return Ok(Value::Binary(if is_rx {
+                port.received.clone().unwrap_or_default()
+            } else {
+                port.visible.clone()
+            }));
+        }
+        self.unit.get(reference).ok_or_else(|| unknown(reference))
+    }
+
+    /// What a network sends, to be looked at without a copy; `None` for another variable.
+    pub(crate) fn sent(&self, reference: Reference) -> Option<&[u8]> {
+        self.data(reference).map(|(_, port, is_rx)| match is_rx {
+            true => port.received.as_deref().unwrap_or_default(),
+            false => &port.visible,
+        })
+    }
+
+    /// Writes a variable.
+    ///
+    /// # Errors
+    /// There is none of this reference, it has another type, it cannot be set now, or the drive refuses the value.
+    pub fn set(&mut self, reference: Reference, value: Value) -> Called<()> {
+        if let Some((place, _, is_rx)) = self.data(reference) {
+            let Value::Binary(bytes) = value else { return refused(format!("variable {reference} is a binary")) };
+            if !is_rx {
+                return refused(format!("variable {reference} is an output"));
+            }
+            self.rest.ports[place].received = Some(bytes);
+            return Ok(());
+        }
+        let variable = self.variables.iter().find(|variable| variable.reference == reference);
+        let variable = variable.ok_or_else(|| unknown(reference))?;
+        let name = variable.name.clone();
+        if value.type_name() != variable.value.type_name() {
+            let (wanted, given) = (variable.value.type_name(), value.type_name());
+            return refused(format!("{name} is a {wanted}, not a {given}"));
+        }
+        let before = matches!(self.rest.mode, Mode::Instantiated | Mode::Initialization);
+        match variable.causality {
+            Causality::Output => return refused(format!("{name} is an output")),
+            Causality::Parameter if !before => {
+                return refused(format!("{name} is a parameter; it is set before initialization ends"));
+            }
+            _ => {}
+        }
+        if let Value::Float64(number) = value
+            && !number.is_finite()
+        {
+            return refused(format!("{name} cannot be {number}"));
+        }
+        if self.rest.mode == Mode::Terminated {
+            return refused(format!("{name} cannot be set: the simulation is over"));
+        }
+        self.act(Action::Set(reference, value)).map_err(|error| CallError(format!("{name}: {error}")))?;
+        Ok(())
+    }
+
+    /// Whether a clock has ticked.
+    ///
+    /// # Errors
+    /// It is not a clock.
+    pub fn clock(&self, reference: Reference) -> Called<bool> {
+        let tx = self.terminals.iter().position(|terminal| terminal.tx_clock == reference);
+        let rx = self.terminals.iter().position(|terminal| terminal.rx_clock == reference);
+        match (tx, rx) {
+            (Some(place), _) => Ok(self.rest.ports[place].ticked),
+            (None, Some(place)) => Ok(self.rest.ports[place].received.is_some()),
+            (None, None) => refused(format!("variable {reference} is not a clock")),
+        }
+    }
+
+    /// The importer has a clock tick.
+    ///
+    /// # Errors
+    /// It is not a clock, or not one that the importer decides.
+    pub fn set_clock(&mut self, reference: Reference, ticks: bool) -> Called<()> {
+        self.expect(&[Mode::Event, Mode::Initialization], "fmi3SetClock")?;
+        self.clock(reference)?;
+        let Some(place) = self.terminals.iter().position(|terminal| terminal.tx_clock == reference) else {
+            // What is received says by itself when it came.
+            return Ok(());
+        };
+        if self.config.clock() == TxClock::Triggered {
+            return refused(format!("clock {reference} is an output: it ticks by itself"));
+        }
+        if ticks {
+            self.tick(place)?;
+        }
+        Ok(())
+    }
+
+    /// When the countdown of a clock ends.
+    ///
+    /// # Errors
+    /// It is not a countdown.
+    pub fn interval(&self, reference: Reference) -> Called<Interval> {
+        let place = self.terminals.iter().position(|terminal| terminal.tx_clock == reference);
+        if place.is_none() || self.config.clock() != TxClock::Countdown {
+            return refused(format!("clock {reference} has no interval: it is not a countdown"));
+        }
+        // Always what is left of it: importers that forget a countdown with each event need it, and others lose nothing.
+        let next = self.unit.next_event().map(|at| at.as_nanos());
+        Ok(next.map_or(Interval::NotKnown, |at| Interval::In(at.saturating_sub(self.rest.now_ns))))
+    }
+
+    /// The whole state.
+    pub fn save(&self) -> SavedState {
+        SavedState(Box::new(self.clone()))
+    }
+
+    /// Takes a state back.
+    pub fn restore(&mut self, state: &SavedState) {
+        *self = (*state.0).clone();
+    }
+
+    pub(crate) fn rest(&self) -> Rest {
+        self.rest.clone()
+    }
+
+    pub(crate) fn put(&mut self, rest: Rest) {
+        self.rest = rest;
+    }
+
+    fn expect(&self, modes: &[Mode], call: &str) -> Called<()> {
+        if modes.contains(&self.rest.mode) {
+            return Ok(());
+        }
+        refused(format!("{call} in the mode {:?}; expected {modes:?}", self.rest.mode))
+    }
+
+    /// Nanoseconds since the begin, to the nearest.
+    fn nanos(&self, time_s: f64) -> u64 {
+        ((time_s - self.rest.start_s) * NANOS).round() as u64
+    }
+
+    /// The binary variable of a network: which network, and whether it is what comes in.
+    fn data(&self, reference: Reference) -> Option<(usize, &Port, bool)> {
+        let is_it = |terminal: &Terminal| terminal.rx_data == reference || terminal.tx_data == reference;
+        let place = self.terminals.iter().position(is_it)?;
+        Some((place, &self.rest.ports[place], self.terminals[place].rx_data == reference))
+    }
+
+    /// Does an action and writes it down.
+    fn act(&mut self, action: Action) -> Called<Vec<u8>> {
+        let done = self.unit.act(&action).map_err(CallError)?;
+        match (&action, self.actions.last()) {
+            // Two of them are as good as one.
+            (Action::Serve, Some(Action::Serve)) => {}
+            (Action::Take(_), _) if done.is_empty() => {}
+            _ => self.actions.push(action),
+        }
+        Ok(done)
+    }
+
+    /// Hands on what was set.
+    fn hand_over(&mut self) -> Called<()> {
+        for place in 0..self.rest.ports.len() {
+            if let Some(bytes) = self.rest.ports[place].received.take().filter(|bytes| !bytes.is_empty()) {
+                self.act(Action::Receive(place, bytes))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn clear_ticks(&mut self) {
+        for port in &mut self.rest.ports {
+            port.visible.clear();
+            port.ticked = false;
+        }
+    }
+
+    fn tick(&mut self, place: usize) -> Called<()> {
+        let sent = self.act(Action::Take(place))?;
+        let port = &mut self.rest.ports[place];
+        port.ticked = true;
+        port.visible.extend(sent);
+        Ok(())
+    }
+
+    /// Clocks that tick by themselves tick where there is something to send.
+    fn tick_triggered(&mut self) -> Called<()> {
+        if self.config.clock() == TxClock::Countdown && self.has_event_mode {
+            return Ok(());
+        }
+        for place in 0..self.rest.ports.len() {
+            let sent = self.act(Action::Take(place))?;
+            if !sent.is_empty() {
+                let port = &mut self.rest.ports[place];
+                port.ticked = true;
+                port.visible.extend(sent);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn unknown(reference: Reference) -> CallError {
+    CallError(format!("there is no variable {reference}"))
+}

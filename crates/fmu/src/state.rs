@@ -1,0 +1,60 @@
+//! The state of an instance as a value and as bytes.
+
+use serde::{Deserialize, Serialize};
+
+use crate::instance::{CallError, Called, Instance};
+use crate::unit::Action;
+
+/// A state, to be taken back by an instance of the same FMU.
+#[derive(Clone)]
+pub struct SavedState(pub(crate) Box<Instance>);
+
+/// What a state is as bytes: of what FMU, and what was done to it since its begin. Taking it back does all that again, a few
+/// milliseconds for each simulated second.
+#[derive(Serialize, Deserialize)]
+struct Written {
+    config: String,
+    actions: Vec<Action>,
+    rest: crate::instance::Rest,
+}
+
+/// Bytes of the check sum before the rest.
+const CHECK_SUM: usize = 4;
+
+impl SavedState {
+    /// The state as bytes.
+    pub fn bytes(&self) -> Vec<u8> {
+        let instance = &self.0;
+        let written =
+            Written { config: instance.config.text(), actions: instance.actions.clone(), rest: instance.rest() };
+        // Numbers, texts and lists of them: they always have a form.
+        let body = rmp_serde::to_vec(&written).unwrap_or_default();
+        let mut bytes = crc32fast::hash(&body).to_le_bytes().to_vec();
+        bytes.extend(body);
+        bytes
+    }
+
+    /// A state from bytes, for an FMU like `of`.
+    ///
+    /// # Errors
+    /// The bytes are torn, or of another FMU.
+    pub fn from_bytes(bytes: &[u8], of: &Instance) -> Called<Self> {
+        let error = |what: String| CallError(format!("not a state of this FMU: {what}"));
+        let (sum, body) = bytes.split_at_checked(CHECK_SUM).ok_or_else(|| error("too few bytes".to_owned()))?;
+        if sum != crc32fast::hash(body).to_le_bytes() {
+            return Err(error("its check sum is wrong".to_owned()));
+        }
+        let written: Written = rmp_serde::from_slice(body).map_err(|torn| error(torn.to_string()))?;
+        if written.config != of.config.text() {
+            return Err(error(format!("it is of {}", written.config.trim())));
+        }
+        let mut instance = of.clone();
+        instance.reset()?;
+        for action in &written.actions {
+            instance.unit.act(action).map_err(|refused| error(refused))?;
+        }
+        instance.actions = written.actions;
+        instance.put(written.rest);
+        Ok(Self(Box::new(instance)))
+    }
+}

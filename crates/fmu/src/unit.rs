@@ -1,0 +1,121 @@
+//! What an FMU computes: a drive or a bus, moved by a few operations, each of which can be written down and done again.
+//!
+//! The state of a drive is its firmware, its physics and its memory; to write it down they are not taken apart. What was done to
+//! a unit since its begin is its state: the same operations give the same unit to the last bit.
+
+use std::path::Path;
+
+use can::Instant;
+use serde::{Deserialize, Serialize};
+
+use crate::bus::BusUnit;
+use crate::config::{Config, ConfigError};
+use crate::drive::DriveUnit;
+use crate::operation::operations;
+use crate::variable::{Reference, Terminal, Value, Variable};
+
+/// One thing that is done to a unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Action {
+    /// Writes a parameter or an input.
+    Set(Reference, Value),
+    /// Time begins.
+    Begin,
+    /// Hands operations to the network of this number.
+    Receive(usize, Vec<u8>),
+    /// Does what is due now.
+    Serve,
+    /// Takes what the network of this number has to send.
+    Take(usize),
+    /// Lets time pass up to so many nanoseconds after the begin.
+    Advance(u64),
+}
+
+/// A drive or a bus.
+#[derive(Clone)]
+pub enum Unit {
+    /// A drive.
+    Drive(Box<DriveUnit>),
+    /// A bus.
+    Bus(BusUnit),
+}
+
+impl Unit {
+    /// What the configuration describes, before time begins.
+    ///
+    /// # Errors
+    /// That there is no such thing.
+    pub fn new(config: &Config, resources: &Path) -> Result<Self, ConfigError> {
+        Ok(match config {
+            Config::Drive(drive) => Self::Drive(Box::new(DriveUnit::new(drive, resources)?)),
+            Config::Bus(bus) => Self::Bus(BusUnit::new(bus)?),
+        })
+    }
+
+    /// Its variables, but for those of its terminals.
+    pub fn variables(&self) -> Vec<Variable> {
+        match self {
+            Self::Drive(drive) => drive.variables(),
+            Self::Bus(bus) => bus.variables(),
+        }
+    }
+
+    /// Its networks.
+    pub fn terminals(&self) -> Vec<Terminal> {
+        match self {
+            Self::Drive(_) => vec![DriveUnit::terminal()],
+            Self::Bus(bus) => bus.terminals(),
+        }
+    }
+
+    /// The variable that says whether nodes are notified of what becomes of their frames.
+    pub const fn notifications(&self) -> Reference {
+        match self {
+            Self::Drive(_) => DriveUnit::notifications(),
+            Self::Bus(_) => BusUnit::notifications(),
+        }
+    }
+
+    /// The value of a variable; `None` without one of this reference.
+    pub fn get(&mut self, reference: Reference) -> Option<Value> {
+        match self {
+            Self::Drive(drive) => drive.get(reference),
+            Self::Bus(bus) => bus.get(reference),
+        }
+    }
+
+    /// Does an action. Operations that are taken come back.
+    ///
+    /// # Errors
+    /// A value that is not taken.
+    pub fn act(&mut self, action: &Action) -> Result<Vec<u8>, String> {
+        match (self, action) {
+            (Self::Drive(drive), Action::Set(reference, value)) => drive.set(*reference, value)?,
+            (Self::Bus(bus), Action::Set(reference, value)) => bus.set(*reference, value)?,
+            (Self::Drive(drive), Action::Begin) => drive.begin(),
+            (Self::Bus(bus), Action::Begin) => bus.begin(),
+            (Self::Drive(drive), Action::Receive(0, bytes)) => {
+                operations(bytes).for_each(|operation| drive.receive(operation));
+            }
+            (Self::Bus(bus), Action::Receive(node, bytes)) => {
+                operations(bytes).for_each(|operation| bus.receive(*node, operation));
+            }
+            (Self::Drive(drive), Action::Serve) => drive.serve(),
+            (Self::Drive(drive), Action::Take(_)) => return Ok(drive.take_outbox()),
+            (Self::Bus(bus), Action::Take(node)) => return Ok(bus.take_outbox(*node)),
+            (Self::Drive(drive), Action::Advance(nanos)) => drive.advance(Instant::from_nanos(*nanos)),
+            (Self::Bus(bus), Action::Advance(nanos)) => bus.advance(Instant::from_nanos(*nanos)),
+            // A drive has one network; a bus does all that is due when time passes.
+            (Self::Drive(_), Action::Receive(..)) | (Self::Bus(_), Action::Serve) => {}
+        }
+        Ok(Vec::new())
+    }
+
+    /// When it next wants to send or to do something.
+    pub fn next_event(&self) -> Option<Instant> {
+        match self {
+            Self::Drive(drive) => drive.next_event(),
+            Self::Bus(bus) => bus.next_event(),
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! The descriptions that an FMU carries: of its variables (FMI 3.0, 2.4), of its networks and of the layered standard.
+
+use std::fmt::Write as _;
+
+use crate::config::{Config, TxClock};
+use crate::unit::Unit;
+use crate::variable::{Causality, Reference, Terminal, Variable};
+
+/// The value reference of time.
+pub const TIME: Reference = 0;
+/// The name of the library in the FMU, without its ending.
+pub const MODEL_IDENTIFIER: &str = "ferrodrive_fmu";
+
+const MIME_TYPE: &str = "application/org.fmi-standard.fmi-ls-bus.can; version=&quot;1.0.0&quot;";
+
+/// Units by the exponents of SI's base units (FMI 3.0, 2.4.3).
+const UNITS: [(&str, &str); 6] = [
+    ("rad", r#"rad="1""#),
+    ("rad/s", r#"rad="1" s="-1""#),
+    ("N.m", r#"kg="1" m="2" s="-2""#),
+    ("A", r#"A="1""#),
+    ("V", r#"kg="1" m="2" s="-3" A="-1""#),
+    ("degC", r#"K="1" offset="273.15""#),
+];
+
+/// What an importer has to hand back at instantiation: another one is of another FMU.
+pub fn token(config: &Config) -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    format!("ferrodrive-{version}-{:08x}", crc32fast::hash(config.text().as_bytes()))
+}
+
+/// `modelDescription.xml`.
+pub fn model_description(config: &Config, unit: &Unit) -> String {
+    let name = match config {
+        Config::Drive(drive) => drive.drive.clone(),
+        Config::Bus(bus) => format!("CAN bus of {} nodes", bus.nodes),
+    };
+    let mut xml = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"3.0\" modelName=\"{}\" \
+         instantiationToken=\"{}\" generationTool=\"Ferrodrive {}\" variableNamingConvention=\"flat\">\n  \
+         <CoSimulation modelIdentifier=\"{MODEL_IDENTIFIER}\" canHandleVariableCommunicationStepSize=\"true\" \
+         hasEventMode=\"true\" canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\"/>\n  <UnitDefinitions>\n",
+        escaped(&name),
+        token(config),
+        env!("CARGO_PKG_VERSION"),
+    );
+    for (unit, exponents) in UNITS {
+        let _ = writeln!(xml, "    <Unit name=\"{unit}\"><BaseUnit {exponents}/></Unit>");
+    }
+    xml.push_str(
+        "  </UnitDefinitions>\n  <LogCategories>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n  \
+         <DefaultExperiment startTime=\"0\" stopTime=\"10\" stepSize=\"0.001\"/>\n  <ModelVariables>\n",
+    );
+    let _ = writeln!(
+        xml,
+        "    <Float64 name=\"time\" valueReference=\"{TIME}\" causality=\"independent\" variability=\"continuous\"/>"
+    );
+    let (variables, terminals) = (unit.variables(), unit.terminals());
+    variables.iter().for_each(|variable| element(&mut xml, variable, variable.reference == unit.notifications()));
+    terminals.iter().for_each(|terminal| network(&mut xml, terminal, config.clock()));
+    xml.push_str("  </ModelVariables>\n  <ModelStructure>\n");
+    let outputs = variables.iter().filter(|variable| variable.causality == Causality::Output);
+    let calculated = |variable: &&Variable| variable.reference != unit.notifications();
+    for variable in outputs.clone() {
+        let _ = writeln!(xml, "    <Output valueReference=\"{}\"/>", variable.reference);
+    }
+    for terminal in &terminals {
+        if config.clock() == TxClock::Triggered {
+            let _ = writeln!(xml, "    <Output valueReference=\"{}\"/>", terminal.tx_clock);
+        }
+        let _ = writeln!(xml, "    <Output valueReference=\"{}\"/>", terminal.tx_data);
+    }
+    let clocks = terminals.iter().filter(|_| config.clock() == TxClock::Triggered).map(|terminal| terminal.tx_clock);
+    for reference in outputs.filter(calculated).map(|variable| variable.reference).chain(clocks) {
+        let _ = writeln!(xml, "    <InitialUnknown valueReference=\"{reference}\"/>");
+    }
+    xml.push_str("  </ModelStructure>\n</fmiModelDescription>\n");
+    xml
+}
+
+/// `terminalsAndIcons/terminalsAndIcons.xml`.
+pub fn terminals_and_icons(unit: &Unit) -> String {
+    let mut xml = String::from(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiTerminalsAndIcons fmiVersion=\"3.0\">\n  <Terminals>\n",
+    );
+    let notifications = unit.variables().into_iter().find(|variable| variable.reference == unit.notifications());
+    for Terminal { name, .. } in unit.terminals() {
+        let _ = writeln!(
+            xml,
+            "    <Terminal name=\"{name}\" terminalKind=\"org.fmi-ls-bus.network-terminal\" \
+             matchingRule=\"org.fmi-ls-bus.transceiver\">"
+        );
+        for member in ["Rx_Clock", "Rx_Data", "Tx_Clock", "Tx_Data"] {
+            let _ = writeln!(
+                xml,
+                "      <TerminalMemberVariable variableKind=\"signal\" variableName=\"{name}.{member}\" memberName=\"{member}\"/>"
+            );
+        }
+        if let Some(variable) = &notifications {
+            let _ = writeln!(
+                xml,
+                "      <Terminal name=\"Configuration\" terminalKind=\"org.fmi-ls-bus.network-terminal.configuration\" \
+                 matchingRule=\"bus\">\n        <TerminalMemberVariable variableKind=\"signal\" variableName=\"{}\" \
+                 memberName=\"BusNotifications\"/>\n      </Terminal>",
+                variable.name
+            );
+        }
+        xml.push_str("    </Terminal>\n");
+    }
+    xml.push_str("  </Terminals>\n</fmiTerminalsAndIcons>\n");
+    xml
+}
+
+/// `extra/org.fmi-standard.fmi-ls-bus/fmi-ls-manifest.xml`.
+pub fn manifest(config: &Config) -> String {
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiLayeredStandardManifest \
+         xmlns:fmi-ls=\"http://fmi-standard.org/fmi-ls-manifest\" fmi-ls:fmi-ls-name=\"org.fmi-standard.fmi-ls-bus\" \
+         fmi-ls:fmi-ls-version=\"1.0.0\" fmi-ls:fmi-ls-description=\"Layered Standard for the simulation of bus \
+         communication on a Physical Signal Abstraction or Network Abstraction based level.\" \
+         isBusSimulationFMU=\"{}\"/>\n",
+        matches!(config, Config::Bus(_))
+    )
+}
+
+/// One variable; a constant has its value as its start.
+fn element(xml: &mut String, variable: &Variable, notifications: bool) {
+    let Variable { reference, name, causality, value, unit, description } = variable;
+    let kind = value.type_name();
+    let variability = match (causality, kind) {
+        (Causality::Parameter, _) => "fixed",
+        (Causality::Output, _) if notifications => "constant",
+        (_, "Float64") => "continuous",
+        _ => "discrete",
+    };
+    let _ = write!(
+        xml,
+        "    <{kind} name=\"{}\" valueReference=\"{reference}\" causality=\"{}\" variability=\"{variability}\" \
+         description=\"{}\"",
+        escaped(name),
+        causality.word(),
+        escaped(description),
+    );
+    if !unit.is_empty() {
+        let _ = write!(xml, " unit=\"{unit}\"");
+    }
+    if *causality != Causality::Output || notifications {
+        let _ = write!(xml, " start=\"{}\"", escaped(&value.text()));
+    }
+    xml.push_str("/>\n");
+}
+
+/// The four variables of a network.
+fn network(xml: &mut String, terminal: &Terminal, clock: TxClock) {
+    let Terminal { name, rx_data, rx_clock, tx_data, tx_clock } = terminal;
+    let (causality, interval) = match clock {
+        TxClock::Countdown => ("input", "countdown"),
+        TxClock::Triggered => ("output", "triggered"),
+    };
+    let _ = writeln!(
+        xml,
+        "    <Clock name=\"{name}.Rx_Clock\" valueReference=\"{rx_clock}\" causality=\"input\" variability=\"discrete\" \
+         intervalVariability=\"triggered\"/>\n    <Binary name=\"{name}.Rx_Data\" valueReference=\"{rx_data}\" \
+         causality=\"input\" variability=\"discrete\" clocks=\"{rx_clock}\" mimeType=\"{MIME_TYPE}\"><Start \
+         value=\"\"/></Binary>\n    <Clock name=\"{name}.Tx_Clock\" valueReference=\"{tx_clock}\" \
+         causality=\"{causality}\" variability=\"discrete\" intervalVariability=\"{interval}\"/>\n    <Binary \
+         name=\"{name}.Tx_Data\" valueReference=\"{tx_data}\" causality=\"output\" variability=\"discrete\" \
+         clocks=\"{tx_clock}\" mimeType=\"{MIME_TYPE}\"/>"
+    );
+}
+
+/// Text as an attribute holds it.
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            letter if letter.is_control() => escaped.push(' '),
+            letter => escaped.push(letter),
+        }
+    }
+    escaped
+}

@@ -1,0 +1,126 @@
+//! Which call is taken in which mode, and what a call of no sense is answered with.
+
+use ferrodrive_fmu::config::{Config, TxClock};
+use ferrodrive_fmu::instance::{Instance, Interval, Mode};
+use ferrodrive_fmu::operation::{NodeStatus, Operation, operations};
+use ferrodrive_fmu::variable::Value;
+
+use crate::importer::{binary, bus, drive, instance};
+
+fn refusal<T>(called: Result<T, ferrodrive_fmu::instance::CallError>) -> String {
+    called.err().map(|error| error.to_string()).unwrap_or_default()
+}
+
+/// A drive without event mode, at the begin of its time.
+fn stepping(spec: &str) -> Instance {
+    let mut instance = Instance::of(drive(spec, TxClock::Triggered), ".".as_ref(), false).unwrap();
+    instance.enter_initialization(0.0).unwrap();
+    instance.exit_initialization().unwrap();
+    instance
+}
+
+#[test]
+fn time_does_not_go_back_and_steps_are_forward() {
+    let mut drive = stepping("zlac8030l@4");
+    drive.step(0.0, 1e-3).unwrap();
+    assert!(refusal(drive.step(0.0, 1e-3)).contains("time stands at 0.001 s"));
+    for step in [-1e-3, f64::NAN, f64::INFINITY, 1e300] {
+        assert!(refusal(drive.step(1e-3, step)).contains("expected a time of 0 or more"), "{step}");
+    }
+    assert!(refusal(drive.step(f64::NAN, 1e-3)).contains("not possible"));
+    drive.step(1e-3, 1e-3).unwrap();
+    assert_eq!(drive.get(0).unwrap(), Value::Float64(2e-3));
+}
+
+#[test]
+fn a_call_in_another_mode_is_refused_with_what_is_expected() {
+    let mut made = Instance::of(drive("zlac8030l@4", TxClock::Countdown), ".".as_ref(), false).unwrap();
+    assert!(refusal(made.step(0.0, 1e-3)).contains("expected [Step]"));
+    assert!(refusal(made.exit_initialization()).contains("expected [Initialization]"));
+    made.enter_initialization(0.0).unwrap();
+    made.exit_initialization().unwrap();
+    assert_eq!(made.mode(), Mode::Step);
+    assert!(refusal(made.enter_event()).contains("eventModeUsed = false"));
+    made.terminate().unwrap();
+    assert!(refusal(made.step(0.0, 1e-3)).contains("Terminated"));
+    made.reset().unwrap();
+    assert_eq!(made.mode(), Mode::Instantiated);
+}
+
+#[test]
+fn variables_are_set_by_their_type_role_and_time() {
+    let mut drive = stepping("zlac8030l@4");
+    assert!(refusal(drive.set(10, Value::Int64(1))).contains("load_torque is a Float64, not a Int64"));
+    assert!(refusal(drive.set(10, Value::Float64(f64::NAN))).contains("load_torque cannot be NaN"));
+    assert!(refusal(drive.set(10, Value::Float64(1e9))).contains("load_torque: "));
+    assert!(refusal(drive.set(200, Value::Float64(1.0))).contains("angle is an output"));
+    assert!(refusal(drive.set(6, Value::UInt64(7))).contains("seed is a parameter"));
+    assert!(refusal(drive.set(99, Value::Float64(1.0))).contains("no variable 99"));
+    drive.set(10, Value::Float64(2.0)).unwrap();
+    drive.set(100, Value::Boolean(true)).unwrap();
+    assert_eq!((drive.get(10).unwrap(), drive.get(100).unwrap()), (Value::Float64(2.0), Value::Boolean(true)));
+}
+
+#[test]
+fn every_variable_of_the_description_can_be_read_and_inputs_hold_their_start() {
+    for config in [
+        drive("zlac8030l@4", TxClock::Countdown),
+        drive("m8025e25b80@7", TxClock::Countdown),
+        drive("zlim42c@16,timing=ideal", TxClock::Countdown),
+        drive("cia402@2", TxClock::Countdown),
+        bus(3, TxClock::Countdown),
+    ] {
+        // A stepper has node-IDs by switches.
+        let config = match config {
+            Config::Drive(mut it) if it.drive.starts_with("zlim") => {
+                it.drive = "zlim42c@15".to_owned();
+                Config::Drive(it)
+            }
+            other => other,
+        };
+        let mut instance = instance(config);
+        for variable in instance.variables().to_vec() {
+            let value = instance.get(variable.reference).unwrap();
+            assert_eq!(value.type_name(), variable.value.type_name(), "{}", variable.name);
+            assert_eq!(value, variable.value, "{}", variable.name);
+        }
+        instance.exit_initialization().unwrap();
+    }
+}
+
+/// The drive is a node like another: no power, no part in the bus; then its bit rate, and its boot-up.
+#[test]
+fn a_drive_says_when_it_joins_the_bus() {
+    let mut drive = instance(drive("zlac8030l@4,timing=ideal", TxClock::Triggered));
+    drive.exit_initialization().unwrap();
+    let mut said: Vec<Operation> = operations(&binary(&mut drive, 4)).map(Result::unwrap).collect();
+    for step in 0..100 {
+        drive.update().unwrap();
+        drive.enter_step().unwrap();
+        drive.step(f64::from(step) * 1e-3, 1e-3).unwrap();
+        said.extend(operations(&binary(&mut drive, 4)).map(Result::unwrap));
+        drive.enter_event().unwrap();
+    }
+    let expected = [
+        Operation::Status(NodeStatus::BusOff),
+        Operation::Baudrate(500_000),
+        Operation::Status(NodeStatus::Active),
+        Operation::Transmit("704#00".parse().unwrap()),
+    ];
+    assert_eq!(said, expected);
+}
+
+#[test]
+fn a_countdown_is_what_its_importer_may_wait_for() {
+    let mut drive = instance(drive("zlac8030l@4,timing=ideal", TxClock::Countdown));
+    drive.exit_initialization().unwrap();
+    // That it takes no part yet is there to be sent.
+    assert_eq!(drive.interval(3).unwrap(), Interval::In(0));
+    drive.set_clock(3, true).unwrap();
+    assert!(!binary(&mut drive, 4).is_empty());
+    drive.update().unwrap();
+    let Interval::In(nanos) = drive.interval(3).unwrap() else { panic!() };
+    assert!(nanos > 0);
+    assert_eq!(drive.interval(3).unwrap(), Interval::In(nanos));
+    assert!(refusal(drive.interval(1)).contains("not a countdown"));
+}
