@@ -1,10 +1,9 @@
-"""Checks of `ferrodrive fmu`: FMPy validates and steps drive and bus by FMI 3.0, fmu-manipulation-toolbox joins them.
+"""Checks of `ferrodrive fmu`: FMPy validates and steps drive and bus by FMI 3.0.
 
 Operations are written here by the layered standard for buses (fmi-ls-bus 1.0, "CAN, CAN FD, CAN XL"), not by our own code."""
 
 import contextlib
 import ctypes
-import json
 import math
 import pathlib
 import struct
@@ -180,29 +179,6 @@ def refused(call, what):
     except Exception:  # FMPy's own for a status, a plain one for an instance that was not made
         return
     raise AssertionError(f"{what} was taken")
-
-
-@check("fmu-manipulation-toolbox joins two drives to a bus, and each hears the other boot", ZLAC8030L)
-def container(bench):
-    from fmu_manipulation_toolbox.assembly import Assembly
-
-    with tempfile.TemporaryDirectory() as folder:
-        names = {}
-        for name, words in (("a", ["zlac8030l@4"]), ("b", ["zlac8030l@5"]), ("bus", ["bus", "--nodes", "2"])):
-            names[name] = pathlib.Path(pack(bench, folder, *words)).rename(pathlib.Path(folder) / f"{name}.fmu")
-        description = {
-            "name": "joined.fmu",
-            "fmu": ["a.fmu", "b.fmu", "bus.fmu"],
-            "link": [["a.fmu", "CAN", "bus.fmu", "Node1"], ["b.fmu", "CAN", "bus.fmu", "Node2"]],
-            "output": [["bus.fmu", "frames", "frames"], ["bus.fmu", "errors", "errors"]],
-            "step_size": 0.001,
-        }
-        (pathlib.Path(folder) / "joined.json").write_text(json.dumps(description))
-        assembly = Assembly("joined.json", default_step_size=0.001, fmu_directory=pathlib.Path(folder))
-        assembly.make_fmu(fmi_version=3)
-        result = fmpy.simulate_fmu(str(pathlib.Path(folder) / "joined.fmu"), stop_time=2.0, step_size=1e-3, output=["frames", "errors"], use_event_mode=False)
-        equal(int(result["frames"][-1]), 2, "boot-ups on the bus")
-        equal(int(result["errors"][-1]), 0, "errors")
 
 
 @check("the program of the handbook's page on FMI runs", ZLAC8030L)
