@@ -98,12 +98,13 @@ const FOLLOWED: [(&str, usize); 16] = [
 ];
 
 /// The pages whose commands are not run here, and why.
-const NOT_FOLLOWED: [(&str, &str); 12] = [
+const NOT_FOLLOWED: [(&str, &str); 13] = [
     ("adapters.md", "in virtual time: crates/cli/src/tests/pages.rs"),
     ("lss.md", "in virtual time: crates/cli/src/tests/pages.rs"),
     ("README.md", "the list of the pages"),
     ("canopen-python.md", "its programs are crates/python/tests/test_canopen_python.py"),
     ("faq.md", "it has no commands"),
+    ("fmu.md", "it packs a library that is built beside the program: tests/peers/fmu.py"),
     ("library.md", "its command is cargo's: the examples' step"),
     ("gateway.md", "it serves until a signal, and a client speaks to it: gateway.rs"),
     ("physics-engine.md", "its programs are Python's: examples/mujoco, which holds the page to them"),
