@@ -34,7 +34,7 @@ enum SyncSource {
 /// After how many periods without a SYNC one of another producer counts as lost.
 const LOST_AFTER_PERIODS: u64 = 3;
 
-/// Counts the cycles of SYNC, and produces it where no other node does. Without the counter of 1019h.
+/// Counts the cycles of SYNC, and produces it where no other node does, with the counter of 1019h where one is wanted.
 ///
 /// Ticks lie on a grid from the start, so that a late call does not shift the ones after it. Ticks that were
 /// missed altogether are not made up for; they are counted.
@@ -45,6 +45,10 @@ pub(super) struct SyncClock {
     /// When the next SYNC is due, or counts as lost.
     due: Option<Instant>,
     pending: bool,
+    /// As 1019h: the counter goes from 1 to this; 0 for a SYNC without.
+    overflow: u8,
+    /// Of the SYNC to come. One that is not sent has none.
+    counter: u8,
     cycle: Option<Cycle>,
     /// No SYNC has come since the source was chosen.
     first: bool,
@@ -55,7 +59,18 @@ pub(super) struct SyncClock {
 impl Default for SyncClock {
     fn default() -> Self {
         let source = SyncSource::Off;
-        Self { source, period_ns: 0, due: None, pending: false, cycle: None, first: true, lost: false, missed: 0 }
+        Self {
+            source,
+            period_ns: 0,
+            due: None,
+            pending: false,
+            overflow: 0,
+            counter: 1,
+            cycle: None,
+            first: true,
+            lost: false,
+            missed: 0,
+        }
     }
 }
 
@@ -77,6 +92,11 @@ impl SyncClock {
         self.due = (self.period_ns > 0).then_some(now);
     }
 
+    /// Each SYNC carries a counter from 1 to `overflow` from now on; 0 for none.
+    pub(super) const fn set_overflow(&mut self, overflow: u8) {
+        (self.overflow, self.counter) = (overflow, 1);
+    }
+
     /// Counts the SYNCs of another producer, which come with this period.
     pub(super) fn follow(&mut self, period: Option<Duration>, now: Instant) {
         self.begin(SyncSource::Another, period);
@@ -87,6 +107,7 @@ impl SyncClock {
         self.period_ns = period.map_or(0, |period| u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
         self.source = if self.period_ns > 0 { source } else { SyncSource::Off };
         (self.due, self.pending, self.first, self.lost) = (None, false, true, false);
+        self.counter = 1;
     }
 
     const fn patience_ns(&self) -> u64 {
@@ -131,7 +152,12 @@ impl SyncClock {
     }
 
     pub(super) fn poll_transmit(&mut self) -> Option<Frame> {
-        core::mem::take(&mut self.pending).then(|| Sync { counter: None }.emit(connection_set::SYNC))
+        if !core::mem::take(&mut self.pending) {
+            return None;
+        }
+        let counter = (self.overflow > 0).then_some(self.counter);
+        self.counter = if self.counter >= self.overflow { 1 } else { self.counter + 1 };
+        Some(Sync { counter }.emit(connection_set::SYNC))
     }
 
     pub(super) const fn next(&self) -> Option<Instant> {
@@ -185,6 +211,24 @@ mod tests {
         assert!(sync.poll_transmit().is_some() && sync.poll_transmit().is_none());
         sync.produce(None, ms(206));
         assert_eq!((sync.next(), sync.poll_transmit()), (None, None));
+    }
+
+    /// CiA 301, 7.2.5.1: from 1 to the value of 1019h, one more with each SYNC that is sent.
+    #[test]
+    fn the_counter_goes_with_the_frames_and_begins_anew_with_them() {
+        let mut sync = SyncClock::default();
+        let run = |sync: &mut SyncClock, at: &[u64]| -> Vec<Option<u8>> {
+            let frame = |sync: &mut SyncClock, at| sync.handle_timeout(ms(at)).and_then(|_| sync.poll_transmit());
+            at.iter().map(|at| Sync::parse(&frame(sync, *at).expect("one is due")).counter).collect()
+        };
+        sync.set_overflow(3);
+        sync.produce(PERIOD, ms(100));
+        // Three periods are missed before 200.
+        assert_eq!(run(&mut sync, &[100, 120, 200, 220]), [Some(1), Some(2), Some(3), Some(1)]);
+        sync.produce(PERIOD, ms(300));
+        assert_eq!(run(&mut sync, &[300]), [Some(1)]);
+        sync.set_overflow(0);
+        assert_eq!(run(&mut sync, &[320]), [None]);
     }
 
     #[test]

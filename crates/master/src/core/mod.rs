@@ -185,6 +185,7 @@ impl Core {
             Command::Cancel(ticket) => self.cancel(ticket),
             Command::Nmt(target, command) => self.send_nmt(target, command),
             Command::Sync(period) => self.produce_sync(period),
+            Command::SyncCounter(overflow) => self.sync.set_overflow(overflow),
             Command::FollowSync(period) => self.follow_sync(period),
             Command::WatchHeartbeat(node, time) => self.watch_heartbeat(node, time),
             Command::WatchByGuarding(node, period, factor) => self.watch_by_guarding(node, period, factor),

@@ -46,6 +46,8 @@ pub enum Command {
     Nmt(NmtTarget, NmtCommand),
     /// Produce SYNC with this period, or stop.
     Sync(Option<Duration>),
+    /// Let each SYNC that is produced carry a counter from 1 to this, as 1019h; 0 for none.
+    SyncCounter(u8),
     /// Count the SYNCs that another node produces with this period, or stop.
     FollowSync(Option<Duration>),
     /// Expect a heartbeat of the node at least this often, or stop watching.

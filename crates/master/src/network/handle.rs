@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use can::{Frame, Instant, Station};
 use canopen::nmt::NmtTarget;
-use canopen::{Mux, NmtCommand, NodeId};
+use canopen::{Mux, NmtCommand, NodeId, sync};
 use devices::AxisId;
 
 use super::moved::{Moved, MovedAxis};
@@ -83,6 +83,14 @@ impl Network {
     /// Produces SYNC with this period, or stops.
     pub fn sync(&self, period: Option<Duration>) {
         self.submit(Command::Sync(period));
+    }
+
+    /// Each SYNC that this network produces carries a counter from 1 to `overflow`, 2 to 240: 1019h of the devices has to be the same.
+    /// Devices begin a synchronous TPDO with a start value (1800h:06 and on) at the SYNC with that counter, so that several of them share
+    /// the bus by turns; without a counter they begin at the first SYNC. `None` for none. Other values are taken as the nearest. Source:
+    /// CiA 301, 7.2.5.1, 7.5.2.22 and 7.5.2.37.
+    pub fn sync_counter(&self, overflow: Option<u8>) {
+        self.submit(Command::SyncCounter(overflow.map_or(0, |overflow| overflow.clamp(2, sync::MAX_COUNTER))));
     }
 
     /// Produces this master's heartbeat under a node-ID, the first one at once, or stops. Periods are whole milliseconds.
