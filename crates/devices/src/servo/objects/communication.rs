@@ -81,7 +81,7 @@ const GENERAL: [Entry; 49] = [
     ro(0x1018, 2, U32).default(402),
     ro(0x1018, 3, U32).default(0x0001_0000),
     ro(0x1018, 4, U32).default(1),
-    rw(0x1019, 0, U8).described("SYNC counter overflow; 0 is off").range(0, 0),
+    rw(0x1019, 0, U8).described("Counter of SYNC: from 1 to this, 2 to 240; 0 is off").range(0, 240).saved(),
     ro(0x1029, 0, U8).default(1),
     rw(0x1029, 1, U8).described("What a loss of communication does to the NMT state")
         .values(&[(0, "pre-operational"), (1, "nothing"), (2, "stopped")]).default(1).saved(),
