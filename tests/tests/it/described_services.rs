@@ -250,20 +250,23 @@ fn a_multiplexed_rpdo_is_stored_and_a_missing_destination_is_emcy_8230h() {
 }
 
 /// Every communication object that a file has and that has no effect here keeps its value: the value itself is taken, another is
-/// 0609 0030h. Those of SDO servers, clients and program download have rules of their own.
+/// 0609 0030h. A record has several entries; which act is decided for each.
 #[test]
 fn what_has_no_effect_takes_its_own_value_and_no_other() {
-    const AT_ONCE: u16 = 100;
-    let others = (0x1000..=0x1FFF_u16).filter(|index| !takes(Mux::new(*index, 0))).collect::<Vec<_>>();
-    assert!(others.len() > 1000 && others.contains(&0x1013) && others.contains(&0x1F81));
-    for indices in others.chunks(AT_ONCE.into()) {
+    const AT_ONCE: usize = 500;
+    const SUBS: [u8; 8] = [0, 1, 2, 3, 4, 8, 0x7F, 0xFE];
+    let all = (0x1000..=0x1FFF_u16).flat_map(|index| SUBS.map(|sub| Mux::new(index, sub)));
+    let others = all.filter(|mux| !takes(*mux)).collect::<Vec<_>>();
+    let has = |index, sub| others.contains(&Mux::new(index, sub));
+    assert!(others.len() > 8000 && has(0x1013, 0) && has(0x1F81, 0x7F) && has(0x1029, 2) && !has(0x1029, 1));
+    for objects in others.chunks(AT_ONCE) {
         let mut rows = vec![(0x1000, 0, U32, "ro", 0, false)];
-        rows.extend(indices.iter().map(|index| (*index, 0, U32, "rw", 5, false)));
+        rows.extend(objects.iter().map(|mux| (mux.index, mux.sub_index, U32, "rw", 5, false)));
         let mut bench = Bench::new(&rows);
-        for index in indices {
-            assert_eq!(bench.write(*index, 0, 4, 6), Some(0x0609_0030), "{index:04X}h");
-            assert_eq!(bench.write(*index, 0, 4, 5), None, "{index:04X}h");
-            assert_eq!(bench.value(*index, 0), 5);
+        for mux in objects {
+            assert_eq!(bench.write(mux.index, mux.sub_index, 4, 6), Some(0x0609_0030), "{mux}");
+            assert_eq!(bench.write(mux.index, mux.sub_index, 4, 5), None, "{mux}");
+            assert_eq!(bench.value(mux.index, mux.sub_index), 5);
         }
     }
     // A text, and an object of a record of which other entries act.
@@ -276,6 +279,26 @@ fn what_has_no_effect_takes_its_own_value_and_no_other() {
     ]);
     assert!(acts_on(Mux::new(0x1029, 1)) && !acts_on(Mux::new(0x1029, 2)));
     assert_eq!((bench.write(0x1029, 1, 1, 1), bench.write(0x1029, 2, 1, 1)), (None, Some(0x0609_0030)));
+}
+
+/// What acts in 2000h to 9FFFh is the application's, which a file does not describe: a device without a known profile keeps what is
+/// written there, each object for itself.
+#[test]
+fn an_object_of_an_unknown_application_is_stored_and_changes_no_other() {
+    const AT_ONCE: u16 = 512;
+    for first in (0x2000..0xA000_u16).step_by(AT_ONCE.into()) {
+        let objects = || (first..first + AT_ONCE).flat_map(|index| [(index, 0), (index, 3)]);
+        let mut rows = vec![(0x1000, 0, U32, "ro", 0, false)];
+        rows.extend(objects().map(|(index, sub)| (index, sub, U32, "rw", 5, true)));
+        let mut bench = Bench::new(&rows);
+        for (index, sub) in objects() {
+            let value = u32::from(index) << 8 | u32::from(sub);
+            assert_eq!(bench.write(index, sub, 4, value), None, "{index:04X}h:{sub:02X}");
+        }
+        for (index, sub) in objects() {
+            assert_eq!(bench.value(index, sub), i64::from(index) << 8 | i64::from(sub), "{index:04X}h:{sub:02X}");
+        }
+    }
 }
 
 /// The built-in servo has no writable communication object without an effect.
