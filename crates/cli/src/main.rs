@@ -258,7 +258,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Disable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Estop(command) => {
-            stops(global, format, async |context| Ok(StopOutcome::all(command.run(context).await?)))
+            stops(global, format, async |context| command.run(context).await.map(StopOutcome::all))
         }
         Command::Stop(command) => stops(global, format, async |context| command.run(context).await),
         Command::QuickStop(command) => stops(global, format, async |context| command.run(context).await),
@@ -278,12 +278,10 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::DriveBase(base) => base.run(global, format),
         Command::Plan(plan) => plan.run(global, format),
         Command::Check(check) => {
-            let report = check.run(global)?;
-            print_whole(format, &report, report.failure(check.strict()))
+            check.run(global).and_then(|report| print_whole(format, &report, report.failure(check.strict())))
         }
         Command::Init(init) => {
-            let report = init.run(global, typed.bus)?;
-            print_whole(format, &report, report.failure())
+            init.run(global, typed.bus).and_then(|report| print_whole(format, &report, report.failure()))
         }
         Command::Plot(plot) => print(format, &plot.draw()?),
         Command::Readings(readings) => print(format, &readings.list()?),

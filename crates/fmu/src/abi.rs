@@ -9,23 +9,16 @@
 
 mod held;
 mod life;
+mod status;
 mod unsupported;
 mod values;
 
 use std::ffi::{CStr, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::instance::{CallError, Called};
+use crate::call::{CallError, Called};
 use held::{Held, instance};
-
-/// `fmi3Status`.
-pub(crate) type Status = i32;
-pub(crate) const OK: Status = 0;
-pub(crate) const ERROR: Status = 3;
-pub(crate) const FATAL: Status = 4;
-
-/// `fmi3LogMessageCallback`.
-pub(crate) type LogMessage = Option<unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char)>;
+use status::{ERROR, FATAL, OK, Status};
 
 /// Carries out a call on an instance; what goes wrong is reported to the importer's log.
 fn call(handle: *mut c_void, work: impl FnOnce(&mut Held) -> Called<()>) -> Status {

@@ -1,4 +1,4 @@
-//! A drive as a node of somebody else's network: frames come and go as operations, torque and voltages as variables.
+//! A drive as a node of another simulator's network: frames come and go as operations, torque and voltages as variables.
 
 use std::path::Path;
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::call::{CallError, Called, refused};
 use crate::config::{Config, ConfigError, TxClock};
-use crate::state::SavedState;
 use crate::unit::{Action, Unit};
 use crate::variable::{Causality, Reference, Terminal, Value, Variable};
 
@@ -27,18 +27,6 @@ pub enum Mode {
     Step,
     /// Over.
     Terminated,
-}
-
-/// Why a call was not carried out: what, and what was expected.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct CallError(pub String);
-
-/// The result of a call.
-pub type Called<T> = Result<T, CallError>;
-
-fn refused<T>(what: impl Into<String>) -> Called<T> {
-    Err(CallError(what.into()))
 }
 
 /// What a step came to.
@@ -139,7 +127,7 @@ impl Instance {
     /// Initialization begins at `start_s`.
     ///
     /// # Errors
-    /// The wrong mode, a time that is no number.
+    /// The wrong mode, a time that is not a number.
     pub fn enter_initialization(&mut self, start_s: f64) -> Called<()> {
         self.expect(&[Mode::Instantiated], "fmi3EnterInitializationMode")?;
         if !start_s.is_finite() {
@@ -211,11 +199,11 @@ impl Instance {
     /// Time passes from `from_s` by `step_s`.
     ///
     /// # Errors
-    /// The wrong mode, a step that does not begin where time stands, or is not forward.
+    /// The wrong mode, a step that does not begin where time stands, or is nott forward.
     pub fn step(&mut self, from_s: f64, step_s: f64) -> Called<Stepped> {
         self.expect(&[Mode::Step], "fmi3DoStep")?;
         let to_s = from_s + step_s;
-        // A step of no time is no step by the standard; importers take one where a countdown ends at once.
+        // By the standard a step takes time; importers make one of none where a countdown ends at once.
         if !(step_s >= 0.0 && to_s.is_finite() && to_s - self.rest.start_s < LATEST_S) {
             return refused(format!("a step of {step_s} s is not possible; expected a time of 0 or more"));
         }
@@ -231,7 +219,7 @@ impl Instance {
         self.act(Action::Serve)?;
         self.act(Action::Advance(to_ns))?;
         self.rest.now_ns = to_ns;
-        // Without a countdown nobody comes back at this instant before the next step: what is due is sent now.
+        // Without a countdown no call comes at this instant before the next step: what is due is sent now.
         if self.config.clock() == TxClock::Triggered || !self.has_event_mode {
             self.act(Action::Serve)?;
         }
@@ -351,16 +339,6 @@ impl Instance {
         // Always what is left of it: importers that forget a countdown with each event need it, and others lose nothing.
         let next = self.unit.next_event().map(|at| at.as_nanos());
         Ok(next.map_or(Interval::NotKnown, |at| Interval::In(at.saturating_sub(self.rest.now_ns))))
-    }
-
-    /// The whole state.
-    pub fn save(&self) -> SavedState {
-        SavedState(Box::new(self.clone()))
-    }
-
-    /// Takes a state back.
-    pub fn restore(&mut self, state: &SavedState) {
-        *self = (*state.0).clone();
     }
 
     pub(crate) fn rest(&self) -> Rest {

@@ -22,6 +22,7 @@
 
 mod abi;
 pub mod bus;
+pub mod call;
 pub mod config;
 pub mod drive;
 pub mod instance;

@@ -66,7 +66,7 @@ pub enum ErrorCode {
     Form = 3,
     /// The check sum did not fit.
     Crc = 4,
-    /// Nobody acknowledged it.
+    /// No node acknowledged it.
     Acknowledge = 5,
     /// An error frame was disturbed.
     BrokenErrorFrame = 6,
@@ -270,11 +270,11 @@ mod tests {
         let mut bytes = vec![0x99, 0, 0, 0, 9, 0, 0, 0, 5];
         Operation::Wakeup.write(&mut bytes);
         assert_eq!(read(&bytes), [Err(&bytes[..9]), Ok(Operation::Wakeup)]);
-        // A length that cannot be: nobody knows where the next one begins.
+        // A length that cannot be: where the next one begins is unknown.
         let torn = [0x20, 0, 0, 0, 200, 0, 0, 0, 1, 0];
         assert_eq!(read(&torn), [Err(&torn[..])]);
         assert_eq!(read(&[1, 2]), [Err(&[1, 2][..])]);
-        // Nine bytes are not a classical frame, and 800h is no standard identifier.
+        // Nine bytes are not a classical frame, and 800h is not a standard identifier.
         let mut nine = written(&Operation::Transmit(Frame::new(CanId::standard(1), &[0; 8])));
         nine.push(0);
         nine[4] = 25;

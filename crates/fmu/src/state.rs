@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::instance::{CallError, Called, Instance};
+use crate::call::{CallError, Called};
+use crate::instance::Instance;
 use crate::unit::Action;
 
 /// A state, to be taken back by an instance of the same FMU.
@@ -22,6 +23,16 @@ struct Written {
 const CHECK_SUM: usize = 4;
 
 impl SavedState {
+    /// The whole state of an instance.
+    pub fn of(instance: &Instance) -> Self {
+        Self(Box::new(instance.clone()))
+    }
+
+    /// Has an instance go on from it.
+    pub fn restore(&self, instance: &mut Instance) {
+        instance.clone_from(&self.0);
+    }
+
     /// The state as bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let instance = &self.0;

@@ -78,10 +78,9 @@ fn a_server_that_was_given_is_stored_unless_it_was_given_for_the_time() {
 /// those of the other.
 #[test]
 fn two_masters_with_a_server_each_do_not_disturb_each_other() {
-    let mut world = World::new(Bitrate::M1);
-    let mut drive = order(model(), &Order::new(model(), NODE, Bitrate::M1)).expect("it is built");
-    drive.set_power(true, Instant::ZERO);
-    world.add_station(drive);
+    let mut world = World::new(Bitrate::M1, 1);
+    let drive = order(model(), &Order::new(model(), NODE, Bitrate::M1)).expect("it is built");
+    world.add_drive(NODE.raw(), drive).expect("the node-ID is free");
     let masters = [Network::new(), Network::new()];
     for network in &masters {
         world.add_station(network.clone());

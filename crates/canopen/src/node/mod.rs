@@ -33,6 +33,7 @@
 //! assert!(matches!(node.poll_event(), Some(NodeEvent::Written { raw: 6, .. })));
 //! ```
 
+mod channel;
 mod channels;
 mod cycle;
 mod event;
@@ -49,7 +50,7 @@ mod transmit;
 
 use can::{CanId, Frame, Instant, Station};
 
-use channels::Channel;
+use channel::Channel;
 use event::EventQueue;
 pub use event::{NodeEvent, Ticket, Via};
 pub use profile::NodeProfile;
@@ -124,7 +125,7 @@ impl<S: Storage> Node<S> {
             heartbeat_state: None,
             emcy: emcy::Producer::new(),
             emcy_id: None,
-            channels: channels::of::<S>(profile.table, &sdo),
+            channels: channel::of::<S>(profile.table, &sdo),
             sdo,
             asked: Ticket(0),
             sync: NodeSync::NONE,

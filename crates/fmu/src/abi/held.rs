@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::ffi::{CString, c_void};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use super::{ERROR, LogMessage};
+use super::status::{ERROR, LogMessage};
 use crate::instance::Instance;
 use crate::state::SavedState;
 

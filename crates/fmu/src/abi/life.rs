@@ -4,7 +4,8 @@ use std::ffi::{c_char, c_void};
 use std::path::Path;
 
 use super::held::{self, Held, Log};
-use super::{LogMessage, Status, call, put, slice, slice_mut, text, wrong};
+use super::status::{LogMessage, Status};
+use super::{call, put, slice, slice_mut, text, wrong};
 use crate::config::Config;
 use crate::instance::Instance;
 use crate::state::SavedState;
@@ -178,7 +179,7 @@ pub unsafe extern "C" fn fmi3GetFMUState(handle: *mut c_void, state: *mut *mut c
         // SAFETY: a place for a pointer by the importer's word.
         let place = unsafe { slice_mut(state, 1)? };
         held.states.remove(&(place[0] as usize));
-        let saved = held.instance.save();
+        let saved = SavedState::of(&held.instance);
         place[0] = held.keep(saved) as *mut c_void;
         Ok(())
     })
@@ -189,7 +190,7 @@ pub unsafe extern "C" fn fmi3GetFMUState(handle: *mut c_void, state: *mut *mut c
 pub extern "C" fn fmi3SetFMUState(handle: *mut c_void, state: *mut c_void) -> Status {
     call(handle, |held| match held.states.get(&(state as usize)) {
         Some(saved) => {
-            held.instance.restore(saved);
+            saved.restore(&mut held.instance);
             Ok(())
         }
         None => wrong("no state of this instance"),

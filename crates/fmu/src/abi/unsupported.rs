@@ -2,7 +2,8 @@
 
 use std::ffi::c_void;
 
-use super::{Status, call, wrong};
+use super::status::Status;
+use super::{call, wrong};
 
 /// Functions of an instance that end with an error. What stands behind the first argument is not looked at.
 macro_rules! unsupported {

@@ -2,8 +2,10 @@
 
 use std::ffi::{CString, c_char, c_void};
 
-use super::{Status, call, slice, slice_mut, text, wrong};
-use crate::instance::{Called, Interval};
+use super::status::Status;
+use super::{call, slice, slice_mut, text, wrong};
+use crate::call::Called;
+use crate::instance::Interval;
 use crate::variable::Value;
 
 /// Values and references are as many, as no variable here is an array.

@@ -7,7 +7,7 @@ use ferrodrive_fmu::variable::Value;
 
 use crate::importer::{binary, bus, drive, instance};
 
-fn refusal<T>(called: Result<T, ferrodrive_fmu::instance::CallError>) -> String {
+fn refusal<T>(called: Result<T, ferrodrive_fmu::call::CallError>) -> String {
     called.err().map(|error| error.to_string()).unwrap_or_default()
 }
 

@@ -45,7 +45,7 @@ fn seen(drive: &mut Instance) -> Vec<Value> {
 #[test]
 fn a_drive_goes_on_from_its_state_and_from_its_bytes() {
     let (mut drive, mut step) = turning();
-    let state = drive.save();
+    let state = SavedState::of(&drive);
     let bytes = state.bytes();
     let begin = step;
     drive.set(10, Value::Float64(1.5)).unwrap();
@@ -57,7 +57,7 @@ fn a_drive_goes_on_from_its_state_and_from_its_bytes() {
     let mut other = Instance::of(drive_config(), ".".as_ref(), false).unwrap();
     let read = SavedState::from_bytes(&bytes, &other).unwrap();
     for taken in [&state, &read] {
-        other.restore(taken);
+        taken.restore(&mut other);
         let mut step = begin;
         other.set(10, Value::Float64(1.5)).unwrap();
         run(&mut other, &mut step, 600);
@@ -73,7 +73,7 @@ fn drive_config() -> ferrodrive_fmu::config::Config {
 #[test]
 fn bytes_that_are_torn_or_of_another_fmu_are_refused() {
     let drive = instance(drive_config());
-    let bytes = drive.save().bytes();
+    let bytes = SavedState::of(&drive).bytes();
     for place in 0..bytes.len() {
         let mut torn = bytes.clone();
         torn[place] ^= 1;
@@ -96,8 +96,8 @@ fn a_bus_goes_on_from_its_bytes() {
     bus.enter_step().unwrap();
     // In the middle of the frame, which begins when 11 recessive bits have passed.
     bus.step(0.0, 1e-4).unwrap();
-    let saved = SavedState::from_bytes(&bus.save().bytes(), &bus).unwrap();
-    bus.restore(&saved);
+    let saved = SavedState::from_bytes(&SavedState::of(&bus).bytes(), &bus).unwrap();
+    saved.restore(&mut bus);
     bus.step(1e-4, 9e-4).unwrap();
     assert_eq!(bus.get(10).unwrap(), Value::UInt64(1));
 }

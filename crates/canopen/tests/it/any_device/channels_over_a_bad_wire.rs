@@ -81,7 +81,10 @@ impl Asker {
                 if mux == CONSTANT {
                     assert_eq!(value, constant());
                 } else {
-                    assert!(self.known.iter().any(|known| known == value), "{mux}: {length} bytes that nobody wrote");
+                    assert!(
+                        self.known.iter().any(|known| known == value),
+                        "{mux}: {length} bytes that were not written"
+                    );
                 }
                 self.done += 1;
             }

@@ -186,7 +186,9 @@ impl Bench {
             Motion::Move => self.run(drive.move_relative(Turns(100.0), options())).map(drop),
             Motion::Torque => self.run(drive.torque(Amperes(0.5))).map(drop),
             Motion::Home => self.start_homing(&drive),
-            Motion::GroupMove | Motion::GroupFollow => return self.group(motion).map(|group| Moving::Group(Box::new(group))),
+            Motion::GroupMove | Motion::GroupFollow => {
+                return self.group(motion).map(|group| Moving::Group(Box::new(group)));
+            }
             Motion::Base => return self.base().map(|base| Moving::Base(Box::new(base))),
         };
         match moved {
