@@ -4,14 +4,16 @@ mod busy;
 
 use std::time::Duration;
 
-use can::{Bitrate, CanId, Frame};
+use can::{Bitrate, CanId, Frame, Instant};
+use canopen::NodeId;
+use devices::servo::CIA402;
 use drives::mjoint::Model;
 use plant::coupled::DifferentialDriveModel;
-use sim::machine::{Realism, mjoint, zlac8030l, zlim42c};
-use sim::{CoupledShaft, Coupling, Place, StationId, VirtualDrive, World};
+use sim::machine::{Order, Realism, mjoint, order as order_of, zlac8030l, zlim42c};
+use sim::{CoupledShaft, Coupling, Fidelity, Place, StationId, VirtualDrive, World};
 
 /// Names of the worlds.
-pub(crate) const WORLDS: [&str; 17] = [
+pub(crate) const WORLDS: [&str; 23] = [
     "1 hub servo turning, silent bus",
     "1 hub servo turning, busy bus",
     "1 hub servo not enabled",
@@ -29,6 +31,12 @@ pub(crate) const WORLDS: [&str; 17] = [
     "16 hub servos turning, silent bus",
     "1 hub servo turning, as on a bench",
     "1 joint turning, as on a bench",
+    "1 described servo turning, silent bus",
+    "1 mechanical hub servo turning, silent bus",
+    "1 mechanical joint turning, silent bus",
+    "1 mechanical described servo turning, silent bus",
+    "127 mechanical hub servos turning, silent bus",
+    "1 mechanical hub servo not enabled",
 ];
 
 /// Drives by their node-ID.
@@ -39,9 +47,9 @@ pub(crate) fn world(name: &str) -> Option<World> {
     Some(match name {
         "1 hub servo turning, silent bus" => turning(hub_servos(1)).0,
         "1 hub servo turning, busy bus" => busy::controlled_each_millisecond(),
-        "1 hub servo not enabled" => not_enabled(1),
-        "6 hub servos not enabled" => not_enabled(6),
-        "127 hub servos not enabled" => not_enabled(127),
+        "1 hub servo not enabled" => not_enabled(hub_servos(1)),
+        "6 hub servos not enabled" => not_enabled(hub_servos(6)),
+        "127 hub servos not enabled" => not_enabled(hub_servos(127)),
         "6 hub servos turning, silent bus" => turning(hub_servos(6)).0,
         "16 hub servos turning, silent bus" => turning(hub_servos(16)).0,
         "1 hub servo turning, as on a bench" => moving(hub_servos(1), |world| make_real(world, 1)).0,
@@ -58,6 +66,12 @@ pub(crate) fn world(name: &str) -> Option<World> {
         "127 hub servos turning, busy bus" => busy::many_in_one_cycle(),
         "2 hub servos turning, silent bus" => turning(hub_servos(2)).0,
         "2 hub servos moving a base, silent bus" => moving(hub_servos(2), move_a_base).0,
+        "1 described servo turning, silent bus" => turning(vec![described(1)]).0,
+        "1 mechanical hub servo turning, silent bus" => turning(mechanical(hub_servos(1))).0,
+        "1 mechanical joint turning, silent bus" => turning(mechanical(vec![joint(1)])).0,
+        "1 mechanical described servo turning, silent bus" => turning(mechanical(vec![described(1)])).0,
+        "127 mechanical hub servos turning, silent bus" => turning(mechanical(hub_servos(127))).0,
+        "1 mechanical hub servo not enabled" => not_enabled(mechanical(hub_servos(1))),
         _ => return None,
     })
 }
@@ -74,11 +88,24 @@ fn stepper(node: u8) -> (u8, Box<dyn VirtualDrive>) {
     (node, Box::new(zlim42c(node, 0)))
 }
 
-fn not_enabled(count: u8) -> World {
+fn described(node: u8) -> (u8, Box<dyn VirtualDrive>) {
+    let order = Order::new(&CIA402, NodeId::new(node).expect("a node-ID"), Bitrate::M1);
+    (node, order_of(&CIA402, &order).expect("the standard's own servo"))
+}
+
+/// The same of fidelity mechanical.
+fn mechanical(mut drives: Drives) -> Drives {
+    for (_, drive) in &mut drives {
+        drive.set_fidelity(Fidelity::Mechanical, Instant::ZERO).expect("a model that has both");
+    }
+    drives
+}
+
+fn not_enabled(drives: Drives) -> World {
     let mut world = World::new(Bitrate::M1, 1);
     // A node that acknowledges: alone it would repeat its boot-up message for ever.
     world.add_probe();
-    for (node, drive) in hub_servos(count) {
+    for (node, drive) in drives {
         world.add_drive(node, drive).expect("numbers differ");
     }
     world.run_for(Duration::from_secs(1));
@@ -116,6 +143,9 @@ fn turning(drives: Drives) -> (World, StationId) {
 fn moving(drives: Drives, join: impl FnOnce(&mut World)) -> (World, StationId) {
     let mut world = World::new(Bitrate::M1, 1);
     let probe = world.add_probe();
+    // 60FFh of the described servo counts increments of its encoder, 131072 a turn.
+    let target = |drive: &dyn VirtualDrive| if drive.model() == CIA402.name { 100 * 131_072 / 60 } else { 100_u32 };
+    let targets: Vec<(u8, u32)> = drives.iter().map(|(node, drive)| (*node, target(drive.as_ref()))).collect();
     let nodes: Vec<u8> = drives.iter().map(|(node, _)| *node).collect();
     for (node, drive) in drives {
         world.add_drive(node, drive).expect("numbers differ");
@@ -123,8 +153,8 @@ fn moving(drives: Drives, join: impl FnOnce(&mut World)) -> (World, StationId) {
     join(&mut world);
     world.run_for(Duration::from_millis(20));
     while world.poll_received(probe).is_some() {} // boot-up messages
-    for node in &nodes {
-        turn(&mut world, probe, *node);
+    for (node, target) in targets {
+        turn(&mut world, probe, node, target);
     }
     world.run_for(Duration::from_secs(1));
     assert_turning(&mut world, &nodes);
@@ -140,13 +170,14 @@ fn assert_turning(world: &mut World, nodes: &[u8]) {
 }
 
 /// Profile velocity at 100 r/min, enabled as each of the drives can be; no watch over the host where there is one.
-fn turn(world: &mut World, probe: StationId, node: u8) {
+fn turn(world: &mut World, probe: StationId, node: u8, target: u32) {
     request(world, probe, node, [0x2B, 0x00, 0x20, 0, 0, 0, 0, 0], true);
     request(world, probe, node, [0x2F, 0x60, 0x60, 0, 3, 0, 0, 0], false);
     for command in [0x06, 0x07, 0x0F] {
         request(world, probe, node, [0x2B, 0x40, 0x60, 0, command, 0, 0, 0], false);
     }
-    request(world, probe, node, [0x23, 0xFF, 0x60, 0, 100, 0, 0, 0], false);
+    let [a, b, c, d] = target.to_le_bytes();
+    request(world, probe, node, [0x23, 0xFF, 0x60, 0, a, b, c, d], false);
 }
 
 /// An SDO request and its answer.

@@ -3,6 +3,8 @@ use canopen::{NmtState, NodeId};
 use cia402::{ModeOfOperation, PowerState};
 use devices::AxisId;
 
+use crate::Fidelity;
+
 /// The firmware of a drive: a station on the bus that also owns a power stage.
 ///
 /// # Contract
@@ -24,6 +26,16 @@ pub trait Firmware: Station + Clone {
 
     /// Time between two ticks, in nanoseconds.
     const CONTROL_PERIOD_NS: u64;
+
+    /// Control periods in a supervision period: so long are the ticks of a firmware whose power stage follows by itself. None if
+    /// it has no such form.
+    const MECHANICAL_PERIODS: Option<u32> = None;
+
+    /// From its next start on it is of this fidelity; [`Fidelity::Mechanical`] of those only that have
+    /// [`MECHANICAL_PERIODS`](Self::MECHANICAL_PERIODS). Its ticks are as long then, and what one returns holds from that tick on.
+    fn set_fidelity(&mut self, fidelity: Fidelity) {
+        let _ = fidelity;
+    }
 
     /// Supply voltage arrives: starts from `hardware` and sends the boot-up message.
     fn power_on(&mut self, hardware: &Self::Hardware, now: Instant);

@@ -38,6 +38,7 @@ extern crate std;
 
 pub mod communication;
 pub mod engine;
+mod fidelity;
 mod firmware;
 pub mod mjoint;
 pub mod node;
@@ -49,6 +50,7 @@ pub mod zlac8030l;
 pub mod zlim42c;
 mod zltech;
 
+pub use fidelity::{Fidelity, ParseFidelityError};
 pub use firmware::{Firmware, Report};
 pub use register_error::RegisterError;
 pub use resting::Resting;

@@ -30,6 +30,12 @@ pub trait Resting: Firmware {
         None
     }
 
+    /// A run of the communication task finds nothing to do, whatever the ticks before it do: nothing waits to be stored, no change of
+    /// a value is to be sent by itself, no host is watched by the time.
+    fn task_is_idle(&self) -> bool {
+        false
+    }
+
     /// The runs of the communication task before `now` have been left out, of a firmware that rests: they would have done nothing.
     fn leave_out_tasks(&mut self, now: Instant) {
         let _ = now;

@@ -71,6 +71,29 @@ impl Commutation {
         self.phase as f32 * self.unit_turns
     }
 
+    /// The same of periods in which the shaft may come far beyond a border before it is seen: the border is taken to lie in the
+    /// middle of the way of the period, and half of it is none of a disagreement.
+    pub fn follow(&mut self, model: &CommutationModel, hall: u8, count: u16) -> f32 {
+        let moved = count.wrapping_sub(self.register) as i16;
+        let (was_aligned, changes) = (self.aligned, hall != self.hall);
+        let turns = self.update(model, hall, count);
+        if !changes {
+            return turns;
+        }
+        let way_turns = f32::from(moved) * model.pole_pairs as f32 * self.unit_turns;
+        if was_aligned {
+            let beyond = (self.disagreement_turns.abs() - way_turns.abs()).max(0.0);
+            self.disagreement_turns = beyond.copysign(self.disagreement_turns);
+            turns
+        } else {
+            // A single count may as well lie before the border.
+            let beyond = i32::from(moved) - i32::from(moved).signum();
+            let half = beyond.wrapping_mul(model.pole_pairs as i32) / 2;
+            self.phase = self.phase.wrapping_add(half).rem_euclid(model.cycle());
+            self.phase as f32 * self.unit_turns
+        }
+    }
+
     /// The angle has been fixed by a change of the Hall state; before that it may be off by 30 degrees.
     pub fn is_aligned(&self) -> bool {
         self.aligned

@@ -81,6 +81,36 @@ impl Observer {
         self.velocity
     }
 
+    /// The same once in a period as long as many, of a shaft whose mean velocity over that period is known, in counts per period:
+    /// what the edges would tell of it. The mean over spans of half a window to a window comes late by half of three quarters of
+    /// a window; a mean over one period by half a period, and a first-order lag brings the rest. Less than one count in the time
+    /// of a standstill is none.
+    pub fn follow(&mut self, gains: &ObserverGains, count: u16, velocity: f32) {
+        let moved = count.wrapping_sub(self.register) as i16;
+        self.register = count;
+        self.position = self.position.wrapping_add(i32::from(moved));
+        self.period = self.period.wrapping_add(u32::from(self.silence() < gains.standstill));
+        let rested = self.silence() >= gains.standstill;
+        if moved == 0 && (rested || self.velocity == 0.0) {
+            // Nothing is known before the second edge.
+            self.velocity = 0.0;
+            return;
+        }
+        if rested && moved.unsigned_abs() < 2 {
+            self.velocity = 0.0;
+        } else {
+            let lag = (gains.window as f32 * (3.0 / 8.0) - 0.5).max(0.0);
+            let from = if self.velocity == 0.0 { velocity } else { self.velocity };
+            self.velocity = from + (velocity - from) / (1.0 + lag);
+        }
+        if moved == 0 {
+            let bound = 1.0 / self.silence().max(1) as f32;
+            self.velocity = self.velocity.clamp(-bound, bound);
+        } else {
+            self.last = Edge { boundary: self.position, period: self.period };
+        }
+    }
+
     /// Counts per period.
     #[inline]
     pub fn velocity(&self) -> f32 {

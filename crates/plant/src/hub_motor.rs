@@ -8,6 +8,7 @@ use crate::angle::{Angle, Axis};
 use crate::brake::BrakeModel;
 use crate::clamp::ClampModel;
 use crate::cogging::Cogging;
+use crate::current_loop::SHORT_STEPS;
 use crate::encoder::{EncoderData, EncoderModel};
 use crate::flows::Flows;
 use crate::hall::{HallFault, HallModel};
@@ -68,6 +69,9 @@ pub enum Inverter {
     Shorted,
     /// Switching with these duty cycles of U, V, W, each 0 to 1.
     Driven([f64; 3]),
+    /// Whatever gives the currents that the motor's current loop is asked for
+    /// ([`LoopData::settings`](crate::current_loop::LoopData)).
+    Regulated,
 }
 
 /// What the drive's sensors read at the end of a step.
@@ -153,6 +157,27 @@ impl HubMotor {
             let flows = self.turn(dt_s, actuation, terminals, self.lost_phase);
             self.book(dt_s, &flows, actuation);
         }
+    }
+
+    /// A step of a supervision period, with the current loop's closed form ([`Inverter::Regulated`]) or an idle bridge. It is done
+    /// in tenths where something goes on that so long a step does not show: suppressors that conduct, molten switches, a bus
+    /// that its source charges in no time.
+    #[inline(never)]
+    pub fn step_long(&mut self, dt_s: f64, actuation: &Actuation) {
+        if actuation.inverter != Inverter::Regulated {
+            self.pmsm.current_loop.release();
+        }
+        if self.needs_short_steps(dt_s) {
+            (0..SHORT_STEPS).for_each(|_| self.step(dt_s / f64::from(SHORT_STEPS), actuation));
+        } else {
+            self.step(dt_s, actuation);
+        }
+    }
+
+    #[inline]
+    fn needs_short_steps(&self, dt_s: f64) -> bool {
+        let supply = &self.rig.supply;
+        self.power_stage_burnt || supply.bus_v > self.model.clamp.from_v || self.model.rig.supply.is_stiff(supply, dt_s)
     }
 
     /// The same while the bus is so high that its suppressors conduct, with two wires that touch, or with molten switches, which
@@ -396,6 +421,7 @@ impl Inverter {
             Inverter::Open => Terminals::Open { bus_v },
             Inverter::Shorted => Terminals::Shorted,
             Inverter::Driven(duty) => Terminals::from_duties(duty, bus_v),
+            Inverter::Regulated => Terminals::Regulated { bus_v },
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::attachment::Attachment;
 use crate::brake::BrakeModel;
 use crate::clamp::ClampModel;
 use crate::cogging::Cogging;
+use crate::current_loop::SHORT_STEPS;
 use crate::gear::{GearData, GearInput, GearModel};
 use crate::hub_motor::Inverter;
 use crate::mechanics::{Load, RotorData, RotorModel};
@@ -168,6 +169,28 @@ impl JointMotor {
         if actuation.set_origin {
             self.model.encoder.set_origin(&mut self.encoder, self.rotor.angle);
         }
+    }
+
+    /// A step of a supervision period: see [`HubMotor::step_long`](crate::HubMotor::step_long).
+    #[inline(never)]
+    pub fn step_long(&mut self, dt_s: f64, actuation: &Actuation) {
+        if actuation.inverter != Inverter::Regulated {
+            self.pmsm.current_loop.release();
+        }
+        if self.needs_short_steps(dt_s) {
+            (0..SHORT_STEPS).for_each(|_| self.step(dt_s / f64::from(SHORT_STEPS), actuation));
+        } else {
+            self.step(dt_s, actuation);
+        }
+    }
+
+    #[inline]
+    fn needs_short_steps(&self, dt_s: f64) -> bool {
+        let supply = &self.rig.supply;
+        self.power_stage_burnt
+            || supply.bus_v > self.model.clamp.from_v
+            || self.discharge_from_v.is_some()
+            || self.model.rig.supply.is_stiff(supply, dt_s)
     }
 
     /// Bus, energies and the magnets' direction, and now and then the slow things.

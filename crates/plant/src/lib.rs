@@ -38,6 +38,7 @@ pub mod brake;
 pub mod clamp;
 pub mod cogging;
 pub mod coupled;
+pub mod current_loop;
 pub mod encoder;
 pub mod free_run;
 pub mod gear;
@@ -56,10 +57,12 @@ pub mod stepper_motor;
 pub mod supply;
 pub mod thermal;
 
+mod dq;
 mod flows;
 mod hub_motors;
 mod joining;
 mod joint_motors;
+mod regulated;
 mod servo_motors;
 mod stepper_motors;
 

@@ -15,13 +15,15 @@
 //! Iron loss is left to the friction of [`mechanics`](crate::mechanics); saturation of the iron is not modelled.
 
 use crate::angle::{Angle, Axis};
+use crate::current_loop::LoopData;
+pub use crate::dq::Dq;
 use crate::flows::Flows;
 
 /// Below this current an idle bridge is taken as not conducting.
 const NO_CURRENT_A: f64 = 1e-9;
 /// Line to line over phase.
 pub(crate) const SQRT_3: f64 = 1.732_050_807_568_877_2;
-const INV_SQRT_3: f64 = 0.577_350_269_189_625_8;
+pub(crate) const INV_SQRT_3: f64 = 0.577_350_269_189_625_8;
 const HALF_SQRT_3: f64 = 0.866_025_403_784_438_6;
 
 /// What never changes about a motor's winding and magnets.
@@ -83,6 +85,11 @@ pub enum Terminals {
         /// Voltage of the bus that the diodes conduct into.
         bus_v: f64,
     },
+    /// A current loop drives the bridge; loop and bridge are one closed form ([`current_loop`](crate::current_loop)).
+    Regulated {
+        /// Voltage of the bus.
+        bus_v: f64,
+    },
 }
 
 impl Terminals {
@@ -95,26 +102,13 @@ impl Terminals {
     }
 }
 
-/// A vector in the rotor's frame.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Dq {
-    /// Along the magnets.
-    pub d: f64,
-    /// Across the magnets: the torque-producing axis.
-    pub q: f64,
-}
-
-impl Dq {
-    fn magnitude(self) -> f64 {
-        libm::sqrt(self.d * self.d + self.q * self.q)
-    }
-}
-
 /// State of the winding: its current.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PmsmData {
     /// Winding current in the rotor's frame.
     pub current_a: Dq,
+    /// Of the loop that regulates it, where loop and bridge are one closed form; it begins anew with each other condition.
+    pub current_loop: LoopData,
 }
 
 /// What acts on the winding during one step.
@@ -221,6 +215,7 @@ impl PmsmModel {
                 self.output(mean, 0.0)
             }
             Terminals::Open { bus_v } => self.step_diodes(data, dt_s, input, winding, bus_v),
+            Terminals::Regulated { bus_v } => self.regulate(data, dt_s, input, bus_v),
         }
     }
 
@@ -284,6 +279,8 @@ impl PmsmModel {
                 (mean, 2.0 * mean - before, 1.5 * voltage_v * mean)
             }
             Terminals::Shorted => (free, 2.0 * free - before, 0.0),
+            // The loop's closed form is that of three wires: the current ends.
+            Terminals::Regulated { .. } => (0.5 * before, 0.0, 0.0),
             Terminals::Open { bus_v } => {
                 // Two wires: the bridge conducts when the one line-to-line voltage exceeds the bus.
                 let counter_v = bus_v * INV_SQRT_3;
@@ -317,7 +314,7 @@ impl PmsmModel {
 }
 
 /// The two voltage equations over one step, ready to be solved for the mean current.
-struct Winding<'a> {
+pub(crate) struct Winding<'a> {
     model: &'a PmsmModel,
     before: Dq,
     half_s: f64,
@@ -327,7 +324,7 @@ struct Winding<'a> {
 
 impl<'a> Winding<'a> {
     #[inline]
-    fn new(model: &'a PmsmModel, data: &PmsmData, dt_s: f64, input: &PmsmInput) -> Self {
+    pub(crate) fn new(model: &'a PmsmModel, data: &PmsmData, dt_s: f64, input: &PmsmInput) -> Self {
         Winding {
             model,
             before: data.current_a,
@@ -339,7 +336,7 @@ impl<'a> Winding<'a> {
 
     /// Implicit midpoint: `i_mean = i_before + dt/2 * f(i_mean)`, two linear equations in `i_mean`.
     #[inline]
-    fn mean_current(&self, voltage_v: Dq) -> Dq {
+    pub(crate) fn mean_current(&self, voltage_v: Dq) -> Dq {
         let PmsmModel { inductance_d_h: l_d, inductance_q_h: l_q, flux_linkage_wb: psi, .. } = *self.model;
         let (h, w) = (self.half_s, self.omega);
         let a = l_d + h * self.resistance_ohm;

@@ -78,6 +78,7 @@ pub struct Rig {
     pub(crate) attached: Option<Attached>,
     pub(crate) coupled: Option<Coupled>,
     winding_ohm: f64,
+    slow_every: u32,
     slow: Slow,
 }
 
@@ -89,6 +90,9 @@ struct Slow {
     winding_j: f64,
     heat_sink_j: f64,
 }
+
+/// The same of steps that are ten times as long: heat shows within a millisecond or two.
+const SLOW_EVERY_LONG: u32 = 2;
 
 impl Rig {
     /// No load, the bus charged from a source of `source_v`, all at `ambient_c`. A phase of the winding has `cold_ohm`
@@ -104,8 +108,14 @@ impl Rig {
             attached: None,
             coupled: None,
             winding_ohm: resistance_at_ohm(cold_ohm, model.resistance_per_k, ambient_c),
+            slow_every: SLOW_EVERY,
             slow: Slow::default(),
         }
+    }
+
+    /// Its steps are supervision periods from now on, or control periods. Before the first one.
+    pub fn set_long_steps(&mut self, long: bool) {
+        self.slow_every = if long { SLOW_EVERY_LONG } else { SLOW_EVERY };
     }
 
     /// Connects the source or disconnects it, its capacitor with it. The inrush limiter has charged the bus by the time
@@ -159,12 +169,12 @@ impl Rig {
 
         self.slow.steps += 1;
         self.slow.time_s += dt_s;
-        self.slow.steps >= SLOW_EVERY
+        self.slow.steps >= self.slow_every
     }
 
     /// Steps up to and with the next one after which [`step_slow`](Self::step_slow) is due.
     pub(crate) fn steps_to_slow(&self) -> u32 {
-        SLOW_EVERY - self.slow.steps
+        self.slow_every - self.slow.steps
     }
 
     /// So many steps in which no power flows but what the drive itself takes, on a bus that such a step leaves as it is: what
@@ -179,7 +189,7 @@ impl Rig {
             self.slow.time_s += dt_s;
         }
         self.slow.steps += steps;
-        self.slow.steps >= SLOW_EVERY
+        self.slow.steps >= self.slow_every
     }
 
     /// Heat of the steps since the last call into the bodies, and the winding's resistance. The time of those steps, s.

@@ -105,6 +105,12 @@ impl SupplyModel {
         0.5 * self.bus_capacitance_f(data) * data.bus_v * data.bus_v
     }
 
+    /// The source charges the bus faster than a step of this length can show.
+    #[inline]
+    pub(crate) fn is_stiff(&self, data: &SupplyData, dt_s: f64) -> bool {
+        data.connected && self.source_resistance_ohm * self.bus_capacitance_f(data) < 0.5 * dt_s
+    }
+
     #[inline]
     fn bus_capacitance_f(&self, data: &SupplyData) -> f64 {
         if data.connected { self.capacitance_f + self.source_capacitance_f } else { self.capacitance_f }

@@ -25,7 +25,7 @@ use sim::command;
 use sim::machine::{TimingMode, order};
 use sim::stimulus::{FORMS, Place};
 use sim::wire::{Statistics, WireEvent};
-use sim::{StationId, VirtualDrive};
+use sim::{Fidelity, StationId, VirtualDrive};
 use words::drive::{DriveSpec, drive_spec};
 
 use crate::failure::{bad_value, named, refused, wrong_use};
@@ -66,6 +66,10 @@ fn timing_mode(timing: &str) -> PyResult<TimingMode> {
     timing.parse().map_err(|_| bad_value(format!("{timing:?} is not a timing; expected device or ideal")))
 }
 
+fn fidelity_of(fidelity: &str) -> PyResult<Fidelity> {
+    fidelity.parse().map_err(|_| bad_value(format!("{fidelity:?} is not a fidelity; expected full or mechanical")))
+}
+
 /// A bus with everything on it, in virtual time; `ferrodrive.World` is what users have.
 #[pyclass(frozen, subclass, weakref, module = "ferrodrive._native")]
 pub(crate) struct World {
@@ -89,6 +93,8 @@ pub(crate) struct WorldState {
     happened: Happened,
     /// What its machine file says, for a master that joins it.
     machine: Option<Arc<Machine>>,
+    /// Of drives that are added and do not say it.
+    fidelity: Fidelity,
 }
 
 /// Why [`World::advance`] came back.
@@ -140,7 +146,15 @@ impl Shared {
 impl WorldState {
     fn new(world: sim::World) -> Self {
         let (recordings, happened) = (Recordings::default(), Happened::default());
-        Self { world, jobs: Jobs::default(), probes: Vec::new(), recordings, happened, machine: None }
+        Self {
+            world,
+            jobs: Jobs::default(),
+            probes: Vec::new(),
+            recordings,
+            happened,
+            machine: None,
+            fidelity: Fidelity::Full,
+        }
     }
 
     /// What its machine file says, if it is of one.
@@ -214,6 +228,16 @@ impl World {
         Self { shared: Arc::new(Shared { process: process::id(), state }) }
     }
 
+    /// Puts a drive onto the bus that is built as described, of the world's fidelity unless it has its own.
+    fn order(&self, py: Python<'_>, number: u8, mut spec: DriveSpec) -> PyResult<()> {
+        let (bitrate, fidelity) = {
+            let state = self.shared.lock(py)?;
+            (state.world.bitrate(), state.fidelity)
+        };
+        spec.fidelity = spec.fidelity.or(Some(fidelity));
+        self.put(py, number, order(spec.model, &spec.order(bitrate)).map_err(refused)?)
+    }
+
     fn put(&self, py: Python<'_>, number: u8, drive: Box<dyn VirtualDrive>) -> PyResult<()> {
         let state = &mut *self.shared.lock(py)?;
         state.world.add_drive(number, drive).map_err(refused)?;
@@ -255,15 +279,14 @@ impl World {
         for (key, value) in options {
             spec.set(&key, &value).map_err(bad_value)?;
         }
-        let bitrate = self.shared.lock(py)?.world.bitrate();
-        self.put(py, node, order(spec.model, &spec.order(bitrate)).map_err(refused)?)
+        self.order(py, node, spec)
     }
 
     /// The same of a drive in words, `zlac8030l@4,motor=fast`; its number.
     fn add_described(&self, py: Python<'_>, words: &str) -> PyResult<u8> {
         let spec = drive_spec(words).map_err(bad_value)?;
-        let (number, bitrate) = (spec.node.raw(), self.shared.lock(py)?.world.bitrate());
-        self.put(py, number, order(spec.model, &spec.order(bitrate)).map_err(refused)?)?;
+        let number = spec.node.raw();
+        self.order(py, number, spec)?;
         Ok(number)
     }
 
@@ -279,11 +302,25 @@ impl World {
         Ok(())
     }
 
+    /// How much is computed of drives that are added from here on and do not say it: `full`, or `mechanical`.
+    fn set_fidelity(&self, py: Python<'_>, fidelity: &str) -> PyResult<()> {
+        self.shared.lock(py)?.fidelity = fidelity_of(fidelity)?;
+        Ok(())
+    }
+
     /// Becomes the world that a machine file describes; data sheets that it names are looked for beside it.
-    fn become_machine(&self, py: Python<'_>, path: PathBuf, seed: Option<u64>, timing: Option<&str>) -> PyResult<()> {
+    fn become_machine(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        seed: Option<u64>,
+        timing: Option<&str>,
+        fidelity: Option<&str>,
+    ) -> PyResult<()> {
         let mut machine = file::read(&path).map_err(|reason| bad_value(named(&path, reason)))?;
         machine.seed = seed.or(machine.seed);
         let said = timing.map(timing_mode).transpose()?;
+        machine.fidelity = fidelity.map(fidelity_of).transpose()?.or(machine.fidelity);
         // What is green here is to be green on the desk.
         machine.timing = said.or(machine.timing).or(Some(TimingMode::Device));
         let world = machine.build().map_err(|bad| bad_value(bad.named(path.display().to_string())))?;

@@ -58,7 +58,7 @@ impl Execution {
     /// What a drive of the machine does not take.
     pub fn begin(scenario: &Scenario, seed: Option<u64>) -> Result<(World, Self), BadFile> {
         let seed = seed.or(scenario.seed).or(scenario.machine.seed).unwrap_or(SEED);
-        let mut machine = scenario.machine.clone();
+        let mut machine = scenario.whole_machine();
         machine.seed = Some(seed);
         let mut world = machine.build()?;
         let network = Network::new();

@@ -11,6 +11,7 @@ use super::entries::{MOST, Many, bounded, entries, expect, figures, host, kept, 
 use super::plan::{Act, Base, Expect, Figure, Host, Measure, ScenarioStep};
 use crate::sweep::file::{SweepAxis, axes};
 use machine::file::Machine;
+use sim::Fidelity;
 use words::document::reader::{self, Parameters, Table};
 use words::document::{BadFile, Located, Problem, read_text};
 use words::suggest::{did_you_mean, near};
@@ -47,6 +48,8 @@ pub struct Scenario {
     pub about: String,
     /// The machine.
     pub machine: Machine,
+    /// How much of its drives is computed, in place of what its machine says; a drive may have its own.
+    pub fidelity: Option<Fidelity>,
     /// The seed of everything random, where it is given.
     pub seed: Option<u64>,
     /// The parameters and their values.
@@ -65,6 +68,18 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// Its machine, of the fidelity that is asked for.
+    pub(crate) fn whole_machine(&self) -> Machine {
+        let mut machine = self.machine.clone();
+        machine.fidelity = self.fidelity.or(machine.fidelity);
+        machine
+    }
+
+    /// What those of its drives that are not of fidelity full do not show; `None` if there is none.
+    pub fn not_shown(&self) -> Option<String> {
+        self.whole_machine().not_shown()
+    }
+
     /// The scenario of a file; files that it names are looked for beside it.
     ///
     /// # Errors
@@ -88,7 +103,8 @@ impl Scenario {
     /// # Errors
     /// A name that is not a parameter of it, or what the value breaks.
     pub fn with(&self, values: &Parameters) -> Result<Self, BadFile> {
-        Self::parse_with(&self.text, &self.folder, values)
+        let scenario = Self::parse_with(&self.text, &self.folder, values)?;
+        Ok(Self { fidelity: self.fidelity, ..scenario })
     }
 
     fn parse_with(text: &str, folder: &Path, values: &Parameters) -> Result<Self, BadFile> {
@@ -121,6 +137,7 @@ impl Scenario {
             title: kept(title, &mut problems).flatten().unwrap_or_else(|| "scenario".into()),
             about: kept(about, &mut problems).flatten().unwrap_or_default(),
             machine,
+            fidelity: None,
             seed: kept(seed, &mut problems).flatten(),
             parameters: parameters.clone(),
             sweep: kept(axes(file, parameters), &mut problems).unwrap_or_default(),

@@ -6,7 +6,7 @@ use can::{Bitrate, Instant, Station};
 use canopen::NmtState;
 use cia402::{ModeOfOperation, PowerState};
 use devices::{AxisId, Description};
-use drives::RegisterError;
+use drives::{Fidelity, RegisterError};
 use plant::FreeRun;
 use plant::physics::Physics;
 
@@ -54,6 +54,20 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     /// Whether it is as it is calculated, or has the noise and the flaws of one on a bench; `seed` decides all of that.
     fn set_realism(&mut self, realism: Realism, seed: u64, now: Instant) {
         let _ = (realism, seed, now);
+    }
+
+    /// How much of it is computed. Before it has power.
+    ///
+    /// # Errors
+    /// [`Refused::Fidelity`] for [`Fidelity::Mechanical`] of a model that has no such form.
+    fn set_fidelity(&mut self, fidelity: Fidelity, now: Instant) -> Result<(), Refused> {
+        let _ = now;
+        match fidelity {
+            Fidelity::Full => Ok(()),
+            Fidelity::Mechanical => {
+                Err(Refused::Fidelity { model: self.model(), reason: "it has no such form; expected full" })
+            }
+        }
     }
 
     /// The bit rate of its CAN controller at present; `None` while it takes no part in the bus (no power).

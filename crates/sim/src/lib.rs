@@ -57,7 +57,7 @@ pub use block_on::{BlockOnError, block_on, block_on_for};
 pub use coupling::{BodyKind, BodyState, CoupledShaft, Coupling, CouplingError};
 pub use devices::AxisId;
 pub use drive::{Brake, Levels, OutputShaft, PowerPhase, Report, VirtualDrive, VirtualDriveClone};
-pub use drives::RegisterError;
+pub use drives::{Fidelity, RegisterError};
 pub use mechanics::Mechanics;
 pub use plant::physics::Physics;
 pub use prng::Prng;

@@ -79,6 +79,22 @@ pub enum Refused {
         /// Actual position in the drive's counts.
         position: i64,
     },
+    /// The drive cannot be of the fidelity that was asked for.
+    #[error("a {model} cannot be simulated with fidelity mechanical: {reason}")]
+    Fidelity {
+        /// The drive's model.
+        model: &'static str,
+        /// Why not, and what to do.
+        reason: &'static str,
+    },
+    /// The fault is one of single phases, of which fidelity mechanical computes none.
+    #[error(
+        "this {model} is of fidelity mechanical, which computes no single phases; choose fidelity full for this fault"
+    )]
+    NotShown {
+        /// The drive's model.
+        model: &'static str,
+    },
     /// The image does not come from this model's memory.
     #[error("not a memory image of a {model}: {reason}")]
     BadImage {

@@ -3,6 +3,7 @@
 use can::Bitrate;
 use canopen::{Mux, NodeId};
 use devices::variant::{NoSuchChoice, Preset, Variant, VariationKind};
+use sim::Fidelity;
 use sim::machine::{Order, TimingMode};
 
 use super::node::node;
@@ -20,6 +21,8 @@ pub struct DriveSpec {
     pub node: NodeId,
     /// Whether it takes the time that such a drive takes, where it is given.
     pub timing: Option<TimingMode>,
+    /// How much of it is computed, where it is given.
+    pub fidelity: Option<Fidelity>,
     /// Whether it waits for LSS (CiA 305) to give it a node-ID; `node` is what the world calls it until then.
     pub unconfigured: bool,
     variant: Variant,
@@ -30,13 +33,14 @@ impl DriveSpec {
     /// A drive as delivered.
     pub fn new(model: &'static Description, node: NodeId) -> Self {
         let variant = Variant::first_of(model.variations);
-        Self { model, node, timing: None, unconfigured: false, variant, presets: Vec::new() }
+        Self { model, node, timing: None, fidelity: None, unconfigured: false, variant, presets: Vec::new() }
     }
 
     /// What to order for a bus of this rate.
     pub fn order(&self, bitrate: Bitrate) -> Order {
         let Self { node, variant, unconfigured, .. } = *self;
-        Order { node, bitrate, variant, presets: self.presets.clone(), unconfigured }
+        let fidelity = self.fidelity.unwrap_or_default();
+        Order { node, bitrate, variant, presets: self.presets.clone(), unconfigured, fidelity }
     }
 
     /// What was chosen for it.
@@ -55,7 +59,7 @@ impl DriveSpec {
     }
 
     /// Takes one option: a choice of the model's (`firmware=2.01`, `reading=Z050:prose` or `Z050=prose`), the value that an
-    /// object has at power-on (`6060=3`, `2030:02=9`), `timing=ideal`, or `node-id=none`.
+    /// object has at power-on (`6060=3`, `2030:02=9`), `timing=ideal`, `fidelity=mechanical`, or `node-id=none`.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
         let (key, value) = match key {
             "reading" => value.split_once(':').ok_or_else(|| {
@@ -64,6 +68,11 @@ impl DriveSpec {
             "timing" => {
                 self.timing =
                     Some(value.parse().map_err(|reason| format!("timing of a {}: {reason}", self.model.name))?);
+                return Ok(());
+            }
+            "fidelity" => {
+                self.fidelity =
+                    Some(value.parse().map_err(|reason| format!("fidelity of a {}: {reason}", self.model.name))?);
                 return Ok(());
             }
             "node-id" if value != "none" => {
@@ -122,7 +131,7 @@ impl DriveSpec {
             VariationKind::Build => format!("{}=CHOICE", variation.key),
         });
         let known = keys
-            .chain(["timing=device or ideal".to_owned()])
+            .chain(["timing=device or ideal".to_owned(), "fidelity=full or mechanical".to_owned()])
             .chain(self.model.lss.then(|| "node-id=none".to_owned()))
             .chain(["OBJECT=VALUE, e.g. 6060=3".to_owned()])
             .collect::<Vec<_>>()
@@ -217,6 +226,14 @@ mod tests {
         assert_eq!(timing("zlac8030l@4"), None);
         assert_eq!(timing("zlac8030l@4,timing=ideal,2014=100"), Some(TimingMode::Ideal));
         assert_eq!(timing("zlac8030l@4,timing=device"), Some(TimingMode::Device));
+    }
+
+    #[test]
+    fn each_drive_may_be_of_its_own_fidelity() {
+        let fidelity = |text| drive_spec(text).ok().unwrap().fidelity;
+        assert_eq!(fidelity("zlac8030l@4"), None);
+        assert_eq!(fidelity("zlac8030l@4,fidelity=mechanical,2014=100"), Some(Fidelity::Mechanical));
+        assert!(refusal("zlac8030l@4,fidelity=fast").contains("fidelity of a zlac8030l: expected full or mechanical"));
     }
 
     #[test]

@@ -69,7 +69,7 @@ impl Subject for zlac8030l::Zlac8030l {
 
     /// A shorted motor is what 202F:01 asks for without being enabled.
     fn is_off(actuation: &Self::Actuation) -> bool {
-        !matches!(actuation.power_stage, zlac8030l::hardware::PowerStage::Modulate { .. })
+        matches!(actuation.power_stage, zlac8030l::hardware::PowerStage::Off | zlac8030l::hardware::PowerStage::Shorted)
     }
 }
 

@@ -238,6 +238,11 @@ impl<S: Storage> Node<S> {
         }
     }
 
+    /// A change that [`notice_changes`](Self::notice_changes) would find is to be sent.
+    pub fn watches_changes(&self) -> bool {
+        self.state.allows_pdo() && self.pdos.watching.next(0).is_some()
+    }
+
     /// Sends `state` in heartbeats instead of the NMT state; `None` for the NMT state again.
     pub const fn set_heartbeat_state(&mut self, state: Option<u8>) {
         self.heartbeat_state = state;

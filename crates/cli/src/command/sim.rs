@@ -17,7 +17,8 @@ use serve::service::{PARTING_PATIENCE, REQUESTS_WAITING, Service, read_lines, ti
 use serve::store_writer::{StoreWriter, file_name};
 use serve::world::ServedWorld;
 use serve::writing::{FrameLog, Pace, RecordFile};
-use sim::machine::{Realism, TimingMode};
+use sim::Fidelity;
+use sim::machine::{Order, Realism, TimingMode};
 use sim::{VirtualDrive, World};
 use tokio::sync::mpsc;
 use transport::{
@@ -139,6 +140,13 @@ pub(crate) struct Sim {
     /// each time between them. One drive may differ: --drive zlac8030l@4,timing=ideal.
     #[arg(long, value_name = "device|ideal", hide_short_help = true)]
     timing: Option<TimingMode>,
+    /// Compute each control period of the drives (full), or their mechanics and outer loops only (mechanical), many times
+    /// faster (default: the machine file's, or full)
+    ///
+    /// Firmware, objects, faults and times on the bus are the same. docs/fidelity.md has what mechanical does not show, and
+    /// how far the two are apart. One drive may differ: --drive zlac8030l@4,fidelity=mechanical.
+    #[arg(long, value_name = "full|mechanical", hide_short_help = true)]
+    fidelity: Option<Fidelity>,
     /// Speed of the bus as a multiple of the clock, e.g. 10 or 0.1, or max
     ///
     /// With max it runs as fast as the machine can while a client is connected, which takes a whole core: 1 ms of the
@@ -200,10 +208,12 @@ impl Sim {
         let mut world = machine.world();
         for placed in &machine.drives {
             world.set_timing(machine.timing_of(placed, TimingMode::Device));
-            add_drive(&mut world, placed, eeproms.as_ref(), &warnings)?;
+            let order = machine.order_of(placed, world.bitrate());
+            add_drive(&mut world, (placed, &order), eeproms.as_ref(), &warnings)?;
             let notes = notes(placed.spec.node, placed.spec.model, self.verbose || global.verbose);
             notes.iter().for_each(|note| warnings.say(&plain(note)));
         }
+        machine.not_shown().iter().for_each(|what| warnings.say(&plain(what)));
         machine.join(&mut world).map_err(unusable)?;
         machine.make_real(&mut world);
         world.set_threads(self.threads.into());
@@ -246,6 +256,7 @@ impl Sim {
         machine.seed = self.seed.or(machine.seed);
         machine.realism = self.realism.or(machine.realism);
         machine.timing = self.timing.or(machine.timing);
+        machine.fidelity = self.fidelity.or(machine.fidelity);
         machine.drives.extend(self.drives.iter().cloned().map(Placed::from));
         if machine.drives.is_empty() {
             return Err(Failure::usage("no drive to run")
@@ -350,12 +361,12 @@ impl Sim {
 /// Adds a drive with what it remembers and what is around it.
 fn add_drive(
     world: &mut World,
-    placed: &Placed,
+    (placed, order): (&Placed, &Order),
     eeproms: Option<&Eeproms>,
     warnings: &Messages,
 ) -> Result<(), Failure> {
     let spec = &placed.spec;
-    let mut drive = embedded::ordered_drive(spec.model, &spec.order(world.bitrate()))?;
+    let mut drive = embedded::ordered_drive(spec.model, order)?;
     placed.supply(drive.as_mut()).map_err(unusable)?;
     let number = spec.node.raw();
     let name = file_name(spec.model.name, number);

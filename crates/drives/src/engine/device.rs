@@ -261,6 +261,11 @@ impl<S: Storage> Device<S> {
         self.running.then(|| self.next_task.plus_nanos(runs * self.task_period_ns))
     }
 
+    /// See [`Resting::task_is_idle`](crate::Resting::task_is_idle).
+    pub fn is_task_idle(&self) -> bool {
+        self.running && self.reset.is_none() && !self.store.has_pending() && !self.node.watches_changes()
+    }
+
     /// See [`Resting::leave_out_tasks`](crate::Resting::leave_out_tasks).
     pub fn leave_out_tasks(&mut self, now: Instant) {
         if let Some(next) = self.task_from(now) {

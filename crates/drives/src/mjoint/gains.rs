@@ -19,6 +19,7 @@ use super::Values;
 use super::assumptions::{CONTROL_PERIOD_S, SUPERVISION_PERIOD_S, VELOCITY_FILTER_S};
 use super::model::Model;
 use super::objects::{POSITION_PROPORTIONAL, VELOCITY_FEED_FORWARD, VELOCITY_INTEGRAL_TIME, VELOCITY_PROPORTIONAL};
+use crate::Fidelity;
 use crate::engine::actuator::observer::TrackingGains;
 use crate::engine::actuator::servo::ServoGains;
 
@@ -40,7 +41,7 @@ const CURRENT_BANDWIDTH_RAD_S: f32 = 3000.0;
 pub const MODULATION_LIMIT: f32 = 0.98;
 
 /// The gains that the objects hold.
-pub(super) fn gains(values: &Values, model: &Model) -> ServoGains {
+pub(super) fn gains(values: &Values, model: &Model, fidelity: Fidelity) -> ServoGains {
     let current = PiGains::for_winding(CURRENT_BANDWIDTH_RAD_S, model.resistance_ohm, model.inductance_h);
     let none = LowPassGains::from_time_constant(0.0, SUPERVISION_PERIOD_S);
     let flux_linkage_wb = f32::from(values.get(VELOCITY_FEED_FORWARD)) * FEED_FORWARD_V_S / f32::from(model.pole_pairs);
@@ -69,7 +70,7 @@ pub(super) fn gains(values: &Values, model: &Model) -> ServoGains {
         },
         velocity_filter: LowPassGains::from_time_constant(VELOCITY_FILTER_S, SUPERVISION_PERIOD_S),
         feed_forward_filter: none,
-        torque_filter: LowPassGains::from_time_constant(0.0, CONTROL_PERIOD_S),
+        torque_filter: LowPassGains::from_time_constant(0.0, fidelity.tick(CONTROL_PERIOD_S, SUPERVISION_PERIOD_S)),
         tracking: TrackingGains::default(),
         tracking_share: 0.0,
     }

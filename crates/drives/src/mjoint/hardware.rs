@@ -5,6 +5,7 @@ use can::Bitrate;
 use super::pulses::PulseInput;
 use super::storage;
 use super::variations::VARIANT;
+use crate::engine::actuator::servo::{CurrentDemand, Followed};
 use crate::engine::storage::StoredImage;
 
 /// The encoder's battery.
@@ -44,6 +45,8 @@ pub struct Sensors {
     pub pulses: PulseInput,
     /// The EEPROM does not answer.
     pub eeprom_fails: bool,
+    /// What a power stage says that follows by itself ([`Fidelity::Mechanical`](crate::Fidelity)).
+    pub followed: Option<Followed>,
 }
 
 /// What the three half bridges do.
@@ -57,6 +60,8 @@ pub enum PowerStage {
         /// Duty cycles of U, V and W.
         duty: [f32; 3],
     },
+    /// Whatever gives these currents ([`Fidelity::Mechanical`](crate::Fidelity)).
+    Follow(CurrentDemand),
 }
 
 /// The holding brake.

@@ -7,11 +7,15 @@ use super::assumptions::{DISPLAY_FILTER_S, STATIONARY_RPM, SUPERVISION_PERIOD_S}
 use super::gains::MODULATION_LIMIT;
 use super::hardware::{PowerStage, Sensors};
 use super::parameters::Parameters;
+use crate::Fidelity;
 use crate::engine::actuator::servo::{Servo, ServoLimits};
 use crate::engine::axis::Demand;
 
 /// Amplitude of a phase over the voltage of the bus.
 const INV_SQRT_3: f32 = 0.577_350_26;
+
+/// The mean of the largest voltage between two of three wires over the amplitude of a phase: `sqrt(3) * 3 / pi`.
+const FARTHEST_WIRES: f32 = 1.653_986_7;
 
 /// Loops and power stage.
 #[derive(Clone, PartialEq)]
@@ -19,7 +23,7 @@ pub(super) struct Output {
     pub(super) servo: Servo,
     weakening: FieldWeakening,
     pub(super) demand: Demand,
-    duty: [f32; 3],
+    stage: PowerStage,
     shown_velocity_rpm: LowPass,
     /// In the amperes of 261Dh and 6078h.
     shown_current_a: LowPass,
@@ -32,7 +36,7 @@ impl Output {
             servo: Servo::new(&parameters.servo, 0, 0),
             weakening: FieldWeakening::default(),
             demand: Demand::Off,
-            duty: [0.0; 3],
+            stage: PowerStage::Off,
             shown_velocity_rpm: LowPass::default(),
             shown_current_a: LowPass::default(),
         }
@@ -72,16 +76,22 @@ impl Output {
         direct_a
     }
 
-    /// The duty cycles, every control period.
+    /// What the power stage is asked for, every control period.
     pub(super) fn modulate(&mut self, parameters: &Parameters, sensors: &Sensors) {
         if self.demand != Demand::Off {
             let Parameters { servo, gains, .. } = parameters;
-            self.duty = self.servo.modulate(servo, gains, sensors.phase_current_a, sensors.bus_v);
+            self.stage = match servo.fidelity {
+                Fidelity::Full => {
+                    let duty = self.servo.modulate(servo, gains, sensors.phase_current_a, sensors.bus_v);
+                    PowerStage::Modulate { duty }
+                }
+                Fidelity::Mechanical => PowerStage::Follow(self.servo.current_demand(servo, gains)),
+            };
         }
     }
 
     pub(super) fn power_stage(&self) -> PowerStage {
-        if self.demand == Demand::Off { PowerStage::Off } else { PowerStage::Modulate { duty: self.duty } }
+        if self.demand == Demand::Off { PowerStage::Off } else { self.stage }
     }
 
     pub(super) const fn shown_velocity_rpm(&self) -> f32 {
@@ -94,12 +104,23 @@ impl Output {
     }
 
     /// Share of the bus voltage between two wires, signed as the current that is asked for; 0 with the motor free.
-    pub(super) fn share(&self) -> f32 {
+    pub(super) fn share(&self, bus_v: f32) -> f32 {
         if self.demand == Demand::Off {
             return 0.0;
         }
-        let most = self.duty.iter().fold(0.0_f32, |most, duty| most.max(*duty));
-        let least = self.duty.iter().fold(1.0_f32, |least, duty| least.min(*duty));
-        if self.servo.setpoint_a() < 0.0 { least - most } else { most - least }
+        let share = match &self.stage {
+            PowerStage::Off => 0.0,
+            PowerStage::Modulate { duty } => {
+                let most = duty.iter().fold(0.0_f32, |most, duty| most.max(*duty));
+                let least = duty.iter().fold(1.0_f32, |least, duty| least.min(*duty));
+                most - least
+            }
+            // Between the two wires that are farthest apart: the mean over the sixth of a turn in which they are.
+            PowerStage::Follow(_) if bus_v > 0.0 => {
+                (FARTHEST_WIRES * self.servo.wanted_magnitude_v() / bus_v).min(MODULATION_LIMIT)
+            }
+            PowerStage::Follow(_) => 0.0,
+        };
+        if self.servo.setpoint_a() < 0.0 { -share } else { share }
     }
 }

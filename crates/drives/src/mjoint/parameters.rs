@@ -11,6 +11,7 @@ use super::objects::*;
 use super::power_on::Function;
 use super::pulses::PulseParameters;
 use super::{Values, homing};
+use crate::Fidelity;
 use crate::engine::actuator::servo::{ServoGains, ServoLimits, ServoModel};
 use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, VelocityRamps};
 
@@ -77,7 +78,7 @@ impl TimeBase {
 impl Parameters {
     /// `function` is that of the last power-on: 2619h acts from the next one on. `amplitude` is that of a phase's current
     /// for each ampere of 261Dh and 6078h.
-    pub(super) fn from(values: &Values, model: &Model, function: Function, amplitude: f32) -> Self {
+    pub(super) fn from(values: &Values, model: &Model, function: Function, amplitude: f32, fidelity: Fidelity) -> Self {
         let max_speed = model.max_rpm * COUNTS_S_PER_RPM;
         let ramp = Ramp::Rate(acceleration(values));
         let moves = |speed: f64| MoveLimits {
@@ -102,8 +103,8 @@ impl Parameters {
             ramp,
             homing: homing_parameters(values, velocity),
             pulses: pulses(values, function),
-            servo: servo_model(model),
-            gains: gains(values, model),
+            servo: servo_model(model, fidelity),
+            gains: gains(values, model, fidelity),
             limits: ServoLimits { current_a, velocity_rad_s: model.max_rpm as f32 * RAD_S_PER_RPM },
             weakening: weakening(values, current_a),
             current_time_s,
@@ -171,7 +172,8 @@ fn pulses(values: &Values, function: Function) -> PulseParameters {
     }
 }
 
-fn servo_model(model: &Model) -> ServoModel {
+fn servo_model(model: &Model, fidelity: Fidelity) -> ServoModel {
+    let control_period_s = fidelity.tick(CONTROL_PERIOD_S, SUPERVISION_PERIOD_S);
     ServoModel {
         commutation: CommutationModel {
             counts_per_turn: COUNTS_PER_TURN,
@@ -181,8 +183,10 @@ fn servo_model(model: &Model) -> ServoModel {
             sequence: [0; 6],
         },
         direction: 1,
-        observer: ObserverGains::new(VELOCITY_WINDOW_S, VELOCITY_STANDSTILL_S, CONTROL_PERIOD_S),
-        control_period_s: CONTROL_PERIOD_S,
+        observer: ObserverGains::new(VELOCITY_WINDOW_S, VELOCITY_STANDSTILL_S, control_period_s),
+        control_period_s,
         supervision_period_s: SUPERVISION_PERIOD_S,
+        switching_period_s: CONTROL_PERIOD_S,
+        fidelity,
     }
 }

@@ -11,11 +11,11 @@ pub(super) struct Rhythm {
 }
 
 impl Rhythm {
-    /// Once each control period: true in every tenth.
+    /// Once each tick: true in each that ends so many.
     #[inline]
-    pub(super) fn is_supervision_due(&mut self) -> bool {
+    pub(super) fn is_supervision_due(&mut self, divider: u8) -> bool {
         self.periods += 1;
-        let due = self.periods >= SUPERVISION_DIVIDER;
+        let due = self.periods >= divider;
         if due {
             self.periods = 0;
         }

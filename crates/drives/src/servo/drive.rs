@@ -17,14 +17,15 @@ use devices::{AxisId, Description};
 
 use super::faults::{Faults, NewFaults, no_faults};
 use super::hardware::{Actuation, Hardware, MAX_AXES, Sensors};
-use super::motor::{CONTROL_PERIOD_NS, CONTROL_PERIOD_S, Motor, SUPERVISION_DIVIDER};
+use super::motor::{CONTROL_PERIOD_NS, CONTROL_PERIOD_S, Motor, SUPERVISION_DIVIDER, SUPERVISION_PERIOD_S};
 use super::protection::{Protection, bleeder_limits};
 use super::shaft::Shaft;
 use crate::engine::actuator::bleeder::{Bleeder, BleederLimits};
+use crate::engine::actuator::servo::CurrentGains;
 use crate::engine::device::ResetTimes;
 use crate::engine::faults::FaultSet;
 use crate::node::described::DescribedDevice;
-use crate::{Firmware, Report};
+use crate::{Fidelity, Firmware, Report};
 
 /// The firmware of a described servo.
 #[derive(Clone)]
@@ -41,6 +42,7 @@ pub struct ServoDrive<S: Storage> {
     /// The last levels of the touch probes, for a probe that is switched on.
     probes: [[bool; 2]; MAX_AXES],
     periods: u8,
+    fidelity: Fidelity,
 }
 
 impl<S: Storage> ServoDrive<S> {
@@ -64,6 +66,7 @@ impl<S: Storage> ServoDrive<S> {
             bleeder_limits: bleeder_limits(&motors[0]),
             probes: [[false; 2]; MAX_AXES],
             periods: 0,
+            fidelity: Fidelity::Full,
         };
         drive.make_shafts();
         drive
@@ -89,6 +92,11 @@ impl<S: Storage> ServoDrive<S> {
         Some(self.shaft(axis)?.demand())
     }
 
+    /// How the current loop of an axis is set, for a power stage that follows by itself.
+    pub fn current_gains(&self, axis: usize) -> Option<CurrentGains> {
+        Some(self.shaft(axis)?.current_gains())
+    }
+
     /// The statusword of an axis, where it has one.
     pub fn statusword(&self, axis: usize) -> Option<u16> {
         let slot = self.shaft(axis)?.slots().statusword?;
@@ -107,7 +115,7 @@ impl<S: Storage> ServoDrive<S> {
     fn make_shafts(&mut self) {
         let table = self.description.dictionary;
         for ((shaft, axis), motor) in self.shafts.iter_mut().zip(self.description.axes).zip(self.motors) {
-            *shaft = Some(Shaft::new(axis, table, motor, self.base.device.values()));
+            *shaft = Some(Shaft::new(axis, table, motor, self.fidelity, self.base.device.values()));
         }
     }
 
@@ -162,6 +170,12 @@ impl<S: Storage> Firmware for ServoDrive<S> {
     type Hardware = Hardware<S>;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
+    const MECHANICAL_PERIODS: Option<u32> = Some(SUPERVISION_DIVIDER as u32);
+
+    fn set_fidelity(&mut self, fidelity: Fidelity) {
+        self.fidelity = fidelity;
+        self.make_shafts();
+    }
 
     fn power_on(&mut self, hardware: &Hardware<S>, now: Instant) {
         self.base.node_id = hardware.node_id;
@@ -190,12 +204,16 @@ impl<S: Storage> Firmware for ServoDrive<S> {
         }
         self.enter_faults(&shorted, now);
         self.periods += 1;
-        if self.periods >= SUPERVISION_DIVIDER {
+        if self.periods >= self.fidelity.tick(SUPERVISION_DIVIDER, 1) {
             self.periods = 0;
             self.supervise(sensors, now);
         }
         let mut actuation = Actuation {
-            bleeder_on: self.bleeder.update(&self.bleeder_limits, sensors.bus_v, CONTROL_PERIOD_S),
+            bleeder_on: self.bleeder.update(
+                &self.bleeder_limits,
+                sensors.bus_v,
+                self.fidelity.tick(CONTROL_PERIOD_S, SUPERVISION_PERIOD_S),
+            ),
             ..Actuation::default()
         };
         let values = self.base.device.values();

@@ -3,6 +3,7 @@
 use canopen::od::Storage;
 
 use super::motor::Motor;
+use crate::engine::actuator::servo::{CurrentDemand, Followed};
 use crate::node::Memory;
 
 /// Most axes of one device (CiA 402-1: eight blocks of 800h from 6000h on).
@@ -44,6 +45,8 @@ pub struct AxisSensors {
     pub home: bool,
     /// The two touch probes: on.
     pub probes: [bool; 2],
+    /// What a power stage says that follows by itself ([`Fidelity::Mechanical`](crate::Fidelity)).
+    pub followed: Option<Followed>,
 }
 
 /// What the drive does until the next control period.
@@ -55,11 +58,26 @@ pub struct Actuation {
     pub bleeder_on: bool,
 }
 
+/// What the three half bridges of an axis do.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum PowerStage {
+    /// All switches off.
+    #[default]
+    Off,
+    /// Switching with these duty cycles of U, V, W, each 0 to 1.
+    Modulate {
+        /// Duty cycles of U, V and W.
+        duty: [f32; 3],
+    },
+    /// Whatever gives these currents ([`Fidelity::Mechanical`](crate::Fidelity)).
+    Follow(CurrentDemand),
+}
+
 /// What is done at one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisActuation {
-    /// Duty cycles of U, V and W, each 0 to 1; `None` with all switches off.
-    pub duty: Option<[f32; 3]>,
+    /// The half bridges.
+    pub power_stage: PowerStage,
     /// The holding brake has current and lets go.
     pub brake_released: bool,
     /// The maker's outputs: bits 16 to 31 of 60FEh.

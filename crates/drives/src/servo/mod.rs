@@ -20,7 +20,7 @@ mod touch_probes;
 mod velocity_mode;
 
 pub use drive::ServoDrive;
-pub use hardware::{Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Sensors};
+pub use hardware::{Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, PowerStage, Sensors};
 pub use motor::{CONTROL_PERIOD_NS, Motor};
 
 use canopen::object::COMMUNICATION_CYCLE_PERIOD;

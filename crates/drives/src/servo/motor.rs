@@ -7,6 +7,7 @@ use motion::foc::{FeedForward, FocGains};
 use motion::observer::ObserverGains;
 use motion::pid::PiGains;
 
+use crate::Fidelity;
 use crate::engine::actuator::observer::TrackingGains;
 use crate::engine::actuator::servo::{ServoGains, ServoModel};
 
@@ -68,7 +69,7 @@ impl Motor {
         1.5 * self.pole_pairs as f32 * self.flux_linkage_wb
     }
 
-    pub(super) fn model(&self) -> ServoModel {
+    pub(super) fn model(&self, fidelity: Fidelity) -> ServoModel {
         ServoModel {
             commutation: CommutationModel {
                 counts_per_turn: self.increments_per_turn,
@@ -77,14 +78,19 @@ impl Motor {
                 sequence: [5, 1, 3, 2, 6, 4],
             },
             direction: 1,
-            observer: ObserverGains { window: VELOCITY_WINDOW, standstill: VELOCITY_STANDSTILL },
-            control_period_s: CONTROL_PERIOD_S,
+            observer: ObserverGains {
+                window: fidelity.tick(VELOCITY_WINDOW, VELOCITY_WINDOW / u32::from(SUPERVISION_DIVIDER)),
+                standstill: fidelity.tick(VELOCITY_STANDSTILL, VELOCITY_STANDSTILL / u32::from(SUPERVISION_DIVIDER)),
+            },
+            control_period_s: fidelity.tick(CONTROL_PERIOD_S, SUPERVISION_PERIOD_S),
             supervision_period_s: SUPERVISION_PERIOD_S,
+            switching_period_s: CONTROL_PERIOD_S,
+            fidelity,
         }
     }
 
     /// Loops of fixed bandwidths: `kp = L w`, `ki = R w` for the current, `kp = J w / Kt` for the velocity.
-    pub(super) fn gains(&self) -> ServoGains {
+    pub(super) fn gains(&self, fidelity: Fidelity) -> ServoGains {
         let current = PiGains {
             proportional: self.inductance_h * CURRENT_BANDWIDTH_RAD_S,
             integral_per_s: self.resistance_ohm * CURRENT_BANDWIDTH_RAD_S,
@@ -117,7 +123,7 @@ impl Motor {
             },
             velocity_filter: LowPassGains::from_time_constant(0.0, SUPERVISION_PERIOD_S),
             feed_forward_filter: LowPassGains::from_time_constant(SUPERVISION_PERIOD_S, SUPERVISION_PERIOD_S),
-            torque_filter: LowPassGains::from_time_constant(0.0, CONTROL_PERIOD_S),
+            torque_filter: LowPassGains::from_time_constant(0.0, fidelity.tick(CONTROL_PERIOD_S, SUPERVISION_PERIOD_S)),
             tracking: TrackingGains::default(),
             tracking_share: 0.0,
         }

@@ -17,14 +17,15 @@ pub(super) use commands::Written;
 use cyclic::CyclicSetPoints;
 
 use super::faults::{Faults, no_faults};
-use super::hardware::{AxisActuation, AxisSensors};
+use super::hardware::{AxisActuation, AxisSensors, PowerStage};
 use super::motor::{CONTROL_PERIOD_NS, Motor, SUPERVISION_DIVIDER, SUPERVISION_PERIOD_S};
 use super::parameters::Parameters;
 use super::read;
 use super::slots::AxisSlots;
 use super::touch_probes::TouchProbes;
+use crate::Fidelity;
 use crate::engine::actuator::overload::{Overload, OverloadLimits};
-use crate::engine::actuator::servo::{Servo, ServoGains, ServoLimits, ServoModel};
+use crate::engine::actuator::servo::{CurrentGains, Servo, ServoGains, ServoLimits, ServoModel};
 use crate::engine::axis::{Demand, Feedback, StopState, Switches};
 use crate::engine::cia402::{self as power, PowerDrive, Targets};
 use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis};
@@ -114,11 +115,12 @@ impl Shaft {
         description: &AxisDescription,
         table: &'static Table,
         motor: Motor,
+        fidelity: Fidelity,
         values: &Dictionary<impl Storage>,
     ) -> Self {
         let slots = AxisSlots::of(table, description.placement);
         let parameters = Parameters::of(values, &slots, &motor, ModeOfOperation::NONE);
-        let model = motor.model();
+        let model = motor.model(fidelity);
         let declared = SupportedModes(read(values, slots.supported_modes, 0) as u32);
         let described = description.modes.iter().fold(SupportedModes::default(), |modes, mode| modes.with(*mode));
         Self {
@@ -126,7 +128,7 @@ impl Shaft {
             modes: if slots.supported_modes.is_some() { declared } else { described },
             motor,
             model,
-            gains: motor.gains(),
+            gains: motor.gains(fidelity),
             parameters,
             parameters_changed: false,
             power: PowerDrive::new(&[]),
@@ -173,6 +175,10 @@ impl Shaft {
         &mut self.faults
     }
 
+    pub(super) fn current_gains(&self) -> CurrentGains {
+        CurrentGains::of(&self.gains.foc, &self.model)
+    }
+
     pub(super) const fn demand(&self) -> &Demand {
         &self.demand
     }
@@ -210,7 +216,10 @@ impl Shaft {
             self.awake = true;
             self.servo = Servo::new(&self.model, sensors.tracks, sensors.encoder_count);
         }
-        self.servo.sense(&self.model, sensors.tracks, sensors.encoder_count);
+        match &sensors.followed {
+            None => self.servo.sense(&self.model, sensors.tracks, sensors.encoder_count),
+            Some(followed) => self.servo.sense_followed(&self.model, sensors.tracks, sensors.encoder_count, followed),
+        }
         if let Some(electrical_turns) = self.commutation_angle {
             self.servo.commutate_at(electrical_turns);
         }
@@ -231,9 +240,15 @@ impl Shaft {
         bus_v: f32,
     ) -> AxisActuation {
         let energised = self.demand != Demand::Off;
-        let duty = energised.then(|| self.servo.modulate(&self.model, &self.gains, sensors.phase_current_a, bus_v));
+        let power_stage = match self.model.fidelity {
+            _ if !energised => PowerStage::Off,
+            Fidelity::Full => PowerStage::Modulate {
+                duty: self.servo.modulate(&self.model, &self.gains, sensors.phase_current_a, bus_v),
+            },
+            Fidelity::Mechanical => PowerStage::Follow(self.servo.current_demand(&self.model, &self.gains)),
+        };
         let outputs = self.outputs(values);
-        AxisActuation { duty, brake_released: energised && !outputs.set_brake, outputs: outputs.manufacturer }
+        AxisActuation { power_stage, brake_released: energised && !outputs.set_brake, outputs: outputs.manufacturer }
     }
 
     /// Every supervision period, first: parameters and what is measured.

@@ -30,6 +30,7 @@ use super::objects::{
     VELOCITY_KI, VELOCITY_KP, VELOCITY_OBSERVER_1, VELOCITY_OBSERVER_2, VELOCITY_OBSERVER_3, VELOCITY_OBSERVER_4,
     VELOCITY_SMOOTHING,
 };
+use crate::Fidelity;
 use crate::engine::actuator::observer::TrackingGains;
 use crate::engine::actuator::servo::ServoGains;
 
@@ -55,7 +56,7 @@ const TRACKING_SHARE: f32 = 1e-3;
 const MODULATION_LIMIT: f32 = 0.98;
 
 /// The gains that the objects hold; `velocity_limit_rad_s` is what the position loop may ask for.
-pub(super) fn gains(values: &Values, velocity_limit_rad_s: f32) -> ServoGains {
+pub(super) fn gains(values: &Values, velocity_limit_rad_s: f32, fidelity: Fidelity) -> ServoGains {
     let count = |object: Object<u16>| f32::from(values.get(object));
     let current = PiGains {
         proportional: count(CURRENT_KP) * CURRENT_KP_V_PER_A,
@@ -92,7 +93,7 @@ pub(super) fn gains(values: &Values, velocity_limit_rad_s: f32) -> ServoGains {
         },
         velocity_filter: smoothing(VELOCITY_SMOOTHING, SUPERVISION_PERIOD_S),
         feed_forward_filter: smoothing(FEEDFORWARD_SMOOTHING, SUPERVISION_PERIOD_S),
-        torque_filter: smoothing(TORQUE_SMOOTHING, CONTROL_PERIOD_S),
+        torque_filter: smoothing(TORQUE_SMOOTHING, fidelity.tick(CONTROL_PERIOD_S, SUPERVISION_PERIOD_S)),
         tracking,
         tracking_share: share.min(1.0),
     }

@@ -2,6 +2,7 @@
 
 use super::storage;
 use super::variations::VARIANT;
+use crate::engine::actuator::servo::{CurrentDemand, Followed};
 use crate::engine::storage::StoredImage;
 
 /// What the drive measures, each control period.
@@ -27,6 +28,8 @@ pub struct Sensors {
     pub inputs: [bool; 2],
     /// The EEPROM answers.
     pub eeprom_ok: bool,
+    /// What a power stage says that follows by itself ([`Fidelity::Mechanical`](crate::Fidelity)).
+    pub followed: Option<Followed>,
 }
 
 impl Default for Sensors {
@@ -43,6 +46,7 @@ impl Default for Sensors {
             reference_v: super::assumptions::REFERENCE_V,
             inputs: [false; 2],
             eeprom_ok: true,
+            followed: None,
         }
     }
 }
@@ -60,6 +64,8 @@ pub enum PowerStage {
         /// Duty cycles of U, V and W.
         duty: [f32; 3],
     },
+    /// Whatever gives these currents ([`Fidelity::Mechanical`](crate::Fidelity)).
+    Follow(CurrentDemand),
 }
 
 /// What the drive does until the next control period.

@@ -10,6 +10,7 @@ use super::assumptions::*;
 use super::gains::gains;
 use super::objects::*;
 use super::variations::{EMERGENCY_COAST, EMERGENCY_RAMP, OVERLOAD_FROM_FACTOR, STOPPED_ENABLED};
+use crate::Fidelity;
 use crate::engine::actuator::bleeder::BleederLimits;
 use crate::engine::actuator::overload::{OverloadLimits, between};
 use crate::engine::actuator::servo::{ServoGains, ServoLimits, ServoModel};
@@ -52,7 +53,7 @@ pub(super) struct Parameters {
 }
 
 impl Parameters {
-    pub(super) fn of(values: &Values, variant: &Variant) -> Self {
+    pub(super) fn of(values: &Values, variant: &Variant, fidelity: Fidelity) -> Self {
         let counts_per_turn = u32::from(values.get(ENCODER_LINES)) * COUNTS_PER_LINE;
         let counts_s_per_rpm = f64::from(counts_per_turn) / 60.0;
         let max_rpm = f64::from(values.get(MAX_MOTOR_SPEED));
@@ -61,8 +62,8 @@ impl Parameters {
             counts_s_per_rpm,
             max_rpm,
             axis: axis(values, variant, counts_s_per_rpm),
-            model: servo_model(values, counts_per_turn),
-            gains: gains(values, limits.velocity_rad_s),
+            model: servo_model(values, counts_per_turn, fidelity),
+            gains: gains(values, limits.velocity_rad_s, fidelity),
             limits,
             overload: overload(values, variant),
             bleeder: bleeder(values),
@@ -111,7 +112,8 @@ fn emergency_stop(variant: &Variant) -> StopRamp {
     }
 }
 
-fn servo_model(values: &Values, counts_per_turn: u32) -> ServoModel {
+fn servo_model(values: &Values, counts_per_turn: u32, fidelity: Fidelity) -> ServoModel {
+    let control_period_s = fidelity.tick(CONTROL_PERIOD_S, SUPERVISION_PERIOD_S);
     ServoModel {
         commutation: CommutationModel {
             counts_per_turn,
@@ -120,9 +122,11 @@ fn servo_model(values: &Values, counts_per_turn: u32) -> ServoModel {
             sequence: HALL_SEQUENCE,
         },
         direction: Parameters::wanted_direction(values),
-        observer: ObserverGains::new(VELOCITY_WINDOW_S, VELOCITY_STANDSTILL_S, CONTROL_PERIOD_S),
-        control_period_s: CONTROL_PERIOD_S,
+        observer: ObserverGains::new(VELOCITY_WINDOW_S, VELOCITY_STANDSTILL_S, control_period_s),
+        control_period_s,
         supervision_period_s: SUPERVISION_PERIOD_S,
+        switching_period_s: CONTROL_PERIOD_S,
+        fidelity,
     }
 }
 

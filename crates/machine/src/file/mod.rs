@@ -7,6 +7,7 @@
 mod bodies;
 mod configuration;
 mod cycles;
+mod fidelity;
 mod motion;
 mod seat;
 mod surroundings;
@@ -14,12 +15,14 @@ mod units;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::str::FromStr;
 
 use can::{Bitrate, Instant};
 use canopen::{Mux, NodeId};
 use master::Gear;
 use master::identify::Identity;
 use master::parameters::{Parameters, from_any_state};
+use sim::Fidelity;
 use sim::machine::{Realism, TimingMode};
 use sim::{Place, Source, Stimulus, VirtualDrive, World};
 
@@ -44,7 +47,7 @@ pub const SEED: u64 = 1;
 const MOST_DRIVES: usize = 127;
 
 /// What a machine file may say of its bus.
-pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "timing", "drive", "body", "group", "base"];
+pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "timing", "fidelity", "drive", "body", "group", "base"];
 
 /// What it may say of a drive.
 pub const DRIVE_KEYS: &[&str] = &[
@@ -80,6 +83,8 @@ pub struct Machine {
     pub realism: Option<Realism>,
     /// Whether its drives take the time that such drives take, where it is given; a drive may have its own.
     pub timing: Option<TimingMode>,
+    /// How much of its drives is computed, where it is given; a drive may have its own.
+    pub fidelity: Option<Fidelity>,
     /// The drives, each at a node of its own.
     pub drives: Vec<Placed>,
     /// Those that a master moves as one.
@@ -159,9 +164,15 @@ impl Machine {
         let bitrate = noted(file.get("bitrate").map(|field| rate(&field)).transpose(), &mut problems);
         let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose();
         let seed = noted(seed, &mut problems);
-        let realism = noted(file.get("realism").map(|field| realism(&field)).transpose(), &mut problems);
-        let timing = noted(file.get("timing").map(|field| timing(&field)).transpose(), &mut problems);
-        let mut machine = Self { bitrate, seed, realism, timing, ..Self::default() };
+        let realism =
+            noted(file.get("realism").map(|field| word(&field, "\"ideal\" or \"full\"")).transpose(), &mut problems);
+        let timing =
+            noted(file.get("timing").map(|field| word(&field, "\"device\" or \"ideal\"")).transpose(), &mut problems);
+        let fidelity = noted(
+            file.get("fidelity").map(|field| word(&field, "\"full\" or \"mechanical\"")).transpose(),
+            &mut problems,
+        );
+        let mut machine = Self { bitrate, seed, realism, timing, fidelity, ..Self::default() };
         let expected = "a table of its own for each drive, begun by [[drive]]";
         let tables = file.get("drive").map_or(Ok(Vec::new()), |field| field.list(expected));
         let tables = tables.unwrap_or_else(|problem| {
@@ -267,7 +278,7 @@ impl Machine {
         let mut problems = Vec::new();
         for placed in &self.drives {
             let spec = &placed.spec;
-            let order = spec.order(world.bitrate());
+            let order = self.order_of(placed, world.bitrate());
             let mut drive =
                 sim::machine::order(spec.model, &order).map_err(|error| placed.refused(None, &error.to_string()))?;
             let supplied = placed.supply(drive.as_mut());
@@ -303,6 +314,7 @@ impl Machine {
             self.seed.map(|_| "seed"),
             self.realism.map(|_| "realism"),
             self.timing.map(|_| "timing"),
+            self.fidelity.map(|_| "fidelity"),
             bodies,
         ];
         let bus = bus.into_iter().flatten().collect::<Vec<_>>().join(", ");
@@ -342,13 +354,8 @@ fn rate(field: &Field<'_>) -> Result<Bitrate, Problem> {
     field.text(expected)?.parse().map_err(|error| field.problem(format!("{error}")))
 }
 
-fn realism(field: &Field<'_>) -> Result<Realism, Problem> {
-    let expected = "\"ideal\" or \"full\"";
-    field.text(expected)?.parse().map_err(|_| field.wrong(expected))
-}
-
-fn timing(field: &Field<'_>) -> Result<TimingMode, Problem> {
-    let expected = "\"device\" or \"ideal\"";
+/// A word that stands for a value, one of those expected.
+fn word<T: FromStr>(field: &Field<'_>, expected: &'static str) -> Result<T, Problem> {
     field.text(expected)?.parse().map_err(|_| field.wrong(expected))
 }
 

@@ -23,7 +23,7 @@ fn bench(model: &'static Description) -> (World, Drive) {
     let network = Network::new();
     world.add_station(network.clone());
     let variant = Variant::first_of(model.variations);
-    let ordered = Order { node: node(NODE), bitrate: Bitrate::K500, variant, presets: Vec::new(), unconfigured: false };
+    let ordered = Order { variant, ..Order::new(model, node(NODE), Bitrate::K500) };
     world.add_drive(NODE, order(model, &ordered).expect("a machine")).expect("a free node-ID");
     world.run_until(Instant::from_secs(2));
     (world, Drive::new(network.node(node(NODE)), model))

@@ -2,6 +2,7 @@
 
 mod attachment;
 mod coupled;
+mod current_loop;
 mod driven_stepper;
 mod external;
 mod free_run;

@@ -107,7 +107,9 @@ class World:
 
         >>> world.set_threads(2)
         """
-    def become_machine(self, path: str, seed: Optional[int], timing: Optional[str]) -> None: ...
+    def set_fidelity(self, fidelity: str) -> None:
+        """How much is computed of drives that are added from here on and do not say it: ``full``, or ``mechanical``."""
+    def become_machine(self, path: str, seed: Optional[int], timing: Optional[str], fidelity: Optional[str]) -> None: ...
     def run_ns(self, ns: int) -> None:
         """Moves on by so many ns."""
     def advance(self, until_ns: Optional[int], probes: list[int]) -> Optional[tuple[str, int]]:

@@ -38,6 +38,8 @@ class World(_native.World):
     :param seed: decides everything random
     :param timing: ``device``: boot, answers and stores take the time that such a device takes, as on the desk; ``ideal``: none beyond the
         wire
+    :param fidelity: ``full``: each control period is computed; ``mechanical``: mechanics and outer loops only, many times faster, without
+        ripple and faults of single phases (docs/fidelity.md). A drive may have its own: ``add(..., fidelity="full")``
     :param channel: a name under which ``can.Bus(interface="ferrodrive", channel=...)`` finds this world
     :param threads: how many compute the drives, which makes no difference but of speed, and pays from some 20 turning drives on
 
@@ -52,22 +54,25 @@ class World(_native.World):
     _watched = False
     _keeps_trail = False
 
-    def __new__(cls, bitrate: Union[int, str] = 500_000, seed: int = 1, timing: str = "device", *, channel: Optional[str] = None, threads: int = 1) -> Self:
+    def __new__(cls, bitrate: Union[int, str] = 500_000, seed: int = 1, timing: str = "device", *, fidelity: Optional[str] = None, channel: Optional[str] = None, threads: int = 1) -> Self:
         world = super().__new__(cls, str(bitrate), seed)
         world.set_timing(timing)
         world.set_threads(threads)
+        if fidelity is not None:
+            world.set_fidelity(fidelity)
         if channel is not None:
             _by_channel[channel] = world
         return world
 
     @classmethod
-    def machine(cls, path: Union[str, os.PathLike[str]], seed: Optional[int] = None, *, timing: Optional[str] = None) -> World:
+    def machine(cls, path: Union[str, os.PathLike[str]], seed: Optional[int] = None, *, timing: Optional[str] = None, fidelity: Optional[str] = None) -> World:
         """The world that a machine file describes: its drives and what is around them. Data sheets that it names are looked for beside
         it.
 
         :param seed: instead of the file's
         :param timing: ``device`` or ``ideal`` instead of the file's, which is ``device`` unless the file has another; a drive that has its
             own in the file keeps it
+        :param fidelity: ``full`` or ``mechanical`` instead of the file's, likewise
         :raises OSError: the file is not there
         :raises ValueError: it makes no sense, with everything that is wrong in it
 
@@ -76,7 +81,7 @@ class World(_native.World):
         """
         os.stat(path)
         world = cls()
-        world.become_machine(os.fspath(path), seed, timing)
+        world.become_machine(os.fspath(path), seed, timing, fidelity)
         world.machine_file = os.fspath(path)
         return world
 

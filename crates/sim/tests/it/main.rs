@@ -11,6 +11,7 @@ mod energies;
 mod events;
 mod external;
 mod faults;
+mod fidelity;
 mod loads;
 mod rest;
 mod stores;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use scenario::Scenario;
+use sim::Fidelity;
 use words::document::BadFile;
 use words::document::reader::Parameters;
 
@@ -16,8 +17,13 @@ pub(super) struct Loaded<'a> {
 }
 
 impl<'a> Loaded<'a> {
-    pub(super) fn read(file: &'a Path, set: &'a [(String, String)]) -> Result<Self, Failure> {
-        let scenario = Scenario::read(file).map_err(|reason| unusable(file, &reason))?;
+    pub(super) fn read(
+        file: &'a Path,
+        set: &'a [(String, String)],
+        fidelity: Option<Fidelity>,
+    ) -> Result<Self, Failure> {
+        let mut scenario = Scenario::read(file).map_err(|reason| unusable(file, &reason))?;
+        scenario.fidelity = fidelity;
         Ok(Self { file, scenario, set })
     }
 

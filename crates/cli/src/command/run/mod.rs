@@ -12,10 +12,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use scenario::{Kept, Outcome, Runner, Scenario};
+use sim::Fidelity;
 
 use crate::failure::Failure;
 use crate::numbers::whole;
 use crate::output::{Format, file_path};
+use crate::plain::plain;
 use crate::progress::Progress;
 use crate::recording::RecordOptions;
 use crate::session::exit_on_signal;
@@ -48,6 +50,10 @@ pub(crate) struct Run {
     /// Set a parameter of the scenario; may be repeated. With several scenarios, in those that have it
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = parameter)]
     set: Vec<(String, String)>,
+    /// Compute each control period of the drives (full), or their mechanics and outer loops only (mechanical), many times
+    /// faster (default: the machine's, or full; docs/fidelity.md)
+    #[arg(long, value_name = "full|mechanical")]
+    fidelity: Option<Fidelity>,
     /// Run with each of these seeds, and with each value of the scenario's [sweep]
     #[arg(long, value_name = "FIRST..LAST", value_parser = seeds)]
     seeds: Option<RangeInclusive<u64>>,
@@ -83,13 +89,23 @@ impl Run {
         self.serving.check()?;
         let [file] = self.files.as_slice() else {
             self.refuse_for_several()?;
-            return several::run(&self.files, self.seed, &self.set, self.jobs, self.junit.as_deref(), format);
+            return several::run(
+                &self.files,
+                self.seed,
+                (&self.set, self.fidelity),
+                self.jobs,
+                self.junit.as_deref(),
+                format,
+            );
         };
         if self.jobs.is_some() && self.seeds.is_none() {
             return Err(Failure::usage("--jobs needs several runs, and this is one")
                 .next("omit it, or give --seeds 1..100 or several files"));
         }
-        let scenario = Loaded::read(file, &self.set).and_then(Loaded::with_all)?;
+        let scenario = Loaded::read(file, &self.set, self.fidelity).and_then(Loaded::with_all)?;
+        if let Some(what) = scenario.not_shown() {
+            Messages::of_warnings().say(&plain(&what));
+        }
         let Some(seeds) = &self.seeds else {
             return self.once(&scenario, file, format);
         };

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use scenario::{Outcome, OutcomeReport, Runner, Scenario, Verdict, junit};
 use serde::Serialize;
+use sim::Fidelity;
 use words::counted;
 
 use super::crew::Crew;
@@ -22,12 +23,12 @@ type Ended = Option<Result<Outcome, Failure>>;
 pub(super) fn run(
     files: &[PathBuf],
     seed: Option<u64>,
-    set: &[(String, String)],
+    (set, fidelity): (&[(String, String)], Option<Fidelity>),
     jobs: Option<u16>,
     junit_file: Option<&Path>,
     format: Format,
 ) -> Result<(), Failure> {
-    let loaded: Vec<Result<Loaded<'_>, Failure>> = files.iter().map(|file| Loaded::read(file, set)).collect();
+    let loaded: Vec<Result<Loaded<'_>, Failure>> = files.iter().map(|file| Loaded::read(file, set, fidelity)).collect();
     let nobodys = set.iter().find(|(name, _)| {
         let mut usable = loaded.iter().flatten();
         usable.all(|loaded| loaded.strange().any(|strange| strange == name))

@@ -3,17 +3,24 @@
 //! [`sense`](Servo::sense) and [`modulate`](Servo::modulate) run every control period, [`measure`](Servo::measure) and
 //! [`control`](Servo::control) every supervision period. Counts and counts/s come in, duty cycles go out; inside it
 //! is radians of the shaft and amperes. All signs are the user's: [`ServoModel::direction`] turns them into the motor's.
+//!
+//! Below the outer loops is the seam of [`Fidelity`](crate::Fidelity): a power stage that switches takes duty cycles
+//! ([`modulate`](Servo::modulate)), one that follows by itself takes the set-point and the setting of the current loop
+//! ([`current_demand`](Servo::current_demand)), and answers with [`Followed`]. Nothing above it knows which it is.
 
 use motion::angle::sin_cos_turns;
 use motion::cascade::{Cascade, CascadeGains, PositionDemand, VelocityDemand};
 use motion::commutation::{Commutation, CommutationModel};
 use motion::filter::{LowPass, LowPassGains};
-use motion::foc::{Foc, FocGains, FocInput};
-use motion::frames::{Dq, clarke, park};
+use motion::foc::{FeedForward, Foc, FocGains, FocInput};
+pub use motion::frames::Dq;
+use motion::frames::{clarke, park};
 use motion::limits::symmetric;
 use motion::observer::{Observer, ObserverGains};
+use motion::pid::PiGains;
 
 use super::observer::{Tracking, TrackingGains};
+use crate::Fidelity;
 use crate::engine::axis::Demand;
 
 const TAU: f32 = core::f32::consts::TAU;
@@ -27,10 +34,61 @@ pub struct ServoModel {
     pub direction: i8,
     /// How velocity is taken from counts.
     pub observer: ObserverGains,
-    /// Control period, s.
+    /// Time between two ticks, s.
     pub control_period_s: f32,
     /// Supervision period, s.
     pub supervision_period_s: f32,
+    /// Time between two changes of the duty cycles, of a power stage that takes such, s.
+    pub switching_period_s: f32,
+    /// What the power stage takes: duty cycles, or the currents that it follows by itself.
+    pub fidelity: Fidelity,
+}
+
+/// What a power stage is asked for that follows by itself: the current loop, as its closed form.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CurrentDemand {
+    /// Set-point in the motor's own sense of rotation.
+    pub setpoint_a: Dq,
+    /// The electrical angle that the loop commutates at now, in turns.
+    pub electrical_turns: f32,
+}
+
+/// [`FocGains`] that matter without a sampling period, alike for both axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CurrentGains {
+    /// Both controllers: V/A and V/(A s).
+    pub controller: PiGains,
+    /// What is known of the motor's own voltages; zeros for nothing.
+    pub feed_forward: FeedForward,
+    /// Share of `bus / sqrt(3)` that may be used.
+    pub modulation_limit: f32,
+    /// By how much more time the voltage comes late than the loop looks ahead: the rotor has turned on so far.
+    pub voltage_lag_s: f32,
+}
+
+/// What such a power stage answers, each supervision period, in the motor's own sense of rotation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Followed {
+    /// Mean velocity of the shaft over the last period, rad/s.
+    pub velocity_rad_s: f32,
+    /// Current now, in the frame that the loop commutates in.
+    pub current_a: Dq,
+    /// The voltage that the loop asks for.
+    pub wanted_v: Dq,
+    /// The bus cannot give it.
+    pub saturated: bool,
+}
+
+impl CurrentGains {
+    /// Of a loop with this sampling period, whose duty cycles act in the period after the next tick.
+    pub(crate) fn of(gains: &FocGains, model: &ServoModel) -> Self {
+        Self {
+            voltage_lag_s: 1.5 * model.switching_period_s - gains.voltage_delay_s,
+            controller: gains.q,
+            feed_forward: gains.feed_forward.unwrap_or_default(),
+            modulation_limit: gains.modulation_limit,
+        }
+    }
 }
 
 /// How the loops are set.
@@ -129,6 +187,34 @@ impl Servo {
         self.observer.update(&model.observer, count);
     }
 
+    /// The same of a power stage that follows by itself, every supervision period.
+    // Apart, as the two below, so that a control period stays as small as it is.
+    #[cold]
+    #[inline(never)]
+    pub fn sense_followed(&mut self, model: &ServoModel, hall: u8, count: u16, followed: &Followed) {
+        let electrical_turns = self.commutation.follow(&model.commutation, hall, count);
+        self.sense_absolute_followed(model, electrical_turns, count, followed);
+    }
+
+    /// The same for a shaft whose encoder is absolute.
+    #[cold]
+    #[inline(never)]
+    pub fn sense_absolute_followed(
+        &mut self,
+        model: &ServoModel,
+        electrical_turns: f32,
+        count: u16,
+        followed: &Followed,
+    ) {
+        self.electrical_turns = electrical_turns;
+        let sign = f32::from(model.direction);
+        let per_period = followed.velocity_rad_s * model.control_period_s / model.rad_per_count();
+        self.observer.follow(&model.observer, count, per_period);
+        self.current_a = Dq { d: followed.current_a.d, q: sign * followed.current_a.q };
+        self.wanted_v = followed.wanted_v;
+        self.saturated = followed.saturated;
+    }
+
     /// Commutates at an angle (electrical turns) in place of the sensors', until they are looked at again.
     pub const fn commutate_at(&mut self, electrical_turns: f32) {
         self.electrical_turns = electrical_turns;
@@ -145,7 +231,7 @@ impl Servo {
         self.commutation = Commutation::new(&model.commutation, hall, count);
     }
 
-    /// Velocity of the shaft, rad/s: every supervision period.
+    /// Velocity and currents of the shaft: every supervision period.
     pub fn measure(&mut self, model: &ServoModel, gains: &ServoGains, phase_current_a: [f32; 2]) {
         let dt_s = model.supervision_period_s;
         let sign = f32::from(model.direction);
@@ -156,9 +242,12 @@ impl Servo {
         }
         let velocity_rad_s = sign * counts_s * model.rad_per_count();
         self.velocity_rad_s = self.velocity_filter.update(&gains.velocity_filter, velocity_rad_s);
-        let (sin, cos) = sin_cos_turns(self.electrical_turns);
-        let Dq { d, q } = park(clarke(three_phases(phase_current_a)), sin, cos);
-        self.current_a = Dq { d, q: sign * q };
+        // A power stage that follows by itself has said its currents.
+        if model.fidelity == Fidelity::Full {
+            let (sin, cos) = sin_cos_turns(self.electrical_turns);
+            let Dq { d, q } = park(clarke(three_phases(phase_current_a)), sin, cos);
+            self.current_a = Dq { d, q: sign * q };
+        }
     }
 
     /// The outer loops: every supervision period. `position` is the actual position that the demand counts in.
@@ -241,6 +330,15 @@ impl Servo {
         self.saturated = output.saturated;
         self.wanted_v = output.wanted_v;
         output.duty
+    }
+
+    /// What a power stage is asked for that follows by itself: every supervision period.
+    #[cold]
+    #[inline(never)]
+    pub fn current_demand(&mut self, model: &ServoModel, gains: &ServoGains) -> CurrentDemand {
+        let torque_a = self.torque_filter.update(&gains.torque_filter, self.setpoint_a);
+        let setpoint_a = Dq { d: self.direct_setpoint_a, q: f32::from(model.direction) * torque_a };
+        CurrentDemand { setpoint_a, electrical_turns: self.electrical_turns }
     }
 
     /// Counts since power-on, wrapping.

@@ -37,7 +37,13 @@ impl MJoint {
         }
         self.terminals.sense(sensors);
         let electrical_turns = self.encoder.electrical_turns(self.model.pole_pairs);
-        self.output.servo.sense_absolute(&self.parameters.servo, electrical_turns, self.encoder.shaft_count());
+        let (model, count) = (&self.parameters.servo, self.encoder.shaft_count());
+        match &sensors.followed {
+            None => self.output.servo.sense_absolute(model, electrical_turns, count),
+            Some(followed) => {
+                self.output.servo.sense_absolute_followed(model, electrical_turns, count, followed);
+            }
+        }
     }
 
     /// Homing looks at its switch every control period, undelayed.
@@ -84,7 +90,7 @@ impl MJoint {
             self.parameters_changed = false;
             let output = self.parameters.gains.foc.modulation_limit;
             let Parameters { function, amplitude, .. } = self.parameters;
-            self.parameters = Parameters::from(self.device.values(), self.model, function, amplitude);
+            self.parameters = Parameters::from(self.device.values(), self.model, function, amplitude, self.fidelity());
             self.parameters.gains.foc.modulation_limit = output;
         }
     }

@@ -36,11 +36,12 @@ use super::terminals::InputTerminals;
 use super::variations::{self, VARIANT};
 use super::{Values, storage};
 use crate::communication::communication;
+use crate::engine::actuator::servo::CurrentGains;
 use crate::engine::axis::{Axis, Demand};
 use crate::engine::device::{Application, Device, ResetTimes};
 use crate::engine::faults::FaultMonitor;
 use crate::engine::storage::StoredImage;
-use crate::{Firmware, Report};
+use crate::{Fidelity, Firmware, Report};
 use devices::variant::Variant;
 
 /// How this drive communicates: operational from the start, SDO requests as short as they may be, TPDO n answers
@@ -95,14 +96,14 @@ impl MJoint {
     pub fn of(model: &'static Model, variant: Variant) -> Self {
         let image = StoredImage::of(&storage::delivered(&variant));
         let profile = if variant.is(variations::FIRMWARE_1_66) { &NODE_PROFILE_1_66 } else { &NODE_PROFILE };
-        Self::over(model, Device::new(profile, Bitrate::M1, image, COMMUNICATION_PERIOD_NS, variant))
+        Self::over(model, Device::new(profile, Bitrate::M1, image, COMMUNICATION_PERIOD_NS, variant), Fidelity::Full)
     }
 
     /// Motor free, and the values of `device` in effect.
-    fn over(model: &'static Model, device: Device<TableStorage>) -> Self {
+    fn over(model: &'static Model, device: Device<TableStorage>, fidelity: Fidelity) -> Self {
         let function = Function::from_raw(device.values().get(MODE_SELECTION)).unwrap_or_default();
         let amplitude = variations::amplitude_per_a(device.variant());
-        let parameters = Parameters::from(device.values(), model, function, amplitude);
+        let parameters = Parameters::from(device.values(), model, function, amplitude, fidelity);
         Self {
             model,
             origin: Origin::new(device.values().get(GEAR_NUMERATOR)),
@@ -125,6 +126,10 @@ impl MJoint {
         }
     }
 
+    const fn fidelity(&self) -> Fidelity {
+        self.parameters.servo.fidelity
+    }
+
     /// The model that it drives.
     pub const fn model(&self) -> &'static Model {
         self.model
@@ -145,6 +150,11 @@ impl MJoint {
         &self.output.demand
     }
 
+    /// How the current loop is set, for a power stage that follows by itself.
+    pub fn current_gains(&self) -> CurrentGains {
+        CurrentGains::of(&self.parameters.gains.foc, &self.parameters.servo)
+    }
+
     /// The communication side, to look at.
     pub const fn node(&self) -> &Node<TableStorage> {
         self.device.node()
@@ -153,7 +163,7 @@ impl MJoint {
     /// Starts the firmware over with the stored values: motor free, then what 2619h says.
     fn start(&mut self, node_id: NodeId, bitrate: Bitrate, now: Instant) {
         self.device.restart(node_id, bitrate, now);
-        let started = Self::over(self.model, self.device.clone());
+        let started = Self::over(self.model, self.device.clone(), self.fidelity());
         let (powered_at, encoder) = (self.powered_at, self.encoder.restarted());
         *self = Self { powered_at, encoder, orders: Orders::new(OwnMotion::Starting), ..started };
         if self.values().get(POSITION_ACTUAL_INTERNAL_VALUE) == NO_RECORD {
@@ -263,6 +273,11 @@ impl Firmware for MJoint {
     type Hardware = Hardware;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
+    const MECHANICAL_PERIODS: Option<u32> = Some(SUPERVISION_DIVIDER as u32);
+
+    fn set_fidelity(&mut self, fidelity: Fidelity) {
+        *self = Self::over(self.model, self.device.clone(), fidelity);
+    }
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.device.power_on(hardware.eeprom);
@@ -293,7 +308,7 @@ impl Firmware for MJoint {
         self.device.set_eeprom_ok(!sensors.eeprom_fails);
         self.sense(sensors);
         self.watch_for_origin(sensors);
-        if self.rhythm.is_supervision_due() {
+        if self.rhythm.is_supervision_due(self.fidelity().tick(SUPERVISION_DIVIDER, 1)) {
             self.supervise(sensors);
         }
         self.output.modulate(&self.parameters, sensors);

@@ -23,7 +23,7 @@ impl MJoint {
     pub(super) fn publish(&mut self, sensors: &Sensors) {
         let speed = round(self.output.shown_velocity_rpm() * SPEED_COUNTS_PER_RPM).clamp(-30_000.0, 30_000.0) as i16;
         let current = round(self.output.shown_current_a().abs() * CURRENT_COUNTS_PER_A).min(LARGEST) as u16;
-        let (inputs, pwm) = (self.terminals.levels(), round(self.output.share() * LARGEST) as i16);
+        let (inputs, pwm) = (self.terminals.levels(), round(self.output.share(sensors.bus_v) * LARGEST) as i16);
         let values = self.device.values_mut();
         // Another width with firmware 1.66.
         values.set_number(VELOCITY_ACTUAL_VALUE, speed);

@@ -22,6 +22,7 @@ impl<S: Storage> Resting for ServoDrive<S> {
             bleeder_limits: _,
             probes,
             periods,
+            fidelity: _,
         } = self;
         (faults, protection, bleeder) == (&earlier.faults, &earlier.protection, &earlier.bleeder)
             && (probes, periods) == (&earlier.probes, &earlier.periods)
@@ -41,12 +42,17 @@ impl<S: Storage> Resting for ServoDrive<S> {
         self.base.device.task_from(at)
     }
 
+    fn task_is_idle(&self) -> bool {
+        self.base.device.is_task_idle()
+    }
+
     fn leave_out_tasks(&mut self, now: Instant) {
         self.base.device.leave_out_tasks(now);
     }
 
     fn leave_out_rounds(&mut self, rounds: u64) {
-        // A round has one supervision.
-        self.shafts.iter_mut().flatten().for_each(|shaft| shaft.leave_out_supervisions(rounds));
+        // A round has one supervision, or each of its ticks is one.
+        let supervisions = rounds * u64::from(self.fidelity.tick(1, SUPERVISION_DIVIDER));
+        self.shafts.iter_mut().flatten().for_each(|shaft| shaft.leave_out_supervisions(supervisions));
     }
 }

@@ -22,7 +22,7 @@ impl Application<TableStorage> for Zlac8030l {
     fn restart(&mut self, now: Instant) {
         let stored = self.device.stored_values();
         self.device.restart(restart::node_id(self.dip_address, &stored), restart::bitrate(&stored), now);
-        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone()) };
+        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone(), self.fidelity()) };
         self.select_mode();
         self.shell.axis.self_test_done();
         self.publish_status();

@@ -24,7 +24,7 @@ use super::variations::{FIRMWARE_2_01, VARIANT};
 use super::{Values, storage};
 use crate::communication::communication;
 use crate::engine::actuator::bleeder::Bleeder;
-use crate::engine::actuator::servo::Servo;
+use crate::engine::actuator::servo::{CurrentGains, Servo};
 use crate::engine::axis::{Demand, Feedback};
 use crate::engine::cia402::Targets;
 use crate::engine::device::{Application, Device, ResetTimes};
@@ -33,7 +33,7 @@ use crate::engine::host_watchdog::HostWatchdog;
 use crate::engine::storage::StoredImage;
 use crate::zltech::Shell;
 use crate::zltech::terminals::Conditions;
-use crate::{Firmware, Report};
+use crate::{Fidelity, Firmware, Report};
 use devices::variant::Variant;
 
 /// How this drive communicates.
@@ -78,12 +78,12 @@ impl Zlac8030l {
     pub fn of(variant: Variant) -> Self {
         let image = StoredImage::of(&storage::delivered(&variant));
         let profile = if variant.is(FIRMWARE_2_01) { &NODE_PROFILE_2_01 } else { &NODE_PROFILE };
-        Self::over(Device::new(profile, Bitrate::K500, image, COMMUNICATION_PERIOD_NS, variant))
+        Self::over(Device::new(profile, Bitrate::K500, image, COMMUNICATION_PERIOD_NS, variant), Fidelity::Full)
     }
 
     /// Motor free, position 0, and the values of `device` in effect.
-    fn over(mut device: Device<TableStorage>) -> Self {
-        let parameters = Parameters::of(device.values(), device.variant());
+    fn over(mut device: Device<TableStorage>, fidelity: Fidelity) -> Self {
+        let parameters = Parameters::of(device.values(), device.variant(), fidelity);
         // 202F:05 acts from a restart on (5.3).
         let resolution = device.values().get(VELOCITY_RESOLUTION);
         device.values_mut().set_resolution(u32::from(resolution));
@@ -121,9 +121,18 @@ impl Zlac8030l {
         &self.shell.demand
     }
 
+    /// How the current loop is set, for a power stage that follows by itself.
+    pub fn current_gains(&self) -> CurrentGains {
+        CurrentGains::of(&self.parameters.gains.foc, &self.parameters.model)
+    }
+
     /// The communication side, to look at.
     pub const fn node(&self) -> &Node<TableStorage> {
         self.device.node()
+    }
+
+    const fn fidelity(&self) -> Fidelity {
+        self.parameters.model.fidelity
     }
 
     /// The first look at the sensors after a restart.
@@ -151,7 +160,7 @@ impl Zlac8030l {
         if !self.shell.parameters_changed {
             return;
         }
-        let mut parameters = Parameters::of(self.device.values(), self.device.variant());
+        let mut parameters = Parameters::of(self.device.values(), self.device.variant(), self.fidelity());
         if self.shell.demand == Demand::Off {
             self.shell.parameters_changed = false;
             let position = self.position();
@@ -254,6 +263,9 @@ impl Zlac8030l {
     fn power_stage(&mut self, sensors: &Sensors) -> PowerStage {
         if self.shell.demand != Demand::Off {
             let Parameters { model, gains, .. } = &self.parameters;
+            if model.fidelity == Fidelity::Mechanical {
+                return PowerStage::Follow(self.servo.current_demand(model, gains));
+            }
             let duty = self.servo.modulate(model, gains, sensors.phase_current_a, sensors.bus_v);
             return PowerStage::Modulate { duty };
         }
@@ -316,6 +328,11 @@ impl Firmware for Zlac8030l {
     type Hardware = Hardware;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
+    const MECHANICAL_PERIODS: Option<u32> = Some(SUPERVISION_DIVIDER as u32);
+
+    fn set_fidelity(&mut self, fidelity: Fidelity) {
+        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone(), fidelity) };
+    }
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
@@ -335,16 +352,24 @@ impl Firmware for Zlac8030l {
         if !self.awake {
             self.wake(sensors);
         }
-        self.servo.sense(&self.parameters.model, sensors.hall, sensors.encoder_count);
+        let (model, count) = (&self.parameters.model, sensors.encoder_count);
+        match &sensors.followed {
+            None => self.servo.sense(model, sensors.hall, count),
+            Some(followed) => self.servo.sense_followed(model, sensors.hall, count, followed),
+        }
         if is_over_current(sensors) && self.faults.raise(row::OVER_CURRENT) {
             self.enter_fault(FaultSet::row(row::OVER_CURRENT), now);
         }
-        if self.shell.is_supervision_due(SUPERVISION_DIVIDER) {
+        if self.shell.is_supervision_due(self.fidelity().tick(SUPERVISION_DIVIDER, 1)) {
             self.supervise(sensors, now);
         }
         Actuation {
             power_stage: self.power_stage(sensors),
-            bleeder_on: self.bleeder.update(&self.parameters.bleeder, sensors.bus_v, CONTROL_PERIOD_S),
+            bleeder_on: self.bleeder.update(
+                &self.parameters.bleeder,
+                sensors.bus_v,
+                self.parameters.model.control_period_s,
+            ),
             outputs: self.shell.outputs,
             brake_engaged: terminals::brake_engaged(self.values()),
         }

@@ -51,6 +51,10 @@ impl Resting for Zlac8030l {
         self.device.task_from(at)
     }
 
+    fn task_is_idle(&self) -> bool {
+        self.values().get(COMMUNICATION_OFFLINE_TIME) == 0 && self.device.is_task_idle()
+    }
+
     fn leave_out_tasks(&mut self, now: Instant) {
         self.device.leave_out_tasks(now);
     }

@@ -54,6 +54,7 @@ impl Rig for HubWheel {
             PowerStage::Off => Inverter::Open,
             PowerStage::Shorted => Inverter::Shorted,
             PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
+            PowerStage::Follow(_) => unreachable!("of fidelity full"),
         };
         let brake_released = !actuation.brake_engaged;
         self.0.step(dt_s, &plant::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released });

@@ -88,6 +88,7 @@ impl Rig for Joint {
         let inverter = match actuation.power_stage {
             PowerStage::Off => Inverter::Open,
             PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
+            PowerStage::Follow(_) => unreachable!("of fidelity full"),
         };
         let brake_released = actuation.brake != Brake::Engaged;
         let set_origin = actuation.set_origin;

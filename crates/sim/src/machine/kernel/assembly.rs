@@ -5,7 +5,7 @@ use std::slice::from_mut;
 use devices::{AxisId, Description};
 use drives::engine::axis::Demand;
 use drives::engine::device::ResetTimes;
-use drives::{Firmware, RegisterError, Resting};
+use drives::{Fidelity, Firmware, RegisterError, Resting};
 use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
 use plant::physics::Physics;
@@ -109,13 +109,29 @@ pub trait Assembly: Clone + Send + 'static {
     /// One control period of physics under `actuation`.
     fn step(&mut self, actuation: &<Self::Firmware as Firmware>::Actuation);
 
+    /// From now on the power stage follows by itself, or not: of a firmware that has such a form.
+    fn set_fidelity(&mut self, fidelity: Fidelity) {
+        let _ = fidelity;
+    }
+
+    /// Puts what a power stage says that follows by itself to what the sensors read.
+    fn add_followed(&self, sensors: &mut <Self::Firmware as Firmware>::Sensors) {
+        let _ = sensors;
+    }
+
+    /// As long a step as the ticks of such a firmware.
+    fn step_long(&mut self, firmware: &Self::Firmware, actuation: &<Self::Firmware as Firmware>::Actuation, dt_s: f64) {
+        let _ = (firmware, dt_s);
+        self.step(actuation);
+    }
+
     /// Whether, under this actuation, such periods change nothing but heat.
-    fn can_rest(&self, actuation: &<Self::Firmware as Firmware>::Actuation) -> bool;
+    fn can_rest(&self, actuation: &<Self::Firmware as Firmware>::Actuation, dt_s: f64) -> bool;
 
     /// So many such periods, or fewer if the sensors read otherwise before.
-    fn rest(&mut self, actuation: &<Self::Firmware as Firmware>::Actuation, periods: u64) -> Rested {
+    fn rest(&mut self, actuation: &<Self::Firmware as Firmware>::Actuation, dt_s: f64, periods: u64) -> Rested {
         let pins = self.pins(AxisId::FIRST, actuation);
-        rest(from_mut(self.motor_at_mut(AxisId::FIRST)), Self::PERIOD_S, |_| pins, periods)
+        rest(from_mut(self.motor_at_mut(AxisId::FIRST)), dt_s, |_| pins, periods)
     }
 
     /// The motor of an axis, and all that is joined to it; of an axis that there is not, the first.

@@ -5,6 +5,7 @@
 
 pub(super) mod assembly;
 mod chip;
+mod fidelity;
 mod load;
 mod power;
 pub(super) mod quantity;
@@ -16,7 +17,7 @@ pub(super) mod timing;
 
 use can::{Bitrate, Frame, Instant, Station};
 use devices::{AxisId, Description, Timing};
-use drives::{Firmware, RegisterError, Resting};
+use drives::{Fidelity, Firmware, RegisterError, Resting};
 use plant::FreeRun;
 use plant::shaft::{Motion, Push};
 
@@ -51,6 +52,9 @@ pub struct Machine<A: Assembly> {
     coupled: bool,
     rest: Rest<A::Firmware>,
     kept_awake: bool,
+    fidelity: Fidelity,
+    /// From one tick to the next.
+    period_ns: u64,
     next_tick: Instant,
 }
 
@@ -89,6 +93,8 @@ impl<A: Assembly> Machine<A> {
             coupled: false,
             rest: Rest::from(Instant::ZERO),
             kept_awake: false,
+            fidelity: Fidelity::Full,
+            period_ns: A::Firmware::CONTROL_PERIOD_NS,
             next_tick: Instant::ZERO,
         }
     }
@@ -112,6 +118,9 @@ impl<A: Assembly> Machine<A> {
 
     /// One control period that begins at `at`.
     fn tick(&mut self, at: Instant) {
+        if self.fidelity == Fidelity::Mechanical {
+            return self.tick_mechanical(at);
+        }
         if !self.is_settled() {
             self.watch_supply(at);
         }
@@ -289,12 +298,12 @@ impl<A: Assembly> Mechanics for Machine<A> {
     }
 
     fn next_period(&self) -> (Instant, u64) {
-        (self.next_tick, A::Firmware::CONTROL_PERIOD_NS)
+        (self.next_tick, self.period_while_coupled_ns())
     }
 
     fn run_period(&mut self) {
         self.tick(self.next_tick);
-        self.next_tick = self.next_tick.plus_nanos(A::Firmware::CONTROL_PERIOD_NS);
+        self.next_tick = self.next_tick.plus_nanos(self.period_ns);
     }
 
     fn push(&self, axis: AxisId) -> Push {
@@ -333,7 +342,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             Stimulus::RotorLock(locked) => self.assembly.set_rotor_locked(axis, locked),
             Stimulus::Supply(source) => self.assembly.set_source(source)?,
             Stimulus::Temperature(sensor, celsius) => self.assembly.hold_temperature(axis, sensor, celsius)?,
-            Stimulus::Fault(component, broken) => self.assembly.set_fault(axis, component, broken)?,
+            Stimulus::Fault(component, broken) => self.set_fault(axis, component, broken)?,
             Stimulus::Battery(connected) => self.assembly.set_battery(connected)?,
             Stimulus::Pulses(train) => self.assembly.set_pulses(train)?,
             Stimulus::CableCut(_) | Stimulus::Bus(_) => {
@@ -363,6 +372,11 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         self.assembly.set_realism(realism);
     }
 
+    fn set_fidelity(&mut self, fidelity: Fidelity, now: Instant) -> Result<(), Refused> {
+        self.advance(now);
+        self.change_fidelity(fidelity)
+    }
+
     fn bitrate(&self) -> Option<Bitrate> {
         let own = (self.life == Life::Running).then(|| self.firmware.report(AxisId::FIRST));
         own.filter(|own| own.powered).map(|own| own.bitrate)
@@ -379,7 +393,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
                 continue;
             }
             self.tick(self.next_tick);
-            self.next_tick = self.next_tick.plus_nanos(A::Firmware::CONTROL_PERIOD_NS);
+            self.next_tick = self.next_tick.plus_nanos(self.period_ns);
             self.look_for_rest();
         }
     }

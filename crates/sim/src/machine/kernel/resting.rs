@@ -10,7 +10,7 @@
 //! does not.
 
 use can::{Instant, Station};
-use drives::{Firmware, Resting};
+use drives::{Fidelity, Firmware, Resting};
 
 use super::assembly::Assembly;
 use super::rest::{LeftOut, Rest, RestWatch};
@@ -40,7 +40,7 @@ impl<A: Assembly> Machine<A> {
         let round = u64::from(A::Firmware::ROUND);
         self.firmware.leave_out_rounds(left_out / round);
         for back in (1..=left_out % round).rev() {
-            let at = Instant::from_nanos(self.next_tick.as_nanos() - back * A::Firmware::CONTROL_PERIOD_NS);
+            let at = Instant::from_nanos(self.next_tick.as_nanos() - back * self.period_ns);
             let _ = self.firmware.tick(&sensors, at);
         }
     }
@@ -64,8 +64,8 @@ impl<A: Assembly> Machine<A> {
 
     #[cold]
     fn book_ahead(&mut self) {
-        let period_ns = A::Firmware::CONTROL_PERIOD_NS;
-        let rested = self.assembly.clone().rest(&self.actuation, FORETOLD_NS / period_ns);
+        let period_ns = self.period_ns;
+        let rested = self.assembly.clone().rest(&self.actuation, self.period_s(), FORETOLD_NS / period_ns);
         if let Rest::Resting(resting) = &mut self.rest {
             resting.foretold_to = self.next_tick.plus_nanos(rested.steps * period_ns);
         }
@@ -75,6 +75,7 @@ impl<A: Assembly> Machine<A> {
     #[inline]
     pub(super) fn firmware_timeout(&self) -> Option<Instant> {
         match self.rest.foretold_to() {
+            None if self.fidelity == Fidelity::Mechanical => self.mechanical_timeout(),
             None => self.firmware.poll_timeout(),
             Some(to) => self.firmware.next_event().into_iter().chain(self.firmware.task_from(to)).min(),
         }
@@ -82,9 +83,9 @@ impl<A: Assembly> Machine<A> {
 
     /// Leaves out the control periods up to `now`, or up to the one that finds other readings.
     pub(super) fn rest_until(&mut self, now: Instant) {
-        let period_ns = A::Firmware::CONTROL_PERIOD_NS;
+        let period_ns = self.period_ns;
         let due = now.nanos_since(self.next_tick) / period_ns + 1;
-        let rested = self.assembly.rest(&self.actuation, due);
+        let rested = self.assembly.rest(&self.actuation, self.period_s(), due);
         self.next_tick = self.next_tick.plus_nanos(rested.steps * period_ns);
         if let Rest::Resting(resting) = &mut self.rest {
             resting.periods += rested.steps;
@@ -108,8 +109,10 @@ impl<A: Assembly> Machine<A> {
     #[cold]
     fn look(&mut self) {
         let again = Rest::from(self.next_tick.plus_nanos(LOOK_AGAIN_NS));
-        let still =
-            !self.kept_awake && !self.coupled && self.noise.is_none() && self.assembly.can_rest(&self.actuation);
+        let still = !self.kept_awake
+            && !self.coupled
+            && self.noise.is_none()
+            && self.assembly.can_rest(&self.actuation, self.period_s());
         let before = std::mem::replace(&mut self.rest, again);
         // Foretold is nothing yet: the communication task runs once more first.
         let from_now = |sensors| Rest::Resting(LeftOut { sensors, periods: 0, foretold_to: self.next_tick });

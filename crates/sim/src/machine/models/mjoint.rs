@@ -9,12 +9,12 @@ use std::sync::Arc;
 use can::Bitrate;
 use devices::AxisId;
 use devices::Description;
-use drives::RegisterError;
 use drives::engine::device::ResetTimes;
 use drives::engine::storage::StoredImage;
 use drives::mjoint::assumptions::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
 use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
+use drives::{Fidelity, RegisterError};
 use plant::absolute_encoder::BatteryState;
 use plant::gear::GearData;
 use plant::pmsm::Phase;
@@ -22,6 +22,7 @@ use plant::rest::is_at_rest;
 use plant::supply::SupplyData;
 use plant::{Angle, FreeRun, Inverter, JointMotor, JointMotorModel, joint_motor};
 
+use super::following::{current_loop, followed};
 use super::order::{Order, OrderError};
 use super::pulse_source::PulseSource;
 use crate::machine::kernel::Machine;
@@ -198,6 +199,7 @@ impl Assembly for Joint {
             dir: self.pulses.dir().unwrap_or(inputs & 2 != 0),
             pulses: self.pulses.read(),
             eeprom_fails: self.eeprom_broken,
+            followed: None,
         }
     }
 
@@ -225,9 +227,28 @@ impl Assembly for Joint {
         self.pulses.advance(Self::PERIOD_S);
     }
 
-    fn can_rest(&self, actuation: &Actuation) -> bool {
+    fn set_fidelity(&mut self, fidelity: Fidelity) {
+        self.motor.rig.set_long_steps(fidelity == Fidelity::Mechanical);
+    }
+
+    fn add_followed(&self, sensors: &mut Sensors) {
+        sensors.followed = Some(followed(&self.motor.rotor, &self.motor.pmsm));
+    }
+
+    fn step_long(&mut self, firmware: &MJoint, actuation: &Actuation, dt_s: f64) {
+        self.last = *actuation;
+        if let PowerStage::Follow(demand) = &actuation.power_stage {
+            let (gains, motor) = (firmware.current_gains(), &mut self.motor);
+            motor.pmsm.current_loop.settings = current_loop(demand, &gains, &motor.model.pmsm, &motor.rotor);
+        }
+        self.fit_brake(actuation);
+        self.motor.step_long(dt_s, &self.pins(AxisId::FIRST, actuation));
+        self.pulses.advance(dt_s);
+    }
+
+    fn can_rest(&self, actuation: &Actuation, dt_s: f64) -> bool {
         let quiet = self.motor.rotor.velocity_rad_s == 0.0 && !actuation.set_origin && self.pulses.is_idle();
-        quiet && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation))
+        quiet && is_at_rest(&self.motor, dt_s, &self.pins(AxisId::FIRST, actuation))
     }
 
     /// Behind a burnt power stage there is no voltage.
@@ -263,6 +284,7 @@ impl Assembly for Joint {
                     Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.phase_current_a()))
                 }
                 PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
+                PowerStage::Follow(_) => Inverter::Regulated,
             },
             brake_released: !braked,
             set_origin: actuation.set_origin,

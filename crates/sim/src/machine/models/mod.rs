@@ -1,6 +1,7 @@
 //! A file for each model, which drives are ordered as, and the list of them.
 
 mod boxed;
+mod following;
 mod kept;
 mod mjoint;
 mod node;

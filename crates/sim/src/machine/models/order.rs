@@ -1,6 +1,7 @@
 //! Drives as one orders them: a model by its name, with an address, a bit rate, and what is special about this one.
 
 use super::boxed::Boxed;
+use crate::Refused;
 use can::Bitrate;
 use canopen::lss::UNCONFIGURED;
 use canopen::od::{Dictionary, Entry, Storage};
@@ -8,6 +9,7 @@ use canopen::{AbortCode, Mux, NodeId};
 use devices::Description;
 use devices::row::is_parameter;
 use devices::variant::{Preset, PresetError, Variant};
+use drives::Fidelity;
 use drives::engine::storage::StoredImage;
 use drives::node::{Memory, is_makers_mark, is_storable};
 
@@ -25,12 +27,21 @@ pub struct Order {
     /// It has no node-ID until LSS (CiA 305) gives it one; `node` is what the world calls it until then. Only of models
     /// that have LSS.
     pub unconfigured: bool,
+    /// How much of it is computed.
+    pub fidelity: Fidelity,
 }
 
 impl Order {
     /// A drive of `model` as delivered, but for its address and bit rate.
     pub fn new(model: &Description, node: NodeId, bitrate: Bitrate) -> Self {
-        Self { node, bitrate, variant: Variant::first_of(model.variations), presets: Vec::new(), unconfigured: false }
+        Self {
+            node,
+            bitrate,
+            variant: Variant::first_of(model.variations),
+            presets: Vec::new(),
+            unconfigured: false,
+            fidelity: Fidelity::Full,
+        }
     }
 
     /// The parameter store of this drive, from the values of one as delivered.
@@ -43,7 +54,7 @@ impl Order {
 }
 
 /// Why there is no such drive.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OrderError {
     /// This model has not been built yet.
     #[error("there is no virtual {model}")]
@@ -73,6 +84,9 @@ pub enum OrderError {
         /// The bit rates that the object lists.
         known: String,
     },
+    /// The model has no form of this fidelity.
+    #[error(transparent)]
+    Fidelity(#[from] Refused),
     /// This value cannot be in the parameter store.
     #[error("{} cannot be {} at power-on: {}", preset.object, preset.value, reason(error))]
     Preset {

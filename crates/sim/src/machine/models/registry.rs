@@ -1,5 +1,6 @@
 //! Which machine is built for which description. Which there are says [`devices::all`].
 
+use can::Instant;
 use devices::servo::CIA402;
 use devices::zltech::{ZLAC8030L, ZLIM42C, ZLIM42C_82};
 use devices::{Description, mjoint};
@@ -43,7 +44,9 @@ pub fn order(model: &'static Description, order: &Order) -> Result<Box<dyn Virtu
         None if model.axes.is_empty() => super::node::ordered,
         None => super::servo::ordered,
     };
-    make(model, order)
+    let mut drive = make(model, order)?;
+    drive.set_fidelity(order.fidelity, Instant::ZERO)?;
+    Ok(drive)
 }
 
 #[cfg(test)]

@@ -7,10 +7,12 @@ use canopen::Mux;
 use devices::servo::variations::VARIATIONS;
 use devices::variant::Pick;
 use devices::{AxisId, Description};
+use drives::Fidelity;
 use drives::engine::device::ResetTimes;
 use drives::node::{Memory, device_acts_on};
 use drives::servo::{
-    Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Motor, Sensors, ServoDrive, acts_on, conditions,
+    Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Motor, PowerStage, Sensors, ServoDrive, acts_on,
+    conditions,
 };
 use plant::FreeRun;
 use plant::angle::Angle;
@@ -22,6 +24,7 @@ use plant::rest::{Rested, is_at_rest, rest};
 use plant::supply::SupplyData;
 
 use super::boxed::Boxed;
+use super::following::{current_loop, followed};
 use super::order::{Order, OrderError};
 use super::{kept, order};
 use crate::machine::kernel::Machine;
@@ -190,6 +193,7 @@ impl ServoBench {
             positive_limit: level(1),
             home: level(2),
             probes: [level(3), level(4)],
+            followed: None,
         }
     }
 
@@ -205,11 +209,16 @@ impl ServoBench {
         }
     }
 
-    fn step_axis(&mut self, axis: usize, actuation: &Actuation) {
+    fn step_axis(
+        &mut self,
+        axis: usize,
+        actuation: &Actuation,
+        step: impl FnOnce(&mut HubMotor, &hub_motor::Actuation),
+    ) {
         let pins = self.pins(AxisId(axis as u8), actuation);
         let motor = &mut self.motors[axis];
         let before = motor.rotor.angle.turns();
-        motor.step(Self::PERIOD_S, &pins);
+        step(motor, &pins);
         self.indexes[axis] = index_count(motor, before);
     }
 }
@@ -308,17 +317,41 @@ impl Assembly for ServoBench {
         self.last = *actuation;
         self.share_source();
         for axis in 0..self.motors.len() {
-            self.step_axis(axis, actuation);
+            self.step_axis(axis, actuation, |motor, pins| motor.step(Self::PERIOD_S, pins));
         }
     }
 
-    fn can_rest(&self, actuation: &Actuation) -> bool {
+    fn set_fidelity(&mut self, fidelity: Fidelity) {
+        let long = fidelity == Fidelity::Mechanical;
+        self.motors.iter_mut().for_each(|motor| motor.rig.set_long_steps(long));
+    }
+
+    fn add_followed(&self, sensors: &mut Sensors) {
+        for (axis, motor) in sensors.axes.iter_mut().zip(&self.motors) {
+            axis.followed = Some(followed(&motor.rotor, &motor.pmsm));
+        }
+    }
+
+    fn step_long(&mut self, firmware: &ServoDrive<Boxed>, actuation: &Actuation, dt_s: f64) {
+        self.last = *actuation;
+        self.share_source();
+        for (axis, (motor, asked)) in self.motors.iter_mut().zip(&actuation.axes).enumerate() {
+            if let (PowerStage::Follow(demand), Some(gains)) = (&asked.power_stage, firmware.current_gains(axis)) {
+                motor.pmsm.current_loop.settings = current_loop(demand, &gains, &motor.model.pmsm, &motor.rotor);
+            }
+        }
+        for axis in 0..self.motors.len() {
+            self.step_axis(axis, actuation, |motor, pins| motor.step_long(dt_s, pins));
+        }
+    }
+
+    fn can_rest(&self, actuation: &Actuation, dt_s: f64) -> bool {
         let stand = self.motors.iter().all(|motor| motor.rotor.velocity_rad_s == 0.0);
-        let rests = |(axis, motor)| is_at_rest(motor, Self::PERIOD_S, &self.pins(AxisId(axis as u8), actuation));
+        let rests = |(axis, motor)| is_at_rest(motor, dt_s, &self.pins(AxisId(axis as u8), actuation));
         stand && self.indexes.iter().all(Option::is_none) && self.motors.iter().enumerate().all(rests)
     }
 
-    fn rest(&mut self, actuation: &Actuation, periods: u64) -> Rested {
+    fn rest(&mut self, actuation: &Actuation, dt_s: f64, periods: u64) -> Rested {
         let pins: [_; MAX_AXES] = std::array::from_fn(|axis| {
             if axis < self.motors.len() {
                 self.pins(AxisId(axis as u8), actuation)
@@ -326,7 +359,7 @@ impl Assembly for ServoBench {
                 hub_motor::Actuation::default()
             }
         });
-        rest(&mut self.motors, Self::PERIOD_S, |axis| pins[axis], periods)
+        rest(&mut self.motors, dt_s, |axis| pins[axis], periods)
     }
 
     /// Behind a burnt power stage there is no voltage.
@@ -350,13 +383,16 @@ impl Assembly for ServoBench {
 
     fn pins(&self, axis: AxisId, actuation: &Actuation) -> hub_motor::Actuation {
         let axis = usize::from(axis.0);
-        let AxisActuation { duty, brake_released, .. } = actuation.axes[axis];
-        let inverter = match duty.map(|duty| duty.map(f64::from)) {
-            None => Inverter::Open,
-            Some(duty) if self.dead_time => Inverter::Driven(with_dead_time(duty, self.motors[axis].phase_current_a())),
-            Some(duty) => Inverter::Driven(duty),
+        let AxisActuation { power_stage, brake_released, .. } = &actuation.axes[axis];
+        let inverter = match power_stage {
+            PowerStage::Off => Inverter::Open,
+            PowerStage::Modulate { duty } if self.dead_time => {
+                Inverter::Driven(with_dead_time(duty.map(f64::from), self.motors[axis].phase_current_a()))
+            }
+            PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
+            PowerStage::Follow(_) => Inverter::Regulated,
         };
-        hub_motor::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released }
+        hub_motor::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released: *brake_released }
     }
 
     fn report(&self, firmware: &ServoDrive<Boxed>, axis: AxisId, common: Report) -> Report {
@@ -383,7 +419,11 @@ impl Assembly for ServoBench {
 
     fn free_run(&self, axis: AxisId) -> Option<FreeRun> {
         let actuation = self.last.axes.get(usize::from(axis.0))?;
-        if actuation.duty.is_some() { None } else { self.motor_at(axis).free_run(actuation.brake_released) }
+        if actuation.power_stage != PowerStage::Off {
+            None
+        } else {
+            self.motor_at(axis).free_run(actuation.brake_released)
+        }
     }
 
     fn image(&self) -> &[u8] {

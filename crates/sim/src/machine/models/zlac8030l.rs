@@ -9,6 +9,7 @@ use canopen::Mux;
 use devices::variant::Variant;
 use devices::zltech::ZLAC8030L;
 use devices::{AxisId, Description};
+use drives::Fidelity;
 use drives::engine::device::ResetTimes;
 use drives::engine::storage::StoredImage;
 use drives::zlac8030l::assumptions::REFERENCE_V;
@@ -24,6 +25,7 @@ use plant::pmsm::Phase;
 use plant::rest::is_at_rest;
 use plant::supply::SupplyData;
 
+use super::following::{current_loop, followed};
 use super::order::{Order, OrderError, baud_rate};
 use crate::machine::kernel::Machine;
 use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, with_demand};
@@ -150,6 +152,7 @@ impl Assembly for HubWheel {
             reference_v: if self.reference_broken { 0.0 } else { REFERENCE_V },
             inputs: [inputs & 1 != 0, inputs & 2 != 0],
             eeprom_ok: !self.eeprom_broken,
+            followed: None,
         }
     }
 
@@ -174,9 +177,25 @@ impl Assembly for HubWheel {
         self.motor.step(Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation));
     }
 
-    fn can_rest(&self, actuation: &Actuation) -> bool {
-        self.motor.rotor.velocity_rad_s == 0.0
-            && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation))
+    fn set_fidelity(&mut self, fidelity: Fidelity) {
+        self.motor.rig.set_long_steps(fidelity == Fidelity::Mechanical);
+    }
+
+    fn add_followed(&self, sensors: &mut Sensors) {
+        sensors.followed = Some(followed(&self.motor.rotor, &self.motor.pmsm));
+    }
+
+    fn step_long(&mut self, firmware: &Zlac8030l, actuation: &Actuation, dt_s: f64) {
+        self.last = *actuation;
+        if let PowerStage::Follow(demand) = &actuation.power_stage {
+            let (gains, motor) = (firmware.current_gains(), &mut self.motor);
+            motor.pmsm.current_loop.settings = current_loop(demand, &gains, &motor.model.pmsm, &motor.rotor);
+        }
+        self.motor.step_long(dt_s, &self.pins(AxisId::FIRST, actuation));
+    }
+
+    fn can_rest(&self, actuation: &Actuation, dt_s: f64) -> bool {
+        self.motor.rotor.velocity_rad_s == 0.0 && is_at_rest(&self.motor, dt_s, &self.pins(AxisId::FIRST, actuation))
     }
 
     /// Behind a burnt power stage there is no voltage.
@@ -203,6 +222,7 @@ impl Assembly for HubWheel {
                 Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.phase_current_a()))
             }
             PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
+            PowerStage::Follow(_) => Inverter::Regulated,
         };
         hub_motor::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released: !actuation.brake_engaged }
     }

@@ -219,9 +219,9 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         self.motor.step(Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation));
     }
 
-    fn can_rest(&self, actuation: &Actuation) -> bool {
+    fn can_rest(&self, actuation: &Actuation, dt_s: f64) -> bool {
         let quiet = self.motor.rotor.velocity_rad_s == 0.0 && (self.zero.is_some() || !actuation.led.green);
-        quiet && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation))
+        quiet && is_at_rest(&self.motor, dt_s, &self.pins(AxisId::FIRST, actuation))
     }
 
     #[inline]
