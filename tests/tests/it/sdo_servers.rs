@@ -99,5 +99,6 @@ fn two_masters_with_a_server_each_do_not_disturb_each_other() {
             }
         };
         master::join_all([work(first, 0x2000), work(second, 0x2001)]).await;
-    });
+    })
+    .expect("the world goes on");
 }
