@@ -171,7 +171,7 @@ const LOOKING: &[Row] = &[
             "selftest",
             "self-test",
         ],
-        tips: &["conform 4", "conform 4 --eds vendor.eds", "conform --list"],
+        tips: &["conform 4", "conform --list"],
     },
     Row { words: &["connect", "open", "interface", "interfaces"], tips: &["--bus can0 scan"] },
     Row { words: &["version"], tips: &["--version"] },

@@ -55,16 +55,6 @@ fn couple(world: &mut World) {
     world.couple("base", &Coupling::DifferentialDrive(base), &shafts).expect("two free shafts");
 }
 
-/// Another node is an encoder on the shaft of node 6.
-fn mount(world: &mut World, node: u8) {
-    let description = devices::model("encoder406").expect("a model");
-    let id = NodeId::new(node).expect("a node-ID");
-    world.set_timing(TimingMode::Ideal);
-    let encoder = order(description, &Order::new(description, id, Bitrate::M1)).expect("an encoder");
-    world.add_drive(node, encoder).expect("numbers differ");
-    world.mount(node, Place::node(6)).expect("they were added").expect("an encoder and a shaft");
-}
-
 /// Profile velocity at 100 r/min, as far as each of them takes that; some answer late, and lose each other's frames.
 fn start(world: &mut World, host: StationId, drives: u8) {
     let writes: [[u8; 8]; 6] = [
@@ -124,9 +114,6 @@ fn run(drives: u8, threads: usize, joined: bool, recorded: bool) -> (Digest, Vec
     world.set_threads(threads);
     if joined {
         couple(&mut world);
-    }
-    if drives < 127 {
-        mount(&mut world, drives + 1);
     }
     if recorded {
         let channels = (1..=drives).map(|node| Channel { place: Place::node(node), signal: Signal::Velocity });

@@ -52,7 +52,7 @@ pub(crate) struct Run {
     set: Vec<(String, String)>,
     /// Compute each control period of the drives (full), or their mechanics and outer loops only (mechanical), many times
     /// faster (default: the machine's, or full; docs/fidelity.md)
-    #[arg(long, value_name = "full|mechanical")]
+    #[arg(long, value_name = "full|mechanical", hide_short_help = true)]
     fidelity: Option<Fidelity>,
     /// Run with each of these seeds, and with each value of the scenario's [sweep]
     #[arg(long, value_name = "FIRST..LAST", value_parser = seeds)]

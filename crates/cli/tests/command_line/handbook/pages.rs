@@ -63,10 +63,18 @@ fn stands_in(file: &str, block: &[String]) -> bool {
     })
 }
 
+/// Pages whose pieces of code are run as they stand there, and by what.
+const RUN: [(&str, &str); 2] =
+    [("fmu.md", "tests/peers/fmu.py"), ("physics-engine.md", "examples/mujoco/test_mujoco.py")];
+
 #[test]
 fn each_piece_of_code_stands_in_the_file_that_is_named_before_it() {
     let mut pieces = 0;
-    for (page, text) in pages() {
+    for (page, runner) in RUN {
+        let runner = std::fs::read_to_string(root().join(runner)).unwrap_or_else(|error| panic!("{runner}: {error}"));
+        assert!(runner.contains(page), "{page} is run");
+    }
+    for (page, text) in pages().into_iter().filter(|(page, _)| !RUN.iter().any(|(run, _)| run == page)) {
         for (before, block) in ["rust", "python", "csv"].iter().flat_map(|language| blocks(&text, language)) {
             let path = *paths(&before).last().unwrap_or_else(|| panic!("{page}: no file is named before {block:?}"));
             let file =
