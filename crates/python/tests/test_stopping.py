@@ -343,7 +343,8 @@ def test_an_interrupted_move_of_a_group_comes_to_rest_and_the_group_goes_on(monk
 
 def test_a_group_has_a_state_while_it_explains_its_stop():
     axes = OpenedAxes()
-    with axes.network:
+    # Behind a broken encoder no standstill is seen, also at the end.
+    with pytest.raises(ferrodrive.MasterError, match="node 2 may still be moving.*does not see its shaft"), axes.network:
         job = axes.group._native.move_to([360, 360], None)
         axes.world.apply("2 fault encoder on")
         causes = set()

@@ -4,7 +4,7 @@
 //! [`control`](Servo::control) every supervision period. Counts and counts/s come in, duty cycles go out; inside it
 //! is radians of the shaft and amperes. All signs are the user's: [`ServoModel::direction`] turns them into the motor's.
 //!
-//! Below the outer loops is the seam of [`Fidelity`](crate::Fidelity): a power stage that switches takes duty cycles
+//! Below the outer loops is the seam of [`Fidelity`]: a power stage that switches takes duty cycles
 //! ([`modulate`](Servo::modulate)), one that follows by itself takes the set-point and the setting of the current loop
 //! ([`current_demand`](Servo::current_demand)), and answers with [`Followed`]. Nothing above it knows which it is.
 
