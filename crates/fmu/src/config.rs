@@ -4,7 +4,7 @@ use std::path::Path;
 
 use can::Bitrate;
 use serde::{Deserialize, Serialize};
-use words::drive::{DriveSpec, drive_spec};
+use words::drive::{DriveSpec, drive_spec_in};
 
 /// The name of the file in the FMU's resources.
 pub const FILE: &str = "ferrodrive.toml";
@@ -56,7 +56,7 @@ pub enum TxClock {
     Triggered,
 }
 
-/// Why there is no such FMU.
+/// Why an FMU cannot be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ConfigError {
     /// The file in the resources is missing or torn.
@@ -106,14 +106,14 @@ impl DriveConfig {
     /// # Errors
     /// What of it is not known.
     pub fn spec(&self, resources: &Path) -> Result<DriveSpec, ConfigError> {
-        let is_file = self.file().is_some();
-        let text = if is_file { resources.join(&self.drive).display().to_string() } else { self.drive.clone() };
-        drive_spec(&text).map_err(|unresolved| ConfigError::Drive(unresolved.into()))
+        let folder = if self.file().is_some() { resources } else { Path::new("") };
+        drive_spec_in(&self.drive, folder).map_err(|unresolved| ConfigError::Drive(unresolved.into()))
     }
 
     /// The file that describes it; `None` for a model that is built in.
     pub fn file(&self) -> Option<&str> {
-        let (model, _) = self.drive.split_once('@')?;
+        let place = self.drive.split(',').next()?;
+        let (model, _) = place.rsplit_once('@')?;
         Path::new(model).extension().map(|_| model)
     }
 }

@@ -1,5 +1,7 @@
 //! A drive to simulate, `MODEL@NODE,key=value,...`, and which model a node is, `NODE=MODEL`.
 
+use std::path::Path;
+
 use can::Bitrate;
 use canopen::{Mux, NodeId};
 use devices::variant::{NoSuchChoice, Preset, Variant, VariationKind};
@@ -10,7 +12,7 @@ use super::node::node;
 use super::object;
 use super::suggest::{did_you_mean, near};
 use super::unresolved::Unresolved;
-use crate::models::{Description, resolve};
+use crate::models::{Description, resolve, resolve_in};
 
 /// A drive to put on a virtual bus.
 #[derive(Clone, Debug)]
@@ -159,12 +161,20 @@ fn number(text: &str) -> Option<i64> {
 /// # Errors
 /// What of it makes no sense, or that the file that it names cannot be used.
 pub fn drive_spec(text: &str) -> Result<DriveSpec, Unresolved> {
+    drive_spec_in(text, Path::new(""))
+}
+
+/// As [`drive_spec`], with files looked for in `folder`.
+///
+/// # Errors
+/// The same.
+pub fn drive_spec_in(text: &str, folder: &Path) -> Result<DriveSpec, Unresolved> {
     let mut words = text.split(',');
     let place = words.next().unwrap_or_default();
     let (name, number) = place
         .rsplit_once('@')
         .ok_or_else(|| format!("'{place}' is not a drive; expected MODEL@NODE, e.g. zlac8030l@4"))?;
-    let mut spec = DriveSpec::new(resolve(name)?, node(number)?);
+    let mut spec = DriveSpec::new(resolve_in(name, folder)?, node(number)?);
     for word in words {
         let (key, value) = word
             .split_once('=')
