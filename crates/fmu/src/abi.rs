@@ -15,28 +15,44 @@ mod values;
 
 use std::ffi::{CStr, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::PoisonError;
 
 use crate::call::{CallError, Called};
 use held::{Held, instance};
 use status::{ERROR, FATAL, OK, Status};
 
-/// Carries out a call on an instance; what goes wrong is reported to the importer's log.
+/// What the importer reads of a panic.
+const DEFECT: &str = "a defect of Ferrodrive; please report it with what was called";
+
+/// Carries out a call on an instance; what goes wrong is reported to the importer's log. After a panic the instance is of no use
+/// until it is reset.
 fn call(handle: *mut c_void, work: impl FnOnce(&mut Held) -> Called<()>) -> Status {
-    let Some(instance) = instance(handle) else { return ERROR };
-    let mut held = match instance.lock() {
-        Ok(held) => held,
-        // An earlier call panicked in the middle.
-        Err(_) => return FATAL,
-    };
-    match catch_unwind(AssertUnwindSafe(|| work(&mut held))) {
-        Ok(Ok(())) => OK,
-        Ok(Err(error)) => {
-            held.log.error(&error.to_string());
-            ERROR
+    carry_out(handle, |held| {
+        if held.is_broken {
+            return Err((FATAL, "an earlier call ended with fmi3Fatal; fmi3Reset makes the instance anew".to_owned()));
         }
-        Err(_) => {
-            held.log.error("a defect of Ferrodrive; please report it with what was called");
-            FATAL
+        work(held).map_err(|error| (ERROR, error.to_string()))
+    })
+}
+
+/// The same, also after a panic.
+fn carry_out(handle: *mut c_void, work: impl FnOnce(&mut Held) -> Result<(), (Status, String)>) -> Status {
+    let Some(instance) = instance(handle) else { return ERROR };
+    let (log, done) = {
+        // No panic leaves this block: the lock is never poisoned.
+        let mut held = instance.lock().unwrap_or_else(PoisonError::into_inner);
+        let done = catch_unwind(AssertUnwindSafe(|| work(&mut held))).unwrap_or_else(|_| {
+            held.is_broken = true;
+            Err((FATAL, DEFECT.to_owned()))
+        });
+        (held.log, done)
+    };
+    // Without the lock: the importer may call in again.
+    match done {
+        Ok(()) => OK,
+        Err((status, what)) => {
+            log.say(status, &what);
+            status
         }
     }
 }

@@ -3,7 +3,7 @@
 use can::{Bitrate, Instant};
 use sim::Prng;
 use sim::fault::Corruption;
-use sim::wire::{Bus, ControllerOptions, ErrorCause, Role, WireEvent};
+use sim::wire::{Bus, ControllerOptions, ErrorCause, ErrorState, Role, WireEvent};
 
 use crate::config::{BusConfig, ConfigError, MAX_NODES, bitrate};
 use crate::operation::{BusError, ErrorCode, LostFrame, NodeStatus, Operation};
@@ -12,7 +12,6 @@ use crate::variable::{Causality, Reference, Terminal, Value, Variable};
 /// Frames of one node that the bus keeps until it is their turn.
 const BUFFERED: usize = 64;
 
-const NOTIFICATIONS: Reference = 1;
 const SEED: Reference = 2;
 const CORRUPTED: Reference = 3;
 const FRAMES: Reference = 10;
@@ -21,7 +20,7 @@ const LOAD: Reference = 12;
 const OVERFLOWS: Reference = 13;
 const TERMINALS: Reference = 1000;
 /// Value references of one terminal.
-const TERMINAL_SIZE: Reference = 4;
+const TERMINAL_SIZE: Reference = 5;
 
 /// The wire, and a controller for each terminal.
 #[derive(Clone)]
@@ -74,37 +73,31 @@ impl BusUnit {
         (1..=self.nodes.len()).zip(first).map(|(node, first)| Terminal::new(format!("Node{node}"), first)).collect()
     }
 
-    /// The reference of the output that says that it notifies nodes.
-    pub const fn notifications() -> Reference {
-        NOTIFICATIONS
-    }
-
     /// Its variables, but for those of the terminals.
     pub fn variables(&self) -> Vec<Variable> {
         use Causality::{Output, Parameter};
         let corrupted = "probability that a frame is destroyed, 0 to 1";
-        vec![
-            Variable::new(
-                NOTIFICATIONS,
-                "BusNotifications",
-                Output,
-                Value::Boolean(true),
-                "nodes are notified of what becomes of their frames",
-            ),
+        let mut rows = vec![
             Variable::new(SEED, "seed", Parameter, Value::UInt64(1), "decides which frames are destroyed"),
             Variable::new(CORRUPTED, "corrupted", Parameter, Value::Float64(0.0), corrupted),
             Variable::new(FRAMES, "frames", Output, Value::UInt64(0), "frames that got through"),
             Variable::new(ERRORS, "errors", Output, Value::UInt64(0), "attempts that failed"),
             Variable::new(LOAD, "load", Output, Value::Float64(0.0), "share of the time in which the bus was taken"),
             Variable::new(OVERFLOWS, "overflows", Output, Value::UInt64(0), "frames for which there was no buffer"),
-        ]
+        ];
+        // One for each terminal: by the layered standard a variable belongs to one.
+        rows.extend(self.terminals().iter().map(|terminal| {
+            let name = format!("{}.BusNotifications", terminal.name);
+            let what = "the node is notified of what becomes of its frames";
+            Variable::new(terminal.notifications, &name, Output, Value::Boolean(true), what)
+        }));
+        rows
     }
 
     /// Reads a variable as of now.
     pub fn get(&self, reference: Reference) -> Option<Value> {
         let statistics = self.bus.statistics(self.now);
         Some(match reference {
-            NOTIFICATIONS => Value::Boolean(true),
             SEED => Value::UInt64(self.seed),
             CORRUPTED => Value::Float64(self.corrupted),
             FRAMES => Value::UInt64(statistics.frames),
@@ -114,6 +107,9 @@ impl BusUnit {
                 Value::Float64(if span == 0 { 0.0 } else { statistics.busy_ns as f64 / span as f64 })
             }
             OVERFLOWS => Value::UInt64(self.overflows),
+            TERMINALS.. if self.terminals().iter().any(|terminal| terminal.notifications == reference) => {
+                Value::Boolean(true)
+            }
             _ => return None,
         })
     }
@@ -201,14 +197,14 @@ impl BusUnit {
             Ok(Operation::Status(status)) => {
                 let is_off = status == NodeStatus::BusOff;
                 // Bus-off by errors is what the wire has counted as well, and ends by itself.
-                if is_off != self.nodes[node].is_off && !(is_off && self.bus.counters(node).tec() > 0) {
+                let is_counted = self.bus.counters(node).state() == ErrorState::BusOff;
+                if is_off != self.nodes[node].is_off && !(is_off && is_counted) {
                     self.nodes[node].is_off = is_off;
                     self.restart(node);
                 }
             }
             Ok(Operation::Wakeup) => {
-                for (i, other) in self.nodes.iter_mut().enumerate().filter(|(i, _)| *i != node) {
-                    let _ = i;
+                for (_, other) in self.nodes.iter_mut().enumerate().filter(|(i, _)| *i != node) {
                     Operation::Wakeup.write(&mut other.outbox);
                 }
             }
@@ -266,7 +262,8 @@ impl BusUnit {
                 let error = BusError {
                     id: frame.id().raw(),
                     code: code_of(cause),
-                    is_primary: is_sender || cause == ErrorCause::BitRate,
+                    // The wire does not say which receivers saw it first.
+                    is_primary: is_sender,
                     is_sender,
                 };
                 Operation::BusError(error).write(&mut node.outbox);

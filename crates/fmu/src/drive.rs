@@ -20,6 +20,7 @@ const SEQUENCE_BITS: u64 = 11;
 const OVERDUE_RETRY_NS: u64 = 1_000;
 
 const TERMINAL: Reference = 1;
+/// The fifth of the terminal.
 const NOTIFICATIONS: Reference = 5;
 const SEED: Reference = 6;
 const LOAD_TORQUE: Reference = 10;
@@ -133,11 +134,6 @@ impl DriveUnit {
         Terminal::new("CAN", TERMINAL)
     }
 
-    /// The reference of the parameter that says whether the bus notifies it.
-    pub const fn notifications() -> Reference {
-        NOTIFICATIONS
-    }
-
     /// Its variables, but for those of the terminal.
     pub fn variables(&self) -> Vec<Variable> {
         use Causality::{Input, Output, Parameter};
@@ -204,6 +200,7 @@ impl DriveUnit {
     /// # Errors
     /// What the drive does not take.
     pub fn set(&mut self, reference: Reference, value: &Value) -> Result<(), String> {
+        self.looked_at = None;
         match (reference, value) {
             (NOTIFICATIONS, Value::Boolean(notified)) => self.notified = *notified,
             (SEED, Value::UInt64(seed)) => self.seed = *seed,
@@ -224,20 +221,24 @@ impl DriveUnit {
             // What acts at once is seen at once.
             (INPUTS..OUTPUTS, Value::Boolean(level)) => {
                 let input = (reference - INPUTS) as usize;
-                let before = self.inputs.get_mut(input).ok_or("the drive has no such input")?;
-                if *before != *level {
-                    *before = *level;
+                let before = *self.inputs.get(input).ok_or("the drive has no such input")?;
+                if before != *level {
                     self.drive.set_input(input, *level, self.now).map_err(|refused| refused.to_string())?;
+                    self.inputs[input] = *level;
                 }
             }
             _ => {}
+        }
+        if self.has_begun {
+            self.not_before = Instant::ZERO;
+            self.after_call();
         }
         Ok(())
     }
 
     /// Time begins: the drive gets its power.
     pub fn begin(&mut self) {
-        self.has_begun = true;
+        (self.has_begun, self.looked_at) = (true, None);
         if self.spec.timing.unwrap_or(TimingMode::Device) == TimingMode::Device {
             let seed = seeds::timing_seed(self.seed, self.spec.node.raw());
             self.drive.set_timing(TimingMode::Device, seed, self.now);
@@ -275,6 +276,7 @@ impl DriveUnit {
         if self.next_deadline().is_none_or(|at| at > self.now) {
             return;
         }
+        self.looked_at = None;
         if self.back_at.is_some_and(|at| at <= self.now) {
             self.back_at = None;
             self.counters = ErrorCounters::default();
@@ -292,10 +294,11 @@ impl DriveUnit {
     /// Takes operations in.
     pub fn receive(&mut self, operation: Result<Operation, &[u8]>) {
         let now = self.now;
-        self.not_before = Instant::ZERO;
+        (self.not_before, self.looked_at) = (Instant::ZERO, None);
         match operation {
             Ok(Operation::Transmit(frame)) if self.is_on_bus() => {
                 self.counters.receive_success();
+                self.say_counted();
                 if !self.drive.ignores(&frame) {
                     self.drive.handle_frame(&frame, now);
                 }
@@ -303,6 +306,7 @@ impl DriveUnit {
             Ok(Operation::Confirm(id)) if self.notified => {
                 if let Some(frame) = self.take_offered(id) {
                     self.counters.transmit_success();
+                    self.say_counted();
                     self.drive.handle_transmitted(&frame, now);
                 }
             }
@@ -325,6 +329,13 @@ impl DriveUnit {
     /// What it has to send, once.
     pub fn take_outbox(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.outbox)
+    }
+
+    /// Looks at it now. True if that changed what it sends or when it next does something.
+    pub fn look(&mut self) -> bool {
+        let before = (self.outbox.len(), self.next_deadline());
+        self.seen();
+        before != (self.outbox.len(), self.next_deadline())
     }
 
     /// What can be measured now.
@@ -387,18 +398,22 @@ impl DriveUnit {
             (false, true, _) => self.counters.first_receive_error(),
             (false, false, _) => self.counters.receive_error(),
         }
-        let status = match self.counters.state() {
-            ErrorState::ErrorActive => NodeStatus::Active,
-            ErrorState::ErrorPassive => NodeStatus::Passive,
-            ErrorState::BusOff => NodeStatus::BusOff,
-        };
-        if status == NodeStatus::BusOff && self.status != NodeStatus::BusOff {
+        if self.counters.state() == ErrorState::BusOff && self.status != NodeStatus::BusOff {
             let bit_ns = self.bitrate.map_or(0, Bitrate::bit_nanos);
             self.back_at = Some(self.now.plus_nanos(u64::from(BUS_OFF_SEQUENCES) * SEQUENCE_BITS * bit_ns));
             self.offered.clear();
             self.drive.handle_bus_off(true, self.now);
         }
-        self.say_status(status);
+        self.say_counted();
+    }
+
+    /// Says the status that belongs to the counters, if it is another one.
+    fn say_counted(&mut self) {
+        self.say_status(match self.counters.state() {
+            ErrorState::ErrorActive => NodeStatus::Active,
+            ErrorState::ErrorPassive => NodeStatus::Passive,
+            ErrorState::BusOff => NodeStatus::BusOff,
+        });
     }
 
     fn say_status(&mut self, status: NodeStatus) {

@@ -1,5 +1,5 @@
 //! An instance of an FMU by the rules of FMI 3.0: in which mode what may be called, and what a call does. Without pointers:
-//! [`abi`](crate) has those.
+//! `abi` has those.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use crate::unit::{Action, Unit};
 use crate::variable::{Causality, Reference, Terminal, Value, Variable};
 
 const NANOS: f64 = 1e9;
-/// A century: beyond it nanoseconds since the begin do not fit 64 bits with certainty.
+/// A century, in seconds: nanoseconds since the begin fit 64 bits far beyond it.
 const LATEST_S: f64 = 3.2e9;
 
 /// The state of an instance (FMI 3.0, 2.3 and 4.2).
@@ -73,6 +73,8 @@ pub(crate) struct Rest {
 pub struct Instance {
     pub(crate) config: Config,
     resources: PathBuf,
+    /// Of what FMU it is.
+    pub(crate) token: String,
     pub(crate) unit: Unit,
     variables: Vec<Variable>,
     terminals: Vec<Terminal>,
@@ -100,8 +102,8 @@ impl Instance {
         let (variables, terminals) = (unit.variables(), unit.terminals());
         let ports = vec![Port::default(); terminals.len()];
         let rest = Rest { ports, mode: Mode::Instantiated, start_s: 0.0, now_ns: 0 };
-        let resources = resources.to_owned();
-        Ok(Self { config, resources, unit, variables, terminals, has_event_mode, rest, actions: Vec::new() })
+        let (token, resources) = (crate::xml::token(&config, resources), resources.to_owned());
+        Ok(Self { config, resources, token, unit, variables, terminals, has_event_mode, rest, actions: Vec::new() })
     }
 
     /// Its mode.
@@ -199,7 +201,7 @@ impl Instance {
     /// Time passes from `from_s` by `step_s`.
     ///
     /// # Errors
-    /// The wrong mode, a step that does not begin where time stands, or is nott forward.
+    /// The wrong mode, a step that does not begin where time stands, or is not forward.
     pub fn step(&mut self, from_s: f64, step_s: f64) -> Called<Stepped> {
         self.expect(&[Mode::Step], "fmi3DoStep")?;
         let to_s = from_s + step_s;
@@ -207,8 +209,9 @@ impl Instance {
         if !(step_s >= 0.0 && to_s.is_finite() && to_s - self.rest.start_s < LATEST_S) {
             return refused(format!("a step of {step_s} s is not possible; expected a time of 0 or more"));
         }
-        let (from_ns, to_ns) = (self.nanos(from_s), self.nanos(to_s));
-        if from_ns != self.rest.now_ns {
+        let (from_ns, to_ns) = (self.nanos(from_s), self.nanos(to_s).max(self.rest.now_ns));
+        // A sum of many steps is a nanosecond beside their number of times one.
+        if from_s < self.rest.start_s - 1.0 / NANOS || from_ns.abs_diff(self.rest.now_ns) > 1 {
             let now_s = self.rest.start_s + self.rest.now_ns as f64 / NANOS;
             return refused(format!(
                 "the step begins at {from_s} s, but time stands at {now_s} s; it does not go back"
@@ -224,7 +227,16 @@ impl Instance {
             self.act(Action::Serve)?;
         }
         self.tick_triggered()?;
-        Ok(Stepped { needs_event: self.rest.ports.iter().any(|port| port.ticked), time_s: to_s })
+        Ok(Stepped { needs_event: self.needs_event(), time_s: to_s })
+    }
+
+    /// Whether a clock has ticked or is due, where there are events at all.
+    fn needs_event(&self) -> bool {
+        self.has_event_mode
+            && match self.config.clock() {
+                TxClock::Triggered => self.rest.ports.iter().any(|port| port.ticked),
+                TxClock::Countdown => self.unit.next_event().is_some_and(|at| at.as_nanos() <= self.rest.now_ns),
+            }
     }
 
     /// The value of a variable.
@@ -241,6 +253,9 @@ impl Instance {
             } else {
                 port.visible.clone()
             }));
+        }
+        if self.unit.look() {
+            self.actions.push(Action::Look);
         }
         self.unit.get(reference).ok_or_else(|| unknown(reference))
     }
@@ -262,6 +277,9 @@ impl Instance {
             let Value::Binary(bytes) = value else { return refused(format!("variable {reference} is a binary")) };
             if !is_rx {
                 return refused(format!("variable {reference} is an output"));
+            }
+            if self.rest.mode == Mode::Terminated {
+                return refused(format!("variable {reference} cannot be set: the simulation is over"));
             }
             self.rest.ports[place].received = Some(bytes);
             return Ok(());
@@ -288,6 +306,10 @@ impl Instance {
         }
         if self.rest.mode == Mode::Terminated {
             return refused(format!("{name} cannot be set: the simulation is over"));
+        }
+        // What changes nothing is not written down, so that a state does not grow with each call.
+        if self.unit.get(reference).as_ref() == Some(&value) {
+            return Ok(());
         }
         self.act(Action::Set(reference, value)).map_err(|error| CallError(format!("{name}: {error}")))?;
         Ok(())
@@ -345,8 +367,16 @@ impl Instance {
         self.rest.clone()
     }
 
-    pub(crate) fn put(&mut self, rest: Rest) {
+    /// Takes the rest of a state.
+    ///
+    /// # Errors
+    /// It has other networks than this instance, or times that cannot be.
+    pub(crate) fn put(&mut self, rest: Rest) -> Called<()> {
+        if rest.ports.len() != self.terminals.len() || !rest.start_s.is_finite() {
+            return refused("its networks or its start time are not possible");
+        }
         self.rest = rest;
+        Ok(())
     }
 
     fn expect(&self, modes: &[Mode], call: &str) -> Called<()> {
@@ -375,6 +405,18 @@ impl Instance {
             // Two of them are as good as one.
             (Action::Serve, Some(Action::Serve)) => {}
             (Action::Take(_), _) if done.is_empty() => {}
+            // Time that passes does all that was due on its way.
+            (Action::Advance(to_ns), _) => {
+                let kept = match self.actions.as_slice() {
+                    [.., Action::Advance(at)] | [.., Action::Advance(at), Action::Serve] if at == to_ns => {
+                        return Ok(done);
+                    }
+                    [kept @ .., Action::Advance(_)] | [kept @ .., Action::Advance(_), Action::Serve] => kept.len(),
+                    all => all.len(),
+                };
+                self.actions.truncate(kept);
+                self.actions.push(action);
+            }
             _ => self.actions.push(action),
         }
         Ok(done)

@@ -35,7 +35,7 @@ pub fn entries(config: &Config, resources: &Path, library: (&str, Vec<u8>)) -> R
     let unit = Unit::new(config, resources)?;
     let (path, bytes) = library;
     let mut entries = vec![
-        ("modelDescription.xml".to_owned(), xml::model_description(config, &unit).into_bytes()),
+        ("modelDescription.xml".to_owned(), xml::model_description(config, resources, &unit).into_bytes()),
         ("terminalsAndIcons/terminalsAndIcons.xml".to_owned(), xml::terminals_and_icons(&unit).into_bytes()),
         ("extra/org.fmi-standard.fmi-ls-bus/fmi-ls-manifest.xml".to_owned(), xml::manifest(config).into_bytes()),
         (format!("resources/{}", config::FILE), config.text().into_bytes()),

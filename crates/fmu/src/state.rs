@@ -14,7 +14,7 @@ pub struct SavedState(pub(crate) Box<Instance>);
 /// milliseconds for each simulated second.
 #[derive(Serialize, Deserialize)]
 struct Written {
-    config: String,
+    token: String,
     actions: Vec<Action>,
     rest: crate::instance::Rest,
 }
@@ -37,7 +37,7 @@ impl SavedState {
     pub fn bytes(&self) -> Vec<u8> {
         let instance = &self.0;
         let written =
-            Written { config: instance.config.text(), actions: instance.actions.clone(), rest: instance.rest() };
+            Written { token: instance.token.clone(), actions: instance.actions.clone(), rest: instance.rest() };
         // Numbers, texts and lists of them: they always have a form.
         let body = rmp_serde::to_vec(&written).unwrap_or_default();
         let mut bytes = crc32fast::hash(&body).to_le_bytes().to_vec();
@@ -56,16 +56,23 @@ impl SavedState {
             return Err(error("its check sum is wrong".to_owned()));
         }
         let written: Written = rmp_serde::from_slice(body).map_err(|torn| error(torn.to_string()))?;
-        if written.config != of.config.text() {
-            return Err(error(format!("it is of {}", written.config.trim())));
+        if written.token != of.token {
+            return Err(error(format!("it is of {}; expected {}", written.token, of.token)));
         }
         let mut instance = of.clone();
         instance.reset()?;
+        let mut latest_ns = 0;
         for action in &written.actions {
-            instance.unit.act(action).map_err(|refused| error(refused))?;
+            if let Action::Advance(to_ns) = action {
+                if *to_ns < latest_ns {
+                    return Err(error("its time goes back".to_owned()));
+                }
+                latest_ns = *to_ns;
+            }
+            instance.unit.act(action).map_err(error)?;
         }
         instance.actions = written.actions;
-        instance.put(written.rest);
+        instance.put(written.rest)?;
         Ok(Self(Box::new(instance)))
     }
 }

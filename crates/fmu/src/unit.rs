@@ -25,6 +25,8 @@ pub enum Action {
     Receive(usize, Vec<u8>),
     /// Does what is due now.
     Serve,
+    /// Reads what can be measured now, where that changed when something is next to be done.
+    Look,
     /// Takes what the network of this number has to send.
     Take(usize),
     /// Lets time pass up to so many nanoseconds after the begin.
@@ -68,11 +70,11 @@ impl Unit {
         }
     }
 
-    /// The variable that says whether nodes are notified of what becomes of their frames.
-    pub const fn notifications(&self) -> Reference {
+    /// Before outputs are read. True if that changed when it next does something: then it belongs to what was done to it.
+    pub fn look(&mut self) -> bool {
         match self {
-            Self::Drive(_) => DriveUnit::notifications(),
-            Self::Bus(_) => BusUnit::notifications(),
+            Self::Drive(drive) => drive.look(),
+            Self::Bus(_) => false,
         }
     }
 
@@ -87,14 +89,19 @@ impl Unit {
     /// Does an action. Operations that are taken come back.
     ///
     /// # Errors
-    /// A value that is not taken.
+    /// A value that is not taken, a network that it does not have.
     pub fn act(&mut self, action: &Action) -> Result<Vec<u8>, String> {
+        if let Action::Receive(place, _) | Action::Take(place) = action
+            && *place >= self.terminals().len()
+        {
+            return Err(format!("it has no network {place}"));
+        }
         match (self, action) {
             (Self::Drive(drive), Action::Set(reference, value)) => drive.set(*reference, value)?,
             (Self::Bus(bus), Action::Set(reference, value)) => bus.set(*reference, value)?,
             (Self::Drive(drive), Action::Begin) => drive.begin(),
             (Self::Bus(bus), Action::Begin) => bus.begin(),
-            (Self::Drive(drive), Action::Receive(0, bytes)) => {
+            (Self::Drive(drive), Action::Receive(_, bytes)) => {
                 operations(bytes).for_each(|operation| drive.receive(operation));
             }
             (Self::Bus(bus), Action::Receive(node, bytes)) => {
@@ -105,8 +112,11 @@ impl Unit {
             (Self::Bus(bus), Action::Take(node)) => return Ok(bus.take_outbox(*node)),
             (Self::Drive(drive), Action::Advance(nanos)) => drive.advance(Instant::from_nanos(*nanos)),
             (Self::Bus(bus), Action::Advance(nanos)) => bus.advance(Instant::from_nanos(*nanos)),
-            // A drive has one network; a bus does all that is due when time passes.
-            (Self::Drive(_), Action::Receive(..)) | (Self::Bus(_), Action::Serve) => {}
+            (Self::Drive(drive), Action::Look) => {
+                drive.look();
+            }
+            // A bus does all that is due when time passes.
+            (Self::Bus(_), Action::Serve | Action::Look) => {}
         }
         Ok(Vec::new())
     }

@@ -10,25 +10,22 @@ pub type Reference = u32;
 pub enum Value {
     /// A 64-bit floating-point number.
     Float64(f64),
-    /// Integers by their width.
+    /// A signed integer of 64 bits.
     Int64(i64),
-    /// 8 bits.
+    /// An unsigned integer of 8 bits.
     UInt8(u8),
-    /// 16 bits.
+    /// An unsigned integer of 16 bits.
     UInt16(u16),
-    /// 32 bits.
+    /// An unsigned integer of 32 bits.
     UInt32(u32),
-    /// 64 bits.
+    /// An unsigned integer of 64 bits.
     UInt64(u64),
     /// True or false.
     Boolean(bool),
-    /// Text.
-    String(String),
     /// Bytes.
     Binary(Vec<u8>),
 }
 
-/// The type of a variable that is not a clock has the name of its [`Value`].
 impl Value {
     /// The name of the type, which is that of the element in the description.
     pub const fn type_name(&self) -> &'static str {
@@ -40,7 +37,6 @@ impl Value {
             Self::UInt32(_) => "UInt32",
             Self::UInt64(_) => "UInt64",
             Self::Boolean(_) => "Boolean",
-            Self::String(_) => "String",
             Self::Binary(_) => "Binary",
         }
     }
@@ -55,7 +51,6 @@ impl Value {
             Self::UInt32(value) => value.to_string(),
             Self::UInt64(value) => value.to_string(),
             Self::Boolean(value) => value.to_string(),
-            Self::String(value) => value.clone(),
             Self::Binary(bytes) => bytes.iter().map(|byte| format!("{byte:02x}")).collect(),
         }
     }
@@ -114,24 +109,33 @@ impl Variable {
     }
 }
 
-/// One network of an FMU: four variables in one terminal (fmi-ls-bus, "Bus Terminal").
+/// One network of an FMU: the variables of one terminal (fmi-ls-bus, "Bus Terminal").
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Terminal {
     /// Its name.
     pub name: String,
-    /// What comes in, and the clock of it, and what goes out, and the clock of it.
+    /// What comes in: operations, binary.
     pub rx_data: Reference,
     /// The clock of what comes in.
     pub rx_clock: Reference,
-    /// What goes out.
+    /// What goes out: operations, binary.
     pub tx_data: Reference,
     /// The clock of what goes out.
     pub tx_clock: Reference,
+    /// Whether the bus notifies the node of what becomes of its frames: of a node a parameter, of a bus a constant.
+    pub notifications: Reference,
 }
 
 impl Terminal {
-    /// The terminal whose variables have the four value references from `first` on.
+    /// The terminal whose variables have the five value references from `first` on.
     pub fn new(name: impl Into<String>, first: Reference) -> Self {
-        Self { name: name.into(), rx_clock: first, rx_data: first + 1, tx_clock: first + 2, tx_data: first + 3 }
+        Self {
+            name: name.into(),
+            rx_clock: first,
+            rx_data: first + 1,
+            tx_clock: first + 2,
+            tx_data: first + 3,
+            notifications: first + 4,
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! The descriptions that an FMU carries: of its variables (FMI 3.0, 2.4), of its networks and of the layered standard.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use crate::config::{Config, TxClock};
 use crate::unit::Unit;
@@ -24,13 +25,21 @@ const UNITS: [(&str, &str); 6] = [
 ];
 
 /// What an importer has to hand back at instantiation: another one is of another FMU.
-pub fn token(config: &Config) -> String {
+/// The file in `resources` that describes a drive counts.
+pub fn token(config: &Config, resources: &Path) -> String {
     let version = env!("CARGO_PKG_VERSION");
-    format!("ferrodrive-{version}-{:08x}", crc32fast::hash(config.text().as_bytes()))
+    let mut sum = crc32fast::Hasher::new();
+    sum.update(config.text().as_bytes());
+    if let Config::Drive(drive) = config
+        && let Some(name) = drive.file()
+    {
+        sum.update(&std::fs::read(resources.join(name)).unwrap_or_default());
+    }
+    format!("ferrodrive-{version}-{:08x}", sum.finalize())
 }
 
 /// `modelDescription.xml`.
-pub fn model_description(config: &Config, unit: &Unit) -> String {
+pub fn model_description(config: &Config, resources: &Path, unit: &Unit) -> String {
     let name = match config {
         Config::Drive(drive) => drive.drive.clone(),
         Config::Bus(bus) => format!("CAN bus of {} nodes", bus.nodes),
@@ -41,14 +50,14 @@ pub fn model_description(config: &Config, unit: &Unit) -> String {
          <CoSimulation modelIdentifier=\"{MODEL_IDENTIFIER}\" canHandleVariableCommunicationStepSize=\"true\" \
          hasEventMode=\"true\" canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\"/>\n  <UnitDefinitions>\n",
         escaped(&name),
-        token(config),
+        token(config, resources),
         env!("CARGO_PKG_VERSION"),
     );
     for (unit, exponents) in UNITS {
         let _ = writeln!(xml, "    <Unit name=\"{unit}\"><BaseUnit {exponents}/></Unit>");
     }
     xml.push_str(
-        "  </UnitDefinitions>\n  <LogCategories>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n  \
+        "  </UnitDefinitions>\n  <LogCategories>\n    <Category name=\"logStatusError\"/>\n    <Category name=\"logStatusFatal\"/>\n  </LogCategories>\n  \
          <DefaultExperiment startTime=\"0\" stopTime=\"10\" stepSize=\"0.001\"/>\n  <ModelVariables>\n",
     );
     let _ = writeln!(
@@ -56,11 +65,12 @@ pub fn model_description(config: &Config, unit: &Unit) -> String {
         "    <Float64 name=\"time\" valueReference=\"{TIME}\" causality=\"independent\" variability=\"continuous\"/>"
     );
     let (variables, terminals) = (unit.variables(), unit.terminals());
-    variables.iter().for_each(|variable| element(&mut xml, variable, variable.reference == unit.notifications()));
+    let notifies = |variable: &Variable| terminals.iter().any(|it| it.notifications == variable.reference);
+    variables.iter().for_each(|variable| element(&mut xml, variable, notifies(variable)));
     terminals.iter().for_each(|terminal| network(&mut xml, terminal, config.clock()));
     xml.push_str("  </ModelVariables>\n  <ModelStructure>\n");
     let outputs = variables.iter().filter(|variable| variable.causality == Causality::Output);
-    let calculated = |variable: &&Variable| variable.reference != unit.notifications();
+    let calculated = |variable: &&Variable| !notifies(variable);
     for variable in outputs.clone() {
         let _ = writeln!(xml, "    <Output valueReference=\"{}\"/>", variable.reference);
     }
@@ -83,7 +93,6 @@ pub fn terminals_and_icons(unit: &Unit) -> String {
     let mut xml = String::from(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiTerminalsAndIcons fmiVersion=\"3.0\">\n  <Terminals>\n",
     );
-    let notifications = unit.variables().into_iter().find(|variable| variable.reference == unit.notifications());
     for Terminal { name, .. } in unit.terminals() {
         let _ = writeln!(
             xml,
@@ -96,16 +105,13 @@ pub fn terminals_and_icons(unit: &Unit) -> String {
                 "      <TerminalMemberVariable variableKind=\"signal\" variableName=\"{name}.{member}\" memberName=\"{member}\"/>"
             );
         }
-        if let Some(variable) = &notifications {
-            let _ = writeln!(
-                xml,
-                "      <Terminal name=\"Configuration\" terminalKind=\"org.fmi-ls-bus.network-terminal.configuration\" \
-                 matchingRule=\"bus\">\n        <TerminalMemberVariable variableKind=\"signal\" variableName=\"{}\" \
-                 memberName=\"BusNotifications\"/>\n      </Terminal>",
-                variable.name
-            );
-        }
-        xml.push_str("    </Terminal>\n");
+        let _ = writeln!(
+            xml,
+            "      <Terminal name=\"Configuration\" terminalKind=\"org.fmi-ls-bus.network-terminal.configuration\" \
+             matchingRule=\"bus\">\n        <TerminalMemberVariable variableKind=\"signal\" \
+             variableName=\"{name}.BusNotifications\" memberName=\"BusNotifications\"/>\n      </Terminal>\n    \
+             </Terminal>"
+        );
     }
     xml.push_str("  </Terminals>\n</fmiTerminalsAndIcons>\n");
     xml
@@ -152,7 +158,7 @@ fn element(xml: &mut String, variable: &Variable, notifications: bool) {
 
 /// The four variables of a network.
 fn network(xml: &mut String, terminal: &Terminal, clock: TxClock) {
-    let Terminal { name, rx_data, rx_clock, tx_data, tx_clock } = terminal;
+    let Terminal { name, rx_data, rx_clock, tx_data, tx_clock, .. } = terminal;
     let (causality, interval) = match clock {
         TxClock::Countdown => ("input", "countdown"),
         TxClock::Triggered => ("output", "triggered"),

@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 use std::ffi::{CString, c_void};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use super::status::{ERROR, LogMessage};
+use super::status::{FATAL, LogMessage, Status};
 use crate::instance::Instance;
 use crate::state::SavedState;
 
@@ -12,14 +13,14 @@ use crate::state::SavedState;
 pub(super) struct Held {
     pub(super) instance: Instance,
     pub(super) log: Log,
-    /// Texts that were handed out: they live until the next ones.
-    pub(super) texts: Vec<CString>,
+    /// A call panicked in the middle.
+    pub(super) is_broken: bool,
     /// States that were handed out, by number.
     pub(super) states: HashMap<usize, SavedState>,
-    next_state: usize,
 }
 
 /// Where messages go.
+#[derive(Clone, Copy)]
 pub(super) struct Log {
     /// The importer's own pointer, as a number: it goes back as it came.
     environment: usize,
@@ -33,6 +34,8 @@ struct Instances {
     held: HashMap<usize, Arc<Mutex<Held>>>,
 }
 
+/// The number of the last state, of whatever instance: a state of another one is not mistaken for one's own.
+static LAST_STATE: AtomicUsize = AtomicUsize::new(0);
 static INSTANCES: LazyLock<Mutex<Instances>> = LazyLock::new(Mutex::default);
 
 impl Log {
@@ -40,24 +43,26 @@ impl Log {
         Self { environment: environment as usize, message }
     }
 
-    pub(super) fn error(&self, what: &str) {
+    /// A message of a call that ends with `status`.
+    pub(super) fn say(&self, status: Status, what: &str) {
         let Some(message) = self.message else { return };
         let text = CString::new(what.replace('\0', " ")).unwrap_or_default();
+        let category = if status == FATAL { c"logStatusFatal" } else { c"logStatusError" };
         // SAFETY: the importer's function with the importer's pointer and texts that live as long as the call.
-        unsafe { message(self.environment as *mut c_void, ERROR, c"logStatusError".as_ptr(), text.as_ptr()) };
+        unsafe { message(self.environment as *mut c_void, status, category.as_ptr(), text.as_ptr()) };
     }
 }
 
 impl Held {
     pub(super) fn new(instance: Instance, log: Log) -> Self {
-        Self { instance, log, texts: Vec::new(), states: HashMap::new(), next_state: 0 }
+        Self { instance, log, is_broken: false, states: HashMap::new() }
     }
 
     /// Keeps a state, and gives its number.
     pub(super) fn keep(&mut self, state: SavedState) -> usize {
-        self.next_state += 1;
-        self.states.insert(self.next_state, state);
-        self.next_state
+        let number = LAST_STATE.fetch_add(1, Ordering::Relaxed) + 1;
+        self.states.insert(number, state);
+        number
     }
 }
 

@@ -4,8 +4,8 @@ use std::ffi::{c_char, c_void};
 use std::path::Path;
 
 use super::held::{self, Held, Log};
-use super::status::{LogMessage, Status};
-use super::{call, put, slice, slice_mut, text, wrong};
+use super::status::{ERROR, FATAL, LogMessage, Status};
+use super::{DEFECT, call, carry_out, put, slice, slice_mut, text, wrong};
 use crate::config::Config;
 use crate::instance::Instance;
 use crate::state::SavedState;
@@ -50,7 +50,7 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
     let made = std::panic::catch_unwind(|| {
         let resources = Path::new(resources.ok_or("the path of the resources is missing")?);
         let config = Config::read(resources).map_err(|error| error.to_string())?;
-        let expected = xml::token(&config);
+        let expected = xml::token(&config, resources);
         if token != Some(expected.as_str()) {
             return Err(format!("the instantiation token is {}; expected {expected}", token.unwrap_or("missing")));
         }
@@ -59,10 +59,13 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
     match made {
         Ok(Ok(instance)) => held::add(Held::new(instance, log)),
         Ok(Err(error)) => {
-            log.error(&error);
+            log.say(ERROR, &error);
             std::ptr::null_mut()
         }
-        Err(_) => std::ptr::null_mut(),
+        Err(_) => {
+            log.say(FATAL, DEFECT);
+            std::ptr::null_mut()
+        }
     }
 }
 
@@ -109,10 +112,14 @@ pub extern "C" fn fmi3Terminate(handle: *mut c_void) -> Status {
     call(handle, |held| held.instance.terminate())
 }
 
-/// `fmi3Reset`.
+/// `fmi3Reset`: also after a panic.
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi3Reset(handle: *mut c_void) -> Status {
-    call(handle, |held| held.instance.reset())
+    carry_out(handle, |held| {
+        held.instance.reset().map_err(|error| (ERROR, error.to_string()))?;
+        held.is_broken = false;
+        Ok(())
+    })
 }
 
 /// `fmi3EvaluateDiscreteStates`: outputs change with `fmi3UpdateDiscreteStates` alone.

@@ -1,9 +1,9 @@
 //! Variables and clocks, by type.
 
-use std::ffi::{CString, c_char, c_void};
+use std::ffi::{c_char, c_void};
 
 use super::status::Status;
-use super::{call, slice, slice_mut, text, wrong};
+use super::{call, slice, slice_mut, wrong};
 use crate::call::Called;
 use crate::instance::Interval;
 use crate::variable::Value;
@@ -108,6 +108,7 @@ of_no_variable!(fmi3GetFloat32, fmi3SetFloat32, f32);
 of_no_variable!(fmi3GetInt8, fmi3SetInt8, i8);
 of_no_variable!(fmi3GetInt16, fmi3SetInt16, i16);
 of_no_variable!(fmi3GetInt32, fmi3SetInt32, i32);
+of_no_variable!(fmi3GetString, fmi3SetString, *const c_char);
 
 /// `fmi3GetBoolean`. A `bool` of C is a byte here, so that any byte of an importer's is a value.
 #[unsafe(no_mangle)]
@@ -134,55 +135,6 @@ pub unsafe extern "C" fn fmi3SetBoolean(
 ) -> Status {
     // SAFETY: handed on as it came.
     unsafe { write(h, (vr, nvr), (values, n), |value| Value::Boolean(value != 0)) }
-}
-
-/// `fmi3GetString`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetString(
-    handle: *mut c_void,
-    references: *const u32,
-    count: usize,
-    values: *mut *const c_char,
-    value_count: usize,
-) -> Status {
-    call(handle, |held| {
-        check_counts(count, value_count)?;
-        // SAFETY: arrays of these counts by the importer's word.
-        let (references, values) = unsafe { (slice(references, count)?, slice_mut(values, value_count)?) };
-        held.texts.clear();
-        for (reference, place) in references.iter().zip(values) {
-            let Value::String(text) = held.instance.get(*reference)? else {
-                return wrong(format!("variable {reference} is not a String"));
-            };
-            let text = CString::new(text).unwrap_or_default();
-            *place = text.as_ptr();
-            // The text itself does not move with its owner.
-            held.texts.push(text);
-        }
-        Ok(())
-    })
-}
-
-/// `fmi3SetString`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetString(
-    handle: *mut c_void,
-    references: *const u32,
-    count: usize,
-    values: *const *const c_char,
-    value_count: usize,
-) -> Status {
-    call(handle, |held| {
-        check_counts(count, value_count)?;
-        // SAFETY: arrays of these counts by the importer's word, and texts in them.
-        let (references, values) = unsafe { (slice(references, count)?, slice(values, value_count)?) };
-        for (reference, value) in references.iter().zip(values) {
-            // SAFETY: as above.
-            let Some(value) = (unsafe { text(*value) }) else { return wrong("a text that is null or not UTF-8") };
-            held.instance.set(*reference, Value::String(value.to_owned()))?;
-        }
-        Ok(())
-    })
 }
 
 /// `fmi3GetBinary`: what is handed out lives until the next call that changes the instance.

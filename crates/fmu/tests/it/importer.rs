@@ -47,7 +47,7 @@ impl Importer {
             drive.exit_initialization().unwrap();
         }
         bus.exit_initialization().unwrap();
-        let terminals = (0..=specs.len()).map(|node| Terminal::new("", 1000 + 4 * node as u32)).collect();
+        let terminals = (0..=specs.len()).map(|node| Terminal::new("", 1000 + 5 * node as u32)).collect();
         Self { bus, drives, script: Script { frames, heard: Vec::new() }, terminals, now_ns: 0 }
     }
 

@@ -1,6 +1,6 @@
 //! Which call is taken in which mode, and what a call of no sense is answered with.
 
-use ferrodrive_fmu::config::{Config, TxClock};
+use ferrodrive_fmu::config::TxClock;
 use ferrodrive_fmu::instance::{Instance, Interval, Mode};
 use ferrodrive_fmu::operation::{NodeStatus, Operation, operations};
 use ferrodrive_fmu::variable::Value;
@@ -66,18 +66,10 @@ fn every_variable_of_the_description_can_be_read_and_inputs_hold_their_start() {
     for config in [
         drive("zlac8030l@4", TxClock::Countdown),
         drive("m8025e25b80@7", TxClock::Countdown),
-        drive("zlim42c@16,timing=ideal", TxClock::Countdown),
+        drive("zlim42c@15", TxClock::Countdown),
         drive("cia402@2", TxClock::Countdown),
         bus(3, TxClock::Countdown),
     ] {
-        // A stepper has node-IDs by switches.
-        let config = match config {
-            Config::Drive(mut it) if it.drive.starts_with("zlim") => {
-                it.drive = "zlim42c@15".to_owned();
-                Config::Drive(it)
-            }
-            other => other,
-        };
         let mut instance = instance(config);
         for variable in instance.variables().to_vec() {
             let value = instance.get(variable.reference).unwrap();

@@ -82,7 +82,7 @@ fn bytes_that_are_torn_or_of_another_fmu_are_refused() {
     }
     let bus = instance(bus(2, TxClock::Triggered));
     let refusal = SavedState::from_bytes(&bytes, &bus).err().unwrap().to_string();
-    assert!(refusal.contains("it is of [drive]"), "{refusal}");
+    assert!(refusal.contains("it is of ferrodrive-"), "{refusal}");
 }
 
 #[test]
