@@ -1,9 +1,13 @@
 //! Which call is taken in which mode, and what a call of no sense is answered with.
 
+use std::collections::BTreeSet;
+
 use ferrodrive_fmu::config::TxClock;
 use ferrodrive_fmu::instance::{Instance, Interval, Mode};
 use ferrodrive_fmu::operation::{NodeStatus, Operation, operations};
+use ferrodrive_fmu::unit::Unit;
 use ferrodrive_fmu::variable::Value;
+use ferrodrive_fmu::xml;
 
 use crate::importer::{binary, bus, drive, instance};
 
@@ -42,6 +46,7 @@ fn a_call_in_another_mode_is_refused_with_what_is_expected() {
     assert_eq!(made.mode(), Mode::Step);
     assert!(refusal(made.enter_event()).contains("eventModeUsed = false"));
     made.terminate().unwrap();
+    assert!(refusal(made.set(2, Value::Binary(vec![0]))).contains("the simulation is over"));
     assert!(refusal(made.step(0.0, 1e-3)).contains("Terminated"));
     made.reset().unwrap();
     assert_eq!(made.mode(), Mode::Instantiated);
@@ -86,7 +91,7 @@ fn a_drive_says_when_it_joins_the_bus() {
     let mut drive = instance(drive("zlac8030l@4,timing=ideal", TxClock::Triggered));
     drive.exit_initialization().unwrap();
     let mut said: Vec<Operation> = operations(&binary(&mut drive, 4)).map(Result::unwrap).collect();
-    for step in 0..100 {
+    for step in 0..1_500 {
         drive.update().unwrap();
         drive.enter_step().unwrap();
         drive.step(f64::from(step) * 1e-3, 1e-3).unwrap();
@@ -100,6 +105,72 @@ fn a_drive_says_when_it_joins_the_bus() {
         Operation::Transmit("704#00".parse().unwrap()),
     ];
     assert_eq!(said, expected);
+}
+
+/// An event is needed when something is due at the end of a step, and never where event mode was not asked for.
+#[test]
+fn a_step_needs_an_event_when_something_is_due_at_its_end() {
+    for (clock, has_events) in [
+        (TxClock::Countdown, true),
+        (TxClock::Triggered, true),
+        (TxClock::Countdown, false),
+        (TxClock::Triggered, false),
+    ] {
+        let mut drive = Instance::of(drive("zlac8030l@4", clock), ".".as_ref(), has_events).unwrap();
+        drive.enter_initialization(0.0).unwrap();
+        drive.exit_initialization().unwrap();
+        if has_events && clock == TxClock::Countdown {
+            drive.set_clock(3, true).unwrap();
+        }
+        let (mut needed, mut has_sent) = (0, false);
+        for step in 0..1_500 {
+            if has_events {
+                drive.update().unwrap();
+                drive.enter_step().unwrap();
+            }
+            let needs_event = drive.step(f64::from(step) * 1e-3, 1e-3).unwrap().needs_event;
+            needed += u32::from(needs_event);
+
+            if has_events {
+                drive.enter_event().unwrap();
+            }
+            if has_events && clock == TxClock::Countdown {
+                assert_eq!(drive.interval(3).unwrap() == Interval::In(0), needs_event, "step {step}");
+                if needs_event {
+                    drive.set_clock(3, true).unwrap();
+                }
+            }
+            has_sent |= !binary(&mut drive, 4).is_empty();
+        }
+        assert!(has_sent, "{clock:?}, event mode {has_events}");
+        assert_eq!(needed > 0, has_events, "{clock:?}, event mode {has_events}");
+    }
+}
+
+/// A sum of many steps is not a product: a nanosecond is let pass; a time before the start is not.
+#[test]
+fn a_step_may_begin_a_nanosecond_beside_where_time_stands() {
+    let mut drive = Instance::of(drive("zlac8030l@4", TxClock::Triggered), ".".as_ref(), false).unwrap();
+    drive.enter_initialization(5.0).unwrap();
+    drive.exit_initialization().unwrap();
+    assert!(refusal(drive.step(4.0, 1e-3)).contains("time stands at 5 s"));
+    drive.step(5.0, 1e-3).unwrap();
+    drive.step(5.001 + 1e-9, 1e-3).unwrap();
+    assert!(refusal(drive.step(5.002 + 4e-9, 1e-3)).contains("time stands at 5.002"));
+}
+
+/// One variable in several terminals is forbidden (fmi-ls-bus, "Bus Terminal").
+#[test]
+fn each_terminal_of_a_bus_has_variables_of_its_own() {
+    let config = bus(3, TxClock::Countdown);
+    let unit = Unit::new(&config, ".".as_ref()).unwrap();
+    let (terminals, model) = (xml::terminals_and_icons(&unit), xml::model_description(&config, ".".as_ref(), &unit));
+    let names: Vec<_> = terminals.split("variableName=\"").skip(1).map(|it| it.split('"').next().unwrap()).collect();
+    assert_eq!(names.len(), 15);
+    assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), 15, "{names:?}");
+    for name in names {
+        assert_eq!(model.matches(&format!(" name=\"{name}\"")).count(), 1, "{name}");
+    }
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! A state that is taken back, as a value and as bytes, goes on as if nothing had happened.
 
 use ferrodrive_fmu::config::TxClock;
-use ferrodrive_fmu::instance::Instance;
+use ferrodrive_fmu::instance::{Instance, Interval};
 use ferrodrive_fmu::operation::Operation;
 use ferrodrive_fmu::state::SavedState;
 use ferrodrive_fmu::variable::Value;
 
-use crate::importer::{bus, drive, instance};
+use crate::importer::{binary, bus, drive, instance};
 
 fn turning() -> (Instance, u32) {
     let mut drive = Instance::of(drive("zlac8030l@4,timing=ideal", TxClock::Triggered), ".".as_ref(), false).unwrap();
@@ -97,7 +97,68 @@ fn a_bus_goes_on_from_its_bytes() {
     // In the middle of the frame, which begins when 11 recessive bits have passed.
     bus.step(0.0, 1e-4).unwrap();
     let saved = SavedState::from_bytes(&SavedState::of(&bus).bytes(), &bus).unwrap();
-    saved.restore(&mut bus);
-    bus.step(1e-4, 9e-4).unwrap();
-    assert_eq!(bus.get(10).unwrap(), Value::UInt64(1));
+    // It has gone on, so that a state that is not taken back is seen: time would not stand at its begin.
+    for _ in 0..2 {
+        bus.step(1e-4, 9e-4).unwrap();
+        assert_eq!(bus.get(10).unwrap(), Value::UInt64(1));
+        saved.restore(&mut bus);
+        assert_eq!(bus.get(10).unwrap(), Value::UInt64(0));
+        assert_eq!(bus.get(0).unwrap(), Value::Float64(1e-4));
+    }
+}
+
+/// The drive with its countdown, and what it sent and showed in steps of 1 ms; with `reads`, it is looked at in each.
+fn booting(drive: &mut Instance, steps: std::ops::Range<u32>, reads: bool) -> Vec<(Vec<u8>, Value)> {
+    let mut all = Vec::new();
+    for step in steps {
+        drive.enter_step().unwrap();
+        drive.step(f64::from(step) * 1e-3, 1e-3).unwrap();
+        drive.enter_event().unwrap();
+        let statusword = if reads { drive.get(208).unwrap() } else { Value::UInt16(0) };
+        if drive.interval(3).unwrap() == Interval::In(0) {
+            drive.set_clock(3, true).unwrap();
+        }
+        all.push((binary(drive, 4), statusword));
+        drive.update().unwrap();
+    }
+    all
+}
+
+/// A read finds that the drive has booted and has it send: that is part of what its bytes are of.
+#[test]
+fn a_drive_that_is_read_while_it_boots_goes_on_from_its_bytes() {
+    let mut first = instance(drive("zlac8030l@4", TxClock::Countdown));
+    first.exit_initialization().unwrap();
+    let statuswords = booting(&mut first.clone(), 0..1_500, true);
+    let booted = statuswords.iter().position(|(_, statusword)| *statusword != Value::UInt16(0)).unwrap() as u32;
+    booting(&mut first, 0..booted - 1, true);
+    for until in booted - 1..booted + 3 {
+        let mut other = instance(drive("zlac8030l@4", TxClock::Countdown));
+        SavedState::from_bytes(&SavedState::of(&first).bytes(), &other).unwrap().restore(&mut other);
+        let end = booted + 200;
+        assert_eq!(booting(&mut other, until..end, true), booting(&mut first.clone(), until..end, true), "{until}");
+        booting(&mut first, until..until + 1, true);
+    }
+}
+
+/// Steps, and inputs that are set to what they are, leave nothing behind; a state from bytes is still the same.
+#[test]
+fn a_state_does_not_grow_with_steps_and_with_inputs_that_stay() {
+    let (mut drive, mut step) = turning();
+    let size = SavedState::of(&drive).bytes().len();
+    for _ in 0..2_000 {
+        drive.set(10, Value::Float64(0.0)).unwrap();
+        drive.set(100, Value::Boolean(false)).unwrap();
+        run(&mut drive, &mut step, 1);
+        drive.get(208).unwrap();
+    }
+    let grown = SavedState::of(&drive).bytes();
+    assert!(grown.len() < size + 500, "{size} bytes have become {}", grown.len());
+    let mut other = instance(drive_config());
+    SavedState::from_bytes(&grown, &other).unwrap().restore(&mut other);
+    assert_eq!(seen(&mut other), seen(&mut drive));
+    let mut begin = step;
+    run(&mut drive, &mut step, 300);
+    run(&mut other, &mut begin, 300);
+    assert_eq!(seen(&mut other), seen(&mut drive));
 }
