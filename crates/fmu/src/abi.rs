@@ -99,3 +99,100 @@ unsafe fn text<'a>(pointer: *const c_char) -> Option<&'a str> {
     // SAFETY: not null; ends with a zero by the importer's word.
     unsafe { CStr::from_ptr(pointer) }.to_str().ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ptr::null_mut;
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::config::{BusConfig, Config, TxClock};
+    use crate::instance::Instance;
+
+    /// What was said, and by whom.
+    static SAID: Mutex<Vec<(usize, Status, String)>> = Mutex::new(Vec::new());
+
+    /// A log of an importer that reads time from the instance that has something to say.
+    unsafe extern "C" fn log(place: *mut c_void, status: Status, category: *const c_char, message: *const c_char) {
+        let mut time = [f64::NAN];
+        // SAFETY: the place of the test's handle, which outlives the call; texts of the caller's.
+        let (handle, message, category) =
+            unsafe { (*place.cast::<*mut c_void>(), CStr::from_ptr(message), CStr::from_ptr(category)) };
+        if !handle.is_null() {
+            // SAFETY: one reference, one place.
+            let read = unsafe { values::fmi3GetFloat64(handle, &crate::xml::TIME, 1, time.as_mut_ptr(), 1) };
+            assert!(read == OK || read == FATAL);
+        }
+        let said = format!("{}: {}", category.to_string_lossy(), message.to_string_lossy());
+        SAID.lock().unwrap().push((place as usize, status, said));
+    }
+
+    fn bus(place: &mut *mut c_void, message: status::LogMessage) {
+        let config = BusConfig { nodes: 2, bitrate: 500_000, clock: TxClock::Countdown };
+        let instance = Instance::of(Config::Bus(config), ".".as_ref(), false).unwrap();
+        let log = held::Log::new(std::ptr::from_mut(place).cast(), message);
+        *place = held::add(Held::new(instance, log));
+    }
+
+    #[test]
+    fn an_importer_may_call_in_from_its_log() {
+        let mut handle = null_mut();
+        bus(&mut handle, Some(log));
+        assert_eq!(life::fmi3EnterStepMode(handle), ERROR);
+        let place = &raw const handle as usize;
+        let said = SAID.lock().unwrap();
+        let (_, status, text) = said.iter().find(|(by, ..)| *by == place).unwrap();
+        assert_eq!(*status, ERROR);
+        assert!(text.starts_with("logStatusError: fmi3EnterStepMode in the mode Instantiated"), "{text}");
+        drop(said);
+        life::fmi3FreeInstance(handle);
+    }
+
+    #[test]
+    fn after_a_panic_an_instance_answers_fatal_until_it_is_reset() {
+        let mut handle = null_mut();
+        bus(&mut handle, None);
+        assert_eq!(call(handle, |_| panic!("a test's own")), FATAL);
+        assert_eq!(life::fmi3EnterInitializationMode(handle, 0, 0.0, 0.0, 0, 0.0), FATAL);
+        assert_eq!(life::fmi3Reset(handle), OK);
+        assert_eq!(life::fmi3EnterInitializationMode(handle, 0, 0.0, 0.0, 0, 0.0), OK);
+        life::fmi3FreeInstance(handle);
+        assert_eq!(life::fmi3Reset(handle), ERROR);
+    }
+
+    #[test]
+    fn a_panic_is_reported_as_fatal() {
+        let mut handle = null_mut();
+        bus(&mut handle, Some(report));
+        assert_eq!(call(handle, |_| panic!("a test's own")), FATAL);
+        assert_eq!(*REPORTED.lock().unwrap(), [(FATAL, DEFECT.to_owned())]);
+        life::fmi3FreeInstance(handle);
+    }
+
+    static REPORTED: Mutex<Vec<(Status, String)>> = Mutex::new(Vec::new());
+
+    unsafe extern "C" fn report(_: *mut c_void, status: Status, category: *const c_char, message: *const c_char) {
+        // SAFETY: texts of the caller's.
+        let (category, message) = unsafe { (CStr::from_ptr(category), CStr::from_ptr(message)) };
+        assert_eq!(category, c"logStatusFatal");
+        REPORTED.lock().unwrap().push((status, message.to_string_lossy().into_owned()));
+    }
+
+    #[test]
+    fn a_state_of_another_instance_is_refused() {
+        let (mut first, mut second) = (null_mut(), null_mut());
+        bus(&mut first, None);
+        bus(&mut second, None);
+        let (mut of_first, mut of_second) = (null_mut(), null_mut());
+        // SAFETY: a place for a pointer each.
+        unsafe {
+            assert_eq!(life::fmi3GetFMUState(first, &raw mut of_first), OK);
+            assert_eq!(life::fmi3GetFMUState(second, &raw mut of_second), OK);
+        }
+        assert_eq!(life::fmi3SetFMUState(first, of_second), ERROR);
+        assert_eq!(life::fmi3SetFMUState(second, of_first), ERROR);
+        assert_eq!(life::fmi3SetFMUState(first, of_first), OK);
+        life::fmi3FreeInstance(first);
+        life::fmi3FreeInstance(second);
+    }
+}

@@ -99,7 +99,7 @@ impl DriveUnit {
     /// The drive without power.
     ///
     /// # Errors
-    /// That there is no such drive.
+    /// What of it is not known.
     pub fn new(config: &DriveConfig, resources: &Path) -> Result<Self, ConfigError> {
         let spec = config.spec(resources)?;
         let ordered = order(spec.model, &spec.order(bitrate(config.bitrate)?));

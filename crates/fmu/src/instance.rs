@@ -242,7 +242,7 @@ impl Instance {
     /// The value of a variable.
     ///
     /// # Errors
-    /// There is none of this reference.
+    /// No variable has this reference.
     pub fn get(&mut self, reference: Reference) -> Called<Value> {
         if reference == crate::xml::TIME {
             return Ok(Value::Float64(self.rest.start_s + self.rest.now_ns as f64 / NANOS));
@@ -271,7 +271,7 @@ impl Instance {
     /// Writes a variable.
     ///
     /// # Errors
-    /// There is none of this reference, it has another type, it cannot be set now, or the drive refuses the value.
+    /// No variable has this reference, it has another type, it cannot be set now, or the drive refuses the value.
     pub fn set(&mut self, reference: Reference, value: Value) -> Called<()> {
         if let Some((place, _, is_rx)) = self.data(reference) {
             let Value::Binary(bytes) = value else { return refused(format!("variable {reference} is a binary")) };
@@ -465,5 +465,5 @@ impl Instance {
 }
 
 fn unknown(reference: Reference) -> CallError {
-    CallError(format!("there is no variable {reference}"))
+    CallError(format!("variable {reference} does not exist"))
 }

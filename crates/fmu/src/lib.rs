@@ -1,6 +1,6 @@
 //! Virtual drives and an exact CAN bus as co-simulation FMUs: FMI 3.0 with the layered standard for buses (fmi-ls-bus 1.0).
 //!
-//! An importer (dSPACE VEOS, Silver, FMPy and others) loads the library of this crate and calls its C functions; what they do
+//! An importer of FMI 3.0, such as FMPy, loads the library of this crate and calls its C functions; what they do
 //! stands in [`instance`] without a pointer, what they compute in [`drive`] and [`bus`]. `ferrodrive fmu` packs the archive.
 //!
 //! ```

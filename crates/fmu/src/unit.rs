@@ -46,7 +46,7 @@ impl Unit {
     /// What the configuration describes, before time begins.
     ///
     /// # Errors
-    /// That there is no such thing.
+    /// What of it is not possible.
     pub fn new(config: &Config, resources: &Path) -> Result<Self, ConfigError> {
         Ok(match config {
             Config::Drive(drive) => Self::Drive(Box::new(DriveUnit::new(drive, resources)?)),

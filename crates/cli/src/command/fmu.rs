@@ -165,7 +165,7 @@ fn archived(files: &[Entry]) -> zip::result::ZipResult<Vec<u8>> {
 }
 
 fn not_packed(error: ConfigError) -> Failure {
-    let failure = Failure::new("there is no such FMU").because(&error);
+    let failure = Failure::new("cannot pack this FMU").because(&error);
     match error {
         ConfigError::Drive(_) => failure.next("ferrodrive help sim describes --drive, which takes the same"),
         _ => failure,

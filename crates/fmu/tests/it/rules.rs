@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use ferrodrive_fmu::config::TxClock;
 use ferrodrive_fmu::instance::{Instance, Interval, Mode};
-use ferrodrive_fmu::operation::{NodeStatus, Operation, operations};
+use ferrodrive_fmu::operation::{BusError, ErrorCode, NodeStatus, Operation, operations};
 use ferrodrive_fmu::unit::Unit;
 use ferrodrive_fmu::variable::Value;
 use ferrodrive_fmu::xml;
@@ -60,7 +60,7 @@ fn variables_are_set_by_their_type_role_and_time() {
     assert!(refusal(drive.set(10, Value::Float64(1e9))).contains("load_torque: "));
     assert!(refusal(drive.set(200, Value::Float64(1.0))).contains("angle is an output"));
     assert!(refusal(drive.set(6, Value::UInt64(7))).contains("seed is a parameter"));
-    assert!(refusal(drive.set(99, Value::Float64(1.0))).contains("no variable 99"));
+    assert!(refusal(drive.set(99, Value::Float64(1.0))).contains("variable 99 does not exist"));
     drive.set(10, Value::Float64(2.0)).unwrap();
     drive.set(100, Value::Boolean(true)).unwrap();
     assert_eq!((drive.get(10).unwrap(), drive.get(100).unwrap()), (Value::Float64(2.0), Value::Boolean(true)));
@@ -186,4 +186,83 @@ fn a_countdown_is_what_its_importer_may_wait_for() {
     assert!(nanos > 0);
     assert_eq!(drive.interval(3).unwrap(), Interval::In(nanos));
     assert!(refusal(drive.interval(1)).contains("not a countdown"));
+}
+
+fn written(all: &[Operation]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    all.iter().for_each(|operation| operation.write(&mut bytes));
+    bytes
+}
+
+/// 12 errors of a sender are 96 (error passive at 128 and above), 4 more are 128; each frame that is sent takes 1 off (ISO 11898-1).
+#[test]
+fn a_node_says_when_its_counters_have_fallen_again() {
+    let mut drive = instance(drive("zlac8030l@4,timing=ideal", TxClock::Triggered));
+    drive.set(5, Value::Boolean(true)).unwrap();
+    drive.exit_initialization().unwrap();
+    let boot_up = 0x704;
+    let error = BusError { id: boot_up, code: ErrorCode::Bit, is_primary: true, is_sender: true };
+    let mut statuses = Vec::new();
+    for operation in std::iter::repeat_n(Operation::BusError(error), 16).chain([Operation::Confirm(boot_up)]) {
+        drive.set(2, Value::Binary(written(&[operation]))).unwrap();
+        drive.update().unwrap();
+        let said = operations(&binary(&mut drive, 4)).map(Result::unwrap).collect::<Vec<_>>();
+        statuses.push(said);
+    }
+    assert!(statuses[..15].iter().all(Vec::is_empty), "{statuses:?}");
+    assert_eq!(statuses[15], [Operation::Status(NodeStatus::Passive)]);
+    assert_eq!(statuses[16], [Operation::Status(NodeStatus::Active)]);
+}
+
+/// A node that has failed once and then switches off takes no part: the other's frame has no acknowledgement.
+#[test]
+fn a_node_that_is_off_by_choice_takes_no_part_though_it_has_had_errors() {
+    let mut bus = instance(bus(2, TxClock::Triggered));
+    bus.exit_initialization().unwrap();
+    let frame = |text: &str| Operation::Transmit(text.parse().unwrap());
+    let off = Operation::Status(NodeStatus::BusOff);
+    // Alone: its frame is not acknowledged, which counts.
+    bus.set(1006, Value::Binary(written(&[off.clone()]))).unwrap();
+    bus.set(1001, Value::Binary(written(&[frame("123#")]))).unwrap();
+    let mut step = 0;
+    let mut run = |bus: &mut Instance| {
+        bus.update().unwrap();
+        bus.enter_step().unwrap();
+        bus.step(f64::from(step) * 1e-3, 1e-3).unwrap();
+        bus.enter_event().unwrap();
+        step += 1;
+        (bus.get(10).unwrap(), bus.get(11).unwrap())
+    };
+    let (frames, Value::UInt64(errors)) = run(&mut bus) else { panic!() };
+    assert_eq!(frames, Value::UInt64(0));
+    assert!(errors > 0);
+    // The second joins, and the frame gets through; the first switches off, with errors in its counter.
+    bus.set(1006, Value::Binary(written(&[Operation::Status(NodeStatus::Active)]))).unwrap();
+    run(&mut bus);
+    let (frames, before) = run(&mut bus);
+    assert_eq!(frames, Value::UInt64(1));
+    bus.set(1001, Value::Binary(written(&[off]))).unwrap();
+    bus.set(1006, Value::Binary(written(&[frame("124#")]))).unwrap();
+    let (frames, after) = run(&mut bus);
+    assert_eq!(frames, Value::UInt64(1));
+    assert_ne!(before, after, "its frame is not acknowledged");
+}
+
+/// The folder of the resources may have any name; what is in the file decides the token.
+#[test]
+fn a_drive_of_a_file_is_found_below_a_path_with_commas() {
+    let folder = std::env::temp_dir().join(format!("ferrodrive, fmu@4, {}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let eds = |of: &str| {
+        let unit = Unit::new(&drive(of, TxClock::Countdown), &folder);
+        unit.err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let refusal = eds("it.eds@5,timing=ideal");
+    assert!(refusal.contains("it.eds") && !refusal.contains("is not an option"), "{refusal}");
+    let config = drive("it.eds@5", TxClock::Countdown);
+    std::fs::write(folder.join("it.eds"), "[FileInfo]\n").unwrap();
+    let token = xml::token(&config, &folder);
+    std::fs::write(folder.join("it.eds"), "[FileInfo]\n\n").unwrap();
+    assert_ne!(xml::token(&config, &folder), token);
+    std::fs::remove_dir_all(&folder).unwrap();
 }
