@@ -39,7 +39,7 @@ pub enum Unit {
     /// A drive.
     Drive(Box<DriveUnit>),
     /// A bus.
-    Bus(BusUnit),
+    Bus(Box<BusUnit>),
 }
 
 impl Unit {
@@ -50,7 +50,7 @@ impl Unit {
     pub fn new(config: &Config, resources: &Path) -> Result<Self, ConfigError> {
         Ok(match config {
             Config::Drive(drive) => Self::Drive(Box::new(DriveUnit::new(drive, resources)?)),
-            Config::Bus(bus) => Self::Bus(BusUnit::new(bus)?),
+            Config::Bus(bus) => Self::Bus(Box::new(BusUnit::new(bus)?)),
         })
     }
 

@@ -222,7 +222,7 @@ fn a_node_that_is_off_by_choice_takes_no_part_though_it_has_had_errors() {
     let frame = |text: &str| Operation::Transmit(text.parse().unwrap());
     let off = Operation::Status(NodeStatus::BusOff);
     // Alone: its frame is not acknowledged, which counts.
-    bus.set(1006, Value::Binary(written(&[off.clone()]))).unwrap();
+    bus.set(1006, Value::Binary(written(std::slice::from_ref(&off)))).unwrap();
     bus.set(1001, Value::Binary(written(&[frame("123#")]))).unwrap();
     let mut step = 0;
     let mut run = |bus: &mut Instance| {

@@ -68,7 +68,7 @@ fn ten_thousand_buffers_are_taken_or_answered_with_a_format_error() {
             instance.enter_event().unwrap();
         }
         assert!(operations(&binary(&mut drive, 4)).all(|operation| operation.is_ok()));
-        time = f64::from(case as u32 + 1) * 2e-3;
+        time = f64::from(case + 1) * 2e-3;
     }
 }
 
