@@ -176,3 +176,37 @@ fn a_state_does_not_grow_with_steps_and_with_inputs_that_stay() {
     run(&mut other, &mut begin, 300);
     assert_eq!(seen(&mut other), seen(&mut drive));
 }
+
+/// A step of no time after what is due was done: what it has to send then is in its bytes.
+#[test]
+fn a_step_of_no_time_takes_nothing_away() {
+    let mut drive = instance(drive("zlac8030l@4", TxClock::Countdown));
+    drive.exit_initialization().unwrap();
+    drive.set_clock(3, true).unwrap();
+    let mut now_ns = 0;
+    let take = |drive: &mut Instance| {
+        drive.set_clock(3, true).unwrap();
+        binary(drive, 4)
+    };
+    // From deadline to deadline, until one has it say that it has booted.
+    loop {
+        drive.update().unwrap();
+        let mut ahead = drive.clone();
+        let Interval::In(nanos) = drive.interval(3).unwrap() else { panic!() };
+        if nanos == 0 && !take(&mut ahead).is_empty() {
+            break;
+        }
+        drive.enter_step().unwrap();
+        drive.step(now_ns as f64 / 1e9, nanos as f64 / 1e9).unwrap();
+        drive.enter_event().unwrap();
+        now_ns += nanos;
+    }
+    drive.enter_step().unwrap();
+    drive.step(now_ns as f64 / 1e9, 0.0).unwrap();
+    drive.enter_event().unwrap();
+    let mut other = drive.clone();
+    SavedState::from_bytes(&SavedState::of(&drive).bytes(), &drive).unwrap().restore(&mut other);
+    let sent = take(&mut drive);
+    assert!(!sent.is_empty());
+    assert_eq!(take(&mut other), sent);
+}
