@@ -63,6 +63,9 @@ fn variables_are_set_by_their_type_role_and_time() {
     assert!(refusal(drive.set(99, Value::Float64(1.0))).contains("variable 99 does not exist"));
     drive.set(10, Value::Float64(2.0)).unwrap();
     drive.set(100, Value::Boolean(true)).unwrap();
+    // What was refused is not what an input has from then on.
+    assert_eq!(drive.get(10).unwrap(), Value::Float64(2.0));
+    assert!(refusal(drive.set(10, Value::Float64(1e9))).contains("load_torque: "));
     assert_eq!((drive.get(10).unwrap(), drive.get(100).unwrap()), (Value::Float64(2.0), Value::Boolean(true)));
 }
 
