@@ -8,9 +8,9 @@ use core::time::Duration;
 
 use plant::coupled::{Body, ExternalData, ExternalModel, Rule};
 
-use super::World;
 use super::body::CoupledBody;
 use super::member::Member;
+use super::{StationId, World};
 use crate::coupling::JOINT_ANGLE;
 use crate::stimulus::Place;
 
@@ -213,6 +213,12 @@ impl World {
         // A drive says what it has in its first control period: a copy of the world looks ahead.
         let mut copy = self.clone();
         copy.stop_recording();
+        // A station may share its state with its copy, as a master does: in the copy its requests would be answered by drives that are not there.
+        for i in 0..copy.members.len() {
+            if matches!(copy.members[i], Member::Station(_)) {
+                copy.remove(StationId(i));
+            }
+        }
         copy.run_for(Duration::from_millis(1));
         copy.settle_all();
         let later = copy.externals().flat_map(|external| copy.shafts_of(external));

@@ -1,8 +1,10 @@
 //! Drives whose shafts an engine outside moves: torque out and motion in, the other form, and what is refused.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use can::{Bitrate, CanId, Frame};
+use can::{Bitrate, CanId, Frame, Instant, Station};
 use drives::mjoint::Model;
 use plant::coupled::{ExternalModel, Rule};
 use sim::machine::{mjoint, zlac8030l};
@@ -75,6 +77,40 @@ impl Engine {
             }
         }
     }
+}
+
+/// A station that counts its own wake-ups at 0.5 ms together with its copies, which share its state as those of a master do.
+#[derive(Clone, Default)]
+struct Shared(Arc<AtomicUsize>);
+
+impl Station for Shared {
+    fn handle_frame(&mut self, _: &Frame, _: Instant) {}
+
+    fn handle_timeout(&mut self, _: Instant) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        None
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        (self.0.load(Ordering::Relaxed) == 0).then_some(Instant::from_micros(500))
+    }
+}
+
+#[test]
+fn a_look_at_the_shafts_of_a_new_world_does_not_touch_its_stations() {
+    let mut world = World::new(Bitrate::K500, 1);
+    world.add_drive(LEFT, Box::new(zlac8030l(LEFT, 1))).unwrap();
+    let model = ExternalModel::new(Rule::Integrate, &[(0.0, WHEEL)]).unwrap();
+    world.couple("wheel", &Coupling::External(model), &[CoupledShaft::direct(Place::node(LEFT))]).unwrap();
+    let station = Shared::default();
+    world.add_station(station.clone());
+    assert!(world.external_shafts()[0].inertia_kg_m2 > 0.0);
+    assert_eq!(station.0.load(Ordering::Relaxed), 0, "the copy that looks ahead has no part in it");
+    world.run_for(Duration::from_millis(1));
+    assert_eq!(station.0.load(Ordering::Relaxed), 1);
 }
 
 #[test]
