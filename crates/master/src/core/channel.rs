@@ -1,6 +1,6 @@
 use std::collections::VecDeque;
 
-use can::{Frame, Instant};
+use can::{CanId, Frame, Instant};
 use canopen::sdo::client::{self, Client};
 use canopen::sdo::wire::Reply;
 use canopen::{AbortCode, Mux, NodeId};
@@ -97,6 +97,12 @@ impl Channel {
     /// Requests that have not begun go to this server.
     pub(super) fn use_server(&mut self, server: SdoServer) {
         self.next_server = Some(server);
+    }
+
+    /// Replies with this identifier are awaited, or will be.
+    pub(super) fn listens_to(&self, reply: CanId) -> bool {
+        let is_asked = self.active.is_some() || self.next_server.is_none();
+        (is_asked && self.server.reply == reply) || self.next_server.is_some_and(|server| server.reply == reply)
     }
 
     /// True once after the node has refused block transfer.

@@ -281,11 +281,18 @@ impl Core {
     }
 
     fn use_sdo_server(&mut self, node: NodeId, server: SdoServer) {
-        self.further_servers.retain(|(_, of)| *of != node);
+        self.member_mut(node).channel.use_server(server);
+        self.forget_servers(node);
         if let Some(reply) = server.reply.as_standard().filter(|_| server != SdoServer::default_of(node)) {
+            self.further_servers.retain(|(known, _)| *known != reply);
             self.further_servers.push((reply, node));
         }
-        self.member_mut(node).channel.use_server(server);
+    }
+
+    /// Those that nothing is asked of any more: not before the request that is on the wire has ended.
+    fn forget_servers(&mut self, node: NodeId) {
+        let channel = &self.members[usize::from(node.raw()) - 1].channel;
+        self.further_servers.retain(|(reply, of)| *of != node || channel.listens_to(CanId::standard(*reply)));
     }
 
     /// Not while SYNC is produced: the segments of a block wait for no answer, and a hundred of them would stand before SYNC and RPDOs
@@ -310,6 +317,7 @@ impl Core {
             }
             let blocks = self.may_use_blocks();
             self.member_mut(node).channel.start_next(blocks, now);
+            self.forget_servers(node);
         }
         let busy = self.member(node).channel.poll_timeout().is_some();
         if busy {

@@ -59,19 +59,28 @@ impl Node {
     }
 
     /// Asks another of its SDO servers from the next request on, whatever handle makes it: two masters that each have one ask the same
-    /// device at the same time, and neither takes the other's answers. Its record, 1201h to 127Fh, is read through the server in use.
+    /// device at the same time, and neither takes the other's answers. Its record, 1201h to 127Fh, is read through the server in use;
+    /// 1200h is the default server, which nothing is read for.
+    ///
+    /// Where the server leaves a stop unanswered (another program may have made it invalid), the second try of the stop and what follows
+    /// go to the default server.
     ///
     /// # Errors
     /// As [`read`](Self::read); [`Error::NoSdoServer`] where it does not exist.
     pub async fn use_sdo_server(&self, record: u16) -> Result<SdoServer, Error> {
+        let server =
+            if record == 0x1200 { SdoServer::default_of(self.id) } else { self.further_server(record).await? };
+        self.network.submit(Command::UseSdoServer(self.id, server));
+        Ok(server)
+    }
+
+    async fn further_server(&self, record: u16) -> Result<SdoServer, Error> {
         let request = CobId(self.read(Mux::new(record, 1)).await?);
         let reply = CobId(self.read(Mux::new(record, 2)).await?);
         let Some((request, reply)) = parameter::identifiers(request, reply) else {
             return Err(Error::NoSdoServer { node: self.id, record });
         };
-        let server = SdoServer { request: CanId::standard(request), reply };
-        self.network.submit(Command::UseSdoServer(self.id, server));
-        Ok(server)
+        Ok(SdoServer { request: CanId::standard(request), reply })
     }
 
     /// SDO upload: the bytes of an object, as they came.

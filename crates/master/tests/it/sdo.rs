@@ -355,3 +355,37 @@ fn what_is_dropped_before_the_runner_comes_leaves_no_trace() {
     assert_eq!(can::Station::poll_transmit(&mut network), None);
     assert_eq!(can::Station::poll_timeout(&network), None);
 }
+
+/// The toy answers only at its default server: the answers of further ones (CiA 301, 7.2.4.3.5) are on the bus at their time.
+#[test]
+fn a_request_keeps_its_answer_while_its_server_is_changed_and_the_default_one_needs_no_question() {
+    let records = |toy: Toy, (index, id): (u16, u32)| toy.u32(index, 1, id).u32(index, 2, id + 0x10);
+    let mut bus = Bus::new(vec![[(0x1201, 0x680), (0x1202, 0x681)].into_iter().fold(Toy::new(4), records)]);
+    let node = bus.network.node(node(4));
+    let request = |answer: &str, after: u64| (Instant::from_secs(5 + after), answer.parse().unwrap());
+    bus.noise = vec![
+        request("690#4302120181060000", 1),
+        request("690#4300100092010400", 2),
+        request("690#4302120291060000", 3),
+        request("690#4300100092010400", 4),
+    ];
+    let node = node.with_timeout(Duration::from_secs(10));
+    bus.block_on(async {
+        node.use_sdo_server(0x1201).await.unwrap();
+        let change = async {
+            let server = node.use_sdo_server(0x1202).await.unwrap();
+            assert_eq!(server.reply.raw(), 0x691);
+            Ok(0)
+        };
+        // The change comes while the second read, which was queued behind those of the record, waits for its answer at 690h.
+        let read = async {
+            node.read::<u32>(DEVICE_TYPE).await.unwrap();
+            node.read::<u32>(DEVICE_TYPE).await
+        };
+        let both: [std::pin::Pin<Box<dyn Future<Output = Result<u32, Error>>>>; 2] = [Box::pin(change), Box::pin(read)];
+        let read = join_all(both).await;
+        assert_eq!(read[1].as_ref().unwrap(), &0x0004_0192);
+        assert_eq!(node.use_sdo_server(0x1200).await.unwrap().request.raw(), 0x604);
+        assert_eq!(node.read::<u32>(mux(0x1201, 1)).await.unwrap(), 0x680);
+    });
+}

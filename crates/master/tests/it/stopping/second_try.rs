@@ -10,6 +10,8 @@ use sim::task::Task;
 use sim::{Place, Stimulus};
 
 use super::{Bench, NODES, PERIOD, models, options};
+use crate::support::toy_drive::zlac8030l;
+use crate::support::{Bus, node};
 
 /// A connection that was gone for a moment, as a converter that is plugged in again: the first stop is not heard.
 #[test]
@@ -49,4 +51,21 @@ fn a_drive_that_is_reached_again_is_stopped_by_a_second_try() {
         assert_eq!(stopped.loss.is_some(), watch != HostWatch::None, "{name}: {stopped:?}");
         assert!(bench.fastest() < 1.0 && bench.network.moved().is_empty(), "{name}");
     }
+}
+
+/// The toy has the record of a further server and does not answer there, as a device whose server another client has made invalid.
+#[test]
+fn a_drive_whose_further_server_is_gone_is_stopped_through_the_default_one() {
+    let drive = zlac8030l(4).u32(0x1201, 1, 0x680).u32(0x1201, 2, 0x690);
+    let mut bus = Bus::new(vec![drive]);
+    let network = bus.network.clone();
+    let drive = master::Drive::new(network.node(node(4)), model("zlac8030l").unwrap());
+    let stopped = bus.block_on(async {
+        drive.velocity(Rpm(60.0), MotionOptions { wait: true, ..options() }).await.unwrap();
+        drive.node().use_sdo_server(0x1201).await.unwrap();
+        network.stop_all_moved().await
+    });
+    assert!(matches!(&stopped[..], [axis] if axis.outcome.is_ok()), "{stopped:?}");
+    assert!(bus.frames().iter().any(|frame| frame.starts_with("680#2B406000")), "the first try");
+    assert!(network.moved().is_empty());
 }
