@@ -24,9 +24,11 @@ pub const fn is_cob_id(mux: Mux) -> bool {
     matches!(mux.index, 0x1201..=0x12FF) && matches!(mux.sub_index, COB_ID_REQUEST | COB_ID_REPLY)
 }
 
-/// Identifiers of requests and replies, if a channel with these COB-IDs exists: both are valid, and of the base frame format.
+/// Identifiers of requests and replies, if a further channel with these COB-IDs exists: both are valid, of the base frame format, and
+/// not restricted to other services (CiA 301, 7.3.5): an EDS may deliver what nobody could write.
 pub fn identifiers(request: CobId, reply: CobId) -> Option<(u16, CanId)> {
-    let exists = request.is_valid() && reply.is_valid() && !reply.is_extended();
+    let is_fit = |cob_id: CobId| cob_id.is_valid() && !cob_id.is_restricted();
+    let exists = is_fit(request) && is_fit(reply) && !reply.is_extended();
     request.can_id().as_standard().filter(|_| exists).map(|request| (request, reply.can_id()))
 }
 

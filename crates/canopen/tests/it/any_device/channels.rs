@@ -276,3 +276,17 @@ fn as_many_servers_as_the_table_has_records_for() {
         talk(&mut node, &[(&format!("6{request:02X}#6000000000000000"), &format!("6{reply:02X}#0030313233343536"))]);
     }
 }
+
+/// CiA 301, table 41: an EDS that delivers such a record would have the requests of node 5, or NMT, taken for its own.
+#[test]
+fn a_delivered_record_with_restricted_identifiers_is_not_served() {
+    for (request, reply) in [(0x605, 0x690), (0x680, 0x585), (0x000, 0x690)] {
+        let mut node = node(vec![
+            rw(0x1201, 1, DataType::Unsigned32).default(request),
+            rw(0x1201, 2, DataType::Unsigned32).default(reply),
+            rw(0x2000, 0, DataType::Unsigned16).default(7),
+        ]);
+        assert_eq!(answer(&mut node, &format!("{request:03X}#4000200000000000")), [""; 0]);
+        assert_eq!(answer(&mut node, "604#4000200000000000"), ["584#4B00200007000000"]);
+    }
+}
