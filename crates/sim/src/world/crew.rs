@@ -6,6 +6,7 @@
 //! no more than one parcel. A worker without work looks for more for a moment, unless that was in vain the last times, and then
 //! sleeps.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -67,6 +68,8 @@ pub(super) struct Crew {
 }
 
 struct Workers {
+    /// A child of `fork` has the handles of its parent's threads, and none of the threads.
+    process: u32,
     shared: Arc<Shared>,
     handles: Vec<JoinHandle<()>>,
 }
@@ -95,15 +98,8 @@ struct Contents {
     job: Job,
     now: Instant,
     errands: Vec<Errand>,
-}
-
-/// Notes that a parcel is done, also if a station in it has panicked.
-struct Done<'a>(&'a AtomicUsize);
-
-impl Drop for Done<'_> {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Release);
-    }
+    /// A station in it has panicked.
+    panicked: bool,
 }
 
 impl Crew {
@@ -138,12 +134,15 @@ impl Crew {
     /// The errands of the last batch in their order.
     ///
     /// # Panics
-    /// If one of the stations has.
+    /// If one of the stations has, once all are back.
     pub(super) fn take_back(&mut self, mut back: impl FnMut(Errand)) {
+        let mut panicked = false;
         for parcel in self.workers.iter().flat_map(|workers| &workers.shared.parcels) {
-            let Ok(mut contents) = parcel.contents.lock() else { panic!("a drive has panicked on another thread") };
+            let mut contents = parcel.contents.lock().unwrap_or_else(PoisonError::into_inner);
+            panicked |= std::mem::take(&mut contents.panicked);
             contents.errands.drain(..).for_each(&mut back);
         }
+        assert!(!panicked, "a drive has panicked; this world cannot go on");
     }
 }
 
@@ -156,7 +155,7 @@ impl Clone for Crew {
 impl Workers {
     fn start(threads: usize) -> Self {
         let parcel = |_| {
-            let contents = Contents { job: Job::Advance, now: Instant::ZERO, errands: Vec::new() };
+            let contents = Contents { job: Job::Advance, now: Instant::ZERO, errands: Vec::new(), panicked: false };
             Parcel { open: AtomicBool::new(false), contents: Mutex::new(contents) }
         };
         let shared = Arc::new(Shared {
@@ -175,12 +174,16 @@ impl Workers {
             std::thread::Builder::new().name(format!("world {number}")).spawn(move || shared.help(number)).ok()
         };
         let handles = (1..threads).filter_map(start).collect();
-        Self { shared, handles }
+        Self { process: std::process::id(), shared, handles }
     }
 }
 
 impl Drop for Workers {
     fn drop(&mut self) {
+        if self.process != std::process::id() {
+            // Nobody to wait for, and the gate may be held for ever.
+            return std::mem::forget(std::mem::take(&mut self.handles));
+        }
         self.shared.closed.store(true, Ordering::SeqCst);
         self.shared.wake();
         self.handles.drain(..).for_each(|handle| drop(handle.join()));
@@ -219,13 +222,13 @@ impl Shared {
         if !parcel.open.load(Ordering::Relaxed) || !parcel.open.swap(false, Ordering::Acquire) {
             return;
         }
-        let _done = Done(&self.left);
-        let Ok(mut contents) = parcel.contents.lock() else { return };
-        let Contents { job, now, ref mut errands } = *contents;
-        for errand in errands {
-            errand.found = errand.member.work(job, now, errand.on_bus);
-        }
+        let mut contents = parcel.contents.lock().unwrap_or_else(PoisonError::into_inner);
+        let Contents { job, now, ref mut errands, ref mut panicked } = *contents;
+        // The batch is finished whatever one of its stations does, so that all of them come back; the world then ends there.
+        let work = || errands.iter_mut().for_each(|errand| errand.found = errand.member.work(job, now, errand.on_bus));
+        *panicked |= catch_unwind(AssertUnwindSafe(work)).is_err();
         drop(contents);
+        self.left.fetch_sub(1, Ordering::Release);
     }
 
     /// What others have begun is nearly done. Where they have lost their processor it is given to them.

@@ -1,6 +1,7 @@
 //! A world does the same on any number of threads: frame by frame at its nanosecond, event by event, and shaft by shaft at
 //! its bit.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use can::{Bitrate, CanId, Frame, Instant};
@@ -9,9 +10,9 @@ use plant::coupled::DifferentialDriveModel;
 use sim::fault::{Babble, Corruption, Delay, NodeFaults};
 use sim::machine::{Order, Realism, TimingMode, order};
 use sim::recorder::{Channel, Recorder, Signal};
-use sim::{CoupledShaft, Coupling, Digest, Place, Prng, StationId, World};
+use sim::{CoupledShaft, Coupling, Digest, Place, Prng, StationId, Stimulus, World};
 
-use crate::common::Chatter;
+use crate::common::{Chatter, TestDrive};
 
 const MODELS: [&str; 5] = ["zlac8030l", "m4230e17b50", "zlim42c", "cia402", "zlim42c-82"];
 
@@ -36,6 +37,31 @@ fn world_of(drives: u8, seed: u64) -> (World, StationId) {
         }
     }
     (world, host)
+}
+
+/// The batch is done to its end, and all drives come back: who catches the panic finds each of them where it was.
+#[test]
+fn a_drive_that_panics_takes_no_other_with_it() {
+    let mut world = World::new(Bitrate::K500, 1);
+    world.set_threads(3);
+    let host = world.add_probe();
+    for node in 1..=30 {
+        let mut drive = Box::new(TestDrive::new(node));
+        drive.powered = true;
+        world.add_drive(node, drive).expect("numbers differ");
+    }
+    let sync = |world: &mut World| {
+        world.send(host, Frame::new(CanId::standard(0x80), &[])).expect("there is room");
+        catch_unwind(AssertUnwindSafe(|| world.run_for(Duration::from_millis(1))))
+    };
+    sync(&mut world).expect("nothing is wrong");
+    world.apply(Place::node(7), &Stimulus::LoadTorque(f64::NAN)).expect("it is there").expect("it is taken");
+    let panic = sync(&mut world).expect_err("node 7 panics");
+    assert_eq!(panic.downcast_ref::<&str>(), Some(&"a drive has panicked; this world cannot go on"));
+    let numbers: Vec<u8> = world.drive_numbers().collect();
+    assert_eq!(numbers, (1..=30).collect::<Vec<_>>());
+    world.apply(Place::node(7), &Stimulus::LoadTorque(0.0)).expect("it is there").expect("it is taken");
+    sync(&mut world).expect("the next batch is done too");
 }
 
 /// Nodes 5 and 10 (hub servos) move a base.
