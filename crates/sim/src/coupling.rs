@@ -76,7 +76,9 @@ pub enum CouplingError {
     #[error("drive {0} moves no shaft")]
     NoShaft(Place),
     /// Control periods of different lengths.
-    #[error("drive {0} has a control period of another length than the others")]
+    #[error(
+        "drive {0} has a control period of another length or phase than the others; drives of fidelity mechanical are coupled before they start"
+    )]
     Period(Place),
     /// A value that makes no sense.
     #[error(transparent)]
