@@ -181,7 +181,7 @@ impl Workers {
 impl Drop for Workers {
     fn drop(&mut self) {
         if self.process != std::process::id() {
-            // Nobody to wait for, and the gate may be held for ever.
+            // No thread to wait for, and the gate may be held for ever.
             return std::mem::forget(std::mem::take(&mut self.handles));
         }
         self.shared.closed.store(true, Ordering::SeqCst);

@@ -215,7 +215,7 @@ impl VirtualDrive for TestDrive {
     }
 
     fn advance(&mut self, now: Instant) {
-        assert!(!self.torque_nm.is_nan(), "a test drive with a load that is no number");
+        assert!(!self.torque_nm.is_nan(), "a test drive with a load that is NaN");
         if self.powered {
             let turns = self.speed_rpm / 60.0 * (now - self.advanced_to).as_secs_f64();
             self.angle_rad += turns * std::f64::consts::TAU;
