@@ -3,7 +3,7 @@
 //! What is given is copied once, into a buffer that the world reads while other Python threads run, and what comes out is a new array.
 //! NumPy is looked for when the first array is needed: who has no engine needs none.
 
-use std::sync::{Arc, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -118,14 +118,11 @@ pub(crate) fn begin_exchange<'py>(
 ) -> PyResult<u64> {
     need_numpy(py)?;
     let dt = step(dt_s)?;
-    let state = &mut world.get().shared().lock(py)?.world;
-    let begun = match second {
-        Some(second) => {
-            let (angle_rad, velocity_rad_s) = (row("angle_rad", first)?, row("velocity_rad_s", second)?);
-            state.begin_exchange(dt, Given::Motion(&angle_rad, &velocity_rad_s))
-        }
-        None => state.begin_exchange(dt, Given::Torque(&row("torque_nm", first)?)),
-    };
+    // Before the world is locked: an array may be an object whose own Python code asks this world, or lets another thread do so.
+    let first = row(if second.is_some() { "angle_rad" } else { "torque_nm" }, first)?;
+    let second = second.map(|second| row("velocity_rad_s", second)).transpose()?;
+    let given = second.as_ref().map_or(Given::Torque(&first), |second| Given::Motion(&first, second));
+    let begun = world.get().shared().lock(py)?.world.begin_exchange(dt, given);
     begun.map_err(bad_value)?;
     Ok(dt.as_nanos() as u64)
 }
@@ -235,6 +232,7 @@ impl Worlds {
         let share = states.len().div_ceil(cores);
         let angles = given.0.chunks(share * width).zip(given.1.chunks(share * width));
         let parts = states.chunks_mut(share).zip(angles).zip(torque_nm.chunks_mut(share * width));
+        let parts: Vec<_> = parts.map(|part| Mutex::new(Some(part))).collect();
         let one_part =
             |((states, (angle_rad, velocity_rad_s)), torque_nm): ((&mut [&mut WorldState], _), &mut [f64])| {
                 let (angle_rad, velocity_rad_s): (&[f64], &[f64]) = (angle_rad, velocity_rad_s);
@@ -245,13 +243,15 @@ impl Worlds {
                     state.keep_record();
                 }
             };
+        let do_part = |part: &Mutex<Option<_>>| {
+            let part = part.lock().unwrap_or_else(PoisonError::into_inner).take();
+            part.into_iter().for_each(one_part);
+        };
         thread::scope(|scope| {
-            let mut parts = parts.into_iter();
-            let own = parts.next();
-            for part in parts {
-                scope.spawn(move || one_part(part));
-            }
-            own.map(one_part);
+            let spawn = |part| thread::Builder::new().spawn_scoped(scope, move || do_part(part)).is_ok();
+            // A system that gives fewer threads gets the same results, later.
+            let others = parts.iter().skip(1).take_while(|part| spawn(*part)).count();
+            parts.iter().take(1).chain(parts.iter().skip(1 + others)).for_each(do_part);
         });
         Ok(torque_nm)
     }

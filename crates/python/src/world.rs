@@ -567,13 +567,13 @@ impl World {
         if Arc::ptr_eq(&self.shared, &other.get().shared) {
             return Ok(());
         }
-        let (world, probes, machine) = {
+        let (world, probes, machine, fidelity) = {
             let state = other.get().shared.lock(py)?;
             state.jobs.check_copyable()?;
             let mut copy = state.world.snapshot();
             // What is kept of a world is not part of it.
             copy.stop_recording();
-            (copy, state.probes.clone(), state.machine())
+            (copy, state.probes.clone(), state.machine(), state.fidelity)
         };
         let state = &mut *self.shared.lock(py)?;
         state.jobs.check_copyable()?;
@@ -589,6 +589,7 @@ impl World {
             ));
         }
         (state.world, state.probes, state.machine) = (world, probes, machine);
+        state.fidelity = fidelity;
         state.recordings.follow(&mut state.world);
         Ok(())
     }

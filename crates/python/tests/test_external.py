@@ -109,6 +109,30 @@ def test_of_several_worlds_all_are_exchanged_or_none():
         worlds.exchange(0.001, numpy.zeros((2, 1)), numpy.zeros((2, 1)))
     with pytest.raises(ValueError, match="twice"):
         ferrodrive.Worlds([worlds[0], worlds[0]])
+    with ferrodrive.virtual_time(worlds[1]), pytest.raises(RuntimeError, match="moved by its own exchange"):
+        worlds.exchange(0.001, good, good)
+
+
+def test_an_array_that_asks_the_world_itself_does_not_wait_for_it():
+    world = wheels()
+
+    class Angles:
+        def __array__(self, dtype=None, copy=None):
+            assert len(world.external_shafts()) == 2
+            return numpy.zeros(2)
+
+    with ferrodrive.virtual_time(world):
+        assert world.exchange(0.001, Angles(), [0.0, 0.0]).shape == (2,)
+
+
+def test_a_copy_of_a_world_adds_drives_of_its_fidelity():
+    world = ferrodrive.World(fidelity="mechanical")
+    copy = world.snapshot()
+    for each in (world, copy):
+        each.add("zlac8030l", node=4)
+    world.run_for(0.5)
+    copy.run_for(0.5)
+    assert copy.digest == world.digest
 
 
 @pytest.mark.parametrize(

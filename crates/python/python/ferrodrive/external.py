@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import _native
+from .turns import active
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -68,10 +69,15 @@ class Worlds(_native.Worlds):
         what each world gives by itself. All worlds are exchanged or none.
 
         :raises ValueError: a shape or a value is wrong, with the number of the world
+        :raises RuntimeError: one of them is that of the virtual time in use (:func:`~ferrodrive.virtual_time`): its threads would not see
+            this time pass; :meth:`World.exchange` moves it
 
         >>> world.external([5])
         >>> worlds = ferrodrive.Worlds([world, world.snapshot()])
         >>> worlds.exchange(0.001, [[0.0], [0.0]], [[0.0], [0.0]]).shape
         (2, 1)
         """
+        time = active()
+        if time is not None and any(world is time.world for world in self.worlds):
+            raise RuntimeError("a world whose virtual time is in use is moved by its own exchange(): take it out of the list, or end that use")
         return super().exchange(dt_s, angle_rad, velocity_rad_s)

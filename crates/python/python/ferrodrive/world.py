@@ -196,7 +196,7 @@ class World(_native.World):
         The torque is the mean over the step at the joint, less the drive's friction; the engine has the drive's inertia as the armature
         of the joint (:meth:`external_shafts`). Time that passes outside of an exchange finds the shafts held fast.
 
-        :param dt_s: the step in s, a whole number of the drives' control periods of 50 us
+        :param dt_s: the step in s, a whole number of the drives' control periods: 50 us, with fidelity ``mechanical`` 500 us
         :param angle_rad: an array of the joints' angles in rad, many turns; ``velocity_rad_s`` one of their velocities in rad/s. What is
             returned is a new array of torques in N m
         :raises ValueError: a length, a value or the step is wrong, or a joint has come further than its velocities explain; nothing is
