@@ -192,17 +192,17 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     let notes = RefCell::new(BusNotes::of(&global.bus));
     let until = async {
         let mut signals = Signals::listen();
-        let failure = tokio::select! {
+        let (failure, by_signal) = tokio::select! {
             result = async {
                 embedded::wait_until_booted(&context.network, embedded.as_deref().unwrap_or_default()).await?;
                 command(&context).await
             } => match result {
                 Ok(done) => return Ok(done),
-                Err(failure) => failure,
+                Err(failure) => (failure, false),
             },
-            signal = signals.next() => Failure::ended_by(signal),
+            signal = signals.next() => (Failure::ended_by(signal), true),
         };
-        let failure = stop_what_moves(&context, failure, asked_again(&context, signals)).await;
+        let failure = stop_what_moves(&context, failure, asked_again(&context, signals, by_signal)).await;
         let notes = notes.borrow();
         // People have read them when they came; programs have only the final report.
         let failure = notes.troubles().filter(|_| global.json).fold(failure, Failure::because);
@@ -272,8 +272,12 @@ pub(crate) fn exit_on_signal() {
 /// Ctrl-C on to a process that has had it already. By then the quick stops are out.
 const ONE_WISH: Duration = Duration::from_millis(250);
 
-/// Until a further signal comes that is a wish of its own.
-async fn asked_again(context: &Context, mut signals: Signals) {
+/// Until a second signal comes that is a wish of its own. Where the command has failed by itself, the first one asks for no more than
+/// what is being done: its sender may not have seen the failure.
+async fn asked_again(context: &Context, mut signals: Signals, has_one: bool) {
+    if !has_one {
+        signals.next().await;
+    }
     let began = context.network.now();
     while context.network.now() - began < ONE_WISH {
         signals.next().await;
@@ -284,7 +288,7 @@ async fn asked_again(context: &Context, mut signals: Signals) {
 /// for it ends at once: drives that were not seen to stand may still be moving.
 async fn stop_what_moves(context: &Context, failure: Failure, again: impl Future<Output = ()>) -> Failure {
     if !context.network.moved().is_empty() {
-        context.progress.show("stopping; Ctrl-C again ends without seeing the drives stand");
+        context.progress.show("stopping; a second Ctrl-C ends without seeing the drives stand");
     }
     let writes = context.is_to_restore();
     let (accounts, restored) = tokio::select! {

@@ -47,11 +47,12 @@ impl Account {
         network.moved().iter().map(lost).collect()
     }
 
-    /// Of the drives that have their quick stop, and whose standstill is not awaited.
+    /// Of the drives whose quick stop was ordered, and of which no more is awaited.
     pub fn of_unawaited(network: &Network, who: &str) -> Vec<Self> {
         let left = |node| {
             let text = format!(
-                "node {node} may still be moving: its quick stop has been sent, and the wait for its standstill was interrupted"
+                "node {node} may still be moving: its quick stop was ordered, and neither its arrival nor a standstill was awaited, since \
+                 that was interrupted"
             );
             Self::moving(node, text, network.guarded(node), who)
         };

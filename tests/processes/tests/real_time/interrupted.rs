@@ -124,7 +124,7 @@ fn ctrl_c_once_more_ends_at_once_and_says_what_was_not_seen() {
     let ended = moving.wait_with_output().unwrap();
     let said = String::from_utf8(ended.stderr).unwrap();
     assert_eq!(ended.status.code(), Some(130), "{said}");
-    assert!(said.contains("node 4 may still be moving: its quick stop has been sent"), "{said}");
+    assert!(said.contains("node 4 may still be moving: its quick stop was ordered"), "{said}");
     assert!(said.contains("make sure that it stands still"), "{said}");
     wait_until("node 4 stands", || speed(&mut simulator, "4").abs() < 1.0);
 }
