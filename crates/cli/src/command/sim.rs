@@ -201,6 +201,9 @@ impl Sim {
                 .next("omit them, or --bus"));
         }
         self.refuse_unanswered_registers(&machine, file.is_some())?;
+        if let Some(what) = machine.bad_realism() {
+            return Err(Failure::usage(what).next("omit --realism full, or --fidelity mechanical"));
+        }
         // Everything that its drives refuse is reported at once, before any of them is created.
         file.map(Machine::build).transpose().map_err(unusable)?;
         let warnings = Messages::of_warnings();

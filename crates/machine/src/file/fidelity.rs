@@ -2,9 +2,9 @@
 
 use can::Bitrate;
 use sim::Fidelity;
-use sim::machine::Order;
+use sim::machine::{Order, Realism};
 
-use super::{Machine, Placed};
+use super::{BadFile, Machine, Placed};
 
 /// What fidelity mechanical leaves out (docs/fidelity.md).
 const NOT_SHOWN: &str = "current ripple, cogging, noise, commutation fault, lost phase or short circuit";
@@ -20,11 +20,51 @@ impl Machine {
         placed.spec.fidelity.or(self.fidelity).unwrap_or_default()
     }
 
+    /// Which of its drives cannot show what `realism = "full"` adds, and why; `None` if all do.
+    pub fn bad_realism(&self) -> Option<String> {
+        let is_mechanical = |placed: &&Placed| self.fidelity_of(placed) == Fidelity::Mechanical;
+        let placed = self.drives.iter().filter(|_| self.realism == Some(Realism::Full)).find(is_mechanical)?;
+        let node = placed.spec.node;
+        Some(format!(
+            "node {node} has fidelity mechanical, which shows nothing of what realism full adds (noise, cogging); expected realism ideal, \
+             or fidelity full"
+        ))
+    }
+
+    pub(super) fn check_realism(&self) -> Result<(), BadFile> {
+        match self.bad_realism().zip(self.drives.first()) {
+            None => Ok(()),
+            Some((what, placed)) => Err(placed.refused(None, &what)),
+        }
+    }
+
     /// What those of its drives that are not of fidelity full do not show; `None` if there is none.
     pub fn not_shown(&self) -> Option<String> {
         let nodes = self.drives.iter().filter(|placed| self.fidelity_of(placed) == Fidelity::Mechanical);
         let nodes: Vec<_> = nodes.map(|placed| placed.spec.node.to_string()).collect();
         let of = if nodes.len() == 1 { "node" } else { "nodes" };
         (!nodes.is_empty()).then(|| format!("fidelity mechanical of {of} {} shows no {NOT_SHOWN}", nodes.join(", ")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn realism_full_is_refused_where_a_drive_could_not_show_it() {
+        let built = |top: &str, drive: &str| {
+            let text = format!("{top}\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n{drive}");
+            Machine::parse(&text).expect("it is read").build().map(|_| ()).map_err(|bad| bad.to_string())
+        };
+        for (top, drive) in [
+            ("realism = 'full'\nfidelity = 'mechanical'", ""),
+            ("realism = 'full'", "options = { fidelity = 'mechanical' }"),
+        ] {
+            let refusal = built(top, drive).expect_err("it would show nothing");
+            assert!(refusal.contains("node 4 has fidelity mechanical"), "{refusal}");
+        }
+        assert_eq!(built("realism = 'full'\nfidelity = 'mechanical'", "options = { fidelity = 'full' }"), Ok(()));
+        assert_eq!(built("realism = 'ideal'\nfidelity = 'mechanical'", ""), Ok(()));
     }
 }

@@ -274,6 +274,7 @@ impl Machine {
     /// # Errors
     /// What a drive does not take, with its place in the file.
     pub fn build(&self) -> Result<World, BadFile> {
+        self.check_realism()?;
         let mut world = self.world();
         let mut problems = Vec::new();
         for placed in &self.drives {
