@@ -132,7 +132,7 @@ def test_a_copy_of_a_world_adds_drives_of_its_fidelity():
         each.add("zlac8030l", node=4)
     world.run_for(0.5)
     copy.run_for(0.5)
-    assert copy.digest == world.digest
+    assert copy.digest() == world.digest()
 
 
 @pytest.mark.parametrize(
