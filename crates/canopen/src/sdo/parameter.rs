@@ -25,7 +25,7 @@ pub const fn is_cob_id(mux: Mux) -> bool {
 }
 
 /// Identifiers of requests and replies, if a further channel with these COB-IDs exists: both are valid, of the base frame format, and
-/// not restricted to other services (CiA 301, 7.3.5): an EDS may deliver what no device could write.
+/// not restricted to other services (CiA 301, 7.3.5): an EDS may deliver what no client could write.
 pub fn identifiers(request: CobId, reply: CobId) -> Option<(u16, CanId)> {
     let is_fit = |cob_id: CobId| cob_id.is_valid() && !cob_id.is_restricted();
     let exists = is_fit(request) && is_fit(reply) && !reply.is_extended();

@@ -1,6 +1,7 @@
 //! SDO over several nodes, through the async face, against toy nodes.
 
 use std::future::Future;
+use std::pin::Pin;
 use std::time::Duration;
 
 use crate::support::toy::Toy;
@@ -382,7 +383,8 @@ fn a_request_keeps_its_answer_while_its_server_is_changed_and_the_default_one_ne
             node.read::<u32>(DEVICE_TYPE).await.unwrap();
             node.read::<u32>(DEVICE_TYPE).await
         };
-        let both: [std::pin::Pin<Box<dyn Future<Output = Result<u32, Error>>>>; 2] = [Box::pin(change), Box::pin(read)];
+        type Asked<'a> = Pin<Box<dyn Future<Output = Result<u32, Error>> + 'a>>;
+        let both: [Asked<'_>; 2] = [Box::pin(change), Box::pin(read)];
         let read = join_all(both).await;
         assert_eq!(read[1].as_ref().unwrap(), &0x0004_0192);
         assert_eq!(node.use_sdo_server(0x1200).await.unwrap().request.raw(), 0x604);
