@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use words::escaped;
+
 use crate::config::{Config, TxClock};
 use crate::unit::Unit;
 use crate::variable::{Causality, Reference, Terminal, Variable};
@@ -173,20 +175,4 @@ fn network(xml: &mut String, terminal: &Terminal, clock: TxClock) {
          name=\"{name}.Tx_Data\" valueReference=\"{tx_data}\" causality=\"output\" variability=\"discrete\" \
          clocks=\"{tx_clock}\" mimeType=\"{MIME_TYPE}\"/>"
     );
-}
-
-/// Text as an attribute holds it.
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            letter if letter.is_control() => escaped.push(' '),
-            letter => escaped.push(letter),
-        }
-    }
-    escaped
 }

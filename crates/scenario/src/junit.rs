@@ -2,6 +2,8 @@
 
 use std::fmt::{self, Write};
 
+use words::escaped;
+
 use super::outcome::{Outcome, Row, Verdict};
 
 /// A file of test suites: of each scenario the outcome of its run under its title, or under its name why it could not be run.
@@ -61,21 +63,4 @@ fn broken_suite(xml: &mut String, name: &str, reason: &str) -> fmt::Result {
         "  <testsuite name=\"{name}\" tests=\"1\" failures=\"0\" errors=\"1\" skipped=\"0\" time=\"0\">\n    \
          <testcase classname=\"{name}\" name=\"the file\" time=\"0\"><error message=\"{reason}\"/></testcase>\n  </testsuite>"
     )
-}
-
-/// Text as XML takes it: no markup, and none of the letters that XML 1.0 does not have.
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\n' | '\t' => escaped.push(letter),
-            _ if letter.is_control() || matches!(letter, '\u{FFFE}' | '\u{FFFF}') => escaped.push('\u{FFFD}'),
-            _ => escaped.push(letter),
-        }
-    }
-    escaped
 }
