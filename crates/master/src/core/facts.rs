@@ -24,6 +24,8 @@ pub struct NodeFacts {
     pub nmt_sent: Option<(Instant, NmtCommand)>,
     /// When any frame of its predefined connection set came (CiA 301, 7.3.3).
     pub seen_at: Option<Instant>,
+    /// When its last SDO answer came, to whichever client.
+    pub answered_at: Option<Instant>,
     /// The heartbeat that is expected of it, if it is being watched.
     pub heartbeat_watch: Option<HeartbeatWatch>,
     /// SDO requests in a row that it has not answered.

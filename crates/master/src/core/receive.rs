@@ -34,6 +34,7 @@ impl Core {
     pub(super) fn handle_sdo_reply(&mut self, node: NodeId, frame: &Frame) {
         let now = self.now;
         let member = self.member_mut(node);
+        member.facts.answered_at = Some(now);
         // Two devices are seen by the answers of their default server, to any client.
         let is_default = frame.id() == connection_set::sdo_reply(node);
         if is_default && let Some(second) = member.answers.answered(frame, now) {

@@ -18,6 +18,10 @@ const WINDOW: usize = 32;
 /// at 500 kbit/s and 40 more at 100 kbit/s.
 pub const SCAN_TIMEOUT: Duration = Duration::from_millis(100);
 
+/// How late an answer may come to a scan that asks with a shorter time-out: behind a gateway or a radio link, or of a program on a
+/// busy computer, it takes a few tenths of a second. A guess of what a user waits for.
+const LATE_ANSWER: Duration = Duration::from_millis(500);
+
 /// How often an object is asked for at most, beside another master.
 const TRIES: usize = 4;
 
@@ -164,7 +168,7 @@ impl Network {
     /// Asks all 127 node-IDs who they are. `progress` is given how many have been asked.
     ///
     /// Nodes that answer no SDO are found by their boot-up or heartbeat messages, if any came before or meanwhile; one that boots
-    /// meanwhile is asked again.
+    /// meanwhile is asked again, and so is one whose answer came after `timeout`, up to half a second late: with more patience.
     pub async fn scan(&self, timeout: Duration, mut progress: impl FnMut(usize)) -> Vec<Found> {
         let nodes: Vec<NodeId> = NodeId::all().collect();
         let mut found = Vec::new();
@@ -176,18 +180,20 @@ impl Network {
             asked += window.len();
             progress(asked);
         }
-        self.ask_late_comers(&mut found, began, timeout).await;
+        // An answer that comes after its time-out shows that its node is there.
+        self.sleep(LATE_ANSWER.saturating_sub(timeout)).await;
+        self.ask_late_comers(&mut found, began, timeout.max(LATE_ANSWER)).await;
         self.hear_heartbeats(&mut found, began).await;
         found
     }
 
-    /// Asks those that have booted or were first heard after they had been asked, and have not answered. Each is asked once more, so
-    /// that this ends.
+    /// Asks those that have booted, answered or were first heard after they had been given up. Each is asked once more, so that this
+    /// ends.
     async fn ask_late_comers(&self, found: &mut Vec<Found>, began: Instant, timeout: Duration) {
         let mut asked_again = NodeSet::EMPTY;
         loop {
             let is_late = |id: &NodeId| match found.iter().find(|found| found.node == *id) {
-                Some(found) => found.identity.is_none() && self.facts(*id).boot_up.is_some_and(|(at, _)| at > began),
+                Some(found) => found.identity.is_none() && self.has_come_since(*id, began),
                 None => true,
             };
             let late: Vec<_> = self.seen().iter().filter(|id| is_late(id) && !asked_again.contains(*id)).collect();
@@ -201,6 +207,12 @@ impl Network {
             found.extend(answers);
         }
         found.sort_by_key(|found| found.node);
+    }
+
+    /// True if a node has booted or answered an SDO request since then.
+    fn has_come_since(&self, id: NodeId, then: Instant) -> bool {
+        let facts = self.facts(id);
+        facts.boot_up.map(|(at, _)| at).max(facts.answered_at).is_some_and(|at| at > then)
     }
 
     /// Waits for one and a half heartbeat periods of each node since `began`, and puts down what all have said by then: a node

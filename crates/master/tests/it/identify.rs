@@ -261,3 +261,30 @@ fn another_master_that_asks_too_keeps_no_node_from_being_found() {
         }
     }
 }
+
+/// Answers that take 0.2 s and more, as behind a gateway, where a scan waits 0.1 s: of nodes that it asks first, in the middle and
+/// last, and of one that it also hears.
+#[test]
+fn nodes_whose_answers_come_after_the_time_out_are_found_all_the_same() {
+    const ALL: &[u8] = &[JOINT, SERVO, 64, 127];
+    for (nodes, late) in [(ALL, "bus late 200 200"), (ALL, "bus late 300 450"), (&[127], "bus late 200 200")] {
+        let mut world = World::new(Bitrate::K500, 5);
+        let network = Network::new();
+        world.add_station(network.clone());
+        for &id in nodes {
+            if id == JOINT {
+                let joint = Model::named("m4230e17b50").unwrap();
+                world.add_drive(id, Box::new(mjoint(joint, id, Bitrate::K500))).unwrap();
+            } else {
+                world.add_drive(id, Box::new(zlac8030l(id, K500))).unwrap();
+            }
+            world.apply(sim::Place::node(id), &late.parse().unwrap()).unwrap().unwrap();
+        }
+        world.run_until(Instant::from_secs(3));
+        let found = scan(&mut world, &network);
+        assert!(found.iter().map(|found| found.node.raw()).eq(nodes.iter().copied()), "{late}: {found:?}");
+        for found in &found {
+            assert!(found.identity.is_some() && found.twins.is_none(), "{late}: {found:?}");
+        }
+    }
+}
