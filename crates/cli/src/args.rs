@@ -2,12 +2,13 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{
-    boot, check, completions, conform, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, estop, events,
-    explain, export, fmu, gateway, group, home, init, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan,
-    plot, program, read, readings, record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time,
-    top, watch, world,
-};
+use crate::command::configure::{dcf, init, lss, params, program, sdo, store};
+use crate::command::look::{dump, emcy, explain, objects, pdo, read, scan, studio, top, watch};
+use crate::command::moving::{drive, drive_base, estop, group, home, motion};
+use crate::command::network::{boot, check, conform, gateway, latency, nmt, plan, send, supervise, sync, time};
+use crate::command::record_and_replay::{convert, decode, plot, record, replay};
+use crate::command::simulate::{demo, events, run, sim, world};
+use crate::command::tools::{completions, eds, export, fmu, man_pages, readings};
 use crate::global::Global;
 
 /// CANopen motor drives, virtual and real: simulate them, look into them, move them.

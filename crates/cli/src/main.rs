@@ -44,10 +44,10 @@ use clap::{ArgMatches, FromArgMatches};
 use clap_complete::env::CompleteEnv;
 
 use crate::args::{Cli, Command};
-use crate::command::completions::ASKED_BY;
-use crate::command::departures::DepartureList;
-use crate::command::drive::StopOutcome;
-use crate::command::objects::{Objects, Whose};
+use crate::command::look::departures::DepartureList;
+use crate::command::look::objects::{Objects, Whose};
+use crate::command::moving::drive::StopOutcome;
+use crate::command::tools::completions::ASKED_BY;
 use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
 use crate::global::Global;

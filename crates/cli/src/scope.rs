@@ -8,7 +8,7 @@ use clap::{ArgMatches, CommandFactory};
 use transport::BusSpec;
 
 use crate::args::{Cli, Command};
-use crate::command::objects::Whose;
+use crate::command::look::objects::Whose;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::help;

@@ -7,7 +7,7 @@ use master::core::CycleLoss;
 use master::cyclic::{CyclicOptions, Refusal};
 use master::plan::NodeTraffic;
 
-use super::studio::bitrate;
+use super::look::studio::bitrate;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::numbers::whole;

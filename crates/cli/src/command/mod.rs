@@ -1,55 +1,76 @@
-//! The commands, one file each (commands that share everything but a word share a file).
+//! The commands, one file each (commands that share everything but a word share a file), a folder for each group of the help.
 
-pub(crate) mod boot;
-pub(crate) mod check;
-pub(crate) mod completions;
-pub(crate) mod conform;
-pub(crate) mod convert;
 mod cycles;
-pub(crate) mod dcf;
-pub(crate) mod decode;
-pub(crate) mod demo;
-pub(crate) mod departures;
-pub(crate) mod drive;
-pub(crate) mod drive_base;
-pub(crate) mod dump;
-pub(crate) mod eds;
-pub(crate) mod emcy;
-pub(crate) mod estop;
-pub(crate) mod events;
-pub(crate) mod explain;
-pub(crate) mod export;
-pub(crate) mod fmu;
-pub(crate) mod gateway;
-pub(crate) mod group;
-pub(crate) mod home;
-pub(crate) mod init;
-pub(crate) mod latency;
-pub(crate) mod lss;
-pub(crate) mod man_pages;
-pub(crate) mod motion;
-pub(crate) mod nmt;
-pub(crate) mod objects;
-pub(crate) mod params;
-pub(crate) mod pdo;
-pub(crate) mod plan;
-pub(crate) mod plot;
-pub(crate) mod program;
-pub(crate) mod read;
-pub(crate) mod readings;
-pub(crate) mod record;
-pub(crate) mod repeat;
-pub(crate) mod replay;
-pub(crate) mod run;
-pub(crate) mod scan;
-pub(crate) mod sdo;
-pub(crate) mod send;
-pub(crate) mod sim;
-pub(crate) mod store;
-pub(crate) mod studio;
-pub(crate) mod supervise;
-pub(crate) mod sync;
-pub(crate) mod time;
-pub(crate) mod top;
-pub(crate) mod watch;
-pub(crate) mod world;
+mod repeat;
+
+pub(crate) mod simulate {
+    pub(crate) mod demo;
+    pub(crate) mod events;
+    pub(crate) mod run;
+    pub(crate) mod sim;
+    pub(crate) mod world;
+}
+
+pub(crate) mod look {
+    pub(crate) mod departures;
+    pub(crate) mod dump;
+    pub(crate) mod emcy;
+    pub(crate) mod explain;
+    pub(crate) mod objects;
+    pub(crate) mod pdo;
+    pub(crate) mod read;
+    pub(crate) mod scan;
+    pub(crate) mod studio;
+    pub(crate) mod top;
+    pub(crate) mod watch;
+}
+
+pub(crate) mod moving {
+    pub(crate) mod drive;
+    pub(crate) mod drive_base;
+    pub(crate) mod estop;
+    pub(crate) mod group;
+    pub(crate) mod home;
+    pub(crate) mod motion;
+}
+
+pub(crate) mod configure {
+    pub(crate) mod dcf;
+    pub(crate) mod init;
+    pub(crate) mod lss;
+    pub(crate) mod params;
+    pub(crate) mod program;
+    pub(crate) mod sdo;
+    pub(crate) mod store;
+}
+
+pub(crate) mod network {
+    pub(crate) mod boot;
+    pub(crate) mod check;
+    pub(crate) mod conform;
+    pub(crate) mod gateway;
+    pub(crate) mod latency;
+    pub(crate) mod nmt;
+    pub(crate) mod plan;
+    pub(crate) mod send;
+    pub(crate) mod supervise;
+    pub(crate) mod sync;
+    pub(crate) mod time;
+}
+
+pub(crate) mod record_and_replay {
+    pub(crate) mod convert;
+    pub(crate) mod decode;
+    pub(crate) mod plot;
+    pub(crate) mod record;
+    pub(crate) mod replay;
+}
+
+pub(crate) mod tools {
+    pub(crate) mod completions;
+    pub(crate) mod eds;
+    pub(crate) mod export;
+    pub(crate) mod fmu;
+    pub(crate) mod man_pages;
+    pub(crate) mod readings;
+}

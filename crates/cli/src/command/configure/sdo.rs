@@ -1,0 +1,266 @@
+//! `ferrodrive write`: an object of a node by SDO download (CiA 301, clause 7.2.4), and objects as they are shown.
+
+use std::path::{Path, PathBuf};
+
+use canopen::od::Entry;
+use canopen::{AbortCode, Mux, NodeId};
+use master::decode::{common_name, common_type, standard_row};
+use master::drive::Limits;
+use master::{Drive, Error};
+use serde::Serialize;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::Report;
+use plot::Paint;
+use words::counted;
+use words::decode::{Decoded, decode};
+use words::document::read_bytes;
+use words::node::node;
+use words::object::{ObjectArg, object};
+use words::value::{Typed, typed_alone, typed_for};
+
+/// Write an object of a node
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Values are decimal, 0x.., have a unit where the object has one, or are one of its words:\n  \
+    ferrodrive write 4 60FF 60rpm\n  ferrodrive write 4 6060 'profile velocity'\n  ferrodrive write 4 6040 0x0F\n  \
+    ferrodrive write 5 1008 'left wheel'\n  ferrodrive write 5 1F50:01 --from firmware.bin\n\
+    An object of CiA 301 or CiA 402 has the standard's type where the model is not known:\n  ferrodrive write 32 6060 6\n\
+    Any object that no known table has takes its type with the value: u16:15, i32:-100, text:'left wheel', hex:01AAFF")]
+pub(crate) struct Write {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Index, index:sub-index or name
+    #[arg(value_parser = object)]
+    object: ObjectArg,
+    /// The value
+    #[arg(allow_hyphen_values = true, required_unless_present = "from")]
+    value: Option<String>,
+    /// Write the bytes of this file, as they are
+    #[arg(long, value_name = "FILE", conflicts_with = "value")]
+    from: Option<PathBuf>,
+}
+
+/// An object and its value.
+#[derive(Debug, Serialize)]
+pub(crate) struct ObjectReport {
+    node: u8,
+    object: String,
+    name: Option<&'static str>,
+    /// The model by whose table it is read, if that is a guess.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    guess: Option<&'static str>,
+    #[serde(flatten)]
+    value: Decoded,
+    /// What to know about what was written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    note: Option<String>,
+    /// The file that the bytes went into or came from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(in crate::command) file: Option<String>,
+    /// Why it was not read, where several objects were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(in crate::command) refused: Option<String>,
+    #[serde(skip)]
+    written: bool,
+}
+
+impl Write {
+    /// Reads what was typed, and writes it.
+    pub(crate) async fn run(&self, context: &Context) -> Result<ObjectReport, Failure> {
+        let content = self.from.as_deref().map(content).transpose()?;
+        let drive = context.drive_without_note(self.node).await?;
+        let (mux, row) = resolve(&drive, &self.object)?;
+        let limits = moving_limits(&drive, row).await?;
+        let advice = match row {
+            Some(_) => {
+                format!("ferrodrive objects {} {:04X} shows its type, range, unit and words", self.node, mux.index)
+            }
+            None => {
+                let Mux { index, sub_index } = mux;
+                format!(
+                    "give its type with the value, e.g. ferrodrive write {} {index:04X}:{sub_index:02X} u16:15",
+                    self.node
+                )
+            }
+        };
+        let wrong = |reason| Failure::usage(reason).at_node(self.node).at_object(mux).next(&advice);
+        let typed = self.value.as_deref().unwrap_or_default();
+        let value = match (content, row) {
+            (Some(bytes), _) => Typed::Bytes(bytes),
+            (None, Some(row)) => typed_for(row, typed, counts_per_unit(limits.as_ref())).map_err(wrong)?,
+            (None, None) => without_a_row(mux, drive.description().is_some(), typed).map_err(wrong)?,
+        };
+        // Bytes may be a number that means something else on another model.
+        drive.check_write(mux, value.number().unwrap_or_else(|| low_bytes(&value.bytes())))?;
+        context.note_guess(&drive);
+        let bytes = value.bytes();
+        if bytes.len() > LONG {
+            context.progress.show(format!("node {}: writing {} bytes to {mux}", self.node, bytes.len()));
+        }
+        if let Err(error) = drive.node().download(mux, &bytes).await {
+            return Err(with_limits(&drive, error, value.number()).await);
+        }
+        let mut report = ObjectReport::new(&drive, mux, row, &bytes, limits.as_ref(), true);
+        report.note = note(&drive, mux, value.number(), limits.as_ref());
+        report.file = self.from.as_ref().map(|path| path.display().to_string());
+        Ok(report)
+    }
+}
+
+/// The value of an object that no row is known of: with its type, or of the standard's where the model is not known.
+fn without_a_row(mux: Mux, model_known: bool, text: &str) -> Result<Typed, String> {
+    match standard_row(mux).filter(|_| !model_known && !text.contains(':')) {
+        Some(row) => typed_for(&row, text, 1),
+        None => typed_alone(text),
+    }
+}
+
+/// Longest content of a file that is written: what the master reads at most.
+const MOST: u64 = 1 << 20;
+
+/// What takes long enough to say that it goes on.
+const LONG: usize = 1024;
+
+fn content(path: &Path) -> Result<Vec<u8>, Failure> {
+    let bytes = read_bytes(path, MOST).map_err(|reason| {
+        Failure::bad_file(format!("cannot read {}", path.display()))
+            .because(reason)
+            .next("give the path of a file with the bytes to write, at most 1 MB")
+    })?;
+    if bytes.is_empty() {
+        let empty = Failure::bad_file(format!("{} is empty", path.display()));
+        return Err(empty.next("check whether this is the right file"));
+    }
+    Ok(bytes)
+}
+
+/// The low bytes as an unsigned number.
+fn low_bytes(bytes: &[u8]) -> i64 {
+    bytes.iter().take(4).rev().fold(0, |number, byte| number << 8 | i64::from(*byte))
+}
+
+/// What the object takes now, where other objects have a say in it.
+pub(in crate::command) async fn moving_limits(drive: &Drive, row: Option<&Entry>) -> Result<Option<Limits>, Failure> {
+    match row.filter(|row| drive.description().is_some() && (row.resolution.is_some() || row.held_to.is_some())) {
+        Some(row) => Ok(Some(drive.limits(row.mux()).await?)),
+        None => Ok(None),
+    }
+}
+
+fn counts_per_unit(limits: Option<&Limits>) -> i64 {
+    limits.map_or(1, Limits::counts_per_unit)
+}
+
+/// What to know about a value that the drive has taken.
+fn note(drive: &Drive, mux: Mux, number: Option<i64>, limits: Option<&Limits>) -> Option<String> {
+    let storage = drive.description().map(|profile| profile.storage);
+    if storage.is_some_and(|storage| storage.effective_after_restart.contains(&mux)) {
+        let node = drive.node().id();
+        return Some(format!("it takes effect at the next restart, if it is stored by then: ferrodrive save {node}"));
+    }
+    let (limits, setting) = limits.and_then(|limits| Some((limits, limits.holding_back(number?)?)))?;
+    let most = limits.held_to.map_or(0, |(most, _)| most);
+    Some(format!("the drive limits it to {most}, by {setting}"))
+}
+
+/// A refusal of a value, with what the object takes now and where that comes from.
+async fn with_limits(drive: &Drive, error: Error, number: Option<i64>) -> Failure {
+    let by_value = [AbortCode::INVALID_VALUE, AbortCode::VALUE_TOO_HIGH, AbortCode::VALUE_TOO_LOW];
+    let refused = error.object().filter(|_| error.abort().is_some_and(|code| by_value.contains(&code)));
+    let failure = Failure::from(error);
+    let Some(mux) = refused else { return failure };
+    let Ok(limits) = drive.limits(mux).await else { return failure };
+    let failure = failure.next(format!("{mux} {} takes {limits}", limits.name));
+    match limits.resolution.filter(|setting| number.is_some_and(|number| limits.take(number)) && setting.since_restart)
+    {
+        Some(setting) => failure.next(format!(
+            "{} has been written since the drive's last restart: until the next one, the value before it is in effect",
+            setting.object
+        )),
+        None => failure,
+    }
+}
+
+/// The multiplexor, and the row if the node's model is known and has it.
+pub(in crate::command) fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), Failure> {
+    let found = object.resolve(drive.description().map(|model| model.dictionary));
+    found.map_err(|reason| {
+        let node = drive.node().id();
+        Failure::usage(reason)
+            .at_node(node)
+            .next(format!("look for it: ferrodrive objects {node} WORD, or give its index, e.g. 6064"))
+    })
+}
+
+impl ObjectReport {
+    /// The object's number.
+    pub(in crate::command) const fn number(&self) -> Option<i64> {
+        self.value.value
+    }
+
+    pub(in crate::command) fn new(
+        drive: &Drive,
+        mux: Mux,
+        row: Option<&'static Entry>,
+        bytes: &[u8],
+        limits: Option<&Limits>,
+        written: bool,
+    ) -> Self {
+        let unknown = row.is_none() && drive.description().is_none();
+        let data_type = common_type(mux, bytes.len()).filter(|_| unknown);
+        let value = decode(drive.description(), row, bytes).typed(data_type);
+        Self {
+            node: drive.node().id().raw(),
+            object: mux.to_string(),
+            name: row.map(|row| row.name).or_else(|| common_name(mux).filter(|_| drive.description().is_none())),
+            guess: guessed(drive),
+            value: value.at_resolution(counts_per_unit(limits)),
+            note: None,
+            file: None,
+            refused: None,
+            written,
+        }
+    }
+}
+
+/// The model that a drive is taken for on the evidence of its objects.
+pub(in crate::command) fn guessed(drive: &Drive) -> Option<&'static str> {
+    drive.guess().filter(|guess| guess.evidence().is_some()).map(|guess| guess.description().name)
+}
+
+impl Report for ObjectReport {
+    fn text(&self, paint: Paint) -> String {
+        let name = self.name.map(|name| format!(" {name}")).unwrap_or_default();
+        if let Some(why) = &self.refused {
+            return format!("node {} {}{name}: refused: {why}", self.node, self.object);
+        }
+        if let Some(file) = &self.file {
+            let (bytes, to) = (self.value.length(), if self.written { "from" } else { "to" });
+            return format!("node {} {}{name}: {} {to} {file}", self.node, self.object, counted(bytes, "byte"));
+        }
+        let verb = if self.written { " written:" } else { " =" };
+        let cut = (self.value.is_cut() && !self.written).then(|| "-o FILE writes all of them into a file".to_owned());
+        let note = self.note.as_ref().or(cut.as_ref()).map(|note| format!("\n  note    {note}")).unwrap_or_default();
+        format!("node {} {}{name}{verb} {}{note}", self.node, self.object, self.value.text(paint))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn objects_of_the_standard_need_no_type_where_the_model_is_not_known() {
+        let bytes = |index, text: &str| without_a_row(Mux::new(index, 0), false, text).map(|typed| typed.bytes());
+        assert_eq!(bytes(0x6060, "6"), Ok(vec![6]));
+        assert_eq!(bytes(0x6060, "-1"), Ok(vec![0xFF]), "a maker's mode");
+        assert_eq!(bytes(0x6060, "homing"), Ok(vec![6]));
+        assert_eq!(bytes(0x6040, "0x0F"), Ok(vec![0x0F, 0]));
+        assert_eq!(bytes(0x607A, "-2"), Ok(vec![0xFE, 0xFF, 0xFF, 0xFF]));
+        assert_eq!(bytes(0x6060, "i16:6"), Ok(vec![6, 0]), "a type that is given goes before");
+        assert!(bytes(0x6060, "200").is_err() && bytes(0x60FF, "60rpm").is_err() && bytes(0x2000, "6").is_err());
+        assert!(without_a_row(Mux::new(0x6060, 0), true, "6").is_err(), "a model that does not have it");
+    }
+}

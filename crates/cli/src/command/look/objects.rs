@@ -1,0 +1,339 @@
+//! `ferrodrive objects`: the object dictionary of a model, searchable.
+
+use canopen::od::{DefaultValue, Entry, ValueRange};
+use canopen::{Mux, NodeId};
+use master::drive::{Limits, Setting};
+use serde::Serialize;
+
+use super::departures::DepartureList;
+use crate::command::configure::sdo::guessed;
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::Report;
+use plot::Paint;
+use plot::Table;
+use words::models::{Description, resolve};
+use words::node::node;
+use words::object::{ObjectArg, object};
+use words::unresolved::Unresolved;
+
+/// List the object dictionary of a model or of a node
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive objects zlac8030l\n  ferrodrive objects 4 velocity\n  ferrodrive objects zlim42c homing\n  \
+        ferrodrive objects zlac8030l,firmware=2.01 202F\n  ferrodrive objects zlac8030l --departures"
+)]
+pub(crate) struct Objects {
+    /// Model (e.g. zlac8030l), data sheet (FILE.eds) or node-ID
+    #[arg(value_name = "MODEL|FILE.eds|NODE", value_parser = whose)]
+    pub(crate) whose: Whose,
+    /// Show only objects with this index, or with this word in name, title or meaning
+    search: Vec<String>,
+    /// Show where the model departs from CiA 301 and CiA 402, and what a program written for them has to do
+    #[arg(long, conflicts_with = "search")]
+    pub(crate) departures: bool,
+}
+
+/// Whose dictionary.
+#[derive(Clone, Copy)]
+pub(crate) enum Whose {
+    /// A model's.
+    Model(&'static Description),
+    /// That of a node, whose model is to be found out.
+    Node(NodeId),
+}
+
+fn whose(text: &str) -> Result<Whose, Unresolved> {
+    if text.starts_with(|first: char| first.is_ascii_digit() || first == '-') {
+        return Ok(Whose::Node(node(text)?));
+    }
+    resolve(text).map(Whose::Model)
+}
+
+/// The rows found.
+#[derive(Debug, Serialize)]
+pub(crate) struct ObjectList {
+    model: &'static str,
+    /// The model, if a node was asked and its model is a guess.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    guess: Option<&'static str>,
+    title: String,
+    objects: Vec<TableRow>,
+}
+
+#[derive(Debug, Serialize)]
+struct TableRow {
+    object: String,
+    #[serde(skip)]
+    mux: Mux,
+    name: &'static str,
+    title: &'static str,
+    /// What the manual calls it or says of it, where that is not the title.
+    #[serde(skip_serializing_if = "str::is_empty")]
+    description: &'static str,
+    data_type: &'static str,
+    access: &'static str,
+    stored: bool,
+    mappable: bool,
+    default: Factory,
+    /// Smallest and largest value, if narrower than the type.
+    limits: Option<NumberBounds>,
+    /// The object that multiplies them, and divides the unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    limits_times: Option<String>,
+    /// The object beyond whose value a value is taken and has no more effect.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acts_up_to: Option<String>,
+    /// What is in force on the node that was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    now: Option<Now>,
+    unit: &'static str,
+    values: Vec<Meaning>,
+}
+
+/// A factory value, as programs read it: a number, a text, or what the node-ID is added to.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum Factory {
+    Number(i64),
+    Unsigned(u64),
+    Real(f64),
+    PlusNodeId { plus_node_id: u32 },
+    Text(&'static str),
+    Bytes(&'static [u8]),
+}
+
+/// Limits as programs read them: two numbers.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum NumberBounds {
+    Integer((i64, i64)),
+    Unsigned((u64, u64)),
+    Real((f64, f64)),
+}
+
+/// The limits in force on a node, and the objects that they follow from.
+#[derive(Debug, Serialize)]
+struct Now {
+    limits: (i64, i64),
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acts_up_to: Option<i64>,
+    by: Vec<By>,
+    #[serde(skip)]
+    text: String,
+}
+
+#[derive(Debug, Serialize)]
+struct By {
+    object: String,
+    name: &'static str,
+    value: i64,
+    /// The drive goes by the value of its last restart.
+    since_restart: bool,
+}
+
+impl Now {
+    fn of(limits: &Limits) -> Self {
+        let settings = limits.resolution.into_iter().chain(limits.held_to.map(|(_, setting)| setting));
+        let by = settings.map(|Setting { object, name, value, since_restart }| By {
+            object: object.to_string(),
+            name,
+            value,
+            since_restart,
+        });
+        Self {
+            limits: (limits.low, limits.high),
+            acts_up_to: limits.held_to.map(|(most, _)| most),
+            by: by.collect(),
+            text: limits.to_string(),
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Meaning {
+    value: i64,
+    meaning: &'static str,
+}
+
+impl Objects {
+    /// Where a node's model departs from the standards.
+    pub(crate) async fn departures_of_node(&self, context: &Context, node: NodeId) -> Result<DepartureList, Failure> {
+        let drive = context.known_drive(node).await?;
+        let model = drive.description().ok_or_else(|| Failure::unknown_model(node))?;
+        Ok(DepartureList::of(model, guessed(&drive)))
+    }
+
+    /// Searches the table of a node's model.
+    pub(crate) async fn of_node(&self, context: &Context, node: NodeId) -> Result<ObjectList, Failure> {
+        let drive = context.known_drive(node).await?;
+        let model = drive.description().ok_or_else(|| Failure::unknown_model(node))?;
+        let mut list = ObjectList { guess: guessed(&drive), ..self.list(model)? };
+        for row in list.objects.iter_mut().filter(|row| row.limits_times.is_some() || row.acts_up_to.is_some()) {
+            row.now = Some(Now::of(&drive.limits(row.mux).await?));
+        }
+        Ok(list)
+    }
+
+    /// Searches the table of `model`.
+    pub(crate) fn list(&self, model: &'static Description) -> Result<ObjectList, Failure> {
+        let rows = model.dictionary.rows();
+        let wanted = |row: &&Entry| self.search.iter().all(|word| matches(row, word));
+        let objects: Vec<TableRow> = rows.iter().filter(wanted).map(TableRow::new).collect();
+        if objects.is_empty() {
+            let words = self.search.join(" ");
+            return Err(Failure::new(format!("no object of the {} matches '{words}'", model.name)).next(format!(
+                "ferrodrive objects {} lists all {}",
+                model.name,
+                rows.len()
+            )));
+        }
+        Ok(ObjectList {
+            model: model.name,
+            guess: None,
+            title: format!("{}, object dictionary of \"{}\"", model.title, model.manual),
+            objects,
+        })
+    }
+}
+
+fn matches(row: &Entry, word: &str) -> bool {
+    if let Ok(ObjectArg::Mux(mux)) = object(word)
+        && mux.index == row.index
+        && (!word.contains(':') || mux.sub_index == row.sub_index)
+    {
+        return true;
+    }
+    let word = word.to_lowercase();
+    let texts =
+        [row.name, row.title, row.description].into_iter().chain(row.values.iter().map(|(_, meaning)| *meaning));
+    texts.into_iter().any(|text| text.to_lowercase().contains(&word))
+}
+
+impl TableRow {
+    fn new(row: &Entry) -> Self {
+        Self {
+            object: row.mux().to_string(),
+            mux: row.mux(),
+            name: row.name,
+            title: row.title,
+            description: row.description,
+            data_type: row.data_type.name(),
+            access: row.access.name(),
+            stored: row.stored,
+            mappable: row.pdo.is_allowed(),
+            default: Factory::of(row),
+            limits: row.limits.map(NumberBounds::of),
+            limits_times: row.resolution.map(|object| object.to_string()),
+            acts_up_to: row.held_to.map(|held_to| held_to.object.to_string()),
+            now: None,
+            unit: row.unit,
+            values: row.values.iter().map(|(value, meaning)| Meaning { value: *value, meaning }).collect(),
+        }
+    }
+
+    fn accepts(&self) -> String {
+        if let Some(now) = &self.now {
+            return now.text.clone();
+        }
+        if self.values.is_empty() {
+            let limits = self.limits.as_ref().map(NumberBounds::text).unwrap_or_default();
+            let times = self.limits_times.as_ref().map(|object| format!(", times {object}")).unwrap_or_default();
+            let held = self.acts_up_to.as_ref().map(|object| format!("; acts up to {object}")).unwrap_or_default();
+            return limits + &times + &held;
+        }
+        let listed = self.values.iter().map(|row| format!("{} {}", row.value, row.meaning));
+        listed.collect::<Vec<_>>().join("; ")
+    }
+
+    fn rights(&self) -> String {
+        let stored = if self.stored { "/s" } else { "" };
+        let mappable = if self.mappable { " pdo" } else { "" };
+        format!("{}{stored}{mappable}", self.access)
+    }
+}
+
+impl Factory {
+    const fn of(row: &Entry) -> Self {
+        match row.default {
+            DefaultValue::Value(value) => Self::Number(value),
+            DefaultValue::Unsigned(value) => Self::Unsigned(value),
+            DefaultValue::Real(value) => Self::Real(value),
+            DefaultValue::NodeIdPlus(base) => Self::PlusNodeId { plus_node_id: base },
+            DefaultValue::Text(text) => Self::Text(text),
+            DefaultValue::Bytes(bytes) => Self::Bytes(bytes),
+        }
+    }
+
+    /// For people. What is in the communication area is mostly identifiers and mappings.
+    fn text(&self, in_communication_area: bool) -> String {
+        match self {
+            Self::Number(value) if in_communication_area && *value > 255 => format!("0x{value:X}"),
+            Self::Number(value) => value.to_string(),
+            Self::Unsigned(value) => value.to_string(),
+            Self::Real(value) => value.to_string(),
+            Self::PlusNodeId { plus_node_id } => format!("0x{plus_node_id:X} + node-ID"),
+            Self::Text(text) => format!("{text:?}"),
+            Self::Bytes(bytes) => bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" "),
+        }
+    }
+}
+
+impl NumberBounds {
+    const fn of(limits: ValueRange) -> Self {
+        match limits {
+            ValueRange::Integer(low, high) => Self::Integer((low, high)),
+            ValueRange::Unsigned(low, high) => Self::Unsigned((low, high)),
+            ValueRange::Real(low, high) => Self::Real((low, high)),
+        }
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Self::Integer((low, high)) => format!("{low} to {high}"),
+            Self::Unsigned((low, high)) => format!("{low} to {high}"),
+            Self::Real((low, high)) => format!("{low} to {high}"),
+        }
+    }
+}
+
+impl Report for ObjectList {
+    fn text(&self, paint: Paint) -> String {
+        let mut table = Table::new(&["object", "name", "type", "access", "default", "unit", "accepts"]);
+        for row in &self.objects {
+            table.row([
+                row.object.clone(),
+                row.name.into(),
+                row.data_type.into(),
+                row.rights(),
+                row.default.text(matches!(row.mux.index, 0x1000..=0x1FFF)),
+                row.unit.into(),
+                row.accepts(),
+            ]);
+        }
+        format!("{}\n\n{}", self.title, table.plain(paint))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use words::models::embedded;
+
+    fn found(words: &[&str]) -> Vec<&'static str> {
+        let search = words.iter().map(|word| (*word).into()).collect();
+        let (_, model) = embedded()[0];
+        let list = Objects { whose: Whose::Model(model), search, departures: false }.list(model);
+        list.map(|list| list.objects.iter().map(|row| row.name).collect()).unwrap_or_default()
+    }
+
+    #[test]
+    fn objects_are_found_by_index_word_and_meaning() {
+        assert_eq!(found(&["6064"]), ["position_actual_value"]);
+        assert_eq!(found(&["2026:01"]), ["motor_temperature"]);
+        assert!(found(&["2026"]).len() == 3);
+        assert!(found(&["temperature", "threshold"]).contains(&"motor_temperature_protection_threshold"));
+        assert!(found(&["profile torque"]).contains(&"modes_of_operation"));
+        assert!(found(&["zebra"]).is_empty());
+    }
+}

@@ -1,0 +1,341 @@
+//! `ferrodrive state`, `enable`, `disable`, `stop`, `quick-stop` and `reset`: the power state machine of CiA 402 by its
+//! intents, and what a drive says of itself.
+
+use canopen::{NmtState, NodeId};
+use cia402::ModeOfOperation;
+use master::Gear;
+use master::drive::{Drive, DriveState};
+use serde::Serialize;
+
+use super::estop::{Estop, StopReport, stop_all};
+use crate::command::configure::sdo::guessed;
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::Report;
+use plot::Paint;
+use words::node::{Nodes, node, nodes};
+
+/// Show the state of a drive: power state, fault, position, speed, current, supply
+///
+/// Reads only. A fault is shown with its remedy. What a drive has no object for is omitted. `explain` shows why it does
+/// not move, `watch` shows objects as they change.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive state 4\n  ferrodrive --bus can0 --machine machine.toml state 4 --json"
+)]
+pub(crate) struct State {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// Enable a drive: power its motor, which holds still
+///
+/// Takes the transitions of CiA 402 to operation enabled, whatever state the drive is in; a fault is not reset. The
+/// drive stays enabled when the command has ended.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive --bus can0 enable 4\n  ferrodrive --bus can0 enable 4 -v      # each frame of it"
+)]
+pub(crate) struct Enable {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// Disable a drive: stop it, then remove power from its motor
+///
+/// A load that pulls (an arm, a slope) moves a motor without power, unless a brake holds it.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  ferrodrive --bus can0 disable 4")]
+pub(crate) struct Disable {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// Stop a drive, or all, with the deceleration ramp; it stays enabled
+///
+/// Returns when it stands. With all, every drive that answers on the bus is stopped at the same time, and the status is
+/// 0 only when each one was seen to stand.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 stop 4\n  ferrodrive --bus can0 stop all")]
+pub(crate) struct Stop {
+    /// Node-ID, or all
+    #[arg(value_name = "NODE|all", value_parser = nodes)]
+    nodes: Nodes,
+}
+
+/// Stop a drive, or all, with the quick stop as configured (605Ah)
+///
+/// Uses the quick stop of the model in every mode, and reports the state of the drive afterwards. `quick-stop all` is
+/// `estop`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 quick-stop 4\n  ferrodrive --bus can0 quick-stop all")]
+pub(crate) struct QuickStop {
+    /// Node-ID, or all
+    #[arg(value_name = "NODE|all", value_parser = nodes)]
+    nodes: Nodes,
+}
+
+/// What came of a stop.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub(crate) enum StopOutcome {
+    /// Of one drive.
+    One(Box<StateReport>),
+    /// Of every drive on the bus.
+    All(Box<StopReport>),
+}
+
+impl StopOutcome {
+    pub(crate) fn all(report: StopReport) -> Self {
+        Self::All(Box::new(report))
+    }
+
+    /// Why not every drive was seen to stand.
+    pub(crate) fn failure(&self) -> Option<Failure> {
+        match self {
+            Self::One(_) => None,
+            Self::All(report) => report.failure(),
+        }
+    }
+}
+
+impl Report for StopOutcome {
+    fn text(&self, paint: Paint) -> String {
+        match self {
+            Self::One(report) => report.text(paint),
+            Self::All(report) => report.text(paint),
+        }
+    }
+}
+
+/// Reset a drive's fault, once its cause is gone
+///
+/// A fault that persists is reported with its cause and remedy. The drive is not enabled.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive --bus can0 reset 4\n  ferrodrive --bus can0 state 4          # the fault, and what to do about it"
+)]
+pub(crate) struct Reset {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// What a drive says of itself.
+#[derive(Debug, Serialize)]
+pub(crate) struct StateReport {
+    pub(crate) node: u8,
+    /// The model, if it is known for sure.
+    model: Option<&'static str>,
+    /// The model that its objects speak for.
+    guess: Option<&'static str>,
+    state: &'static str,
+    /// The mode of operation: its number, and its name where CiA 402 or the model has one.
+    mode: Option<i8>,
+    mode_name: Option<&'static str>,
+    statusword: u16,
+    bits: Vec<&'static str>,
+    fault_code: u16,
+    faults: Vec<FaultReport>,
+    #[serde(flatten)]
+    pub(crate) motion: ShaftMotion,
+    supply_v: Option<f64>,
+    motor_c: Option<f64>,
+    driver_c: Option<f64>,
+    nmt_state: Option<String>,
+    /// What stands behind the shaft, where something does: angles and speeds are those of its output.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gear: Option<GearReport>,
+}
+
+/// What stands behind a shaft, as the machine file says.
+#[derive(Debug, Serialize)]
+struct GearReport {
+    ratio: f64,
+    feed_constant_mm: Option<f64>,
+    #[serde(skip)]
+    text: String,
+}
+
+/// Where a shaft is and what it does; what is not known is left out of the text.
+#[derive(Debug, Serialize)]
+pub(crate) struct ShaftMotion {
+    position: Option<i64>,
+    angle_deg: Option<f64>,
+    velocity_rpm: Option<f64>,
+    current_a: Option<f64>,
+    /// The same along the way, behind a gear with a feed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    position_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    velocity_mm_s: Option<f64>,
+    #[serde(skip)]
+    is_geared: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct FaultReport {
+    code: u16,
+    name: &'static str,
+    remedy: &'static str,
+}
+
+impl State {
+    /// Reads everything.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+        StateReport::read(&context.drive(self.node).await?).await
+    }
+}
+
+impl Enable {
+    /// Enables and shows the state.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+        let drive = context.drive(self.node).await?;
+        drive.enable().await?;
+        StateReport::read(&drive).await
+    }
+}
+
+impl Disable {
+    /// Disables and shows the state.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+        let drive = context.drive_to_stop(self.node).await?;
+        drive.disable().await?;
+        StateReport::read(&drive).await
+    }
+}
+
+impl Stop {
+    /// Stops and shows the state.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
+        let Nodes::One(node) = self.nodes else { return stop_all(context).await.map(StopOutcome::all) };
+        let drive = context.drive_to_stop(node).await?;
+        drive.stop().await?;
+        Ok(StopOutcome::One(Box::new(StateReport::read(&drive).await?)))
+    }
+}
+
+impl QuickStop {
+    /// Stops at once and shows the state. The stop goes out before the model is asked for.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
+        let Nodes::One(node) = self.nodes else { return Estop::default().run(context).await.map(StopOutcome::all) };
+        context.quick_stop(node).await?;
+        let drive = context.drive_to_stop(node).await?;
+        drive.quick_stop().await?;
+        Ok(StopOutcome::One(Box::new(StateReport::read(&drive).await?)))
+    }
+}
+
+impl Reset {
+    /// Resets and shows the state.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+        let drive = context.drive(self.node).await?;
+        drive.reset_fault().await?;
+        StateReport::read(&drive).await
+    }
+}
+
+impl StateReport {
+    /// Reads everything that the drive says of itself.
+    pub(crate) async fn read(drive: &Drive) -> Result<Self, Failure> {
+        let state: DriveState = drive.state().await?;
+        let bits = state.statusword_words();
+        let gear = drive.gear();
+        let mm = |turns: Option<f64>| Some(turns? * gear.feed_m()? * 1e3);
+        let faults = state.faults.iter().map(|row| FaultReport { code: row.code, name: row.name, remedy: row.remedy });
+        Ok(Self {
+            node: drive.node().id().raw(),
+            model: drive.description().filter(|_| drive.guess().is_none()).map(|profile| profile.name),
+            guess: guessed(drive),
+            state: state.power.map_or("no state of CiA 402", |power| power.name()),
+            mode: state.mode.map(|mode| mode.0),
+            mode_name: state.mode.and_then(ModeOfOperation::name),
+            statusword: state.statusword.0,
+            bits,
+            fault_code: state.fault_code,
+            faults: faults.collect(),
+            motion: ShaftMotion {
+                position: state.position.map(|counts| counts.0),
+                angle_deg: state.angle.map(|angle| angle.0),
+                velocity_rpm: state.velocity.map(|speed| speed.0),
+                current_a: state.current.map(|current| current.0),
+                position_mm: mm(state.angle.map(|angle| angle.0 / 360.0)),
+                velocity_mm_s: mm(state.velocity.map(|speed| speed.0 / 60.0)),
+                is_geared: gear != Gear::DIRECT,
+            },
+            supply_v: state.supply.map(|supply| supply.0),
+            motor_c: state.motor_temperature.map(|temperature| temperature.0),
+            driver_c: state.driver_temperature.map(|temperature| temperature.0),
+            // A boot-up message says only that the node has just left the state it names.
+            nmt_state: state.nmt.filter(|nmt| *nmt != NmtState::Initialising).map(|nmt| nmt.to_string()),
+            gear: (gear != Gear::DIRECT).then(|| GearReport {
+                ratio: gear.ratio(),
+                feed_constant_mm: gear.feed_m().map(|metres| metres * 1e3),
+                text: gear.to_string(),
+            }),
+        })
+    }
+
+    /// Faults and what to do about them; nothing without one. `gap` lines the texts up with others.
+    pub(crate) fn fault_lines(&self, paint: Paint, gap: &str) -> Vec<String> {
+        if self.fault_code != 0 && self.faults.is_empty() {
+            return vec![format!("  fault {gap}{}", paint.bad(&format!("{:04X}h", self.fault_code)))];
+        }
+        let lines = self.faults.iter().flat_map(|fault| {
+            let name = paint.bad(&format!("{:04X}h {}", fault.code, fault.name));
+            [format!("  fault {gap}{name}"), format!("  remedy{gap}{}", fault.remedy)]
+        });
+        lines.collect()
+    }
+
+    fn power(&self) -> String {
+        let parts = [
+            self.supply_v.map(|supply| format!("{supply:.1} V")),
+            self.motor_c.map(|celsius| format!("motor {celsius:.1} °C")),
+            self.driver_c.map(|celsius| format!("driver {celsius:.1} °C")),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl ShaftMotion {
+    /// In one line.
+    pub(crate) fn text(&self) -> String {
+        // A tenth of an r/min of the output may be many of a shaft behind a gear.
+        let decimals = if self.is_geared { 3 } else { 1 };
+        let parts = [
+            self.position.map(|counts| format!("{counts} counts")),
+            self.angle_deg.map(|angle| format!("{angle:.2}°")),
+            self.position_mm.map(|mm| format!("{mm:.3} mm")),
+            self.velocity_rpm.map(|speed| format!("{speed:.decimals$} r/min")),
+            self.velocity_mm_s.map(|speed| format!("{speed:.2} mm/s")),
+            self.current_a.map(|current| format!("{current:.1} A")),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Report for StateReport {
+    fn text(&self, paint: Paint) -> String {
+        let mode = self.mode.map_or_else(|| "unknown mode".into(), |mode| ModeOfOperation(mode).to_string());
+        let model = self.model.map(|model| format!(" ({model})")).unwrap_or_default();
+        let mut lines = vec![format!("node {}{model}: {}, {mode}", self.node, paint.strong(self.state))];
+        lines.push(format!("  statusword  {:04X}h  {}", self.statusword, self.bits.join(", ")));
+        lines.extend(self.fault_lines(paint, "      "));
+        if self.fault_code == 0 {
+            lines.push("  fault       none".into());
+        }
+        lines.push(format!("  motion      {}", self.motion.text()));
+        if let Some(gear) = &self.gear {
+            lines.push(format!("  behind      {}: angles and speeds are those of its output", gear.text));
+        }
+        lines.push(format!("  power       {}", self.power()));
+        if let Some(nmt) = &self.nmt_state {
+            lines.push(format!("  nmt         {nmt}"));
+        }
+        lines.join("\n")
+    }
+}

@@ -1,0 +1,390 @@
+//! `ferrodrive velocity`, `move` and `torque`: motion in physical units.
+
+use std::fmt;
+use std::pin::pin;
+use std::time::Duration;
+
+use canopen::NodeId;
+use devices::{Quantity, Ramps, Scale};
+use master::drive::{Commanded, Drive, Manner, MotionReport, Note};
+use master::units::{Along, Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
+use serde::Serialize;
+
+use super::drive::{ShaftMotion, StateReport};
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::guard::{Guard, GuardArgs, GuardReport};
+use crate::output::Report;
+use plot::Paint;
+use words::models::is_from_file;
+use words::node::node;
+
+/// Turn the motor at a speed
+///
+/// Enables the drive and returns when the speed is reached; the motor keeps turning. With --for it is stopped
+/// afterwards.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive velocity 4 60rpm --for 2s\n  ferrodrive velocity 4 -360deg/s --acceleration 120rpm/s"
+)]
+pub(crate) struct Velocity {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Speed: 60 (r/min), 60rpm, 6.28rad/s, 360deg/s, 1r/s; 200mm/s where the machine file has a feed constant
+    #[arg(allow_hyphen_values = true)]
+    speed: Along<Rpm>,
+    #[command(flatten)]
+    ramps: RampArgs,
+    /// Keep turning for this long, then stop
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
+    duration: Option<Duration>,
+}
+
+/// Move to a position, or by an angle
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive move 4 90deg\n  ferrodrive move 4 32000 --profile-velocity 60rpm\n  \
+    ferrodrive move 4 --relative -0.5turn --acceleration 300ms")]
+pub(crate) struct Move {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Position: 32000 (counts), 90deg, 0.5turn, 1.57rad; 40mm where the machine file has a feed constant
+    #[arg(allow_hyphen_values = true)]
+    position: Along<Angle>,
+    /// Move by this much from the last target, instead of to a position
+    #[arg(long)]
+    relative: bool,
+    /// Highest speed of the move
+    #[arg(long, value_name = "SPEED", value_parser = speed)]
+    profile_velocity: Option<Along<Rpm>>,
+    #[command(flatten)]
+    ramps: RampArgs,
+}
+
+/// Apply a motor current (profile torque)
+///
+/// Returns at once: what the motor does depends on the load. With --for the torque is removed afterwards.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  ferrodrive torque 4 1.5A --for 2s")]
+pub(crate) struct Torque {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Motor current: 1.5A, -800mA
+    #[arg(allow_hyphen_values = true)]
+    current: Amperes,
+    /// Apply it for this long, then stop
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
+    duration: Option<Duration>,
+    /// Accepted for symmetry with the other moving commands: this one never waits
+    #[arg(long)]
+    no_wait: bool,
+    #[command(flatten)]
+    guard: GuardArgs,
+}
+
+/// How a motion is to be made, where the drive's own settings are not wanted.
+#[derive(Debug, clap::Args)]
+struct RampArgs {
+    /// Acceleration, or the time to speed up: 500ms, 120rpm/s, 12.6rad/s2; 500mm/s2 with a feed constant
+    #[arg(long, value_name = "RAMP")]
+    acceleration: Option<Along<Ramp>>,
+    /// Deceleration, in the same forms
+    #[arg(long, value_name = "RAMP")]
+    deceleration: Option<Along<Ramp>>,
+    /// Return at once, without waiting for the target
+    #[arg(long)]
+    no_wait: bool,
+    /// Longest time to reach the target; beyond it the drive is quick-stopped
+    ///
+    /// Without it: 1.5 times the calculated duration of the ramps and the travel, and 2 s.
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
+    within: Option<Duration>,
+    #[command(flatten)]
+    guard: GuardArgs,
+}
+
+pub(in crate::command) fn speed(text: &str) -> Result<Along<Rpm>, String> {
+    match text.parse() {
+        Ok(speed @ (Along::Turning(Rpm(value)) | Along::Metres(value))) if value > 0.0 => Ok(speed),
+        Ok(_) => Err("expected a profile velocity above 0, e.g. 60rpm; the target decides the direction".into()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// What was asked, within which limits, and what came of it.
+#[derive(Debug, Serialize)]
+pub(crate) struct MotionOutcome {
+    asked: String,
+    /// The same with what was sent, where that differs.
+    #[serde(skip)]
+    done: String,
+    /// Each value that was asked for, and what was sent for it.
+    commanded: Vec<SentCommand>,
+    reached: bool,
+    reached_after_s: Option<f64>,
+    stopped: bool,
+    /// How it turned or pushed before it was stopped again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    before_stop: Option<ShaftMotion>,
+    limits: ProfileLimits,
+    guard: GuardReport,
+    #[serde(flatten)]
+    state: StateReport,
+    notes: Vec<String>,
+}
+
+/// A value that was asked for, and what the drive was sent for it.
+#[derive(Debug, Serialize)]
+struct SentCommand {
+    what: &'static str,
+    requested: f64,
+    commanded: f64,
+    unit: &'static str,
+    object: String,
+    raw: i64,
+    /// The two differ by more than a thousandth.
+    rounded: bool,
+    #[serde(skip)]
+    text: String,
+}
+
+impl From<&Commanded> for SentCommand {
+    fn from(sent: &Commanded) -> Self {
+        let Commanded { what, requested, commanded, unit, object, raw } = *sent;
+        let (object, rounded) = (object.to_string(), sent.is_rounded());
+        Self { what, requested, commanded, unit, object, raw, rounded, text: sent.to_string() }
+    }
+}
+
+/// The limits that the drive keeps to.
+#[derive(Debug, Default, Serialize)]
+struct ProfileLimits {
+    profile_velocity_rpm: Option<f64>,
+    acceleration_ms: Option<f64>,
+    deceleration_ms: Option<f64>,
+    quick_stop_ms: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acceleration_rpm_s: Option<f64>,
+}
+
+impl Velocity {
+    /// Turns.
+    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+        let drive = context.known_drive(self.node).await?;
+        let doing = format!("node {}: to {}", self.node, self.speed);
+        let command = master::drive::Motion::Velocity(self.speed, self.ramps.manner());
+        let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &command).await?;
+        let then = self.duration.map_or(Then::goes_on_if(!stands_at(&self.speed)), Then::StopAfter);
+        outcome(context, &drive, ("turn at", &self.speed), motion, then, guard).await
+    }
+}
+
+impl Move {
+    /// Moves.
+    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+        let drive = context.known_drive(self.node).await?;
+        let verb = if self.relative { "move by" } else { "move to" };
+        let doing = format!("node {}: {verb} {}", self.node, self.position);
+        let (speed, manner) = (self.profile_velocity, self.ramps.manner());
+        let command = master::drive::Motion::Move { to: self.position, relative: self.relative, speed, manner };
+        let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &command).await?;
+        let then = Then::goes_on_if(motion.reached_after.is_none());
+        outcome(context, &drive, (verb, &self.position), motion, then, guard).await
+    }
+}
+
+impl Torque {
+    /// Pushes.
+    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+        let drive = context.known_drive(self.node).await?;
+        let doing = format!("node {}: applying {}", self.node, self.current);
+        let command = master::drive::Motion::Torque(self.current);
+        let (motion, guard) = perform(context, &drive, &doing, &self.guard, &command).await?;
+        let then = self.duration.map_or(Then::goes_on_if(self.current.0 != 0.0), Then::StopAfter);
+        outcome(context, &drive, ("apply", &self.current), motion, then, guard).await
+    }
+}
+
+impl RampArgs {
+    fn manner(&self) -> Manner {
+        Manner {
+            acceleration: self.acceleration,
+            deceleration: self.deceleration,
+            wait: !self.no_wait,
+            within: self.within,
+        }
+    }
+}
+
+/// Whether a motor that turns at this speed stands.
+fn stands_at(speed: &Along<Rpm>) -> bool {
+    matches!(speed, Along::Turning(Rpm(value)) | Along::Metres(value) if *value == 0.0)
+}
+
+/// Carries out a command that moves a drive, which is guarded first, and shows meanwhile what it is doing.
+pub(in crate::command) async fn perform(
+    context: &Context,
+    drive: &Drive,
+    doing: &str,
+    guard: &GuardArgs,
+    command: &master::drive::Motion,
+) -> Result<(MotionReport, Guard), Failure> {
+    drive.check_motion(command)?;
+    context.progress.show(doing);
+    let guard = guard.begin(context, drive).await?;
+    let report = shown_while(context, drive, doing, drive.make(command)).await?;
+    Ok((report, guard))
+}
+
+/// How often a motion that goes on is shown to a person who waits at a terminal.
+const PROGRESS_PERIOD: Duration = Duration::from_millis(500);
+
+/// Shows where the shaft is while `motion` goes on, to people at a terminal: the questions cost the bus some frames.
+pub(in crate::command) async fn shown_while<T>(
+    context: &Context,
+    drive: &Drive,
+    doing: &str,
+    motion: impl Future<Output = T>,
+) -> T {
+    if !context.progress.is_shown() {
+        return motion.await;
+    }
+    let began = context.network.now();
+    let mut motion = pin!(motion);
+    loop {
+        tokio::select! {
+            done = &mut motion => return done,
+            () = context.network.sleep(PROGRESS_PERIOD) => {}
+        }
+        // The motion goes on while it is asked where it is.
+        let state = tokio::select! {
+            done = &mut motion => return done,
+            state = StateReport::read(drive) => state,
+        };
+        // What keeps it from answering is reported by the motion.
+        let Ok(state) = state else { continue };
+        let seconds = (context.network.now() - began).as_secs_f64();
+        context.progress.show(format!("{doing}: at {} after {seconds:.1} s", state.motion.text()));
+    }
+}
+
+/// What follows a commanded motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::command) enum Then {
+    /// It is watched for this long, then the drive is stopped.
+    StopAfter(Duration),
+    /// The command ends, the motion does not.
+    GoesOn,
+    /// It is at its end.
+    Stands,
+}
+
+impl Then {
+    /// The motion goes on if so, and else is at its end.
+    pub(in crate::command) const fn goes_on_if(moving: bool) -> Self {
+        if moving { Self::GoesOn } else { Self::Stands }
+    }
+}
+
+/// Reads what came of a motion, and ends it if it is to be ended. `verb` and `value` say what was asked for.
+pub(in crate::command) async fn outcome(
+    context: &Context,
+    drive: &Drive,
+    (verb, value): (&str, &dyn fmt::Display),
+    motion: MotionReport,
+    then: Then,
+    guard: Guard,
+) -> Result<MotionOutcome, Failure> {
+    let asked = format!("{verb} {value}");
+    let done = match motion.commanded.first().filter(|sent| sent.is_rounded()) {
+        Some(sent) => format!("{verb} {} {} ({value} asked for)", Shown(sent.commanded), sent.unit),
+        None => asked.clone(),
+    };
+    let limits = limits(drive).await;
+    let mut before_stop = None;
+    if let Then::StopAfter(duration) = then {
+        let doing = format!("node {}: {done} for {} s", drive.node().id(), duration.as_secs_f64());
+        context.progress.show(&doing);
+        shown_while(context, drive, &doing, drive.supervise(duration)).await?;
+        before_stop = Some(StateReport::read(drive).await?.motion);
+        drive.stop().await?;
+    }
+    let state = StateReport::read(drive).await?;
+    let from_file = drive.description().is_some_and(is_from_file);
+    let units = from_file.then(|| "the data sheet does not define the units: CiA 402's units are assumed".to_owned());
+    let (guard, farewell) = guard.end(context, drive, then == Then::GoesOn).await?;
+    // What the drive does without its host is reported by the guard.
+    let notes = motion.notes.iter().filter(|note| !matches!(note, Note::HostLoss(_))).map(ToString::to_string);
+    Ok(MotionOutcome {
+        asked,
+        done,
+        commanded: motion.commanded.iter().map(SentCommand::from).collect(),
+        reached: motion.reached_after.is_some(),
+        reached_after_s: motion.reached_after.map(|time| time.as_secs_f64()),
+        stopped: before_stop.is_some(),
+        before_stop,
+        limits,
+        guard,
+        state,
+        notes: notes.chain(farewell).chain(units).collect(),
+    })
+}
+
+/// What limits a motion, as far as the drive has objects for it.
+async fn limits(drive: &Drive) -> ProfileLimits {
+    let Some(axis) = drive.axis_description() else { return ProfileLimits::default() };
+    let profile_velocity_rpm = match axis.units.profile_velocity {
+        Some(quantity) => drive.read_quantity(quantity).await.ok(),
+        None => None,
+    };
+    let limits = ProfileLimits { profile_velocity_rpm, ..ProfileLimits::default() };
+    let number = async |object, scale| drive.read_quantity(Quantity { object, scale }).await.ok();
+    let ms = Scale::PerCount(1.0);
+    match axis.units.ramps {
+        Some(Ramps::Times { acceleration, deceleration, quick_stop }) => ProfileLimits {
+            acceleration_ms: number(acceleration, ms).await,
+            deceleration_ms: number(deceleration, ms).await,
+            quick_stop_ms: number(quick_stop, ms).await,
+            ..limits
+        },
+        Some(Ramps::Rates { acceleration, scale, .. }) => {
+            ProfileLimits { acceleration_rpm_s: number(acceleration, scale).await, ..limits }
+        }
+        None => limits,
+    }
+}
+
+impl ProfileLimits {
+    fn text(&self) -> String {
+        let parts = [
+            self.profile_velocity_rpm.map(|rpm| format!("profile velocity {} r/min", Shown(rpm))),
+            self.acceleration_ms.map(|ms| format!("acceleration {ms:.0} ms")),
+            self.deceleration_ms.map(|ms| format!("deceleration {ms:.0} ms")),
+            self.quick_stop_ms.map(|ms| format!("quick stop {ms:.0} ms")),
+            self.acceleration_rpm_s.map(|rate| format!("acceleration {} (r/min)/s", Shown(rate))),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Report for MotionOutcome {
+    fn text(&self, paint: Paint) -> String {
+        let reached = match self.reached_after_s {
+            Some(seconds) => paint.good(&format!("reached after {seconds:.2} s")),
+            None => "commanded, not waited for".into(),
+        };
+        let then = if self.stopped { "; stopped again" } else { "" };
+        let mut lines = vec![format!("node {}: {}: {reached}{then}", self.state.node, self.done)];
+        let rounded = self.commanded.iter().filter(|sent| sent.rounded);
+        lines.extend(rounded.map(|sent| format!("  sent    {}", sent.text)));
+        lines.extend(self.before_stop.as_ref().map(|motion| format!("  before  {}", motion.text())));
+        lines.push(format!("  at      {}", self.state.motion.text()));
+        lines.push(format!("  limits  {}", self.limits.text()));
+        lines.push(format!("  guard   {}", self.guard.text));
+        lines.extend(self.state.fault_lines(paint, "  "));
+        lines.extend(self.notes.iter().map(|note| format!("  note    {note}")));
+        lines.join("\n")
+    }
+}

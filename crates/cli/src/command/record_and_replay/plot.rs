@@ -1,0 +1,172 @@
+//! `ferrodrive plot`: a record as a picture.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use recording::{Kind, Recorded, picture, read};
+use serde::Serialize;
+use words::counted;
+use words::document::read_bytes;
+
+use crate::command::configure::dcf::is_stdout;
+use crate::failure::Failure;
+use crate::output::Report;
+use plot::Paint;
+
+/// Draw a record of --record: a figure for each node, a panel for each quantity
+///
+/// The picture is SVG (.svg), or a self-contained web page (.html) that shows the values under the pointer and the
+/// differences between two points. A record whose writer was killed, or is still at work, is drawn as far as it goes.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  \
+    ferrodrive plot run.mcap -o run.svg\n  \
+    ferrodrive plot run.csv --signals velocity --from 1.5s --to 3s -o run.html")]
+pub(crate) struct Plot {
+    /// Record, NAME.mcap or NAME.csv
+    file: PathBuf,
+    /// Signals, e.g. velocity,4.current_a,5.* (default: positions, velocities, currents and supplies)
+    #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',')]
+    signals: Vec<String>,
+    /// Start, e.g. 500ms (a bare number is s)
+    #[arg(long, value_name = "TIME", default_value = "0s", value_parser = seconds)]
+    from: f64,
+    /// End (default: that of the record)
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    to: Option<f64>,
+    /// Write the picture to this file, NAME.svg or NAME.html, or with - to standard output (default: NAME.svg beside
+    /// the record)
+    #[arg(long, short, alias = "svg", alias = "html", value_name = "FILE", value_parser = picture_path)]
+    output: Vec<PathBuf>,
+}
+
+fn picture_path(text: &str) -> Result<PathBuf, String> {
+    let is_known = text == "-" || [".svg", ".html"].iter().any(|ending| text.to_ascii_lowercase().ends_with(ending));
+    if is_known {
+        Ok(text.into())
+    } else {
+        Err("expected NAME.svg (a picture), NAME.html (a web page) or - (the picture to standard output)".into())
+    }
+}
+
+/// Where a picture of a command that draws no web page goes.
+pub(in crate::command) fn svg_path(text: &str) -> Result<PathBuf, String> {
+    if text == "-" || text.to_ascii_lowercase().ends_with(".svg") {
+        Ok(text.into())
+    } else {
+        Err("expected NAME.svg, or - for standard output".into())
+    }
+}
+
+/// Largest record that is read: 4 GiB would be a day of three drives at 1 kHz.
+const LARGEST: u64 = 4 << 30;
+
+fn seconds(text: &str) -> Result<f64, String> {
+    can::parse_duration_in("s", text).map(|time| time.as_secs_f64()).map_err(|error| error.to_string())
+}
+
+/// What was drawn.
+#[derive(Debug, Serialize)]
+pub(crate) struct Drawn {
+    record: PathBuf,
+    /// How many signals and marks are in the picture.
+    signals: usize,
+    marks: usize,
+    torn: bool,
+    files: Vec<PathBuf>,
+    /// The picture, if it goes to standard output.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    picture: Option<String>,
+}
+
+impl Plot {
+    /// Draws it.
+    pub(crate) fn draw(&self) -> Result<Drawn, Failure> {
+        let recorded = self.read()?;
+        let title = self.file.file_name().unwrap_or_default().to_string_lossy();
+        let span = self.from..=self.to.unwrap_or(f64::INFINITY);
+        if span.is_empty() {
+            return Err(Failure::usage("--to is before --from").next("give a later --to, or omit it"));
+        }
+        let poster = picture(&title, &recorded, &self.signals, span).map_err(|reason| {
+            Failure::new(format!("cannot draw {}", self.file.display()))
+                .of_kind("record")
+                .because(reason)
+                .next("omit --signals, --from and --to to draw everything that can be plotted")
+        })?;
+        let mut files = self.output.clone();
+        if files.is_empty() {
+            files.push(self.file.with_extension("svg"));
+        }
+        let with_stdout = files.len();
+        files.retain(|path| !is_stdout(path));
+        let picture = (files.len() < with_stdout).then(|| poster.to_svg());
+        for path in &files {
+            let is_page = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
+            let (text, begin): (_, &[u8]) =
+                if is_page { (poster.to_html(), b"<!doctype html>") } else { (poster.to_svg(), b"<svg") };
+            write(path, &text, begin)?;
+        }
+        let figures = || poster.rows.iter().flatten();
+        let signals = figures().flat_map(|figure| &figure.panels).map(|panel| panel.traces.len()).sum();
+        let marks = figures().map(|figure| figure.events.len()).max().unwrap_or(0);
+        Ok(Drawn { record: self.file.clone(), signals, marks, torn: recorded.torn, files, picture })
+    }
+
+    fn read(&self) -> Result<Recorded, Failure> {
+        let unreadable = |reason| {
+            Failure::bad_file(format!("cannot read the record {}", self.file.display()))
+                .because(reason)
+                .next("give a file that --record of this program has written")
+        };
+        let kind = Kind::of_name(&self.file.to_string_lossy()).ok_or_else(|| {
+            Failure::usage(format!("{} is not a record", self.file.display()))
+                .because("a record is called NAME.mcap or NAME.csv")
+                .next("make one, e.g. ferrodrive sim --drive zlac8030l@4 --record run.mcap")
+        })?;
+        let bytes = read_bytes(&self.file, LARGEST).map_err(unreadable)?;
+        read(kind, &bytes).map_err(|reason| unreadable(reason).of_kind("record"))
+    }
+}
+
+/// Writes a picture where it is asked for; the text of it, if that is standard output.
+pub(in crate::command) fn write_svg(path: &Path, svg: String) -> Result<Option<String>, Failure> {
+    if is_stdout(path) {
+        return Ok(Some(svg));
+    }
+    write(path, &svg, b"<svg").map(|()| None)
+}
+
+/// Writes a picture to a new file, or over an earlier picture, and over nothing else.
+fn write(path: &Path, text: &str, begin: &[u8]) -> Result<(), Failure> {
+    let written = serve::files::create_picture(path, begin).and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|error| Failure::of_writing("the picture", path, &error))
+}
+
+impl Report for Drawn {
+    fn text(&self, _: Paint) -> String {
+        if let Some(picture) = &self.picture {
+            return picture.trim_end().to_owned();
+        }
+        let files: Vec<String> = self.files.iter().map(|path| path.display().to_string()).collect();
+        let drawn =
+            format!("{}: {} and {}", files.join(" and "), counted(self.signals, "signal"), counted(self.marks, "mark"));
+        let torn = "the end of the record is missing: its writer was killed, or is still running";
+        if self.torn { format!("{drawn}\n{torn}") } else { drawn }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::seconds;
+
+    #[test]
+    fn a_bare_number_is_in_seconds_and_a_wrong_unit_is_refused() {
+        assert_eq!(seconds("1.5"), Ok(1.5));
+        assert_eq!(seconds("1.5s"), Ok(1.5));
+        assert_eq!(seconds("500ms"), Ok(0.5));
+        assert_eq!(seconds("0.5min"), Ok(30.0));
+        for text in ["1.5sss", "-1", "nan", "inf", "", "s"] {
+            assert!(seconds(text).is_err(), "{text}");
+        }
+    }
+}

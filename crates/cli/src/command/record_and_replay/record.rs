@@ -1,0 +1,335 @@
+//! `ferrodrive record`: objects of nodes over time, on any bus, into a file that `plot` and Foxglove read.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use can::Instant;
+use canopen::od::{DataType, Entry};
+use canopen::pdo::{Direction, PdoId, PdoNumber};
+use canopen::{Mux, NodeId};
+use master::core::Event;
+use master::decode::{common_name, common_row, common_type};
+use master::pdo::TimerUnits;
+use master::units::parse_duration;
+use master::{Drive, Node};
+use recording::{Column, Kind, Mark, Severity, Subject};
+use serde::Serialize;
+use sim::Place;
+use words::counted;
+use words::node::node;
+use words::object::{ObjectArg, object};
+use words::unit::split_factor;
+
+use crate::command::configure::dcf::is_stdout;
+use crate::command::configure::sdo::resolve;
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::Report;
+use plot::Paint;
+use serve::files::create_record;
+use serve::messages::Messages;
+use serve::writing::{Batch, Pace, RecordFile};
+
+/// Record objects of a node over time
+///
+/// Reads each object repeatedly, from the TPDOs that carry it where the node sends some, otherwise by SDO, and writes
+/// the values in their units to a file that ferrodrive plot draws: .mcap (for Foxglove, PlotJuggler, Rerun; with the
+/// frames of other nodes) or .csv. Nothing is written to the node. With SDO no other program may ask the same node
+/// meanwhile: CiA 301 gives each node one channel, and each program would take the other's answers. Ends after --for,
+/// or with Ctrl-C; everything older than a second is on the disk by then.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    ferrodrive record 4 velocity_actual_value 6064 -o run.mcap --for 10s\n  \
+    ferrodrive --bus can0 record 4 606C 6077 --every 20ms -o run.csv\n  ferrodrive plot run.mcap")]
+pub(crate) struct Record {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Objects: index, index:sub-index or name
+    #[arg(value_name = "OBJECT", required = true, value_parser = object)]
+    objects: Vec<ObjectArg>,
+    /// Write to this file, NAME.mcap or NAME.csv: new, empty, or an earlier record, which is replaced; - writes CSV to
+    /// standard output
+    #[arg(long = "output", short = 'o', alias = "out", value_name = "FILE", value_parser = record_file)]
+    out: (PathBuf, Kind),
+    /// Time between two samples
+    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = sample_time)]
+    every: Duration,
+    /// End after this time (default on an embedded virtual bus: 1s)
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
+    duration: Option<Duration>,
+}
+
+fn record_file(text: &str) -> Result<(PathBuf, Kind), String> {
+    if text == "-" {
+        return Ok((text.into(), Kind::Csv));
+    }
+    let kind =
+        Kind::of_name(text).ok_or("a record is called NAME.mcap or NAME.csv; for frames alone there is --log")?;
+    Ok((text.into(), kind))
+}
+
+/// Standard output as a file of its own.
+fn stdout_file() -> std::io::Result<File> {
+    #[cfg(unix)]
+    let own = std::os::fd::AsFd::as_fd(&std::io::stdout()).try_clone_to_owned();
+    #[cfg(windows)]
+    let own = std::os::windows::io::AsHandle::as_handle(&std::io::stdout()).try_clone_to_owned();
+    own.map(File::from)
+}
+
+/// An SDO takes some hundred microseconds.
+fn sample_time(text: &str) -> Result<Duration, String> {
+    let time = parse_duration(text).map_err(|error| error.to_string())?;
+    if time < Duration::from_millis(1) {
+        Err("an SDO takes most of a millisecond; give 1ms or more".into())
+    } else {
+        Ok(time)
+    }
+}
+
+/// Recorded of an embedded bus, whose time is virtual.
+const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
+
+/// How often what was sampled is handed to the disk, and how long that may take at the end.
+const HANDED_ON: Duration = Duration::from_millis(200);
+const DISK_PATIENCE: Duration = Duration::from_secs(10);
+
+/// A value that came by PDO is good for so long; then the node is asked.
+const PDO_FRESH: Duration = Duration::from_secs(1);
+
+/// TPDOs that are looked at for the objects: those of the predefined connection set.
+const TPDOS: u16 = 4;
+
+/// An object that is recorded.
+struct RecordedObject {
+    mux: Mux,
+    row: Option<&'static Entry>,
+    /// Its form in TPDOs, where that is another.
+    pdo_type: Option<(DataType, f64)>,
+    factor: f64,
+    column: Column,
+}
+
+/// What was recorded.
+#[derive(Debug, Serialize)]
+pub(crate) struct RecordReport {
+    file: String,
+    node: u8,
+    signals: Vec<String>,
+    samples: u64,
+    /// Values that came by PDO.
+    by_pdo: u64,
+    /// Values that were asked for by SDO.
+    by_sdo: u64,
+    /// Values that the node did not give.
+    missing: u64,
+    duration_s: f64,
+}
+
+impl Record {
+    /// Records until the time is over.
+    pub(crate) async fn run(&self, context: &Context) -> Result<RecordReport, Failure> {
+        if context.prints_json() && is_stdout(&self.out.0) {
+            return Err(Failure::usage("a record and lines of JSON cannot both go to standard output")
+                .next("give --output NAME.csv, or omit --json"));
+        }
+        let drive = context.drive(self.node).await?;
+        let sources =
+            self.objects.iter().map(|object| RecordedObject::new(&drive, object)).collect::<Result<Vec<_>, _>>()?;
+        let node = context.node(self.node);
+        // Each has to answer once, before there is a file.
+        for source in &sources {
+            node.upload(source.mux).await?;
+        }
+        for number in (1..=TPDOS).filter_map(PdoNumber::new) {
+            // A TPDO that does not exist, or whose mapping cannot be read, does not matter: then by SDO.
+            let _ = node.adopt_pdo(PdoId { direction: Direction::Tpdo, number }, TimerUnits::STANDARD).await;
+        }
+        let columns: Vec<Column> = sources.iter().map(|source| source.column.clone()).collect();
+        let (path, kind) = &self.out;
+        let cannot = |error: std::io::Error| Failure::of_writing("the record", path, &error);
+        let file = if is_stdout(path) { stdout_file() } else { create_record(path, *kind) };
+        let file = file.map_err(cannot)?;
+        let mut file =
+            RecordFile::start(*kind, file, &columns, Pace::RealTime, Messages::of_warnings()).map_err(cannot)?;
+        let mut report = RecordReport {
+            file: path.display().to_string(),
+            node: self.node.raw(),
+            signals: columns.iter().map(Column::name).collect(),
+            samples: 0,
+            by_pdo: 0,
+            by_sdo: 0,
+            missing: 0,
+            duration_s: 0.0,
+        };
+        self.sample(context, &node, &sources, &mut file, &mut report).await;
+        file.finish(DISK_PATIENCE)?;
+        if is_stdout(path) {
+            context.progress.clear();
+            context.note(&report.summary(Paint::OFF));
+        }
+        Ok(report)
+    }
+
+    async fn sample(
+        &self,
+        context: &Context,
+        node: &Node,
+        sources: &[RecordedObject],
+        file: &mut RecordFile,
+        report: &mut RecordReport,
+    ) {
+        let network = &context.network;
+        let begin = network.now();
+        let end = self.duration.or(context.is_embedded().then_some(EMBEDDED_DURATION)).map(|time| begin + time);
+        let mut heard = context.traffic.of_others();
+        let mut batch = Batch::default();
+        let (mut due, mut handed) = (begin, begin);
+        while end.is_none_or(|end| due < end) {
+            let now = network.now();
+            if due > now {
+                network.sleep(due - now).await;
+            }
+            let at = network.now();
+            let mut values = Vec::with_capacity(sources.len());
+            for source in sources {
+                values.push(source.value(node, at, report).await);
+            }
+            // Times count from the begin, as those of a simulator's record.
+            let since = |at: Instant| Instant::ZERO + (at - begin);
+            batch.rows.push((since(at), values));
+            report.samples += 1;
+            while let Ok(passed) = heard.try_recv() {
+                batch.frames.push((since(passed.at), passed.frame));
+            }
+            while let Some((came, event)) = network.poll_event() {
+                batch.marks.extend(mark(since(came), &event));
+            }
+            if at - handed >= HANDED_ON {
+                handed = at;
+                file.write(std::mem::take(&mut batch));
+                context.progress.show(format!("{} samples", report.samples));
+            }
+            // What took longer than a period is not made up for.
+            due = (due + self.every).max(network.now());
+        }
+        report.duration_s = (network.now() - begin).as_secs_f64();
+        file.write(batch);
+    }
+}
+
+impl RecordedObject {
+    fn new(drive: &Drive, object: &ObjectArg) -> Result<Self, Failure> {
+        let id = drive.node().id();
+        let (mux, row) = resolve(drive, object)?;
+        let row = if drive.description().is_some() { row } else { common_row(mux) };
+        if row.is_some_and(|row| !row.data_type.fits_cell()) {
+            return Err(Failure::usage(format!("{mux} is not a number of at most 32 bits, which a record requires"))
+                .at_node(id)
+                .at_object(mux)
+                .next(format!("ferrodrive objects {id} shows the types; ferrodrive read shows such an object once")));
+        }
+        let name = row.map(|row| row.name).or_else(|| common_name(mux));
+        let mut name = name.map_or_else(|| format!("object_{:04X}", mux.index), str::to_owned);
+        if mux.sub_index != 0 {
+            name = format!("{name}_{:02X}", mux.sub_index);
+        }
+        let (factor, unit) = row.map_or((1.0, ""), |row| factor_of(row.unit));
+        if let Some(ending) = ending(unit) {
+            name.push_str(ending);
+        }
+        let form = drive.description().and_then(|model| model.pdo.mapping.tpdo_form(mux));
+        let subject = Subject::Axis(Place::node(id.raw()));
+        let column = Column { subject, signal: name.into(), unit: unit.to_owned().into() };
+        let pdo_type = form.map(|form| (form.data_type, factor_of(form.unit).0));
+        Ok(Self { mux, row, pdo_type, factor, column })
+    }
+
+    /// The value in its unit; not a number where the node does not give one.
+    async fn value(&self, node: &Node, now: Instant, report: &mut RecordReport) -> f64 {
+        let received = node.network().received(node.id(), self.mux);
+        if let Some(received) = received.filter(|received| now - received.at < PDO_FRESH) {
+            report.by_pdo += 1;
+            let (data_type, factor) = match self.pdo_type {
+                Some(form) => form,
+                None => (self.row.map_or(DataType::Unsigned32, |row| row.data_type), self.factor),
+            };
+            return number(data_type, received.raw as u32) * factor;
+        }
+        match node.upload(self.mux).await {
+            Ok(payload) => {
+                report.by_sdo += 1;
+                let bytes = payload.as_bytes();
+                let data_type = self.row.map(|row| row.data_type).or_else(|| common_type(self.mux, bytes.len()));
+                number(data_type.unwrap_or(DataType::Unsigned32), payload.raw()) * self.factor
+            }
+            Err(_) => {
+                report.missing += 1;
+                f64::NAN
+            }
+        }
+    }
+}
+
+fn number(data_type: DataType, raw: u32) -> f64 {
+    if data_type == DataType::Real32 { f64::from(f32::from_bits(raw)) } else { data_type.value(raw) as f64 }
+}
+
+fn factor_of(unit: &'static str) -> (f64, &'static str) {
+    if unit.is_empty() { (1.0, "") } else { split_factor(unit) }
+}
+
+/// What a signal's name ends with for its unit, as the signals of a simulator do.
+fn ending(unit: &str) -> Option<&'static str> {
+    const ENDINGS: [(&str, &str); 8] = [
+        ("r/min", "_rpm"),
+        ("counts", "_counts"),
+        ("A", "_a"),
+        ("V", "_v"),
+        ("°C", "_c"),
+        ("rad", "_rad"),
+        ("°", "_deg"),
+        ("N·m", "_nm"),
+    ];
+    ENDINGS.iter().find(|(known, _)| *known == unit).map(|(_, ending)| *ending)
+}
+
+/// What a person wants marked in a picture.
+fn mark(at: Instant, event: &Event) -> Option<Mark> {
+    let (node, severity) = match event {
+        Event::BootUp(node) | Event::NmtState(node, _) => (node, Severity::Note),
+        Event::Emcy(node, emcy) if emcy.code.0 != 0 => (node, Severity::Warning),
+        Event::Emcy(node, _) => (node, Severity::Note),
+        Event::HeartbeatLost(node, _) => (node, Severity::Fault),
+        _ => return None,
+    };
+    let (of, text) = (format!("node {node}"), event.to_string());
+    // The text of a mark names its node.
+    let text = text.strip_prefix(&of).map_or(&*text, |rest| rest.trim_start_matches([':', ' '])).to_owned();
+    Some(Mark { at, of: of.into(), kind: "".into(), severity, text })
+}
+
+impl Report for RecordReport {
+    fn text(&self, paint: Paint) -> String {
+        // The record is there already, and nothing else is to be in it.
+        if is_stdout(Path::new(&self.file)) { String::new() } else { self.summary(paint) }
+    }
+}
+
+impl RecordReport {
+    fn summary(&self, paint: Paint) -> String {
+        let Self { file, node, samples, by_pdo, by_sdo, missing, duration_s, .. } = self;
+        let mut text = format!(
+            "{}: {} of node {node} in {duration_s:.3} s, {} by PDO, {by_sdo} by SDO",
+            paint.strong(file),
+            counted(*samples, "sample"),
+            counted(*by_pdo, "value")
+        );
+        if *missing > 0 {
+            text.push_str(&format!("; {} did not come", counted(*missing, "value")));
+        }
+        text
+    }
+}

@@ -1,0 +1,173 @@
+//! `ferrodrive fmu`: virtual drives and a bus for other people's simulators.
+
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+
+use can::Bitrate;
+use fmu::config::{BusConfig, Config, ConfigError, DriveConfig, MAX_NODES, TxClock};
+use fmu::package::{Entry, entries, platform};
+use plot::Paint;
+use serde::Serialize;
+use words::counted;
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
+
+use crate::command::configure::dcf::{keep, new_file};
+use crate::failure::Failure;
+use crate::output::Report;
+use crate::plain::plain;
+
+/// The library without what systems add to its name.
+const LIBRARY: &str = "ferrodrive_fmu";
+
+/// Pack a virtual drive, or a CAN bus, as an FMU for co-simulation (FMI 3.0)
+///
+/// The drive has its firmware, motor, load and supply; it talks to other FMUs over a CAN terminal by the layered standard for buses
+/// (fmi-ls-bus), and takes the torque of its load and its supply voltage as inputs. `bus` is a CAN bus with arbitration, exact
+/// lengths of frames and errors. The library that an FMU carries is built by `cargo build --release -p ferrodrive-fmu`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive fmu zlac8030l@4 -o wheel.fmu\n  \
+    ferrodrive fmu vendor.eds@5 -o servo.fmu\n  \
+    ferrodrive fmu bus --nodes 3 --bitrate 500k -o bus.fmu")]
+pub(crate) struct Fmu {
+    /// The drive, as `sim --drive` takes it, or `bus`
+    #[arg(value_name = "MODEL@NODE[,KEY=VALUE..]")]
+    what: String,
+    /// Write to this file
+    #[arg(long, short, value_name = "FILE.fmu", value_parser = fmu_path)]
+    output: PathBuf,
+    /// How many nodes can be joined to the bus
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=i64::from(MAX_NODES)))]
+    nodes: Option<u8>,
+    /// Bit rate of the bus, or of the drive at its first start
+    #[arg(long, value_name = "RATE", default_value = "500k")]
+    bitrate: Bitrate,
+    /// How it announces what it sends: exact times, or at the end of each step for importers that know no countdown
+    #[arg(long, value_name = "KIND", default_value = "countdown", value_parser = clock)]
+    clock: TxClock,
+    /// The library that it carries (default: the one beside this program)
+    #[arg(long, value_name = "FILE")]
+    library: Option<PathBuf>,
+    /// Overwrite an existing file
+    #[arg(long)]
+    force: bool,
+}
+
+fn fmu_path(text: &str) -> Result<PathBuf, String> {
+    if text.to_ascii_lowercase().ends_with(".fmu") { Ok(text.into()) } else { Err("expected FILE.fmu".into()) }
+}
+
+fn clock(text: &str) -> Result<TxClock, String> {
+    match text {
+        "countdown" => Ok(TxClock::Countdown),
+        "triggered" => Ok(TxClock::Triggered),
+        _ => Err("expected countdown or triggered".into()),
+    }
+}
+
+/// What was packed.
+#[derive(Debug, Serialize)]
+pub(crate) struct FmuReport {
+    file: String,
+    /// `drive` or `bus`.
+    kind: &'static str,
+    /// Variables beside those of the terminals.
+    variables: usize,
+    /// The names of its networks.
+    terminals: Vec<String>,
+    bytes: usize,
+}
+
+impl Report for FmuReport {
+    fn text(&self, _: Paint) -> String {
+        let (variables, terminals) = (counted(self.variables, "variable"), self.terminals.join(", "));
+        format!("{}: {variables}, CAN at {terminals}; {}", plain(&self.file), counted(self.bytes, "byte"))
+    }
+}
+
+impl Fmu {
+    /// Packs it.
+    pub(crate) fn run(&self) -> Result<FmuReport, Failure> {
+        let path = new_file(Some(&self.output), self.force)?.unwrap_or(&self.output);
+        let (config, folder) = self.config()?;
+        let library = self.library()?;
+        let (place, ending) = platform().ok_or_else(|| {
+            Failure::new("FMI has no name for this system")
+                .next("pack on Linux, macOS or Windows with a 64-bit processor")
+        })?;
+        let name = format!("{place}/{LIBRARY}.{ending}");
+        let unit = fmu::unit::Unit::new(&config, folder).map_err(not_packed)?;
+        let files = entries(&config, folder, (&name, library)).map_err(not_packed)?;
+        let archive = archived(&files).map_err(|error| Failure::new("cannot pack the archive").because(error))?;
+        keep(path, &archive, self.force)?;
+        Ok(FmuReport {
+            file: path.display().to_string(),
+            kind: if matches!(config, Config::Bus(_)) { "bus" } else { "drive" },
+            variables: unit.variables().len(),
+            terminals: unit.terminals().into_iter().map(|terminal| terminal.name).collect(),
+            bytes: archive.len(),
+        })
+    }
+
+    /// What is packed, and the folder of the files that it names.
+    fn config(&self) -> Result<(Config, &Path), Failure> {
+        let (bitrate, clock) = (self.bitrate.bits_per_second(), self.clock);
+        if self.what == "bus" {
+            let nodes = self.nodes.ok_or_else(|| {
+                Failure::usage("a bus needs the number of its nodes").next("ferrodrive fmu bus --nodes 3 -o bus.fmu")
+            })?;
+            return Ok((Config::Bus(BusConfig { nodes, bitrate, clock }), Path::new("")));
+        }
+        if self.nodes.is_some() {
+            return Err(Failure::usage("--nodes is the number of nodes of a bus, and this is a drive")
+                .next("omit it, or give `bus` in place of the drive"));
+        }
+        let (place, options) =
+            self.what.split_once(',').map_or((self.what.as_str(), None), |(it, rest)| (it, Some(rest)));
+        let (model, node) = place.rsplit_once('@').unwrap_or((place, ""));
+        let (folder, drive) = match Path::new(model).file_name().and_then(|name| name.to_str()) {
+            Some(name) if Path::new(model).extension().is_some() => {
+                let folder = Path::new(model).parent().unwrap_or(Path::new(""));
+                (folder, options.map_or(format!("{name}@{node}"), |options| format!("{name}@{node},{options}")))
+            }
+            _ => (Path::new(""), self.what.clone()),
+        };
+        Ok((Config::Drive(DriveConfig { drive, bitrate, clock }), folder))
+    }
+
+    /// The library: what was named, or what stands beside this program or among what was built with it.
+    fn library(&self) -> Result<Vec<u8>, Failure> {
+        let missing = |path: &Path, error: std::io::Error| {
+            Failure::bad_file(format!("cannot read the library {}", path.display()))
+                .because(error)
+                .next("cargo build --release -p ferrodrive-fmu builds it in a clone; --library names it")
+        };
+        if let Some(path) = &self.library {
+            return std::fs::read(path).map_err(|error| missing(path, error));
+        }
+        let name = format!("{}{LIBRARY}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+        let program = std::env::current_exe().unwrap_or_default();
+        let beside = program.parent().unwrap_or(Path::new("")).join(&name);
+        let places = [beside.clone(), beside.with_file_name("deps").join(&name)];
+        let found = places.iter().find_map(|path| std::fs::read(path).ok());
+        found.ok_or_else(|| missing(&beside, std::io::ErrorKind::NotFound.into()))
+    }
+}
+
+/// The archive, whose bytes depend on nothing but what is in it.
+fn archived(files: &[Entry]) -> zip::result::ZipResult<Vec<u8>> {
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    for (path, content) in files {
+        archive.start_file(path.as_str(), SimpleFileOptions::default())?;
+        archive.write_all(content)?;
+    }
+    Ok(archive.finish()?.into_inner())
+}
+
+fn not_packed(error: ConfigError) -> Failure {
+    let failure = Failure::new("cannot pack this FMU").because(&error);
+    match error {
+        ConfigError::Drive(_) => failure.next("ferrodrive help sim describes --drive, which takes the same"),
+        _ => failure,
+    }
+}
