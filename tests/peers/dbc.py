@@ -7,7 +7,7 @@ import subprocess
 import cantools
 
 from checks import check, equal, near, true
-from drive import ALL, MJOINT
+from drive import ALL, MJOINT, ZLAC8030L
 from services.pdo import set_up
 
 #: Objects that have another form in PDOs than by SDO: drive, index, then type and unit.
@@ -79,6 +79,25 @@ def compare(drive, message, objects):
             near(value, number * factor, abs(number) * 1e-12, f"{what}: value of {data.hex()}")
         at += bits
     return len(objects)
+
+
+#: ZLAC8030L quick start guide V1.00, 9, as the command line spells them, with their sub-indexes.
+LONG = (
+    "input_terminal_x0_function_selection_02",
+    "output_terminal_y0_function_selection_0D",
+    "output_terminal_y1_function_selection_0F",
+)
+
+
+@check("cantools has names that are longer than DBC allows, whole and each once", ZLAC8030L)
+def long_names(bench):
+    identifier = 0x180 + bench.node_id
+    mapped = [(0x1A00, place, 0x2030_0010 | sub << 8) for place, sub in enumerate((0x02, 0x0D, 0x0F), start=1)]
+    off, on = (0x1800, 1, 1 << 31 | identifier), (0x1800, 1, identifier)
+    bench.write_all([off, (0x1A00, 0, 0), *mapped, (0x1A00, 0, len(mapped)), on])
+    message = export(bench).get_message_by_name(f"TPDO1_{bench.node_id}")
+    equal(tuple(signal.name for signal in message.signals), LONG, "names")
+    equal(message.decode(bytes.fromhex("090001000400"), decode_choices=False), dict(zip(LONG, (9, 1, 4))), "values")
 
 
 @check("cantools reads heartbeat, emergency and NMT of its DBC", *ALL)
