@@ -25,6 +25,7 @@ mod help;
 mod motion;
 pub mod network;
 mod nodes;
+pub mod page;
 mod parameters;
 mod pdo;
 mod run;

@@ -7,7 +7,6 @@
 //! Not done here: opening a bus and a port, and running the two (`ferrodrive studio`).
 
 mod access;
-mod message;
 mod web;
 
 pub use access::{Access, AccessError, Password, Token};

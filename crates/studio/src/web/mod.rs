@@ -86,7 +86,7 @@ pub fn app(handle: HostHandle, access: Arc<Access>) -> Router {
 fn handler(operation: Operation) -> MethodRouter<Web> {
     match operation {
         Operation::State => get(state),
-        Operation::PowerStates => get(async || json_text(page::power_states())),
+        Operation::PowerStates => get(async || json_text(host::page::power_states())),
         Operation::OpenApi => get(async || json_text(openapi::document().to_string())),
         Operation::Stop => post(stop),
         Operation::Login => post(login),

@@ -3,8 +3,6 @@
 use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
-use cia402::{PowerEvent, PowerState, TRANSITIONS};
-use serde_json::{Value, json};
 
 use super::answer::trouble;
 
@@ -69,24 +67,4 @@ pub(super) fn file(name: &str) -> Response {
 pub(super) fn refused(status: StatusCode, reason: &str) -> Response {
     let text = include_str!("../../page/refused.html").replace("REASON", reason);
     (status, [(CONTENT_TYPE, HTML)], text).into_response()
-}
-
-/// The power drive state machine as the page draws it. Transitions 0 (start) and 13 (a fault, from any state) are not rows of
-/// the table.
-pub(super) fn power_states() -> String {
-    let states: Vec<_> = PowerState::ALL.iter().map(|state| state.name()).collect();
-    let transitions: Vec<Value> = TRANSITIONS
-        .iter()
-        .map(|row| {
-            let event = match row.event {
-                PowerEvent::Command(command) => command.name(),
-                PowerEvent::SelfTestDone => "self-test done",
-                PowerEvent::FaultOccurred => "fault",
-                PowerEvent::FaultReactionDone => "fault reaction done",
-                PowerEvent::QuickStopDone => "quick stop done",
-            };
-            json!({ "number": row.number, "from": row.from.name(), "to": row.to.name(), "event": event })
-        })
-        .collect();
-    json!({ "states": states, "transitions": transitions }).to_string()
 }

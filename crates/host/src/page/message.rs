@@ -3,8 +3,9 @@
 //! `seq` rises from message to message, and `session` is the word of the welcome message: a message that is sent
 //! again, or to another session, is refused. The rest is a [`Command`].
 
-use host::Command;
 use serde_json::Value;
+
+use crate::command::Command;
 
 /// A message of a page.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,8 +52,8 @@ impl PageMessage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::NodeCommand;
     use canopen::NodeId;
-    use host::command::NodeCommand;
 
     #[test]
     fn a_message_is_its_number_its_session_and_a_command() {
