@@ -4,6 +4,7 @@ import { ask } from "./link.js";
 import { h, hex, number, renew, setText } from "./dom.js";
 import { term, terms } from "./help.js";
 import { powerMachine } from "./machine.js";
+import { request } from "./transport.js";
 
 /** Label, field, decimals, unit. */
 export const VALUES = [
@@ -58,7 +59,7 @@ export function driveView(shared) {
   const findings = h("div", { class: "findings" });
   const why = h("button", { type: "button", id: "why", onclick: explain }, "Why does it not move?");
   let machine = null;
-  fetch("/api/power-states")
+  request("/api/power-states")
     .then((answer) => answer.json())
     .then((table) => {
       machine = powerMachine(table);

@@ -4,6 +4,7 @@
 import { h, hex, number, renew, setText, toggle } from "./dom.js";
 import { documented, pointed } from "./help.js";
 import { headRow, lineRow } from "./trace.js";
+import { request } from "./transport.js";
 
 /** Least time between two requests. */
 const ASK_MS = 250;
@@ -41,7 +42,7 @@ export function faultsView() {
     asking = true;
     asked_at = performance.now();
     try {
-      const answer = await fetch(`/api/faults?since=${revision}`);
+      const answer = await request(`/api/faults?since=${revision}`);
       const news = await answer.json();
       if (!answer.ok) throw new Error(news.error.message);
       [revision, oldest, trouble] = [news.revision, news.oldest, null];
@@ -125,7 +126,7 @@ export function faultsView() {
     const asked = new URLSearchParams({ from_s: Math.max(0, entry.at_s - AROUND_S).toFixed(6), until_s: (entry.at_s + AROUND_S).toFixed(6), count: "2000" });
     let lines = [];
     try {
-      const answer = await fetch(`/api/trace?${asked}`);
+      const answer = await request(`/api/trace?${asked}`);
       const body = await answer.json();
       if (!answer.ok) throw new Error(body.error.message);
       lines = body.lines;

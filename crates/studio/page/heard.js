@@ -4,6 +4,7 @@
 import { choice } from "./choice.js";
 import { h, setText } from "./dom.js";
 import { Series } from "./series.js";
+import { request } from "./transport.js";
 
 const ASK_MS = 100;
 const KEPT_S = 60;
@@ -22,7 +23,7 @@ const isCurrent = ({ name, unit }) => /current|torque/i.test(name ?? "") || /\bm
 export const heard = () => [...chosen.values()];
 
 async function fetchSeries(parameters) {
-  const answer = await fetch(`/api/series?${new URLSearchParams(parameters)}`);
+  const answer = await request(`/api/series?${new URLSearchParams(parameters)}`);
   const body = await answer.json();
   if (!answer.ok) throw new Error(body.error.message);
   return body;

@@ -4,6 +4,8 @@
 // is stale: then only a stop is sent, since a command that waits in a connection would be executed much later. A
 // connection that is lost, or silent, is opened again; control has to be taken again then.
 
+import { open, request } from "./transport.js";
+
 const RETRY_MS = 1000;
 const ALIVE_MS = 500;
 /** The studio sends its state every 50 ms. */
@@ -27,7 +29,7 @@ export const link = {
 let turned_away = null;
 
 const listeners = { state: [], news: [], change: [], sight: [], stop: [] };
-let socket = null;
+let connection = null;
 let seq = 0;
 const waiting = new Map();
 /** When the newest state of this connection came, and when the connection was opened, by `performance.now()`. */
@@ -54,11 +56,11 @@ const refused = (kind, message) => Promise.resolve({ ok: false, error: { kind, m
 
 /** Sends a command; resolves with the answer, and never rejects. */
 export function ask(command) {
-  if (!link.welcome || socket?.readyState !== WebSocket.OPEN) return refused("no_connection", "There is no connection to the studio.");
+  if (!link.welcome || !connection?.isOpen()) return refused("no_connection", "There is no connection to the studio.");
   if (!link.fresh && command.do !== "stop_all") return refused("no_picture", "Nothing was sent: the state of the studio is stale.");
   seq += 1;
   const message = { seq, session: link.welcome.word, ...command };
-  socket.send(JSON.stringify(message));
+  connection.send(JSON.stringify(message));
   return new Promise((resolve) => waiting.set(message.seq, resolve));
 }
 
@@ -80,7 +82,7 @@ export function stopAll() {
     confirmed = true;
     emit("stop", { confirmed: true, after_ms: performance.now() - began });
   });
-  fetch("/api/stop", { method: "POST", keepalive: true }).catch(() => {});
+  request("/api/stop", { method: "POST", keepalive: true }).catch(() => {});
   setTimeout(missed, CONFIRM_MS);
 }
 
@@ -114,16 +116,17 @@ function take(message) {
 
 /** Connects, and reconnects whenever the connection is lost. */
 export function connect() {
-  const mine = new WebSocket(`ws://${location.host}/ws`);
-  socket = mine;
   opened_at = performance.now();
   // Messages of a connection that was given up no longer count.
-  mine.addEventListener("message", (event) => mine === socket && take(JSON.parse(event.data)));
-  mine.addEventListener("close", () => mine === socket && lose());
+  const mine = open(
+    (text) => mine === connection && take(JSON.parse(text)),
+    () => mine === connection && lose(),
+  );
+  connection = mine;
 }
 
 function lose() {
-  [socket, link.welcome, seen_at] = [null, null, -Infinity];
+  [connection, link.welcome, seen_at] = [null, null, -Infinity];
   for (const resolve of waiting.values()) {
     resolve({ ok: false, error: { kind: "no_connection", message: "The connection to the studio was lost." } });
   }
@@ -137,7 +140,7 @@ function lose() {
 /** A socket that is refused does not say why; the answer to a request does. */
 async function findRefusal() {
   try {
-    const answer = await fetch("/api/state", { signal: AbortSignal.timeout(RETRY_MS) });
+    const answer = await request("/api/state", { signal: AbortSignal.timeout(RETRY_MS) });
     turned_away = answer.ok ? null : (await answer.json()).error.message;
   } catch {
     turned_away = null;
@@ -151,8 +154,8 @@ function look() {
   const before = link.fresh;
   link.fresh = now - seen_at <= OLD_MS;
   if (!link.fresh || !before) emit("sight", { fresh: link.fresh, connected: link.welcome !== null, age_ms: now - last_at, refused: turned_away });
-  if (socket && now - Math.max(seen_at, opened_at) > DEAD_MS) {
-    const dead = socket;
+  if (connection && now - Math.max(seen_at, opened_at) > DEAD_MS) {
+    const dead = connection;
     lose();
     dead.close();
   }

@@ -2,6 +2,7 @@
 
 import { ask, inControl } from "./link.js";
 import { count, h, setText } from "./dom.js";
+import { request } from "./transport.js";
 
 /** A message may have 64 KiB, and a character of the file may take two bytes of it. */
 const LARGEST = 30000;
@@ -55,7 +56,7 @@ export function parameterFile({ node, report, mark, written }) {
 
   /** The TOML with the values of a DCF, since a DCF is larger than a message may be. */
   async function ofDcf(file) {
-    const answer = await fetch(`/api/parameters.toml?node=${node()}`, { method: "POST", body: file }).catch(() => null);
+    const answer = await request(`/api/parameters.toml?node=${node()}`, { method: "POST", body: file }).catch(() => null);
     if (answer?.ok) return answer.text();
     throw new Error(answer ? ((await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}`) : "the studio does not answer");
   }

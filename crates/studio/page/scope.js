@@ -12,6 +12,7 @@ import { crossing, spectrum, stepResponse, within } from "./analysis.js";
 import { edge } from "./scope_edge.js";
 import { SvgPen } from "./svg_pen.js";
 import { trigger } from "./scope_trigger.js";
+import { request } from "./transport.js";
 
 const SPANS_S = [1, 2, 5, 10, 30, 60];
 const LONGEST_MARK = 40;
@@ -262,7 +263,7 @@ export function scopeView(shared) {
     const events = marks.filter(({ time_s }) => time_s >= first_s).map(({ time_s, text }) => [time_s, Array(columns.length).fill(""), `"${text.replaceAll('"', '""').replaceAll("\n", " ")}"`]);
     const lines = [...rows, ...events].sort(([a], [b]) => a - b).map(([time_s, row, mark = ""]) => [time_s, ...row, mark].join(","));
     const body = [["t_s", ...columns, "mark"].join(","), ...lines, ""].join("\n");
-    const answer = await fetch("/api/recording.mcap", { method: "POST", body }).catch(() => null);
+    const answer = await request("/api/recording.mcap", { method: "POST", body }).catch(() => null);
     if (answer?.ok) return save(await answer.blob(), "application/octet-stream", "mcap");
     const why = answer ? (await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}` : "the studio does not answer";
     setText(saved, `MCAP not saved: ${why}`);

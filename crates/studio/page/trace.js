@@ -3,6 +3,7 @@
 
 import { h, number, setText, toggle } from "./dom.js";
 import { pointed } from "./help.js";
+import { request } from "./transport.js";
 
 const ASK_MS = 100;
 const PART = 500;
@@ -102,7 +103,7 @@ export function traceView() {
     fetching = true;
     let body = null;
     try {
-      const answer = await fetch(`/api/trace?${asked}`);
+      const answer = await request(`/api/trace?${asked}`);
       body = await answer.json();
       if (!answer.ok) throw new Error(body.error.message);
     } catch (error) {

@@ -18,6 +18,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("login.js", SCRIPT, include_str!("../../page/login.js")),
     ("main.js", SCRIPT, include_str!("../../page/main.js")),
     ("link.js", SCRIPT, include_str!("../../page/link.js")),
+    ("transport.js", SCRIPT, include_str!("../../page/transport.js")),
     ("keys.js", SCRIPT, include_str!("../../page/keys.js")),
     ("limit.js", SCRIPT, include_str!("../../page/limit.js")),
     ("dom.js", SCRIPT, include_str!("../../page/dom.js")),

@@ -1,0 +1,87 @@
+// How the page reaches its host: over a WebSocket and requests to the studio that serves it, or, where the page says so, through a
+// worker of its own that holds virtual drives. Messages and requests are the same.
+
+/** The worker of a page without a server. */
+const worker_at = document.documentElement.dataset.worker;
+
+/** A host behind a socket: `heard` and `closed` are called with each message, and when the connection is lost. */
+function overSocket(heard, closed) {
+  const socket = new WebSocket(`ws://${location.host}/ws`);
+  socket.addEventListener("message", (event) => heard(event.data));
+  socket.addEventListener("close", closed);
+  return {
+    isOpen: () => socket.readyState === WebSocket.OPEN,
+    send: (text) => socket.send(text),
+    close: () => socket.close(),
+  };
+}
+
+let worker = null;
+/** Why the last worker has ended. */
+let ended = null;
+let asked = 0;
+const answers = new Map();
+
+/** The machine lives as long as its worker: a connection that is opened again is a new session with it. */
+function inWorker(heard, closed) {
+  worker ??= new Worker(worker_at, { type: "module" });
+  const mine = worker;
+  const lose = (why) => {
+    if (worker !== mine) return;
+    [worker, ended] = [null, why];
+    mine.terminate();
+    for (const { reject } of answers.values()) reject(new Error(why));
+    answers.clear();
+    closed();
+  };
+  mine.onmessage = ({ data }) => {
+    if (data.text !== undefined) heard(data.text);
+    else if (data.ended !== undefined) lose(data.ended);
+    else {
+      answers.get(data.answer)?.resolve(new Response(data.body, { status: data.status, headers: { "content-type": data.kind } }));
+      answers.delete(data.answer);
+    }
+  };
+  mine.onerror = (event) => lose(event.message ?? "it cannot be loaded");
+  mine.postMessage({ open: true, ...machine() });
+  const text = ended && `The virtual machine has ended: ${ended}. It begins anew`;
+  ended = null;
+  if (text) setTimeout(() => heard(JSON.stringify({ type: "news", time_s: null, node: null, text })));
+  return { isOpen: () => worker === mine, send: (text) => mine.postMessage({ say: text }), close: () => {} };
+}
+
+/** The machine file that this tab keeps, and data sheets that it names; a base with two wheels, and two axes, at first. */
+function machine() {
+  const kept = sessionStorage.getItem("machine");
+  return kept ? JSON.parse(kept) : { machine: document.getElementById("machine").textContent, files: {} };
+}
+
+/** A request to the host: `fetch` with a path. */
+function requestWorker(path, { body = null } = {}) {
+  if (!worker) return Promise.reject(new Error("the worker has ended"));
+  asked += 1;
+  const answer = asked;
+  worker.postMessage({ request: answer, path, body });
+  return new Promise((resolve, reject) => answers.set(answer, { resolve, reject }));
+}
+
+/** Opens a connection: `{ isOpen, send, close }`. */
+export const open = worker_at ? inWorker : overSocket;
+
+/** As `fetch`, of a path of the host. */
+export const request = worker_at ? requestWorker : (path, options) => fetch(path, options);
+
+// Links to files that the host makes.
+if (worker_at) {
+  addEventListener("click", async (event) => {
+    const link = event.target.closest?.("a[href^='/api/']");
+    if (!link) return;
+    event.preventDefault();
+    const answer = await request(link.getAttribute("href"));
+    const url = URL.createObjectURL(await answer.blob());
+    const save = document.createElement("a");
+    [save.href, save.download] = [url, link.download];
+    save.click();
+    setTimeout(() => URL.revokeObjectURL(url), 1000);
+  });
+}
