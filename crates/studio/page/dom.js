@@ -7,7 +7,7 @@ function fill(element, properties, children) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (name === "class") element.setAttribute("class", value);
     else if (typeof value === "boolean") element.toggleAttribute(name, value);
-    else element.setAttribute(name, value);
+    else if (value !== null) element.setAttribute(name, value);
   }
   element.append(...children.filter((child) => child !== null));
   return element;
@@ -16,7 +16,7 @@ function fill(element, properties, children) {
 /** An element with attributes; `onclick` and the like add listeners. Autocomplete is off: its list would take the keys of Stop. */
 export const h = (tag, properties = {}, ...children) => fill(document.createElement(tag), tag === "input" ? { autocomplete: "off", ...properties } : properties, children);
 
-/** A toggle button with `checked`: pressed by the pointer and by Enter, since Space is Stop. */
+/** A toggle button with `checked`: pressed by the pointer and by Enter, since Space is Stop. `id` may be null. */
 export function toggle(id, text, on, onchange = () => {}, properties = {}) {
   const button = h("button", { type: "button", id, class: "toggle", "aria-pressed": String(on), ...properties }, text);
   Object.defineProperty(button, "checked", {

@@ -32,7 +32,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("scenario", &["can", "canopen", "cia402", "devices", "machine", "master", "sim", "words"]),
     ("host", &["can", "canopen", "cia402", "devices", "eds", "machine", "master", "plot", "sim", "words"]),
     ("serve", &["can", "canlog", "host", "master", "recording", "scenario", "sim", "transport", "words"]),
-    ("studio", &["can", "canopen", "host", "machine", "master", "recording", "words"]),
+    ("studio", &["can", "canlog", "canopen", "host", "machine", "master", "recording", "words"]),
     (
         "python",
         &[

@@ -14,4 +14,4 @@ mod series;
 pub use origin::Origin;
 pub use query::{Asked, Query};
 pub use ring::{Held, Trace};
-pub use series::AskedSeries;
+pub use series::{AskedSeries, LogSeries};

@@ -40,6 +40,8 @@ struct Ring {
     /// The decoder, which has learned from the frames so far.
     decoder: Decoder,
     models: BTreeMap<NodeId, &'static Description>,
+    /// The models among which nodes are identified.
+    known: Models,
 }
 
 /// Consecutive frames.
@@ -65,8 +67,9 @@ impl Trace {
 
     /// A trace that identifies nodes among these models.
     pub fn new(models: Models, origin: Origin) -> Self {
-        let decoder = Decoder::knowing(models);
-        let ring = Ring { chunks: VecDeque::new(), held: 0, next: 0, decoder, models: BTreeMap::new() };
+        let decoder = Decoder::knowing(models.clone());
+        let (chunks, nodes) = (VecDeque::new(), BTreeMap::new());
+        let ring = Ring { chunks, held: 0, next: 0, decoder, models: nodes, known: models };
         Self { ring: Mutex::new(ring), origin, logs_saved: AtomicU64::new(0) }
     }
 
@@ -85,6 +88,14 @@ impl Trace {
         ring.models.insert(node, model);
         ring.decoder.set_model(node, model);
         ring.begin_chunk();
+    }
+
+    /// A decoder that has seen no frame, and knows the models of this bus's nodes.
+    pub(super) fn fresh_decoder(&self) -> Decoder {
+        let ring = self.lock();
+        let mut decoder = Decoder::knowing(ring.known.clone());
+        ring.models.iter().for_each(|(node, model)| decoder.set_model(*node, model));
+        decoder
     }
 
     /// A snapshot of the kept frames, unaffected by further ones.

@@ -3,13 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use can::Instant;
+use can::{Frame, Instant};
 use canopen::{Mux, NodeId};
-use master::decode::Number;
+use master::decode::{Decoded, Number};
 use serde::{Deserialize, Serialize};
 
 use super::query::{MOST_SEARCHED, node};
-use super::ring::Held;
+use super::ring::{Held, Trace};
 
 /// Most objects in one request.
 const MOST_OBJECTS: usize = 32;
@@ -90,32 +90,92 @@ impl SeriesQuery {
         let to = held.next();
         let wanted_from = self.after.unwrap_or_default();
         let from = wanted_from.max(held.oldest()).max(to.saturating_sub(MOST_SEARCHED)).min(to);
-        let mut found = BTreeMap::new();
+        let mut found = Collected::default();
+        let is_list = self.objects.is_empty();
         held.decode(from, to, |_, passed, decoded| {
-            let Some(node) = decoded.node() else { return };
-            for Number { mux, name, value, unit } in decoded.numbers() {
-                if !self.objects.is_empty() && !self.objects.contains(&(node, mux)) {
-                    continue;
-                }
-                let one = found.entry((node, mux.index, mux.sub_index)).or_insert_with(|| Series {
-                    object: format!("{node}:{:04X}:{:02X}", mux.index, mux.sub_index),
-                    node: node.raw(),
-                    name,
-                    unit,
-                    count: 0,
-                    points: Vec::new(),
-                });
-                one.count += 1;
-                if !self.objects.is_empty() {
-                    one.points.push(((passed.at - Instant::ZERO).as_secs_f64(), value));
-                }
-            }
+            found.take(passed.at, decoded, !is_list, |object| is_list || self.objects.contains(object));
         });
         Values {
             from,
             to,
             skipped: self.after.map_or(0, |after| from.saturating_sub(after)),
-            series: found.into_values().collect(),
+            series: found.0.into_values().collect(),
         }
     }
+}
+
+/// The values of each object so far.
+#[derive(Debug, Default)]
+struct Collected(BTreeMap<(NodeId, u16, u8), Series>);
+
+impl Collected {
+    /// Adds the numbers of a frame; `keeps`: their values too, and not only how many there are. Returns how many were added.
+    fn take(
+        &mut self,
+        at: Instant,
+        decoded: &Decoded,
+        keeps: bool,
+        is_wanted: impl Fn(&(NodeId, Mux)) -> bool,
+    ) -> usize {
+        let Some(node) = decoded.node() else { return 0 };
+        let mut added = 0;
+        for Number { mux, name, value, unit } in decoded.numbers() {
+            if !is_wanted(&(node, mux)) {
+                continue;
+            }
+            let one = self.0.entry((node, mux.index, mux.sub_index)).or_insert_with(|| Series {
+                object: format!("{node}:{:04X}:{:02X}", mux.index, mux.sub_index),
+                node: node.raw(),
+                name,
+                unit,
+                count: 0,
+                points: Vec::new(),
+            });
+            one.count += 1;
+            added += 1;
+            if keeps {
+                one.points.push(((at - Instant::ZERO).as_secs_f64(), value));
+            }
+        }
+        added
+    }
+}
+
+/// Most values of one log: some 40 MB of text.
+const MOST_OF_A_LOG: usize = 2_000_000;
+
+impl Trace {
+    /// The values of every object in a log of another time, decoded by the models of this bus's nodes: object, name, unit, and times
+    /// in s with values.
+    ///
+    /// # Errors
+    /// More than two million values.
+    pub fn values_of_log(&self, frames: impl IntoIterator<Item = (Instant, Frame)>) -> Result<Vec<LogSeries>, String> {
+        let mut decoder = self.fresh_decoder();
+        let mut found = Collected::default();
+        let mut count = 0;
+        for (at, frame) in frames {
+            count += found.take(at, &decoder.decode(&frame), true, |_| true);
+            if count > MOST_OF_A_LOG {
+                return Err(format!(
+                    "the log has more than {MOST_OF_A_LOG} values: cut it, for instance with ferrodrive convert"
+                ));
+            }
+        }
+        let series = found.0.into_values();
+        Ok(series.map(|Series { object, name, unit, points, .. }| LogSeries { object, name, unit, points }).collect())
+    }
+}
+
+/// The values of an object in a log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LogSeries {
+    /// `4:606C:00`.
+    pub object: String,
+    /// Its name, if its node's model is known.
+    pub name: Option<&'static str>,
+    /// The unit of one count, as text; may be empty.
+    pub unit: &'static str,
+    /// Time in s and value.
+    pub points: Vec<(f64, i64)>,
 }

@@ -3,6 +3,7 @@
 //! Access is decided before anything else, in one place ([`guard`]). The handlers know nothing of drives.
 
 mod answer;
+mod bundle;
 mod door;
 mod guessers;
 mod openapi;
@@ -74,9 +75,9 @@ pub fn app(handle: HostHandle, access: Arc<Access>) -> Router {
     let one = || Arc::new(Semaphore::new(1));
     let web = Web { handle, access, guessers: Arc::default(), doors: trace::Doors::default(), records: one() };
     let api = ROUTES.iter().fold(Router::new(), |router, route| router.route(route.path, handler(route.operation)));
-    api.route("/", get(async || page::file("index.html")))
-        .route("/page/{file}", get(async |Path(file): Path<String>| page::file(&file)))
-        .route("/login", get(async || page::file("login.html")))
+    api.route("/", get(async |asked: HeaderMap| page::file("index.html", &asked)))
+        .route("/page/{file}", get(async |Path(file): Path<String>, asked: HeaderMap| page::file(&file, &asked)))
+        .route("/login", get(async |asked: HeaderMap| page::file("login.html", &asked)))
         .fallback(async || trouble(StatusCode::NOT_FOUND, "not_found", "there is nothing at this path"))
         .layer(DefaultBodyLimit::max(LARGEST_MESSAGE))
         .layer(middleware::from_fn_with_state(web.clone(), guard))
@@ -101,6 +102,10 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
             post(async |State(web): State<Web>, body: axum::body::Bytes| recording::mcap(web.records, body).await)
                 .layer(DefaultBodyLimit::max(recording::LARGEST))
         }
+        Operation::Recording => post(async |State(web): State<Web>, asked, body: axum::body::Bytes| {
+            recording::values(web.handle, web.records, asked, body).await
+        })
+        .layer(DefaultBodyLimit::max(recording::LARGEST)),
         Operation::ParametersToml => post(async |State(web): State<Web>, asked, body: axum::body::Bytes| {
             parameters::toml(web.records, asked, body).await
         })
@@ -117,7 +122,8 @@ async fn guard(State(web): State<Web>, request: Request, next: Next) -> Response
         None => in_json(next.run(request).await),
     };
     for (name, value) in HEADERS {
-        response.headers_mut().insert(name, HeaderValue::from_static(value));
+        // A file of the page may be kept if it is asked for again.
+        response.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));
     }
     response
 }

@@ -16,6 +16,7 @@ pub(super) enum Operation {
     Trace,
     TraceLog,
     RecordingMcap,
+    Recording,
     ParametersToml,
 }
 
@@ -35,7 +36,7 @@ const OVER: (&str, &str) = ("503", "The studio is ending");
 const FOREIGN: (&str, &str) = ("403", "The Origin or the Host is not that of this server");
 
 /// All requests. No GET changes anything, and no request moves a drive: motion goes through the socket, where it is held.
-pub(super) const ROUTES: [Route; 12] = [
+pub(super) const ROUTES: [Route; 13] = [
     Route {
         path: "/api/state",
         method: "get",
@@ -133,6 +134,21 @@ pub(super) const ROUTES: [Route; 12] = [
         ],
     },
     Route {
+        path: "/api/recording",
+        method: "post",
+        operation: Operation::Recording,
+        summary: "The values of a file, the body: a record (MCAP, CSV), or a log of frames in any form that ferrodrive reads",
+        answers: &[
+            ("200", "Columns with times in s and values, what happened, and what was not read"),
+            ("400", "The body is not such a file"),
+            LET_IN,
+            FOREIGN,
+            ("413", "More than 32 MB"),
+            ("429", "Another record is being read"),
+            OVER,
+        ],
+    },
+    Route {
         path: "/api/parameters.toml",
         method: "post",
         operation: Operation::ParametersToml,
@@ -176,6 +192,7 @@ const fn parameters(operation: Operation) -> &'static [(&'static str, &'static s
             ),
             ("after", "integer", "Only frames from this number on"),
         ],
+        Operation::Recording => &[("name", "string", "Name of the file: its ending shows what it is")],
         Operation::ParametersToml => &[("node", "integer", "The node-ID to use if the file has none, 1 to 127")],
         Operation::Faults => &[("since", "integer", "The revision of the last answer; 0 for everything")],
         _ => &[],

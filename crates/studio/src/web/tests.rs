@@ -78,7 +78,7 @@ async fn nothing_but_the_token_of_this_launch_opens_the_page() {
     let page = ask(&app, "GET", "/", &[("cookie", cookie)], "").await;
     assert_eq!(page.status(), StatusCode::OK);
     assert!(page.headers()["content-security-policy"].to_str().expect("text").contains("script-src 'self'"));
-    assert!(text(page).await.contains("page/main.js"));
+    assert!(text(page).await.contains("page/bundle.js"));
     let bearer = format!("Bearer {}", token(&access));
     assert_eq!(ask(&app, "GET", "/api/state", &[("authorization", &bearer)], "").await.status(), StatusCode::OK);
     let other = [("cookie", "ferrodrive_studio_8402=00000000000000000000000000000000")];
