@@ -1,7 +1,7 @@
 // Analysis of a part of a series: step response, spectrum, level crossings. Independent of the page.
 
 /** The value of a straight line between the samples of `series` at a time within it. */
-function between(series, time_s) {
+export function between(series, time_s) {
   const right = Math.min(Math.max(series.at(time_s), series.start + 1), series.end - 1);
   const [t0, t1] = [series.times[right - 1], series.times[right]];
   const [v0, v1] = [series.values[right - 1], series.values[right]];

@@ -2,21 +2,11 @@
 // happened meanwhile.
 
 import { on } from "./link.js";
+import { QUANTITIES } from "./quantities.js";
 import { Series } from "./series.js";
 
 const KEPT_S = 60;
 const MARKERS_KEPT = 200;
-
-/** The values read from a drive: field, label, unit, decimals. A current has no step response. */
-export const QUANTITIES = [
-  { field: "velocity_rpm", label: "Speed", unit: "r/min", decimals: 1 },
-  { field: "angle_degrees", label: "Position", unit: "°", decimals: 1 },
-  { field: "current_a", label: "Current", unit: "A", decimals: 2, steps: false },
-  { field: "supply_v", label: "Supply", unit: "V", decimals: 1 },
-];
-
-/** Further fields saved with them. */
-const SAVED = ["position_counts", "statusword"];
 
 /** By node: by field, a series. */
 const kept = new Map();
@@ -32,16 +22,15 @@ export function series(node, field) {
 /** When the newest value of a node was read. */
 export const newest_s = (node) => Math.max(0, ...[...(kept.get(node)?.values() ?? [])].map((one) => one.last_s()));
 
-/** Every value of these nodes, each at the times of its own: `[node, field, series]`. */
-export const everything = (nodes) =>
-  nodes.flatMap((node) => [...QUANTITIES.map(({ field }) => field), ...SAVED].map((field) => [node, field, series(node, field)]));
+/** Every value of these nodes, each at the times of its own, as columns of the scope. */
+export const everything = (nodes) => nodes.flatMap((node) => QUANTITIES.map((quantity) => ({ ...quantity, node, series: series(node, quantity.field) })));
 
 on("state", (state) => {
   for (const { node, drive } of state.nodes) {
     if (!drive) continue;
     const fields = kept.get(node) ?? new Map();
     kept.set(node, fields);
-    for (const field of [...QUANTITIES.map((quantity) => quantity.field), ...SAVED]) {
+    for (const { field } of QUANTITIES) {
       if (drive[field] === null || drive[field] === undefined) continue;
       const one = fields.get(field) ?? new Series(KEPT_S);
       fields.set(field, one);

@@ -1,130 +1,185 @@
-// The Scope view: the values of the last 60 s, over time or over frequency.
+// The Scope view: the values of the last 60 s, over time, over frequency or over each other, and captures laid over them.
 //
 // A sample is one reading of a drive, with its time; two readings are joined by a straight line, and nothing else is interpolated.
 
+import { against, firstOf, lastOf, samplesOf, seriesOf } from "./capture.js";
 import { choice } from "./choice.js";
-import { h, number, setText } from "./dom.js";
+import { h, number, setText, toggle } from "./dom.js";
 import { chooser } from "./drive.js";
 import { heard, heardChooser } from "./heard.js";
-import { QUANTITIES, everything, markers, newest_s, series } from "./kept.js";
-import { frame, overFrequency, overTime } from "./scope_picture.js";
-import { crossing, spectrum, stepResponse, within } from "./analysis.js";
+import { everything, markers, newest_s, series } from "./kept.js";
+import { linkTo, linked } from "./linked.js";
+import { QUANTITIES } from "./quantities.js";
+import { mcapOf, recordOf } from "./recordings.js";
+import { Scales, ZOOM } from "./scale.js";
+import { frame, overEach, overFrequency, overTime } from "./scope_picture.js";
+import { capturePanel } from "./scope_captures.js";
+import { computedPanel } from "./scope_computed.js";
+import { crossing, spectrum } from "./analysis.js";
 import { edge } from "./scope_edge.js";
+import { gestures, keyMeaning } from "./scope_pointer.js";
+import { measured } from "./scope_readout.js";
+import { scalePanel } from "./scope_scales.js";
+import { overlaid, panesOf } from "./scope_source.js";
+import { kept, keep } from "./settings.js";
 import { SvgPen } from "./svg_pen.js";
 import { trigger } from "./scope_trigger.js";
-import { request } from "./transport.js";
 
 const SPANS_S = [1, 2, 5, 10, 30, 60];
+const SHORTEST_S = 1e-3;
+const LONGEST_S = 86_400;
 const LONGEST_MARK = 40;
 /** Least height of a legible pane; the picture grows with its panes. */
 const LOWEST_PANE = 76;
+const SETTINGS = "scope";
+const HIDDEN = ["supply_v", "position_counts", "statusword"];
 
 const cut = (text) => (text.length > LONGEST_MARK ? `${text.slice(0, LONGEST_MARK - 1)}…` : text);
 
 export function scopeView(shared) {
+  const before = kept(SETTINGS, {});
   const choose = chooser(shared);
-  const canvas = h("canvas", { tabindex: "0", "aria-label": "Values over time. Click sets cursor A, Shift+click cursor B; the wheel zooms while paused." });
+  const canvas = h("canvas", {
+    tabindex: "0",
+    role: "img",
+    "aria-label": "Values over time. Arrows left and right move the cursor, Enter changes to the other one; arrows up and down zoom the scale, plus and minus the time, Page up and down move the picture.",
+  });
   const readout = h("p", { class: "readout", role: "status" });
-  const seconds = choice("scope-window", "Time shown", SPANS_S.map((span) => ({ value: String(span), text: `${span} s` })), { value: "10" });
+  const seconds = choice("scope-window", "Time shown", SPANS_S.map((span) => ({ value: String(span), text: `${span} s` })), { value: SPANS_S.includes(before.span_s) ? String(before.span_s) : "10" });
   const button = (id, text, onclick, title = "") => h("button", { type: "button", id, title, onclick }, text);
-  const toggled = (id, text, onclick, title) => h("button", { type: "button", id, title, "aria-pressed": "false", onclick }, text);
-  const pause = toggled("scope-pause", "Pause", pauseOrGoOn, "Key p");
-  const steps = toggled("scope-step", "Step response", () => press(steps), "Rise time, overshoot and settling time of the values shown, or between the cursors");
-  const frequencies = toggled("scope-fft", "Spectrum", () => press(frequencies), "Spectrum of the values shown");
+  const pause = toggle("scope-pause", "Pause", false, () => (frozen ? goOn() : freeze()), { title: "Key p" });
+  const steps = toggle("scope-step", "Step response", false, () => {}, { title: "Rise time, overshoot and settling time of the values shown, or between the cursors" });
+  const frequencies = toggle("scope-fft", "Spectrum", false, () => only(across), { title: "Spectrum of the values shown" });
+  const across = toggle("scope-xy", "XY", false, () => only(frequencies), { title: "Each value over another one" });
+  const only = (not) => {
+    not.checked = false;
+    below.hidden = !across.checked;
+  };
+  const below = choice("scope-across", "Value below the picture", []);
+  below.hidden = true;
+  const together = toggle("scope-together", "One pane", before.together === true, store, { title: "All values in one pane, each with its own scale" });
+  const other = toggle("scope-cursor", "Set cursor B", false, () => {}, { title: "A tap or a key sets cursor B, not A (Enter on the picture)" });
   const panes = h("span", { class: "chooser", role: "group", "aria-label": "Values shown" });
   const others = h("span", { class: "chooser", role: "group", "aria-label": "Drives shown besides the chosen one" });
-  const trip = trigger(thaw);
+  const trip = trigger(goOn);
+  const keeps = toggle("trigger-keep", "Keep each", false, () => {}, { title: "Keep a capture whenever the trigger fires" });
   const saved = h("p", { class: "bad", role: "status" });
+  const computed = computedPanel();
+  const captures = capturePanel({ take: shownCapture, open: openCapture });
+  const scales = new Scales(before.scales);
+  const scale = scalePanel(scales, () => areas, store);
   const root = h(
     "section",
     { class: "scope" },
     h("div", { class: "bar" }, choose.root, others),
-    h("div", { class: "bar" }, seconds, pause, panes, steps, frequencies, button("scope-clear", "Clear cursors", () => (cursors = [null, null])), button("scope-save", "Save CSV", saveCsv), button("scope-mcap", "Save MCAP", saveMcap, "For Foxglove, PlotJuggler, Rerun and ferrodrive plot"), button("scope-svg", "Save SVG", saveSvg)),
-    h("div", { class: "bar" }, trip.root, heardChooser().root),
-    saved,
+    h("div", { class: "bar" }, seconds, pause, panes, together, heardChooser().root),
+    h("div", { class: "bar" }, trip.root, keeps),
     canvas,
+    h("div", { class: "bar under" }, scale.root),
+    h("div", { class: "bar" }, other, button("scope-clear", "Clear cursors", () => (cursors = [null, null])), button("scope-zoom-in", "Time +", () => zoom(null, 1 / ZOOM), "Shorter time (plus on the picture)"), button("scope-zoom-out", "Time −", () => zoom(null, ZOOM), "Longer time (minus on the picture)"), steps, frequencies, across, below),
     readout,
-    h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second, fewer with many drives; for an added object, each frame that carries it. Click: cursor A; Shift+click: cursor B; key p: pause. While paused, the wheel zooms and a drag moves."),
+    captures.root,
+    computed.root,
+    h("div", { class: "bar" }, h("span", { class: "quiet" }, "Save as"), button("scope-save", "CSV", saveCsv, "A record, for ferrodrive plot and spreadsheets"), button("scope-mcap", "MCAP", saveMcap, "For Foxglove, PlotJuggler, Rerun and ferrodrive plot"), button("scope-svg", "SVG", saveSvg)),
+    saved,
+    h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second, fewer with many drives; for an added object, each frame that carries it. A tap sets cursor A, with Shift cursor B; key p: pause. While paused a drag moves, the wheel or two fingers zoom; on the figures beside a pane they zoom and move its scale, and a double tap sets it free."),
   );
-  /** While paused: the series, and their end. */
+  /** While paused: `{ columns, end_s, span_s, zero_s, marks, byTrigger, id }`; `id` is that of a capture that is shown by itself. */
   let frozen = null;
   let cursors = [null, null];
+  let followed = linked.changes;
   let shown = false;
-  let extent = null;
-  /** The inputs of the picture on the canvas. */
+  /** What is on the canvas: its inputs, its extent, its areas, and what it drew. */
   let picture = null;
+  let extent = null;
+  let areas = [];
+  let drives = [];
   const liveEdge = edge();
-  const hidden = new Set(["supply_v"]);
+  const lay = overlaid();
+  const hidden = new Set(Array.isArray(before.hidden) ? before.hidden : HIDDEN);
   const beside = new Set();
 
   for (const { field, label } of QUANTITIES) {
-    const pressed = h("button", { type: "button", "data-field": field, "aria-pressed": String(!hidden.has(field)) }, label);
-    pressed.addEventListener("click", () => {
+    const pressed = toggle(null, label, !hidden.has(field), () => {
       if (!hidden.delete(field)) hidden.add(field);
-      pressed.setAttribute("aria-pressed", String(!hidden.has(field)));
-    });
+      store();
+    }, { "data-field": field });
     panes.append(pressed);
   }
 
-  const press = (one) => one.setAttribute("aria-pressed", String(one.getAttribute("aria-pressed") !== "true"));
-  const isPressed = (one) => one.getAttribute("aria-pressed") === "true";
+  function store() {
+    keep(SETTINGS, { hidden: [...hidden], together: together.checked, span_s: Number(seconds.value), scales: scales.kept() });
+  }
 
   /** The drawn drives, the chosen one first. */
   const nodes = () => [shared.node, ...[...beside].filter((node) => node !== shared.node)].filter((node) => node !== null);
 
-  /** Holds the picture as it is, or as it was at an end time; `byTrigger`: until the trigger fires again. */
-  function freeze(end_s = end(), byTrigger = false) {
-    const copies = new Map(all().map(([node, field, one]) => [`${node} ${field}`, one.cut(one.first_s(), end_s + Number(seconds.value))]));
-    frozen = { copies, end_s, span_s: Number(seconds.value), marks: [...markers], byTrigger };
-    pause.setAttribute("aria-pressed", "true");
+  /** Every value that is read or heard now. */
+  const live = () => [...everything(drives), ...heard()];
+
+  /** Holds the picture as it is, or as it was at an end time. */
+  function freeze({ end_s = end(), zero_s = null, byTrigger = false } = {}) {
+    const span_s = Number(seconds.value);
+    const columns = live().map((one) => ({ ...one, series: one.series.cut(one.series.first_s(), end_s + span_s) }));
+    hold({ columns, end_s, span_s, zero_s, marks: [...markers], byTrigger, id: null });
+  }
+
+  function hold(what) {
+    frozen = what;
+    pause.checked = true;
     setText(pause, "Resume");
   }
 
-  function thaw() {
+  function openCapture(capture) {
+    const columns = capture.columns.map((one) => ({ ...one, series: seriesOf(one) }));
+    const [first_s, last_s] = [firstOf(capture), lastOf(capture)];
+    cursors = [null, null];
+    hold({ columns, end_s: last_s, span_s: Math.max(SHORTEST_S, last_s - first_s), zero_s: capture.zero_s, marks: capture.marks, byTrigger: false, id: capture.id });
+  }
+
+  function goOn() {
+    const was = frozen;
     frozen = null;
-    pause.setAttribute("aria-pressed", "false");
+    pause.checked = false;
     setText(pause, "Pause");
+    if (was && !was.byTrigger) trip.rearm(newest_s(shared.node));
   }
-
-  function pauseOrGoOn() {
-    if (!frozen) return freeze();
-    thaw();
-    trip.rearm(newest_s(shared.node));
-  }
-
-  const ofSource = (node, field) => frozen?.copies.get(`${node} ${field}`) ?? heard().find((one) => one.field === field)?.series ?? series(node, field);
-
-  /** The source of the trigger: a value of the chosen drive, or an added object. */
-  const live = (field) => heard().find((one) => one.field === field)?.series ?? series(shared.node, field);
 
   /** When the newest drawable value was read, and the end of the running picture. */
   const newest = () => Math.max(newest_s(shared.node), ...heard().map((one) => one.series.last_s()));
   const end = () => liveEdge(newest(), performance.now() / 1e3);
 
-  /** Every series of the drawn drives, and of the added objects: `[node, field, series]`. */
-  const all = () => [...everything(nodes()), ...heard().map((one) => [one.node, one.field, one.series])];
-
-  /** The panes that are drawn now. */
+  /** What the picture is of: the shown values, and the captures over them. */
   function content() {
     const end_s = frozen ? frozen.end_s : end();
     const from_s = end_s - (frozen ? frozen.span_s : Number(seconds.value));
-    const drawn = QUANTITIES.filter(({ field }) => !hidden.has(field))
-      .map((quantity) => ({
-        ...quantity,
-        level: trip.isOn() && trip.field() === quantity.field ? trip.level() : undefined,
-        lines: nodes()
-          .map((node) => ({ name: `node ${node}`, series: ofSource(node, quantity.field) }))
-          .filter((line) => line.series.length > 0),
-      }))
-      .filter(({ lines }) => lines.length > 0);
-    for (const one of heard()) {
-      const lines = [{ name: `node ${one.node}`, series: ofSource(one.node, one.field) }].filter((line) => line.series.length > 0);
-      if (lines.length > 0) drawn.push({ ...one, level: trip.isOn() && trip.field() === one.field ? trip.level() : undefined, lines });
-    }
-    const marks = (frozen ? frozen.marks : markers)
-      .filter(({ node }) => node === null || nodes().includes(node))
-      .map(({ time_s, text }) => ({ time_s, text: cut(text) }));
-    return { panes: drawn, from_s, to_s: end_s, cursors, markers: marks };
+    const all = frozen ? frozen.columns : live();
+    const isDrawn = ({ node, field }) => frozen?.id || field.includes(":") || nodes().includes(node);
+    const base = { name: "", columns: all.filter((one) => one.series.length > 0 && isDrawn(one)) };
+    const over = captures.chosen().filter(({ id }) => id !== frozen?.id);
+    const sources = [base, ...over.map((one) => lay(one, captures.alignment(), { from_s, zero_s: frozen?.zero_s ?? null }))];
+    const marks = (frozen ? frozen.marks : markers).filter(({ node }) => node === null || frozen?.id || nodes().includes(node));
+    return { sources, from_s, to_s: end_s, cursors, marks };
+  }
+
+  /** The panes of it. */
+  function drawn({ sources, from_s, to_s, marks }) {
+    const all = panesOf(sources, { definitions: computed.definitions(), hidden, subtracts: captures.subtracts() });
+    for (const one of all) if (trip.isOn() && trip.field() === one.key) one.level = trip.level();
+    return { panes: all, from_s, to_s, cursors, markers: marks.map(({ time_s, text }) => ({ time_s, text: cut(text) })) };
+  }
+
+  /** What is shown now, as a capture. */
+  function shownCapture() {
+    const { sources, from_s, to_s, marks } = content();
+    return captureOf(sources[0].columns.map((one) => ({ ...one, series: one.series.cut(from_s, to_s) })), marks.filter(({ time_s }) => time_s >= from_s && time_s <= to_s), frozen?.zero_s ?? from_s);
+  }
+
+  function captureOf(columns, marks, zero_s) {
+    const taken = new Date();
+    const filled = columns.filter((one) => one.series.length > 0).map(({ series: of, ...column }) => ({ ...column, ...samplesOf(of) }));
+    const name = taken.toLocaleTimeString("en-GB");
+    return filled.length ? { id: crypto.randomUUID(), name, taken: taken.toISOString(), zero_s, shift_s: 0, columns: filled, marks } : null;
   }
 
   function colours() {
@@ -133,21 +188,31 @@ export function scopeView(shared) {
     return { card: of("--card"), line: of("--line"), quiet: of("--quiet"), text: of("--text"), warn: of("--warn"), lines: ["--accent", "--bad", "--good", "--warn"].map(of) };
   }
 
+  /** Each line over the line of the same name of the value below. */
+  function overBelow({ panes: all, from_s, to_s }) {
+    const under = all.find(({ key }) => key === below.value) ?? all[0];
+    const over = (line) => against((under.lines.find(({ name }) => name === line.name) ?? under.lines[0]).series, line.series, from_s, to_s);
+    return all.filter((one) => one !== under).map((one) => ({ ...one, label: `${one.label} over ${under.label}`, lines: one.lines.map((line) => ({ name: line.name, ...over(line) })) }));
+  }
+
   function paint(pen, width, height, now) {
     pen.font = "12px system-ui, sans-serif";
-    if (isPressed(frequencies)) {
-      const panes = now.panes.map((one) => ({ ...one, lines: one.lines.map(({ name, series: of }) => ({ name, spectrum: spectrum(of, now.from_s, now.to_s) })) }));
-      overFrequency(pen, width, height, colours(), panes);
-    } else {
-      overTime(pen, width, height, colours(), now);
+    const layout = { scales, together: together.checked, first: scale.pane() };
+    if (frequencies.checked) {
+      const all = now.panes.map((one) => ({ ...one, key: `Hz ${one.key}`, lines: one.lines.map(({ name, series: of }) => ({ name, spectrum: spectrum(of, now.from_s, now.to_s) })) }));
+      return overFrequency(pen, width, height, colours(), all, layout);
     }
+    if (!across.checked || !now.panes.length) return overTime(pen, width, height, colours(), now, layout);
+    const under = now.panes.find(({ key }) => key === below.value) ?? now.panes[0];
+    return overEach(pen, width, height, colours(), overBelow(now), under, layout);
   }
 
   /** The inputs of the picture: the same picture is not drawn twice. */
-  function keyOf({ panes: all, from_s, to_s, markers: marks }, width, height, scale) {
-    const lines = all.flatMap(({ field, level, lines: of }) => [field, level, ...of.map(({ name, series: one }) => `${name} ${one.first_s()} ${one.last_s()}`)]);
-    const newest = marks.at(-1);
-    return JSON.stringify([width, height, scale, colours(), isPressed(frequencies), isPressed(steps), from_s, to_s, cursors, marks.length, newest?.time_s, lines]);
+  function keyOf({ sources, from_s, to_s, marks }, size) {
+    const lines = sources.map(({ name, columns }) => [name, columns.map(({ node, field, series: one }) => `${node} ${field} ${one.first_s()} ${one.last_s()} ${one.length}`)]);
+    const set = [frequencies, steps, across, together].map((one) => one.checked);
+    const trigger = [trip.isOn(), trip.field(), trip.level()];
+    return JSON.stringify([size, colours(), set, trigger, below.value, scale.pane(), scales.kept(), captures.subtracts(), [...hidden], computed.definitions(), from_s, to_s, cursors, marks.length, marks.at(-1)?.time_s, lines]);
   }
 
   function draw() {
@@ -155,139 +220,180 @@ export function scopeView(shared) {
     requestAnimationFrame(draw);
     trip.offer([...QUANTITIES, ...heard()]);
     watchTrigger();
-    const scale = devicePixelRatio || 1;
+    followCursor();
+    const ratio = devicePixelRatio || 1;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    const now = content();
-    const key = keyOf(now, width, height, scale);
+    const what = content();
+    const key = keyOf(what, [width, height, ratio]);
     if (key === picture) return;
     picture = key;
-    if (canvas.width !== Math.round(width * scale) || canvas.height !== Math.round(height * scale)) {
-      canvas.width = Math.round(width * scale);
-      canvas.height = Math.round(height * scale);
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
     }
     const pen = canvas.getContext("2d");
-    pen.setTransform(scale, 0, 0, scale, 0, 0);
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
-    paint(pen, width, height, now);
-    const least = `${now.panes.length * LOWEST_PANE}px`;
+    const now = drawn(what);
+    areas = paint(pen, width, height, now);
+    const least = `${(together.checked ? 1 : now.panes.length) * LOWEST_PANE}px`;
     if (canvas.style.minHeight !== least) canvas.style.minHeight = least;
+    canvas.classList.toggle("held", frozen !== null);
     extent = { ...frame(width), from_s: now.from_s, span_s: now.to_s - now.from_s };
-    setText(readout, measured(now));
+    offerPanes(now.panes);
+    setText(readout, measured(now, steps.checked));
+  }
+
+  function offerPanes(all) {
+    scale.offer(areas.map(({ key }) => ({ key, label: all.find((one) => one.key === key)?.label ?? key })));
+    const key = all.map((one) => one.key).join("\n");
+    if (below.dataset.key === key) return;
+    below.dataset.key = key;
+    below.offer(all.map((one) => ({ value: one.key, text: `over ${one.label}` })));
   }
 
   /** Holds the picture once the trigger has fired, with the wanted part before it. */
   function watchTrigger() {
     if (frozen && !(frozen.byTrigger && trip.comesAgain())) return;
-    const end_s = trip.look(live(trip.field()), Number(seconds.value), crossing);
-    if (end_s !== null) freeze(end_s, true);
+    const source = heard().find((one) => one.field === trip.field())?.series ?? series(shared.node, trip.field());
+    const held = trip.look(source, Number(seconds.value), crossing);
+    if (held === null) return;
+    freeze({ ...held, byTrigger: true });
+    if (keeps.checked) captures.keep();
   }
 
-  /** The values at the cursors, their differences, and the step response of each line. */
-  function measured({ panes: drawn, from_s, to_s }) {
-    const all = drawn.flatMap(({ lines, ...quantity }) => lines.map((one) => ({ ...quantity, ...one, label: lines.length > 1 ? `${quantity.label} of ${one.name}` : quantity.label })));
-    const lines = [];
-    const [a, b] = cursors.map((at_s) => (at_s === null ? null : all.map((one) => one.series.value(at_s))));
-    const listed = (values) => all.map(({ label, unit, decimals }, at) => `${label} ${number(values[at], decimals)} ${unit}`).join(", ");
-    [a, b].forEach((values, which) => {
-      if (values?.some((value) => value !== null)) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: ${listed(values)}`);
-      else if (values) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: no reading that early`);
-    });
-    if (a && b) {
-      const differences = all.map((_, at) => (a[at] === null || b[at] === null ? null : b[at] - a[at]));
-      lines.push(`B − A: ${number(cursors[1] - cursors[0], 3)} s, ${listed(differences)}`);
-    }
-    if (isPressed(steps)) {
-      const [from, to] = a && b ? [Math.min(...cursors), Math.max(...cursors)] : [from_s, to_s];
-      for (const { label, unit, decimals, steps: takesSteps, series: of } of all) {
-        const step = takesSteps === false ? null : stepResponse(of, from, to);
-        if (step) lines.push(`Step of ${label}: ${step.few === undefined ? shownStep(step, unit, decimals) : tooFew(step.few)}`);
-      }
-      if (!lines.some((line) => line.startsWith("Step"))) lines.push("No step found: a value other than a current has to be steady, change, and be steady again.");
-    }
-    return lines.join("\n");
+  /** A line that was chosen in the Trace view is where cursor A stands. */
+  function followCursor() {
+    if (linked.changes === followed) return;
+    followed = linked.changes;
+    if (frozen?.id) return;
+    cursors = [linked.at_s, cursors[1]];
+    if (linked.at_s === null || !frozen) return;
+    const from_s = frozen.end_s - frozen.span_s;
+    if (linked.at_s < from_s || linked.at_s > frozen.end_s) frozen.end_s = linked.at_s + frozen.span_s / 2;
   }
 
-  function shownStep({ from, to, rise_s, overshoot, overshoot_grid, settling_s, grid_s }, unit, decimals) {
-    const above = overshoot === null ? "overshoot too short for these readings" : overshoot === 0 ? "no overshoot" : `overshoot ${within(100 * overshoot, 100 * overshoot_grid)} %`;
-    const settling = settling_s === null ? "not settled to 2 %" : `settled to 2 % in ${within(settling_s, grid_s)} s`;
-    return `${number(from, decimals)} to ${number(to, decimals)} ${unit}, rise time (10 to 90 %) ${within(rise_s, grid_s)} s, ${above}, ${settling}`;
+  function setCursor(which, at_s) {
+    cursors = which === 1 ? [cursors[0], at_s] : [at_s, cursors[1]];
+    // The times of a file are not those of the bus.
+    if (which === 0 && !frozen?.id) linkTo(at_s);
+    followed = linked.changes;
   }
 
-  const tooFew = (few) => `too few readings: ${few} in the rise, expected at least 10. Map the object into a TPDO with an event timer of 1 ms (PDO view), start the node, and add the object here.`;
-
+  const isOverTime = () => extent !== null && !frequencies.checked && !across.checked;
   const timeAt = (x) => extent.from_s + ((x - extent.left) / (extent.right - extent.left)) * extent.span_s;
-  let dragged = null;
+  const areaAt = (y) => areas.find(({ bottom }) => y <= bottom + 4) ?? areas.at(-1);
 
-  canvas.addEventListener("pointerdown", (event) => (dragged = frozen && { x: event.offsetX, end_s: frozen.end_s, far: false }));
-  canvas.addEventListener("pointermove", (event) => {
-    if (!dragged || !frozen) return;
-    dragged.far ||= Math.abs(event.offsetX - dragged.x) > 4;
-    if (dragged.far) frozen.end_s = dragged.end_s - ((event.offsetX - dragged.x) / (extent.right - extent.left)) * frozen.span_s;
-  });
-  canvas.addEventListener("click", (event) => {
-    const moved = dragged?.far;
-    dragged = null;
-    if (!extent || moved || isPressed(frequencies)) return;
-    const at_s = timeAt(event.offsetX);
-    if (at_s < extent.from_s || at_s > extent.from_s + extent.span_s) return;
-    cursors = event.shiftKey ? [cursors[0], at_s] : [at_s, cursors[1]];
-  });
-  canvas.addEventListener("pointerleave", () => (dragged = null));
-  canvas.addEventListener("wheel", (event) => {
-    if (!frozen || isPressed(frequencies)) return;
-    event.preventDefault();
-    // Zoom around the pointer: the point under it stays there.
-    const around_s = timeAt(event.offsetX);
-    const span_s = Math.min(60, Math.max(0.01, frozen.span_s * (event.deltaY > 0 ? 1.25 : 0.8)));
+  /** Zooms in time around a place of the picture, its middle where there is none. The point under it stays there. */
+  function zoom(x, times) {
+    if (!isOverTime()) return;
+    if (!frozen) freeze();
+    const around_s = x === null ? frozen.end_s - frozen.span_s / 2 : timeAt(x);
+    const span_s = Math.min(LONGEST_S, Math.max(SHORTEST_S, frozen.span_s * times));
     frozen.end_s = around_s + ((frozen.end_s - around_s) * span_s) / frozen.span_s;
     frozen.span_s = span_s;
+  }
+
+  /** Changes the scale of a pane. */
+  function rescale(area, change) {
+    if (!area) return;
+    change(area.key, [area.low, area.high]);
+    scale.choose(area.key);
+    store();
+  }
+  const heightOf = ({ top, bottom }, y) => (bottom - y) / (bottom - top);
+
+  const pointer = gestures(
+    {
+      tap(x, y, isOther) {
+        const area = areaAt(y);
+        if (area) scale.choose(area.key);
+        if (!isOverTime()) return;
+        const at_s = timeAt(x);
+        if (at_s >= extent.from_s && at_s <= extent.from_s + extent.span_s) setCursor(isOther !== other.checked ? 1 : 0, at_s);
+      },
+      pan(dx) {
+        if (frozen && isOverTime()) frozen.end_s -= (dx / (extent.right - extent.left)) * frozen.span_s;
+      },
+      slide: (y, dy) => rescale(areaAt(y), (key, bounds) => scales.move(key, bounds, dy / (areaAt(y).bottom - areaAt(y).top))),
+      free: (y) => rescale(areaAt(y), (key) => scales.free(key)),
+      zoom,
+      scale: (y, times) => rescale(areaAt(y), (key, bounds) => scales.zoom(key, bounds, times, heightOf(areaAt(y), y))),
+    },
+    (x) => extent !== null && x < extent.left,
+  );
+  const placed = (event) => ({ id: event.pointerId, x: event.offsetX, y: event.offsetY, at_ms: event.timeStamp, other: event.shiftKey });
+
+  canvas.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    // Only then moves outside of the canvas are seen; a pointer that is gone already has none.
+    try {
+      canvas.setPointerCapture(event.pointerId);
+    } catch {
+      return;
+    }
+    pointer.down(placed(event));
   });
+  canvas.addEventListener("pointermove", (event) => pointer.move(placed(event)));
+  canvas.addEventListener("pointerup", (event) => pointer.up(placed(event)));
+  canvas.addEventListener("pointercancel", (event) => pointer.lose(placed(event)));
+  canvas.addEventListener("wheel", (event) => {
+    const times = event.deltaY > 0 ? ZOOM : 1 / ZOOM;
+    if (extent && event.offsetX < extent.left) rescale(areaAt(event.offsetY), (key, bounds) => scales.zoom(key, bounds, times, heightOf(areaAt(event.offsetY), event.offsetY)));
+    else if (frozen && isOverTime()) zoom(event.offsetX, times);
+    else return;
+    event.preventDefault();
+  });
+
+  /** Keys on the picture; `by` is a number of steps. */
+  const KEYS = {
+    cursor: (by) => isOverTime() && setCursor(other.checked ? 1 : 0, Math.min(extent.from_s + extent.span_s, Math.max(extent.from_s, (cursors[other.checked ? 1 : 0] ?? extent.from_s + extent.span_s / 2) + (by * extent.span_s) / 500))),
+    other: () => (other.checked = !other.checked),
+    zoom: (by) => zoom(cursors[0] !== null && extent ? extent.left + ((cursors[0] - extent.from_s) / extent.span_s) * (extent.right - extent.left) : null, ZOOM ** by),
+    pan: (by) => isOverTime() && frozen && (frozen.end_s += by * frozen.span_s * 0.5),
+    scale: (by) => rescale(chosenArea(), (key, bounds) => scales.zoom(key, bounds, ZOOM ** by)),
+    slide: (by) => rescale(chosenArea(), (key, bounds) => scales.move(key, bounds, by * 0.1)),
+    free: () => rescale(chosenArea(), (key) => scales.free(key)),
+    pane: () => areas.length && scale.choose(areas[(areas.indexOf(chosenArea()) + 1) % areas.length].key),
+  };
+  const chosenArea = () => areas.find(({ key }) => key === scale.pane()) ?? areas[0];
+  canvas.addEventListener("keydown", (event) => {
+    const meaning = keyMeaning(event);
+    if (!meaning) return;
+    KEYS[meaning.does](meaning.by);
+    event.preventDefault();
+    event.stopPropagation();
+  });
+
   seconds.addEventListener("change", () => {
     if (frozen) frozen.span_s = Number(seconds.value);
+    store();
   });
 
+  /** Everything of the shown drives, as the text of a record. */
+  function record() {
+    const { sources, marks } = content();
+    const columns = sources[0].columns.map(({ series: of, ...column }) => ({ ...column, ...samplesOf(of) }));
+    const first_s = Math.min(...columns.map(({ times }) => times[0]));
+    return recordOf({ columns, marks: marks.filter(({ time_s }) => time_s >= first_s) });
+  }
+
   function saveCsv() {
-    // The name of an object includes its node.
-    const title = (node, field) => (nodes().length > 1 && !field.includes(":") ? `node${node}_${field}` : field);
-    const [columns, rows] = table(title);
-    const lines = rows.map(([time_s, row]) => [time_s, ...row].join(","));
-    save([["at_s", ...columns].join(","), ...lines, ""].join("\n"), "text/csv", "csv");
+    save(record(), "text/csv", "csv");
   }
 
-  /** As a record with the events: the studio converts a table in the form of a CSV record. */
   async function saveMcap() {
-    const title = (node, field) => `${node}.${field.includes(":") ? field.split(":").slice(1).join("_") : field}`;
-    const [columns, rows] = table(title);
-    const marks = (frozen ? frozen.marks : markers).filter(({ node }) => node === null || nodes().includes(node));
-    const first_s = rows[0]?.[0] ?? Infinity;
-    const events = marks.filter(({ time_s }) => time_s >= first_s).map(({ time_s, text }) => [time_s, Array(columns.length).fill(""), `"${text.replaceAll('"', '""').replaceAll("\n", " ")}"`]);
-    const lines = [...rows, ...events].sort(([a], [b]) => a - b).map(([time_s, row, mark = ""]) => [time_s, ...row, mark].join(","));
-    const body = [["t_s", ...columns, "mark"].join(","), ...lines, ""].join("\n");
-    const answer = await request("/api/recording.mcap", { method: "POST", body }).catch(() => null);
-    if (answer?.ok) return save(await answer.blob(), "application/octet-stream", "mcap");
-    const why = answer ? (await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}` : "the studio does not answer";
-    setText(saved, `MCAP not saved: ${why}`);
-  }
-
-  /** Column titles, and a row for each time of a reading; values that were not read then are empty. */
-  function table(title) {
-    const columns = all()
-      .map(([node, field]) => [title(node, field), ofSource(node, field)])
-      .filter(([, one]) => one.length > 0);
-    const rows = new Map();
-    columns.forEach(([, { times, values, start, end }], column) => {
-      for (let at = start; at < end; at += 1) {
-        if (!rows.has(times[at])) rows.set(times[at], Array(columns.length).fill(""));
-        rows.get(times[at])[column] = values[at];
-      }
-    });
-    return [columns.map(([name]) => name), [...rows].sort(([a], [b]) => a - b)];
+    try {
+      save(await mcapOf(record()), "application/octet-stream", "mcap");
+    } catch (error) {
+      setText(saved, `MCAP not saved: ${error.message}`);
+    }
   }
 
   function saveSvg() {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     const pen = new SvgPen(width, height, colours().card);
-    paint(pen, width, height, content());
+    paint(pen, width, height, drawn(content()));
     save(pen.text(), "image/svg+xml", "svg");
   }
 
@@ -300,17 +406,14 @@ export function scopeView(shared) {
 
   function update(state) {
     choose.update(state);
-    const drives = state.nodes.filter((node) => node.drive && node.node !== shared.node).map((node) => node.node);
-    const key = drives.join(" ");
+    drives = state.nodes.filter((node) => node.drive).map((node) => node.node);
+    const more = drives.filter((node) => node !== shared.node);
+    const key = more.join(" ");
     if (others.dataset.key !== key) {
       others.dataset.key = key;
-      others.replaceChildren(...drives.map((node) => {
-        const pressed = h("button", { type: "button", "data-beside": String(node), "aria-pressed": String(beside.has(node)), title: `Draw node ${node} too` }, `+ ${node}`);
-        pressed.addEventListener("click", () => {
-          if (!beside.delete(node)) beside.add(node);
-          pressed.setAttribute("aria-pressed", String(beside.has(node)));
-        });
-        return pressed;
+      others.replaceChildren(...more.map((node) => {
+        const turn = () => beside.delete(node) || beside.add(node);
+        return toggle(null, `+ ${node}`, beside.has(node), turn, { "data-beside": String(node), title: `Draw node ${node} too` });
       }));
     }
     if (!shown) {
@@ -320,7 +423,7 @@ export function scopeView(shared) {
   }
 
   function key(event) {
-    if (event.key === "p") pauseOrGoOn();
+    if (event.key === "p") pause.click();
   }
 
   return { root, update, key, hide: () => (shown = false) };

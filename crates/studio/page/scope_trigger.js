@@ -23,7 +23,7 @@ export function trigger(release) {
   }
   for (const one of [mode, field, edge, level, before]) one.addEventListener("change", arm);
 
-  /** The end of the picture that is to be held, or null. `crossing` returns when a series crosses a level after a time. */
+  /** The picture that is to be held: `end_s`, and `zero_s`, when it crossed; or null. `crossing` returns when a series crosses a level after a time. */
   function look(series, span_s, crossing) {
     if (mode.value === "off" || !series.length) {
       setText(status, "");
@@ -34,9 +34,9 @@ export function trigger(release) {
     setText(status, came_s === null ? "waiting" : `fired at ${came_s.toFixed(3)} s`);
     const after_s = span_s * (1 - Math.min(100, Math.max(0, Number(before.value))) / 100);
     if (came_s === null || series.last_s() < came_s + after_s) return null;
-    const end_s = came_s + after_s;
-    [armed_s, came_s] = [end_s, null];
-    return end_s;
+    const held = { end_s: came_s + after_s, zero_s: came_s };
+    [armed_s, came_s] = [held.end_s, null];
+    return held;
   }
 
   /** Waits for the next crossing if it is to repeat; else switches off. */

@@ -1,0 +1,62 @@
+// Records and logs as captures, and captures as records. The studio reads the files; the forms are those of the command line.
+
+import { QUANTITIES } from "./quantities.js";
+import { request } from "./transport.js";
+
+/** `4.velocity_rpm`, `4.606C_00`: what a column is called in a record. */
+export function titleOf({ node, field }) {
+  const name = field.includes(":") ? field.split(":").slice(1).join("_") : field.startsWith("=") ? `computed_${field.slice(1).replace(/\W+/g, "_")}` : field;
+  return `${node ?? "computed"}.${name}`;
+}
+
+/** The field and the node of a column of a record. */
+export function placeOf(title) {
+  const [, node, axis, name] = /^(?:(\d+)(?:\.(\d+))?\.)?(.*)$/.exec(title);
+  const object = /^([0-9A-F]{4})_([0-9A-F]{2})$/i.exec(name);
+  if (node === undefined || axis !== undefined) return { node: null, field: title };
+  return { node: Number(node), field: object ? `${node}:${object[1].toUpperCase()}:${object[2].toUpperCase()}` : name };
+}
+
+/** A capture as the text of a record: a column for each value, a line for each time, and what happened. */
+export function recordOf({ columns, marks }) {
+  const rows = new Map();
+  columns.forEach(({ times, values }, column) => {
+    times.forEach((time_s, at) => {
+      if (!rows.has(time_s)) rows.set(time_s, Array(columns.length).fill(""));
+      rows.get(time_s)[column] = values[at];
+    });
+  });
+  const empty = Array(columns.length).fill("");
+  const quoted = (text) => `"${text.replaceAll('"', '""').replaceAll("\n", " ")}"`;
+  const lines = [...[...rows].map(([time_s, row]) => [time_s, row, ""]), ...marks.map(({ time_s, text }) => [time_s, empty, quoted(text)])];
+  lines.sort(([one], [other]) => one - other);
+  return [["t_s", ...columns.map(titleOf), "mark"].join(","), ...lines.map(([time_s, row, mark]) => [time_s, ...row, mark].join(",")), ""].join("\n");
+}
+
+/** A capture of what the studio has read of a file: `{ columns: [{ name, title, unit, points }], marks, remark }`. */
+export function captureOf(name, { columns, marks }, now = new Date()) {
+  const read = columns.map(({ name: title, title: shown, unit, points }) => {
+    const { node, field } = placeOf(title);
+    const known = QUANTITIES.find((one) => one.field === field);
+    const [times, values] = [0, 1].map((of) => Float64Array.from(points, (point) => point[of]));
+    return { field, node, label: known?.label ?? shown ?? title, unit: known?.unit ?? unit, decimals: known?.decimals ?? 3, steps: known?.steps, times, values };
+  });
+  const first_s = Math.min(...read.map(({ times }) => times[0]));
+  return { id: crypto.randomUUID(), name, taken: now.toISOString(), zero_s: first_s, shift_s: 0, columns: read, marks };
+}
+
+async function posted(path, body) {
+  const answer = await request(path, { method: "POST", body }).catch(() => null);
+  if (answer?.ok) return answer;
+  throw new Error(answer ? ((await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}`) : "the studio does not answer");
+}
+
+/** Reads a record or a log: `{ capture, remark }`. Throws what is wrong with it. */
+export async function readRecording(file) {
+  const body = await (await posted(`/api/recording?${new URLSearchParams({ name: file.name })}`, file)).json();
+  if (!body.columns.length) throw new Error(`${file.name} has no values${body.remark ? `: ${body.remark}` : ""}`);
+  return { capture: captureOf(file.name, body), remark: body.remark };
+}
+
+/** The text of a record as MCAP, which Foxglove, PlotJuggler and Rerun open. */
+export const mcapOf = async (text) => (await posted("/api/recording.mcap", text)).blob();

@@ -1,0 +1,36 @@
+// What the scope measures, in words: the values at the cursors, their differences, and the step response. Independent of the page.
+
+import { stepResponse, within } from "./analysis.js";
+import { number } from "./dom.js";
+
+function shownStep({ from, to, rise_s, overshoot, overshoot_grid, settling_s, grid_s }, unit, decimals) {
+  const above = overshoot === null ? "overshoot too short for these readings" : overshoot === 0 ? "no overshoot" : `overshoot ${within(100 * overshoot, 100 * overshoot_grid)} %`;
+  const settling = settling_s === null ? "not settled to 2 %" : `settled to 2 % in ${within(settling_s, grid_s)} s`;
+  return `${number(from, decimals)} to ${number(to, decimals)} ${unit}, rise time (10 to 90 %) ${within(rise_s, grid_s)} s, ${above}, ${settling}`;
+}
+
+const tooFew = (few) => `too few readings: ${few} in the rise, expected at least 10. Map the object into a TPDO with an event timer of 1 ms (PDO view), start the node, and add the object here.`;
+
+/** The lines of the readout of a picture; `steps`: with the step response of each line. */
+export function measured({ panes, from_s, to_s, cursors }, steps) {
+  const all = panes.flatMap(({ lines, ...quantity }) => lines.map((one) => ({ ...quantity, ...one, label: lines.length > 1 ? `${quantity.label} of ${one.name}` : quantity.label })));
+  const lines = [];
+  const [a, b] = cursors.map((at_s) => (at_s === null ? null : all.map((one) => one.series.value(at_s))));
+  const listed = (values) => all.map(({ label, unit, decimals }, at) => `${label} ${number(values[at], decimals)} ${unit}`).join(", ");
+  [a, b].forEach((values, which) => {
+    if (values?.some((value) => value !== null)) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: ${listed(values)}`);
+    else if (values) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: no reading that early`);
+  });
+  if (a && b) {
+    const differences = all.map((_, at) => (a[at] === null || b[at] === null ? null : b[at] - a[at]));
+    lines.push(`B − A: ${number(cursors[1] - cursors[0], 3)} s, ${listed(differences)}`);
+  }
+  if (!steps) return lines.join("\n");
+  const [from, to] = a && b ? [Math.min(...cursors), Math.max(...cursors)] : [from_s, to_s];
+  for (const { label, unit, decimals, steps: takesSteps, series } of all) {
+    const step = takesSteps === false ? null : stepResponse(series, from, to);
+    if (step) lines.push(`Step of ${label}: ${step.few === undefined ? shownStep(step, unit, decimals) : tooFew(step.few)}`);
+  }
+  if (!lines.some((line) => line.startsWith("Step"))) lines.push("No step found: a value other than a current has to be steady, change, and be steady again.");
+  return lines.join("\n");
+}

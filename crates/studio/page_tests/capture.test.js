@@ -1,0 +1,103 @@
+// Captures: laid over each other, subtracted, one value over another, in files.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { against, difference, freeName, noRoomFor, seriesOf, shiftOf } from "../page/capture.js";
+import { captureOf, placeOf, recordOf, titleOf } from "../page/recordings.js";
+import { overlaid, panesOf } from "../page/scope_source.js";
+import { defined, keptDefinitions } from "../page/scope_computed.js";
+
+const column = (times, of, more = {}) => ({ field: "velocity_rpm", node: 4, label: "Speed", unit: "r/min", decimals: 1, times: Float64Array.from(times), values: Float64Array.from(times, of), ...more });
+const grid = (from_s, count, step_s) => Array.from({ length: count }, (_, at) => from_s + at * step_s);
+const capture = (columns, more = {}) => ({ id: "a", name: "first", taken: "2026-01-02T03:04:05.000Z", zero_s: 10, shift_s: 0, columns, marks: [], ...more });
+
+test("captures are aligned by trigger, by begin, or by the time of the bus, and moved by hand", () => {
+  const one = capture([column(grid(8, 50, 0.1), () => 0)]);
+  const picture = { from_s: 100, zero_s: 103 };
+  assert.equal(shiftOf(one, "zero", picture), 93);
+  assert.equal(shiftOf(one, "start", picture), 92);
+  assert.equal(shiftOf(one, "time", picture), 0);
+  // Without a trigger the zero of the picture is where it begins.
+  assert.equal(shiftOf(one, "zero", { from_s: 100, zero_s: null }), 90);
+  assert.equal(shiftOf({ ...one, shift_s: 0.25 }, "start", picture), 92.25);
+});
+
+test("the difference of two lines is a line, where both are known", () => {
+  const one = seriesOf(column(grid(0, 11, 0.1), (time_s) => 3 * time_s + 1));
+  // Read at other times, and from 0.35 s to 0.85 s only.
+  const other = seriesOf(column(grid(0.35, 6, 0.1), (time_s) => time_s));
+  const less = difference(one, other);
+  assert.deepEqual([less.length, less.first_s() > 0.35, less.last_s() <= 0.85], [5, true, true]);
+  for (let at = less.start; at < less.end; at += 1) assert.ok(Math.abs(less.values[at] - (2 * less.times[at] + 1)) < 1e-12);
+  assert.equal(difference(one, seriesOf(column([0.5], () => 0))).length, 0, "of a single reading");
+});
+
+test("a sine over a cosine is a circle", () => {
+  const times = grid(0, 629, 0.01);
+  const { xs, ys } = against(seriesOf(column(times, Math.cos)), seriesOf(column(times, Math.sin)), 0, 10);
+  assert.equal(xs.length, 629);
+  xs.forEach((x, at) => assert.ok(Math.abs(Math.hypot(x, ys[at]) - 1) < 1e-12));
+  assert.deepEqual(against(seriesOf(column([0, 1], () => 0)), seriesOf(column([2, 3], () => 0)), 0, 5), { xs: [], ys: [] });
+});
+
+test("the values of a field stand in one pane, captures too, and their differences below", () => {
+  const live = { name: "", columns: [column(grid(100, 11, 0.1), (time_s) => time_s - 100)].map((one) => ({ ...one, series: seriesOf(one) })) };
+  const lay = overlaid();
+  const other = capture([column(grid(8, 11, 0.1), () => 0.5), column(grid(8, 11, 0.1), () => 2, { field: "current_a", label: "Current", unit: "A" })]);
+  const over = lay(other, "start", { from_s: 100, zero_s: null });
+  const panes = panesOf([live, over], { subtracts: true });
+  assert.deepEqual(panes.map(({ key, lines }) => [key, lines.map(({ name }) => name)]), [
+    ["velocity_rpm", ["node 4", "node 4, first"]],
+    ["velocity_rpm −", ["less node 4, first"]],
+    ["current_a", ["node 4, first"]],
+  ]);
+  // At 0.7 s after the begin: 0.7 of the one, 0.5 of the other.
+  assert.ok(Math.abs(panes[1].lines[0].series.value(100.7 + 1e-9) - 0.2) < 1e-9);
+  assert.deepEqual(panesOf([live, over], { hidden: new Set(["velocity_rpm"]), subtracts: true }).map(({ key }) => key), ["current_a"]);
+  // What stays where it is is not moved again.
+  const again = lay(other, "start", { from_s: 100, zero_s: null });
+  assert.equal(again.columns[0].series, over.columns[0].series);
+});
+
+test("a computed quantity is one of each source that has what it takes", () => {
+  const definitions = [defined({ name: "power", unit: "W", text: "speed * current" })];
+  const of = (node) => [column([0, 1], () => 2, { node }), column([0, 1], () => 3, { node, field: "current_a" })].map((one) => ({ ...one, series: seriesOf(one) }));
+  const sources = [{ name: "", columns: [...of(1), ...of(4)] }, { name: "first", columns: of(4).slice(1) }];
+  const power = panesOf(sources, { definitions }).find(({ key }) => key === "=power");
+  assert.deepEqual(power.lines.map(({ name, series }) => [name, series.value(1)]), [["node 1", 6], ["node 4", 6]]);
+  assert.throws(() => defined({ name: " ", text: "1" }), /expected a name/);
+  assert.deepEqual(keptDefinitions([{ name: "a", text: "speed" }, { name: "b", text: "((" }, null, 3]).map(({ name }) => name), ["a"]);
+  assert.deepEqual(keptDefinitions("of another version"), []);
+});
+
+test("a browser keeps a bounded number and a bounded size", () => {
+  const small = capture([column([0], () => 0)]);
+  assert.equal(noRoomFor(small, Array(39).fill(small)), null);
+  assert.match(noRoomFor(small, Array(40).fill(small)), /keeps 40 captures; delete one/);
+  // 16 bytes a sample: 4 M samples are 64 MB.
+  const large = capture([{ times: { byteLength: 32 << 20 }, values: { byteLength: 32 << 20 } }]);
+  assert.equal(noRoomFor(large, []), null);
+  assert.match(noRoomFor(large, [large]), /would take 128 MB, expected at most 96 MB/);
+  assert.equal(freeName("first", [small, { name: "first (2)" }]), "first (3)");
+});
+
+test("a record has the names of the command line, both ways", () => {
+  for (const [field, title] of [["velocity_rpm", "4.velocity_rpm"], ["4:606C:00", "4.606C_00"]]) {
+    assert.equal(titleOf({ node: 4, field }), title);
+    assert.deepEqual(placeOf(title), { node: 4, field });
+  }
+  assert.deepEqual(placeOf("5.2.velocity_rpm"), { node: null, field: "5.2.velocity_rpm" });
+  assert.deepEqual(placeOf("base.x_m"), { node: null, field: "base.x_m" });
+  const one = capture([column([0.5, 1.5], () => 2), column([1, 1.5], () => 3, { field: "4:606C:00" })], { marks: [{ time_s: 1.2, node: 4, text: 'node 4: "hard", over-voltage' }] });
+  // RFC 4180: a quotation mark in a quoted field is written twice.
+  assert.equal(recordOf(one), 't_s,4.velocity_rpm,4.606C_00,mark\n0.5,2,,\n1,,3,\n1.2,,,"node 4: ""hard"", over-voltage"\n1.5,2,3,\n');
+});
+
+test("what the studio read of a file is a capture", () => {
+  const read = { columns: [{ name: "4.velocity_rpm", title: "velocity_rpm of node 4", unit: "r/min", points: [[2, 10], [3, 11]] }, { name: "4.606C_00", title: "4:606C:00 velocity_actual_value", unit: "[0.1 r/min]", points: [[1, 100]] }], marks: [] };
+  const found = captureOf("a.log", read, new Date("2026-01-02T03:04:05Z"));
+  assert.deepEqual([found.name, found.taken, found.zero_s, found.shift_s], ["a.log", "2026-01-02T03:04:05.000Z", 1, 0]);
+  assert.deepEqual(found.columns.map(({ label, unit, node }) => [label, unit, node]), [["Speed", "r/min", 4], ["4:606C:00 velocity_actual_value", "[0.1 r/min]", 4]]);
+  assert.deepEqual([...found.columns[0].values], [10, 11]);
+});
