@@ -11,6 +11,7 @@
 //!
 //! Times are seconds, in MCAP nanoseconds, from the start of the world or of the connection.
 
+mod capture;
 mod column;
 mod convert;
 mod csv;
@@ -23,6 +24,7 @@ mod read;
 mod record;
 mod trail;
 
+pub use capture::{Capture, Trace};
 pub use column::{Column, Subject, columns_of_drives, select};
 pub use convert::mcap_of_csv;
 pub use picture::picture;

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use plot::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
 
+use super::capture::ABOUT;
 use super::column::{Column, Subject, select};
 use super::piece::{Recorded, Series, Severity};
 
@@ -85,7 +86,10 @@ fn figure(subject: &Subject, series: &[Series], recorded: &Recorded, span: &Rang
     let title = subject.title();
     let marks = recorded.marks.iter().filter(|mark| {
         let about_it = mark.of.is_empty() || mark.of == title;
-        about_it && !QUIET.contains(&&*mark.kind) && span.contains(&mark.at.as_secs_f64())
+        about_it
+            && !mark.text.starts_with(ABOUT)
+            && !QUIET.contains(&&*mark.kind)
+            && span.contains(&mark.at.as_secs_f64())
     });
     let events = marks.map(|mark| Event {
         at_s: mark.at.as_secs_f64(),

@@ -28,7 +28,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("words", &["can", "canopen", "cia402", "devices", "eds", "master", "plot", "sim"]),
     ("fmu", &["can", "sim", "words"]),
     ("machine", &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives", "sim", "master", "words"]),
-    ("recording", &["can", "plot", "sim", "words"]),
+    ("recording", &["can", "canopen", "plot", "sim", "words"]),
     ("scenario", &["can", "canopen", "cia402", "devices", "machine", "master", "sim", "words"]),
     ("host", &["can", "canopen", "cia402", "devices", "eds", "machine", "master", "plot", "sim", "words"]),
     ("serve", &["can", "canlog", "host", "master", "recording", "scenario", "sim", "transport", "words"]),
