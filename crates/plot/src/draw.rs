@@ -4,7 +4,7 @@ use crate::lanes;
 use crate::poster::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
 use crate::svg::{Anchor, Font, Scale, Svg};
 use crate::thin::thin;
-use crate::ticks::Ticks;
+use crate::ticks::{self, Ticks};
 
 /// Chosen for pages that show pictures about 900 px wide: letters stay readable there.
 const WIDTH: f64 = 1000.0;
@@ -48,6 +48,8 @@ const SECTION: Font = Font { size: 11.5, colour: "#5b6773", bold: false };
 /// Where things of a figure lie, px.
 struct Layout<'a> {
     time: (f64, f64),
+    /// What a logarithmic axis shows; empty for a time.
+    logarithmic: &'a str,
     cuts: &'a [(f64, f64)],
     left: f64,
     right: f64,
@@ -101,9 +103,17 @@ fn figure(svg: &mut Svg, figure: &Figure, (left, right): (f64, f64), top: f64, n
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     let section_strip = if figure.sections.is_empty() { 0.0 } else { SECTION_STRIP };
     let top = top + TOP;
-    let (time, event_top) = (figure.time_span(), top + section_strip);
-    let mut layout =
-        Layout { time, cuts: &figure.cuts, left, right, top, event_top, panels_top: 0.0, panels_bottom: 0.0 };
+    let mut layout = Layout {
+        time: figure.time_span(),
+        logarithmic: if figure.logarithmic { &figure.time } else { "" },
+        cuts: &figure.cuts,
+        left,
+        right,
+        top,
+        event_top: top + section_strip,
+        panels_top: 0.0,
+        panels_bottom: 0.0,
+    };
     let event_lanes = event_lanes(&layout, &events);
     let lane_count = event_lanes.iter().max().map_or(0, |lane| lane + 1);
     layout.panels_top = layout.event_top + lane_count as f64 * EVENT_LANE + 26.0;
@@ -155,6 +165,7 @@ fn draw_panel(svg: &mut Svg, layout: &Layout<'_>, top: f64, panel: &Panel, figur
         name: &panel.title,
         unit: &panel.unit,
         x: ((layout.left, layout.right), layout.time),
+        logarithmic: layout.logarithmic,
         y: (top, panel.height),
         values: (low, high),
     });
@@ -265,12 +276,16 @@ fn time_axis(svg: &mut Svg, layout: &Layout<'_>, name: &str) {
     let (begin, end) = layout.time;
     // As if what is cut out were there, with the same distances.
     let whole = (layout.right - layout.left) * (end - begin) / layout.shown(end);
-    let ticks = Ticks::within(begin, end, ((whole / TICK_DISTANCE) as usize).max(2));
+    let ticks = if layout.logarithmic.is_empty() {
+        Ticks::within(begin, end, ((whole / TICK_DISTANCE) as usize).max(2)).labelled()
+    } else {
+        ticks::logarithmic(begin, end)
+    };
     let y = layout.panels_bottom;
     svg.line((layout.left, y), (layout.right, y), &format!(r#"stroke="{ZERO}""#));
     let mut free_from = f64::NEG_INFINITY;
-    for tick in ticks.values.iter().copied().filter(|tick| !layout.is_cut(*tick)) {
-        let (x, text) = (layout.x(tick), ticks.text(tick));
+    for (tick, text) in ticks.into_iter().filter(|(tick, _)| !layout.is_cut(*tick)) {
+        let x = layout.x(tick);
         svg.line((x, y), (x, y + 5.0), &format!(r#"stroke="{ZERO}""#));
         let half = AXIS.width(&text) / 2.0;
         if x - half >= free_from {
@@ -353,6 +368,7 @@ mod tests {
         let wave =
             |amplitude: f64| (0..2000).map(move |i| (f64::from(i) * 0.01, amplitude * (f64::from(i) * 0.01).sin()));
         Figure {
+            logarithmic: false,
             title: "Drive".into(),
             subtitle: "in words".into(),
             time: "time, s".into(),
@@ -449,6 +465,7 @@ mod tests {
         let cuts = [(2.0, 4.0), (6.0, 7.0)];
         let layout = Layout {
             time: (0.0, 10.0),
+            logarithmic: "",
             cuts: &cuts,
             left: 0.0,
             right: 700.0,

@@ -13,6 +13,8 @@ function panelOf(group) {
     figure: group.dataset.figure,
     name: group.dataset.name,
     unit: group.dataset.unit,
+    // What a logarithmic axis shows: "frequency, Hz". Empty for a time.
+    axis: group.dataset.logarithmic,
     left: number("left"), right: number("right"),
     top: number("top"), height: number("height"),
     begin: number("begin"), end: number("end"),
@@ -31,7 +33,10 @@ function panelOf(group) {
 }
 
 const panels = [...picture.querySelectorAll("g[data-figure]")].map(panelOf);
-const timeAt = (panel, x) => panel.begin + (x - panel.left) / (panel.right - panel.left) * (panel.end - panel.begin);
+function timeAt(panel, x) {
+  const at = panel.begin + (x - panel.left) / (panel.right - panel.left) * (panel.end - panel.begin);
+  return panel.axis ? 10 ** at : at;
+}
 
 // The value of a line at x: on the line between its neighbours.
 function valueAt(panel, line, x) {
@@ -78,7 +83,8 @@ function show(panel, x) {
   here(panel, x);
   const from = fixed && fixed.panel.figure === panel.figure ? fixed : null;
   const time = timeAt(panel, x);
-  const rows = [["time", "s", time, from ? time - timeAt(panel, from.x) : null, "#1f2933"]];
+  const [name, unit] = panel.axis ? panel.axis.split(", ") : ["time", "s"];
+  const rows = [[name, unit, time, from ? time - timeAt(panel, from.x) : null, "#1f2933"]];
   for (const other of panels.filter((other) => other.figure === panel.figure)) {
     for (const line of other.lines) {
       const value = valueAt(other, line, x);

@@ -22,6 +22,8 @@ pub struct Figure {
     pub subtitle: String,
     /// What the time axis shows: "time, s".
     pub time: Cow<'static, str>,
+    /// The axis is logarithmic: what stands as a time is the common logarithm of what the axis shows, a frequency for instance.
+    pub logarithmic: bool,
     /// From top to bottom.
     pub panels: Vec<Panel>,
     /// Spans of time with a name, not overlapping.

@@ -20,6 +20,8 @@ pub(crate) struct Scale<'a> {
     pub(crate) unit: &'a str,
     /// Left and right end, px, and what they stand for.
     pub(crate) x: ((f64, f64), (f64, f64)),
+    /// What the axis of `x` shows; empty for a time.
+    pub(crate) logarithmic: &'a str,
     /// Upper end and height, px.
     pub(crate) y: (f64, f64),
     /// Value at the lower and the upper end.
@@ -72,13 +74,14 @@ impl Svg {
     /// Begins a group that a script finds as a panel.
     pub(crate) fn begin_panel(&mut self, scale: &Scale<'_>) {
         if self.scripted {
-            let Scale { figure, name, unit, x: ((left, right), (begin, end)), y: (top, height), values: (low, high) } =
-                scale;
+            let Scale { figure, name, unit, logarithmic, .. } = scale;
+            let Scale { x: ((left, right), (begin, end)), y: (top, height), values: (low, high), .. } = scale;
             let _ = writeln!(
                 self.body,
-                r#"<g data-figure="{figure}" data-name="{}" data-unit="{}" data-left="{left}" data-right="{right}" data-begin="{begin}" data-end="{end}" data-top="{top}" data-height="{height}" data-low="{low}" data-high="{high}">"#,
+                r#"<g data-figure="{figure}" data-name="{}" data-unit="{}" data-left="{left}" data-right="{right}" data-begin="{begin}" data-end="{end}" data-top="{top}" data-height="{height}" data-low="{low}" data-high="{high}" data-logarithmic="{}">"#,
                 escape(name),
-                escape(unit)
+                escape(unit),
+                escape(logarithmic)
             );
         }
     }

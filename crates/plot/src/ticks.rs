@@ -18,6 +18,11 @@ impl Ticks {
         Self { values: (first..=last).map(|n| n as f64 * step).collect(), step }
     }
 
+    /// Each of them with its text.
+    pub(crate) fn labelled(&self) -> Vec<(f64, String)> {
+        self.values.iter().map(|value| (*value, self.text(*value))).collect()
+    }
+
     /// A tick as text, with as many decimals as the step needs and thousands set apart by a thin space.
     pub(crate) fn text(&self, value: f64) -> String {
         let decimals = (-self.step.log10()).ceil().clamp(0.0, 9.0) as usize;
@@ -39,6 +44,14 @@ impl Ticks {
         }
         text
     }
+}
+
+/// Where 1, 2 and 5 times powers of ten stand on an axis of their common logarithms, with their texts.
+pub(crate) fn logarithmic(low: f64, high: f64) -> Vec<(f64, String)> {
+    let decades = (low.floor() as i32)..=(high.ceil() as i32);
+    let values = decades.flat_map(|decade| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(decade)));
+    let inside = values.filter(|value| (low - 1e-9..=high + 1e-9).contains(&value.log10()));
+    inside.map(|value| (value.log10(), Ticks { values: Vec::new(), step: value.min(1.0) }.text(value))).collect()
 }
 
 /// The smallest of 1, 2, 5 times a power of ten that is not below `least`.
@@ -67,6 +80,12 @@ mod tests {
     #[test]
     fn inner_ticks_stay_inside() {
         assert_eq!(Ticks::within(0.0, 61.0, 7).values, [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0]);
+    }
+
+    #[test]
+    fn a_logarithmic_axis_has_one_two_and_five_of_each_decade() {
+        let texts = logarithmic(0.5_f64.log10(), 30_f64.log10()).into_iter().map(|(_, text)| text).collect::<Vec<_>>();
+        assert_eq!(texts, ["0.5", "1", "2", "5", "10", "20"]);
     }
 
     #[test]
