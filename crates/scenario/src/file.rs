@@ -64,6 +64,8 @@ pub struct Scenario {
     pub(super) expects: Vec<Expect>,
     pub(super) figures: Vec<Figure>,
     text: String,
+    /// The text of the machine file that it names; empty where its machine stands in it.
+    machine_text: String,
     folder: PathBuf,
 }
 
@@ -73,6 +75,17 @@ impl Scenario {
         let mut machine = self.machine.clone();
         machine.fidelity = self.fidelity.or(machine.fidelity);
         machine
+    }
+
+    /// The names of its figures.
+    pub(crate) fn figure_names(&self) -> impl Iterator<Item = &str> {
+        self.figures.iter().map(|figure| figure.name.as_str())
+    }
+
+    /// Hash over its text and that of the machine file that it names. Data sheets (EDS) of that are not in it.
+    pub(crate) fn text_digest(&self) -> u64 {
+        // Both texts are UTF-8, which has no byte FFh.
+        sim::Digest::of(&[self.text.as_bytes(), &[0xFF], self.machine_text.as_bytes()].concat()).value()
     }
 
     /// What those of its drives that are not of fidelity full do not show; `None` if there is none.
@@ -126,7 +139,7 @@ impl Scenario {
 
     fn from_table(file: &Table<'_>, text: &str, folder: &Path, parameters: &Parameters) -> Many<Self> {
         let mut problems = file.strangers(KEYS);
-        let machine = kept(machine(file, folder), &mut problems).unwrap_or_default();
+        let (machine, machine_text) = kept(machine(file, folder), &mut problems).unwrap_or_default();
         let title = file.get("title").map(|field| field.words("a title as text")).transpose().map_err(single);
         let about = file.get("about").map(|field| field.words("a text")).transpose().map_err(single);
         let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose().map_err(single);
@@ -149,6 +162,7 @@ impl Scenario {
             expects: entries(file, "expect", "an expectation", &mut problems, expect),
             figures: kept(figures(file), &mut problems).unwrap_or_default(),
             text: text.to_owned(),
+            machine_text,
             folder: folder.to_owned(),
         };
         scenario.limit = scenario.limit.max(scenario.end.unwrap_or_default());
@@ -290,15 +304,20 @@ fn placed(at: &Located, text: &str, what: String) -> Problem {
 }
 
 /// The machine, written here or in a file of its own.
-fn machine(file: &Table<'_>, folder: &Path) -> Many<Machine> {
+fn machine(file: &Table<'_>, folder: &Path) -> Many<(Machine, String)> {
     const EXPECTED: &str = "a machine: [machine] with [[machine.drive]], or the path of a machine file";
     let field = file.need("machine", EXPECTED).map_err(single)?;
     if field.is_table() {
-        return Machine::from_table(&field.table("a machine", EXPECTED).map_err(single)?, folder);
+        let machine = Machine::from_table(&field.table("a machine", EXPECTED).map_err(single)?, folder)?;
+        return Ok((machine, String::new()));
     }
     let path = folder.join(field.words(EXPECTED).map_err(single)?);
-    machine::file::read(&path)
-        .map_err(|reason| vec![field.problem(format!("the machine file {} cannot be used:\n{reason}", path.display()))])
+    let unusable =
+        |reason: String| vec![field.problem(format!("the machine file {} cannot be used:\n{reason}", path.display()))];
+    let text = read_text(&path).map_err(unusable)?;
+    let machine = Machine::parse_in(&text, path.parent().unwrap_or(Path::new("")));
+    let machine = machine.map_err(|bad| unusable(bad.named(path.display().to_string()).to_string()))?;
+    Ok((machine, text))
 }
 
 /// The parameters and their values, in the words that they are put into texts with.

@@ -25,5 +25,6 @@ mod recording;
 mod run;
 mod serving;
 mod status;
+mod sweep;
 mod units;
 mod usage;

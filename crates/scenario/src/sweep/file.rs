@@ -13,6 +13,15 @@ pub struct SweepAxis {
     pub values: Vec<String>,
 }
 
+impl SweepAxis {
+    /// True if all of its values are numbers, written as a number is.
+    pub(super) fn is_numeric(&self) -> bool {
+        let is_number =
+            |value: &String| value.parse().is_ok_and(|number: f64| number.is_finite() && number.to_string() == *value);
+        self.values.iter().all(is_number)
+    }
+}
+
 /// Values that one parameter may go through.
 const MOST_VALUES: usize = 100_000;
 

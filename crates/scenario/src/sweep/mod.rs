@@ -6,8 +6,11 @@
 mod alike;
 pub mod file;
 mod report;
+pub mod results;
+mod shard;
 mod summary;
 
+use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 use serde::Serialize;
@@ -21,6 +24,7 @@ use words::document::reader::Parameters;
 
 pub use alike::Alike;
 pub use report::{SweepReport, Worst};
+pub use shard::Shard;
 pub use summary::{Distribution, Failed, OfValue, Summary};
 
 /// Runs that a sweep may have: more would take too long.
@@ -31,8 +35,11 @@ pub const MOST_RUNS: u64 = 1_000_000_000;
 pub struct Sweep {
     scenario: Scenario,
     axes: Vec<SweepAxis>,
+    /// The parameters of which all values are numbers.
+    numeric: BTreeSet<String>,
     seeds: RangeInclusive<u64>,
     runs: u64,
+    shard: Shard,
 }
 
 /// One run of a sweep.
@@ -47,9 +54,14 @@ pub struct Point {
 impl Point {
     /// The options of `ferrodrive run` that repeat it.
     pub fn options(&self) -> String {
-        let values = self.values.iter().map(|(name, value)| format!(" --set {name}={}", quoted(value)));
+        let values = self.values.iter().map(|(name, value)| set_option(name, value));
         format!("--seed {}{}", self.seed, values.collect::<String>())
     }
+}
+
+/// The option of `ferrodrive run` that gives a parameter this value, behind a space.
+pub fn set_option(name: &str, value: &str) -> String {
+    format!(" --set {name}={}", quoted(value))
 }
 
 /// A value as a shell takes it.
@@ -73,7 +85,10 @@ impl Sweep {
         let runs = axes.iter().try_fold(count.unwrap_or(0), |runs, axis| runs.checked_mul(axis.values.len() as u64));
         match runs {
             None | Some(0) if seeds.is_empty() => Err("there is no seed in this range".into()),
-            Some(runs @ 1..=MOST_RUNS) => Ok(Self { scenario, axes, seeds, runs }),
+            Some(runs @ 1..=MOST_RUNS) => {
+                let numeric = axes.iter().filter(|axis| axis.is_numeric()).map(|axis| axis.name.clone()).collect();
+                Ok(Self { scenario, axes, numeric, seeds, runs, shard: Shard::WHOLE })
+            }
             _ => Err(format!("more than {MOST_RUNS} runs; take fewer seeds or values")),
         }
     }
@@ -83,9 +98,25 @@ impl Sweep {
         &self.scenario.title
     }
 
-    /// How many runs there are.
+    /// The same sweep, of which this part is to be made. The numbers of its runs stay what they are.
+    #[must_use]
+    pub fn of_shard(self, shard: Shard) -> Self {
+        Self { shard, ..self }
+    }
+
+    /// The part that is to be made.
+    pub fn shard(&self) -> Shard {
+        self.shard
+    }
+
+    /// How many runs there are, of all parts together.
     pub fn runs(&self) -> u64 {
         self.runs
+    }
+
+    /// How many of them are to be made here.
+    pub fn share(&self) -> u64 {
+        self.shard.share(self.runs)
     }
 
     /// Which setting of the parameters a run has; runs of one setting differ in their seeds alone.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Distribution, Failed, OfValue, Summary, Sweep};
+use super::{Distribution, Failed, OfValue, Shard, Summary, Sweep};
 
 /// The result of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -15,7 +15,10 @@ pub struct SweepReport {
     pub title: String,
     /// Its file.
     pub file: String,
-    /// How many runs the sweep has.
+    /// Which part of the sweep it is of; `None` if of all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shard: Option<String>,
+    /// How many runs it has: the sweep, or this part.
     pub runs: u64,
     /// Runs that passed.
     pub passed: u64,
@@ -54,10 +57,11 @@ impl SweepReport {
             ok: failed == 0,
             title: sweep.title().to_owned(),
             file: file.display().to_string(),
-            runs: sweep.runs(),
+            shard: (sweep.shard() != Shard::WHOLE).then(|| sweep.shard().to_string()),
+            runs: sweep.share(),
             passed,
             failed,
-            complete: passed + failed == sweep.runs(),
+            complete: passed + failed == sweep.share(),
             values: summary.of_values(sweep),
             figures: summary.distributions(sweep),
             seeds_differ: summary.seeds_differ(),

@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::results::RunResult;
 use super::{Point, Sweep};
-use crate::Outcome;
-use words::document::BadFile;
 
 /// Failed runs that are listed: those with the lowest numbers.
 const MOST_LISTED: usize = 10;
@@ -96,20 +95,15 @@ struct Figure {
 }
 
 impl Summary {
-    /// Adds the result of the run of this number.
-    pub fn add(&mut self, sweep: &Sweep, number: u64, outcome: &Result<Outcome, BadFile>) {
-        match outcome {
-            Ok(outcome) => {
-                self.add_digest(sweep, number, outcome.digest);
-                let failure = outcome.failures().next().map(|row| (row.asked.clone(), row.seen.clone()));
-                let figures = outcome.figures.iter().map(|(name, value)| (name.as_str(), *value));
-                self.add_run(sweep, number, figures, failure);
-            }
-            Err(bad) => {
-                let failure = ("the machine and the scenario".into(), bad.to_string());
-                self.add_run(sweep, number, std::iter::empty(), Some(failure));
-            }
+    /// Adds the result of a run.
+    pub fn add(&mut self, sweep: &Sweep, result: &RunResult) {
+        if let Some(digest) = result.digest.as_ref().and_then(|digest| u64::from_str_radix(digest, 16).ok()) {
+            self.add_digest(sweep, result.run, digest);
         }
+        let figures = result.figures.iter().filter_map(|(name, value)| Some((name.as_str(), (*value)?)));
+        let seen = |asked: &String| (asked.clone(), result.seen.clone().unwrap_or_default());
+        let failure = (!result.passed).then(|| result.asked.as_ref().map(seen).unwrap_or_default());
+        self.add_run(sweep, result.run, figures, failure);
     }
 
     /// Adds a run that was made elsewhere: its figures, and of a failed one what was asked first that was not so, and what was
@@ -264,7 +258,8 @@ mod tests {
     use can::Instant;
 
     use super::*;
-    use crate::Scenario;
+    use crate::{Outcome, Scenario};
+    use words::document::BadFile;
 
     fn sweep(seeds: u64) -> Sweep {
         let text = "machine = { drive = [{ model = 'zlac8030l', node = 4 }] }\n[parameters]\na = 1\nb = 'x'\n\
@@ -307,8 +302,8 @@ mod tests {
         let mut forth = Summary::default();
         let mut back = Summary::default();
         for number in 0..200_000 {
-            forth.add(&sweep, number, &outcome(value(number)));
-            back.add(&sweep, 199_999 - number, &outcome(value(199_999 - number)));
+            forth.add(&sweep, &RunResult::new(&sweep, number, &outcome(value(number))));
+            back.add(&sweep, &RunResult::new(&sweep, 199_999 - number, &outcome(value(199_999 - number))));
         }
         assert_eq!(forth.distributions(&sweep), back.distributions(&sweep));
         let found = &forth.distributions(&sweep)[0];
@@ -351,15 +346,15 @@ mod tests {
         let sweep = sweep(3);
         let with_digest = |digest: u64| outcome(1.0).map(|outcome| Outcome { digest, ..outcome });
         let mut summary = Summary::default();
-        summary.add(&sweep, 0, &with_digest(7));
+        summary.add(&sweep, &RunResult::new(&sweep, 0, &with_digest(7)));
         // Another value of a parameter, not another seed.
-        summary.add(&sweep, 3, &with_digest(8));
+        summary.add(&sweep, &RunResult::new(&sweep, 3, &with_digest(8)));
         assert_eq!((summary.seeds_differ(), summary.note(&sweep)), (None, None));
-        summary.add(&sweep, 1, &with_digest(7));
+        summary.add(&sweep, &RunResult::new(&sweep, 1, &with_digest(7)));
         assert_eq!(summary.seeds_differ(), Some(false));
         let note = summary.note(&sweep).unwrap_or_default();
         assert!(note.contains("realism = \"full\"") && note.contains("timing = \"device\""), "{note}");
-        summary.add(&sweep, 5, &with_digest(9));
+        summary.add(&sweep, &RunResult::new(&sweep, 5, &with_digest(9)));
         assert_eq!((summary.seeds_differ(), summary.note(&sweep)), (Some(true), None));
     }
 

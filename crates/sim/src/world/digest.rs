@@ -10,6 +10,13 @@ const OFFSET_BASIS: u64 = 0xCBF2_9CE4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01B3;
 
 impl Digest {
+    /// The hash of these bytes.
+    pub fn of(bytes: &[u8]) -> Self {
+        let mut digest = Self::default();
+        digest.bytes(bytes);
+        digest
+    }
+
     /// The hash of all that was added so far: two runs that are alike have the same.
     pub fn value(self) -> u64 {
         self.0
@@ -45,9 +52,7 @@ mod tests {
         for (text, hash) in
             [("", 0xCBF2_9CE4_8422_2325u64), ("a", 0xAF63_DC4C_8601_EC8C), ("foobar", 0x8594_4171_F739_67E8)]
         {
-            let mut digest = Digest::default();
-            digest.bytes(text.as_bytes());
-            assert_eq!(digest.value(), hash, "{text:?}");
+            assert_eq!(Digest::of(text.as_bytes()).value(), hash, "{text:?}");
         }
     }
 }

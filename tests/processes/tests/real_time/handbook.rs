@@ -98,7 +98,7 @@ const FOLLOWED: [(&str, usize); 16] = [
 ];
 
 /// The pages whose commands are not run here, and why.
-const NOT_FOLLOWED: [(&str, &str); 13] = [
+const NOT_FOLLOWED: [(&str, &str); 14] = [
     ("adapters.md", "in virtual time: crates/cli/src/tests/pages.rs"),
     ("lss.md", "in virtual time: crates/cli/src/tests/pages.rs"),
     ("README.md", "the list of the pages"),
@@ -111,6 +111,7 @@ const NOT_FOLLOWED: [(&str, &str); 13] = [
     ("python-can.md", "it has no commands: tests/peers"),
     ("socketcan.md", "it needs CAN interfaces of Linux: socketcan.rs, in a virtual machine"),
     ("studio.md", "it serves a browser: studio.rs, and tests/browser_and_schema"),
+    ("sweeps.md", "its shards are made and merged: crates/cli/tests/command_line/sweep.rs"),
     ("top.md", "it draws on a terminal: top.rs"),
 ];
 

@@ -1,13 +1,14 @@
 //! Work for all cores: threads take the numbers of pieces of work, and one place takes the results.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
 
 use crate::session::runtime;
 use crate::signals::{Signal, asked_to_end};
 
-/// Results that may wait to be taken: a piece of work may be much faster than another.
-const WAITING: usize = 256;
+/// Pieces that may be begun before the first that is not done: one may take as long as thousands of others.
+const AHEAD: u64 = 1024;
 
 /// Threads that do work, and whether a signal has asked them to end.
 pub(super) struct Crew {
@@ -40,27 +41,91 @@ impl Crew {
         *self.heard.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Does the pieces 0 to `count`, and hands the result of each to `take` with its number, in the order in which they end.
+    /// Begins no further piece.
+    pub(super) fn end(&self) {
+        self.stop.store(true, Ordering::Release);
+    }
+
+    /// Does the pieces 0 to `count`, and hands the result of each to `take` with its number, in the order of the numbers. Of work
+    /// that ends early that is all from the first on without a gap.
     pub(super) fn work<T: Send>(&self, count: u64, work: impl Fn(u64) -> T + Sync, mut take: impl FnMut(u64, T)) {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let jobs = self.jobs.unwrap_or(cores).min(usize::try_from(count).unwrap_or(usize::MAX));
         let next = AtomicU64::new(0);
-        let (results, incoming) = mpsc::sync_channel(WAITING);
+        let taken = (Mutex::new(0), Condvar::new());
+        let (results, incoming) = mpsc::channel();
         std::thread::scope(|scope| {
             for _ in 0..jobs {
                 let results = results.clone();
-                let (next, work) = (&next, &work);
+                let (next, taken, work) = (&next, &taken, &work);
                 scope.spawn(move || {
                     while !self.stop.load(Ordering::Acquire) {
                         let number = next.fetch_add(1, Ordering::Relaxed);
-                        if number >= count || results.send((number, work(number))).is_err() {
+                        if number >= count {
+                            return;
+                        }
+                        // The thread with the first piece that is not done does not wait here.
+                        let first = taken.0.lock().unwrap_or_else(PoisonError::into_inner);
+                        drop(taken.1.wait_while(first, |first| number >= *first + AHEAD));
+                        if results.send((number, work(number))).is_err() {
                             return;
                         }
                     }
                 });
             }
             drop(results);
-            incoming.into_iter().for_each(|(number, result)| take(number, result));
+            let mut early = BTreeMap::new();
+            let mut first = 0;
+            for (number, result) in incoming {
+                early.insert(number, result);
+                while let Some(result) = early.remove(&first) {
+                    take(first, result);
+                    first += 1;
+                }
+                *taken.0.lock().unwrap_or_else(PoisonError::into_inner) = first;
+                taken.1.notify_all();
+            }
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn crew(jobs: usize) -> Crew {
+        Crew { jobs: Some(jobs), stop: Arc::default(), heard: Arc::default() }
+    }
+
+    #[test]
+    fn results_come_in_the_order_of_their_numbers_and_no_thread_runs_far_ahead_of_a_slow_piece() {
+        let count = 3 * AHEAD;
+        let most = AtomicU64::new(0);
+        let piece = |number: u64| {
+            // The first piece ends when the others have come as far as they may.
+            while number == 0 && most.load(Ordering::Acquire) < AHEAD - 1 {
+                std::thread::yield_now();
+            }
+            let before = most.fetch_max(number, Ordering::AcqRel);
+            assert!(number != 0 || before == AHEAD - 1, "{before} was begun");
+            number
+        };
+        let mut seen = Vec::new();
+        crew(3).work(count, piece, |number, result| seen.push((number, result)));
+        assert_eq!(seen, (0..count).map(|number| (number, number)).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn work_that_ends_early_has_all_results_up_to_a_number() {
+        let crew = crew(2);
+        let mut seen = Vec::new();
+        let take = |number, ()| {
+            seen.push(number);
+            if number == 5 {
+                crew.end();
+            }
+        };
+        crew.work(1 << 40, |_| (), take);
+        assert!(seen.len() > 5 && seen.iter().copied().eq(0..seen.len() as u64), "{seen:?}");
     }
 }

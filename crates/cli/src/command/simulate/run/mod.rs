@@ -3,6 +3,7 @@
 mod crew;
 mod loaded;
 mod report;
+mod results;
 mod serving;
 mod several;
 mod sweeping;
@@ -11,6 +12,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use scenario::sweep::{Shard, Sweep, set_option};
 use scenario::{Kept, Outcome, Runner, Scenario};
 use sim::Fidelity;
 
@@ -39,7 +41,9 @@ use serving::ServeOptions;
     ferrodrive run examples/scenarios/*.toml --junit result.xml\n  \
     ferrodrive run scenario.toml --serve socketcand://127.0.0.1:29536\n  \
     ferrodrive run scenario.toml --seed 7 --set torque=1.5 --junit result.xml\n  \
-    ferrodrive run scenario.toml --seeds 1..1000 --jobs 4")]
+    ferrodrive run scenario.toml --seeds 1..1000 --jobs 4\n  \
+    ferrodrive run scenario.toml --seeds 1..100000 --shard 3/8 -o part-3.jsonl --resume\n  \
+    ferrodrive run scenario.toml --seeds 1..100000 --merge part-*.jsonl -o results.jsonl")]
 pub(crate) struct Run {
     /// Scenario files
     #[arg(value_name = "FILE.toml", required = true)]
@@ -57,6 +61,18 @@ pub(crate) struct Run {
     /// Run with each of these seeds, and with each value of the scenario's [sweep]
     #[arg(long, value_name = "FIRST..LAST", value_parser = seeds)]
     seeds: Option<RangeInclusive<u64>>,
+    /// Make a part of the runs: the I-th of N. Each meets each value, and --merge puts them together
+    #[arg(long, value_name = "I/N", requires = "seeds", hide_short_help = true)]
+    shard: Option<Shard>,
+    /// Also write the result of each run to this file, a line of JSON each, in the order of the runs (docs/scenarios.md)
+    #[arg(long = "output", short = 'o', alias = "out", value_name = "NAME.jsonl", requires = "seeds", value_parser = results_path)]
+    output: Option<PathBuf>,
+    /// Go on with the runs after those whose results are in the output file, if it is there
+    #[arg(long, requires = "output", hide_short_help = true)]
+    resume: bool,
+    /// Put the results of all shards together instead of making runs: their summary, and with -o one file of them
+    #[arg(long, value_name = "PART.jsonl", num_args = 1.., requires = "seeds", conflicts_with_all = ["shard", "resume", "jobs"], hide_short_help = true)]
+    merge: Vec<PathBuf>,
     /// Number of runs at once, of a sweep or of several files (default: one for each core)
     #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=1024_u16))]
     jobs: Option<u16>,
@@ -117,7 +133,26 @@ impl Run {
             return Err(Failure::usage("--serve and --control serve one run, and a sweep has many")
                 .next("give --seed in place of --seeds, or omit --serve"));
         }
-        sweeping::sweep(scenario, seeds.clone(), self.jobs, file, format)
+        let sweep = Sweep::new(scenario, seeds.clone()).map_err(|reason| {
+            Failure::usage("cannot sweep").because(reason).next("give --seeds 1..1000, and fewer values to [sweep]")
+        })?;
+        let sweep = sweep.of_shard(self.shard.unwrap_or(Shard::WHOLE));
+        let asked = sweeping::Asked {
+            jobs: self.jobs,
+            output: self.output.as_deref(),
+            resume: self.resume,
+            merge: &self.merge,
+            again: self.again(file, seeds),
+        };
+        sweeping::sweep(&sweep, &asked, file, format)
+    }
+
+    /// The command that makes the same sweep.
+    fn again(&self, file: &Path, seeds: &RangeInclusive<u64>) -> String {
+        let set = self.set.iter().map(|(name, value)| set_option(name, value));
+        let fidelity = self.fidelity.map(|fidelity| format!(" --fidelity {fidelity}"));
+        let options: String = set.chain(fidelity).collect();
+        format!("ferrodrive run {} --seeds {}..{}{options}", file.display(), seeds.start(), seeds.end())
     }
 
     /// What is about one run only is not given with several files.
@@ -192,6 +227,14 @@ impl Run {
 fn batch(runner: &mut Runner) -> Batch {
     let Kept { frames, events } = runner.take_kept();
     Batch::of_world(runner.world_mut().take_recorded(), frames, &events)
+}
+
+/// Where the results of a sweep go.
+fn results_path(text: &str) -> Result<PathBuf, String> {
+    if text.ends_with(".jsonl") {
+        return Ok(text.into());
+    }
+    Err("the results of a sweep go to NAME.jsonl; --json prints the summary for programs".into())
 }
 
 /// `torque=1.5`.

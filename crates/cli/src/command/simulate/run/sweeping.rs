@@ -1,14 +1,15 @@
 //! A sweep over all cores: what came of its runs, added up.
 
-use std::ops::RangeInclusive;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use master::units::Shown;
+use scenario::Outcome;
+use scenario::sweep::results::RunResult;
 use scenario::sweep::{Alike, OfValue, Summary, Sweep, SweepReport, Worst};
-use scenario::{Outcome, Scenario};
 use words::document::BadFile;
 
 use super::crew::Crew;
+use super::results::{ResultsFile, merge_files};
 use crate::failure::Failure;
 use crate::output::{Format, Report};
 use crate::progress::Progress;
@@ -21,41 +22,83 @@ const MOST_VALUES: usize = 40;
 /// Runs between two changes of the line of progress.
 const RUNS_A_LOOK: u64 = 16;
 
-/// Makes the runs, `jobs` at once or as many as there are cores, and prints what came of them.
-pub(super) fn sweep(
-    scenario: Scenario,
-    seeds: RangeInclusive<u64>,
-    jobs: Option<u16>,
-    file: &Path,
-    format: Format,
-) -> Result<(), Failure> {
-    let sweep = Sweep::new(scenario, seeds).map_err(|reason| {
-        Failure::usage("cannot sweep").because(reason).next("give --seeds 1..1000, and fewer values to [sweep]")
-    })?;
-    let crew = Crew::new(jobs);
-    let summary = sum_up(&sweep, &crew, &Progress::new(format.json));
-    let mut report = SweepReport::new(file, &sweep, &summary);
-    let failure = crew.signal().map(Failure::ended_by).or_else(|| failure(&report));
-    report.ok = failure.is_none();
-    format.print_judged(&report, failure)
+/// What is asked of a sweep.
+pub(super) struct Asked<'a> {
+    /// Runs at once; `None` for as many as there are cores.
+    pub(super) jobs: Option<u16>,
+    /// Where the results go.
+    pub(super) output: Option<&'a Path>,
+    /// Whether it goes on with the results that are there.
+    pub(super) resume: bool,
+    /// The files of results that are put together instead of making runs.
+    pub(super) merge: &'a [PathBuf],
+    /// The options that make the same runs, for a command that repeats them.
+    pub(super) again: String,
 }
 
-fn sum_up(sweep: &Sweep, crew: &Crew, progress: &Progress) -> Summary {
+/// Makes the runs, or puts their results together, and prints what came of them.
+pub(super) fn sweep(sweep: &Sweep, asked: &Asked<'_>, file: &Path, format: Format) -> Result<(), Failure> {
     let mut summary = Summary::default();
+    if !asked.merge.is_empty() {
+        merge_files(asked.merge, asked.output, sweep, &mut summary, &asked.again)?;
+        return print(sweep, &summary, file, format, None);
+    }
+    let mut results = None;
+    let mut done = 0;
+    if let Some(path) = asked.output {
+        let (opened, runs) = ResultsFile::open(path, sweep, asked.resume, &mut summary)?;
+        results = Some(opened);
+        done = runs;
+    }
+    let crew = Crew::new(asked.jobs);
+    make_runs(sweep, done, &crew, &mut summary, results.as_mut(), &Progress::new(format.json))?;
+    print(sweep, &summary, file, format, crew.signal().map(Failure::ended_by))
+}
+
+/// Makes the runs of this part from the `done`-th on.
+fn make_runs(
+    sweep: &Sweep,
+    done: u64,
+    crew: &Crew,
+    summary: &mut Summary,
+    mut results: Option<&mut ResultsFile>,
+    progress: &Progress,
+) -> Result<(), Failure> {
     let alike = Alike::default();
+    let mut written = Ok(());
     crew.work(
-        sweep.runs(),
-        |number| made(sweep, &alike, number),
-        |number, outcome| {
-            summary.add(sweep, number, &outcome);
-            let done = summary.passed() + summary.failures();
-            if done.is_multiple_of(RUNS_A_LOOK) {
-                progress.show(format!("{done} of {} runs, {} failed", sweep.runs(), summary.failures()));
+        sweep.share() - done,
+        |nth| {
+            let number = sweep.shard().number(done + nth);
+            RunResult::new(sweep, number, &made(sweep, &alike, number))
+        },
+        |nth, result| {
+            if written.is_err() {
+                return;
+            }
+            summary.add(sweep, &result);
+            if let Some(results) = &mut results {
+                written = results.append(&result.to_line());
+                if written.is_err() {
+                    crew.end();
+                }
+            }
+            if (done + nth).is_multiple_of(RUNS_A_LOOK) {
+                progress.show(format!("{} of {} runs, {} failed", done + nth + 1, sweep.share(), summary.failures()));
             }
         },
     );
     progress.clear();
-    summary
+    written?;
+    results.map_or(Ok(()), ResultsFile::finish)
+}
+
+/// Prints the summary, and fails with `ended` or with the runs that failed.
+fn print(sweep: &Sweep, summary: &Summary, file: &Path, format: Format, ended: Option<Failure>) -> Result<(), Failure> {
+    let mut report = SweepReport::new(file, sweep, summary);
+    let failure = ended.or_else(|| failure(&report));
+    report.ok = failure.is_none();
+    format.print_judged(&report, failure)
 }
 
 /// The outcome of a run; it is not repeated where nothing in it is random.
@@ -100,7 +143,8 @@ fn of_values(values: &[OfValue], paint: Paint) -> Option<String> {
 
 impl Report for SweepReport {
     fn text(&self, paint: Paint) -> String {
-        let mut lines = vec![paint.strong(&self.title)];
+        let shard = self.shard.as_ref().map(|shard| format!(", shard {shard}")).unwrap_or_default();
+        let mut lines = vec![paint.strong(&format!("{}{shard}", self.title))];
         lines.extend(of_values(&self.values, paint));
         if !self.figures.is_empty() {
             let mut table = Table::new(&["figure", "min", "median", "max", "lowest with", "highest with"]);
