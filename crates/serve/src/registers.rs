@@ -3,17 +3,25 @@
 //! A unit is a drive by the address it uses at present (2615h of an M joint). Requests are served between two steps of
 //! the world, at its present time, as world commands are. Who answers decides when: an answer may stand for a store.
 
+#[cfg(test)]
+mod tests;
+
 use sim::{RegisterError, World};
 use transport::{ModbusException, ModbusRequest, RegisterAccess, RegisterAnswer};
 
 /// What the drive that `request` is for answers, and that drive's number; a broadcast is a write for all of them, and none
 /// answers.
 pub(crate) fn answer(world: &mut World, request: &ModbusRequest) -> (RegisterAnswer, Option<u8>) {
-    if request.broadcast {
-        return (broadcast(world, request), None);
-    }
-    let Some(number) = world.modbus_drive(request.unit) else { return (None, None) };
-    let access = request.access.as_ref().map_err(|refused| *refused);
+    if request.broadcast { (broadcast(world, request), None) } else { of_unit(world, request.unit, &request.access) }
+}
+
+fn of_unit(
+    world: &mut World,
+    unit: u8,
+    access: &Result<RegisterAccess, ModbusException>,
+) -> (RegisterAnswer, Option<u8>) {
+    let Some(number) = world.modbus_drive(unit) else { return (None, None) };
+    let access = access.as_ref().map_err(|refused| *refused);
     (Some(access.and_then(|access| carry_out(world, number, access))), Some(number))
 }
 

@@ -68,3 +68,11 @@ fn a_pdo_that_was_set_up_comes_and_before_it_was_said_why_not() {
     let tpdo = &shown["nodes"][0]["pdos"][0];
     assert_eq!((&tpdo["pdo"], &tpdo["silent"]), (&"TPDO1".into(), &serde_json::json!([])), "{shown}");
 }
+
+#[test]
+fn what_cannot_be_stored_for_want_of_a_model_is_refused_before_the_first_write() {
+    let (bench, folder) = (bench(), scratch("params_unknown"));
+    let file = folder.values("wanted.toml", "1017 = 200\n");
+    bench.refused(&["params", "apply", "4", &file, "--save"], &["--model 4=zlac8030l", "Nothing was sent"]);
+    assert_eq!(bench.json(&["read", "4", "1017"])["value"], 0);
+}

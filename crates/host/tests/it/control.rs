@@ -260,6 +260,12 @@ fn without_the_token_nothing_is_done_and_the_third_try_is_the_last() {
     assert!(bench.world.report(4).unwrap().powered);
     assert_eq!(bench.say(1, r#"{"request":"hello","token":"secre"}"#), Outcome::Close);
     assert_eq!(inbox.only()["error"]["kind"], "token");
+    // Lines of any kind are tries.
+    let stranger = bench.join(3);
+    let lines = ["x".repeat(1 << 20), "{{{".to_owned(), r#"{"request":"fly"}"#.to_owned()];
+    let outcomes = lines.map(|line| bench.say(3, &line));
+    assert_eq!(outcomes, [Outcome::Answered, Outcome::Answered, Outcome::Close]);
+    assert!(stranger.all().iter().all(|(_, answer)| answer["error"]["kind"] == "token"));
     let honest = bench.join(2);
     assert_eq!(bench.ask(2, &honest, &json!({ "request": "hello", "token": "secret" }))["ok"], true);
     assert_eq!(bench.ask(2, &honest, &json!({ "request": "now" }))["ok"], true);

@@ -1,5 +1,7 @@
-//! The control connection, and a machine file made by looking at a bus; clients that share a network. One program: a file each.
+//! The control connection, a machine file made by looking at a bus, parameters that are proved; clients that share a network. One
+//! program: a file each.
 
 mod clients;
 mod control;
 mod init;
+mod params;

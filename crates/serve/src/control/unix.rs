@@ -52,3 +52,25 @@ impl Drop for OwnPath {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_path_is_removed_at_the_end_unless_it_is_somebody_elses_by_then() {
+        let folder = std::env::temp_dir().join(format!("ferrodrive-control-path-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let path = folder.join("bench.sock");
+        drop(bind(&path).expect("it listens"));
+        assert!(!path.exists(), "it is ours");
+        let ours = bind(&path).expect("it listens");
+        std::fs::remove_file(&path).expect("it is there");
+        let other = std::os::unix::net::UnixListener::bind(&path).expect("the path is free");
+        drop(ours);
+        assert!(path.exists(), "the socket of another program");
+        drop(other);
+        // A folder of temporary files is not kept.
+        let _ = std::fs::remove_dir_all(folder);
+    }
+}

@@ -197,6 +197,11 @@ impl Bench {
         self.served.left(ClientId::of(number), LeaveReason::Closed);
     }
 
+    /// It goes for the sake of another.
+    pub(crate) fn make_room(&mut self, number: u64) {
+        self.served.left(ClientId::of(number), LeaveReason::Displaced);
+    }
+
     /// It sends a frame.
     pub(crate) fn send(&mut self, number: u64, frame: &str) {
         self.served.inject(ClientId::of(number), &frame.parse::<Frame>().expect("a frame"));

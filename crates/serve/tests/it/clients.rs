@@ -77,3 +77,14 @@ fn frames_of_clients_that_come_and_go_are_given_up_within_a_bound_and_counted() 
     bench.ask("run 10s");
     assert_eq!(bench.heard().iter().filter(|frame| frame.starts_with("300#")).count(), 4097);
 }
+
+#[test]
+fn clients_that_make_room_are_spoken_of_once() {
+    let mut bench = by_hand();
+    for client in 1..=3 {
+        bench.join(client);
+        bench.make_room(client);
+    }
+    let warned = bench.warned();
+    assert!(warned.len() == 1 && warned[0].contains("idle make room"), "{warned:?}");
+}

@@ -42,6 +42,29 @@ fn time_begins_with_the_first_client_and_what_is_open_at_the_limit_has_failed() 
 }
 
 #[test]
+fn a_host_outside_meets_what_the_scenario_does_to_its_drive_and_the_end_is_that_of_the_scenario() {
+    let mut bench = by_hand(
+        "limit = '60s'\n[[step]]\nname = 'brown-out'\nwhen = '4 event target reached'\ndo = '4 supply 12'\n\
+         [[expect]]\nthat = '4 event fault 0x0002'\nafter = 'brown-out'\nwithin = '200ms'\n\
+         [[expect]]\nthat = '4 velocity = 60 +- 15'\n",
+    );
+    bench.join(1);
+    bench.ask("run 1s");
+    // Profile velocity, shutdown, switch on, enable operation, 60 r/min (CiA 402-2).
+    for frame in ["2F60600003000000", "2B40600006000000", "2B40600007000000", "2B4060000F000000", "23FF60003C000000"] {
+        bench.send(1, &format!("604#{frame}"));
+        bench.ask("run 20ms");
+    }
+    bench.request(serve::service::Request::Line("run 60s".into()));
+    bench.turn();
+    let outcome = outcome(bench);
+    assert!(outcome.passed(), "{:?}", outcome.rows);
+    let fault = outcome.rows.iter().find(|row| row.asked == "4 event fault 0x0002").expect("a row");
+    assert!(fault.seen.starts_with("node 4: fault 0002h"), "{fault:?}");
+    assert!(outcome.end < Instant::from_secs(10), "all that is expected has been seen: {:?}", outcome.end);
+}
+
+#[test]
 fn the_adapter_of_a_host_outside_can_be_cut_and_joined() {
     let mut bench = by_hand(
         "end = '3s'\n[[step]]\nname = 'cut'\nat = '1s'\ndo = 'host cut'\n[[step]]\nname = 'join'\nat = '2s'\ndo = 'host join'\n\
