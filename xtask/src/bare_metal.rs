@@ -6,6 +6,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 
 use crate::debian::{apt, last_line};
 use crate::process::{self, output, quietly};
@@ -35,6 +36,11 @@ pub(crate) fn step() -> Tally {
         }
         Err(error) => Tally::failed(error),
     }
+}
+
+/// What the step takes of others.
+pub(crate) fn fetch() -> Result<(), String> {
+    Rust::found().map(|_| ())
 }
 
 /// A Rust that builds for the target.
@@ -143,6 +149,9 @@ impl Made {
     }
 
     fn make(&self) -> Result<(), String> {
+        // A second step finds what the first has made.
+        static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+        let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
         if self.sysroot.is_dir() {
             return Ok(());
         }

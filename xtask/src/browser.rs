@@ -7,8 +7,13 @@ use crate::test_programs::{self, How, SCHEMA_AND_BROWSER};
 /// The browser and what moves it, with the packages of Debian that they are in.
 const PROGRAMS: &[(&str, &str)] = &[("chromium", "chromium"), ("chromedriver", "chromium-driver")];
 
+/// What the step takes of others.
+pub(crate) fn fetch() -> Result<(), String> {
+    debian::install(PROGRAMS)
+}
+
 pub(crate) fn step() -> Tally {
-    if let Err(reason) = debian::install(PROGRAMS) {
+    if let Err(reason) = fetch() {
         return Tally::skipped(reason);
     }
     // One browser at a time: each takes some hundred megabytes and a core.

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 
 use crate::process::{self, quietly};
 use crate::say::say;
@@ -11,6 +12,9 @@ use crate::say::say;
 /// # Errors
 /// A sentence: which are missing, and why they cannot be installed.
 pub(crate) fn install(programs: &[(&str, &str)]) -> Result<(), String> {
+    // A second step finds what the first has installed.
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let missing: Vec<&str> =
         programs.iter().filter(|(program, _)| !there(program)).map(|(_, package)| *package).collect();
     if missing.is_empty() {

@@ -25,21 +25,29 @@ enum Ending {
     TooLate,
 }
 
+/// Builds the examples, and names them.
+///
+/// # Errors
+/// A sentence; what the compiler says goes to standard error.
+pub(crate) fn build() -> Result<Vec<String>, String> {
+    let packages = workspace::packages()?.into_iter().filter(|package| !package.examples.is_empty());
+    let packages: Vec<_> = packages.collect();
+    let mut cargo = workspace::cargo();
+    cargo.args(["build", "--examples", "--quiet"]).args(workspace::AS_TESTS_ARE_BUILT);
+    cargo.args(packages.iter().flat_map(|package| ["--package", &package.name]));
+    if !process::run(&mut cargo, |_| ())? {
+        return Err("the examples do not build".to_owned());
+    }
+    Ok(packages.into_iter().flat_map(|package| package.examples).collect())
+}
+
 /// Runs each example without arguments. They all run on an embedded virtual bus when given none.
 pub(crate) fn run() -> Tally {
-    let packages = match workspace::packages() {
-        Ok(packages) => packages,
+    let names = match build() {
+        Ok(names) if names.is_empty() => return Tally::skipped("the workspace has no examples"),
+        Ok(names) => names,
         Err(error) => return Tally::failed(error),
     };
-    let names: Vec<String> = packages.into_iter().flat_map(|package| package.examples).collect();
-    if names.is_empty() {
-        return Tally::skipped("the workspace has no examples");
-    }
-    match process::run(workspace::cargo().args(["build", "--workspace", "--examples", "--quiet"]), |_| ()) {
-        Ok(true) => {}
-        Ok(false) => return Tally::failed("the examples do not build"),
-        Err(error) => return Tally::failed(error),
-    }
     let folder = workspace::target().join("debug").join("examples");
     let mut tally = Tally::default();
     for name in names {

@@ -12,11 +12,20 @@ use crate::tally::Tally;
 use crate::{debian, process, program, python, workspace};
 
 /// The pinned packages: one file that people can also give to `pip install -r`.
-const REQUIREMENTS: &str = "tests/peers/requirements.txt";
+pub(crate) const REQUIREMENTS: &str = "tests/peers/requirements.txt";
+
+/// The environment that has them.
+pub(crate) const VENV: &str = "peers-venv";
+
 const SCRIPT: &str = "tests/peers/run.py";
 
 /// Programs of Debian packages that read log files. Checks that miss theirs are skipped.
 const PROGRAMS: &[(&str, &str)] = &[("tshark", "tshark"), ("editcap", "wireshark-common"), ("asc2log", "can-utils")];
+
+/// What the step takes of others.
+pub(crate) fn fetch() -> Result<(), String> {
+    debian::install(PROGRAMS)
+}
 
 pub(crate) fn run() -> Tally {
     let program = match program::build("sim") {
@@ -24,8 +33,8 @@ pub(crate) fn run() -> Tally {
         Err(tally) => return tally,
     };
     // The wheel is built in an environment of its own.
-    let environments = python::environment(python::VENV, python::REQUIREMENTS)
-        .and_then(|_| python::environment("peers-venv", REQUIREMENTS));
+    let environments =
+        python::environment(python::VENV, python::REQUIREMENTS).and_then(|_| python::environment(VENV, REQUIREMENTS));
     let python = match environments {
         Ok(python) => python,
         Err(reason) => return Tally::skipped(reason),
@@ -33,7 +42,7 @@ pub(crate) fn run() -> Tally {
     if let Err(error) = python::install_wheel(&python) {
         return Tally::failed(error);
     }
-    if let Err(reason) = debian::install(PROGRAMS) {
+    if let Err(reason) = fetch() {
         say(format_args!("without {reason}"));
     }
     let root = workspace::root();

@@ -6,7 +6,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use crate::say::say;
 use crate::tally::Tally;
@@ -21,8 +21,20 @@ pub(crate) const VENV: &str = "python-venv";
 /// What is needed for some of the tests alone, and is left out where it does not install.
 const FURTHER_REQUIREMENTS: &str = "crates/python/tests/further_requirements.txt";
 
+/// With it the package is built on what the tests of the command line have built already.
+const SHARED_BUILD: &str = "ferrodrive-python/shared-build";
+
 /// The tests, of the package and of what users copy from.
 const TESTS: &[&str] = &["crates/python/tests", "examples/mobile_base_tests", "examples/arm_tests", "examples/mujoco"];
+
+/// What the step takes of others.
+pub(crate) fn fetch() -> Result<(), String> {
+    environment(VENV, REQUIREMENTS).and_then(|python| install_further(&python))
+}
+
+fn install_further(python: &Path) -> Result<(), String> {
+    process::output(pip(python).args(["install", "--quiet", "-r", FURTHER_REQUIREMENTS])).map(|_| ())
+}
 
 /// The python step of `cargo xtask test`.
 pub(crate) fn step() -> Tally {
@@ -33,7 +45,7 @@ pub(crate) fn step() -> Tally {
     if let Err(error) = install_wheel(&python).and_then(|()| lint(&python)) {
         return Tally::failed(error);
     }
-    if let Err(error) = process::output(pip(&python).args(["install", "--quiet", "-r", FURTHER_REQUIREMENTS])) {
+    if let Err(error) = install_further(&python) {
         let reason = error.lines().last().unwrap_or_default();
         say(format_args!("without what {FURTHER_REQUIREMENTS} names, which does not install here: {reason}"));
     }
@@ -67,6 +79,9 @@ pub(crate) fn wheel(python: &Path, profile: &str, program: Option<&Path>, folder
     let mut pip = pip(python);
     // The environment has the build's needs, in pinned versions.
     pip.args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]).arg(folder).arg(".");
+    if profile == "dev" {
+        pip.arg(format!("--config-settings=build-args=--profile dev --locked --features {SHARED_BUILD}"));
+    }
     pip.env("FERRODRIVE_PROFILE", profile).env("CARGO_TARGET_DIR", workspace::target());
     pip.envs(program.map(|program| ("FERRODRIVE_PROGRAM", program)));
     process::output(pip.env("PATH", with_tools_of(python)?))?;
@@ -89,6 +104,9 @@ pub(crate) fn environment(name: &str, requirements: &str) -> Result<PathBuf, Str
 
 /// The same, with the packages named here: a line each.
 pub(crate) fn environment_of(name: &str, wanted: &str) -> Result<PathBuf, String> {
+    // A second step finds what the first has made.
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = workspace::target().join(name);
     let python = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
     let stamp = folder.join("installed.txt");
@@ -120,7 +138,8 @@ pub(crate) fn pip(python: &Path) -> Command {
 fn lint(python: &Path) -> Result<(), String> {
     if process::works("cargo", &["clippy", "--version"]) {
         let mut clippy = workspace::cargo();
-        clippy.args(["clippy", "--package", "ferrodrive-python", "--quiet", "--", "-D", "warnings"]);
+        clippy.args(["clippy", "--package", "ferrodrive-python", "--features", SHARED_BUILD, "--quiet"]);
+        clippy.args(["--", "-D", "warnings"]);
         process::output(clippy.env("PYO3_PYTHON", python))?;
     }
     let mut mypy = Command::new(python);

@@ -7,7 +7,7 @@ use crate::say::say;
 use crate::tally::Tally;
 use crate::test_programs::{self, How, REAL_TIME, SCHEMA_AND_BROWSER};
 use crate::{
-    bare_metal, browser, dist, examples, libtest, packages, page, peers, process, program, python, tidy, vcan,
+    bare_metal, browser, dist, examples, libtest, packages, page, peers, process, program, python, tidy, vcan, wheel,
     workspace,
 };
 
@@ -24,9 +24,11 @@ pub(crate) struct Step {
 pub(crate) enum When {
     /// In the quick list, one after the other.
     Quick,
-    /// With `--all`, after the quick list: steps that keep the processor busy, one after the other,
+    /// With `--all`, after the quick list: what the others build first, which keeps every core busy.
+    Building,
+    /// Then steps that keep the processor busy, one after the other,
     Busy,
-    /// and, beside them, steps that mostly wait for time to pass, for a browser, for a virtual machine.
+    /// and, beside them, two at a time, steps that mostly wait for time to pass, for a browser, for a virtual machine; the longest first.
     Waiting,
 }
 
@@ -45,6 +47,12 @@ pub(crate) const STEPS: &[Step] = &[
         does: "every procedure of the manuals against the virtual drives",
         when: When::Quick,
         run: program::demo,
+    },
+    Step {
+        name: "build",
+        does: "the programs and tests that the steps behind this one run",
+        when: When::Building,
+        run: build,
     },
     Step { name: "clippy", does: "lints of every target, warnings are errors", when: When::Busy, run: clippy },
     Step { name: "docs", does: "the documentation builds and its links work", when: When::Busy, run: docs },
@@ -81,18 +89,6 @@ pub(crate) const STEPS: &[Step] = &[
     },
     Step { name: "page", does: "what the studio's page computes and says, by node", when: When::Busy, run: page::step },
     Step {
-        name: "real_time",
-        does: "processes in real time: servers, signals, sockets, terminals",
-        when: When::Waiting,
-        run: real_time,
-    },
-    Step {
-        name: "schema",
-        does: "JSON of every command, and control connections, by their schemas",
-        when: When::Waiting,
-        run: schema,
-    },
-    Step {
         name: "studio",
         does: "the studio's page in a real browser: enable, move, jog, close the tab",
         when: When::Waiting,
@@ -104,6 +100,29 @@ pub(crate) const STEPS: &[Step] = &[
         when: When::Waiting,
         run: vcan::step,
     },
+    Step {
+        name: "real_time",
+        does: "processes in real time: servers, signals, sockets, terminals",
+        when: When::Waiting,
+        run: real_time,
+    },
+    Step {
+        name: "schema",
+        does: "JSON of every command, and control connections, by their schemas",
+        when: When::Waiting,
+        run: schema,
+    },
+];
+
+/// What steps take of others, in the order in which it is needed. It is fetched while the quick list computes, since a download
+/// leaves the processor idle; a step whose part cannot be had reports that itself.
+pub(crate) const FETCHES: &[(&str, fn() -> Result<(), String>)] = &[
+    ("studio", browser::fetch),
+    ("vcan", vcan::fetch),
+    ("no_std", bare_metal::fetch),
+    ("python", python::fetch),
+    ("peers", peers::fetch),
+    ("dist", wheel::fetch),
 ];
 
 /// What needs a Python interpreter to build.
@@ -120,6 +139,13 @@ fn fmt() -> Tally {
         return Tally::skipped("rustfmt is not installed: rustup component add rustfmt");
     }
     cargo(&["fmt", "--all", "--check"], &[], "run cargo fmt")
+}
+
+fn build() -> Tally {
+    let built = program::built().and_then(|_| examples::build());
+    let built =
+        built.and_then(|_| test_programs::build(REAL_TIME)).and_then(|_| test_programs::build(SCHEMA_AND_BROWSER));
+    built.map_or_else(Tally::failed, |_| Tally::passed())
 }
 
 fn clippy() -> Tally {

@@ -1,13 +1,16 @@
 //! `cargo xtask test`: runs steps, prints a table and a count, and fails when anything failed.
 
 use std::process::ExitCode;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use crate::since;
-use crate::steps::{STEPS, Step, When};
+use crate::steps::{FETCHES, STEPS, Step, When};
 use crate::table::{Row, conclude, seconds, sum};
 use crate::{libtest, say};
+
+/// How many steps that wait run side by side, beside those that compute.
+const WAITING_AT_A_TIME: usize = 2;
 
 /// Runs `cargo xtask test` with the words that follow it.
 pub(crate) fn command(words: &[&str]) -> ExitCode {
@@ -66,12 +69,22 @@ fn run(steps: &[&'static Step]) -> ExitCode {
     let start = Instant::now();
     let of = |when: When| steps.iter().copied().filter(move |step| step.when == when);
     let rows = Mutex::new(Vec::new());
-    of(When::Quick).for_each(|step| run_one(step, false, &rows));
-    let (busy, waiting): (Vec<_>, Vec<_>) = (of(When::Busy).collect(), of(When::Waiting).collect());
-    let beside = !busy.is_empty() && !waiting.is_empty();
+    let (busy, waits) = (of(When::Busy).count(), of(When::Waiting).count());
+    let beside = waits > 1 || waits > 0 && busy > 0;
+    let waiting = Mutex::new(of(When::Waiting));
     std::thread::scope(|scope| {
-        scope.spawn(|| waiting.iter().for_each(|step| run_one(step, beside, &rows)));
-        busy.iter().for_each(|step| run_one(step, beside, &rows));
+        if of(When::Quick).count() > 0 {
+            scope.spawn(|| fetch_for(steps));
+        }
+        of(When::Quick).chain(of(When::Building)).for_each(|step| run_one(step, false, &rows));
+        for _ in 0..WAITING_AT_A_TIME {
+            scope.spawn(|| {
+                // The lock is held while one is taken, not while it runs.
+                let next = || waiting.lock().unwrap_or_else(PoisonError::into_inner).next();
+                std::iter::from_fn(next).for_each(|step| run_one(step, beside, &rows));
+            });
+        }
+        of(When::Busy).for_each(|step| run_one(step, beside, &rows));
     });
     let rows = rows.into_inner().unwrap_or_default();
     let ended = conclude(&rows, start.elapsed());
@@ -82,6 +95,14 @@ fn run(steps: &[&'static Step]) -> ExitCode {
     // The count is the last line.
     println!("{}", sum(&rows).summary());
     ended
+}
+
+/// What these steps take of others. What fails here fails again in its step, which reports it.
+fn fetch_for(steps: &[&'static Step]) {
+    say::work_for(Some("fetch"));
+    for (_, fetch) in FETCHES.iter().filter(|(name, _)| steps.iter().any(|step| step.name == *name)) {
+        let _ = fetch();
+    }
 }
 
 fn ran(rows: &[Row], name: &str) -> bool {

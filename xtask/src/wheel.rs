@@ -32,6 +32,11 @@ pub(crate) fn command() -> ExitCode {
     }
 }
 
+/// What giving a tag takes of others.
+pub(crate) fn fetch() -> Result<(), String> {
+    python::environment_of(VENV, PACKAGES).map(|_| ())
+}
+
 /// Gives the wheel the tag of what it needs; returns its new path, or why it keeps the old one.
 pub(crate) fn tag(wheel: &Path) -> Result<PathBuf, String> {
     if !cfg!(target_os = "linux") {

@@ -7,6 +7,9 @@ use serde_json::Value;
 
 use crate::process;
 
+/// What is built beside these has the features that it has in the quick list, and what was built there is not built again.
+pub(crate) const AS_TESTS_ARE_BUILT: [&str; 4] = ["--package", "ferrodrive", "--package", "ferrodrive-tests"];
+
 /// A package of the workspace.
 #[derive(Debug, Clone)]
 pub(crate) struct Package {

@@ -3,10 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 
 use crate::debian;
 use crate::process::{self, quietly};
 use crate::say::say;
+use crate::workspace;
 
 /// Raised when what is kept has to be made anew.
 const FORMAT: u32 = 3;
@@ -36,13 +38,16 @@ pub(super) struct Image {
     pub(super) initrd: PathBuf,
 }
 
-/// The image in `folder`, made now if need be; or why there is none.
-pub(super) fn prepare(folder: &Path) -> Result<Image, String> {
+/// The image, made now if need be; or why there is none.
+pub(super) fn prepare() -> Result<Image, String> {
+    // A second step finds what the first has made.
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     if std::env::consts::OS != "linux" || std::env::consts::ARCH != "x86_64" {
         return Err("the guest is for an x86-64 machine with Linux".to_owned());
     }
     debian::install(PROGRAMS)?;
-    let folder = folder.join(format!("v{FORMAT}"));
+    let folder = workspace::target().join("vcan-vm").join(format!("v{FORMAT}"));
     let image = Image { kernel: folder.join("kernel"), initrd: folder.join("initrd") };
     if image.initrd.exists() {
         return Ok(image);

@@ -12,14 +12,13 @@ use std::process::ExitCode;
 
 use crate::say::say;
 use crate::tally::Tally;
-use crate::{libtest, python, test_programs, workspace};
+use crate::{libtest, peers, python, test_programs, workspace};
 
 /// The tests that are run inside.
 const TESTS: &str = "socketcan::";
 
 /// canopen-python on the same interfaces.
 const PEER: &str = "tests/peers/on_socketcan.py";
-const PEER_REQUIREMENTS: &str = "tests/peers/requirements.txt";
 
 /// `cargo xtask vcan-test`.
 pub(crate) fn command() -> ExitCode {
@@ -28,9 +27,14 @@ pub(crate) fn command() -> ExitCode {
     if tally.failed > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS }
 }
 
+/// What the step takes of others.
+pub(crate) fn fetch() -> Result<(), String> {
+    image::prepare().and_then(|_| python::environment(peers::VENV, peers::REQUIREMENTS)).map(|_| ())
+}
+
 /// The step of `cargo xtask test`.
 pub(crate) fn step() -> Tally {
-    let image = match image::prepare(&workspace::target().join("vcan-vm")) {
+    let image = match image::prepare() {
         Ok(image) => image,
         Err(reason) => return Tally::skipped(reason),
     };
@@ -38,7 +42,7 @@ pub(crate) fn step() -> Tally {
         Ok(tests) => tests,
         Err(error) => return Tally::failed(error),
     };
-    let peer = python::environment("peers-venv", PEER_REQUIREMENTS);
+    let peer = python::environment(peers::VENV, peers::REQUIREMENTS);
     let checks = checks(&tests, peer.as_ref().ok());
     say("booting a guest with CAN interfaces");
     let output = match guest::run(&image, &checks) {
@@ -86,7 +90,7 @@ fn read(output: &guest::Output) -> Tally {
         say(line);
         libtest::count(line, &mut tally);
         failed.extend(libtest::failed_test(line));
-        crate::peers::count(line, &mut tally);
+        peers::count(line, &mut tally);
     }
     if !output.ended_well && tally.failed == 0 {
         tally.failed = 1;
