@@ -27,9 +27,9 @@ pub trait Firmware: Station + Clone {
     /// Time between two ticks, in nanoseconds.
     const CONTROL_PERIOD_NS: u64;
 
-    /// Control periods in a supervision period: so long are the ticks of a firmware whose power stage follows by itself. None if
-    /// it has no such form.
-    const MECHANICAL_PERIODS: Option<u32> = None;
+    /// Of a firmware whose power stage follows by itself: control periods up to its first tick, which is the first supervision, and
+    /// from one tick to the next. None if it has no such form.
+    const MECHANICAL_PERIODS: Option<[u32; 2]> = None;
 
     /// From its next start on it is of this fidelity; [`Fidelity::Mechanical`] of those only that have
     /// [`MECHANICAL_PERIODS`](Self::MECHANICAL_PERIODS). Its ticks are as long then, and what one returns holds from that tick on.

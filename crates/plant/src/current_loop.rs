@@ -9,7 +9,7 @@
 //!
 //! They are solved exactly over the step: with `A` the matrix and `b` the constant part,
 //! `x(h) = exp(Ah) x(0) + h phi1(Ah) b`, and the mean is `phi1(Ah) x(0) + h phi2(Ah) b`. Where the voltage of the bus does not
-//! suffice, the equations are not linear any more: the step is then done in tenths, as the controller itself goes, with its
+//! suffice, the equations are not linear any more: the step is then done in control periods, as the controller itself goes, with its
 //! limit and its anti-windup. Currents and powers are means over the step, so that the balance of energies closes.
 //!
 //! Where the controller's angle is off, its frame stands beside the rotor's, and all of it is computed there: motors with one
@@ -20,8 +20,13 @@
 use crate::angle::Axis;
 use crate::dq::Dq;
 
-/// Steps in a step whose voltage is at its limit: what a control period is of a supervision period.
-pub(crate) const SHORT_STEPS: u32 = 10;
+/// A control period, s: so long are the steps of what goes on too fast for a step of a supervision period.
+const SHORT_S: f64 = 50e-6;
+
+/// How many of them are in a step.
+pub(crate) fn short_steps(dt_s: f64) -> u32 {
+    ((dt_s / SHORT_S + 0.5) as u32).max(1)
+}
 /// Relative change of the winding's resistance at which its closed form is made anew.
 const RESISTANCE_STEP: f64 = 1e-4;
 /// Terms of the series, which is summed for matrices of a norm up to a quarter: what is left out is below `0.25^9 / 11!`.

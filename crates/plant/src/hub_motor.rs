@@ -8,7 +8,7 @@ use crate::angle::{Angle, Axis};
 use crate::brake::BrakeModel;
 use crate::clamp::ClampModel;
 use crate::cogging::Cogging;
-use crate::current_loop::SHORT_STEPS;
+use crate::current_loop::short_steps;
 use crate::encoder::{EncoderData, EncoderModel};
 use crate::flows::Flows;
 use crate::hall::{HallFault, HallModel};
@@ -160,7 +160,7 @@ impl HubMotor {
     }
 
     /// A step of a supervision period, with the current loop's closed form ([`Inverter::Regulated`]) or an idle bridge. It is done
-    /// in tenths where something goes on that so long a step does not show: suppressors that conduct, molten switches, a bus
+    /// in control periods where something goes on that so long a step does not show: suppressors that conduct, molten switches, a bus
     /// that its source charges in no time.
     #[inline(never)]
     pub fn step_long(&mut self, dt_s: f64, actuation: &Actuation) {
@@ -168,7 +168,8 @@ impl HubMotor {
             self.pmsm.current_loop.release();
         }
         if self.needs_short_steps(dt_s) {
-            (0..SHORT_STEPS).for_each(|_| self.step(dt_s / f64::from(SHORT_STEPS), actuation));
+            let steps = short_steps(dt_s);
+            (0..steps).for_each(|_| self.step(dt_s / f64::from(steps), actuation));
         } else {
             self.step(dt_s, actuation);
         }

@@ -11,7 +11,7 @@ use crate::attachment::Attachment;
 use crate::brake::BrakeModel;
 use crate::clamp::ClampModel;
 use crate::cogging::Cogging;
-use crate::current_loop::SHORT_STEPS;
+use crate::current_loop::short_steps;
 use crate::gear::{GearData, GearInput, GearModel};
 use crate::hub_motor::Inverter;
 use crate::mechanics::{Load, RotorData, RotorModel};
@@ -178,7 +178,8 @@ impl JointMotor {
             self.pmsm.current_loop.release();
         }
         if self.needs_short_steps(dt_s) {
-            (0..SHORT_STEPS).for_each(|_| self.step(dt_s / f64::from(SHORT_STEPS), actuation));
+            let steps = short_steps(dt_s);
+            (0..steps).for_each(|_| self.step(dt_s / f64::from(steps), actuation));
         } else {
             self.step(dt_s, actuation);
         }

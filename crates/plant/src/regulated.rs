@@ -1,6 +1,6 @@
-//! A winding under its current loop: by the closed form, or in tenths of the step while the voltage is used up.
+//! A winding under its current loop: by the closed form, or in control periods while the voltage is used up.
 
-use crate::current_loop::{ClosedForm, CurrentLoop, LoopData, SHORT_STEPS};
+use crate::current_loop::{ClosedForm, CurrentLoop, LoopData, short_steps};
 use crate::pmsm::{Dq, INV_SQRT_3, PmsmData, PmsmInput, PmsmModel, PmsmOutput, Winding};
 
 impl PmsmModel {
@@ -70,11 +70,12 @@ impl PmsmModel {
     #[inline(never)]
     fn regulate_in_short_steps(&self, data: &mut PmsmData, dt_s: f64, input: &PmsmInput, limit_v: f64) -> PmsmOutput {
         let settings = data.current_loop.settings;
-        let share = 1.0 / f64::from(SHORT_STEPS);
+        let steps = short_steps(dt_s);
+        let share = 1.0 / f64::from(steps);
         let short_s = dt_s * share;
         let omega = f64::from(self.pole_pairs) * input.velocity_rad_s;
         let mut means = PmsmOutput::default();
-        for _ in 0..SHORT_STEPS {
+        for _ in 0..steps {
             let seen_a = settings.seen(data.current_a);
             let wanted = settings.wanted_v(data.current_loop.integral_v, seen_a, omega);
             let voltage_v = within_circle(wanted, limit_v);

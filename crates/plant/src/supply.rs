@@ -105,10 +105,11 @@ impl SupplyModel {
         0.5 * self.bus_capacitance_f(data) * data.bus_v * data.bus_v
     }
 
-    /// The source charges the bus faster than a step of this length can show.
+    /// The source charges the bus faster than a step of this length can show: by the midpoint rule what is off of the bus's voltage comes back
+    /// with the other sign, and more than a third of it.
     #[inline]
     pub(crate) fn is_stiff(&self, data: &SupplyData, dt_s: f64) -> bool {
-        data.connected && self.source_resistance_ohm * self.bus_capacitance_f(data) < 0.5 * dt_s
+        data.connected && self.source_resistance_ohm * self.bus_capacitance_f(data) < 0.25 * dt_s
     }
 
     #[inline]

@@ -92,10 +92,16 @@ impl<const N: usize> FaultMonitor<N> {
     /// Takes in which causes are present now, once each supervision period; returns what is newly latched.
     #[inline]
     pub fn observe(&mut self, present: FaultSet) -> FaultSet {
+        self.observe_for(present, 1)
+    }
+
+    /// The same once in so many supervision periods.
+    #[inline]
+    pub fn observe_for(&mut self, present: FaultSet, periods: u16) -> FaultSet {
         if present.is_empty() && self.present.is_empty() {
             return FaultSet::NONE;
         }
-        self.count(present)
+        self.count(present, periods)
     }
 
     /// Latches a fault at once; true if it is new.
@@ -149,11 +155,11 @@ impl<const N: usize> FaultMonitor<N> {
         self.latched.rows().fold(generic, |bits, row| bits | self.table[row].error_register)
     }
 
-    fn count(&mut self, present: FaultSet) -> FaultSet {
+    fn count(&mut self, present: FaultSet, periods: u16) -> FaultSet {
         let mut new = FaultSet::NONE;
         for (row, debounce) in self.debounce.iter().enumerate() {
             let lasts = &mut self.present_for[row];
-            *lasts = if present.has(row) { lasts.saturating_add(1) } else { 0 };
+            *lasts = if present.has(row) { lasts.saturating_add(periods) } else { 0 };
             let confirmed = *lasts > 0 && *lasts >= *debounce;
             new = new.with(row, confirmed && !self.latched.has(row));
         }

@@ -170,7 +170,7 @@ impl<S: Storage> Firmware for ServoDrive<S> {
     type Hardware = Hardware<S>;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
-    const MECHANICAL_PERIODS: Option<u32> = Some(SUPERVISION_DIVIDER as u32);
+    const MECHANICAL_PERIODS: Option<[u32; 2]> = Some([SUPERVISION_DIVIDER as u32; 2]);
 
     fn set_fidelity(&mut self, fidelity: Fidelity) {
         self.fidelity = fidelity;

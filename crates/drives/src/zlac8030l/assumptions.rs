@@ -11,6 +11,10 @@ pub const SUPERVISION_DIVIDER: u8 = 10;
 /// Supervision period in seconds.
 pub const SUPERVISION_PERIOD_S: f32 = 0.5e-3;
 
+/// Supervision periods that one at fidelity mechanical stands for: 1 ms, an eighth of the velocity loop's time with the faster of the
+/// two windings.
+pub const MECHANICAL_SUPERVISIONS: u16 = 2;
+
 /// Communication task: 0.5 ms, the unit of the drive's PDO timers (6.1).
 pub const COMMUNICATION_PERIOD_NS: u64 = 500_000;
 

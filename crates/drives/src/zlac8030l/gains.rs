@@ -24,12 +24,13 @@ use motion::foc::FocGains;
 use motion::pid::PiGains;
 
 use super::Values;
-use super::assumptions::{CONTROL_PERIOD_S, SUPERVISION_PERIOD_S};
+use super::assumptions::CONTROL_PERIOD_S;
 use super::objects::{
     CURRENT_KI, CURRENT_KP, FEEDFORWARD_SMOOTHING, POSITION_KF, POSITION_KP, TORQUE_SMOOTHING, VELOCITY_KF,
     VELOCITY_KI, VELOCITY_KP, VELOCITY_OBSERVER_1, VELOCITY_OBSERVER_2, VELOCITY_OBSERVER_3, VELOCITY_OBSERVER_4,
     VELOCITY_SMOOTHING,
 };
+use super::parameters::supervision_period_s;
 use crate::Fidelity;
 use crate::engine::actuator::observer::TrackingGains;
 use crate::engine::actuator::servo::ServoGains;
@@ -57,6 +58,7 @@ const MODULATION_LIMIT: f32 = 0.98;
 
 /// The gains that the objects hold; `velocity_limit_rad_s` is what the position loop may ask for.
 pub(super) fn gains(values: &Values, velocity_limit_rad_s: f32, fidelity: Fidelity) -> ServoGains {
+    let dt_s = supervision_period_s(fidelity);
     let count = |object: Object<u16>| f32::from(values.get(object));
     let current = PiGains {
         proportional: count(CURRENT_KP) * CURRENT_KP_V_PER_A,
@@ -68,7 +70,7 @@ pub(super) fn gains(values: &Values, velocity_limit_rad_s: f32, fidelity: Fideli
         acceleration_per_s3: count(VELOCITY_OBSERVER_3) * TRACKING.acceleration_per_s3,
     };
     // One that follows nothing would leave the velocity loop with what is not there.
-    let share = if tracking.follow(SUPERVISION_PERIOD_S) { count(VELOCITY_OBSERVER_4) * TRACKING_SHARE } else { 0.0 };
+    let share = if tracking.follow(dt_s) { count(VELOCITY_OBSERVER_4) * TRACKING_SHARE } else { 0.0 };
     let smoothing = |object, dt_s| LowPassGains::from_time_constant(count(object) * SMOOTHING_S, dt_s);
     ServoGains {
         foc: FocGains {
@@ -91,9 +93,9 @@ pub(super) fn gains(values: &Values, velocity_limit_rad_s: f32, fidelity: Fideli
             friction_feed_forward: 0.0,
             velocity_limit_rad_s,
         },
-        velocity_filter: smoothing(VELOCITY_SMOOTHING, SUPERVISION_PERIOD_S),
-        feed_forward_filter: smoothing(FEEDFORWARD_SMOOTHING, SUPERVISION_PERIOD_S),
-        torque_filter: smoothing(TORQUE_SMOOTHING, fidelity.tick(CONTROL_PERIOD_S, SUPERVISION_PERIOD_S)),
+        velocity_filter: smoothing(VELOCITY_SMOOTHING, dt_s),
+        feed_forward_filter: smoothing(FEEDFORWARD_SMOOTHING, dt_s),
+        torque_filter: smoothing(TORQUE_SMOOTHING, fidelity.tick(CONTROL_PERIOD_S, dt_s)),
         tracking,
         tracking_share: share.min(1.0),
     }

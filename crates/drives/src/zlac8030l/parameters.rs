@@ -3,6 +3,7 @@
 use canopen::od::Object;
 use cia402::StopRamp;
 use motion::commutation::CommutationModel;
+use motion::filter::LowPassGains;
 use motion::observer::ObserverGains;
 
 use super::Values;
@@ -50,6 +51,10 @@ pub(super) struct Parameters {
     pub(super) alarm_pwm: bool,
     /// What is done with a shaft that is not enabled.
     pub(super) holding: Holding,
+    /// What 606Ch and 6077h show.
+    pub(super) shown: LowPassGains,
+    /// Supervision periods that one stands for.
+    pub(super) supervisions: u16,
 }
 
 impl Parameters {
@@ -72,7 +77,14 @@ impl Parameters {
             driver_limit_c: tenths(values, DRIVER_TEMPERATURE_THRESHOLD),
             alarm_pwm: values.get(ALARM_PWM) == 1,
             holding: Holding { when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1, when_switched_on: false },
+            shown: LowPassGains::from_time_constant(DISPLAY_FILTER_S, supervision_period_s(fidelity)),
+            supervisions: fidelity.tick(1, MECHANICAL_SUPERVISIONS),
         }
+    }
+
+    /// From one supervision to the next, s.
+    pub(super) const fn supervision_period_s(&self) -> f32 {
+        self.model.supervision_period_s
     }
 
     /// The motor's sense of rotation that 2001h asks for.
@@ -112,8 +124,14 @@ fn emergency_stop(variant: &Variant) -> StopRamp {
     }
 }
 
+/// From one supervision to the next, s.
+pub(super) fn supervision_period_s(fidelity: Fidelity) -> f32 {
+    SUPERVISION_PERIOD_S * fidelity.tick(1.0, f32::from(MECHANICAL_SUPERVISIONS))
+}
+
 fn servo_model(values: &Values, counts_per_turn: u32, fidelity: Fidelity) -> ServoModel {
-    let control_period_s = fidelity.tick(CONTROL_PERIOD_S, SUPERVISION_PERIOD_S);
+    let supervision_period_s = supervision_period_s(fidelity);
+    let control_period_s = fidelity.tick(CONTROL_PERIOD_S, supervision_period_s);
     ServoModel {
         commutation: CommutationModel {
             counts_per_turn,
@@ -124,7 +142,7 @@ fn servo_model(values: &Values, counts_per_turn: u32, fidelity: Fidelity) -> Ser
         direction: Parameters::wanted_direction(values),
         observer: ObserverGains::new(VELOCITY_WINDOW_S, VELOCITY_STANDSTILL_S, control_period_s),
         control_period_s,
-        supervision_period_s: SUPERVISION_PERIOD_S,
+        supervision_period_s,
         switching_period_s: CONTROL_PERIOD_S,
         fidelity,
     }

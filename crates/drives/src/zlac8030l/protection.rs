@@ -87,9 +87,12 @@ impl Protection {
     pub(super) fn causes(&mut self, parameters: &Parameters, sensors: &Sensors, now: &FaultSituation<'_>) -> FaultSet {
         FaultSet::NONE
             .with(row::OVER_VOLTAGE, over_voltage(sensors.bus_v, now))
-            .with(row::UNDER_VOLTAGE, self.under_voltage(sensors.bus_v, now))
+            .with(row::UNDER_VOLTAGE, self.under_voltage(parameters, sensors.bus_v, now))
             .with(row::OVER_CURRENT, is_over_current(sensors) || self.loose_wire(parameters, sensors, now))
-            .with(row::OVERLOAD, self.overload.update(&parameters.overload, now.current_a(), SUPERVISION_PERIOD_S))
+            .with(
+                row::OVERLOAD,
+                self.overload.update(&parameters.overload, now.current_a(), parameters.supervision_period_s()),
+            )
             .with(row::OUT_OF_TOLERANCE, out_of_tolerance(parameters, now))
             .with(row::REFERENCE_VOLTAGE, !within(sensors.reference_v, REFERENCE_V, REFERENCE_TOLERANCE_V))
             .with(row::EEPROM, !now.eeprom_sound)
@@ -116,9 +119,9 @@ impl Protection {
         self.wires = WireWatch::default();
     }
 
-    fn under_voltage(&mut self, bus_v: f32, now: &FaultSituation<'_>) -> bool {
+    fn under_voltage(&mut self, parameters: &Parameters, bus_v: f32, now: &FaultSituation<'_>) -> bool {
         if self.supplied_for < SUPPLY_SETTLING_PERIODS {
-            self.supplied_for += 1;
+            self.supplied_for += parameters.supervisions;
             return false;
         }
         let recovered = if now.latched.has(row::UNDER_VOLTAGE) { VOLTAGE_HYSTERESIS_V } else { 0.0 };
@@ -132,9 +135,9 @@ impl Protection {
             && asked_a >= LOOSE_WIRE_LEAST_A
             && now.current_a().abs() < LOOSE_WIRE_CURRENT_SHARE * asked_a
             && now.velocity_rpm.abs() < LOOSE_WIRE_MOST_RPM;
-        self.loose_wire_for = if missing { self.loose_wire_for.saturating_add(1) } else { 0 };
+        self.loose_wire_for = if missing { self.loose_wire_for.saturating_add(parameters.supervisions) } else { 0 };
         let pole_pairs = parameters.model.commutation.pole_pairs as f32;
-        let turned = now.velocity_rpm * (SUPERVISION_PERIOD_S / 60.0) * pole_pairs;
+        let turned = now.velocity_rpm * (parameters.supervision_period_s() / 60.0) * pole_pairs;
         let off = if *now.demand == Demand::Off {
             self.wires = WireWatch::default();
             false

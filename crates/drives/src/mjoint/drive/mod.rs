@@ -273,7 +273,7 @@ impl Firmware for MJoint {
     type Hardware = Hardware;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
-    const MECHANICAL_PERIODS: Option<u32> = Some(SUPERVISION_DIVIDER as u32);
+    const MECHANICAL_PERIODS: Option<[u32; 2]> = Some([SUPERVISION_DIVIDER as u32; 2]);
 
     fn set_fidelity(&mut self, fidelity: Fidelity) {
         *self = Self::over(self.model, self.device.clone(), fidelity);

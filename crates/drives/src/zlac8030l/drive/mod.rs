@@ -2,6 +2,7 @@
 //!
 //! Three rhythms: frames as they come (`handle_frame`, in [`commands`]), the communication task every 0.5 ms
 //! (`handle_timeout`), and the control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
+//! At fidelity mechanical a tick is a supervision, of 1 ms.
 
 mod commands;
 mod resting;
@@ -10,7 +11,7 @@ use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
 use cia402::{ModeOfOperation, PowerState};
 use devices::AxisId;
-use motion::filter::{LowPass, LowPassGains};
+use motion::filter::LowPass;
 
 use super::assumptions::*;
 use super::faults::{DEBOUNCE, FAULT_COUNT, FAULTS, row};
@@ -149,7 +150,8 @@ impl Zlac8030l {
         self.read_inputs(sensors);
         self.read_targets();
         let Parameters { axis, holding, model, gains, limits, .. } = &self.parameters;
-        self.shell.demand = self.shell.move_axis(feedback, axis, *holding, f64::from(SUPERVISION_PERIOD_S));
+        let dt_s = f64::from(model.supervision_period_s);
+        self.shell.demand = self.shell.move_axis(feedback, axis, *holding, dt_s);
         self.servo.control(model, gains, &self.shell.demand, feedback.position, limits);
         self.publish(sensors);
     }
@@ -177,9 +179,8 @@ impl Zlac8030l {
     fn measure(&mut self, sensors: &Sensors) -> Feedback {
         self.servo.measure(&self.parameters.model, &self.parameters.gains, sensors.phase_current_a);
         let velocity_rpm = self.servo.velocity_rpm();
-        let shown = LowPassGains::from_time_constant(DISPLAY_FILTER_S, SUPERVISION_PERIOD_S);
-        self.shown_velocity_rpm.update(&shown, velocity_rpm);
-        self.shown_current_a.update(&shown, self.servo.current_a());
+        self.shown_velocity_rpm.update(&self.parameters.shown, velocity_rpm);
+        self.shown_current_a.update(&self.parameters.shown, self.servo.current_a());
         Feedback {
             position: self.position(),
             velocity: f64::from(velocity_rpm) * self.parameters.counts_s_per_rpm,
@@ -200,7 +201,7 @@ impl Zlac8030l {
             latched: self.faults.latched(),
         };
         let causes = self.protection.causes(&self.parameters, sensors, &situation);
-        let new = self.faults.observe(causes);
+        let new = self.faults.observe_for(causes, self.parameters.supervisions);
         if causes.has(row::ENCODER) {
             // Reported once: whether encoder and Hall sensors still disagree shows at the next edges.
             self.servo.realign(&self.parameters.model, sensors.hall, sensors.encoder_count);
@@ -233,7 +234,8 @@ impl Zlac8030l {
 
     /// Debounced inputs.
     fn read_inputs(&mut self, sensors: &Sensors) {
-        let levels = self.shell.inputs.update(sensors.inputs, INPUT_DEBOUNCE_PERIODS);
+        const MECHANICAL: u8 = INPUT_DEBOUNCE_PERIODS.div_ceil(MECHANICAL_SUPERVISIONS as u8);
+        let levels = self.shell.inputs.update(sensors.inputs, self.fidelity().tick(INPUT_DEBOUNCE_PERIODS, MECHANICAL));
         let signals = TERMINALS.signals(self.values(), levels);
         if self.shell.take_signals(&signals) {
             self.drop_targets();
@@ -328,7 +330,8 @@ impl Firmware for Zlac8030l {
     type Hardware = Hardware;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
-    const MECHANICAL_PERIODS: Option<u32> = Some(SUPERVISION_DIVIDER as u32);
+    const MECHANICAL_PERIODS: Option<[u32; 2]> =
+        Some([SUPERVISION_DIVIDER as u32, SUPERVISION_DIVIDER as u32 * MECHANICAL_SUPERVISIONS as u32]);
 
     fn set_fidelity(&mut self, fidelity: Fidelity) {
         *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone(), fidelity) };

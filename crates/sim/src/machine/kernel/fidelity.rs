@@ -45,14 +45,14 @@ impl<A: Assembly> Machine<A> {
         Ok(())
     }
 
-    /// Of a firmware that runs: control periods in a tick.
-    fn tick_periods(&self) -> u64 {
-        self.fidelity.tick(1, u64::from(A::Firmware::MECHANICAL_PERIODS.unwrap_or(1)))
+    /// Of a firmware that runs: control periods up to its first tick, and from one to the next.
+    fn tick_periods(&self) -> [u64; 2] {
+        self.fidelity.tick([1; 2], A::Firmware::MECHANICAL_PERIODS.unwrap_or([1; 2]).map(u64::from))
     }
 
     /// The period of a coupled machine, which is the same before its firmware runs.
     pub(super) fn period_while_coupled_ns(&self) -> u64 {
-        A::Firmware::CONTROL_PERIOD_NS * self.tick_periods()
+        A::Firmware::CONTROL_PERIOD_NS * self.tick_periods()[1]
     }
 
     /// The period that ends at `at`, and the tick there; of a coupled machine the tick, and the period that begins.
@@ -70,14 +70,23 @@ impl<A: Assembly> Machine<A> {
         }
         let ran = self.life == Life::Running;
         self.step_long();
-        let periods = self.tick_periods();
+        let [first, periods] = self.tick_periods();
         self.period_ns = A::Firmware::CONTROL_PERIOD_NS * if ran { periods } else { 1 };
         self.run_firmware(at);
         if !ran && self.life == Life::Running {
-            self.period_ns = A::Firmware::CONTROL_PERIOD_NS * (periods - 1).max(1);
+            self.period_ns = A::Firmware::CONTROL_PERIOD_NS * (first - 1).max(1);
         }
         if self.life != Life::Running {
             self.period_ns = A::Firmware::CONTROL_PERIOD_NS;
+        }
+    }
+
+    /// The firmware has been started from outside, before its next tick: supervises when it would.
+    pub(super) fn wait_for_first_tick(&mut self) {
+        if self.fidelity == Fidelity::Mechanical && self.life == Life::Running && !self.coupled {
+            let wait_ns = A::Firmware::CONTROL_PERIOD_NS * (self.tick_periods()[0] - 1);
+            self.next_tick = self.next_tick.plus_nanos(wait_ns);
+            self.period_ns += wait_ns;
         }
     }
 

@@ -116,7 +116,13 @@ impl<A: Assembly> Machine<A> {
             Power::On if self.life != Life::Dead && self.supply != Supply::On => {
                 self.supply = Supply::Cycling(now.plus_nanos(DRAIN_PATIENCE_NS));
             }
-            Power::On => self.switch_on(now),
+            Power::On => {
+                let ran = self.life == Life::Running;
+                self.switch_on(now);
+                if !ran {
+                    self.wait_for_first_tick();
+                }
+            }
             Power::Off => {
                 self.supply = Supply::Off;
                 let (rig, model) = self.assembly.rig_and_model_mut();
