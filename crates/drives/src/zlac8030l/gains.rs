@@ -24,13 +24,12 @@ use motion::foc::FocGains;
 use motion::pid::PiGains;
 
 use super::Values;
-use super::assumptions::CONTROL_PERIOD_S;
+use super::assumptions::{CONTROL_PERIOD_S, MECHANICAL_SUPERVISIONS, SUPERVISION_PERIOD_S};
 use super::objects::{
     CURRENT_KI, CURRENT_KP, FEEDFORWARD_SMOOTHING, POSITION_KF, POSITION_KP, TORQUE_SMOOTHING, VELOCITY_KF,
     VELOCITY_KI, VELOCITY_KP, VELOCITY_OBSERVER_1, VELOCITY_OBSERVER_2, VELOCITY_OBSERVER_3, VELOCITY_OBSERVER_4,
     VELOCITY_SMOOTHING,
 };
-use super::parameters::supervision_period_s;
 use crate::Fidelity;
 use crate::engine::actuator::observer::TrackingGains;
 use crate::engine::actuator::servo::ServoGains;
@@ -55,6 +54,11 @@ const TRACKING_SHARE: f32 = 1e-3;
 
 /// Share of the bus voltage that the power stage can give; the rest is dead time.
 const MODULATION_LIMIT: f32 = 0.98;
+
+/// From one supervision to the next, s.
+pub(super) fn supervision_period_s(fidelity: Fidelity) -> f32 {
+    SUPERVISION_PERIOD_S * fidelity.tick(1.0, f32::from(MECHANICAL_SUPERVISIONS))
+}
 
 /// The gains that the objects hold; `velocity_limit_rad_s` is what the position loop may ask for.
 pub(super) fn gains(values: &Values, velocity_limit_rad_s: f32, fidelity: Fidelity) -> ServoGains {

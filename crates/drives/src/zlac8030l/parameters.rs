@@ -8,7 +8,7 @@ use motion::observer::ObserverGains;
 
 use super::Values;
 use super::assumptions::*;
-use super::gains::gains;
+use super::gains::{gains, supervision_period_s};
 use super::objects::*;
 use super::variations::{EMERGENCY_COAST, EMERGENCY_RAMP, OVERLOAD_FROM_FACTOR, STOPPED_ENABLED};
 use crate::Fidelity;
@@ -122,11 +122,6 @@ fn emergency_stop(variant: &Variant) -> StopRamp {
     } else {
         StopRamp::CurrentLimit
     }
-}
-
-/// From one supervision to the next, s.
-pub(super) fn supervision_period_s(fidelity: Fidelity) -> f32 {
-    SUPERVISION_PERIOD_S * fidelity.tick(1.0, f32::from(MECHANICAL_SUPERVISIONS))
 }
 
 fn servo_model(values: &Values, counts_per_turn: u32, fidelity: Fidelity) -> ServoModel {
