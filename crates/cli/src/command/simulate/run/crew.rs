@@ -52,21 +52,20 @@ impl Crew {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let jobs = self.jobs.unwrap_or(cores).min(usize::try_from(count).unwrap_or(usize::MAX));
         let next = AtomicU64::new(0);
-        let taken = (Mutex::new(0), Condvar::new());
+        let taken = Taken::default();
         let (results, incoming) = mpsc::channel();
         std::thread::scope(|scope| {
             for _ in 0..jobs {
                 let results = results.clone();
                 let (next, taken, work) = (&next, &taken, &work);
                 scope.spawn(move || {
+                    let _releases = taken.on_panic();
                     while !self.stop.load(Ordering::Acquire) {
                         let number = next.fetch_add(1, Ordering::Relaxed);
                         if number >= count {
                             return;
                         }
-                        // The thread with the first piece that is not done does not wait here.
-                        let first = taken.0.lock().unwrap_or_else(PoisonError::into_inner);
-                        drop(taken.1.wait_while(first, |first| number >= *first + AHEAD));
+                        taken.wait_for(number.saturating_sub(AHEAD - 1));
                         if results.send((number, work(number))).is_err() {
                             return;
                         }
@@ -82,10 +81,57 @@ impl Crew {
                     take(first, result);
                     first += 1;
                 }
-                *taken.0.lock().unwrap_or_else(PoisonError::into_inner) = first;
-                taken.1.notify_all();
+                taken.show(first);
             }
         });
+    }
+}
+
+/// How many results have been taken. Threads that are not far ahead look at it without a lock, which would have them wait for the one
+/// thread that takes results.
+#[derive(Default)]
+struct Taken {
+    count: AtomicU64,
+    waiting: AtomicU64,
+    lock: Mutex<()>,
+    more: Condvar,
+}
+
+impl Taken {
+    /// Returns when so many have been taken; the thread with the first piece that is not done never waits.
+    fn wait_for(&self, wanted: u64) {
+        if self.count.load(Ordering::SeqCst) >= wanted {
+            return;
+        }
+        self.waiting.fetch_add(1, Ordering::SeqCst);
+        let lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
+        drop(self.more.wait_while(lock, |()| self.count.load(Ordering::SeqCst) < wanted));
+        self.waiting.fetch_sub(1, Ordering::SeqCst);
+    }
+
+    /// While this lives, a panic of its thread has no other one wait for a result that never comes.
+    fn on_panic(&self) -> OnPanic<'_> {
+        OnPanic(self)
+    }
+
+    /// So many have been taken. Either it sees who waits, or they see the count: both are in one order (SeqCst).
+    fn show(&self, count: u64) {
+        self.count.fetch_max(count, Ordering::SeqCst);
+        if self.waiting.load(Ordering::SeqCst) > 0 {
+            drop(self.lock.lock().unwrap_or_else(PoisonError::into_inner));
+            self.more.notify_all();
+        }
+    }
+}
+
+/// See [`Taken::on_panic`].
+struct OnPanic<'a>(&'a Taken);
+
+impl Drop for OnPanic<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.show(u64::MAX);
+        }
     }
 }
 
@@ -113,6 +159,12 @@ mod tests {
         let mut seen = Vec::new();
         crew(3).work(count, piece, |number, result| seen.push((number, result)));
         assert_eq!(seen, (0..count).map(|number| (number, number)).collect::<Vec<_>>());
+    }
+
+    #[test]
+    #[should_panic(expected = "a scoped thread panicked")]
+    fn a_piece_that_panics_ends_the_work_and_does_not_hang_it() {
+        crew(3).work(3 * AHEAD, |number| assert_ne!(number, 0, "the first piece panics"), |_, ()| {});
     }
 
     #[test]
