@@ -9,6 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use scenario::sweep;
+use scenario::sweep::results::{self, RunResult};
 use scenario::{Outcome, Runner, Scenario};
 use words::document::BadFile;
 use words::document::reader::Parameters;
@@ -25,7 +26,8 @@ type Setting = (String, String);
 #[pyfunction]
 pub(crate) fn run_scenario(py: Python<'_>, path: PathBuf, seed: Option<u64>, set: Vec<Setting>) -> PyResult<String> {
     let scenario = read(&path, set)?;
-    let outcome = made(py, || Runner::new(&scenario, seed).map_err(|bad| bad.named(path.display().to_string())))?;
+    let begin = || Runner::new(&scenario, seed).map_err(|bad| bad.named(path.display().to_string()));
+    let outcome = made(py, begin)?.map_err(bad_value)?;
     serde_json::to_string(&outcome.to_json()).map_err(bad_value)
 }
 
@@ -70,16 +72,36 @@ impl Sweep {
     /// Makes the run of this number; returns what `ferrodrive run --json` prints.
     fn run(&self, py: Python<'_>, number: u64) -> PyResult<String> {
         self.check(number)?;
-        if let Some(known) = self.alike.of(&self.sweep, number) {
-            return serde_json::to_string(&known.to_json()).map_err(bad_value);
-        }
-        let outcome = made(py, || self.sweep.runner(number))?;
-        self.alike.keep(&self.sweep, number, &outcome);
+        let outcome = self.made(py, number)?.map_err(bad_value)?;
         serde_json::to_string(&outcome.to_json()).map_err(bad_value)
+    }
+
+    /// The first line of a file of results.
+    fn head(&self) -> String {
+        results::head(&self.sweep, self.sweep.shard())
+    }
+
+    /// Makes the run of this number; returns its line in a file of results.
+    fn line(&self, py: Python<'_>, number: u64) -> PyResult<String> {
+        self.check(number)?;
+        let outcome = self.made(py, number)?;
+        Ok(RunResult::new(&self.sweep, number, &outcome).to_line())
     }
 }
 
 impl Sweep {
+    /// The outcome of a run, or why it cannot be made; it is not repeated where nothing in it is random.
+    fn made(&self, py: Python<'_>, number: u64) -> PyResult<Result<Outcome, BadFile>> {
+        if let Some(known) = self.alike.of(&self.sweep, number) {
+            return Ok(Ok(known));
+        }
+        let outcome = made(py, || self.sweep.runner(number))?;
+        if let Ok(outcome) = &outcome {
+            self.alike.keep(&self.sweep, number, outcome);
+        }
+        Ok(outcome)
+    }
+
     fn check(&self, number: u64) -> PyResult<()> {
         if number < self.sweep.runs() {
             return Ok(());
@@ -119,6 +141,15 @@ impl Summary {
         Ok(())
     }
 
+    /// Adds what came of a run, by its line in a file of results.
+    fn add_line(&self, line: &str) -> PyResult<()> {
+        let sweep = self.sweep.get();
+        let result: RunResult = serde_json::from_str(line).map_err(bad_value)?;
+        sweep.check(result.run)?;
+        self.summary.lock().unwrap_or_else(PoisonError::into_inner).add(&sweep.sweep, &result);
+        Ok(())
+    }
+
     /// What `ferrodrive run --seeds --json` prints of these runs.
     fn report(&self) -> PyResult<String> {
         let sweep = self.sweep.get();
@@ -137,10 +168,17 @@ fn read(path: &Path, set: Vec<Setting>) -> PyResult<Scenario> {
     scenario.with(&values).map_err(|bad| bad_value(bad.named(path.display().to_string())))
 }
 
-/// Goes through a run while other threads of Python go on; a signal whose handler raises (Ctrl-C) ends it.
-fn made(py: Python<'_>, begin: impl Fn() -> Result<Runner, BadFile> + Send + Sync) -> PyResult<Outcome> {
+/// Goes through a run while other threads of Python go on; a signal whose handler raises (Ctrl-C) ends it. The inner error is that
+/// it cannot begin.
+fn made(
+    py: Python<'_>,
+    begin: impl Fn() -> Result<Runner, BadFile> + Send + Sync,
+) -> PyResult<Result<Outcome, BadFile>> {
     py.detach(|| {
-        let mut runner = begin().map_err(bad_value)?;
+        let mut runner = match begin() {
+            Ok(runner) => runner,
+            Err(bad) => return Ok(Err(bad)),
+        };
         let mut steps = 0u32;
         while runner.step() {
             steps = steps.wrapping_add(1);
@@ -148,6 +186,6 @@ fn made(py: Python<'_>, begin: impl Fn() -> Result<Runner, BadFile> + Send + Syn
                 Python::attach(|py| py.check_signals())?;
             }
         }
-        Ok(runner.conclude())
+        Ok(Ok(runner.conclude()))
     })
 }

@@ -36,7 +36,7 @@ SECTIONS = {
         "AsyncParameters",
         "check",
     ],
-    "Scenarios": ["run", "Outcome", "Row", "Sweep", "SweepSummary"],
+    "Scenarios": ["run", "Outcome", "Row", "Sweep", "SweepSummary", "sweep_table"],
     "A served simulator": ["Simulator", "Control"],
     "What goes wrong": [
         "FerrodriveError",

@@ -5,6 +5,7 @@ import math
 import os
 import pathlib
 import pickle
+import runpy
 import signal
 import subprocess
 import sys
@@ -199,15 +200,137 @@ def test_a_summary_counts_a_run_that_could_not_be_made_as_failed(one_fails):
     assert "--set speed=fast" in report["worst"][0]["again"]
 
 
+#: Each seed is another run, half of which fail.
+RANDOM = """
+end = '400ms'
+machine = { drive = [{ model = 'zlac8030l', node = 4 }] }
+[parameters]
+volts = 24
+name = 'supply'
+[sweep]
+volts = [20, 24]
+name = ['supply', 'nothing']
+[[step]]
+at = '0s'
+do = ['bus corrupt 0.2', '4 {name} {volts}']
+[[expect]]
+at = '300ms'
+that = '4 supply > 22'
+[figures]
+volts = 'last 4 supply'
+rotor = 'last 4 rotor_position'
+"""
+
+
+@pytest.fixture
+def random(tmp_path):
+    path = tmp_path / "random.toml"
+    path.write_text(RANDOM)
+    return path
+
+
+def test_the_lines_of_a_sweep_are_the_file_of_the_command_line_and_of_its_shards(random, tmp_path):
+    words = [random, "--seeds", "1..10"]
+    one, whole = tmp_path / "one.jsonl", tmp_path / "whole.jsonl"
+    printed = of_command_line(*words, "-o", one)
+    shards = [tmp_path / f"part-{shard}.jsonl" for shard in (1, 2)]
+    processes = [
+        subprocess.Popen([program(), "run", *words, "--shard", f"{shard}/2", "-o", path], stdout=subprocess.DEVNULL)
+        for shard, path in enumerate(shards, 1)
+    ]
+    assert [process.wait(timeout=300) for process in processes] == [1, 1]
+    assert of_command_line(*words, "--merge", *shards, "-o", whole) == printed
+    assert whole.read_bytes() == one.read_bytes()
+    sweep = ferrodrive.Sweep(random, range(1, 11))
+    summary = sweep.summary()
+    lines = [sweep.line(number) for number in range(len(sweep))]
+    assert (sweep.head() + "".join(lines)).encode() == one.read_bytes()
+    for line in reversed(lines):
+        summary.add_line(line)
+    del printed["error"]
+    assert rounded(summary.report()) == rounded(printed)
+    with pytest.raises(ValueError, match="EOF|expected"):
+        summary.add_line(lines[0][:20])
+    with pytest.raises(IndexError):
+        ferrodrive.Sweep(random).summary().add_line(lines[-1])
+
+
+def test_results_are_a_table_of_arrow_with_the_types_of_the_head(random, tmp_path):
+    pyarrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed here")
+    path = tmp_path / "results.jsonl"
+    last = 2**64 - 1
+    sweep = ferrodrive.Sweep(random, range(last - 1, last + 1))
+    text = sweep.head() + "".join(sweep.line(number) for number in range(len(sweep)))
+    path.write_text(text)
+    table = ferrodrive.sweep_table(path)
+    kinds = {
+        "run": pyarrow.uint64(),
+        "seed": pyarrow.uint64(),
+        "values.name": pyarrow.string(),
+        "values.volts": pyarrow.float64(),
+        "passed": pyarrow.bool_(),
+        "end_s": pyarrow.float64(),
+        "figures.rotor": pyarrow.float64(),
+        "figures.volts": pyarrow.float64(),
+        "digest": pyarrow.string(),
+        "asked": pyarrow.string(),
+        "seen": pyarrow.string(),
+    }
+    assert dict(zip(table.schema.names, table.schema.types)) == kinds
+    assert table["run"].to_pylist() == list(range(8))
+    assert table["seed"].to_pylist() == [last - 1, last] * 4
+    # The parameters change in the order of the alphabet, each after the seeds.
+    assert table["values.name"].to_pylist() == (["supply"] * 2 + ["nothing"] * 2) * 2
+    assert table["values.volts"].to_pylist() == [20.0] * 4 + [24.0] * 4
+    assert table["passed"].to_pylist() == [False] * 4 + [True] * 2 + [False] * 2
+    assert table["figures.rotor"].null_count == 8, "this drive measures its rotor: there is no other position of it"
+    assert table["digest"].null_count == table["end_s"].null_count == 4, "'nothing' is not something that a drive has"
+    assert table["asked"].to_pylist()[4] is None and table["asked"].to_pylist()[0] == "4 supply > 22"
+    assert [f"{sweep.run(4).digest:016x}"] == table["digest"].to_pylist()[4:5]
+    # As a process leaves it that is killed: within a line, behind the head.
+    path.write_text(text[:-20])
+    assert ferrodrive.sweep_table(path).num_rows == 7
+    path.write_text(sweep.head())
+    empty = ferrodrive.sweep_table(path)
+    assert empty.num_rows == 0 and empty.schema == table.schema
+    for other in ("", "[]\n", "notes\n", "{}\n"):
+        path.write_text(other)
+        with pytest.raises(ValueError, match="results.jsonl, line 1: not the head"):
+            ferrodrive.sweep_table(path)
+    with pytest.raises(FileNotFoundError):
+        ferrodrive.sweep_table(tmp_path / "absent.jsonl")
+
+
 @pytest.mark.parametrize("engine", ["processes", "ray"])
-def test_the_example_makes_the_sweep_of_the_command_line_with_its_workers(engine):
+def test_the_example_makes_the_sweep_of_the_command_line_with_its_workers(engine, random, tmp_path):
     if engine == "ray":
         pytest.importorskip("ray", reason="ray is not installed here")
-    words = [STEP_LOSS, "--seeds", "1..20"]
-    command = [sys.executable, EXAMPLES / "ray_sweep.py", *words, "--workers", "2", "--engine", engine]
+    words = [random, "--seeds", "1..100"]
+    one, results = tmp_path / "one.jsonl", tmp_path / "results.jsonl"
+    command = [sys.executable, EXAMPLES / "ray_sweep.py", *words, "--workers", "2", "--engine", engine, "-o", results]
     quiet = {**os.environ, "RAY_USAGE_STATS_ENABLED": "0"}
     made = subprocess.run(command, capture_output=True, text=True, timeout=300, env=quiet)
-    assert made.returncode == 0, made.stderr
+    assert made.returncode == 1, made.stderr
     report = json.loads(made.stdout.splitlines()[-1])
-    assert rounded(report) == rounded(of_command_line(*words))
-    assert report["runs"] == report["passed"] == 60
+    printed = of_command_line(*words, "-o", one)
+    del printed["error"]
+    assert rounded(report) == rounded(printed)
+    assert (report["runs"], report["passed"]) == (400, 100)
+    assert results.read_bytes() == one.read_bytes()
+
+
+def test_the_tasks_of_the_example_have_a_quarter_of_a_second_of_work_each():
+    example = runpy.run_path(str(EXAMPLES / "ray_sweep.py"))
+    tasks = example["Tasks"](100_000, 7, 0.01)
+    given = iter(tasks)
+    assert next(given) == range(7, 32)
+    tasks.took(25, 0.05)  # 2 ms a run: together 6 ms
+    assert next(given) == range(32, 32 + 42)
+    for _ in range(60):
+        tasks.took(1, 0.0)
+    assert len(next(given)) == example["MOST_RUNS"]
+    for _ in range(60):
+        tasks.took(1, 90.0)
+    assert len(next(given)) == 1
+    numbers = [number for task in example["Tasks"](1000, 3, 0.013) for number in task]
+    assert numbers == list(range(3, 1000))

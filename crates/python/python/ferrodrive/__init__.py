@@ -43,7 +43,7 @@ from .drive import AsyncDrive, Drive
 from .external import ExternalShaft, Worlds
 from .master import Network, check
 from .parameters import AsyncParameters, Parameters
-from .scenario import Outcome, Row, Sweep, SweepSummary, run
+from .scenario import Outcome, Row, Sweep, SweepSummary, run, sweep_table
 from .simulator import Simulator
 from .supervisor import AsyncSupervisor, Supervisor
 from .virtual_drive import VirtualDrive
@@ -91,5 +91,6 @@ __all__ = [
     "models",
     "run",
     "stimulus_forms",
+    "sweep_table",
     "virtual_time",
 ]

@@ -15,6 +15,9 @@ from .words import setting
 #: The value of a parameter: a number, or a text as the file would have it.
 Value = Union[int, float, str]
 
+#: A line of a file of results is at most so long, in bytes.
+LONGEST_LINE = 1 << 20
+
 
 @dataclass(frozen=True)
 class Row:
@@ -161,6 +164,25 @@ class Sweep:
         """
         return outcome(self._native.run(number))
 
+    def head(self) -> str:
+        """First line of a file of results, with its line end: which sweep it is of, and its columns with their Arrow types.
+
+        >>> sweep.head().startswith("{")
+        True
+        """
+        return self._native.head()
+
+    def line(self, number: int) -> str:
+        """Makes the run of this number; returns its line in a file of results, with its line end. Behind :meth:`head` and in the
+        order of their numbers the lines are what ``ferrodrive run --seeds -o results.jsonl`` writes. Values that make no sense together
+        raise nothing: this run has failed.
+
+        >>> import json
+        >>> json.loads(sweep.line(1))["seed"]
+        2
+        """
+        return self._native.line(number)
+
     def summary(self) -> SweepSummary:
         """A summary to which no run has been added.
 
@@ -195,6 +217,14 @@ class SweepSummary:
         else:
             self._native.add(number, [], ("the machine and the scenario", str(came)))
 
+    def add_line(self, line: str) -> None:
+        """Adds what came of a run, by its line of :meth:`Sweep.line` or of a file of results.
+
+        >>> summary = sweep.summary()
+        >>> summary.add_line(sweep.line(0))
+        """
+        self._native.add_line(line)
+
     def report(self) -> dict[str, Any]:
         """What ``ferrodrive run --seeds --json`` prints: ``runs``, ``passed``, ``failed``, ``complete``; of each figure ``min``,
         ``median``, ``max`` and the points with the least and the most; the first failed runs with the command that repeats each;
@@ -205,6 +235,51 @@ class SweepSummary:
         """
         report: dict[str, Any] = json.loads(self._native.report())
         return report
+
+
+def sweep_table(path: Union[str, os.PathLike[str]]) -> Any:
+    """The results of a sweep as a table of Arrow, a row for each run; needs the package ``pyarrow``.
+
+    :param path: a file that ``ferrodrive run --seeds -o results.jsonl`` has written
+
+    Columns: ``run`` and ``seed`` (``uint64``), ``values.NAME`` for each parameter that is swept (``double`` where all of its values
+    are numbers, else ``string``), ``passed`` (``bool``), ``end_s`` (``double``, virtual time), ``figures.NAME`` (``double``, in the
+    units of the scenario), ``digest``, ``asked`` and ``seen`` (``string``). What a run does not have is null: a figure with nothing to
+    measure, what failed in a run that passed. A file that is not one of results raises :class:`ValueError`.
+
+    >>> with open("results.jsonl", "w") as file:
+    ...     _ = file.write(sweep.head() + sweep.line(0) + sweep.line(1))
+    >>> ferrodrive.sweep_table("results.jsonl")["seed"].to_pylist()
+    [1, 2]
+    """
+    import pyarrow  # type: ignore[import-untyped, import-not-found, unused-ignore]
+    import pyarrow.json  # type: ignore[import-untyped, import-not-found, unused-ignore]
+
+    with open(path, "rb") as file:
+        try:
+            columns = json.loads(file.readline())["columns"]
+        except (ValueError, KeyError, TypeError) as error:
+            wanted = "expected that of what `ferrodrive run --seeds -o NAME.jsonl` writes"
+            raise ValueError(f"{os.fspath(path)}, line 1: not the head of a file of results; {wanted}") from error
+        lines = file.read()
+    # What a process that was killed left of a line is not a result.
+    lines = lines[: lines.rfind(b"\n") + 1]
+    kinds = [(name, pyarrow.type_for_alias(kind)) for name, kind in columns]
+    if not lines:
+        return pyarrow.schema(kinds).empty_table()
+    shape: dict[str, Any] = {}
+    for name, kind in kinds:
+        group, dot, member = name.partition(".")
+        if dot:
+            shape.setdefault(group, []).append((member, kind))
+        else:
+            shape[group] = kind
+    fields = [(name, pyarrow.struct(kind) if isinstance(kind, list) else kind) for name, kind in shape.items()]
+    # Without these types a figure that no run has would be of none, and a seed of 64 bits would not fit.
+    parse = pyarrow.json.ParseOptions(explicit_schema=pyarrow.schema(fields), unexpected_field_behavior="ignore")
+    read = pyarrow.json.ReadOptions(block_size=max(LONGEST_LINE, min(len(lines), 64 * LONGEST_LINE)))
+    table = pyarrow.json.read_json(pyarrow.BufferReader(lines), read_options=read, parse_options=parse)
+    return table.flatten().select([name for name, _ in columns])
 
 
 def outcome(text: str) -> Outcome:
