@@ -41,9 +41,8 @@ use serving::ServeOptions;
     ferrodrive run examples/scenarios/*.toml --junit result.xml\n  \
     ferrodrive run scenario.toml --serve socketcand://127.0.0.1:29536\n  \
     ferrodrive run scenario.toml --seed 7 --set torque=1.5 --junit result.xml\n  \
-    ferrodrive run scenario.toml --seeds 1..1000 --jobs 4\n  \
-    ferrodrive run scenario.toml --seeds 1..100000 --shard 3/8 -o part-3.jsonl --resume\n  \
-    ferrodrive run scenario.toml --seeds 1..100000 --merge part-*.jsonl -o results.jsonl")]
+    ferrodrive run wheel.toml --seeds 1..9999 --shard 3/8 -o part-3.jsonl --resume\n  \
+    ferrodrive run wheel.toml --seeds 1..9999 --merge part-*.jsonl -o all.jsonl")]
 pub(crate) struct Run {
     /// Scenario files
     #[arg(value_name = "FILE.toml", required = true)]
@@ -64,7 +63,7 @@ pub(crate) struct Run {
     /// Make a part of the runs: the I-th of N. Each meets each value, and --merge puts them together
     #[arg(long, value_name = "I/N", requires = "seeds", hide_short_help = true)]
     shard: Option<Shard>,
-    /// Also write the result of each run to this file, a line of JSON each, in the order of the runs (docs/scenarios.md)
+    /// Also write the result of each run to this file, a line of JSON each
     #[arg(long = "output", short = 'o', alias = "out", value_name = "NAME.jsonl", requires = "seeds", value_parser = results_path)]
     output: Option<PathBuf>,
     /// Go on with the runs after those whose results are in the output file, if it is there
@@ -73,7 +72,7 @@ pub(crate) struct Run {
     /// Put the results of all shards together instead of making runs: their summary, and with -o one file of them
     #[arg(long, value_name = "PART.jsonl", num_args = 1.., requires = "seeds", conflicts_with_all = ["shard", "resume", "jobs"], hide_short_help = true)]
     merge: Vec<PathBuf>,
-    /// Number of runs at once, of a sweep or of several files (default: one for each core)
+    /// Number of runs at once (default: one for each core)
     #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=1024_u16))]
     jobs: Option<u16>,
     /// Threads that compute the drives of one run; the result is the same on any number of them (default: 1)
