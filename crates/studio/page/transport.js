@@ -17,10 +17,11 @@ function overSocket(heard, closed) {
 }
 
 let worker = null;
-/** Why the last worker has ended. */
-let ended = null;
 let asked = 0;
 const answers = new Map();
+/** The views make requests before the page connects. */
+let begun;
+const beginning = new Promise((resolve) => (begun = resolve));
 
 /** The machine lives as long as its worker: a connection that is opened again is a new session with it. */
 function inWorker(heard, closed) {
@@ -28,7 +29,8 @@ function inWorker(heard, closed) {
   const mine = worker;
   const lose = (why) => {
     if (worker !== mine) return;
-    [worker, ended] = [null, why];
+    worker = null;
+    dispatchEvent(new CustomEvent("machine-ended", { detail: why }));
     mine.terminate();
     for (const { reject } of answers.values()) reject(new Error(why));
     answers.clear();
@@ -36,17 +38,18 @@ function inWorker(heard, closed) {
   };
   mine.onmessage = ({ data }) => {
     if (data.text !== undefined) heard(data.text);
-    else if (data.ended !== undefined) lose(data.ended);
-    else {
+    else if (data.ended !== undefined) {
+      // Not again and again: the next one is the first one.
+      if (data.refused) sessionStorage.removeItem("machine");
+      lose(data.refused ? `The machine was refused. ${data.ended}` : `The virtual machine has ended, and begins anew: ${data.ended}`);
+    } else {
       answers.get(data.answer)?.resolve(new Response(data.body, { status: data.status, headers: { "content-type": data.kind } }));
       answers.delete(data.answer);
     }
   };
   mine.onerror = (event) => lose(event.message ?? "it cannot be loaded");
   mine.postMessage({ open: true, ...machine() });
-  const text = ended && `The virtual machine has ended: ${ended}. It begins anew`;
-  ended = null;
-  if (text) setTimeout(() => heard(JSON.stringify({ type: "news", time_s: null, node: null, text })));
+  begun();
   return { isOpen: () => worker === mine, send: (text) => mine.postMessage({ say: text }), close: () => {} };
 }
 
@@ -57,8 +60,9 @@ function machine() {
 }
 
 /** A request to the host: `fetch` with a path. */
-function requestWorker(path, { body = null } = {}) {
-  if (!worker) return Promise.reject(new Error("the worker has ended"));
+async function requestWorker(path, { body = null } = {}) {
+  await beginning;
+  if (!worker) throw new Error("the worker has ended");
   asked += 1;
   const answer = asked;
   worker.postMessage({ request: answer, path, body });
