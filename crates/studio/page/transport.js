@@ -1,4 +1,4 @@
-// How the page reaches its host: over a WebSocket and requests to the studio that serves it, or, where the page says so, through a
+// How the page reaches its host: over a WebSocket and requests to the studio that serves it, or, where the page names one, through a
 // worker of its own that holds virtual drives. Messages and requests are the same.
 
 /** The worker of a page without a server. */
