@@ -33,6 +33,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("host", &["can", "canopen", "cia402", "devices", "eds", "machine", "master", "plot", "sim", "words"]),
     ("serve", &["can", "canlog", "host", "master", "recording", "scenario", "sim", "transport", "words"]),
     ("studio", &["can", "canlog", "canopen", "host", "machine", "master", "recording", "words"]),
+    ("web", &["can", "canopen", "host", "machine", "master", "scenario", "sim", "words"]),
     (
         "python",
         &[
