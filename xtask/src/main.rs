@@ -25,6 +25,7 @@ mod python;
 mod say;
 mod since;
 mod steps;
+mod sysroot;
 mod table;
 mod tally;
 mod test;
