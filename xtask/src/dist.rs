@@ -287,12 +287,12 @@ fn wheel_works(wheel: &Path, unpacked: &Path, empty: &Path) -> Result<(), String
     process::output(Command::new(tools.join("ferrodrive")).current_dir(empty).arg("--version")).map(|_| ())
 }
 
-fn copy(from: &Path, to: &Path) -> Result<(), String> {
+pub(crate) fn copy(from: &Path, to: &Path) -> Result<(), String> {
     make_parent(to)?;
     fs::copy(from, to).map(|_| ()).map_err(|error| format!("{} to {}: {error}", from.display(), to.display()))
 }
 
-fn write(path: &Path, text: &str) -> Result<(), String> {
+pub(crate) fn write(path: &Path, text: &str) -> Result<(), String> {
     make_parent(path)?;
     fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))
 }

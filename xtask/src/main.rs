@@ -33,6 +33,7 @@ mod test_programs;
 mod tidy;
 mod times;
 mod vcan;
+mod web;
 mod wheel;
 mod workspace;
 
@@ -51,6 +52,7 @@ The project's own chores.
   cargo xtask tidy               the style that a program can check
   cargo xtask defects [--only NUMBER]..    do the tests notice what is wrong: defects put into a copy of the tree, one at a time
   cargo xtask wheel              the Python package, in dist/: the library, the binary, the interface for python-can
+  cargo xtask web [-o FOLDER]    the studio with virtual drives in it, as static files; and the JavaScript package
   cargo xtask dist               what is released, in dist/: an archive of the program, the wheel, checksums
   cargo xtask pgo                the binary to release, optimised by what a training run does
   cargo xtask bench [--compare COMMIT] [ROW..]    what frames, control periods and cycles cost, in instructions; paired with a commit
@@ -68,6 +70,7 @@ fn main() -> ExitCode {
         ["tidy"] => tidy::command(),
         ["defects", rest @ ..] => defects::command(rest),
         ["dist"] => dist::command(),
+        ["web", rest @ ..] => web::command(rest),
         ["wheel"] => wheel::command(),
         ["pgo"] => pgo::command(),
         ["bench-peers"] => bench_peers::command(),

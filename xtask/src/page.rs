@@ -15,10 +15,14 @@ pub(crate) fn step() -> Tally {
     if let Err(reason) = debian::install(PROGRAMS) {
         return Tally::skipped(reason);
     }
+    tests(Command::new("node").current_dir(workspace::root().join("crates/studio")), "page_tests/")
+}
+
+/// Runs the tests of a folder by `node`, one file after the other.
+pub(crate) fn tests(node: &mut Command, folder: &str) -> Tally {
     let mut tally = Tally::default();
-    let mut node = Command::new("node");
-    node.current_dir(workspace::root().join("crates/studio")).args(["--test", "--test-reporter=tap", "page_tests/"]);
-    let ended = process::run(&mut node, |line| match line.split_once("ok ") {
+    node.args(["--test", "--test-concurrency=1", "--test-reporter=tap", folder]);
+    let ended = process::run(node, |line| match line.split_once("ok ") {
         Some(("", _)) => tally.passed += 1,
         Some(("not ", name)) => {
             tally.failed += 1;

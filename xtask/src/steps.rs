@@ -7,7 +7,7 @@ use crate::say::say;
 use crate::tally::Tally;
 use crate::test_programs::{self, How, REAL_TIME, SCHEMA_AND_BROWSER};
 use crate::{
-    bare_metal, browser, dist, examples, libtest, packages, page, peers, process, program, python, tidy, vcan, wheel,
+    bare_metal, browser, dist, examples, libtest, packages, page, peers, process, program, python, tidy, vcan, web, wheel,
     workspace,
 };
 
@@ -30,6 +30,8 @@ pub(crate) enum When {
     Busy,
     /// and, beside them, two at a time, steps that mostly wait for time to pass, for a browser, for a virtual machine; the longest first.
     Waiting,
+    /// Only where it is named: it would make everybody's list longer by minutes, and is about few files.
+    Named,
 }
 
 pub(crate) const STEPS: &[Step] = &[
@@ -111,6 +113,12 @@ pub(crate) const STEPS: &[Step] = &[
         does: "JSON of every command, and control connections, by their schemas",
         when: When::Waiting,
         run: schema,
+    },
+    Step {
+        name: "web",
+        does: "the page without a server: runs equal to the native ones, in node and a browser; its compiler takes three minutes",
+        when: When::Named,
+        run: web::step,
     },
 ];
 

@@ -1,0 +1,123 @@
+// The machine of a page without a server: chosen from a list, from a file or by a link, and scenarios to play.
+
+import { choice } from "./page/choice.js";
+import { h } from "./page/dom.js";
+
+const given = JSON.parse(document.getElementById("given").textContent);
+const LARGEST_FILE = 2 ** 20;
+
+/** This tab has this machine from now on. */
+function begin(machine, files = {}) {
+  sessionStorage.setItem("machine", JSON.stringify({ machine, files }));
+  location.reload();
+}
+
+/** The machine of this tab. */
+function present() {
+  const kept = sessionStorage.getItem("machine");
+  return kept ? JSON.parse(kept) : { machine: document.getElementById("machine").textContent, files: {} };
+}
+
+const status = h("span", { role: "status", id: "machine-status" });
+const say = (text, kind = "quiet") => {
+  status.className = kind;
+  status.replaceChildren(text);
+};
+addEventListener("machine-ended", ({ detail }) => say(detail, "bad"));
+
+const list = choice("machine-choice", "Machine", [], { onchange: () => pick(list.value) });
+list.offer([
+  { value: "", text: "Machine …" },
+  ...given.machines.map(({ title }, at) => ({ value: `machine ${at}`, text: title })),
+  ...given.scenarios.map(({ title }, at) => ({ value: `scenario ${at}`, text: `Scenario: ${title}` })),
+]);
+
+function pick(value) {
+  const [kind, at] = value.split(" ");
+  if (kind === "machine") begin(given.machines[at].text);
+  else if (kind === "scenario") play(given.scenarios[at]);
+}
+
+/** Runs a scenario in a worker of its own, faster than the clock, and shows what it found. */
+function play({ title, text }) {
+  say(`${title} …`);
+  const worker = new Worker("scenario.js", { type: "module" });
+  worker.onmessage = ({ data }) => {
+    worker.terminate();
+    say("");
+    show(title, data);
+  };
+  worker.onerror = (event) => say(`${title}: ${event.message ?? "it cannot be run"}`);
+  worker.postMessage({ scenario: text });
+}
+
+function show(title, { outcome, error }) {
+  const rows = (outcome?.rows ?? []).map((row) =>
+    h("tr", { class: row.verdict === "passed" ? "" : "bad" }, ...[row.t === null ? "–" : `${row.t.toFixed(3)} s`, row.kind, row.name, row.asked, row.seen, row.verdict].map((cell) => h("td", {}, cell))),
+  );
+  const heads = h("tr", {}, ...["Time", "What", "Name", "Asked", "Seen", "Verdict"].map((head) => h("th", {}, head)));
+  const found = outcome
+    ? h("p", {}, `${outcome.ok ? "As expected" : "NOT as expected"}: ${outcome.end_s.toFixed(3)} s of virtual time, seed ${outcome.seed}, digest ${outcome.digest}`)
+    : h("p", { class: "bad" }, error);
+  const dialog = h("dialog", { id: "scenario" }, h("button", { type: "button", onclick: () => dialog.remove() }, "Close"), h("h2", {}, title), found, h("table", {}, h("thead", {}, heads), h("tbody", {}, ...rows)));
+  document.getElementById("scenario")?.remove();
+  document.body.append(dialog);
+  dialog.show();
+}
+
+/** The address with this machine. Data sheets are not in it. */
+async function copyLink() {
+  const { machine, files } = present();
+  const url = new URL(location.href);
+  url.hash = `machine=${encodeURIComponent(machine)}`;
+  if (Object.keys(files).length) return say("A machine with data sheets is too large for a link: hand on its files");
+  try {
+    await navigator.clipboard.writeText(url.href);
+    say("The link is copied: it holds the machine");
+  } catch {
+    location.hash = url.hash;
+    say("The address holds the machine now");
+  }
+}
+
+/** Machine files, scenarios and data sheets that are dropped or chosen. */
+async function take(files) {
+  const sheets = {};
+  for (const file of files) {
+    if (file.size > LARGEST_FILE) return say(`${file.name} has ${file.size} bytes; at most ${LARGEST_FILE} are read`, "bad");
+    if (/\.(eds|dcf)$/i.test(file.name)) sheets[file.name] = await file.text();
+    else if (/\.toml$/i.test(file.name)) {
+      const text = await file.text();
+      if (/^\s*\[machine\]/m.test(text)) return play({ title: file.name, text });
+      return begin(text, { ...present().files, ...sheets });
+    } else return say(`${file.name}: expected a machine file or scenario (.toml), or a data sheet (.eds, .dcf)`, "bad");
+  }
+  // A device joins the machine at the next free node-ID.
+  const { machine, files: kept } = present();
+  const taken = [...machine.matchAll(/^\s*node\s*=\s*(\d+)/gm)].map(([, node]) => Number(node));
+  let text = machine;
+  for (const name of Object.keys(sheets)) {
+    const node = Array.from({ length: 127 }, (_, at) => at + 1).find((free) => !taken.includes(free));
+    taken.push(node);
+    text += `\n[[drive]]\nmodel = ${JSON.stringify(name)}\nnode = ${node}\n`;
+  }
+  begin(text, { ...kept, ...sheets });
+}
+
+const input = h("input", { type: "file", id: "machine-file", multiple: true, accept: ".toml,.eds,.dcf", hidden: true, onchange: () => take(input.files) });
+addEventListener("dragover", (event) => event.preventDefault());
+addEventListener("drop", (event) => {
+  event.preventDefault();
+  take(event.dataTransfer.files);
+});
+
+document.getElementById("top").append(
+  list,
+  input,
+  h("button", { type: "button", id: "machine-open", title: "Open a machine file, a scenario, or a data sheet, which joins the machine; or drop it on the page", onclick: () => input.click() }, "File …"),
+  h("button", { type: "button", id: "machine-link", title: "Copy a link to this machine", onclick: copyLink }, "Link"),
+  status,
+);
+
+// Offline once loaded, where the page has come over https or from this machine.
+navigator.serviceWorker?.register("offline.js").catch(() => {});

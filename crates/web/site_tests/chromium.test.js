@@ -1,0 +1,176 @@
+// The page in headless Chromium, from a folder below a static host's root: the same runs, a motion, and a page without a network.
+
+import assert from "node:assert/strict";
+import { execFileSync, spawn } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { createServer } from "node:http";
+import { tmpdir } from "node:os";
+import { extname, join, normalize } from "node:path";
+import { after, before, test } from "node:test";
+
+const { SITE, FERRODRIVE, SCENARIOS, PICTURES } = process.env;
+const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm", ".tgz": "application/gzip" };
+/** A loaded machine is slow; what hangs is ended. */
+const PATIENCE_MS = 120_000;
+
+let server, driver, session, profile, address;
+const asked = [];
+
+function serve() {
+  server = createServer((request, answer) => {
+    const path = new URL(request.url, "http://host").pathname;
+    asked.push(path);
+    const name = normalize(path.replace(/^\/try\//, "")) || "index.html";
+    try {
+      const content = readFileSync(join(SITE, name === "." ? "index.html" : name));
+      answer.writeHead(200, { "content-type": TYPES[extname(name)] ?? "text/html" }).end(content);
+    } catch {
+      answer.writeHead(404).end();
+    }
+  });
+  return new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+}
+
+async function webdriver(method, path, body) {
+  const answer = await fetch(`${driver.address}/session${path}`, { method, body: body && JSON.stringify(body) });
+  const { value } = await answer.json();
+  if (value?.error) throw new Error(`${value.error}: ${value.message}`);
+  return value;
+}
+
+const run = (script, ...args) => webdriver("POST", `/${session}/execute/async`, { script: `const done = arguments[arguments.length - 1]; (async () => { ${script} })().then(done, (error) => done({ failed: String(error) }));`, args });
+
+async function until(what, script, ...args) {
+  const end = performance.now() + PATIENCE_MS;
+  for (;;) {
+    const value = await run(script, ...args);
+    if (value && !value.failed) return value;
+    if (performance.now() > end) {
+      await picture("failed");
+      throw new Error(`${what}: ${JSON.stringify(value)}; the page: ${await run("return document.body.innerText.slice(0, 2000)")}`);
+    }
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+}
+
+async function picture(name) {
+  if (PICTURES) writeFileSync(join(PICTURES, `web_${name}.png`), Buffer.from(await webdriver("GET", `/${session}/screenshot`), "base64"));
+}
+
+before(async () => {
+  await serve();
+  address = `http://127.0.0.1:${server.address().port}/try/`;
+  profile = mkdtempSync(join(tmpdir(), "ferrodrive-web-"));
+  const child = spawn("chromedriver", ["--port=0"], { stdio: ["ignore", "pipe", "ignore"] });
+  const port = await new Promise((resolve, reject) => {
+    child.stdout.on("data", (said) => {
+      const found = /successfully on port (\d+)/.exec(String(said));
+      if (found) resolve(found[1]);
+    });
+    child.on("error", reject);
+  });
+  driver = { child, address: `http://127.0.0.1:${port}` };
+  const args = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking", "--no-first-run", "--window-size=1280,900", `--user-data-dir=${profile}`];
+  const made = await fetch(`${driver.address}/session`, { method: "POST", body: JSON.stringify({ capabilities: { alwaysMatch: { "goog:chromeOptions": { args }, timeouts: { script: PATIENCE_MS } } } }) });
+  session = (await made.json()).value.sessionId;
+});
+
+after(async () => {
+  if (session) await webdriver("DELETE", `/${session}`).catch(() => {});
+  driver?.child.kill();
+  server?.close();
+  server?.closeAllConnections();
+  if (profile) rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
+});
+
+test("the page finds its drives and turns one of them, and stops it", async () => {
+  await webdriver("POST", `/${session}/url`, { url: address });
+  await until("four drives", "return document.querySelectorAll('#view table tbody tr').length >= 4");
+  await picture("bus");
+  const { first_motion_ms } = await until(
+    "the wheel turns",
+    `const { ask, link } = await import(new URL("page/link.js", location.href));
+     if (!link.fresh) return null;
+     window.turning ??= (async () => {
+       const taken = await ask({ do: "take_control" });
+       const turned = await ask({ do: "velocity", node: 4, rpm: 60 });
+       return { taken, turned };
+     })();
+     const { taken, turned } = await window.turning;
+     if (!taken.ok || !turned.ok) { window.turning = null; return { failed: JSON.stringify({ taken, turned }) }; }
+     const drive = link.state.nodes.find(({ node }) => node === 4).drive;
+     return Math.abs(drive.velocity_rpm - 60) < 5 ? { first_motion_ms: performance.now() } : null;`,
+  );
+  console.log(`# turning ${Math.round(first_motion_ms)} ms after the page was asked for`);
+  await run("location.hash = 'scope'; return true");
+  await new Promise((resolve) => setTimeout(resolve, 1500));
+  await picture("scope");
+  await run("document.getElementById('stop').dispatchEvent(new PointerEvent('pointerdown')); return true");
+  await until(
+    "the wheel stands",
+    `const { link } = await import(new URL("page/link.js", location.href));
+     const { drive, doing } = link.state.nodes.find(({ node }) => node === 4);
+     return Math.abs(drive.velocity_rpm) < 1 && !doing && drive.state !== "Operation enabled"`,
+  );
+});
+
+test("the views get what they request", async () => {
+  await run("location.hash = 'trace'; return true");
+  await until("lines of the trace", "return [...document.querySelectorAll('.trace-list .trace-row')].some((row) => /6041h/.test(row.innerText))");
+  await picture("trace");
+  await run("location.hash = 'drive'; return true");
+  await until("the state machine", "return document.querySelectorAll('#view svg.machine .state').length === 8");
+  await run("location.hash = 'world'; return true");
+  await until("the world", "return /48\\.0 V/.test(document.querySelector('#view .world')?.innerText ?? '')");
+  await picture("world");
+});
+
+test("a scenario in the browser is the same run as the native one", async () => {
+  const path = join(SCENARIOS, "brown_out.toml");
+  const native = JSON.parse(execFileSync(FERRODRIVE, ["run", "--json", path], { encoding: "utf8" }));
+  // The page itself may not compile: its policy leaves that to workers.
+  const here = await run(
+    `return new Promise((resolve) => {
+       const worker = new Worker("scenario.js", { type: "module" });
+       worker.onmessage = ({ data }) => resolve(data);
+       worker.onerror = (event) => resolve({ error: event.message });
+       worker.postMessage({ scenario: ${JSON.stringify(readFileSync(path, "utf8"))} });
+     })`,
+  );
+  assert.equal(here.error, undefined);
+  assert.equal(here.outcome.digest, native.digest);
+});
+
+test("a scenario of the list is played, and its rows are shown", async () => {
+  await run("document.querySelector('#machine-choice button').click(); return true");
+  await until("the list", "const at = [...document.querySelectorAll('#machine-choice li')].find((one) => /Brown-out/.test(one.innerText)); at?.click(); return at !== undefined");
+  const text = await until("the outcome", "return document.getElementById('scenario')?.innerText");
+  await picture("scenario");
+  assert.match(text, /As expected: .* digest [0-9a-f]{16}/);
+  assert.match(text, /603F/);
+  await run("document.querySelector('#scenario button').click(); return true");
+});
+
+test("a machine that is refused says why, and the first one stands in for it", async () => {
+  await webdriver("POST", `/${session}/url`, { url: `${address}?refused#machine=${encodeURIComponent("[[drive]]\nmodel = 'zlac9'\nnode = 4\n")}` });
+  await until("why", "return /refused.*line 2.*zlac9/s.test(document.getElementById('machine-status').innerText)");
+  await until("four drives", "return document.querySelectorAll('#view table tbody tr').length >= 4");
+  await picture("refused");
+});
+
+test("a link holds a machine, which its server never sees", async () => {
+  const machine = '[[drive]]\nmodel = "zlim42c"\nnode = 77\n';
+  await webdriver("POST", `/${session}/url`, { url: `${address}?again#machine=${encodeURIComponent(machine)}` });
+  await until("node 77 alone", "return document.querySelectorAll('#view table tbody tr').length === 1 && /77/.test(document.querySelector('#view table tbody').innerText)");
+  assert.equal(asked.some((path) => path.includes("zlim")), false);
+  await run("sessionStorage.clear(); return true");
+});
+
+test("once loaded the page works without a network, and has asked for nothing but its own files", async () => {
+  await until("the service worker", "return (await navigator.serviceWorker.ready) && navigator.serviceWorker.controller !== null");
+  assert.deepEqual(asked.filter((path) => !path.startsWith("/try/") && path !== "/favicon.ico"), []);
+  server.close();
+  server.closeAllConnections();
+  await webdriver("POST", `/${session}/url`, { url: address });
+  await until("four drives, offline", "return document.querySelectorAll('#view table tbody tr').length >= 4");
+});
