@@ -47,6 +47,14 @@ impl Column {
         body.kind.signals().into_iter().map(column).collect()
     }
 
+    /// How many binary digits after the point an MCAP file and those who watch get of it; `None`: all of them. Of a simulated
+    /// value, the last of 53 digits say nothing of a drive.
+    pub(super) fn kept_bits(&self) -> Option<u8> {
+        let is_simulated =
+            matches!(self.subject, Subject::Body(_)) || Signal::ALL.iter().any(|it| it.name() == self.signal);
+        KEPT_BITS.iter().find(|(unit, _)| is_simulated && *unit == self.unit).map(|(_, bits)| *bits)
+    }
+
     /// Its name in a file, `4.velocity_rpm`, and back: see [`FromStr`].
     pub fn name(&self) -> String {
         format!("{}.{}", self.subject, self.signal)
@@ -134,6 +142,22 @@ fn unit_of(signal: &str) -> &'static str {
     ];
     ENDINGS.iter().find(|(ending, _)| signal.ends_with(ending)).map_or("", |(_, unit)| unit)
 }
+
+/// What is kept of a simulated value, by its unit: steps of 2 thousandths of 1 r/min, 1 mA, 8 mV, 16 mK, 8 urad, 0.5 mN·m, 8 mJ, 1 um.
+const KEPT_BITS: [(&str, u8); 12] = [
+    ("r/min", 9),
+    ("A", 10),
+    ("V", 7),
+    ("°C", 6),
+    ("rad", 17),
+    ("rad/s", 10),
+    ("°", 12),
+    ("°/s", 6),
+    ("N·m", 11),
+    ("J", 7),
+    ("m", 20),
+    ("m/s", 14),
+];
 
 /// Every signal of these axes.
 pub fn columns_of_drives(places: impl IntoIterator<Item = Place>) -> Vec<Column> {

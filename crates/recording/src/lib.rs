@@ -4,14 +4,16 @@
 //! whose end is missing. Two kinds of file:
 //!
 //! - MCAP (<https://mcap.dev/spec>), which Foxglove, PlotJuggler and Rerun open: a topic for each axis (`/node/4`,
-//!   `/node/5/2`) and body (`/body/base`) with JSON messages and a JSON schema that gives the units, `/can` with the
-//!   frames and `/events` with what happened, as log lines.
+//!   `/node/5/2`) and body (`/body/base`), whose schema gives the units, `/can` with the frames and `/events` with what
+//!   happened, as log lines. [`Channels`] has them, for the file and for those who watch a run.
 //! - CSV: `t_s`, a column for each signal (`4.velocity_rpm`), and `mark`, what happened since the line before. It has no
 //!   frames.
 //!
 //! Times are seconds, in MCAP nanoseconds, from the start of the world or of the connection.
 
 mod capture;
+mod cdr;
+mod channels;
 mod column;
 mod convert;
 mod csv;
@@ -25,10 +27,11 @@ mod record;
 mod trail;
 
 pub use capture::{Capture, Trace};
+pub use channels::{Channel, Channels, MESSAGE_ENCODING, SCHEMA_ENCODING, Sink};
 pub use column::{Column, Subject, columns_of_drives, select};
 pub use convert::mcap_of_csv;
 pub use picture::picture;
-pub use piece::{Kind, Mark, Recorded, Series, Severity, Target};
+pub use piece::{Batch, Entry, Kind, Mark, Recorded, Series, Severity, Target};
 pub use read::read;
 pub use record::Record;
 pub use trail::Trail;

@@ -3,10 +3,10 @@
 //! What is held while a file is written does not grow with it: a chunk is compressed and written whole, and the index of all chunks,
 //! which stands at the end of the file, is made from what the file then holds.
 
-use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom, Write as _};
+use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
 
-use lz4_flex::frame::{BlockSize, FrameEncoder, FrameInfo};
+use zstd::bulk::Compressor;
 
 use super::piece::Target;
 
@@ -14,8 +14,10 @@ use super::piece::Target;
 const CHUNK: usize = 256 << 10;
 /// Bytes of the index that are made before they are written.
 const INDEX_PIECE: usize = 64 << 10;
-/// How the specification names the frame format of LZ4.
-pub(super) const LZ4: &str = "lz4";
+/// How the specification names Zstandard (RFC 8878).
+pub(super) const ZSTD: &str = "zstd";
+/// The level that makes the smallest records of all below 10: rows of numbers repeat at one distance, which it finds at once.
+const LEVEL: i32 = 1;
 
 /// Kinds of record.
 mod op {
@@ -54,6 +56,7 @@ pub(super) struct McapWriter {
     message_count: u64,
     /// Times of all messages, ns.
     span: Option<(u64, u64)>,
+    compressor: Compressor<'static>,
     /// What is put together before it is written.
     out: Vec<u8>,
     /// The target refused a write: how much of it is in the file is unknown.
@@ -86,6 +89,7 @@ impl McapWriter {
             chunk_count: 0,
             message_count: 0,
             span: None,
+            compressor: Compressor::new(LEVEL)?,
             out: Vec::new(),
             failed: false,
             ended: false,
@@ -255,20 +259,16 @@ impl McapWriter {
         }
         self.chunk_count += 1;
         let chunk = &self.chunk;
-        let mut packed = Ok(());
+        let packed = self.compressor.compress(chunk)?;
         record(&mut self.out, op::CHUNK, |body| {
             body.extend(first.to_le_bytes());
             body.extend(last.to_le_bytes());
             body.extend((chunk.len() as u64).to_le_bytes());
             body.extend(crc32fast::hash(chunk).to_le_bytes());
-            put_text(body, LZ4);
-            let length_at = body.len();
-            body.extend([0; 8]);
-            packed = pack(chunk, body);
-            let length = (body.len() - length_at - 8) as u64;
-            body[length_at..length_at + 8].copy_from_slice(&length.to_le_bytes());
+            put_text(body, ZSTD);
+            body.extend((packed.len() as u64).to_le_bytes());
+            body.extend_from_slice(&packed);
         });
-        packed?;
         for (id, count) in (1_u16..).zip(&mut self.counts).filter(|(_, count)| !count.in_chunk.is_empty()) {
             record(&mut self.out, op::MESSAGE_INDEX, |body| {
                 body.extend(id.to_le_bytes());
@@ -324,20 +324,11 @@ fn put_length(out: &mut Vec<u8>, length: usize) {
     out.extend((length as u32).to_le_bytes());
 }
 
-/// Appends `plain` as an LZ4 frame.
-fn pack(plain: &[u8], out: &mut Vec<u8>) -> io::Result<()> {
-    // Blocks as large as what is written at once.
-    let mut encoder = FrameEncoder::with_frame_info(FrameInfo::new().block_size(BlockSize::Auto), out);
-    encoder.write_all(plain)?;
-    encoder.finish().map_err(io::Error::other)?;
-    Ok(())
-}
-
 /// Appends the index of the chunk that begins at `at`, where `file` stands, and returns where the next begins.
 fn index_chunk(file: &mut BufReader<impl Read + Seek>, at: u64, data_until: u64, out: &mut Vec<u8>) -> io::Result<u64> {
     let changed = || io::Error::new(io::ErrorKind::InvalidData, "another program has changed the file");
     // Kind and length of the record, then times, uncompressed size, check sum, name of the compression and its size.
-    let head: [u8; 9 + 24 + 4 + 4 + LZ4.len() + 8] = take(file)?;
+    let head: [u8; 9 + 24 + 4 + 4 + ZSTD.len() + 8] = take(file)?;
     let number = |from: usize| u64_at(&head, from);
     let (length, packed) = (number(1), number(head.len() - 8));
     let after = |at: u64, length: u64| at.checked_add(length)?.checked_add(9).filter(|end| *end <= data_until);
@@ -365,7 +356,7 @@ fn index_chunk(file: &mut BufReader<impl Read + Seek>, at: u64, data_until: u64,
             body.extend(place.to_le_bytes());
         }
         body.extend((end - after_chunk).to_le_bytes());
-        put_text(body, LZ4);
+        put_text(body, ZSTD);
         body.extend(packed.to_le_bytes());
         body.extend(number(25).to_le_bytes());
     });
@@ -397,8 +388,19 @@ mod tests {
         /// Bytes that are held for what was written and what was not.
         fn held(&self) -> usize {
             // Each part by name: one that is added is thought of here.
-            let Self { schemas, channels, counts, chunk, out, target: _, place: _, check_sum: _, data_from: _, .. } =
-                self;
+            let Self {
+                schemas,
+                channels,
+                counts,
+                chunk,
+                out,
+                compressor: _,
+                target: _,
+                place: _,
+                check_sum: _,
+                data_from: _,
+                ..
+            } = self;
             let Self { schema_count: _, chunk_count: _, message_count: _, span: _, chunk_span: _, failed: _, .. } =
                 self;
             let index: usize = counts.iter().map(|count| count.in_chunk.capacity() * size_of::<(u64, u64)>()).sum();
@@ -433,12 +435,12 @@ mod tests {
 
     /// Unpacks for the reader of others, which is given no more than a chunk at a time.
     #[derive(Default)]
-    struct Lz4 {
+    struct Unpack {
         packed: Vec<u8>,
         plain: Option<(Vec<u8>, usize)>,
     }
 
-    impl Decompressor for Lz4 {
+    impl Decompressor for Unpack {
         fn next_read_size(&self) -> usize {
             0
         }
@@ -448,9 +450,7 @@ mod tests {
             if self.plain.is_none() {
                 self.packed.extend_from_slice(src);
                 consumed = src.len();
-                let mut plain = Vec::new();
-                let whole = lz4_flex::frame::FrameDecoder::new(&*self.packed).read_to_end(&mut plain);
-                self.plain = whole.ok().map(|_| (plain, 0));
+                self.plain = zstd::decode_all(&*self.packed).ok().map(|plain| (plain, 0));
             }
             let Some((plain, at)) = &mut self.plain else { return Ok(DecompressResult { consumed, wrote: 0 }) };
             let wrote = dst.len().min(plain.len() - *at);
@@ -465,7 +465,7 @@ mod tests {
         }
 
         fn name(&self) -> &'static str {
-            LZ4
+            ZSTD
         }
     }
 
@@ -476,7 +476,7 @@ mod tests {
             .with_validate_data_section_crc(true)
             .with_validate_summary_section_crc(true);
         let mut reader = LinearReader::new_with_options(options);
-        reader.add_decompressor(Lz4::default()).unwrap();
+        reader.add_decompressor(Unpack::default()).unwrap();
         let (mut found, mut rest) = (Vec::new(), bytes);
         while let Some(event) = reader.next_event() {
             match event.unwrap() {
@@ -527,7 +527,7 @@ mod tests {
         assert_eq!(summary.chunk_indexes.len(), 3000);
         for (number, chunk) in (0_u64..).zip(&summary.chunk_indexes) {
             assert_eq!((chunk.message_start_time, chunk.message_end_time), (number * 100, number * 100 + 50));
-            assert_eq!((bytes[chunk.chunk_start_offset as usize], chunk.compression.as_str()), (op::CHUNK, LZ4));
+            assert_eq!((bytes[chunk.chunk_start_offset as usize], chunk.compression.as_str()), (op::CHUNK, ZSTD));
             let indexes = summary.read_message_indexes(&bytes, chunk).unwrap();
             let times = |topic: &str| -> Vec<u64> {
                 let of_it = indexes.iter().find(|(channel, _)| channel.topic == topic).expect("an index");

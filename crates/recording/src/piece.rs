@@ -3,8 +3,9 @@
 use std::borrow::Cow;
 use std::io::{Read, Seek, Write};
 
-use can::Instant;
+use can::{Frame, Instant};
 use sim::events::{Event, EventKind};
+use sim::recorder::Recorder;
 use sim::wire::ErrorState;
 
 use super::column::{Column, Subject};
@@ -81,6 +82,66 @@ impl From<&Event> for Mark {
         };
         let (kind, text) = (event.kind.name().into(), event.kind.to_string());
         Self { at: event.at, of: of.into(), kind, severity, text }
+    }
+}
+
+/// What a record is given at one time.
+#[derive(Clone, Copy, Debug)]
+pub enum Entry<'a> {
+    /// The values of all columns, in their order; not a number where there is none.
+    Row(Instant, &'a [f64]),
+    /// A frame that the bus carried, with the time of its last bit.
+    Frame(Instant, &'a Frame),
+    /// Something that happened.
+    Mark(&'a Mark),
+}
+
+/// What happened since the batch before, each kind in the order of its times.
+#[derive(Clone, Debug, Default)]
+pub struct Batch {
+    /// Samples of a world.
+    pub recorded: Option<Recorder>,
+    /// Samples of anything else: the values of all columns.
+    pub rows: Vec<(Instant, Vec<f64>)>,
+    /// What the bus carried.
+    pub frames: Vec<(Instant, Frame)>,
+    /// What happened.
+    pub marks: Vec<Mark>,
+}
+
+impl Batch {
+    /// Of a world.
+    pub fn of_world(recorded: Option<Recorder>, frames: Vec<(Instant, Frame)>, events: &[Event]) -> Self {
+        // A frame's event has the frame's time, which may be before that of an event that was found first.
+        let mut marks: Vec<Mark> = events.iter().map(Mark::from).collect();
+        marks.sort_by_key(|mark| mark.at);
+        Self { recorded, rows: Vec::new(), frames, marks }
+    }
+
+    /// How many rows it has.
+    pub fn samples(&self) -> usize {
+        self.rows.len() + self.recorded.as_ref().map_or(0, |recorded| recorded.times().len())
+    }
+
+    /// Gives all of it in the order of the times: of one time the frames first, the row last.
+    ///
+    /// # Errors
+    /// What `take` says.
+    pub fn give<E>(&self, mut take: impl FnMut(Entry<'_>) -> Result<(), E>) -> Result<(), E> {
+        let mut frames = self.frames.iter().peekable();
+        let mut marks = self.marks.iter().peekable();
+        let rows = self.rows.iter().map(|(at, values)| (*at, values.as_slice()));
+        for (at, values) in self.recorded.iter().flat_map(Recorder::rows).chain(rows) {
+            while let Some((ended, frame)) = frames.next_if(|(ended, _)| *ended <= at) {
+                take(Entry::Frame(*ended, frame))?;
+            }
+            while let Some(mark) = marks.next_if(|mark| mark.at <= at) {
+                take(Entry::Mark(mark))?;
+            }
+            take(Entry::Row(at, values))?;
+        }
+        frames.try_for_each(|(ended, frame)| take(Entry::Frame(*ended, frame)))?;
+        marks.try_for_each(|mark| take(Entry::Mark(mark)))
     }
 }
 

@@ -7,7 +7,7 @@ use can::{Frame, Instant};
 use super::column::Column;
 use super::csv::Csv;
 use super::mcap_file::Mcap;
-use super::piece::{Kind, Mark, Target};
+use super::piece::{Entry, Kind, Mark, Target};
 
 /// A file that is being written.
 ///
@@ -35,37 +35,35 @@ impl Record {
         Ok(Self { writer })
     }
 
-    /// The values of all columns at `at`, in their order; one that is not a number is left out.
+    /// Takes an entry. In MCAP a subject of which no value of a row is a number has no message; CSV has no place for frames.
+    ///
+    /// # Errors
+    /// What the target says.
+    pub fn put(&mut self, entry: Entry<'_>) -> io::Result<()> {
+        match &mut self.writer {
+            Writer::Mcap(file) => file.put(entry),
+            Writer::Csv(file) => match entry {
+                Entry::Row(at, values) => file.row(at, values),
+                Entry::Frame(..) => Ok(()),
+                Entry::Mark(mark) => file.mark(mark),
+            },
+        }
+    }
+
+    /// The values of all columns at `at`.
     ///
     /// # Errors
     /// What the target says.
     pub fn row(&mut self, at: Instant, values: &[f64]) -> io::Result<()> {
-        match &mut self.writer {
-            Writer::Mcap(file) => file.row(at, values),
-            Writer::Csv(file) => file.row(at, values),
-        }
+        self.put(Entry::Row(at, values))
     }
 
-    /// As [`row`](Self::row), but in MCAP a subject of which no value is a number has no message.
-    ///
-    /// # Errors
-    /// What the target says.
-    pub fn sparse_row(&mut self, at: Instant, values: &[f64]) -> io::Result<()> {
-        match &mut self.writer {
-            Writer::Mcap(file) => file.sparse_row(at, values),
-            Writer::Csv(file) => file.row(at, values),
-        }
-    }
-
-    /// A frame that the bus carried, with the time of its last bit; CSV has no place for it.
+    /// A frame that the bus carried.
     ///
     /// # Errors
     /// What the target says.
     pub fn frame(&mut self, at: Instant, frame: &Frame) -> io::Result<()> {
-        match &mut self.writer {
-            Writer::Mcap(file) => file.frame(at, frame),
-            Writer::Csv(_) => Ok(()),
-        }
+        self.put(Entry::Frame(at, frame))
     }
 
     /// Something that happened.
@@ -73,10 +71,7 @@ impl Record {
     /// # Errors
     /// What the target says.
     pub fn mark(&mut self, mark: &Mark) -> io::Result<()> {
-        match &mut self.writer {
-            Writer::Mcap(file) => file.mark(mark),
-            Writer::Csv(file) => file.mark(mark),
-        }
+        self.put(Entry::Mark(mark))
     }
 
     /// Hands everything given so far to the target. Call it once a second: so much is lost at most.

@@ -14,7 +14,8 @@ use super::control::ControlMessage;
 use super::input::next_line;
 use super::messages::Messages;
 use super::world::{Commanded, ServedWorld};
-use crate::writing::{Batch, FrameLog, RecordFile};
+use crate::writing::{FrameLog, RecordFile};
+use recording::Batch;
 use words::failure::Failure;
 
 /// How often the log is handed on, and drives are looked at that nothing has happened to.

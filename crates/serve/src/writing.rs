@@ -8,4 +8,4 @@ mod record_file;
 pub use background::{Pace, ROOM};
 pub use command_log::{CommandLog, NewLog, Writing};
 pub use frame_log::FrameLog;
-pub use record_file::{Batch, RecordFile};
+pub use record_file::RecordFile;

@@ -4,41 +4,11 @@ use std::fs::File;
 use std::io;
 use std::time::Duration;
 
-use can::{Frame, Instant};
-use recording::{Column, Kind, Mark, Record};
-use sim::events::Event;
-use sim::recorder::Recorder;
+use recording::{Batch, Column, Kind, Record};
 
 use super::background::{Background, Output, Pace, WaitingRules};
 use crate::messages::Messages;
 use words::failure::Failure;
-
-/// What happened since the batch before, each kind in the order of its times.
-#[derive(Default)]
-pub struct Batch {
-    /// Samples of a world.
-    pub recorded: Option<Recorder>,
-    /// Samples of anything else: the values of all columns.
-    pub rows: Vec<(Instant, Vec<f64>)>,
-    /// What the bus carried.
-    pub frames: Vec<(Instant, Frame)>,
-    /// What happened.
-    pub marks: Vec<Mark>,
-}
-
-impl Batch {
-    /// Of a world.
-    pub fn of_world(recorded: Option<Recorder>, frames: Vec<(Instant, Frame)>, events: &[Event]) -> Self {
-        // A frame's event has the frame's time, which may be before that of an event that was found first.
-        let mut marks: Vec<Mark> = events.iter().map(Mark::from).collect();
-        marks.sort_by_key(|mark| mark.at);
-        Self { recorded, rows: Vec::new(), frames, marks }
-    }
-
-    fn samples(&self) -> usize {
-        self.rows.len() + self.recorded.as_ref().map_or(0, |recorded| recorded.times().len())
-    }
-}
 
 /// A record that a thread of its own writes.
 pub struct RecordFile(Background<Batch>);
@@ -72,26 +42,69 @@ impl Output<Batch> for Record {
     const FILE: &'static str = "the record";
     const PIECES: &'static str = "samples";
 
-    /// Writes samples, frames and marks in the order of their times, and hands them to the system.
+    /// Writes it, and hands it to the system.
     fn write(&mut self, batch: Batch) -> io::Result<()> {
-        let mut frames = batch.frames.iter().peekable();
-        let mut marks = batch.marks.iter().peekable();
-        let rows = batch.rows.iter().map(|(at, values)| (*at, values.as_slice()));
-        for (at, values) in batch.recorded.iter().flat_map(Recorder::rows).chain(rows) {
-            while let Some((ended, frame)) = frames.next_if(|(ended, _)| *ended <= at) {
-                self.frame(*ended, frame)?;
-            }
-            while let Some(mark) = marks.next_if(|mark| mark.at <= at) {
-                self.mark(mark)?;
-            }
-            self.row(at, values)?;
-        }
-        frames.try_for_each(|(ended, frame)| self.frame(*ended, frame))?;
-        marks.try_for_each(|mark| self.mark(mark))?;
+        batch.give(|entry| self.put(entry))?;
         self.flush()
     }
 
     fn end(self) -> io::Result<()> {
         self.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use recording::columns_of_drives;
+    use scenario::{Runner, Scenario};
+    use sim::Place;
+    use sim::recorder::{Channel, Recorder, Signal};
+
+    use super::*;
+
+    /// An hour of one drive that turns, all of its signals each millisecond, is to fit into 200 MB.
+    const MOST_A_SECOND: f64 = 200e6 / 3600.0;
+
+    /// Steps of the world between two batches, as `ferrodrive run` makes them.
+    const STEPS_A_BATCH: usize = 1000;
+
+    #[test]
+    fn a_second_of_a_drive_that_turns_takes_its_share_of_200_mb_an_hour() {
+        let folder = crate::scratch("record-size");
+        for realism in ["ideal", "full"] {
+            let text = format!(
+                "end = \"4s\"\n[machine]\nrealism = \"{realism}\"\ndrive = [{{ model = \"zlac8030l\", node = 4 }}]\n\
+                 [[host]]\ndo = [\"4 write 2000 0\", \"4 velocity 60rpm\"]\n"
+            );
+            let scenario = Scenario::parse(&text, Path::new("")).expect("a scenario");
+            let mut runner = Runner::new(&scenario, None).expect("a machine");
+            let place = Place::node(4);
+            let channels = Signal::ALL.map(|signal| Channel { place, signal });
+            runner.world_mut().start_recording(Recorder::new(Duration::from_millis(1), channels));
+            runner.world_mut().watch(true);
+            runner.keep();
+            let path = folder.join(format!("{realism}.mcap"));
+            let file = crate::files::create_record(&path, Kind::Mcap).expect("a file");
+            let columns = columns_of_drives([place]);
+            let messages = Messages::silent();
+            let mut record = RecordFile::start(Kind::Mcap, file, &columns, Pace::Free, messages).expect("begun");
+            let mut goes_on = true;
+            while goes_on {
+                goes_on = (0..STEPS_A_BATCH).all(|_| runner.step());
+                let kept = runner.take_kept();
+                record.write(Batch::of_world(runner.world_mut().take_recorded(), kept.frames, &kept.events));
+            }
+            record.finish(Duration::MAX).expect("whole");
+            let bytes = std::fs::read(&path).expect("it is there");
+            let recorded = recording::read(Kind::Mcap, &bytes).expect("a record");
+            let speed = recorded.series.iter().find(|series| series.column.signal == "velocity_rpm").expect("a speed");
+            let (until, last) = speed.points.last().copied().expect("samples");
+            assert!(last > 50.0 && speed.points.len() as f64 > until * 1000.0, "{last} r/min after {until} s");
+            let a_second = bytes.len() as f64 / until;
+            assert!(a_second < MOST_A_SECOND, "{realism}: {a_second:.0} bytes a second");
+        }
+        std::fs::remove_dir_all(folder).expect("it is ours");
     }
 }

@@ -13,7 +13,7 @@ use master::decode::{common_name, common_row, common_type};
 use master::pdo::TimerUnits;
 use master::units::parse_duration;
 use master::{Drive, Node};
-use recording::{Column, Kind, Mark, Severity, Subject};
+use recording::{Batch, Column, Kind, Mark, Severity, Subject};
 use serde::Serialize;
 use sim::Place;
 use words::counted;
@@ -29,7 +29,7 @@ use crate::output::Report;
 use plot::Paint;
 use serve::files::create_record;
 use serve::messages::Messages;
-use serve::writing::{Batch, Pace, RecordFile};
+use serve::writing::{Pace, RecordFile};
 
 /// Record objects of a node over time
 ///

@@ -12,6 +12,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use recording::Batch;
 use scenario::sweep::{Shard, Sweep, set_option};
 use scenario::{Kept, Outcome, Runner, Scenario};
 use sim::Fidelity;
@@ -26,7 +27,7 @@ use crate::session::exit_on_signal;
 use loaded::{Loaded, unbuildable, write};
 use report::RunReport;
 use serve::messages::Messages;
-use serve::writing::{Batch, Pace};
+use serve::writing::Pace;
 use serving::ServeOptions;
 
 /// Run scenarios in virtual time, and check what they expect
