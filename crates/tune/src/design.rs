@@ -1,0 +1,274 @@
+//! Gains from one wish, within what a drive's parameters can hold.
+//!
+//! Of all gains that keep the margins, those with the greatest integral gain are taken: they let a load push the speed away by
+//! the least (K. J. Åström, T. Hägglund, "Advanced PID Control", 2006, 6.7: integral gain maximised under a limit of the sensitivity).
+
+use std::f64::consts::{PI, TAU};
+
+use realfft::num_complex::Complex;
+
+use crate::controller::Loop;
+use crate::mechanics::Mechanics;
+
+/// Frequencies at which a loop is looked at, from a thousandth of its highest to its highest.
+const POINTS: usize = 600;
+const DECADES: f64 = 5.0;
+/// Largest sensitivity: the least distance of the loop from -1 is its inverse (same source, 4.6: 1.4 to 2).
+const SENSITIVITY: f64 = 2.0;
+/// Least factor by which the loop gain may grow.
+const GAIN_MARGIN: f64 = 2.0;
+/// Phase margin where only a bandwidth was wished for.
+const PHASE_MARGIN_DEG: f64 = 40.0;
+/// Gains that are tried: so many of each, this far below and above those of the drive.
+const STEPS: i32 = 72;
+const SPAN: f64 = 30.0;
+/// Integral times that are tried, in times of the crossover.
+const INTEGRAL_TIMES: [f64; 7] = [2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0];
+
+/// What a person asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Wish {
+    /// Where the loop gain falls to one, Hz.
+    Bandwidth(f64),
+    /// Degrees that are left at the crossover; as fast as that allows.
+    PhaseMargin(f64),
+}
+
+/// How far a loop is from being unstable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margins {
+    /// Where the loop gain falls to one for the last time, Hz.
+    pub crossover_hz: f64,
+    /// Least phase that is left where the loop gain is one.
+    pub phase_deg: f64,
+    /// Factor by which the loop gain may grow.
+    pub gain: f64,
+    /// Largest sensitivity.
+    pub sensitivity: f64,
+    /// The closed loop is stable (Nyquist).
+    pub is_stable: bool,
+}
+
+/// Gains, and what they give.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proposal {
+    /// Times what the drive has.
+    pub proportional: f64,
+    /// Times what the drive has.
+    pub integral: f64,
+    /// Time constant of the filter of the speed.
+    pub filter_s: f64,
+    /// What they give.
+    pub margins: Margins,
+    /// The wish is not granted as a whole: a margin that has to be kept ends before.
+    pub is_limited: bool,
+}
+
+/// The loop gain of a speed loop.
+fn open_loop(mechanics: &Mechanics, around: &Loop) -> impl Fn(f64) -> Complex<f64> {
+    move |omega| mechanics.response(omega) * around.controller(omega) * around.feedback(omega)
+}
+
+/// Margins of a speed loop around a shaft. `highest_hz` is where it ends: half of the rate at which it is computed.
+pub fn margins(mechanics: &Mechanics, around: &Loop, highest_hz: f64) -> Margins {
+    margins_of(open_loop(mechanics, around), highest_hz)
+}
+
+fn grid(highest_hz: f64) -> impl DoubleEndedIterator<Item = f64> {
+    (0..POINTS).map(move |n| highest_hz * 10f64.powf(DECADES * (n as f64 / (POINTS - 1) as f64 - 1.0)))
+}
+
+/// Nyquist's criterion for an open loop with one pole at zero and no unstable ones: with the frequency `1 + L` turns on by a
+/// quarter turn, from where the integrator holds it to 1. With two (an integral gain and no friction), by half a turn.
+fn margins_of(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Margins {
+    let mut margins =
+        Margins { crossover_hz: 0.0, phase_deg: 180.0, gain: f64::INFINITY, sensitivity: 0.0, is_stable: false };
+    let (mut turned, mut before): (f64, Option<Complex<f64>>) = (0.0, None);
+    let mut first = 0.0;
+    for hz in grid(highest_hz) {
+        let now = open(TAU * hz);
+        let distance = 1.0 + now;
+        margins.sensitivity = margins.sensitivity.max(1.0 / distance.norm());
+        if let Some(before) = before {
+            turned += (distance / (1.0 + before)).arg();
+            let crosses = (before.norm() - 1.0) * (now.norm() - 1.0) < 0.0;
+            if crosses {
+                margins.crossover_hz = hz;
+                let left = 180.0 - (-now).arg().abs().to_degrees();
+                margins.phase_deg = margins.phase_deg.min(180.0 - left.abs());
+            }
+            // Through the negative real axis.
+            if before.im * now.im < 0.0 && now.re < 0.0 && now.norm() < 1.0 {
+                margins.gain = margins.gain.min(1.0 / now.norm());
+            }
+        } else {
+            // Integrators turn it back by up to half a turn and more: it comes from there.
+            first = if distance.arg() > 0.0 { distance.arg() - TAU } else { distance.arg() };
+        }
+        before = Some(now);
+    }
+    // What is left to 1 beyond the last frequency is small: the loop gain is.
+    let last = first + turned;
+    margins.is_stable = last.abs() < PI / 2.0 && before.is_some_and(|now| now.norm() < 1.0);
+    margins
+}
+
+impl Margins {
+    fn keeps(&self, phase_deg: f64) -> bool {
+        self.is_stable && self.phase_deg >= phase_deg && self.gain >= GAIN_MARGIN && self.sensitivity <= SENSITIVITY
+    }
+}
+
+/// Gains for a speed loop. `filters_s` are time constants that the drive's filter of its speed can have; each factor of the gains
+/// is one that `can_hold` takes. `None` where not even the smallest gains keep the margins.
+pub fn propose(
+    mechanics: &Mechanics,
+    around: &Loop,
+    wish: Wish,
+    highest_hz: f64,
+    filters_s: &[f64],
+    can_hold: impl Fn(f64, f64) -> bool,
+) -> Option<Proposal> {
+    let phase_deg = match wish {
+        Wish::PhaseMargin(degrees) => degrees,
+        Wish::Bandwidth(_) => PHASE_MARGIN_DEG,
+    };
+    let mut best: Option<(f64, Proposal)> = None;
+    for &filter_s in filters_s {
+        for step in -STEPS..=STEPS {
+            let proportional = SPAN.powf(f64::from(step) / f64::from(STEPS));
+            let with = |integral: f64| Loop {
+                proportional: around.proportional * proportional,
+                integral,
+                filter_s,
+                ..*around
+            };
+            let crossover = margins(mechanics, &with(0.0), highest_hz).crossover_hz;
+            for time in INTEGRAL_TIMES {
+                let candidate = with(around.proportional * proportional * TAU * crossover / time);
+                let integral = candidate.integral / around.integral;
+                if crossover == 0.0 || !can_hold(proportional, integral) {
+                    continue;
+                }
+                let margins = margins(mechanics, &candidate, highest_hz);
+                if !margins.keeps(phase_deg) {
+                    continue;
+                }
+                let worth = match wish {
+                    Wish::PhaseMargin(_) => candidate.integral,
+                    // As near as can be; of the same, the stiffer one.
+                    Wish::Bandwidth(hz) => {
+                        -(margins.crossover_hz / hz).ln().abs() + 1e-3 * candidate.integral / around.integral
+                    }
+                };
+                let is_limited = match wish {
+                    Wish::PhaseMargin(_) => false,
+                    Wish::Bandwidth(hz) => (margins.crossover_hz / hz).ln().abs() > 0.1,
+                };
+                if best.as_ref().is_none_or(|(most, _)| worth > *most) {
+                    best = Some((worth, Proposal { proportional, integral, filter_s, margins, is_limited }));
+                }
+            }
+        }
+    }
+    best.map(|(_, proposal)| proposal)
+}
+
+/// The gain of a position loop (1/s) around a speed loop, so that this phase is left; and its margins. `late_s` is how late the
+/// position is seen.
+pub fn propose_position(
+    mechanics: &Mechanics,
+    around: &Loop,
+    phase_deg: f64,
+    highest_hz: f64,
+    late_s: f64,
+) -> Option<(f64, Margins)> {
+    let speed = open_loop(mechanics, around);
+    let closed = |omega: f64| {
+        let forward = mechanics.response(omega) * around.controller(omega);
+        forward / (1.0 + speed(omega))
+    };
+    let with = |gain: f64| {
+        margins_of(
+            |omega| gain / Complex::new(0.0, omega) * closed(omega) * Complex::from_polar(1.0, -omega * late_s),
+            highest_hz,
+        )
+    };
+    let gains = (0..=200).rev().map(|n| 10f64.powf(f64::from(n) / 50.0 - 1.0));
+    gains.map(|gain| (gain, with(gain))).find(|(_, margins)| margins.keeps(phase_deg))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LATE_S: f64 = 2e-3;
+
+    fn integrator(gain: f64) -> impl Fn(f64) -> Complex<f64> {
+        move |omega| gain / Complex::new(0.0, omega) * Complex::from_polar(1.0, -omega * LATE_S)
+    }
+
+    /// An integrator with a delay: the crossover is the gain, 90 degrees less the delay's are left, and it is stable up to a quarter
+    /// turn in the delay.
+    #[test]
+    fn margins_of_an_integrator_with_a_delay_are_those_of_its_closed_form() {
+        for gain in [20.0, 100.0, 300.0, 700.0, 780.0] {
+            let margins = margins_of(integrator(gain), 1000.0);
+            let left = 90.0 - (gain * LATE_S).to_degrees();
+            assert!((margins.crossover_hz * TAU / gain - 1.0).abs() < 0.02, "{margins:?}");
+            assert!((margins.phase_deg - left).abs() < 2.0, "{gain}: {margins:?}, {left}");
+            assert!((margins.gain * gain * LATE_S / (PI / 2.0) - 1.0).abs() < 0.05, "{gain}: {margins:?}");
+            assert!(margins.is_stable, "{gain}: {margins:?}");
+        }
+        for gain in [800.0, 1000.0, 3000.0] {
+            assert!(!margins_of(integrator(gain), 1000.0).is_stable, "{gain}");
+        }
+    }
+
+    /// Two integrators with less lead than lag are unstable at any gain.
+    #[test]
+    fn an_integral_time_that_is_shorter_than_the_delays_is_unstable_however_small_the_gain() {
+        let open = |omega: f64| {
+            let s = Complex::new(0.0, omega);
+            10.0 / (s * s) * (1.0 + 0.005 * s) * Complex::from_polar(1.0, -0.011 * omega)
+        };
+        assert!(!margins_of(open, 1000.0).is_stable);
+        let more_lead = |omega: f64| {
+            open(omega) * (1.0 + 0.05 * Complex::new(0.0, omega)) / (1.0 + 0.005 * Complex::new(0.0, omega))
+        };
+        assert!(margins_of(more_lead, 1000.0).is_stable);
+    }
+
+    const MECHANICS: Mechanics = Mechanics { gain: 50.0, viscous_per_s: 0.2, elastic: None, delay_s: 1e-3, off: 0.0 };
+    const AROUND: Loop =
+        Loop { proportional: 0.5, integral: 1.0, filter_s: 1e-3, asked_late_s: 1e-3, seen_late_s: 1e-3, off: 0.0 };
+
+    #[test]
+    fn a_wish_for_phase_is_kept_and_a_greater_one_makes_the_loop_slower() {
+        let of =
+            |degrees| propose(&MECHANICS, &AROUND, Wish::PhaseMargin(degrees), 1000.0, &[1e-3], |_, _| true).unwrap();
+        let (fast, slow) = (of(45.0), of(70.0));
+        assert!(fast.margins.phase_deg >= 45.0 && slow.margins.phase_deg >= 70.0, "{fast:?} {slow:?}");
+        assert!(fast.margins.crossover_hz > slow.margins.crossover_hz, "{fast:?} {slow:?}");
+    }
+
+    #[test]
+    fn a_bandwidth_is_met_or_said_to_be_limited_and_gains_that_the_drive_cannot_hold_are_not_proposed() {
+        let of = |hz, most: f64| {
+            propose(&MECHANICS, &AROUND, Wish::Bandwidth(hz), 1000.0, &[1e-3], |kp, _| kp <= most).unwrap()
+        };
+        let met = of(10.0, 100.0);
+        assert!((met.margins.crossover_hz / 10.0 - 1.0).abs() < 0.1 && !met.is_limited, "{met:?}");
+        let limited = of(400.0, 100.0);
+        assert!(limited.is_limited && limited.margins.sensitivity <= SENSITIVITY, "{limited:?}");
+        assert!(of(400.0, 1.0).proportional <= 1.0);
+    }
+
+    #[test]
+    fn a_position_loop_is_slower_than_the_speed_loop_inside() {
+        let inner = margins(&MECHANICS, &AROUND, 1000.0);
+        let (gain, outer) = propose_position(&MECHANICS, &AROUND, 60.0, 1000.0, 1e-3).unwrap();
+        assert!(outer.is_stable && outer.phase_deg >= 60.0, "{outer:?}");
+        assert!(gain < TAU * inner.crossover_hz, "{gain} {inner:?}");
+    }
+}
