@@ -112,5 +112,5 @@ pub use error::{Access, Error, Hints};
 pub use gear::{Gear, GearError};
 pub use models::Models;
 pub use network::{
-    DEFAULT_TIMEOUT, Elapsed, Exchange, Network, NextSync, NoCycle, Node, NodeView, Sleep, Wait, join_all,
+    DEFAULT_TIMEOUT, Elapsed, Exchange, FrameLog, Network, NextSync, NoCycle, Node, NodeView, Sleep, Wait, join_all,
 };

@@ -11,6 +11,7 @@ mod cycle;
 mod event;
 mod facts;
 mod field;
+mod frame_log;
 mod image;
 mod nmt;
 mod node_set;
@@ -37,6 +38,7 @@ pub use event::{Event, Silence, two_devices};
 pub use facts::{HeartbeatWatch, NodeFacts};
 pub(crate) use field::bits_of;
 pub use field::{Field, NumberForm, Sample, SetPoint, Signal};
+pub use frame_log::{FrameLogs, LoggedFrame};
 pub use image::{ProcessImage, Received, RpdoTrigger};
 pub use node_set::NodeSet;
 pub use payload::Payload;
@@ -88,6 +90,7 @@ pub struct Core {
     /// The earliest of all deadlines; heartbeats may make it too early, never too late.
     due: Instant,
     image: ProcessImage,
+    frame_logs: FrameLogs,
     sync: SyncClock,
     supervision: Supervision,
     /// Drives to stop, for the length of a call.
@@ -134,6 +137,7 @@ impl Core {
             heartbeat_check: Instant::FAR_FUTURE,
             due: Instant::FAR_FUTURE,
             image: ProcessImage::default(),
+            frame_logs: FrameLogs::default(),
             sync: SyncClock::default(),
             supervision: Supervision::default(),
             lost: Vec::new(),
@@ -243,6 +247,11 @@ impl Core {
     /// Last values of mapped objects, to change mappings and values to send.
     pub const fn image_mut(&mut self) -> &mut ProcessImage {
         &mut self.image
+    }
+
+    /// Frames that are kept one by one.
+    pub const fn frame_logs_mut(&mut self) -> &mut FrameLogs {
+        &mut self.frame_logs
     }
 
     /// The latest time that was passed to this core.
@@ -411,6 +420,7 @@ impl Station for Core {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         self.advance(now);
         let Some(id) = frame.standard_data_id() else { return };
+        self.frame_logs.note(id, frame, now);
         if let Some(node) = self.image.handle_frame(id, frame, now) {
             self.member_mut(node).facts.seen_at = Some(now);
             self.changed.insert(node);

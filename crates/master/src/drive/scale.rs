@@ -158,7 +158,10 @@ impl Drive {
     }
 
     /// Physical units in one count, by the resolution that is set on the drive.
-    pub(crate) async fn step_of(&self, quantity: Quantity) -> Result<f64, Error> {
+    ///
+    /// # Errors
+    /// [`Error::UnknownModel`]; those of the SDO reads.
+    pub async fn step_of(&self, quantity: Quantity) -> Result<f64, Error> {
         Ok(self.worth(quantity).await? / self.resolution(quantity).await?)
     }
 

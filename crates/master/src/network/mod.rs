@@ -7,6 +7,7 @@
 
 mod claim;
 mod cycle;
+mod frame_log;
 mod future;
 mod handle;
 mod join;
@@ -15,6 +16,7 @@ mod node;
 
 pub(crate) use claim::Claim;
 pub use cycle::{Exchange, NextSync, NoCycle};
+pub use frame_log::FrameLog;
 pub use future::{Elapsed, NodeView, Sleep, Wait};
 pub use handle::Network;
 pub use join::join_all;

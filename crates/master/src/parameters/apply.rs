@@ -1,5 +1,6 @@
 //! The writes themselves, each read back, and the way back.
 
+use canopen::pdo::Direction;
 use canopen::{AbortCode, Mux};
 
 use super::error::{ApplyError, PlanError, Why};
@@ -41,9 +42,30 @@ impl Drive {
     pub async fn apply_parameters(
         &self,
         plan: &Plan,
-        mut progress: impl FnMut(usize, &ParameterStep),
+        progress: impl FnMut(usize, &ParameterStep),
     ) -> Result<Result<Applied, ApplyError>, PlanError> {
         self.check_at_rest().await?;
+        self.write_steps(plan, progress).await
+    }
+
+    /// As [`apply_parameters`](Self::apply_parameters); a plan that changes TPDOs alone is written to a drive at work too: what it
+    /// sends, and when, changes nothing of what it does.
+    ///
+    /// # Errors
+    /// Those of [`apply_parameters`](Self::apply_parameters).
+    pub async fn apply_tpdos(&self, plan: &Plan) -> Result<Result<Applied, ApplyError>, PlanError> {
+        let is_tpdo = |step: &ParameterStep| pdo_of(step.object).is_some_and(|pdo| pdo.direction == Direction::Tpdo);
+        if !plan.steps.iter().all(is_tpdo) {
+            self.check_at_rest().await?;
+        }
+        self.write_steps(plan, |_, _| ()).await
+    }
+
+    async fn write_steps(
+        &self,
+        plan: &Plan,
+        mut progress: impl FnMut(usize, &ParameterStep),
+    ) -> Result<Result<Applied, ApplyError>, PlanError> {
         let mut rounded = Vec::new();
         for (position, step) in plan.steps.iter().enumerate() {
             progress(position + 1, step);
