@@ -16,6 +16,7 @@
 
 mod answer;
 pub mod around;
+pub mod capture;
 pub mod clients;
 pub mod command;
 mod commands;

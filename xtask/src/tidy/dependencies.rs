@@ -31,7 +31,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("machine", &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives", "sim", "master", "words"]),
     ("recording", &["can", "canopen", "plot", "sim", "words"]),
     ("scenario", &["can", "canopen", "cia402", "devices", "machine", "master", "sim", "words"]),
-    ("host", &["can", "canopen", "cia402", "devices", "eds", "machine", "master", "plot", "sim", "tune", "words"]),
+    ("host", &["can", "canopen", "cia402", "devices", "eds", "machine", "master", "plot", "recording", "sim", "tune", "words"]),
     ("serve", &["can", "canlog", "host", "master", "recording", "scenario", "sim", "transport", "words"]),
     ("studio", &["can", "canlog", "canopen", "host", "machine", "master", "recording", "words"]),
     ("web", &["can", "canopen", "host", "machine", "master", "scenario", "sim", "words"]),

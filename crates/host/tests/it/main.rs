@@ -1,6 +1,7 @@
 //! The control connection, a machine file made by looking at a bus, parameters that are proved; clients that share a network. One
 //! program: a file each.
 
+mod capture;
 mod clients;
 mod control;
 mod init;

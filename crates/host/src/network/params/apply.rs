@@ -217,7 +217,7 @@ fn rounded(applied: &Applied, model: Option<&'static Description>) -> Vec<Rounde
 }
 
 /// The write that was refused, and how the node stands now.
-fn refused(error: &ApplyError, model: Option<&'static Description>, path: &Path) -> Failure {
+pub(crate) fn refused(error: &ApplyError, model: Option<&'static Description>, path: &Path) -> Failure {
     let named = name(model, error.object).map(|name| format!(" {name}")).unwrap_or_default();
     let value = Shown::new(model, error.object, &error.value).text;
     let what = format!(

@@ -14,6 +14,7 @@ use master::Drive;
 use master::parameters::{Parameters, Plan, PlanOptions, from_any_state};
 use serde::Serialize;
 
+pub(crate) use apply::refused as apply_refused;
 pub use apply::{ApplyReport, Proof, Rounded, Transaction};
 pub use compare::{Deviates, DiffReport, DiffRow, VerifyReport, diff_of_files, diff_of_node, verify_node};
 pub use shown::{Shown, name};

@@ -1,0 +1,17 @@
+//! Fast capture: a drive is made to send what is asked for, what comes is kept with its times, and everything is put back.
+//!
+//! [`plan`] finds the TPDOs and what makes them come; [`Wanted::begin`] sets them up, with the way back on the disk, and [`Running`]
+//! collects until a capture is whole. [`Restorer`] leads back, whatever ends it. [`merit`] has the figures of a response.
+
+pub mod merit;
+mod plan;
+mod quantity;
+mod restorer;
+mod rows;
+mod session;
+
+pub use plan::{CapturePlan, Pace, Request, plan};
+pub use quantity::{Form, Quantity, short_names};
+pub use restorer::Restorer;
+pub use rows::Trigger;
+pub use session::{Running, Span, Taken, Wanted, Way};

@@ -1,0 +1,291 @@
+//! Fast capture of virtual drives: what is measured is what the drive has, and whatever ends it the drive is as it was.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use can::{Bitrate, Instant};
+use canopen::{Mux, NodeId};
+use host::capture::{Pace, Quantity, Restorer, Running, Span, Wanted, Way};
+use host::network::params::journal::roll_back_by;
+use master::drive::MotionOptions;
+use master::units::{Ramp, Rpm};
+use master::{Drive, Network};
+use sim::machine::{Order, order};
+use sim::stimulus::Power;
+use sim::{Place, StationId, Stimulus, World, block_on, block_on_for};
+use words::failure::Failure;
+
+const MS: Duration = Duration::from_millis(1);
+
+fn node() -> NodeId {
+    NodeId::new(4).expect("a node-ID")
+}
+
+struct Bench {
+    world: World,
+    station: StationId,
+    network: Network,
+    drive: Drive,
+}
+
+impl Bench {
+    fn new(name: &str) -> Self {
+        let mut world = World::new(Bitrate::K500, 7);
+        let network = Network::new();
+        let station = world.add_station(network.clone());
+        let model = devices::model(name).expect("a model");
+        world
+            .add_drive(4, order(model, &Order::new(model, node(), Bitrate::K500)).expect("it is built"))
+            .expect("added");
+        world.run_until(Instant::from_secs(2));
+        let drive = Drive::new(network.node(node()), model);
+        Self { world, station, network, drive }
+    }
+
+    fn run<T>(&mut self, what: impl Future<Output = T>) -> T {
+        block_on(&mut self.world, what).expect("the bus goes on")
+    }
+
+    /// Another program comes to the bus; the one before has died.
+    fn begin_anew(&mut self) {
+        self.world.remove(self.station);
+        let model = self.drive.description().expect("a model");
+        self.network = Network::new();
+        self.station = self.world.add_station(self.network.clone());
+        self.drive = Drive::new(self.network.node(node()), model);
+    }
+
+    /// Everything about the node's TPDOs, as it reads.
+    fn tpdos(&mut self) -> BTreeMap<Mux, Vec<u8>> {
+        let drive = self.drive.clone();
+        self.run(async {
+            let mut objects = BTreeMap::new();
+            let indices = (0x1800..0x1804).flat_map(|index| (1..=5).map(move |sub_index| Mux::new(index, sub_index)));
+            for object in indices.chain((0x1A00..0x1A04).flat_map(|index| (0..=8).map(move |sub| Mux::new(index, sub))))
+            {
+                if let Ok(payload) = drive.node().upload(object).await {
+                    objects.insert(object, payload.as_bytes().to_vec());
+                }
+            }
+            objects
+        })
+    }
+
+    fn wanted(&mut self, quantities: &[&str], journal: Option<PathBuf>) -> Wanted {
+        let drive = self.drive.clone();
+        let quantities = self.run(async {
+            let mut found = Vec::new();
+            for name in quantities {
+                found.push(Quantity::named(&drive, name).await.expect("the model has it"));
+            }
+            found
+        });
+        let (take, by_sdo, on_kept): (_, _, fn(&str)) = (Vec::new(), false, |_| ());
+        Wanted { quantities, period: MS, bitrate: Bitrate::K500, take, by_sdo, journal, on_kept }
+    }
+
+    fn begin(&mut self, wanted: &Wanted) -> Result<(Running, Restorer), Failure> {
+        let drive = self.drive.clone();
+        self.run(wanted.begin(&drive))
+    }
+}
+
+fn at_once(ms: u64) -> Span {
+    Span { duration: Duration::from_millis(ms), trigger: None, pre_trigger: Duration::ZERO }
+}
+
+fn scratch(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("ferrodrive-capture-{name}-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    folder.join("journal")
+}
+
+#[test]
+fn a_motion_is_captured_at_the_rate_that_was_asked_for_with_demand_and_truth() {
+    for (name, quantities) in [
+        ("zlac8030l", &["velocity", "target_velocity", "current", "position"][..]),
+        ("cia402", &["velocity", "velocity_demand", "current"]),
+    ] {
+        let mut bench = Bench::new(name);
+        let before = bench.tpdos();
+        let mut wanted = bench.wanted(quantities, None);
+        // The statuswords that a cia402 sends by itself take the rest of a bus of 500 kbit/s.
+        wanted.period = if name == "cia402" { 2 * MS } else { MS };
+        let period_s = wanted.period.as_secs_f64();
+        let (mut running, restorer) = bench.begin(&wanted).expect("it begins");
+        let drive = bench.drive.clone();
+        let ramp = Some(Ramp::Time(Duration::from_millis(200)));
+        let options = MotionOptions { acceleration: ramp, deceleration: ramp, wait: false, ..MotionOptions::default() };
+        bench.run(drive.velocity(Rpm(60.0), options)).expect("it turns");
+        let taken = bench.run(running.next(&at_once(500))).expect("it is captured");
+        assert!(taken.cut_off.is_none(), "{name}: {:?}", taken.cut_off);
+        let capture = taken.capture;
+        for trace in &capture.traces {
+            assert!((trace.period_s - period_s).abs() < 2e-5, "{name} {}: {}", trace.quantity, trace.period_s);
+            assert!(trace.jitter_s < 3e-4 && trace.gaps == 0, "{name} {}: {}", trace.quantity, trace.jitter_s);
+            assert_eq!(trace.values.iter().filter(|value| value.is_finite()).count(), capture.time_s.len(), "{name}");
+        }
+        let most = (0.5 / period_s) as usize;
+        assert!((most - 5..=most + 5).contains(&capture.time_s.len()), "{name}: {} rows", capture.time_s.len());
+        let speed = capture.trace("velocity_rpm").expect("a speed");
+        assert_eq!(speed.unit, "r/min");
+        // The last reading and the shaft itself: one count of the speed and the ripple of the shaft lie between.
+        let truth = bench.world.report(4).expect("the drive").velocity_rpm;
+        let last = speed.values.last().expect("a reading");
+        assert!((last - truth).abs() < 2.0 && (truth - 60.0).abs() < 2.0, "{name}: {last}, {truth}");
+        if name == "zlac8030l" {
+            assert_eq!(capture.trace("target_velocity").expect("a demand").values.last(), Some(&60.0));
+        }
+        assert!(capture.parameters.contains_key(&Mux::new(0x1800, 2)) && capture.model == name);
+        bench.run(drive.quick_stop()).expect("it stops");
+        drop(running);
+        assert_eq!(bench.run(restorer.restore()), Vec::<String>::new(), "{name}");
+        assert_eq!(bench.tpdos(), before, "{name}");
+        // The node is no longer operational: nothing more comes.
+        let log = bench.network.log_frames(&[0x184, 0x284, 0x384, 0x484], 100);
+        bench.world.run_for(Duration::from_millis(100));
+        let mut came = Vec::new();
+        log.take(&mut came);
+        assert!(came.is_empty(), "{name}: {came:?}");
+    }
+}
+
+#[test]
+fn a_trigger_keeps_what_was_before_it_and_is_armed_again() {
+    let mut bench = Bench::new("zlac8030l");
+    let wanted = bench.wanted(&["velocity"], None);
+    let (mut running, restorer) = bench.begin(&wanted).expect("it begins");
+    let drive = bench.drive.clone();
+    let span = Span {
+        duration: Duration::from_millis(100),
+        trigger: Some("velocity > 20".parse().expect("a trigger")),
+        pre_trigger: Duration::from_millis(50),
+    };
+    let options = MotionOptions { wait: false, ..MotionOptions::default() };
+    for turn in 0..2 {
+        bench.run(drive.velocity(Rpm(60.0), options)).expect("it turns");
+        let taken = bench.run(running.next(&span)).expect("it is captured");
+        let capture = taken.capture;
+        let at = capture.trigger_s.expect("it was triggered");
+        assert!((0.045..=0.051).contains(&at), "{turn}: {at}");
+        let points: Vec<(f64, f64)> = capture.points(&capture.traces[0]).collect();
+        assert!(points.iter().all(|(time, value)| (*value > 20.0) == (*time >= at - 1e-9)), "{turn}: {points:?}");
+        let end = points.last().expect("a reading").0;
+        assert!((at + 0.098..=at + 0.1001).contains(&end), "{turn}: {end}");
+        bench.run(drive.stop()).expect("it stops");
+    }
+    let other = Span { trigger: Some("current > 1".parse().expect("a trigger")), ..span };
+    let refused = bench.run(running.next(&other)).expect_err("it is not captured");
+    assert!(refused.to_string().contains("name one of: velocity_rpm"), "{refused}");
+    bench.run(restorer.restore());
+}
+
+/// The law: at whatever point it is ended, by whichever way back, the TPDOs read as they did before.
+#[test]
+fn whatever_point_a_capture_is_ended_at_the_tpdos_are_as_they_were() {
+    for name in ["zlac8030l", "zlim42c", "cia402"] {
+        let mut changed = 0;
+        for end_ms in [0, 3, 9, 260, 300, 335, 350, 358, 366, 374, 382, 390, 400, 420, 460, 500, 600] {
+            for killed in [false, true] {
+                let mut bench = Bench::new(name);
+                let before = bench.tpdos();
+                let path = scratch(&format!("{name}-{end_ms}-{killed}"));
+                let mut wanted = bench.wanted(&["velocity", "position"], Some(path.clone()));
+                wanted.period = 2 * MS;
+                let drive = bench.drive.clone();
+                let mut way_back = None;
+                let capturing = async {
+                    let (mut running, restorer) = wanted.begin(&drive).await?;
+                    way_back = Some(restorer);
+                    running.next(&at_once(10_000)).await
+                };
+                let end = block_on_for(&mut bench.world, Duration::from_millis(end_ms), capturing);
+                assert!(end.is_err(), "{name} {end_ms} ms: it came to its end: {:?}", end.map(|end| end.err()));
+                let at_the_end = path.exists();
+                changed += usize::from(at_the_end);
+                match way_back {
+                    // Ended: its owner leads it back.
+                    Some(restorer) if !killed => {
+                        assert_eq!(bench.run(restorer.restore()), Vec::<String>::new(), "{name} {end_ms} ms");
+                    }
+                    // Killed: another program does, by the journal.
+                    _ => {
+                        bench.begin_anew();
+                        roll_back(&mut bench, &path, (name, end_ms));
+                    }
+                }
+                assert!(!path.exists(), "{name} {end_ms} ms");
+                let now = bench.tpdos();
+                assert_eq!(now, before, "{name} {end_ms} ms, killed: {killed}");
+                let _ = std::fs::remove_dir_all(path.parent().expect("a folder"));
+            }
+        }
+        assert!(changed >= 6, "{name}: ended {changed} times while something was changed");
+    }
+}
+
+fn roll_back(bench: &mut Bench, path: &Path, what: (&str, u64)) {
+    if path.exists() {
+        let drive = bench.drive.clone();
+        bench.run(roll_back_by(path, &drive)).unwrap_or_else(|failure| panic!("{what:?}: {failure}"));
+    }
+}
+
+#[test]
+fn a_drive_that_loses_its_supply_cuts_the_capture_off_and_what_came_is_kept() {
+    let mut bench = Bench::new("zlac8030l");
+    let path = scratch("supply");
+    let wanted = bench.wanted(&["velocity"], Some(path.clone()));
+    let (mut running, restorer) = bench.begin(&wanted).expect("it begins");
+    bench.world.apply(Place::node(4), &Stimulus::Power(Power::Off)).expect("known").expect("it is done");
+    let taken = bench.run(running.next(&at_once(5000))).expect("what came is there");
+    let why = taken.cut_off.expect("it is cut off");
+    assert_eq!(why.kind, "capture_cut_off");
+    assert!(taken.capture.is_cut_off);
+    drop(running);
+    // Nobody answers: what could not be put back is said, and the journal stays.
+    assert!(!bench.run(restorer.restore()).is_empty());
+    drop(restorer);
+    assert!(path.exists());
+    bench.world.apply(Place::node(4), &Stimulus::Power(Power::On)).expect("known").expect("it is done");
+    bench.world.run_for(Duration::from_secs(2));
+    roll_back(&mut bench, &path, ("supply", 0));
+    let _ = std::fs::remove_dir_all(path.parent().expect("a folder"));
+}
+
+#[test]
+fn what_cannot_be_mapped_is_refused_or_read_by_sdo_and_changes_nothing() {
+    let mut bench = Bench::new("m4230e17b50");
+    let before = bench.tpdos();
+    let mut wanted = bench.wanted(&["velocity", "position"], None);
+    let refused = bench.begin(&wanted).expect_err("its mapping is fixed");
+    assert_eq!(refused.kind, "no_mapping");
+    assert_eq!(bench.tpdos(), before);
+    wanted.by_sdo = true;
+    let (mut running, restorer) = bench.begin(&wanted).expect("by SDO");
+    assert_eq!(running.ways(), [Way::Sdo, Way::Sdo]);
+    let taken = bench.run(running.next(&at_once(200))).expect("it is captured");
+    for trace in &taken.capture.traces {
+        // Asked for every millisecond; an SDO to this drive takes a millisecond or two.
+        assert!((1e-3..10e-3).contains(&trace.period_s), "{}: {}", trace.quantity, trace.period_s);
+    }
+    assert_eq!(bench.run(restorer.restore()), Vec::<String>::new());
+    assert_eq!(bench.tpdos(), before);
+}
+
+#[test]
+fn a_sync_that_others_send_is_followed() {
+    let mut bench = Bench::new("zlac8030l");
+    let other = Network::new();
+    bench.world.add_station(other.clone());
+    other.sync(Some(2 * MS));
+    bench.world.run_for(Duration::from_millis(20));
+    let mut wanted = bench.wanted(&["velocity"], None);
+    wanted.period = 4 * MS;
+    let (mut running, restorer) = bench.begin(&wanted).expect("it begins");
+    assert_eq!(running.plan().map(|plan| plan.pace), Some(Pace::Sync(2)));
+    let taken = bench.run(running.next(&at_once(200))).expect("it is captured");
+    assert!((taken.capture.traces[0].period_s - 4e-3).abs() < 1e-4);
+    bench.run(restorer.restore());
+}
