@@ -69,6 +69,7 @@ impl Host {
             }
             SessionCommand::LimitSpeed { rpm } => self.limit_speed(session, rpm, asked),
             SessionCommand::Scan {} => self.begin_scan(Some(asked)),
+            SessionCommand::SendFrame { frame } => self.send_frame(session, &frame, asked),
             SessionCommand::Help { node, topic, name } => {
                 self.help(node, topic, &name, asked);
             }

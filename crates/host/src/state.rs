@@ -59,6 +59,8 @@ pub struct Setting {
     pub world: Option<WorldDoor>,
     /// Health and news of the bus.
     pub wire: Wire,
+    /// Frames that a session sends as they are may set drives in motion.
+    pub allow_motion: bool,
 }
 
 /// The one task that owns the network. See the [crate](crate).

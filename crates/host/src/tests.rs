@@ -211,6 +211,7 @@ fn setting() -> Setting {
         journals: None,
         world: None,
         wire: Wire::default(),
+        allow_motion: false,
     }
 }
 

@@ -139,7 +139,7 @@ export function faultsView() {
       frames.replaceChildren(h("p", { class: "quiet" }, "There are no frames of that time, or they are no longer kept."));
       return;
     }
-    const rows = lines.map(lineRow);
+    const rows = lines.map((line) => lineRow(line));
     // The frame that reported it: the last one of the node up to then.
     const at = lines.findLastIndex((line) => line.node === entry.node && line.at_s <= entry.at_s + 1e-6);
     rows[at]?.classList.add("marked");

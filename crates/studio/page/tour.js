@@ -37,7 +37,7 @@ const STEPS = [
   { title: "PDO", view: "pdo", mark: () => (document.querySelector("#pdo-apply:not([disabled])") ? "#pdo-apply" : document.querySelector("#pdo-search") ? "#pdo-search" : "button[data-edit=TPDO1]"), text: "On the wheel (zlac8030l): change TPDO1, add an object, and apply. Before that you see what it would write and its effect on the bus.", done: (state, before) => sum(state, "mapped") > sum(before, "mapped") },
   { title: "Save", view: "parameters", mark: () => "#parameters-store", text: "Store the parameters in the drive, so that it keeps them over a restart.", done: (state, before) => sum(state, "stored") > sum(before, "stored") },
   { title: "Scenario", view: "world", mark: () => "[data-line='cable cut']", text: "Change the surroundings of the machine: cut the cable of a drive, see the effect in Bus and Faults, and undo it. ferrodrive run plays such scenarios from a file.", done: (state, before) => state.changes > before.changes },
-  { title: "Recording", view: "trace", mark: () => "#trace-save", text: "Save the frames of the bus, for ferrodrive dump and replay.", done: (state, before) => state.logs_saved > before.logs_saved },
+  { title: "Recording", view: "trace", mark: () => "#trace-save-log", text: "Save the frames of the bus, for ferrodrive dump and replay.", done: (state, before) => state.logs_saved > before.logs_saved },
 ];
 
 const read = () => {

@@ -1,11 +1,18 @@
 // The Trace view: the frames on the bus, in words. The studio keeps the frames; this page has a part of their lines,
 // requests new ones while it is in view, and older ones when the list is scrolled there.
 
+import { choice } from "./choice.js";
 import { h, number, setText, toggle } from "./dom.js";
 import { pointed } from "./help.js";
+import { linkTo, linked } from "./linked.js";
+import { identifierTable } from "./trace_identifiers.js";
+import { sendWindow } from "./trace_send.js";
+import { DELTAS, lineAt, timeOf } from "./trace_sum.js";
 import { request } from "./transport.js";
 
 const ASK_MS = 100;
+/** The table by identifier is read by eye. */
+const ASK_IDENTIFIERS_MS = 500;
 const PART = 500;
 /** Lines kept in the page while it shows the newest; older ones are fetched again from the studio. */
 const LINES_KEPT = 20_000;
@@ -15,15 +22,24 @@ const ROW_PX = 24;
 const KINDS = ["nmt", "sync", "time", "emcy", "pdo", "sdo", "heartbeat", "lss", "other"];
 /** An object as it is written in a line. */
 const OBJECT = /[0-9A-F]{4}h:[0-9A-F]{2}/;
+/** Forms in which the kept frames are saved, as by `ferrodrive convert`. */
+const FORMS = [
+  ["log", "candump"],
+  ["asc", "ASC"],
+  ["blf", "BLF"],
+  ["pcapng", "pcapng"],
+];
+/** Lines before and after the cursor of the scope that are fetched for it. */
+const AROUND_S = 1;
 const COLUMNS = ["Time (s)", "From", "COB-ID", "What", "Bytes", "Took", "In words"];
 
 /** The column titles. */
 export const headRow = () => h("div", { class: "trace-row head" }, ...COLUMNS.map((title) => h("span", {}, title)));
 
-/** A line of the trace. */
-export function lineRow(line) {
+/** A line of the trace; `time_s` is what its first column shows. */
+export function lineRow(line, time_s = line.at_s) {
   const took = line.took_ms === undefined ? "" : `${number(line.took_ms, 1)} ms`;
-  const cells = [number(line.at_s, 6), line.from, line.id, line.kind, line.data, took, line.text];
+  const cells = [number(time_s, 6), line.from, line.id, line.kind, line.data, took, line.text];
   const spans = cells.map((cell) => h("span", {}, cell));
   const row = h("div", { class: `trace-row ${line.kind}`, "data-number": String(line.number), title: line.text }, ...spans);
   // `?` on the words explains the object that they name; elsewhere in the line, the service.
@@ -37,19 +53,30 @@ export function traceView() {
   const words = h("input", { id: "trace-text", size: "24", placeholder: "words, separated by commas", "aria-label": "Words that a line must contain, separated by commas", oninput: again });
   const kinds = h("div", { class: "chooser", role: "group", "aria-label": "Kinds of frames; none for all" }, ...KINDS.map((kind) => h("button", { type: "button", "data-kind": kind, "aria-pressed": "false", onclick: choose }, kind)));
   const whole = toggle("trace-transfers", "whole SDO transfers", true, () => again());
-  const quiet = toggle("trace-quiet", "without the studio's readings", false, () => again());
+  const quiet = toggle("trace-quiet", "without the studio's readings", true, () => again());
+  const byId = toggle("trace-by-id", "by COB-ID", false, () => again(), { title: "A line for each COB-ID, with its period" });
+  const delta = choice("trace-delta", "Time shown", DELTAS, { value: "none", onchange: () => draw() });
   const pause = h("button", { type: "button", id: "trace-pause", "aria-pressed": "false", onclick: pauseOrGoOn }, "Pause");
-  const save = h("a", { id: "trace-save", class: "button", download: "trace.log", title: "All kept frames of these nodes and kinds, as a candump log" }, "Save candump");
-  const room = h("div", { class: "room" });
-  const list = h("div", { class: "trace-list", tabindex: "0", role: "log", "aria-label": "Frames", onscroll: draw }, room);
+  const saves = FORMS.map(([ending, name]) => h("a", { id: `trace-save-${ending}`, class: "button", download: `trace.${ending}`, title: `All kept frames of these nodes and kinds, as ${name}`, "data-form": ending }, name));
+  const toCursor = h("button", { type: "button", id: "trace-cursor", hidden: true, title: "The lines around cursor A of the scope", onclick: goToCursor }, "At the scope's cursor");
+  const table = identifierTable((id) => {
+    words.value = id;
+    byId.checked = false;
+    again();
+  });  const room = h("div", { class: "room" });
+  const list = h("div", { class: "trace-list", tabindex: "0", role: "log", "aria-label": "Frames", onscroll: draw, onclick: chooseLine, onkeydown: moveLine }, room);
+  const listed = h("div", { class: "wide" }, headRow(), list);
   const status = h("p", { class: "quiet", role: "status" });
   const root = h(
     "section",
     { class: "trace" },
-    h("div", { class: "bar" }, h("label", {}, "Nodes ", nodes), h("label", {}, "Text ", words), whole, quiet, pause, save),
-    h("div", { class: "bar" }, kinds),
-    h("div", { class: "wide" }, headRow(), list),
+    h("div", { class: "bar" }, h("label", {}, "Nodes ", nodes), h("label", {}, "Text ", words), whole, quiet, byId, pause),
+    h("div", { class: "bar" }, kinds, delta, toCursor),
+    listed,
+    h("div", { class: "by-id", tabindex: "0", role: "region", "aria-label": "Frames by COB-ID" }, table.root),
     status,
+    h("div", { class: "bar" }, h("span", { class: "quiet" }, "Save as"), ...saves),
+    sendWindow(),
   );
 
   let shown = false;
@@ -67,6 +94,9 @@ export function traceView() {
   let fetching = false;
   /** The newest line is kept in view. */
   let follows = true;
+  let seen = linked.changes;
+  /** Whether lines of another time than the newest are shown. */
+  let elsewhere = false;
 
   function filter() {
     const chosen = [...kinds.children].filter((button) => button.getAttribute("aria-pressed") === "true").map((button) => button.dataset.kind);
@@ -85,14 +115,19 @@ export function traceView() {
   /** Starts again, with the newest lines of another filter. */
   function again() {
     generation += 1;
-    [lines, from, to, skipped, follows] = [[], null, null, 0, true];
-    save.href = `/api/trace.log?${filter()}`;
+    [lines, from, to, skipped, follows, elsewhere] = [[], null, null, 0, true, false];
+    for (const save of saves) save.href = `/api/trace.${save.dataset.form}?${filter()}`;
+    table.clear();
+    listed.hidden = byId.checked;
+    table.root.parentElement.hidden = !byId.checked;
+    whole.disabled = delta.disabled = byId.checked;
     fetching = false;
     draw();
     ask();
   }
 
-  async function part(more) {
+  /** Asks the studio; null where the answer does not count any more, or there is none. */
+  async function part(more, path = "/api/trace") {
     const asked = filter();
     asked.set("count", String(PART));
     if (words.value.trim()) asked.set("text", words.value);
@@ -103,7 +138,7 @@ export function traceView() {
     fetching = true;
     let body = null;
     try {
-      const answer = await request(`/api/trace?${asked}`);
+      const answer = await request(`${path}?${asked}`);
       body = await answer.json();
       if (!answer.ok) throw new Error(body.error.message);
     } catch (error) {
@@ -112,7 +147,7 @@ export function traceView() {
     }
     // The filter has changed since.
     if (mine !== generation) return null;
-    [trouble, fetching, oldest, next] = [null, false, body.oldest, body.next];
+    [trouble, fetching, oldest, next] = [null, false, body.oldest ?? oldest, body.next ?? next];
     return body;
   }
 
@@ -122,6 +157,7 @@ export function traceView() {
     clearTimeout(timer);
     if (!shown) return;
     const mine = generation;
+    if (byId.checked) return askIdentifiers(mine);
     // The first lines of a filter are shown even while paused; a hidden tab requests nothing.
     if (wantsNew() && !document.hidden && !fetching) {
       const body = await part(to === null ? {} : { after: to });
@@ -143,6 +179,73 @@ export function traceView() {
     }
   }
 
+  async function askIdentifiers(mine) {
+    if (!document.hidden && !fetching && (!paused || to === null)) {
+      const body = await part(to === null ? {} : { after: to }, "/api/trace/identifiers");
+      if (body) {
+        to = body.to;
+        skipped += body.skipped;
+        table.add(body);
+      }
+      if (mine === generation) draw();
+    }
+    if (mine !== generation) return;
+    clearTimeout(timer);
+    timer = setTimeout(ask, ASK_IDENTIFIERS_MS);
+  }
+
+  /** Shows the lines around the cursor of the scope, as after Pause. */
+  async function goToCursor() {
+    const at_s = linked.at_s;
+    if (at_s === null) return;
+    byId.checked = false;
+    if (!paused) pauseOrGoOn();
+    again();
+    generation += 1;
+    const body = await part({ until_s: at_s + AROUND_S });
+    if (!body) return;
+    [lines, from, to, follows, elsewhere] = [body.lines, body.from, body.to, false, true];
+    // So many lines that the one of the cursor is among them.
+    while (lines.length && lines[0].at_s > at_s && from > oldest) {
+      const before = from;
+      await askOlder();
+      if (from === before) break;
+    }
+    draw();
+    showLine(lineAt(lines, at_s));
+  }
+
+  function showLine(at) {
+    if (at < 0) return;
+    room.style.height = `${lines.length * ROW_PX}px`;
+    list.scrollTop = Math.max(0, at * ROW_PX - list.clientHeight / 2);
+    draw();
+  }
+
+  /** A line that is pressed is where cursor A of the scope stands. */
+  function chooseLine(event) {
+    const row = event.target.closest(".trace-row");
+    const line = row && lines.find(({ number: of }) => String(of) === row.dataset.number);
+    if (!line) return;
+    linkTo(line.at_s);
+    seen = linked.changes;
+    draw();
+  }
+
+  function moveLine(event) {
+    const by = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+    if (by === undefined || event.altKey || event.ctrlKey || event.metaKey || linked.at_s === null) return;
+    const at = Math.min(lines.length - 1, Math.max(0, lineAt(lines, linked.at_s) + by));
+    if (!lines[at]) return;
+    follows = false;
+    linkTo(lines[at].at_s);
+    seen = linked.changes;
+    const top = at * ROW_PX;
+    if (top < list.scrollTop || top + 2 * ROW_PX > list.scrollTop + list.clientHeight) showLine(at);
+    else draw();
+    event.preventDefault();
+  }
+
   /** Fetches the lines before the first one. */
   async function askOlder() {
     if (fetching || from === null || from <= oldest || lines.length >= MOST_LINES) return;
@@ -161,12 +264,14 @@ export function traceView() {
     paused = !paused;
     pause.setAttribute("aria-pressed", String(paused));
     setText(pause, paused ? "Resume" : "Pause");
+    if (!paused && elsewhere) return again();
     if (!paused) follows = true;
     draw();
   }
 
-  const row = (line, at) => {
-    const element = lineRow(line);
+  const row = (line, at, chosen) => {
+    const element = lineRow(line, timeOf(lines, at, delta.value, linked.at_s));
+    element.classList.toggle("chosen-line", at === chosen);
     element.style.top = `${at * ROW_PX}px`;
     return element;
   };
@@ -178,20 +283,28 @@ export function traceView() {
     if (follows && !event) list.scrollTop = list.scrollHeight;
     const first = Math.max(0, Math.floor(list.scrollTop / ROW_PX) - 2);
     const last = Math.min(lines.length, first + Math.ceil(list.clientHeight / ROW_PX) + 4);
-    room.replaceChildren(...lines.slice(first, last).map((line, at) => row(line, first + at)));
+    const chosen = linked.at_s === null ? -1 : lineAt(lines, linked.at_s);
+    room.replaceChildren(...lines.slice(first, last).map((line, at) => row(line, first + at, chosen)));
+    toCursor.hidden = linked.at_s === null;
     if (event && list.scrollTop < ROW_PX) askOlder();
     // With a filter that few lines pass, the lines that fill the view are further back.
     else if (lines.length * ROW_PX < list.clientHeight) askOlder();
     const missed = skipped ? ` ${skipped} frames are not shown: too many for this page.` : "";
     const kept = next - oldest;
     const searched = from === null ? 0 : next - from;
-    setText(status, trouble ?? `${lines.length} ${lines.length === 1 ? "line" : "lines"} of the last ${searched} frames; the studio keeps ${kept}.${missed}${paused ? " Paused: the studio keeps recording." : ""}`);
+    const byIdentifier = `${table.size()} COB-IDs${quiet.checked ? ", without the studio's readings" : ""}.${missed}${paused ? " Paused." : ""}`;
+    setText(status, trouble ?? (byId.checked ? byIdentifier : `${lines.length} ${lines.length === 1 ? "line" : "lines"} of the last ${searched} frames; the studio keeps ${kept}.${missed}${paused ? " Paused: the studio keeps recording." : ""}`));
     status.classList.toggle("bad", trouble !== null);
   }
 
   function update() {
+    if (shown && seen !== linked.changes) {
+      seen = linked.changes;
+      draw();
+    }
     if (shown) return;
     shown = true;
+    seen = linked.changes;
     // After a pause only the newest frames are fetched, not each one since.
     if (paused) ask();
     else again();

@@ -44,7 +44,7 @@ impl Command {
     /// Whether it needs control.
     pub const fn needs_control(&self) -> bool {
         match self {
-            Self::Session(_) => false,
+            Self::Session(command) => command.needs_control(),
             Self::World(command) => command.needs_control(),
             Self::Group(_) => true,
             Self::Node(_, command) => command.needs_control(),

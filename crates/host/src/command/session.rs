@@ -32,6 +32,12 @@ pub enum SessionCommand {
     StopAll {},
     /// Scans the bus for nodes.
     Scan {},
+    /// Sends a frame as it is, `604#4041600000000000`. One that may set a drive in motion is refused, unless the program was started
+    /// with leave for it.
+    SendFrame {
+        /// In the form of candump: identifier, `#`, data.
+        frame: String,
+    },
     /// Explains a term that the state has.
     Help {
         /// The node that has it, for terms of its model.
@@ -54,8 +60,14 @@ impl SessionCommand {
         "limit_speed",
         "stop_all",
         "scan",
+        "send_frame",
         "help",
     ];
+
+    /// Whether it needs control.
+    pub(super) const fn needs_control(&self) -> bool {
+        matches!(self, Self::SendFrame { .. })
+    }
 }
 
 /// What concerns the world around virtual drives.

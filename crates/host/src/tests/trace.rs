@@ -6,7 +6,9 @@ use canopen::object::DEVICE_TYPE;
 use cia402::object::{POSITION_ACTUAL_VALUE, TARGET_VELOCITY};
 use serde_json::{Value, json};
 
-use super::{ARM, Stage, WHEEL, play};
+use super::{ARM, Stage, WHEEL, play, play_in, setting};
+use crate::Setting;
+use crate::command::SessionCommand;
 use crate::trace::{Asked, Origin, Trace};
 use can::BusFrame;
 
@@ -219,4 +221,79 @@ fn the_log_reads_back_frame_by_frame() {
         let of_arm = read(&log(json!({ "node": "2", "kind": "sdo" })));
         assert!(of_arm.len() > 100 && of_arm.len() < records.len());
     });
+}
+
+/// A SYNC at 0, 10, 24, 34 and 44 ms, and a heartbeat of an extended identifier between.
+#[test]
+fn the_frames_of_each_identifier_are_counted_and_timed_in_parts_that_add_up() {
+    let trace = Trace::new(master::Models::default(), Origin::default());
+    for (at_ms, frame) in [(0, "080#"), (10, "080#"), (12, "00000080#"), (24, "080#"), (34, "080#"), (44, "080#")] {
+        let at = Instant::from_millis(at_ms);
+        trace.append(BusFrame { at, frame: frame.parse().expect("a frame"), own: false });
+    }
+    let of = |asked: Value| {
+        let asked: Asked = serde_json::from_value(asked).expect("parameters");
+        serde_json::to_value(asked.understand().expect("sense").identifiers(&trace.held())).expect("JSON")
+    };
+    let near = |value: &Value, wanted: f64| (value.as_f64().expect("a number") - wanted).abs() < 1e-6;
+    let all = of(json!({}));
+    let rows = all["identifiers"].as_array().expect("rows");
+    assert_eq!(rows.iter().map(|row| row["id"].as_str().expect("text")).collect::<Vec<_>>(), ["080", "00000080"]);
+    assert_eq!((&rows[0]["count"], &rows[0]["last"]["number"], &all["to"]), (&5.into(), &5.into(), &6.into()));
+    assert!(near(&rows[0]["least_ms"], 10.0) && near(&rows[0]["most_ms"], 14.0), "{all}");
+    assert!(rows[1]["least_ms"].is_null() && rows[1]["count"] == 1, "{all}");
+    let later = of(json!({ "after": 3, "kind": "sync" }));
+    assert_eq!(later["identifiers"].as_array().expect("rows").len(), 1);
+    let row = &later["identifiers"][0];
+    assert!(row["count"] == 3 && near(&row["first_s"], 0.024) && near(&row["most_ms"], 10.0), "{later}");
+    assert_eq!(of(json!({ "text": "nothing" }))["identifiers"], json!([]));
+}
+
+/// CiA 301, 7.2.8.3.1: NMT start is 01h of identifier 0.
+#[test]
+fn a_frame_is_sent_as_it_is_and_one_that_may_move_needs_leave() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        let send = |frame: &str| SessionCommand::SendFrame { frame: frame.into() };
+        assert_eq!(page.ask(send("604#4000100000000000")).await.error_kind(), "not_in_control");
+        page.must(SessionCommand::TakeControl {}).await;
+        let sent = page.ask(send("604#4000100000000000")).await;
+        assert!(sent.is_ok() && sent.json().contains("sent: SDO node 4: read 1000h:00"), "{}", sent.json());
+        stage.settle().await;
+        let seen = stage.lines(json!({ "text": "40 00 10 00" }));
+        assert!(seen.iter().any(|line| line["from"] == "studio"), "{seen:?}");
+        let begin = stage.trace(json!({}))["next"].clone();
+        for (frame, why) in [("000#0104", "NMT start"), ("604#2B40600006000000", "a controlword"), ("204#0F00", "PDO")]
+        {
+            let refused = page.ask(send(frame)).await;
+            assert_eq!(refused.error_kind(), "motion", "{}", refused.json());
+            assert!(refused.json().contains(why) && refused.json().contains("--allow-motion"), "{}", refused.json());
+        }
+        let malformed = page.ask(send("604#4")).await;
+        assert_eq!(malformed.error_kind(), "malformed", "{}", malformed.json());
+        stage.settle().await;
+        assert_eq!(stage.lines(json!({ "after": begin, "kind": "nmt" })), Vec::<Value>::new(), "nothing was sent");
+    });
+}
+
+#[test]
+fn what_a_frame_with_leave_may_move_counts_as_moved() {
+    let scene = async |stage: &Stage| {
+        let mut page = stage.page().await;
+        page.must(SessionCommand::TakeControl {}).await;
+        let shown = |stage: &Stage| stage.state()["nodes"].as_array().expect("nodes").clone();
+        let moving = |stage: &Stage| shown(stage).iter().any(|node| node["node"] == 4 && node["moving"] == true);
+        assert!(!moving(stage));
+        page.must(SessionCommand::LimitSpeed { rpm: Some(20.0) }).await;
+        let send = || SessionCommand::SendFrame { frame: "604#2B40600006000000".into() };
+        assert_eq!(page.ask(send()).await.error_kind(), "speed_limit");
+        page.must(SessionCommand::LimitSpeed { rpm: None }).await;
+        page.must(send()).await;
+        stage.sleep(200).await;
+        assert!(moving(stage), "{:?}", shown(stage));
+        drop(page);
+        stage.sleep(1500).await;
+        assert!(!moving(stage), "it was stopped with the session, and is seen to stand");
+    };
+    play_in(Setting { allow_motion: true, ..setting() }, scene, |_| {}, async |_| {}, |_| {}, async |_| {});
 }

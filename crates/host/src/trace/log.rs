@@ -1,5 +1,7 @@
 //! The kept frames as a candump log, which `ferrodrive dump` and can-utils read.
 
+use can::BusFrame;
+
 use super::origin::Origin;
 use super::query::Query;
 use super::ring::{CHUNK, Held};
@@ -22,11 +24,21 @@ impl Query {
             return None;
         }
         let mut text = String::new();
-        held.decode(from, next, |_, passed, decoded| {
+        self.frames(held, from, next, |passed| origin.push_line(&mut text, passed));
+        Some(Part { text, next })
+    }
+
+    /// Visits all frames of the log.
+    pub fn all_frames(&self, held: &Held, visit: impl FnMut(&BusFrame)) {
+        let (floor, ceiling) = self.bounds(held);
+        self.frames(held, floor, ceiling, visit);
+    }
+
+    fn frames(&self, held: &Held, from: u64, to: u64, mut visit: impl FnMut(&BusFrame)) {
+        held.decode(from, to, |_, passed, decoded| {
             if self.chooses(decoded) {
-                origin.push_line(&mut text, passed);
+                visit(passed);
             }
         });
-        Some(Part { text, next })
     }
 }

@@ -3,6 +3,7 @@
 //! In: every frame of the bus. Out: parts of the kept frames, decoded then ([`Query`]), or as a log ([`Origin`]). The memory is
 //! bounded, and no reader makes the host wait: the lock is held for a push, or for the copy of some pointers.
 
+mod identifiers;
 pub(crate) mod learning;
 mod line;
 mod log;

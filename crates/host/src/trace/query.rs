@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 
-use can::Instant;
+use can::{BusFrame, Instant};
 use canopen::NodeId;
 use master::decode::{Decoded, ServiceKind};
 use serde::{Deserialize, Serialize};
 
-use super::line::{Line, Transfers};
+use super::line::{Begun, Line, Transfers};
 use super::ring::Held;
 
 /// Default number of lines, and most lines.
@@ -167,20 +167,8 @@ impl Query {
     }
 
     fn lines(&self, held: &Held, from: u64, to: u64) -> VecDeque<Line> {
-        let mut transfers = Transfers::default();
         let mut lines = VecDeque::new();
-        let begin = if self.follows_transfers() { from.saturating_sub(LOOK_BACK) } else { from };
-        held.decode(begin, to, |number, passed, decoded| {
-            let begun = match decoded {
-                Decoded::Sdo(sdo) if self.follows_transfers() => transfers.follow(passed, sdo),
-                _ => None,
-            };
-            if number < from
-                || !self.chooses(decoded)
-                || self.quiet && begun.is_some_and(|begun| begun.is_own_reading())
-            {
-                return;
-            }
+        self.each(held, from, to, |number, passed, decoded, begun| {
             let line = match decoded {
                 Decoded::Sdo(sdo) if self.transfers => Line::of_transfer(number, passed, decoded, sdo, begun),
                 _ => Some(Line::of_frame(number, passed, decoded)),
@@ -188,6 +176,36 @@ impl Query {
             lines.extend(line.filter(|line| line.has(&self.words)));
         });
         lines
+    }
+
+    /// Visits each frame of node, service and reader that match, with the start of the SDO transfer that it belongs to.
+    pub(super) fn each(
+        &self,
+        held: &Held,
+        from: u64,
+        to: u64,
+        mut visit: impl FnMut(u64, &BusFrame, &Decoded, Option<Begun>),
+    ) {
+        let mut transfers = Transfers::default();
+        let begin = if self.follows_transfers() { from.saturating_sub(LOOK_BACK) } else { from };
+        held.decode(begin, to, |number, passed, decoded| {
+            let begun = match decoded {
+                Decoded::Sdo(sdo) if self.follows_transfers() => transfers.follow(passed, sdo),
+                _ => None,
+            };
+            let is_hidden = self.quiet && begun.is_some_and(|begun| begun.is_own_reading());
+            if number >= from && self.chooses(decoded) && !is_hidden {
+                visit(number, passed, decoded, begun);
+            }
+        });
+    }
+
+    pub(super) fn words(&self) -> &[String] {
+        &self.words
+    }
+
+    pub(super) const fn after(&self) -> Option<u64> {
+        self.after
     }
 
     /// True if a frame can be decoded only with those before it.

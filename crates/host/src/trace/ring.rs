@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use can::Instant;
+use can::{Frame, Instant};
 use canopen::sdo::wire::Reply;
 use canopen::{Mux, NodeId, connection_set};
 use devices::Description;
@@ -96,6 +96,12 @@ impl Trace {
         let mut decoder = Decoder::knowing(ring.known.clone());
         ring.models.iter().for_each(|(node, model)| decoder.set_model(*node, model));
         decoder
+    }
+
+    /// What a frame would mean after those that have passed.
+    pub(crate) fn meaning(&self, frame: &Frame) -> Decoded {
+        let mut decoder = self.lock().decoder.clone();
+        decoder.decode(frame)
     }
 
     /// A snapshot of the kept frames, unaffected by further ones.
@@ -214,7 +220,7 @@ impl Held {
 mod tests {
     use std::time::Duration;
 
-    use can::{CanId, Frame};
+    use can::CanId;
     use sim::Prng;
 
     use super::*;

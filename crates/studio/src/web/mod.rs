@@ -29,6 +29,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{MethodRouter, get, post};
+use canlog::Format;
 use serde::Deserialize;
 use serde_json::json;
 use tokio::sync::Semaphore;
@@ -98,6 +99,12 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
             get(async |State(web): State<Web>, asked| trace::series(web.handle, web.doors, asked).await)
         }
         Operation::TraceLog => get(async |State(web): State<Web>, asked| trace::log(web.handle, &web.doors, asked)),
+        Operation::TraceAsc => saved_trace(Format::Asc),
+        Operation::TraceBlf => saved_trace(Format::Blf),
+        Operation::TracePcapng => saved_trace(Format::Pcapng),
+        Operation::Identifiers => {
+            get(async |State(web): State<Web>, asked| trace::identifiers(web.handle, web.doors, asked).await)
+        }
         Operation::RecordingMcap => {
             post(async |State(web): State<Web>, body: axum::body::Bytes| recording::mcap(web.records, body).await)
                 .layer(DefaultBodyLimit::max(recording::LARGEST))
@@ -111,6 +118,10 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
         })
         .layer(DefaultBodyLimit::max(parameters::LARGEST)),
     }
+}
+
+fn saved_trace(format: Format) -> MethodRouter<Web> {
+    get(async move |State(web): State<Web>, asked| trace::saved(web.handle, &web.doors, asked, format).await)
 }
 
 /// Access control, and the headers of every answer.

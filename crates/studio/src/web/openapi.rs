@@ -15,6 +15,10 @@ pub(super) enum Operation {
     Series,
     Trace,
     TraceLog,
+    TraceAsc,
+    TraceBlf,
+    TracePcapng,
+    Identifiers,
     RecordingMcap,
     Recording,
     ParametersToml,
@@ -35,8 +39,12 @@ const MALFORMED: (&str, &str) = ("400", "A parameter is not valid");
 const OVER: (&str, &str) = ("503", "The studio is ending");
 const FOREIGN: (&str, &str) = ("403", "The Origin or the Host is not that of this server");
 
+/// The answers to a request for a log in a form that is made as a whole.
+const SAVED: &[(&str, &str)] =
+    &[("200", "The frames of the chosen nodes and kinds"), MALFORMED, LET_IN, ("429", "Others are fetching it"), OVER];
+
 /// All requests. No GET changes anything, and no request moves a drive: motion goes through the socket, where it is held.
-pub(super) const ROUTES: [Route; 13] = [
+pub(super) const ROUTES: [Route; 17] = [
     Route {
         path: "/api/state",
         method: "get",
@@ -119,6 +127,39 @@ pub(super) const ROUTES: [Route; 13] = [
         answers: &[("200", "One frame per line"), MALFORMED, LET_IN, ("429", "Others are fetching it"), OVER],
     },
     Route {
+        path: "/api/trace.asc",
+        method: "get",
+        operation: Operation::TraceAsc,
+        summary: "All kept frames, as Vector ASCII",
+        answers: SAVED,
+    },
+    Route {
+        path: "/api/trace.blf",
+        method: "get",
+        operation: Operation::TraceBlf,
+        summary: "All kept frames, in the binary form of Vector",
+        answers: SAVED,
+    },
+    Route {
+        path: "/api/trace.pcapng",
+        method: "get",
+        operation: Operation::TracePcapng,
+        summary: "All kept frames, for Wireshark",
+        answers: SAVED,
+    },
+    Route {
+        path: "/api/trace/identifiers",
+        method: "get",
+        operation: Operation::Identifiers,
+        summary: "The kept frames by identifier: how many, how far apart, and the last one in words; transfers and count are ignored",
+        answers: &[
+            ("200", "A row for each identifier, of the newest frames after the given one"),
+            MALFORMED,
+            LET_IN,
+            OVER,
+        ],
+    },
+    Route {
         path: "/api/recording.mcap",
         method: "post",
         operation: Operation::RecordingMcap,
@@ -168,7 +209,12 @@ pub(super) const ROUTES: [Route; 13] = [
 /// The query parameters of a request: name, JSON type, meaning.
 const fn parameters(operation: Operation) -> &'static [(&'static str, &'static str, &'static str)] {
     match operation {
-        Operation::Trace | Operation::TraceLog => &[
+        Operation::Trace
+        | Operation::TraceLog
+        | Operation::TraceAsc
+        | Operation::TraceBlf
+        | Operation::TracePcapng
+        | Operation::Identifiers => &[
             ("after", "integer", "Only frames from this number on"),
             ("before", "integer", "Only frames below this number"),
             ("from_s", "number", "Only frames from this time of the bus on"),

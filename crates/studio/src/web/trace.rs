@@ -1,5 +1,6 @@
 //! The trace: lines of it as JSON, and all of it as a log. Decoding is done in another thread than the task that moves drives.
 
+use std::io::Cursor;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Duration;
@@ -14,8 +15,9 @@ use futures_util::stream;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::answer::{json_text, trouble};
+use canlog::{Direction, Format, Interface, LogWriter, Record};
 use host::HostHandle;
-use host::trace::{Asked, AskedSeries, Held, Query};
+use host::trace::{Asked, AskedSeries, Held, Origin, Query};
 
 /// Readers whose lines are decoded at the same time; others wait their turn. However many read, a second core is free for
 /// the task that moves drives.
@@ -45,14 +47,27 @@ pub(super) type InQuery = Result<InAddress<Asked>, QueryRejection>;
 
 /// The newest lines that match the query.
 pub(super) async fn lines(handle: HostHandle, doors: Doors, asked: InQuery) -> Response {
+    decoded(handle, doors, asked, |query, held| serde_json::to_string(&query.select(held))).await
+}
+
+/// The newest frames that match the query, by identifier.
+pub(super) async fn identifiers(handle: HostHandle, doors: Doors, asked: InQuery) -> Response {
+    decoded(handle, doors, asked, |query, held| serde_json::to_string(&query.identifiers(held))).await
+}
+
+async fn decoded(
+    handle: HostHandle,
+    doors: Doors,
+    asked: InQuery,
+    work: impl FnOnce(&Query, &Held) -> serde_json::Result<String> + Send + 'static,
+) -> Response {
     let query = match understand(asked) {
         Ok(query) => query,
         Err(refusal) => return *refusal,
     };
     let Ok(_decoding) = doors.decoding.acquire().await else { return over() };
     let held = handle.trace().held();
-    let selected = tokio::task::spawn_blocking(move || serde_json::to_string(&query.select(&held))).await;
-    match selected {
+    match tokio::task::spawn_blocking(move || work(&query, &held)).await {
         Ok(Ok(json)) => json_text(json),
         _ => over(),
     }
@@ -101,6 +116,47 @@ pub(super) fn log(handle: HostHandle, doors: &Doors, asked: InQuery) -> Response
     // The file name is that of the address, or the one that the page gives.
     let headers = [(CONTENT_TYPE, "text/plain; charset=utf-8"), (CONTENT_DISPOSITION, "attachment")];
     (headers, Body::from_stream(parts)).into_response()
+}
+
+/// The same in a form that is made as a whole, some 5 MB of it.
+pub(super) async fn saved(handle: HostHandle, doors: &Doors, asked: InQuery, format: Format) -> Response {
+    let query = match understand(asked) {
+        Ok(query) => query,
+        Err(refusal) => return *refusal,
+    };
+    let Ok(door) = Arc::clone(&doors.saving).try_acquire_owned() else {
+        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "others are saving the trace: try again later");
+    };
+    handle.trace().note_saved();
+    let held = handle.trace().held();
+    let work = tokio::task::spawn_blocking(move || {
+        let _door = door;
+        log_in(format, &query, &held, handle.trace().origin())
+    });
+    let headers = [(CONTENT_TYPE, "application/octet-stream"), (CONTENT_DISPOSITION, "attachment")];
+    match work.await {
+        Ok(Ok(file)) => (headers, file).into_response(),
+        _ => over(),
+    }
+}
+
+fn log_in(format: Format, query: &Query, held: &Held, origin: &Origin) -> std::io::Result<Vec<u8>> {
+    let mut log = LogWriter::new(Cursor::new(Vec::new()), format).map_err(std::io::Error::other)?;
+    let interface = Interface::named(&origin.interface);
+    let mut written = Ok(());
+    query.all_frames(held, |passed| {
+        let direction = if passed.own { Direction::Transmitted } else { Direction::Received };
+        let record = Record {
+            interface,
+            direction: Some(direction),
+            ..Record::of_frame(passed.at + origin.unix_zero, passed.frame)
+        };
+        if written.is_ok() {
+            written = log.write(&record);
+        }
+    });
+    written?;
+    Ok(log.finish()?.into_inner())
 }
 
 /// A log being downloaded.

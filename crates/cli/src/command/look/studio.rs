@@ -60,6 +60,12 @@ pub(crate) struct Studio {
     /// here, the server could be used from any browser of this network.
     #[arg(long = "host", value_name = "NAME")]
     hosts: Vec<String>,
+    /// Let the send window of the Trace view send frames that may set a drive in motion
+    ///
+    /// Controlwords, targets, RPDOs, NMT start, makers' objects: whatever is not known to be harmless. What such a frame moves is
+    /// stopped with the page, as any motion of it, but not held to its speed limit.
+    #[arg(long)]
+    allow_motion: bool,
     /// Open the page in the browser of this machine
     #[arg(long)]
     open: bool,
@@ -106,7 +112,7 @@ impl Studio {
         let url = access.url();
         format.print(&Ready { studio: url.clone() }).map_err(Failure::of_stdout)?;
         context.traffic.listen();
-        let mut setting = setting(context);
+        let mut setting = Setting { allow_motion: self.allow_motion, ..setting(context) };
         if self.control.is_given() && setting.world.is_none() {
             setting.world = Some(far_world::open(&self.control)?);
         }
@@ -155,6 +161,7 @@ pub(in crate::command) fn setting(context: &Context) -> Setting {
         unix_zero: context.traffic.unix_zero(),
         world: context.world.clone(),
         wire: context.wire.clone(),
+        allow_motion: false,
     }
 }
 

@@ -80,7 +80,7 @@ async fn the_tour_goes_on_when_the_drive_did_what_it_asks_for() {
     stage.click("[data-line='cable cut'].tour-mark").await;
     stage.says("#tour", "10 of 10: Recording").await;
     stage.go_on().await;
-    stage.click("#trace-save.tour-mark").await;
+    stage.click("#trace-save-log.tour-mark").await;
     stage.says("#tour", "The tour is done").await;
     stage.click("#tour-leave").await;
     stage.close().await;
