@@ -1,8 +1,13 @@
 //! The page of the studio in a real browser: Chromium, moved by its WebDriver.
 
+use std::process::Command;
+
 use crate::debian;
+use crate::process::quietly;
+use crate::say::say;
 use crate::tally::Tally;
 use crate::test_programs::{self, How, SCHEMA_AND_BROWSER};
+use crate::workspace;
 
 /// The browser and what moves it, with the packages of Debian that they are in.
 const PROGRAMS: &[(&str, &str)] = &[("chromium", "chromium"), ("chromedriver", "chromium-driver")];
@@ -11,12 +16,41 @@ const PROGRAMS: &[(&str, &str)] = &[("chromium", "chromium"), ("chromedriver", "
 pub(crate) fn fetch() -> Result<(), String> {
     debian::install(PROGRAMS)
 }
+/// What judges whether everybody can use the page.
+const AXE: &str = "axe-core@4.14.1";
 
 pub(crate) fn step() -> Tally {
     if let Err(reason) = fetch() {
         return Tally::skipped(reason);
     }
+    let mut arguments = vec!["--ignored", "studio_browser::"];
+    let without_axe = install_axe().err();
+    if without_axe.is_some() {
+        arguments.extend(["--skip", "studio_browser::axe::"]);
+    }
     // One browser at a time: each takes some hundred megabytes and a core.
-    let how = How { programs: 1, threads: 1, arguments: &["--ignored", "studio_browser::"] };
-    test_programs::build(SCHEMA_AND_BROWSER).map_or_else(Tally::failed, |programs| test_programs::run(programs, how))
+    let how = How { programs: 1, threads: 1, arguments: &arguments };
+    let run = |programs| test_programs::run(programs, how);
+    let tally = test_programs::build(SCHEMA_AND_BROWSER).map_or_else(Tally::failed, run);
+    match without_axe {
+        Some(reason) if tally.failed == 0 => {
+            Tally { skipped: tally.skipped + 1, note: format!("{AXE}: {reason}"), ..tally }
+        }
+        _ => tally,
+    }
+}
+
+/// Fetches axe-core by npm to where its test looks for it.
+///
+/// # Errors
+/// A sentence: why it cannot be had.
+fn install_axe() -> Result<(), String> {
+    let folder = workspace::target().join("npm");
+    if folder.join("node_modules/axe-core/axe.min.js").is_file() {
+        return Ok(());
+    }
+    debian::install(&[("npm", "npm")])?;
+    say(format_args!("installing {AXE}"));
+    let mut npm = Command::new("npm");
+    quietly(npm.args(["install", "--no-save", "--no-audit", "--no-fund", "--prefix"]).arg(&folder).arg(AXE))
 }

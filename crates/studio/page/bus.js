@@ -1,7 +1,8 @@
 // The Bus view: the nodes of the bus.
 
-import { ask } from "./link.js";
-import { h, hex, number, setText } from "./dom.js";
+import { ask, link } from "./link.js";
+import { SORTED, chosenNodes, summary } from "./bus_rows.js";
+import { h, hex, number, setText, toggle } from "./dom.js";
 import { pointed } from "./help.js";
 
 const COLUMNS = ["Node", "Model", "NMT state", "Heartbeat", "Power state", "Position", "Speed", "Fault", "Identity (1018h)"];
@@ -11,14 +12,25 @@ export function busView(shared, open) {
   const rows = h("tbody");
   const empty = h("p", { class: "quiet" });
   const wire = h("p", { id: "wire", role: "status" });
+  const words = h("input", { type: "search", id: "bus-filter", size: "24", placeholder: "words, such as 4 or fault", "aria-label": "Words that a node must have", oninput: () => link.state && update(link.state) });
+  const only = toggle("bus-faults", "faults only", false, () => link.state && update(link.state));
+  const all = h("span", { class: "quiet", role: "status", id: "bus-summary" });
+  const order = { by: "Node", down: false };
+  const heads = COLUMNS.map((title) => h("th", { scope: "col", "data-label": title }, SORTED.includes(title) ? h("button", { type: "button", class: "plain", title: `Sort by ${title.toLowerCase()}`, onclick: () => sortBy(title) }, title) : title));
   const root = h(
     "section",
     { class: "bus" },
-    h("div", { class: "bar" }, h("h2", {}, "Bus"), scan),
+    h("div", { class: "bar" }, h("h2", {}, "Bus"), scan, words, only, all),
     wire,
-    h("table", {}, h("thead", {}, h("tr", {}, ...COLUMNS.map((title) => h("th", { scope: "col" }, title)))), rows),
+    h("table", {}, h("thead", {}, h("tr", {}, ...heads)), rows),
     empty,
   );
+
+  function sortBy(title) {
+    order.down = order.by === title && !order.down;
+    order.by = title;
+    if (link.state) update(link.state);
+  }
 
   function row(node) {
     const look = () => {
@@ -47,11 +59,15 @@ export function busView(shared, open) {
     tellWire(state.bus);
     scan.disabled = state.scanning;
     setText(scan, state.scanning ? "Scanning …" : "Scan");
-    const nodes = state.nodes.map((node) => String(node.node));
-    if ([...rows.children].map((tr) => tr.dataset.node).join() !== nodes.join()) {
-      rows.replaceChildren(...state.nodes.map((node) => row(node.node)));
+    const nodes = chosenNodes(state.nodes, { words: words.value, only: only.checked, ...order });
+    setText(all, summary(state.nodes));
+    heads.forEach((head) => head.setAttribute("aria-sort", head.dataset.label !== order.by ? "none" : order.down ? "descending" : "ascending"));
+    // Rows that only change places keep the focus.
+    if ([...rows.children].map((tr) => tr.dataset.node).join() !== nodes.map(({ node }) => node).join()) {
+      const known = new Map([...rows.children].map((tr) => [Number(tr.dataset.node), tr]));
+      rows.replaceChildren(...nodes.map(({ node }) => known.get(node) ?? row(node)));
     }
-    state.nodes.forEach((node, at) => {
+    nodes.forEach((node, at) => {
       const cells = rows.children[at].children;
       const drive = node.drive;
       setText(cells[0].firstChild, String(node.node));
@@ -71,7 +87,7 @@ export function busView(shared, open) {
       cells[7].className = node.trouble || (drive && drive.fault_code !== 0) ? "bad" : "";
       setText(cells[8], [node.vendor_id, node.product_code, node.revision_number].map((part) => hex(part, 1)).join(" : "));
     });
-    setText(empty, state.nodes.length ? "" : state.scanning ? "Asking all 127 node-IDs …" : "No node answers. Check supply, cable, termination (60 Ω between CAN_H and CAN_L) and bit rate, then scan again.");
+    setText(empty, nodes.length ? "" : state.nodes.length ? "No node has these words." : state.scanning ? "Asking all 127 node-IDs …" : "No node answers. Check supply, cable, termination (60 Ω between CAN_H and CAN_L) and bit rate, then scan again.");
   }
 
   return { root, update };

@@ -1,10 +1,13 @@
 // The Drive view: what one drive reports, and why it does not move yet.
 
 import { ask } from "./link.js";
+import { hasFault, isSilent } from "./bus_rows.js";
 import { h, hex, number, renew, setText } from "./dom.js";
 import { term, terms } from "./help.js";
 import { powerMachine } from "./machine.js";
 import { request } from "./transport.js";
+import { buttonsOf } from "./remedy.js";
+import { remedyBar } from "./remedy_bar.js";
 
 /** Label, field, decimals, unit. */
 export const VALUES = [
@@ -22,10 +25,11 @@ export function chooser(shared) {
   const root = h("div", { class: "chooser", role: "group", "aria-label": "Drive" });
   const update = (state) => {
     const drives = state.nodes.filter((node) => node.drive || node.trouble);
-    const key = `${shared.node} ${drives.map((node) => `${node.node}${node.model}`).join()}`;
+    const isBad = (node) => hasFault(node) || isSilent(node);
+    const key = `${shared.node} ${drives.map((node) => `${node.node}${node.model}${isBad(node)}`).join()}`;
     renew(root, key, () =>
       drives.map((node) =>
-        h("button", { type: "button", "aria-pressed": String(node.node === shared.node), onclick: () => (shared.node = node.node) }, `${node.node} ${node.model ?? ""}`)));
+        h("button", { type: "button", "aria-pressed": String(node.node === shared.node), class: isBad(node) ? "bad" : "", title: isBad(node) ? "A fault, or no answer" : "", onclick: () => (shared.node = node.node) }, `${isBad(node) ? "⚠ " : ""}${node.node} ${node.model ?? ""}`)));
   };
   return { root, update };
 }
@@ -46,7 +50,7 @@ export function tiles(values) {
   return { root, update };
 }
 
-export function driveView(shared) {
+export function driveView(shared, report) {
   const choose = chooser(shared);
   const large = tiles(VALUES);
   const title = h("h2");
@@ -97,6 +101,7 @@ export function driveView(shared) {
       { class: finding.cause ? "cause" : "warning", open: finding.cause },
       h("summary", {}, `${finding.cause ? "Cause" : "Warning"} (${finding.topic}): ${finding.found}`),
       h("dl", {}, h("dt", {}, "Expected"), h("dd", {}, finding.expected), h("dt", {}, "Consequence"), h("dd", {}, finding.follows), h("dt", {}, "Remedy"), h("dd", {}, finding.remedy)),
+      remedyBar(buttonsOf(finding.remedy), report),
     );
 
   function update(state) {
@@ -119,7 +124,8 @@ export function driveView(shared) {
       if (!drive) return [];
       if (drive.fault_code === 0) return [h("li", { class: "good" }, "None")];
       const rows = drive.faults.map((row) => h("li", { class: "bad" }, term("fault", row.name, node.node), h("p", {}, row.remedy)));
-      return rows.length ? rows : [h("li", { class: "bad" }, `${hex(drive.fault_code, 4)}: not in the drive's description`)];
+      const reset = h("li", { class: "plain" }, remedyBar(buttonsOf(`ferrodrive reset ${node.node}`), report));
+      return [...(rows.length ? rows : [h("li", { class: "bad" }, `${hex(drive.fault_code, 4)}: not in the drive's description`)]), reset];
     });
     renew(words, drive ? `${node.node} ${drive.statusword} ${drive.controlword} ${drive.mode}` : "", () =>
       !drive

@@ -3,6 +3,8 @@
 
 import { h, hex, number, renew, setText, toggle } from "./dom.js";
 import { documented, pointed } from "./help.js";
+import { buttonsOf } from "./remedy.js";
+import { remedyBar } from "./remedy_bar.js";
 import { headRow, lineRow } from "./trace.js";
 import { request } from "./transport.js";
 
@@ -15,7 +17,7 @@ const KINDS = { emcy: "EMCY", fault: "fault", silent: "silent", state: "power st
 /** The kinds that have an end. */
 const LASTING = ["emcy", "fault", "silent"];
 
-export function faultsView() {
+export function faultsView(report) {
   const only = toggle("faults-only", "faults only", false, () => draw());
   const here = h("span", { class: "quiet", role: "status" });
   const list = h("div", { class: "timeline", tabindex: "0", role: "log", "aria-label": "What happened, newest first" });
@@ -102,7 +104,9 @@ export function faultsView() {
       const code = entry.code === null ? "" : ` ${hex(entry.code, 4)}`;
       const rows = [h("dt", {}, "Cause and remedy"), h("dd", { id: "remedy" }, entry.remedy ?? (LASTING.includes(entry.kind) ? "Not in the drive's description: see its manual." : "Nothing to do."))];
       if (entry.source) rows.push(h("dt", {}, "Source"), h("dd", { id: "fault-source" }, entry.source));
-      return [h("h2", {}, `Node ${entry.node}: ${KINDS[entry.kind]}${code}, ${entry.what}`), h("dl", {}, ...rows)];
+      const lasts = LASTING.includes(entry.kind) && entry.kind !== "silent" && entry.gone_s === null;
+      const buttons = lasts ? remedyBar(buttonsOf(`ferrodrive reset ${entry.node}`), report) : null;
+      return [h("h2", {}, `Node ${entry.node}: ${KINDS[entry.kind]}${code}, ${entry.what}`), h("dl", {}, ...rows), ...(buttons ? [buttons] : [])];
     });
   }
 

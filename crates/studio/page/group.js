@@ -121,7 +121,7 @@ export function groupMotion(report) {
 
   // The base: which drives are its wheels, how it is built, and how fast.
   const [left, right] = [choice("base-left", "Left wheel"), choice("base-right", "Right wheel")];
-  const [turns_left, turns_right] = [input("base-turns-left", "1"), input("base-turns-right", "-1")];
+  const [turns_left, turns_right] = [input("base-turns-left", "1", { "aria-label": "Turns of the left drive for a turn of its wheel" }), input("base-turns-right", "-1", { "aria-label": "Turns of the right drive for a turn of its wheel" })];
   const [base_m, radius_m] = [input("base-wheel-base", "0.5"), input("base-wheel-radius", "0.08")];
   const [speed, most, ramp_m] = [input("base-speed", "0.1"), input("base-most", "0.3"), input("base-ramp", "0.5")];
   const twist = (forward, round) => {
@@ -168,7 +168,7 @@ export function groupMotion(report) {
   const details = h("details", { class: "homing", id: "group" }, h("summary", {}, "Groups: several drives as one motion"), h("p", { class: "quiet" }, "All start with one SYNC and end together. When one faults, is lost or lags, all stop. The drives are enabled for the motion, also by a held button, and disabled afterwards. Their PDO mapping is changed for it."), fields);
 
   function line(node) {
-    const fields = { in: toggle(`group-in-${node}`, "", false, () => link.state && update(link.state), { "aria-label": `Node ${node} is in the group` }), angle: input(`group-angle-${node}`, "90"), speed: input(`group-speed-${node}`, "30"), now: h("td"), counts: h("td"), does: h("td") };
+    const fields = { in: toggle(`group-in-${node}`, "", false, () => link.state && update(link.state), { "aria-label": `Node ${node} is in the group` }), angle: input(`group-angle-${node}`, "90", { "aria-label": `Angle of node ${node} in degrees` }), speed: input(`group-speed-${node}`, "30", { "aria-label": `Speed of node ${node} in r/min` }), now: h("td"), counts: h("td"), does: h("td") };
     lines.set(node, fields);
     return fields;
   }

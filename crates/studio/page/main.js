@@ -4,18 +4,13 @@ import { ask, connect, inControl, link, on, stopAll } from "./link.js";
 import { closeChoice } from "./choice.js";
 import { h, number, renew, setText, toggle } from "./dom.js";
 import { busView } from "./bus.js";
+import { concerns } from "./bus_rows.js";
 import { driveView } from "./drive.js";
 import { motionView } from "./motion.js";
 import { helpPanel } from "./help.js";
 import { meaningOf } from "./keys.js";
-import { scopeView } from "./scope.js";
 import { lostSight, unseenStops } from "./sight.js";
-import { parametersView } from "./parameters.js";
-import { pdoView } from "./pdo.js";
-import { faultsView } from "./faults.js";
 import { tourBar } from "./tour.js";
-import { traceView } from "./trace.js";
-import { worldView } from "./world.js";
 
 const byId = (id) => document.getElementById(id);
 const NEWS_KEPT = 200;
@@ -36,18 +31,35 @@ const help = helpPanel(shared, characters);
 document.body.append(help.root);
 byId("what").addEventListener("click", help.overview);
 
+/** Stands for a view that is still being fetched. */
+const fetching = () => ({ root: h("p", { class: "quiet", role: "status" }, "Loading …"), update() {} });
+
 const views = [
   { name: "bus", title: "Bus", view: busView(shared, () => show("drive")) },
-  { name: "drive", title: "Drive", view: driveView(shared) },
+  { name: "drive", title: "Drive", view: driveView(shared, report) },
   { name: "motion", title: "Motion", view: motionView(shared, report) },
-  { name: "scope", title: "Scope", view: scopeView(shared) },
-  { name: "parameters", title: "Parameters", view: parametersView(shared, report) },
-  { name: "pdo", title: "PDO", view: pdoView(shared, report) },
-  { name: "trace", title: "Trace", view: traceView() },
-  { name: "faults", title: "Faults", view: faultsView() },
-  { name: "world", title: "World", view: worldView(shared, report) },
+  { name: "scope", title: "Scope", view: fetching() },
+  { name: "parameters", title: "Parameters", view: fetching() },
+  { name: "pdo", title: "PDO", view: fetching() },
+  { name: "trace", title: "Trace", view: fetching() },
+  { name: "faults", title: "Faults", view: fetching() },
+  { name: "world", title: "World", view: fetching() },
 ];
 let shown = null;
+
+/** Fetches the other views, again and again while the line is down. */
+async function fetchViews() {
+  try {
+    const { laterViews } = await import("./views.js");
+    for (const [name, view] of Object.entries(laterViews(shared, report))) views.find((one) => one.name === name).view = view;
+  } catch {
+    setTimeout(fetchViews, SAME_NEWS_MS);
+    return;
+  }
+  if (!shown || byId("view").firstElementChild === shown.view.root) return;
+  byId("view").replaceChildren(shown.view.root);
+  if (link.state) shown.view.update(link.state);
+}
 const tour = tourBar(() => shown?.name ?? null, show);
 byId("view").before(tour.root);
 help.offer("The tour", tour.isOffered, tour.resume);
@@ -111,6 +123,8 @@ addEventListener(
   },
   true,
 );
+
+byId("concerns").addEventListener("click", () => show("faults"));
 
 // Light or dark: as the system has it, until chosen here.
 const chosen = localStorage.getItem("theme");
@@ -188,6 +202,9 @@ on("state", (state) => {
   const bus = `${load}${state.bus.frames_per_s} frames/s · ${state.bus.name}`;
   setText(byId("bus-line"), bus);
   byId("bus-line").title = bus;
+  const bad = concerns(state.nodes);
+  setText(byId("concerns"), bad);
+  byId("concerns").hidden = bad === "";
   updateControl(state);
   const unseen = unseenStops(state);
   byId("moving-notice").hidden = unseen.length === 0;
@@ -241,3 +258,4 @@ on("stop", ({ confirmed, after_ms }) => {
 
 show(location.hash.slice(1) || "bus");
 connect();
+fetchViews();

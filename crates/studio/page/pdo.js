@@ -30,7 +30,7 @@ export function pdoView(shared, report) {
   const undo = h("button", { type: "button", id: "pdo-undo", onclick: goBack }, "Undo the last change");
   const store = h("button", { type: "button", id: "pdo-store", title: "Keep the parameters over a restart", onclick: keep }, "Store in the drive");
   const rows = h("tbody");
-  const table = h("table", { class: "pdos" }, h("thead", {}, h("tr", {}, ...COLUMNS.map((title) => h("th", { scope: "col" }, title)))), rows);
+  const table = h("table", { class: "pdos" }, h("thead", {}, h("tr", {}, ...COLUMNS.map((title) => (title === "" ? h("td") : h("th", { scope: "col" }, title))))), rows);
   const place = h("div");
   const plan = pdoPlan({ write, forget: forgetAll });
   const root = h("section", { class: "pdo" }, h("div", { class: "bar" }, choose.root, nmt, undo, store), about, table, place, plan.root);

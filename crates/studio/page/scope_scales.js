@@ -10,7 +10,7 @@ export function scalePanel(scales, areas, changed) {
   const field = (id, label) => h("input", { id, type: "number", step: "any", class: "short", "aria-label": label, onchange: set });
   const [low, high] = [field("scale-low", "From"), field("scale-high", "To")];
   const status = h("span", { class: "bad", role: "status" });
-  const button = (id, text, title, onclick) => h("button", { type: "button", id, title, "aria-label": title, onclick }, text);
+  const button = (id, text, title, onclick) => h("button", { type: "button", id, title, "aria-label": text.length > 1 ? null : title, onclick }, text);
   const zoomBy = (times) => act((key, bounds) => scales.zoom(key, bounds, times));
   const moveBy = (part) => act((key, bounds) => scales.move(key, bounds, part));
   const root = h(

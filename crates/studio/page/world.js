@@ -24,7 +24,7 @@ export function worldView(shared, report) {
   const groups = h("div", { class: "world-groups" });
   const answer = h("p", { id: "world-answer", role: "status" });
   const list = h("ol", { class: "world-changes", reversed: true });
-  const controls = h("fieldset", { class: "world-controls" }, free, h("h3", {}, "Done so far"), list, groups);
+  const controls = h("fieldset", { class: "world-controls" }, free, h("h2", { class: "small" }, "Done so far"), list, groups);
   const root = h("section", { class: "world" }, about, cards, answer, controls);
 
   /** The drawing of each drive, by place. */

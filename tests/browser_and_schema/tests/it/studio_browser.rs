@@ -3,6 +3,7 @@
 //! `cargo xtask test --only studio` installs both where it can, and runs this. A screenshot of each view is left in
 //! `target/studio` to be looked at.
 
+mod axe;
 mod figures;
 mod group;
 mod help;
@@ -473,14 +474,25 @@ async fn a_fault_is_shown_with_its_remedy_and_the_frames_around() {
     stage.client.release_actions().await.expect("a release");
     stage.find(".happening.emcy:not([aria-pressed=true])").await;
     stage.find(".happening:not(.emcy)[aria-pressed=true]:focus").await;
+    stage.says("#concerns", "1 drive with a fault").await;
+    stage.click("#tabs [data-name=bus]").await;
+    stage.find("#bus-filter").await.send_keys("over-voltage").await.expect("typed");
+    stage
+        .until("the drive with the fault alone", async || {
+            let listed = stage.client.find_all(Locator::Css(".bus tbody tr")).await.expect("rows");
+            listed.len() == 1
+        })
+        .await;
+    stage.says("#bus-summary", "3 nodes · 3 drives · 0 enabled · 1 drive with a fault").await;
     simulator.ask("4 supply 48");
     stage.click("#take").await;
     stage.find("#release").await;
-    stage.click("#tabs [data-name=motion]").await;
-    stage.click(".motion .chooser button:nth-child(3)").await;
-    stage.click("#reset-fault").await;
+    stage.click("#concerns").await;
+    // The remedy of a fault has its button.
+    stage.click(".happening.emcy.lasts").await;
+    stage.click(".fault-detail [data-does=reset_fault]").await;
     stage.wheel("no fault", |wheel| wheel["drive"]["fault_code"] == 0);
-    stage.click("#tabs [data-name=faults]").await;
+    stage.find("#concerns[hidden]").await;
     stage.find(".happening.emcy:not(.lasts)").await;
     stage.click("#theme").await;
     stage.shoot("faults_other_theme").await;

@@ -15,12 +15,13 @@ use super::{PATIENCE, Stage, press, speed};
 /// The stepper of the embedded bus, by its place: nothing stops it when the studio dies.
 const STEPPER: usize = 1;
 
-const VIEWS: [&str; 9] = ["bus", "drive", "motion", "scope", "parameters", "pdo", "trace", "faults", "world"];
+pub(super) const VIEWS: [&str; 9] =
+    ["bus", "drive", "motion", "scope", "parameters", "pdo", "trace", "faults", "world"];
 
 impl Stage {
     /// A window of this size; narrow ones as those of a device that is touched, whose layout is as wide as its contents. By a
     /// command of Chromium's own (Chrome DevTools Protocol), which its driver passes on.
-    async fn device(&self, width: u32, height: u32) {
+    pub(super) async fn device(&self, width: u32, height: u32) {
         let session = self.client.session_id().await.expect("it answers").expect("it has begun");
         let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 1000 });
         let body = json!({ "cmd": "Emulation.setDeviceMetricsOverride", "params": metrics }).to_string();

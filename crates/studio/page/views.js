@@ -1,0 +1,18 @@
+// The views that are not needed for the first picture: fetched after it, so that a page on a slow line is there sooner.
+
+import { faultsView } from "./faults.js";
+import { parametersView } from "./parameters.js";
+import { pdoView } from "./pdo.js";
+import { scopeView } from "./scope.js";
+import { traceView } from "./trace.js";
+import { worldView } from "./world.js";
+
+/** By name: the view. */
+export const laterViews = (shared, report) => ({
+  scope: scopeView(shared),
+  parameters: parametersView(shared, report),
+  pdo: pdoView(shared, report),
+  trace: traceView(),
+  faults: faultsView(report),
+  world: worldView(shared, report),
+});
