@@ -16,6 +16,7 @@ const PROGRAMS: &[(&str, &str)] = &[("chromium", "chromium"), ("chromedriver", "
 pub(crate) fn fetch() -> Result<(), String> {
     debian::install(PROGRAMS)
 }
+
 /// What judges whether everybody can use the page.
 const AXE: &str = "axe-core@4.14.1";
 

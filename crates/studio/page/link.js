@@ -28,7 +28,7 @@ export const link = {
 /** What the studio says to a page that it does not let in: it was started anew, with another token. */
 let turned_away = null;
 
-const listeners = { state: [], news: [], change: [], sight: [], stop: [] };
+const listeners = { state: [], news: [], change: [], sight: [], stop: [], asked: [] };
 let connection = null;
 let seq = 0;
 const waiting = new Map();
@@ -41,7 +41,7 @@ let last_at = performance.now();
 /**
  * Calls `listener` with each state ("state"), each piece of news ("news"), when the connection opens or closes ("change"), when the
  * shown state becomes current or stale, and repeatedly while it is stale ("sight": `{ fresh, connected, age_ms, refused }`), and with
- * the outcome of a press of stop ("stop": `{ confirmed, after_ms }`).
+ * the outcome of a press of stop ("stop": `{ confirmed, after_ms }`), and with each command that is sent ("asked").
  */
 export function on(what, listener) {
   listeners[what].push(listener);
@@ -61,6 +61,7 @@ export function ask(command) {
   seq += 1;
   const message = { seq, session: link.welcome.word, ...command };
   connection.send(JSON.stringify(message));
+  emit("asked", command);
   return new Promise((resolve) => waiting.set(message.seq, resolve));
 }
 

@@ -9,6 +9,7 @@ import { speedLimit } from "./limit.js";
 import { homingWizard } from "./homing.js";
 import { series } from "./kept.js";
 import { motionForm } from "./motion_form.js";
+import { sequencePanel } from "./sequence_panel.js";
 import { isSeenMoving } from "./sight.js";
 
 // Three within the 200 ms after which the studio stops what is not held.
@@ -125,6 +126,15 @@ export function motionView(shared, report) {
     return angles.value(angles.last_s() - 1);
   };
 
+  /** Whether all these drives may be moved; of one that nothing stops the question is its own, when it is chosen. */
+  function areAccepted(nodes) {
+    const open = link.state?.nodes.find(({ node, goes_on, accepted }) => nodes.has(node) && goes_on && !accepted);
+    if (!open) return true;
+    shared.node = open.node;
+    update(link.state);
+    return risk.isAccepted();
+  }
+
   const controls = h(
     "fieldset",
     {},
@@ -163,7 +173,7 @@ export function motionView(shared, report) {
     homing.root,
     group.root,
   );
-  const root = h("section", { class: "motion" }, h("div", { class: "bar" }, title, choose.root), large.root, status, risk.root, speedLimit(report), controls);
+  const root = h("section", { class: "motion" }, h("div", { class: "bar" }, title, choose.root), large.root, status, risk.root, speedLimit(report), controls, sequencePanel(areAccepted));
 
   function update(state) {
     choose.update(state);

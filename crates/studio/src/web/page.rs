@@ -63,6 +63,8 @@ const SOURCES: &[(&str, &str)] = files![
     "scope_source.js",
     "settings.js",
     "kept.js",
+    "sequence.js",
+    "sequence_panel.js",
     "series.js",
     "analysis.js",
     "svg_pen.js",

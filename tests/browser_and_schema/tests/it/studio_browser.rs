@@ -281,6 +281,8 @@ async fn a_drive_is_found_enabled_moved_and_stopped() {
     let stage = Stage::open("moved").await;
     stage.shoot("bus").await;
     stage.take_the_wheel().await;
+    stage.click("#sequence summary").await;
+    stage.click_for("#sequence-record", "#sequence-record[aria-pressed=true]").await;
     stage.click("#enable").await;
     stage.wheel("an enabled drive", |wheel| wheel["drive"]["state"] == "Operation enabled");
     stage.click("#go-move").await;
@@ -292,12 +294,34 @@ async fn a_drive_is_found_enabled_moved_and_stopped() {
     stage.client.perform_actions(press(' ')).await.expect("a key");
     stage.rests();
     stage.wheel("a quick stop", |wheel| wheel["drive"]["state"] != "Operation enabled");
+    a_sequence_is_played_and_runs_as_a_scenario(&stage).await;
     stage.click("#tabs [data-name=drive]").await;
     stage.click_for("#why:not([disabled])", ".findings details.cause").await;
     stage.shoot("drive").await;
     stage.click("#theme").await;
     stage.shoot("drive_other_theme").await;
     stage.close().await;
+}
+
+/// What was recorded moves the wheel again until Stop, and the scenario made of it runs on the command line.
+async fn a_sequence_is_played_and_runs_as_a_scenario(stage: &Stage) {
+    stage.click("#sequence-record").await;
+    stage.says(".sequence li:nth-child(2)", "node 4: Move by 90°").await;
+    stage.says("#sequence-text", "ferrodrive velocity 4 60rpm --no-wait").await;
+    stage.choose("#sequence-form", "python").await;
+    stage.says("#sequence-text", "node_4.move(90, relative=True, wait=False)").await;
+    stage.choose("#sequence-form", "scenario").await;
+    stage.click("#sequence-save").await;
+    let scenario = stage.saved("sequence.toml").await;
+    let ran = processes::ferrodrive(&["run", &scenario.to_string_lossy(), "--json"]);
+    assert_eq!(ran.status, Some(0), "{} {}", ran.out, ran.err);
+    stage.click("#sequence-play").await;
+    stage.turns();
+    stage.client.perform_actions(press(Key::Escape.into())).await.expect("a press");
+    stage.client.release_actions().await.expect("a release");
+    stage.rests();
+    // The last command is sent by then: all were, or Stop was sooner.
+    stage.find("#sequence-play[aria-pressed=false]").await;
 }
 
 #[tokio::test]

@@ -1,0 +1,116 @@
+// The sequence of the Motion view: recorded, kept by the browser, shown as code, and played again.
+
+import { ask, inControl, link, on } from "./link.js";
+import { choice } from "./choice.js";
+import { h, setText, toggle } from "./dom.js";
+import { commandLine, keptSteps, python, recorded, scenario, shownStep } from "./sequence.js";
+import { keep, kept } from "./settings.js";
+
+const KEY = "sequence";
+const MOST = 200;
+const FORMS = [
+  { value: "line", text: "as command line", file: "sequence.sh" },
+  { value: "python", text: "as Python", file: "sequence.py" },
+  { value: "scenario", text: "as scenario", file: "sequence.toml" },
+];
+
+/** `isAccepted` asks once about drives that nothing stops if the studio dies. */
+export function sequencePanel(isAccepted) {
+  const record = toggle("sequence-record", "Record", false, () => (record.checked ? begin() : end()), { title: "Records what is commanded in this page, until pressed again" });
+  const play = toggle("sequence-play", "Play", false, () => (play.checked ? run() : halt("ended by the button")), { title: "Sends the recorded commands with their pauses; Stop ends it" });
+  const clear = h("button", { type: "button", id: "sequence-clear", onclick: () => change([]) }, "Clear");
+  const form = choice("sequence-form", "Show", FORMS, { value: "line", onchange: () => draw() });
+  const save = h("button", { type: "button", id: "sequence-save", onclick: saveText }, "Save");
+  const status = h("span", { class: "quiet", role: "status", id: "sequence-status" });
+  const list = h("ol", { class: "sequence", "aria-label": "Recorded commands" });
+  const text = h("pre", { class: "code", id: "sequence-text", tabindex: "0", "aria-label": "The sequence as text" });
+  const hint = h("p", { class: "quiet" }, "A jog is recorded as a turn that ends with a stop. Motions are sent with the pauses between what was done, whether they were reached or not.");
+  const root = h("details", { class: "homing", id: "sequence" }, h("summary", {}, "Sequence: record, play, show as code"), h("div", { class: "bar" }, record, play, clear, form, save, status), list, text, hint);
+  let steps = keptSteps(kept(KEY, []));
+  /** When the step before was sent; null while nothing is recorded. */
+  let before = null;
+  /** The play under way; a new object each time. */
+  let playing = null;
+
+  function change(to) {
+    steps = to;
+    keep(KEY, steps);
+    draw();
+  }
+
+  function begin() {
+    halt("");
+    change([]);
+    before = performance.now();
+    setText(status, "recording");
+  }
+
+  function end() {
+    before = null;
+    setText(status, "");
+  }
+
+  on("asked", (command) => {
+    const what = before === null || playing ? null : recorded(command);
+    if (!what) return;
+    if (steps.length >= MOST) return setText(status, `at most ${MOST} commands: recording has ended`);
+    const now = performance.now();
+    const after_s = steps.length ? (now - before) / 1e3 : 0;
+    before = now;
+    change([...steps, { after_s, command: what }]);
+  });
+
+  /** Ends a play; what it has set in motion is stopped by Stop, or by the next command. */
+  function halt(why) {
+    if (!playing) return;
+    playing = null;
+    play.checked = false;
+    setText(status, why);
+  }
+  on("stop", () => halt("ended by Stop"));
+  on("change", (connected) => connected || halt("ended: the connection to the studio was lost"));
+
+  async function run() {
+    play.checked = false;
+    if (!steps.length) return setText(status, "nothing is recorded");
+    if (!inControl()) return setText(status, "take control first");
+    if (!isAccepted(new Set(steps.map(({ command }) => command.node)))) return;
+    if (record.checked) record.click();
+    const mine = {};
+    playing = mine;
+    play.checked = true;
+    for (const [at, { after_s, command }] of steps.entries()) {
+      if (at > 0) await new Promise((resolve) => setTimeout(resolve, after_s * 1e3));
+      if (playing !== mine) return;
+      setText(status, `${at + 1} of ${steps.length}: ${shownStep(steps[at], 0)}`);
+      // Not awaited: the next command comes when it came, and replaces a motion that is not done.
+      ask(command).then((answer) => {
+        if (playing === mine && !answer.ok && answer.error.kind !== "replaced") halt(`ended at ${at + 1}: ${answer.error.message}`);
+      });
+    }
+    if (playing === mine) halt(`all ${steps.length} commands were sent`);
+  }
+
+  function code() {
+    const bus = link.state?.bus.name ?? "can0";
+    const models = (link.state?.nodes ?? []).filter(({ model }) => model);
+    return { line: () => commandLine(steps, bus), python: () => python(steps, bus), scenario: () => scenario(steps, models) }[form.value]();
+  }
+
+  function saveText() {
+    const address = URL.createObjectURL(new Blob([code()], { type: "text/plain" }));
+    h("a", { href: address, download: FORMS.find(({ value }) => value === form.value).file }).click();
+    URL.revokeObjectURL(address);
+  }
+
+  function draw() {
+    list.replaceChildren(...steps.map((step, at) => h("li", {}, shownStep(step, at))));
+    text.hidden = steps.length === 0;
+    setText(text, steps.length ? code() : "");
+    for (const button of [play, clear, save]) button.disabled = steps.length === 0;
+  }
+  draw();
+  // The bus and its models are known later.
+  root.addEventListener("toggle", draw);
+  return root;
+}
