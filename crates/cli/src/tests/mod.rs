@@ -2,10 +2,12 @@
 //! without a clock. What only processes show (signals, sockets, terminals) is in `tests/processes`.
 
 mod guards;
+mod images;
 mod latency;
 mod limits;
 mod looks;
 mod lss;
+mod machines;
 mod models;
 mod pages;
 mod params;

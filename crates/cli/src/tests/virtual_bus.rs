@@ -37,6 +37,12 @@ impl VirtualBus {
         let specs = drives.iter().map(|drive| Placed::from(drive_spec(drive).expect("a drive")));
         let mut machine = Machine::default();
         (machine.bitrate, machine.drives) = (Some(Bitrate::K500), specs.collect());
+        Self::of_machine(&machine)
+    }
+
+    /// The drives of a machine file, which have booted.
+    #[track_caller]
+    pub(super) fn of_machine(machine: &Machine) -> Self {
         let bus = Self { world: Arc::new(Mutex::new(machine.build().expect("a machine"))), options: Vec::new() };
         bus.pass(BOOT);
         bus

@@ -88,6 +88,36 @@ fn a_scenario_that_is_recorded_is_the_same_run() {
 }
 
 #[test]
+fn a_record_says_how_a_drive_turned_and_what_was_done_to_it() {
+    let place = scratch("recorded-turn");
+    let scenario = place.join("turn.toml");
+    let text = "machine = { drive = [{ model = 'zlac8030l', node = 4 }] }\nend = '6s'\n\
+                [[host]]\ndo = ['4 enable', '4 move by 360deg at 60rpm']\n\
+                [[step]]\nat = '5s'\ndo = '4 load torque 0.5'\n";
+    std::fs::write(&scenario, text).unwrap();
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        done(&["run", scenario.to_str().unwrap(), "--record", path.to_str().unwrap()]);
+        let recorded = recorded(&path);
+        assert!(!recorded.torn, "{name}");
+        let of = |wanted: &str| {
+            let found = recorded.series.iter().find(|series| series.column.name() == wanted);
+            &found.unwrap_or_else(|| panic!("{wanted} in {name}")).points
+        };
+        // A turn has 4096 counts, and the drive measures within a count of where it is.
+        let (_, position) = of("4.position_counts").iter().rev().find(|(at, _)| *at <= 4.9).unwrap();
+        assert!((position - 4096.0).abs() < 8.0, "{name}: {position}");
+        let fastest = of("4.velocity_rpm").iter().map(|(_, rpm)| *rpm).fold(0.0, f64::max);
+        assert!((50.0..70.0).contains(&fastest), "{name}: {fastest} r/min");
+        // A sample each millisecond, none missing, none twice.
+        let steps = of("4.supply_v").windows(2).map(|pair| ((pair[1].0 - pair[0].0) * 1e6).round() as i64);
+        assert!(steps.into_iter().all(|micros| micros == 1000), "{name}");
+        let mark = recorded.marks.iter().find(|mark| mark.text.contains("load torque 0.5")).expect(name);
+        assert!((mark.at.as_secs_f64() - 5.0).abs() < 0.002, "{name}: {mark:?}");
+    }
+}
+
+#[test]
 fn a_body_is_recorded_with_what_it_does() {
     let place = scratch("recorded-body");
     let scenario = place.join("base.toml");

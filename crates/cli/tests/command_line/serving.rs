@@ -1,9 +1,10 @@
 //! What `sim`, `run --serve`, `studio` and `top` refuse before they serve anything.
 
+use std::net::TcpListener;
 use std::path::PathBuf;
 use std::process::Command;
 
-use processes::{Scratch, ferrodrive, scratch};
+use processes::{Scratch, Simulator, ferrodrive, scratch};
 
 const DRIVE: [&str; 2] = ["--drive", "zlac8030l@4"];
 
@@ -170,4 +171,31 @@ fn a_place_that_cannot_be_served_is_reported_before_it_is_ready() {
     let ended = ferrodrive(&["sim", "--drive", "m4230e17b50@2", "--modbus", "rtu:///dev/no-such-line"]);
     assert_eq!((ended.status, ended.out.as_str()), (Some(1), ""), "{}", ended.err);
     assert!(ended.err.contains("cannot serve rtu:///dev/no-such-line"), "{}", ended.err);
+}
+
+#[test]
+fn a_simulator_that_nobody_can_reach_says_so_and_runs() {
+    let mut simulator = Simulator::start_heard(&[&DRIVE[..], &["--clock", "manual"]].concat());
+    assert_eq!(simulator.ready, "ready");
+    assert!(simulator.error("no program can reach").contains("--serve"));
+    assert_eq!(simulator.ask("now")["ok"], true);
+}
+
+#[test]
+fn a_gateway_that_cannot_serve_says_why() {
+    let embedded = ferrodrive(&["gateway"]);
+    assert!(embedded.status == Some(2) && embedded.err.contains("cannot serve a virtual bus"), "{}", embedded.err);
+    // Nothing is asked of the drive, whose time stands.
+    let served = ["--clock", "manual", "--serve", "socketcand://127.0.0.1:0"];
+    let simulator = Simulator::start(&[&DRIVE[..], &served].concat());
+    let bus = simulator.bus("socketcand");
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let place = taken.local_addr().unwrap().to_string();
+    let second = ferrodrive(&["--bus", &bus, "gateway", "--listen", &place]);
+    assert!(second.status == Some(1) && second.err.contains("cannot listen at"), "{}", second.err);
+    // An address of no machine (RFC 5737), and a word that is none.
+    let nowhere = ferrodrive(&["--bus", &bus, "gateway", "--listen", "192.0.2.1:1"]);
+    assert!(nowhere.status == Some(1) && nowhere.err.contains("cannot listen at 192.0.2.1:1"), "{}", nowhere.err);
+    let word = ferrodrive(&["--bus", &bus, "gateway", "--listen", "here"]);
+    assert!(word.status == Some(2) && word.err.contains("expected HOST:PORT"), "{}", word.err);
 }

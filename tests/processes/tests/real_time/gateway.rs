@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, ChildStderr, Stdio};
 
-use processes::{PATIENCE, Simulator, command, done, ferrodrive, wait_until};
+use processes::{PATIENCE, Simulator, command, done, wait_until};
 
 /// A running gateway; killed when dropped.
 struct Gateway {
@@ -84,10 +84,6 @@ impl Client {
 const DRIVES: [&str; 6] = ["--drive", "zlac8030l@4", "--drive", "m4230e17b50@1", "--drive", "zlim42c@2"];
 const MODELS: [&str; 3] = ["4=zlac8030l", "1=m4230e17b50", "2=zlim42c"];
 
-fn simulator() -> Simulator {
-    Simulator::start(&[&DRIVES[..], &["--serve", "socketcand://127.0.0.1:0"]].concat())
-}
-
 /// Brings a drive into motion at 60 r/min by the gateway alone (CiA 402: mode 3, shutdown, switch on, enable operation).
 fn turn(client: &mut Client) {
     for (number, line) in [
@@ -160,20 +156,4 @@ fn a_gateway_that_is_asked_to_end_stops_what_its_clients_moved() {
     wait_until("the drive stands", || speed_of(&simulator).abs() < 1.0);
     let mut rest = String::new();
     let _ = client.lines.read_to_string(&mut rest);
-}
-
-#[test]
-fn a_gateway_that_cannot_serve_says_why() {
-    let embedded = ferrodrive(&["gateway"]);
-    assert!(embedded.status == Some(2) && embedded.err.contains("cannot serve a virtual bus"), "{}", embedded.err);
-    let simulator = simulator();
-    let bus = simulator.bus("socketcand");
-    let first = Gateway::start(&bus, &[]);
-    let second = ferrodrive(&["--bus", &bus, "gateway", "--listen", &first.address]);
-    assert!(second.status == Some(1) && second.err.contains("cannot listen at"), "{}", second.err);
-    // An address of no machine (RFC 5737), and a word that is none.
-    let nowhere = ferrodrive(&["--bus", &bus, "gateway", "--listen", "192.0.2.1:1"]);
-    assert!(nowhere.status == Some(1) && nowhere.err.contains("cannot listen at 192.0.2.1:1"), "{}", nowhere.err);
-    let word = ferrodrive(&["--bus", &bus, "gateway", "--listen", "here"]);
-    assert!(word.status == Some(2) && word.err.contains("expected HOST:PORT"), "{}", word.err);
 }

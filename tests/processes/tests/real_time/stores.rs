@@ -76,6 +76,8 @@ fn a_store_is_there_after_every_end_that_came_with_its_acknowledgement() {
         let found = found(&state);
         assert!(found == value || !was_promised(&simulator), "{found} instead of {value} after {end}");
     }
+    // In a folder of its own it is as delivered (ZLAC8030L quick start guide V1.00, chapter 9).
+    assert_eq!(found(&scratch("ends-elsewhere")), 1000);
 }
 
 /// A disk that takes longer than clients wait is not waited for, which is reported: then an ended one has promised nothing.

@@ -2,9 +2,10 @@
 
 use processes::studio::Studio;
 
+#[cfg(unix)]
 #[test]
-fn the_first_line_is_the_way_in_and_the_embedded_drives_are_there() {
-    let studio = Studio::start(&[]);
+fn the_first_line_is_the_way_in_the_embedded_drives_are_there_and_it_ends_when_it_is_asked_to() {
+    let mut studio = Studio::start(&[]);
     assert!(studio.ask("GET /", "").starts_with("HTTP/1.1 401"));
     let opened = studio.ask(&format!("GET /?token={}", studio.token), "");
     assert!(opened.starts_with("HTTP/1.1 303") && opened.contains("HttpOnly"), "{opened}");
@@ -14,13 +15,6 @@ fn the_first_line_is_the_way_in_and_the_embedded_drives_are_there() {
     assert_eq!(state["nodes"][2]["model"], "zlac8030l");
     // All is as it is delivered, without power on the motor.
     assert_eq!(state["nodes"][2]["drive"]["state"], "Switch on disabled");
-}
-
-#[cfg(unix)]
-#[test]
-fn it_ends_when_it_is_asked_to() {
-    let mut studio = Studio::start(&[]);
-    studio.state();
     let asked = std::process::Command::new("kill").arg(studio.child.id().to_string()).status().unwrap();
     assert!(asked.success());
     assert_eq!(studio.child.wait().unwrap().code(), Some(143));

@@ -1,4 +1,5 @@
-//! What readers that do not read, clients that send too much and files of others can do to a simulator: nothing.
+//! What readers that do not read and clients that send too much can do to a simulator: nothing. Who makes room is asked of the hub
+//! (`transport/hub.rs`), what happens to lines that are too long or not read in `crates/serve/src/{input,messages}.rs`.
 #![cfg(unix)]
 
 use std::io::Write;
@@ -6,11 +7,9 @@ use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use processes::Simulator;
 use processes::raw_bus::RawBus;
-use processes::{Simulator, done, scratch};
-use serde_json::Value;
 
-const DRIVE: [&str; 2] = ["--drive", "zlac8030l@4"];
 const SERVED: [&str; 4] = ["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"];
 
 /// Connections that send the same over and over until they are dropped.
@@ -41,35 +40,6 @@ impl Drop for Flood {
         self.0.store(true, Ordering::Relaxed);
         self.1.drain(..).for_each(|thread| thread.join().unwrap());
     }
-}
-
-#[test]
-fn answers_that_nobody_reads_stop_no_drive_and_their_number_is_reported() {
-    const ASKED: u64 = 30_000;
-    let mut simulator = Simulator::start_deaf(&SERVED);
-    let mut input = simulator.take_input();
-    for _ in 0..ASKED {
-        writeln!(input, "4 get").unwrap();
-    }
-    simulator.error("standard output is not being read");
-    let bus = simulator.bus("socketcand");
-    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200B"]).json()["value"], 1024);
-    let (mut answered, mut dropped, mut last) = (0, 0, 0.0);
-    while answered + dropped < ASKED {
-        let answer: Value = serde_json::from_str(&simulator.line()).unwrap();
-        match answer["dropped"].as_u64() {
-            Some(count) => dropped += count,
-            None => {
-                let t = answer["t"].as_f64().unwrap();
-                assert!(t >= last, "{t} after {last}");
-                (answered, last) = (answered + 1, t);
-            }
-        }
-    }
-    assert!(dropped > 0 && answered > 5_000, "{answered} answered, {dropped} dropped");
-    simulator.error("answers were dropped");
-    writeln!(input, "now").unwrap();
-    assert!(simulator.line().contains("behind_ms"));
 }
 
 #[test]
@@ -138,61 +108,4 @@ fn among_twenty_flooders_of_a_higher_priority_an_honest_client_is_answered_each_
     }
     drop(flood);
     assert!(others > 25, "the flooders were heard: {others} frames");
-}
-
-#[test]
-fn idle_connections_make_room() {
-    let simulator = Simulator::start_heard(&SERVED);
-    let address = simulator.address("socketcand");
-    let mut honest = RawBus::connect(&address);
-    let idle: Vec<TcpStream> = (0..300).map(|_| TcpStream::connect(&address).unwrap()).collect();
-    let mut late = RawBus::connect(&address);
-    for bus in [&mut honest, &mut late] {
-        assert!(bus.upload(4, 0x200B, 0).is_some());
-    }
-    simulator.error("idle make room");
-    drop(idle);
-}
-
-#[test]
-fn an_endless_line_is_refused_without_being_kept() {
-    let mut simulator = Simulator::start(&SERVED);
-    let mut input = simulator.take_input();
-    let chunk = [b'x'; 1 << 16];
-    for _ in 0..(200 << 20) / chunk.len() {
-        input.write_all(&chunk).unwrap();
-    }
-    writeln!(input, "\nnow").unwrap();
-    assert!(simulator.line().contains("longer than 4096 bytes"));
-    assert!(simulator.line().contains("behind_ms"));
-    let status = std::fs::read_to_string(format!("/proc/{}/status", simulator.id())).unwrap_or_default();
-    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse().ok());
-    assert!(peak.is_none_or(|kilobytes: u64| kilobytes < 64 << 10), "{peak:?} kB");
-}
-
-#[test]
-fn a_simulator_that_nobody_can_reach_says_so_and_runs() {
-    let mut simulator = Simulator::start_heard(&DRIVE);
-    assert_eq!(simulator.ready, "ready");
-    assert!(simulator.error("no program can reach").contains("--serve"));
-    assert_eq!(simulator.ask("now")["ok"], true);
-}
-
-#[test]
-fn a_drive_that_its_image_puts_elsewhere_is_said_at_the_start() {
-    let directory = scratch("elsewhere");
-    let state = ["--state", directory.to_str().unwrap()];
-    let mut first = Simulator::start(&[&SERVED[..], &state].concat());
-    let bus = first.bus("socketcand");
-    let write = |object: &str, value: &str| {
-        done(&["--bus", &bus, "--model", "4=zlac8030l", "write", "4", object, value]);
-    };
-    // Node-ID 9, and number 2 of the bit rates, which is 250 kbit/s.
-    write("200D", "9");
-    write("200E", "2");
-    first.ask("quit");
-    first.wait();
-    let second = Simulator::start_heard(&[&SERVED[..], &state].concat());
-    assert!(second.error("is off the bus").contains("zlac8030l@4"));
-    assert!(second.error("is node 9 on the bus").contains("zlac8030l@4"));
 }

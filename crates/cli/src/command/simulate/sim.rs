@@ -253,7 +253,7 @@ impl Sim {
     }
 
     /// The machine of the file, if there is one, with what the command line says beside it.
-    fn machine(&self, file: Option<&Machine>) -> Result<Machine, Failure> {
+    pub(crate) fn machine(&self, file: Option<&Machine>) -> Result<Machine, Failure> {
         let mut machine = file.cloned().unwrap_or_default();
         machine.bitrate = self.bitrate.or(machine.bitrate);
         machine.seed = self.seed.or(machine.seed);
@@ -401,7 +401,7 @@ fn unusable(bad: BadFile) -> Failure {
 /// Says it if a drive is not where the command line puts it, because its EEPROM contents say otherwise.
 ///
 /// That is seen from one that is switched on beside the bus.
-fn note_what_the_image_changes(
+pub(crate) fn note_what_the_image_changes(
     mut drive: Box<dyn VirtualDrive>,
     of_bus: Bitrate,
     number: u8,
