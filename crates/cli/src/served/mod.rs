@@ -2,10 +2,12 @@
 
 mod control_options;
 
-use std::io::{IsTerminal, stdin};
+use std::io::{self, IsTerminal, stdin};
+use std::net::SocketAddr;
 
 use serve::pacer::Clock;
 use serve::service::{END_PATIENCE, Parted, Request};
+use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::sync::mpsc;
 
@@ -40,6 +42,19 @@ impl From<ClockArg> for Clock {
 /// The runtime of a served world and its clients.
 pub(crate) fn runtime_of_clients() -> Result<Runtime, Failure> {
     serve::service::runtime_of_clients().map_err(|error| no_runtime(&error))
+}
+
+/// What `--listen` says: a server there, and its address.
+pub(crate) async fn listen(place: &str) -> Result<(TcpListener, SocketAddr), Failure> {
+    let listener = TcpListener::bind(place).await.map_err(|error| cannot_listen(place, error))?;
+    let address = listener.local_addr().map_err(|error| cannot_listen(place, error))?;
+    Ok((listener, address))
+}
+
+pub(crate) fn cannot_listen(place: &str, error: io::Error) -> Failure {
+    Failure::new(format!("cannot listen at {place}"))
+        .because(error)
+        .next("give --listen HOST:PORT of this machine, with a port that is free; port 0 takes any")
 }
 
 /// Lines of standard input are typed by a person.

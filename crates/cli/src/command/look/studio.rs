@@ -14,7 +14,6 @@ use host::{Host, Journals, Setting};
 use machine::parameters::journal::Journal;
 use serde::Serialize;
 use studio::{Access, AccessError, Password, Token};
-use tokio::net::TcpListener;
 use transport::BusSpec;
 use words::document::read_text;
 
@@ -26,6 +25,7 @@ use crate::failure::Failure;
 use crate::far_world;
 use crate::output::{Format, Report, file_path};
 use crate::recording::interface_of;
+use crate::served::{cannot_listen, listen};
 use plot::Paint;
 
 /// Show and move drives in the browser
@@ -90,13 +90,7 @@ impl Studio {
     /// Serves until a signal ends it.
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         let password = self.password_file.as_deref().map(read_password).transpose()?;
-        let cannot = |error: std::io::Error| {
-            Failure::new(format!("cannot listen at {}", self.listen))
-                .because(error)
-                .next("give --listen HOST:PORT of this machine, with a port that is free; port 0 takes any")
-        };
-        let listener = TcpListener::bind(&self.listen).await.map_err(cannot)?;
-        let address = listener.local_addr().map_err(cannot)?;
+        let (listener, address) = listen(&self.listen).await?;
         let access = Access::new(address, password).map_err(|error| refused(&error))?.with_hosts(self.hosts.clone());
         let access = match self.token_file.as_deref().map(kept_token).transpose()? {
             Some(token) => access.with_token(token),
@@ -119,7 +113,7 @@ impl Studio {
         let (host, handle) = Host::new(context.network.clone(), setting);
         let app = studio::app(handle, Arc::new(access));
         tokio::select! {
-            served = studio::serve(listener, app) => served.map_err(cannot),
+            served = studio::serve(listener, app) => served.map_err(|error| cannot_listen(&self.listen, error)),
             // Not before the router is gone, which holds the handle.
             () = host.run(|| context.traffic.take()) => Ok(()),
             never = self.keep_open(context, &url) => match never {},

@@ -20,6 +20,7 @@ use places::{MAX_CLIENTS, Places};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
+use crate::served::listen;
 use plot::Paint;
 
 /// Serve the bus to other programs as text over TCP (CiA 309-3)
@@ -74,13 +75,7 @@ impl Gateway {
                 .because("such a bus has virtual time, in which no client can connect")
                 .next("ferrodrive sim --drive MODEL@NODE --serve socketcand://127.0.0.1:29536, then --bus socketcand://127.0.0.1:29536/can0"));
         }
-        let cannot = |error: std::io::Error| {
-            Failure::new(format!("cannot listen at {}", self.listen))
-                .because(error)
-                .next("give --listen HOST:PORT of this machine, with a port that is free; port 0 takes any")
-        };
-        let listener = TcpListener::bind(&self.listen).await.map_err(cannot)?;
-        let address = listener.local_addr().map_err(cannot)?;
+        let (listener, address) = listen(&self.listen).await?;
         if !address.ip().is_loopback() {
             context.note(&format!("there is no password: anyone who can reach {address} can move the drives"));
         }
