@@ -2,9 +2,10 @@
 
 use std::fmt::Write;
 
+use plot::escaped;
+
 use crate::case::Group;
 use crate::cases;
-use crate::junit::escaped;
 use crate::report::{CaseResult, Outcome, Report};
 
 const STYLE: &str = "

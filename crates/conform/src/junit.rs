@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use plot::escaped;
+
 use crate::report::{Outcome, Report};
 
 /// The report in the form of JUnit: a test case each; those that do not apply, and departures that the manual states, are
@@ -38,29 +40,4 @@ pub fn junit(report: &Report) -> String {
     }
     out.push_str("</testsuite>\n");
     out
-}
-
-/// Text as it may stand in XML and HTML, in an attribute too.
-pub(crate) fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\n' => out.push('\n'),
-            control if control.is_control() => out.push('?'),
-            other => out.push(other),
-        }
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn nothing_that_a_device_says_ends_an_element() {
-        assert_eq!(super::escaped("a<b>&\"\u{1b}"), "a&lt;b&gt;&amp;&quot;?");
-    }
 }

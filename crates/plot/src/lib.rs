@@ -25,10 +25,12 @@ mod svg;
 mod table;
 mod thin;
 mod ticks;
+mod xml;
 
 pub use paint::Paint;
 pub use poster::{Colour, Event, EventKind, Figure, Panel, Poster, Section, Style, Trace};
 pub use table::Table;
+pub use xml::escaped;
 
 impl Poster {
     /// The picture, as the text of an SVG file.

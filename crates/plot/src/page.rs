@@ -1,7 +1,7 @@
 //! A picture as a web page of its own: the SVG, and a script that shows the values under the pointer.
 
 use crate::poster::Poster;
-use crate::svg::escape;
+use crate::xml::escaped;
 
 const SCRIPT: &str = include_str!("page.js");
 
@@ -12,7 +12,7 @@ td{padding:0 14px 0 0}td:nth-child(2),td:nth-child(3){text-align:right;font-vari
 
 /// The page; it needs nothing from anywhere.
 pub(crate) fn page(poster: &Poster, svg: &str) -> String {
-    let title = escape(&poster.title);
+    let title = escaped(&poster.title);
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>{STYLE}</style>\n\

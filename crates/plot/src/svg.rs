@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use crate::xml::escaped;
+
 /// SVG text under construction.
 #[derive(Default)]
 pub(crate) struct Svg {
@@ -79,9 +81,9 @@ impl Svg {
             let _ = writeln!(
                 self.body,
                 r#"<g data-figure="{figure}" data-name="{}" data-unit="{}" data-left="{left}" data-right="{right}" data-begin="{begin}" data-end="{end}" data-top="{top}" data-height="{height}" data-low="{low}" data-high="{high}" data-logarithmic="{}">"#,
-                escape(name),
-                escape(unit),
-                escape(logarithmic)
+                escaped(name),
+                escaped(unit),
+                escaped(logarithmic)
             );
         }
     }
@@ -95,7 +97,7 @@ impl Svg {
 
     /// What a script finds a line by.
     pub(crate) fn label(&self, label: &str) -> String {
-        if self.scripted { format!(r#" data-label="{}""#, escape(label)) } else { String::new() }
+        if self.scripted { format!(r#" data-label="{}""#, escaped(label)) } else { String::new() }
     }
 
     /// Puts what another one holds on top.
@@ -158,7 +160,7 @@ impl Svg {
             r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" font-size="{}" fill="{}"{weight}{paint}>{}</text>"#,
             font.size,
             font.colour,
-            escape(text)
+            escaped(text)
         );
     }
 
@@ -173,15 +175,10 @@ impl Svg {
             ),
             width = width,
             height = height,
-            title = escape(title),
+            title = escaped(title),
             body = self.body
         )
     }
-}
-
-/// Text as it stands in SVG and HTML.
-pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -18,6 +18,8 @@ pub mod unit;
 pub mod unresolved;
 pub mod value;
 
+pub use plot::escaped;
+
 /// A number and what there are so many of: `1 value`, `2 values`.
 pub fn counted(count: impl TryInto<u64>, what: &str) -> String {
     // A number beyond 64 bits counts nothing that there is.
@@ -37,23 +39,6 @@ pub fn plain(text: &str) -> String {
         }
     }
     shown
-}
-
-/// Text as XML takes it: no markup, and none of the letters that XML 1.0 does not have.
-pub fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\n' | '\t' => escaped.push(letter),
-            _ if letter.is_control() || matches!(letter, '\u{FFFE}' | '\u{FFFF}') => escaped.push('\u{FFFD}'),
-            _ => escaped.push(letter),
-        }
-    }
-    escaped
 }
 
 #[cfg(test)]
