@@ -21,6 +21,7 @@ mod mcap_file;
 mod mcap_read;
 mod mcap_writer;
 mod picture;
+mod packing;
 mod piece;
 mod read;
 mod record;

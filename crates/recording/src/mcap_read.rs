@@ -11,13 +11,11 @@ use serde_json::Value;
 use super::cdr::Decoder;
 use super::channels::{EVENTS, MESSAGE_ENCODING, NAMED};
 use super::column::{Column, Subject};
-use super::mcap_writer::ZSTD;
+use super::packing;
 use super::piece::{Mark, Recorded, Series, Severity};
 
 /// The longest chunk that is unpacked, in bytes. Writers end theirs at some MB.
 const LONGEST_CHUNK: u64 = 64 << 20;
-/// How the specification names the frame format of LZ4, in which other programs, and records of before, have their chunks.
-const LZ4: &str = "lz4";
 
 pub(super) fn read_mcap(bytes: &[u8]) -> Result<Recorded, String> {
     if !bytes.starts_with(mcap::MAGIC) {
@@ -55,17 +53,9 @@ fn unpacked(header: &ChunkHeader, data: &[u8]) -> Result<Option<Vec<u8>>, String
     if size > LONGEST_CHUNK {
         return Err(format!("a chunk of it has {size} bytes; expected at most {LONGEST_CHUNK}"));
     }
-    let mut plain = Vec::new();
-    let read = match header.compression.as_str() {
-        "" => data.take(size).read_to_end(&mut plain),
-        ZSTD => zstd::Decoder::new(data).and_then(|data| data.take(size).read_to_end(&mut plain)),
-        LZ4 => lz4_flex::frame::FrameDecoder::new(data).take(size).read_to_end(&mut plain),
-        other => {
-            return Err(format!("its chunks are compressed with '{other}'; expected '{ZSTD}', '{LZ4}', or none"));
-        }
-    };
+    let Ok(plain) = packing::unpacked(&header.compression, data, size)? else { return Ok(None) };
     // A check sum of 0 says that there is none.
-    let is_whole = read.is_ok_and(|read| read as u64 == size)
+    let is_whole = plain.len() as u64 == size
         && (header.uncompressed_crc == 0 || header.uncompressed_crc == crc32fast::hash(&plain));
     Ok(is_whole.then_some(plain))
 }

@@ -6,18 +6,13 @@
 use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
 
-use zstd::bulk::Compressor;
-
+use super::packing::{Packer, WRITTEN};
 use super::piece::Target;
 
 /// Bytes of a chunk, uncompressed, before it is written without a flush.
 const CHUNK: usize = 256 << 10;
 /// Bytes of the index that are made before they are written.
 const INDEX_PIECE: usize = 64 << 10;
-/// How the specification names Zstandard (RFC 8878).
-pub(super) const ZSTD: &str = "zstd";
-/// The level that makes the smallest records of all below 10: rows of numbers repeat at one distance, which it finds at once.
-const LEVEL: i32 = 1;
 
 /// Kinds of record.
 mod op {
@@ -56,7 +51,7 @@ pub(super) struct McapWriter {
     message_count: u64,
     /// Times of all messages, ns.
     span: Option<(u64, u64)>,
-    compressor: Compressor<'static>,
+    packer: Packer,
     /// What is put together before it is written.
     out: Vec<u8>,
     /// The target refused a write: how much of it is in the file is unknown.
@@ -89,7 +84,7 @@ impl McapWriter {
             chunk_count: 0,
             message_count: 0,
             span: None,
-            compressor: Compressor::new(LEVEL)?,
+            packer: Packer::new()?,
             out: Vec::new(),
             failed: false,
             ended: false,
@@ -259,13 +254,13 @@ impl McapWriter {
         }
         self.chunk_count += 1;
         let chunk = &self.chunk;
-        let packed = self.compressor.compress(chunk)?;
+        let packed = self.packer.pack(chunk)?;
         record(&mut self.out, op::CHUNK, |body| {
             body.extend(first.to_le_bytes());
             body.extend(last.to_le_bytes());
             body.extend((chunk.len() as u64).to_le_bytes());
             body.extend(crc32fast::hash(chunk).to_le_bytes());
-            put_text(body, ZSTD);
+            put_text(body, WRITTEN);
             body.extend((packed.len() as u64).to_le_bytes());
             body.extend_from_slice(&packed);
         });
@@ -328,7 +323,7 @@ fn put_length(out: &mut Vec<u8>, length: usize) {
 fn index_chunk(file: &mut BufReader<impl Read + Seek>, at: u64, data_until: u64, out: &mut Vec<u8>) -> io::Result<u64> {
     let changed = || io::Error::new(io::ErrorKind::InvalidData, "another program has changed the file");
     // Kind and length of the record, then times, uncompressed size, check sum, name of the compression and its size.
-    let head: [u8; 9 + 24 + 4 + 4 + ZSTD.len() + 8] = take(file)?;
+    let head: [u8; 9 + 24 + 4 + 4 + WRITTEN.len() + 8] = take(file)?;
     let number = |from: usize| u64_at(&head, from);
     let (length, packed) = (number(1), number(head.len() - 8));
     let after = |at: u64, length: u64| at.checked_add(length)?.checked_add(9).filter(|end| *end <= data_until);
@@ -356,7 +351,7 @@ fn index_chunk(file: &mut BufReader<impl Read + Seek>, at: u64, data_until: u64,
             body.extend(place.to_le_bytes());
         }
         body.extend((end - after_chunk).to_le_bytes());
-        put_text(body, ZSTD);
+        put_text(body, WRITTEN);
         body.extend(packed.to_le_bytes());
         body.extend(number(25).to_le_bytes());
     });
@@ -394,7 +389,7 @@ mod tests {
                 counts,
                 chunk,
                 out,
-                compressor: _,
+                packer: _,
                 target: _,
                 place: _,
                 check_sum: _,
@@ -465,7 +460,7 @@ mod tests {
         }
 
         fn name(&self) -> &'static str {
-            ZSTD
+            WRITTEN
         }
     }
 
@@ -527,7 +522,7 @@ mod tests {
         assert_eq!(summary.chunk_indexes.len(), 3000);
         for (number, chunk) in (0_u64..).zip(&summary.chunk_indexes) {
             assert_eq!((chunk.message_start_time, chunk.message_end_time), (number * 100, number * 100 + 50));
-            assert_eq!((bytes[chunk.chunk_start_offset as usize], chunk.compression.as_str()), (op::CHUNK, ZSTD));
+            assert_eq!((bytes[chunk.chunk_start_offset as usize], chunk.compression.as_str()), (op::CHUNK, WRITTEN));
             let indexes = summary.read_message_indexes(&bytes, chunk).unwrap();
             let times = |topic: &str| -> Vec<u64> {
                 let of_it = indexes.iter().find(|(channel, _)| channel.topic == topic).expect("an index");
