@@ -62,7 +62,7 @@ pub(crate) fn respond(handle: &HostHandle, request: &Request, body: &[u8]) -> Re
             Ok(of_json(&json!({ "ok": true })))
         }
         "/api/recording.mcap" => {
-            let why = "a page without a server does not make MCAP files: save a CSV, and convert it with `ferrodrive convert`";
+            let why = "a page without a server does not make MCAP files: save a CSV";
             return trouble(501, "not_here", why);
         }
         _ => return trouble(404, "not_found", "there is nothing at this path"),
