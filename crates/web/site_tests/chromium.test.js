@@ -151,6 +151,19 @@ test("a scenario of the list is played, and its rows are shown", async () => {
   await run("document.querySelector('#scenario button').click(); return true");
 });
 
+test("a data sheet that is dropped on the page joins the machine at the next free node-ID", async () => {
+  const sheet = readFileSync(new URL("../tests/data/io401.eds", import.meta.url), "utf8");
+  await run(
+    `location.hash = "bus";
+     const data = new DataTransfer();
+     data.items.add(new File([${JSON.stringify(sheet)}], "mine.eds"));
+     window.dispatchEvent(new DragEvent("drop", { dataTransfer: data, cancelable: true }));
+     return true`,
+  );
+  await until("node 3 among four drives", "return [...document.querySelectorAll('#view table tbody tr')].map((row) => parseInt(row.innerText)).join() === '1,2,3,4,5'");
+  await picture("eds");
+});
+
 test("a machine that is refused says why, and the first one stands in for it", async () => {
   await webdriver("POST", `/${session}/url`, { url: `${address}?refused#machine=${encodeURIComponent("[[drive]]\nmodel = 'zlac9'\nnode = 4\n")}` });
   await until("why", "return /refused.*line 2.*zlac9/s.test(document.getElementById('machine-status').innerText)");
