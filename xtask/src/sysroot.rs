@@ -45,11 +45,18 @@ impl Rust {
         if Path::new(rustc(&["--print", "target-libdir", "--target", target.name])?.trim()).is_dir() {
             return Ok(Self { target, sysroot: None, programs, built });
         }
+        // A second step finds what the first has made.
+        static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+        let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
         let made = Made::of(target, &sysroot, &host, &version()?);
-        made.make().map_err(|error| {
-            let name = target.name;
-            format!("the target {name} is not installed, and cannot be made: {error}; or: rustup target add {name}")
-        })?;
+        if !made.sysroot.is_dir() {
+            made.make().map_err(|error| {
+                let name = target.name;
+                format!("the target {name} is not installed, and cannot be made: {error}; or: rustup target add {name}")
+            })?;
+            // Cargo does not see that what it built was for another standard library.
+            let _ = std::fs::remove_dir_all(&built);
+        }
         Ok(Self { target, sysroot: Some(made.sysroot), programs, built })
     }
 
@@ -86,12 +93,6 @@ impl Made {
     }
 
     fn make(&self) -> Result<(), String> {
-        // A second step finds what the first has made.
-        static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-        let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.sysroot.is_dir() {
-            return Ok(());
-        }
         let library = self.sources()?;
         say(format_args!("building {} for {}", self.target.crates, self.target.name));
         // Under another name until it is whole: what was cut short is begun again.
@@ -129,7 +130,8 @@ impl Made {
         cargo.arg(format!("-Zbuild-std-features={}", self.target.features));
         // Of this version alone, and from where they were unpacked: Cargo has no stable option for either.
         cargo.env("RUSTC_BOOTSTRAP", "1").env("__CARGO_TESTS_ONLY_SRC_ROOT", library);
-        quietly(cargo.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS"))?;
+        // With bitcode, as the libraries of a toolchain have it: a program may be optimised as a whole (LTO).
+        quietly(cargo.env("CARGO_ENCODED_RUSTFLAGS", "-Cembed-bitcode=yes"))?;
         let built = folder.join("target").join(self.target.name).join("release/deps");
         let files = std::fs::read_dir(built).map_err(failed)?.filter_map(|entry| Some(entry.ok()?.path()));
         let is_library = |path: &PathBuf| {

@@ -26,9 +26,6 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; i
 /// What runs the module, with the packages of Debian that they are in.
 const PROGRAMS: &[(&str, &str)] = &[("node", "nodejs"), ("chromium", "chromium"), ("chromedriver", "chromium-driver")];
 
-/// Optimises a module for size.
-const BINARYEN: &str = "binaryen@132.0.0";
-
 const HELP: &str = "usage: cargo xtask web [-o FOLDER]    (target/web/site without it)";
 
 /// Runs `cargo xtask web`.
@@ -41,7 +38,7 @@ pub(crate) fn command(words: &[&str]) -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    match module("web").and_then(|module| make(&optimised(&module), &folder)) {
+    match module("web").and_then(|module| make(&module, &folder)) {
         Ok(()) => {
             println!("{}", folder.display());
             ExitCode::SUCCESS
@@ -90,36 +87,6 @@ fn module(profile: &str) -> Result<PathBuf, String> {
     let words = ["rustc", "--profile", profile, "--package", "ferrodrive-web", "--crate-type", "cdylib"];
     quietly(&mut rust.cargo(&words))?;
     Ok(rust.built(profile).join("web.wasm"))
-}
-
-/// The module as `wasm-opt` makes it, where npm can get that; else as it is.
-fn optimised(module: &Path) -> PathBuf {
-    let tools = folder().join("tools");
-    let optimiser = tools.join("node_modules/.bin/wasm-opt");
-    let made = module.with_file_name("optimised.wasm");
-    let optimise = || {
-        if !optimiser.is_file() {
-            let mut npm = Command::new("npm");
-            quietly(
-                npm.args(["install", "--no-save", "--no-audit", "--no-fund", "--prefix"]).arg(&tools).arg(BINARYEN),
-            )?;
-        }
-        // What the compiler says that the module uses is in it.
-        quietly(
-            Command::new(&optimiser)
-                .args(["-Oz", "--strip-debug", "--strip-producers"])
-                .arg(module)
-                .arg("-o")
-                .arg(&made),
-        )
-    };
-    match optimise() {
-        Ok(()) => made,
-        Err(reason) => {
-            println!("not optimised for size: {}", reason.lines().next().unwrap_or_default());
-            module.to_owned()
-        }
-    }
 }
 
 /// Makes the folder anew around a module.
