@@ -108,8 +108,8 @@ impl<A: Assembly> Machine<A> {
         self.actuation = next;
     }
 
-    /// When the firmware has to be asked. Every second run of a communication task that finds nothing to do is left out; what a
-    /// tick has to send, such as EMCY, goes out with the next one.
+    /// When the firmware has to be asked: with the first run of its communication task after the tick behind the next one. The runs before it, which
+    /// find nothing to do, are left out; what a tick has to send, such as EMCY, goes out with the next one.
     #[cold]
     #[inline(never)]
     pub(super) fn mechanical_timeout(&self) -> Option<Instant> {
