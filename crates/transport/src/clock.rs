@@ -5,6 +5,7 @@
 //! its own that waits for an [`Alarm`] at an absolute time and ends with the last copy of the clock.
 
 mod alarm;
+pub(crate) mod waiter;
 
 use std::collections::BTreeMap;
 use std::future::Future;

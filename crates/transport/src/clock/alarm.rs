@@ -9,6 +9,7 @@ pub(super) use portable::Alarm;
 /// computing and setting it makes nothing later, and the kernel's slack of 50 µs for sleeping threads does not hold for it.
 #[cfg(target_os = "linux")]
 mod linux {
+    use std::os::fd::{AsFd, AsRawFd, RawFd};
     use std::time::Duration;
 
     use nix::sys::time::TimeSpec;
@@ -28,6 +29,13 @@ mod linux {
             Self(timer.expect("the process has a file descriptor left for a timer"))
         }
 
+        /// One whose [`wait`](Self::wait) returns at once, for a runtime that waits for file descriptors; `None` if the process may open
+        /// no more.
+        pub(in crate::clock) fn that_never_blocks() -> Option<Self> {
+            let flags = TimerFlags::TFD_CLOEXEC | TimerFlags::TFD_NONBLOCK;
+            TimerFd::new(ClockId::CLOCK_BOOTTIME, flags).ok().map(Self)
+        }
+
         /// Goes off at `at`, at once if that is past, or never.
         pub(in crate::clock) fn set(&self, at: Option<Duration>) {
             // Zero would switch the timer off.
@@ -42,6 +50,12 @@ mod linux {
         /// Waits until it goes off.
         pub(in crate::clock) fn wait(&self) {
             let _ = self.0.wait();
+        }
+    }
+
+    impl AsRawFd for Alarm {
+        fn as_raw_fd(&self) -> RawFd {
+            self.0.as_fd().as_raw_fd()
         }
     }
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use tokio::sync::mpsc;
 
+use crate::clock::waiter::Waiter;
 use crate::{ClientId, ErrorFrame, Hub, HubEvent, LeaveReason, WallClock};
 
 /// How far a world is moved past its next deadline in one go. A world that is late (the machine was busy, the process was
@@ -108,6 +109,7 @@ where
     W: RealTimeWorld,
 {
     let mut commands_open = true;
+    let mut waiter = Waiter::new(clock);
     loop {
         let is_late = catch_up(world, hub, clock);
         while let Some(event) = hub.try_next_event() {
@@ -136,16 +138,16 @@ where
                 catch_up(world, hub, clock);
                 take_in(world, event);
             }
-            () = until_due(deadline, clock) => {}
+            () = until_due(deadline, clock, &mut waiter) => {}
         }
     }
 }
 
 /// Waits for the deadline, and lets the tasks of the clients run in any case.
-async fn until_due(deadline: Option<Instant>, clock: &WallClock) {
+async fn until_due(deadline: Option<Instant>, clock: &WallClock, waiter: &mut Waiter) {
     match deadline {
         Some(deadline) if deadline <= clock.now() => tokio::task::yield_now().await,
-        _ => clock.sleep_until_due(deadline).await,
+        _ => waiter.until(deadline).await,
     }
 }
 
