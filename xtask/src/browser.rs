@@ -1,13 +1,8 @@
 //! The page of the studio in a real browser: Chromium, moved by its WebDriver.
 
-use std::process::Command;
-
-use crate::debian;
-use crate::process::quietly;
-use crate::say::say;
 use crate::tally::Tally;
 use crate::test_programs::{self, How, SCHEMA_AND_BROWSER};
-use crate::workspace;
+use crate::{debian, npm};
 
 /// The browser and what moves it, with the packages of Debian that they are in.
 const PROGRAMS: &[(&str, &str)] = &[("chromium", "chromium"), ("chromedriver", "chromium-driver")];
@@ -19,13 +14,14 @@ pub(crate) fn fetch() -> Result<(), String> {
 
 /// What judges whether everybody can use the page.
 const AXE: &str = "axe-core@4.14.1";
+const AXE_FILE: &str = "axe-core/axe.min.js";
 
 pub(crate) fn step() -> Tally {
     if let Err(reason) = fetch() {
         return Tally::skipped(reason);
     }
     let mut arguments = vec!["--ignored", "studio_browser::"];
-    let without_axe = install_axe().err();
+    let without_axe = npm::install(AXE, AXE_FILE).err();
     if without_axe.is_some() {
         arguments.extend(["--skip", "studio_browser::axe::"]);
     }
@@ -39,19 +35,4 @@ pub(crate) fn step() -> Tally {
         }
         _ => tally,
     }
-}
-
-/// Fetches axe-core by npm to where its test looks for it.
-///
-/// # Errors
-/// A sentence: why it cannot be had.
-fn install_axe() -> Result<(), String> {
-    let folder = workspace::target().join("npm");
-    if folder.join("node_modules/axe-core/axe.min.js").is_file() {
-        return Ok(());
-    }
-    debian::install(&[("npm", "npm")])?;
-    say(format_args!("installing {AXE}"));
-    let mut npm = Command::new("npm");
-    quietly(npm.args(["install", "--no-save", "--no-audit", "--no-fund", "--prefix"]).arg(&folder).arg(AXE))
 }

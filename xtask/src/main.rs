@@ -15,6 +15,7 @@ mod dist;
 mod examples;
 mod idle;
 mod libtest;
+mod npm;
 mod packages;
 mod page;
 mod peers;

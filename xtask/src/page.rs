@@ -1,8 +1,9 @@
-//! What the studio's page computes and says, by node: the parts of it that need no browser.
+//! What the studio's page computes and says, by node, and its types, by the TypeScript compiler: what needs no browser.
 
 use std::process::Command;
 
 use crate::debian;
+use crate::npm;
 use crate::process;
 use crate::say::say;
 use crate::tally::Tally;
@@ -10,6 +11,9 @@ use crate::workspace;
 
 /// What runs JavaScript, with the package of Debian that it is in.
 const PROGRAMS: &[(&str, &str)] = &[("node", "nodejs")];
+
+/// What checks the types of the page, which `jsconfig.json` switches on.
+const TYPESCRIPT: &str = "typescript@5.9.3";
 
 pub(crate) fn step() -> Tally {
     if let Err(reason) = debian::install(PROGRAMS) {
@@ -35,6 +39,22 @@ pub(crate) fn tests(node: &mut Command, folder: &str) -> Tally {
         Err(error) => Tally::failed(error),
         Ok(false) if tally.failed == 0 => Tally::failed("node --test failed"),
         Ok(_) if tally.passed + tally.failed == 0 => Tally::failed("no test was found"),
-        Ok(_) => tally,
+        Ok(_) => with_types(tally),
+    }
+}
+
+/// The same and the types.
+fn with_types(tally: Tally) -> Tally {
+    let compiler = match npm::install(TYPESCRIPT, "typescript/bin/tsc") {
+        Ok(compiler) => compiler,
+        Err(reason) if tally.failed == 0 => return Tally { skipped: tally.skipped + 1, note: reason, ..tally },
+        Err(_) => return tally,
+    };
+    let mut node = Command::new("node");
+    node.current_dir(workspace::root().join("crates/studio")).arg(compiler).args(["-p", "jsconfig.json"]);
+    match process::run(&mut node, |line| say(line)) {
+        Ok(true) => Tally { passed: tally.passed + 1, ..tally },
+        Ok(false) => Tally { failed: tally.failed + 1, note: "types of the page".into(), ..tally },
+        Err(error) => Tally::failed(error),
     }
 }

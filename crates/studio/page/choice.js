@@ -17,7 +17,7 @@ addEventListener("pointerdown", (event) => open && !open.root.contains(event.tar
  * An element with `value` and `disabled`, which fires "change" when an option is chosen. `offer` sets its options: `{ value, text,
  * disabled, title }`; the value stays if it is still among them, else it is the first one's. `onopen` is called before its list is shown.
  */
-export function choice(id, label, options = [], { value, onopen = () => {}, onchange = () => {} } = {}) {
+export function choice(id, label, options = [], { value = undefined, onopen = () => {}, onchange = () => {} } = {}) {
   const shown = h("span", { class: "choice-text" });
   const button = h("button", { type: "button", role: "combobox", "aria-haspopup": "listbox", "aria-expanded": "false", "aria-label": label, onclick: () => (mine === open ? close() : show()) }, shown);
   const list = h("ul", { role: "listbox", "aria-label": label, hidden: true });

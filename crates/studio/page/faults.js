@@ -86,7 +86,8 @@ export function faultsView(report) {
     const older = oldest > 0 ? ` The first ${oldest} are no longer kept.` : "";
     setText(here, trouble ?? `${shown.length} shown, ${open} of them still lasting.${older}`);
     const top = list.scrollTop;
-    const focused = list.contains(document.activeElement) ? document.activeElement.dataset.number : undefined;
+    const active = document.activeElement;
+    const focused = active instanceof HTMLElement && list.contains(active) ? active.dataset.number : undefined;
     renew(list, `${revision} ${only.checked}`, () => shown.map(row));
     list.scrollTop = top;
     for (const element of list.children) {

@@ -39,7 +39,10 @@ function mean([values, spans], times) {
   });
 }
 
-/** By name: how many arguments, and what is computed of their columns and of the times. */
+/**
+ * By name: how many arguments, and what is computed of their columns and of the times.
+ * @type {Record<string, [number, (columns: Float64Array[], times: Float64Array) => Float64Array]>}
+ */
 const FUNCTIONS = {
   abs: [1, pointwise(Math.abs)],
   sqrt: [1, pointwise(Math.sqrt)],

@@ -113,6 +113,7 @@ export function groupMotion(report) {
   }
 
   const turn = (sign) => () => {
+    /** @type {any} */
     const at = axes("rpm", "speed");
     return at && isAccepted(at.map(({ node }) => node)) && { do: "group_jog", axes: at.map(({ node, rpm }) => ({ node, rpm: sign * rpm })), rpm_per_s: read(ramp) };
   };

@@ -77,7 +77,9 @@ export function helpPanel(shared, settings) {
   /** Where no element has the focus or the pointer: a list of what has help in this view. */
   function overview() {
     const seen = new Set();
-    const all = [...document.querySelectorAll("#view [data-help]")].filter((element) => {
+    /** @type {any[]} */
+    const marked = [...document.querySelectorAll("#view [data-help]")];
+    const all = marked.filter((element) => {
       const key = `${element.dataset.help} ${element.dataset.name}`;
       return element.getClientRects().length && !seen.has(key) && seen.add(key);
     });
@@ -95,7 +97,7 @@ export function helpPanel(shared, settings) {
   }
 
   document.addEventListener("click", (event) => {
-    const pressed = event.target.closest?.("button.term[data-help]");
+    const pressed = event.target instanceof Element && event.target.closest("button.term[data-help]");
     if (pressed) about(pressed);
   });
   const offer = (name, is_there, take) => offers.push([name, is_there, take]);

@@ -102,6 +102,7 @@ export function homingPicture(method) {
   const head = s("marker", { id: "homing-head", viewBox: "0 0 8 8", refX: "7", refY: "4", markerWidth: "7", markerHeight: "7", orient: "auto" }, s("path", { d: "M0 0L8 4L0 8z" }));
   root.append(s("defs", {}, head), text(LEFT, 16, "negative ←"), text(RIGHT - 62, 16, "→ positive"));
   let y = 40;
+  /** @type {any} */
   let end = null;
   all.forEach((points, at) => {
     const { group, end: reached } = drawn(points, y, at > 0);

@@ -4,7 +4,9 @@ const trouble = document.getElementById("trouble");
 document.getElementById("form").addEventListener("submit", async (event) => {
   event.preventDefault();
   trouble.textContent = "";
-  const password = document.getElementById("password").value;
+  /** @type {any} */
+  const field = document.getElementById("password");
+  const password = field.value;
   try {
     const answer = await fetch("/api/login", { method: "POST", body: JSON.stringify({ password }) });
     if (answer.ok) {

@@ -12,6 +12,7 @@ import { meaningOf } from "./keys.js";
 import { lostSight, unseenStops } from "./sight.js";
 import { tourBar } from "./tour.js";
 
+/** @type {(id: string) => any} */
 const byId = (id) => document.getElementById(id);
 const NEWS_KEPT = 200;
 /** The same news within this time is shown once. */
@@ -105,6 +106,7 @@ const isText = (target) =>
 
 addEventListener(
   "keydown",
+  /** @param {any} event */
   (event) => {
     const types = event.target.matches("input, textarea, [aria-expanded=true]");
     const meaning = meaningOf(event, { in_text: isText(event.target), types, characters: characters.checked });

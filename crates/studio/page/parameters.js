@@ -60,7 +60,7 @@ export function parametersView(shared, report) {
   }
 
   /** Reads these, a few at a time; true if all were read. */
-  async function read(rows, step = () => {}) {
+  async function read(rows, step = (_) => {}) {
     const [of, wanted] = [node, rows.filter((row) => row.readable)];
     for (let from = 0; from < wanted.length; from += AT_ONCE) {
       const some = wanted.slice(from, from + AT_ONCE);

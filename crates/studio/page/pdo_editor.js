@@ -37,7 +37,7 @@ export function pdoEditor({ draft, objects, node, changed }) {
     const fits = (row) => typeof row[direction] === "number";
     // Without a search, what may be mapped; with one, also what may not, and why.
     const rows = objects.filter((row) => (sought.length ? sought.every((word) => words(row).includes(word)) : fits(row)));
-    const first = [...rows].sort((one, other) => fits(other) - fits(one));
+    const first = [...rows].sort((one, other) => Number(fits(other)) - Number(fits(one)));
     found.replaceChildren(...first.slice(0, MOST_FOUND).map(offer), rows.length > MOST_FOUND ? h("li", { class: "quiet" }, `and ${rows.length - MOST_FOUND} more`) : "");
   }
 

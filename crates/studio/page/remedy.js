@@ -1,6 +1,9 @@
 // The buttons of a remedy: what a text tells to do with the command line, as commands of the page. Independent of the page.
 
-/** Commands of the command line that are one command of the page as well: their pattern, the button, and what is sent. */
+/**
+ * Commands of the command line that are one command of the page as well: their pattern, the button, and what is sent.
+ * @type {[RegExp, string, string, object][]}
+ */
 const ROWS = [
   [/\bferrodrive reset (\d+)/, "Reset fault", "reset_fault", {}],
   [/\bferrodrive enable (\d+)/, "Enable", "enable", {}],

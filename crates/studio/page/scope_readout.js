@@ -3,6 +3,7 @@
 import { stepResponse, within } from "./analysis.js";
 import { number } from "./dom.js";
 
+/** @param {any} step */
 function shownStep({ from, to, rise_s, overshoot, overshoot_grid, settling_s, grid_s }, unit, decimals) {
   const above = overshoot === null ? "overshoot too short for these readings" : overshoot === 0 ? "no overshoot" : `overshoot ${within(100 * overshoot, 100 * overshoot_grid)} %`;
   const settling = settling_s === null ? "not settled to 2 %" : `settled to 2 % in ${within(settling_s, grid_s)} s`;

@@ -37,5 +37,5 @@ export function lostSight({ state, connected, age_ms, refused = null }) {
     else if (without_us) lines.push({ text: `Node ${node}: if the studio is dead, ${without_us}.`, urgent: false });
     else lines.push({ text: `Whether anything stops node ${node} if the studio is dead is unknown: use the emergency stop.`, urgent: true });
   }
-  return lines.sort((one, other) => other.urgent - one.urgent);
+  return lines.sort((one, other) => Number(other.urgent) - Number(one.urgent));
 }

@@ -7,6 +7,9 @@ const place = (value) => Math.round(value * 100) / 100;
 export class SvgPen {
   constructor(width, height, background) {
     this.size = [width, height];
+    this.strokeStyle = this.fillStyle = "";
+    this.lineWidth = 1;
+    this.textAlign = "left";
     this.parts = [`<rect width="${width}" height="${height}" fill="${background}"/>`];
     this.path = "";
     this.clips = 0;

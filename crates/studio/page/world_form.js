@@ -48,6 +48,7 @@ export function commandForm(command, { place, names, run }) {
   const { found, hint } = parts(command);
   const fields = [];
   const shown = [];
+  /** @type {any} */
   let last = null;
   found.forEach((part, at) => {
     const before = found[at - 1]?.word;
@@ -70,7 +71,7 @@ export function commandForm(command, { place, names, run }) {
       shown.push(field);
     }
   });
-  const line = (end) => [...fields.flatMap((field) => field()), ...(end === undefined ? [] : [end])].join(" ");
+  const line = (end = undefined) => [...fields.flatMap((field) => field()), ...(end === undefined ? [] : [end])].join(" ");
   const buttons = last
     ? last.map((end) => h("button", { type: "button", "data-line": `${found.map((part) => part.word).filter(Boolean).join(" ")} ${end}`, onclick: () => form.reportValidity() && run(line(end)) }, end))
     : [h("button", {}, "Do")];
