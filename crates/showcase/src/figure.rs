@@ -62,6 +62,7 @@ pub(super) fn zlim42c(finished: &Finished, name: &'static str) -> Vec<Vec<Figure
 pub(super) fn same_calls(finished: &Finished, _name: &'static str) -> Vec<Vec<Figure>> {
     let names = ["ZLAC8030L", "M joint", "ZLIM42-C"];
     vec![vec![Figure {
+        logarithmic: false,
         title: "Three drives on one bus".into(),
         subtitle: "the same call of the master on each, in degrees and r/min at the motor's shaft".into(),
         time: "time, s".into(),
@@ -80,6 +81,7 @@ pub(super) fn same_calls(finished: &Finished, _name: &'static str) -> Vec<Vec<Fi
 pub(super) fn interpolation(finished: &Finished, _name: &'static str) -> Vec<Vec<Figure>> {
     let names = ["node 1", "node 2", "node 3"];
     let starts = finished.starts.iter().map(|start| Figure {
+        logarithmic: false,
         title: format!("{}: {:.0} µs apart", start.setting, start.spread_us()),
         subtitle: "three joints after one SYNC".into(),
         time: "µs".into(),
@@ -104,6 +106,7 @@ pub(super) fn interpolation(finished: &Finished, _name: &'static str) -> Vec<Vec
         ..Figure::default()
     });
     let path = Figure {
+        logarithmic: false,
         title: "Three joints, interpolation".into(),
         subtitle: "mode 7: RPDO4 to each and SYNC, every 2 ms".into(),
         time: "time, s".into(),
@@ -160,6 +163,7 @@ fn drive(
     };
     let (velocity, current) = (mean_rpm(finished, 0), samples(finished, 0, Signal::Current));
     Figure {
+        logarithmic: false,
         title: title.into(),
         subtitle: subtitle.into(),
         time: "time, s".into(),
