@@ -10,8 +10,8 @@ use realfft::num_complex::Complex;
 
 use crate::samples::Unusable;
 
-/// Neighbouring frequencies are this far apart, relative: closer than a lightly damped resonance (damping of 0.5 %) is wide.
-const SPACING: f64 = 0.01;
+/// Neighbouring frequencies are this far apart, relative: as far as a lightly damped resonance (damping of 1 %) is wide.
+const SPACING: f64 = 0.02;
 /// The amplitude of a line grows with this power of its frequency: the shaft follows high ones less.
 const SLOPE: f64 = 0.5;
 /// How often the peak is cut off, and to what share.
@@ -126,8 +126,8 @@ mod tests {
         let values: Vec<_> = (0..excitation.len()).map(|n| excitation.at(n)).collect();
         let rms = (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
         assert!(values.iter().all(|value| value.abs() <= 1.0));
-        // A sine has 1.41; sines at random phases have four and more.
-        assert!(1.0 / rms < 2.4, "crest factor {}", 1.0 / rms);
+        // A sine has 1.41; a hundred sines at random phases have four.
+        assert!(1.0 / rms < 3.0, "crest factor {}", 1.0 / rms);
         assert!(values.iter().sum::<f64>().abs() < 1e-6);
     }
 

@@ -30,6 +30,8 @@ const SPLITS: [f64; 5] = [1.06, 1.15, 1.35, 1.8, 3.0];
 /// So many of the best beginnings are followed to their end.
 const FOLLOWED: usize = 4;
 const DAMPING: f64 = 0.03;
+/// Steel alone damps as much.
+const LEAST_DAMPING: f64 = 0.002;
 
 /// What a shaft and its load are.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,8 +117,14 @@ fn rigid_of([gain, viscous, delay]: [f64; 3]) -> Mechanics {
 fn elastic_of([gain, viscous, delay, anti, anti_damping, split, damping]: [f64; 7]) -> Mechanics {
     let anti_resonance_hz = anti.exp();
     let resonance_hz = anti_resonance_hz * (1.0 + split.exp());
-    let elastic = Elastic { anti_resonance_hz, anti_damping: anti_damping.exp(), resonance_hz, damping: damping.exp() };
+    let elastic =
+        Elastic { anti_resonance_hz, anti_damping: damped(anti_damping), resonance_hz, damping: damped(damping) };
     Mechanics { elastic: Some(elastic), ..rigid_of([gain, viscous, delay]) }
+}
+
+/// A damping by its logarithm. Noise may look like less than none, and with none nobody knows which way round a loop goes.
+fn damped(logarithm: f64) -> f64 {
+    logarithm.exp().max(LEAST_DAMPING)
 }
 
 /// Differences of the logarithms, magnitude and phase, in standard deviations.
