@@ -3,6 +3,7 @@ use core::time::Duration;
 use canopen::Mux;
 use cia402::{HomingMethod, HomingRow, HomingSequence, ModeOfOperation, PowerState, Statusword};
 
+use crate::loops::Loops;
 use crate::placement::Placement;
 use crate::terminals::Terminals;
 use crate::units::{Quantity, Units};
@@ -34,6 +35,8 @@ pub struct AxisDescription {
     pub terminals: Terminals,
     /// What raw values are worth.
     pub units: Units,
+    /// How its loops are set, where it has gains.
+    pub loops: Option<Loops>,
 }
 
 impl AxisDescription {

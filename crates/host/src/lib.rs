@@ -38,6 +38,7 @@ pub mod stopping;
 mod tests;
 pub mod timeline;
 pub mod trace;
+pub mod tune;
 mod wire;
 mod work;
 mod world;

@@ -390,6 +390,10 @@ impl Motor for HubMotor {
 
     motor::parts!(HubMotor);
 
+    fn pmsm_model(&self) -> Option<&PmsmModel> {
+        Some(&self.model.pmsm)
+    }
+
     fn physics(&self) -> Physics {
         let velocity_rad_s = load_velocity_rad_s(&self.rig, self.rotor.velocity_rad_s);
         Physics {

@@ -351,6 +351,10 @@ impl Motor for JointMotor {
 
     motor::parts!(JointMotor);
 
+    fn pmsm_model(&self) -> Option<&PmsmModel> {
+        Some(&self.model.pmsm)
+    }
+
     /// The load is behind the reducer.
     fn physics(&self) -> Physics {
         Physics {

@@ -7,6 +7,7 @@ use crate::angle::Angle;
 use crate::attachment::Attachment;
 use crate::mechanics::{RotorData, RotorModel};
 use crate::physics::Physics;
+use crate::pmsm::PmsmModel;
 use crate::rig::{Rig, RigModel};
 use crate::shaft::Motion;
 
@@ -25,6 +26,11 @@ pub trait Motor: Clone + PartialEq {
 
     /// What never changes about its shaft.
     fn rotor_model(&self) -> &RotorModel;
+
+    /// Its windings, of one with magnets.
+    fn pmsm_model(&self) -> Option<&PmsmModel> {
+        None
+    }
 
     /// Load, supply, temperatures and energies.
     fn rig(&self) -> &Rig;

@@ -66,7 +66,6 @@ pub(super) fn same_calls(finished: &Finished, _name: &'static str) -> Vec<Vec<Fi
         title: "Three drives on one bus".into(),
         subtitle: "the same call of the master on each, in degrees and r/min at the motor's shaft".into(),
         time: "time, s".into(),
-        logarithmic: false,
         panels: vec![
             axes(names, "Shaft angle", "°", |drive| angle(finished, drive, 360.0)),
             axes(names, "Velocity", "r/min", |drive| mean_rpm(finished, drive)),
@@ -85,7 +84,6 @@ pub(super) fn interpolation(finished: &Finished, _name: &'static str) -> Vec<Vec
         title: format!("{}: {:.0} µs apart", start.setting, start.spread_us()),
         subtitle: "three joints after one SYNC".into(),
         time: "µs".into(),
-        logarithmic: false,
         panels: vec![Panel {
             title: "Shaft".into(),
             unit: "counts".into(),
@@ -110,7 +108,6 @@ pub(super) fn interpolation(finished: &Finished, _name: &'static str) -> Vec<Vec
         title: "Three joints, interpolation".into(),
         subtitle: "mode 7: RPDO4 to each and SYNC, every 2 ms".into(),
         time: "time, s".into(),
-        logarithmic: false,
         panels: vec![axes(names, "Shaft angle", "turns of the motor", |drive| angle(finished, drive, 1.0))],
         sections: sections(finished),
         events: finished.events.clone(),
@@ -167,7 +164,6 @@ fn drive(
         title: title.into(),
         subtitle: subtitle.into(),
         time: "time, s".into(),
-        logarithmic: false,
         panels: vec![
             panel("Position", position_unit, 80.0, Colour::Blue, Axis::Position, Signal::PositionDemand, position),
             panel("Velocity", "r/min", 80.0, Colour::Teal, Axis::Velocity, Signal::VelocityDemand, velocity),

@@ -8,12 +8,25 @@ use cia402::{ModeOfOperation, PowerState};
 use devices::{AxisId, Description};
 use drives::{Fidelity, RegisterError};
 use plant::FreeRun;
+use plant::mechanics::RotorModel;
 use plant::physics::Physics;
+use plant::pmsm::PmsmModel;
 
 use crate::machine::{Realism, TimingMode};
 use crate::mechanics::Mechanics;
 use crate::refused::Refused;
 use crate::stimulus::{Component, Power, Source, Stimulus, SwitchRange, TemperatureSensor};
+
+/// What a virtual drive's motor is made of: what a data sheet says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorData {
+    /// Rotor and bearings.
+    pub rotor: RotorModel,
+    /// Windings and magnets.
+    pub windings: PmsmModel,
+    /// Motor turns per turn of the output shaft, where a reducer is built in.
+    pub reducer: Option<f64>,
+}
 
 /// A drive joined to its physics: firmware, motor, load, supply and sensors as one station.
 ///
@@ -93,6 +106,12 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     /// What the shaft of an axis will do in the end if its load stays as it is; `None` while the drive drives it, or where it
     /// is not known. Velocities are the motor's.
     fn free_run(&self, axis: AxisId) -> Option<FreeRun> {
+        let _ = axis;
+        None
+    }
+
+    /// What the motor of an axis is made of, of one with magnets.
+    fn motor(&self, axis: AxisId) -> Option<MotorData> {
         let _ = axis;
         None
     }

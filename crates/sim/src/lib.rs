@@ -56,7 +56,7 @@ mod world;
 pub use block_on::{BlockOnError, block_on, block_on_for};
 pub use coupling::{BodyKind, BodyState, CoupledShaft, Coupling, CouplingError};
 pub use devices::AxisId;
-pub use drive::{Brake, Levels, OutputShaft, PowerPhase, Report, VirtualDrive, VirtualDriveClone};
+pub use drive::{Brake, Levels, MotorData, OutputShaft, PowerPhase, Report, VirtualDrive, VirtualDriveClone};
 pub use drives::{Fidelity, RegisterError};
 pub use mechanics::Mechanics;
 pub use plant::physics::Physics;

@@ -114,6 +114,7 @@ const AXIS: AxisDescription = AxisDescription {
     interpolation: Some(Duration::from_millis(2)),
     homing: Some(HOMING),
     terminals: Terminals::NONE,
+    loops: None,
     units: UNITS,
 };
 

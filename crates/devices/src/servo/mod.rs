@@ -80,6 +80,7 @@ pub const fn axis(placement: Placement, modes: &'static [ModeOfOperation]) -> Ax
         interpolation: None,
         homing: Some(HOMING),
         terminals: Terminals::CIA402,
+        loops: None,
         units: UNITS,
     }
     .placed(placement)

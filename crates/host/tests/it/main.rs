@@ -6,3 +6,4 @@ mod clients;
 mod control;
 mod init;
 mod params;
+mod tune;

@@ -9,6 +9,8 @@ pub mod objects;
 pub mod statusword;
 pub mod variations;
 
+use core::time::Duration;
+
 use can::Bitrate;
 use canopen::od::Table;
 use canopen::pdo::MappingRules;
@@ -18,6 +20,7 @@ use cia402::{ModeOfOperation, object};
 use crate::axis::{AxisDescription, NewSetPoint, PowerStyle};
 use crate::description::{Description, Edition, HostWatch, NmtRules, PdoRules, Section};
 use crate::faults::Faults;
+use crate::loops::{Integral, Loops};
 use crate::placement::Placement;
 use crate::stated::Stated;
 use crate::terminals::{BrakeOutput, Input, InputSignal, Terminals};
@@ -88,6 +91,20 @@ const AXIS: AxisDescription = AxisDescription {
         motor_temperature: Some(Quantity::new(0x2026, 1, 0.1)),
         driver_temperature: Some(Quantity::new(0x2026, 2, 0.1)),
     },
+    loops: Some(LOOPS),
+};
+
+/// Chapter 9: 6074h is printed as "real-time target torque", 2018h to 2020h without units. Those
+/// that stand here, and the period, are assumed (`drives::zlac8030l::gains`).
+const LOOPS: Loops = Loops {
+    demand: Some(Quantity::new(0x6074, 0, 1e-3)),
+    speed_proportional: Mux::new(0x201D, 0),
+    speed_integral: Integral::Gain(Mux::new(0x201E, 0)),
+    speed_filter: Some(Quantity::new(0x2018, 0, 1e-6)),
+    position_proportional: Quantity::new(0x2020, 0, 0.2),
+    current: Some((Quantity::new(0x2019, 0, 1e-3), Quantity::new(0x201A, 0, 1.0))),
+    without_ramps: &[(Mux::new(0x6083, 0), 0), (Mux::new(0x6084, 0), 0)],
+    period: Duration::from_micros(500),
 };
 
 /// All objects are in one list.

@@ -74,6 +74,7 @@ const AXIS: AxisDescription = AxisDescription {
     interpolation: None,
     homing: Some(HOMING),
     terminals: TERMINALS,
+    loops: None,
     units: UNITS,
 };
 

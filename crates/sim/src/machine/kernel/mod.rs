@@ -19,11 +19,12 @@ use can::{Bitrate, Frame, Instant, Station};
 use devices::{AxisId, Description, Timing};
 use drives::{Fidelity, Firmware, RegisterError, Resting};
 use plant::FreeRun;
+use plant::motor::Motor;
 use plant::shaft::{Motion, Push};
 
 use crate::mechanics::Mechanics;
 use crate::stimulus::{Stimulus, SwitchRange};
-use crate::{Levels, PowerPhase, Refused, Report, VirtualDrive, nmt_reset};
+use crate::{Levels, MotorData, PowerPhase, Refused, Report, VirtualDrive, nmt_reset};
 use assembly::Assembly;
 use realism::{Noise, Realism};
 use rest::Rest;
@@ -439,6 +440,12 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn mechanics(&mut self) -> Option<&mut dyn Mechanics> {
         Some(self)
+    }
+
+    fn motor(&self, axis: AxisId) -> Option<MotorData> {
+        let motor = self.assembly.motor_at(axis);
+        let (rotor, reducer) = (*motor.rotor_model(), self.assembly.reducer());
+        motor.pmsm_model().map(|windings| MotorData { rotor, windings: *windings, reducer })
     }
 
     fn check_couple(&self, axis: AxisId) -> Result<(), Refused> {

@@ -1,0 +1,89 @@
+//! What was found of a drive, from what was measured.
+
+use devices::{Loops, Quantity, Scale};
+use sim::MotorData;
+use tune::{BackEmf, Friction, Loop, Mechanics, Response, Unusable};
+
+use super::measure::Measurement;
+use super::setup::Setup;
+
+/// What a drive and its load are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// The measured frequency response, per actual current where the current loop is known.
+    pub response: Response,
+    /// One or two masses.
+    pub mechanics: Mechanics,
+    /// What the speed loop sees: the same per current demand. What the current loop lets through of the back-emf damps it.
+    pub plant: Mechanics,
+    /// Currents that steady motion takes.
+    pub friction: Friction,
+    /// The speed loop as it was while it was measured.
+    pub around: Loop,
+    /// The share of the drive's own gains that it had then.
+    pub gain_share: f64,
+    /// Torque per ampere: the motor's, from its data.
+    pub torque_constant_nm_a: f64,
+}
+
+impl Found {
+    /// From what was measured.
+    ///
+    /// # Errors
+    /// Why nothing can be said of it.
+    pub fn of(measured: &Measurement, setup: &Setup, loops: &Loops, motor: &MotorData) -> Result<Self, Unusable> {
+        let response = tune::response(&measured.samples, Some(&measured.excitation))?;
+        let value = |quantity: Quantity| match quantity.scale {
+            Scale::PerCount(worth) => setup.had(quantity.object).map(|raw| raw as f64 * worth),
+            _ => None,
+        };
+        let filter_s = loops.speed_filter.and_then(value).unwrap_or(0.0);
+        let around = tune::identify_loop(&response, filter_s)?;
+        let plant = tune::identify(&response)?;
+        let current = loops.current.and_then(|(kp, ki)| value(kp).zip(value(ki)));
+        let response = current.map_or_else(
+            || response.clone(),
+            |(proportional, integral)| response.without(&back_emf(motor, proportional, integral)),
+        );
+        Ok(Self {
+            mechanics: tune::identify(&response)?,
+            plant,
+            friction: tune::fit_friction(&measured.runs)?,
+            response,
+            around,
+            gain_share: measured.gain_share,
+            torque_constant_nm_a: motor.windings.torque_constant_nm_a(),
+        })
+    }
+
+    /// Inertia of all that turns, at the motor's shaft.
+    pub fn inertia_kg_m2(&self) -> f64 {
+        self.mechanics.inertia_kg_m2(self.torque_constant_nm_a)
+    }
+
+    /// Dry friction at the motor's shaft.
+    pub fn dry_nm(&self) -> f64 {
+        self.friction.dry_a * self.torque_constant_nm_a
+    }
+
+    /// Viscous friction at the motor's shaft.
+    pub fn viscous_nm_s(&self) -> f64 {
+        self.friction.viscous_a_s_rad * self.torque_constant_nm_a
+    }
+
+    /// What comes late in the speed loop, from the current that it asks for to the speed that it compares, its filter apart.
+    pub fn loop_delay_s(&self) -> f64 {
+        self.plant.delay_s + self.around.seen_late_s
+    }
+}
+
+fn back_emf(motor: &MotorData, proportional: f64, integral: f64) -> BackEmf {
+    let windings = &motor.windings;
+    BackEmf {
+        constant_v_s: windings.back_emf_constant_v_s(),
+        resistance_ohm: windings.resistance_ohm,
+        inductance_h: windings.inductance_q_h,
+        proportional,
+        integral,
+    }
+}

@@ -1,0 +1,302 @@
+//! The whole of it: measured, found, proposed, tried on the twin; and then on the drive. As the rows that programs read.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use canopen::Mux;
+use master::Drive;
+use master::cyclic::CyclicOptions;
+use plot::{Colour, Figure, Panel, Poster, Style, Trace};
+use serde::Serialize;
+use tune::{Margins, Response, Wish};
+use words::failure::Failure;
+
+use super::{Bench, Bounds, Found, Proposed, Setup, StepResponse, Trial, Twin, loops_of, measure, motor_of};
+
+/// How long the answer of the drive to a step is looked at.
+const ANSWER_S: f64 = 0.5;
+
+/// What is asked for.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// What the speed loop is to be.
+    pub wish: Wish,
+    /// The gain of the position loop too.
+    pub with_position: bool,
+    /// Time from one sample to the next.
+    pub period: Duration,
+    /// What the motion keeps to.
+    pub bounds: Bounds,
+    /// How late the program may be, and what guards the drive.
+    pub cyclic: CyclicOptions,
+    /// Torque per ampere, N m/A, where the motor is not the model's own.
+    pub torque_constant_nm_a: Option<f64>,
+    /// Where the way back is kept while the drive is measured; `None` on a bus that ends with the program.
+    pub journal: Option<PathBuf>,
+    /// Hears what to do about a journal that stays.
+    pub on_kept: fn(&str),
+}
+
+/// What was found and is proposed. Torques and inertia are those at the motor's shaft.
+#[derive(Debug, Serialize)]
+pub struct TuneReport {
+    /// Its node-ID.
+    pub node: u8,
+    /// Its model.
+    pub model: &'static str,
+    /// Inertia of all that turns.
+    pub inertia_kg_m2: f64,
+    /// Dry friction.
+    pub dry_friction_nm: f64,
+    /// Viscous friction.
+    pub viscous_friction_nm_s: f64,
+    /// What pushes the shaft in one direction; positive against positive motion.
+    pub load_nm: f64,
+    /// Torque per ampere with which these were computed.
+    pub torque_constant_nm_a: f64,
+    /// Where the motor moves least, if the load swings.
+    pub anti_resonance_hz: Option<f64>,
+    /// Where it moves most.
+    pub resonance_hz: Option<f64>,
+    /// What comes late in the speed loop, its filter apart.
+    pub loop_delay_ms: f64,
+    /// Frequencies at which the coherence was high enough.
+    pub coherent: usize,
+    /// Frequencies at which it was measured.
+    pub frequencies: usize,
+    /// How far the model of one or two masses is from what was measured: the median of the relative difference.
+    pub model_off: f64,
+    /// How far the measured response of the twin is from that of the drive, likewise.
+    pub twin_off: f64,
+    /// The share of the drive's gains with which it was measured: below 1 where its speed loop swings by itself.
+    pub gain_share: f64,
+    /// The most current that was asked for.
+    pub peak_a: f64,
+    /// The farthest that the shaft was from where it had stood.
+    pub travel_turns: f64,
+    /// Proposed values.
+    pub gains: Vec<GainRow>,
+    /// Margins of the speed loop with the drive's gains.
+    pub before: MarginRow,
+    /// Margins of the speed loop with those that are proposed.
+    pub after: MarginRow,
+    /// Margins of the position loop, if it was asked for.
+    pub position: Option<MarginRow>,
+    /// A step of the set-point and a load on the twin: integral of the absolute error, r/min s, before and after.
+    pub twin_error: [f64; 2],
+    /// The same of a step on the drive, once the values were tried there.
+    pub drive_error: Option<[f64; 2]>,
+    /// The drive has the proposed values.
+    pub applied: bool,
+    /// What else is to be known.
+    pub notes: Vec<String>,
+    /// Bode plot, and the trials.
+    #[serde(skip)]
+    pub picture: Poster,
+}
+
+/// An object of a proposal.
+#[derive(Debug, Serialize)]
+pub struct GainRow {
+    /// Such as `201Dh:00`.
+    pub object: String,
+    /// Its name.
+    pub name: &'static str,
+    /// What it has.
+    pub before: i64,
+    /// What is proposed.
+    pub after: i64,
+}
+
+/// How far a loop is from being unstable.
+#[derive(Debug, Serialize)]
+pub struct MarginRow {
+    /// Where its gain falls to one for the last time.
+    pub crossover_hz: f64,
+    /// Least phase where it is one.
+    pub phase_deg: f64,
+    /// Largest sensitivity.
+    pub sensitivity: f64,
+    /// Nyquist's criterion.
+    pub stable: bool,
+}
+
+impl From<Margins> for MarginRow {
+    fn from(margins: Margins) -> Self {
+        let Margins { crossover_hz, phase_deg, sensitivity, is_stable, .. } = margins;
+        Self { crossover_hz, phase_deg, sensitivity, stable: is_stable }
+    }
+}
+
+/// Measures a drive, and finds gains for it. The drive has what it had in the end.
+///
+/// # Errors
+/// What stopped it, what is not possible with this drive, and that not everything could be put back.
+pub async fn find(drive: &Drive, request: &Request) -> Result<(TuneReport, Proposed), Failure> {
+    let (model, loops) = loops_of(drive)?;
+    let id = drive.node().id();
+    let failed = |reason: &dyn std::fmt::Display| {
+        Failure::new(format!("node {id}: nothing could be found")).at_node(id).because(reason)
+    };
+    let mut motor = motor_of(model).ok_or_else(|| failed(&"no motor with magnets is known for its model"))?;
+    if let Some(constant) = request.torque_constant_nm_a {
+        motor.windings.flux_linkage_wb *= constant / motor.windings.torque_constant_nm_a();
+    }
+    let how = (request.period, request.bounds);
+    let setup = Setup::begin(drive, (model, loops), request.journal.as_deref(), request.on_kept).await?;
+    let measured = measure(drive, &setup, loops, (how.0, how.1, request.cyclic)).await;
+    let gains = gains_of(&setup, loops);
+    let had = Setup::clone_values(&setup);
+    let put_back = setup.put_back(drive).await;
+    let measured = measured?;
+    put_back?;
+    let found = Found::of(&measured, &had, loops, &motor).map_err(|error| failed(&error))?;
+    let twin = Twin::new((model, loops), &found, &motor, gains);
+    let share = lowered(&had, loops, measured.gain_share);
+    let of_twin = twin.measure(&share, how)?;
+    let seen = Found::of(&of_twin, &had, loops, &motor).map_err(|error| failed(&error))?;
+    let twin_off = between(&found.response, &seen.response);
+    let Some(proposed) = Proposed::of(&found, &had, (model, loops), request.wish, request.with_position) else {
+        return Err(failed(&"no gains keep the phase margin that was asked for")
+            .next("ask for less, e.g. --phase-margin 30; or stiffen the coupling of the load"));
+    };
+    let after: Vec<(Mux, i64)> = proposed.gains.iter().map(|gain| (gain.object, gain.after)).collect();
+    // On the twin a large current hurts nobody.
+    let wide = (how.0, Bounds { current_a: f64::MAX, travel_turns: f64::MAX, ..how.1 });
+    let trials = [twin.try_out(&[], wide)?, twin.try_out(&after, wide)?];
+    let elastic = found.mechanics.elastic;
+    let report = TuneReport {
+        node: id.raw(),
+        model: model.name,
+        inertia_kg_m2: found.inertia_kg_m2(),
+        dry_friction_nm: found.dry_nm(),
+        viscous_friction_nm_s: found.viscous_nm_s(),
+        load_nm: found.friction.load_a * found.torque_constant_nm_a,
+        torque_constant_nm_a: found.torque_constant_nm_a,
+        anti_resonance_hz: elastic.map(|elastic| elastic.anti_resonance_hz),
+        resonance_hz: elastic.map(|elastic| elastic.resonance_hz),
+        loop_delay_ms: found.loop_delay_s() * 1e3,
+        coherent: found.response.coherent().count(),
+        frequencies: found.response.lines.len(),
+        model_off: found.mechanics.off,
+        twin_off,
+        gain_share: found.gain_share,
+        peak_a: measured.peak_a,
+        travel_turns: measured.travel_turns,
+        gains: proposed.gains.iter().map(GainRow::from).collect(),
+        before: proposed.before.into(),
+        after: proposed.after.into(),
+        position: proposed.position.map(MarginRow::from),
+        twin_error: [trials[0].error(), trials[1].error()],
+        drive_error: None,
+        applied: false,
+        notes: notes(&found, &proposed, request),
+        picture: picture(model.title, &found, &trials),
+    };
+    Ok((report, proposed))
+}
+
+impl From<&super::Gain> for GainRow {
+    fn from(gain: &super::Gain) -> Self {
+        Self { object: gain.object.to_string(), name: gain.name, before: gain.before, after: gain.after }
+    }
+}
+
+/// How the drive itself answers a step of its set-point with the gains that it has. What was written for that is put back.
+///
+/// # Errors
+/// What stopped it, and that not everything could be put back.
+pub async fn step(drive: &Drive, request: &Request) -> Result<StepResponse, Failure> {
+    let (model, loops) = loops_of(drive)?;
+    let setup = Setup::begin(drive, (model, loops), request.journal.as_deref(), request.on_kept).await?;
+    let answer = async {
+        let mut bench = Bench::open(drive, loops, request.period, request.bounds, request.cyclic).await?;
+        let answer = bench.step_response(ANSWER_S).await;
+        let stopped = bench.stop().await;
+        answer.and_then(|answer| stopped.map(|()| answer))
+    };
+    let answer = answer.await;
+    let put_back = setup.put_back(drive).await;
+    answer.and_then(|answer| put_back.map(|()| answer))
+}
+
+/// The values of the loops' objects.
+fn gains_of(setup: &Setup, loops: &devices::Loops) -> Vec<(Mux, i64)> {
+    let filter = loops.speed_filter.map(|filter| filter.object);
+    let current = loops.current.into_iter().flat_map(|(kp, ki)| [kp.object, ki.object]);
+    let own = [loops.speed_proportional, loops.speed_integral.object(), loops.position_proportional.object];
+    let all = own.into_iter().chain(filter).chain(current);
+    all.filter_map(|object| Some((object, setup.had(object)?))).collect()
+}
+
+/// The gains of the speed loop as they were lowered for the measurement.
+fn lowered(setup: &Setup, loops: &devices::Loops, share: f64) -> Vec<(Mux, i64)> {
+    let gains = [loops.speed_proportional, loops.speed_integral.object()];
+    gains.into_iter().filter_map(|gain| Some((gain, (setup.had(gain)? as f64 * share).round() as i64))).collect()
+}
+
+/// How far two responses are apart where both are coherent.
+fn between(drive: &Response, twin: &Response) -> f64 {
+    let nearest = |omega: f64| {
+        let off = |line: &&tune::Line| (line.omega() - omega).abs();
+        twin.lines.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|line| line.plant)
+    };
+    tune::distance(drive, |omega| nearest(omega).unwrap_or_default())
+}
+
+fn notes(found: &Found, proposed: &Proposed, request: &Request) -> Vec<String> {
+    let mut notes = Vec::new();
+    if found.gain_share < 1.0 {
+        notes.push(format!(
+            "its speed loop swings by itself: it was measured with {:.0} % of its gains",
+            100.0 * found.gain_share
+        ));
+    }
+    if proposed.is_limited {
+        notes.push(format!(
+            "the bandwidth that was asked for is not reached: the margins end at {:.1} Hz",
+            proposed.after.crossover_hz
+        ));
+    }
+    if request.torque_constant_nm_a.is_none() {
+        notes.push(format!(
+            "inertia and friction are those of a motor with {:.3} N m/A, the model's own: --torque-constant gives another",
+            found.torque_constant_nm_a
+        ));
+    }
+    notes
+}
+
+fn picture(title: &str, found: &Found, trials: &[Trial; 2]) -> Poster {
+    let [before, after] = trials;
+    let answer = |name: &str, of: &dyn Fn(&Trial) -> StepResponse| {
+        let trace = |label: &'static str, style, answer: StepResponse| Trace {
+            label: label.into(),
+            style,
+            points: answer.speed_rpm.iter().enumerate().map(|(n, rpm)| (n as f64 * answer.period_s, *rpm)).collect(),
+        };
+        let traces =
+            vec![trace("before", Style::Demand, of(before)), trace("after", Style::Actual(Colour::Teal), of(after))];
+        let panel = Panel {
+            title: "velocity".into(),
+            unit: "r/min".into(),
+            height: 150.0,
+            with_zero: false,
+            least_span: 5.0,
+            traces,
+        };
+        Figure {
+            title: name.to_owned(),
+            subtitle: "on the twin".to_owned(),
+            time: "time, s".into(),
+            panels: vec![panel],
+            ..Figure::default()
+        }
+    };
+    let bode = tune::bode("Frequency response", &found.response, Some(&found.mechanics));
+    let answers = vec![
+        answer("A step of the set-point", &|trial| trial.step.clone()),
+        answer("A load", &|trial| trial.load.clone()),
+    ];
+    Poster { title: title.to_owned(), subtitle: "measured, and the model".to_owned(), rows: vec![vec![bode], answers] }
+}

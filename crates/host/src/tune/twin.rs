@@ -1,0 +1,148 @@
+//! A virtual drive that is what was found, to try gains on.
+
+use std::f64::consts::TAU;
+use std::time::Duration;
+
+use can::Bitrate;
+use canopen::{Mux, NodeId};
+use devices::{AxisId, Description, Loops};
+use master::cyclic::CyclicOptions;
+use master::{Drive, Network};
+use sim::machine::{Order, order};
+use sim::{MotorData, Place, World};
+use words::failure::Failure;
+
+use super::found::Found;
+use super::measure::{Bench, Bounds, Measurement, StepResponse, write};
+
+/// A load's gear has an output wheel of this share of the rotor's inertia (crate `plant`).
+const WHEEL_SHARE: f64 = 0.01;
+const NODE: NodeId = NodeId::MIN;
+/// How long the answer to a step and to a load is looked at.
+const ANSWER_S: f64 = 0.5;
+/// The load that comes on, by the current that holds it.
+const LOAD_A: f64 = 4.5;
+
+/// A twin: what is built anew for each trial.
+#[derive(Clone, Debug)]
+pub struct Twin {
+    model: &'static Description,
+    loops: Loops,
+    /// What hangs on its shaft, as words of a world.
+    pub load: Vec<String>,
+    /// Objects that have not their factory values.
+    values: Vec<(Mux, i64)>,
+    torque_constant_nm_a: f64,
+    seed: u64,
+}
+
+/// How a drive behaves with some gains.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// A step of the set-point.
+    pub step: StepResponse,
+    /// A load that comes on while it turns: the same, with no step.
+    pub load: StepResponse,
+}
+
+impl Trial {
+    /// Integral of the absolute error after both, in r/min s.
+    pub fn error(&self) -> f64 {
+        self.step.error() + self.load.error()
+    }
+}
+
+/// What a virtual drive's motor is, of a model as it is delivered.
+pub fn motor_of(model: &'static Description) -> Option<MotorData> {
+    let order_of = Order::new(model, NODE, model.bitrate.unwrap_or(Bitrate::M1));
+    order(model, &order_of).ok()?.motor(AxisId(0))
+}
+
+impl Twin {
+    /// The twin of what was found; `values` are the drive's own settings that matter.
+    pub fn new(
+        (model, loops): (&'static Description, &Loops),
+        found: &Found,
+        motor: &MotorData,
+        values: Vec<(Mux, i64)>,
+    ) -> Self {
+        let rotor = motor.rotor;
+        let wheel = if found.mechanics.elastic.is_some() { WHEEL_SHARE * rotor.inertia_kg_m2 } else { 0.0 };
+        let inertia = (found.inertia_kg_m2() - rotor.inertia_kg_m2 - wheel).max(0.0);
+        let (dry, viscous) = (found.dry_nm() - rotor.coulomb_nm, found.viscous_nm_s() - rotor.viscous_nm_s);
+        let mut load = vec![
+            format!("load inertia {inertia}"),
+            format!("load friction {} viscous {}", dry.max(0.0), viscous.max(0.0)),
+            format!("load torque {}", found.friction.load_a * found.torque_constant_nm_a),
+        ];
+        if let Some(elastic) = found.mechanics.elastic {
+            // Both masses against each other.
+            let reduced = 1.0 / (1.0 / (inertia + wheel) + 1.0 / rotor.inertia_kg_m2);
+            load.push(format!("load gear 1 0 {}", (TAU * elastic.resonance_hz).powi(2) * reduced));
+        }
+        let torque_constant_nm_a = found.torque_constant_nm_a;
+        Self { model, loops: *loops, load, values, torque_constant_nm_a, seed: 1 }
+    }
+
+    /// A virtual drive with a load of these words, whatever was found.
+    pub fn with_load((model, loops): (&'static Description, &Loops), load: Vec<String>, motor: &MotorData) -> Self {
+        let torque_constant_nm_a = motor.windings.torque_constant_nm_a();
+        Self { model, loops: *loops, load, values: Vec::new(), torque_constant_nm_a, seed: 1 }
+    }
+
+    /// A world with the twin alone, booted.
+    ///
+    /// # Errors
+    /// The model cannot be built, or has not what hangs on its shaft.
+    pub fn world(&self) -> Result<(World, Drive), Failure> {
+        let failed = |reason: &dyn std::fmt::Display| Failure::new("the twin cannot be made").because(reason);
+        let mut world = World::new(Bitrate::M1, self.seed);
+        let network = Network::new();
+        world.add_station(network.clone());
+        let machine = order(self.model, &Order::new(self.model, NODE, Bitrate::M1)).map_err(|error| failed(&error))?;
+        world.add_drive(NODE.raw(), machine).map_err(|error| failed(&error))?;
+        for words in &self.load {
+            let stimulus = words.parse().map_err(|error: sim::stimulus::StimulusError| failed(&error))?;
+            let applied = world.apply(Place::node(NODE.raw()), &stimulus).map_err(|error| failed(&error))?;
+            applied.map_err(|error| failed(&error))?;
+        }
+        world.run_for(Duration::from_secs(1));
+        Ok((world, Drive::new(network.node(NODE), self.model)))
+    }
+
+    async fn open(&self, drive: &Drive, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Bench, Failure> {
+        for (object, value) in self.values.iter().chain(values) {
+            write(drive, *object, *value).await?;
+        }
+        Bench::open(drive, &self.loops, how.0, how.1, CyclicOptions::default()).await
+    }
+
+    /// The same measurement as of the drive.
+    ///
+    /// # Errors
+    /// What stopped it.
+    pub fn measure(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Measurement, Failure> {
+        let (mut world, drive) = self.world()?;
+        let run = async { self.open(&drive, values, how).await?.measure().await };
+        sim::block_on(&mut world, run).map_err(|error| Failure::new(error.to_string()))?
+    }
+
+    /// How it behaves with these values of its gains: a step of the set-point, and a load.
+    ///
+    /// # Errors
+    /// What stopped it.
+    pub fn try_out(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Trial, Failure> {
+        let (mut world, drive) = self.world()?;
+        let ended = |error: sim::BlockOnError| Failure::new(error.to_string());
+        let mut bench = sim::block_on(&mut world, self.open(&drive, values, how)).map_err(ended)??;
+        let step = sim::block_on(&mut world, bench.step_response(ANSWER_S)).map_err(ended)??;
+        let torque_nm = LOAD_A * self.torque_constant_nm_a;
+        let present = sim::Stimulus::LoadTorque(torque_nm);
+        // A refusal would leave it without a load, which the comparison would not show.
+        let applied =
+            world.apply(Place::node(NODE.raw()), &present).map_err(|error| Failure::new(error.to_string()))?;
+        applied.map_err(|error| Failure::new(error.to_string()))?;
+        let load = sim::block_on(&mut world, bench.hold_response(ANSWER_S)).map_err(ended)??;
+        Ok(Trial { step, load })
+    }
+}
