@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::command::configure::{dcf, init, lss, params, program, sdo, store};
+use crate::command::configure::{dcf, init, lss, params, program, sdo, store, tune};
 use crate::command::look::{dump, emcy, explain, objects, pdo, read, scan, studio, top, watch};
 use crate::command::moving::{drive, drive_base, estop, group, home, motion};
 use crate::command::network::{boot, check, conform, gateway, latency, nmt, plan, send, supervise, sync, time};
@@ -66,6 +66,7 @@ pub(crate) enum Command {
     Home(home::Home),
     Group(group::GroupCommand),
     DriveBase(drive_base::DriveBase),
+    Tune(tune::Tune),
     Latency(latency::Latency),
     Record(record::Record),
     Export(export::Export),

@@ -35,7 +35,7 @@ const GROUPS: &[CommandGroup] = &[
     },
     CommandGroup {
         title: "Configure",
-        commands: &["init", "write", "params", "dcf", "save", "restore", "lss", "program"],
+        commands: &["init", "write", "params", "tune", "dcf", "save", "restore", "lss", "program"],
     },
     CommandGroup {
         title: "Network",

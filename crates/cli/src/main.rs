@@ -269,6 +269,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Save(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Restore(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Program(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Tune(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Home(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Objects(objects) => list_objects(global, format, objects),
         Command::Latency(command) => on_bus(global, format, async |context| command.run(context).await),

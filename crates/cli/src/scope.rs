@@ -268,6 +268,7 @@ mod tests {
         "time",
         "top",
         "torque 4 1A",
+        "tune 4",
         "velocity 4 60rpm",
         "watch 4 6064",
         "world --control 127.0.0.1:1 now",

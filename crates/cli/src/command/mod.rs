@@ -42,6 +42,7 @@ pub(crate) mod configure {
     pub(crate) mod program;
     pub(crate) mod sdo;
     pub(crate) mod store;
+    pub(crate) mod tune;
 }
 
 pub(crate) mod network {

@@ -1,0 +1,265 @@
+//! `ferrodrive tune`: gains for a drive's loops, from a measurement.
+
+use std::io::{IsTerminal, stdin};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use canopen::NodeId;
+use host::network::params::Transaction;
+use host::network::params::journal::default_path;
+use host::tune::{Bounds, Proposed, Request, TuneReport, find, step};
+use master::Drive;
+use master::parameters::Parameters;
+use master::units::{Amperes, Rpm, parse_duration};
+use words::node::node;
+
+use crate::command::cycles::CycleArgs;
+use super::params::journal::note_kept;
+use crate::command::repeat::period;
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::guard::{Guard, GuardArgs};
+use crate::output::Report;
+use plot::{Paint, Table};
+
+/// Which loops gains are found for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum WhichLoop {
+    /// The speed loop
+    Speed,
+    /// The speed loop, and the position loop around it
+    Position,
+}
+
+/// Find gains for the loops of a drive: measure it, try them on its twin, then on the drive
+///
+/// The shaft turns to and fro at steady speeds, and then at one speed with an excitation on top that grows to a share of
+/// --current. The motion stops where it reaches --current or --travel. Afterwards the drive has the parameters that it had,
+/// unless --apply is given. Keep an emergency stop within reach, and the load free to turn.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive tune 4                                # the stiffest speed loop that leaves 40 degrees\n  \
+    ferrodrive tune 4 --bandwidth 20 --loop position --picture tune.svg\n  \
+    ferrodrive --bus can0 tune 4 --speed 60rpm --current 8A --apply"
+)]
+pub(crate) struct Tune {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Which loops
+    #[arg(long = "loop", value_enum, default_value = "speed")]
+    which: WhichLoop,
+    /// Wish: where the gain of the speed loop is to fall to one, in Hz
+    #[arg(long, value_name = "HZ", value_parser = hertz, conflicts_with = "phase_margin")]
+    bandwidth: Option<f64>,
+    /// Wish: degrees that are to be left there; as stiff as that allows
+    #[arg(long, value_name = "DEGREES", default_value = "40", value_parser = degrees)]
+    phase_margin: f64,
+    /// Highest speed of the measurement
+    #[arg(long, value_name = "SPEED", default_value = "120rpm")]
+    speed: Rpm,
+    /// Most current that the speed loop may ask for meanwhile
+    #[arg(long, value_name = "CURRENT", default_value = "15A")]
+    current: Amperes,
+    /// Farthest that the shaft may turn from where it stands, in turns
+    #[arg(long, value_name = "TURNS", default_value = "40", value_parser = turns)]
+    travel: f64,
+    /// Time from one sample to the next
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = period)]
+    period: Duration,
+    /// Torque per ampere of another motor than the model's own, in N·m/A
+    #[arg(long, value_name = "NM_PER_A", value_parser = constant)]
+    torque_constant: Option<f64>,
+    /// Write the proposed values to the drive, and measure once more
+    #[arg(long)]
+    apply: bool,
+    /// Draw frequency response and trials into this SVG file
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Longest time for the transaction
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = parse_duration, hide = true)]
+    within: Duration,
+    #[command(flatten)]
+    cycles: CycleArgs,
+    #[command(flatten)]
+    guard: GuardArgs,
+}
+
+fn number(text: &str, what: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if range.contains(&value) => Ok(value),
+        _ => Err(format!("expected {what} from {} to {}, got '{text}'", range.start(), range.end())),
+    }
+}
+
+fn hertz(text: &str) -> Result<f64, String> {
+    number(text, "a frequency in Hz", 0.1..=500.0)
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    number(text, "degrees", 10.0..=80.0)
+}
+
+fn turns(text: &str) -> Result<f64, String> {
+    number(text, "turns", 0.1..=10_000.0)
+}
+
+fn constant(text: &str) -> Result<f64, String> {
+    number(text, "N·m/A", 1e-4..=1e3)
+}
+
+impl Tune {
+    fn request(&self, context: &Context) -> Request {
+        let wish = self.bandwidth.map_or(tune::Wish::PhaseMargin(self.phase_margin), tune::Wish::Bandwidth);
+        Request {
+            wish,
+            with_position: self.which == WhichLoop::Position,
+            period: self.period,
+            bounds: Bounds {
+                speed_rpm: self.speed.0.abs(),
+                current_a: self.current.0.abs(),
+                travel_turns: self.travel,
+            },
+            cyclic: self.cycles.options(),
+            torque_constant_nm_a: self.torque_constant,
+            journal: (!context.is_embedded()).then(|| default_path(self.node)),
+            on_kept: note_kept,
+        }
+    }
+
+    /// Measures and proposes; and writes, if that was asked for.
+    pub(crate) async fn run(&self, context: &Context) -> Result<TuneReport, Failure> {
+        let drive = context.known_drive(self.node).await?;
+        host::tune::loops_of(&drive)?;
+        let request = self.request(context);
+        context.progress.show(format!("node {}: measuring, about half a minute", self.node));
+        let guard = self.guard.begin(context, &drive).await?;
+        let done = self.carry_out(context, &drive, &request).await;
+        let released = Guard::end(guard, context, &drive, false).await;
+        let report = done?;
+        released?;
+        if let Some(path) = &self.picture {
+            let written = std::fs::write(path, report.picture.to_svg());
+            written.map_err(|error| Failure::of_writing("the picture", path, &error))?;
+        }
+        Ok(report)
+    }
+
+    async fn carry_out(&self, context: &Context, drive: &Drive, request: &Request) -> Result<TuneReport, Failure> {
+        let (mut report, proposed) = find(drive, request).await?;
+        if !self.apply {
+            return Ok(report);
+        }
+        context.progress.show(format!("node {}: a step with the gains that it has", self.node));
+        let before = step(drive, request).await?;
+        self.write(context, drive, &proposed, true).await?;
+        context.progress.show(format!("node {}: the same step with the new gains", self.node));
+        // Whatever stops it: gains that do not hold the shaft do not stay.
+        let after = match step(drive, request).await {
+            Ok(after) => after,
+            Err(failure) => {
+                self.write(context, drive, &proposed, false).await?;
+                return Err(failure.because("it was given its former gains back").into());
+            }
+        };
+        report.drive_error = Some([before.error(), after.error()]);
+        report.applied = after.ripple_a() <= before.ripple_a().max(0.1 * request.bounds.current_a);
+        if !report.applied {
+            report.notes.push("its current swings with the new gains: it was given its former ones back".into());
+        } else if wants_back(context) {
+            report.applied = false;
+            report.notes.push("it was given its former gains back".into());
+        }
+        if !report.applied {
+            self.write(context, drive, &proposed, false).await?;
+        }
+        Ok(report)
+    }
+
+    /// The proposed values, or those of before, as a transaction.
+    async fn write(&self, context: &Context, drive: &Drive, proposed: &Proposed, new: bool) -> Result<(), Failure> {
+        let mut wanted = Parameters::default();
+        for gain in &proposed.gains {
+            let width =
+                drive.description().and_then(|model| model.row(gain.object)).map_or(2, |row| row.data_type.size());
+            let value = if new { gain.after } else { gain.before };
+            wanted.values.insert(gain.object, value.to_le_bytes()[..width.min(8)].to_vec());
+        }
+        let transaction = Transaction {
+            address: false,
+            save: false,
+            prove: None,
+            within: self.within,
+            journal: (!context.is_embedded()).then(|| default_path(self.node)),
+            on_kept: note_kept,
+        };
+        let what = if new { "proposed gains" } else { "former gains" };
+        transaction.apply(&context.progress, drive, &wanted, what.to_owned()).await?;
+        Ok(())
+    }
+}
+
+/// One key of a person at a terminal: b and Enter.
+fn wants_back(context: &Context) -> bool {
+    if !stdin().is_terminal() || !std::io::stderr().is_terminal() {
+        return false;
+    }
+    context.progress.clear();
+    context.note("the drive stands, with the new gains. Enter keeps them; b and Enter goes back");
+    let mut line = String::new();
+    // An input that has ended keeps them.
+    stdin().read_line(&mut line).is_ok_and(|_| line.trim().eq_ignore_ascii_case("b"))
+}
+
+impl Report for TuneReport {
+    fn text(&self, paint: Paint) -> String {
+        let mut lines = vec![format!(
+            "node {} ({}): inertia {:.4} kg·m², dry friction {:.3} N·m, viscous {:.4} N·m·s/rad, load {:.2} N·m",
+            self.node, self.model, self.inertia_kg_m2, self.dry_friction_nm, self.viscous_friction_nm_s, self.load_nm
+        )];
+        lines.push(match (self.anti_resonance_hz, self.resonance_hz) {
+            (Some(anti), Some(resonance)) => format!("anti-resonance {anti:.1} Hz, resonance {resonance:.1} Hz"),
+            _ => "no resonance was found".to_owned(),
+        });
+        lines.push(format!(
+            "delay of the speed loop {:.1} ms; coherent at {} of {} frequencies; the model is {:.0} % off, the twin {:.0} %",
+            self.loop_delay_ms,
+            self.coherent,
+            self.frequencies,
+            100.0 * self.model_off,
+            100.0 * self.twin_off
+        ));
+        lines.push(format!("it took {:.1} A at most, and {:.1} turns to one side", self.peak_a, self.travel_turns));
+        let mut table = Table::new(&["object", "name", "has", "proposed"]);
+        for row in &self.gains {
+            table.row([row.object.clone(), row.name.to_owned(), row.before.to_string(), row.after.to_string()]);
+        }
+        lines.push(String::new());
+        lines.push(table.plain(paint));
+        let margins = |name: &str, row: &host::tune::MarginRow| {
+            let state = if row.stable { "stable" } else { "NOT stable" };
+            format!(
+                "{name}: crossover {:.1} Hz, phase margin {:.0} degrees, sensitivity {:.1}, {state}",
+                row.crossover_hz, row.phase_deg, row.sensitivity
+            )
+        };
+        lines.push(String::new());
+        lines.push(margins("speed loop, as it is ", &self.before));
+        lines.push(margins("speed loop, proposed ", &self.after));
+        lines.extend(self.position.iter().map(|row| margins("position loop around", row)));
+        let error = |[before, after]: [f64; 2]| format!("{before:.2} r/min s before, {after:.2} after");
+        lines.push(format!("error after a step and a load, on the twin: {}", error(self.twin_error)));
+        if let Some(errors) = self.drive_error {
+            lines.push(format!("error after a step, on the drive: {}", error(errors)));
+        }
+        lines.push(match (self.applied, self.drive_error.is_some()) {
+            (true, _) => {
+                format!("the drive has the proposed values; they are not stored: ferrodrive save {}", self.node)
+            }
+            (false, true) => "the drive has its former gains".to_owned(),
+            (false, false) => "nothing of the drive has changed; --apply writes the proposed values".to_owned(),
+        });
+        lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
+        lines.join("\n")
+    }
+}
