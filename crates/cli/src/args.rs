@@ -4,9 +4,9 @@ use clap::{Parser, Subcommand};
 
 use crate::command::configure::{dcf, init, lss, params, program, sdo, store, tune};
 use crate::command::look::{dump, emcy, explain, objects, pdo, read, scan, studio, top, watch};
-use crate::command::moving::{drive, drive_base, estop, group, home, motion};
+use crate::command::moving::{drive, drive_base, estop, group, home, motion, test_motion};
 use crate::command::network::{boot, check, conform, gateway, latency, nmt, plan, send, supervise, sync, time};
-use crate::command::record_and_replay::{convert, decode, plot, record, replay};
+use crate::command::record_and_replay::{capture, convert, decode, plot, record, replay};
 use crate::command::simulate::{demo, events, run, sim, world};
 use crate::command::tools::{completions, eds, export, fmu, man_pages, readings};
 use crate::global::Global;
@@ -65,10 +65,12 @@ pub(crate) enum Command {
     Torque(motion::Torque),
     Home(home::Home),
     Group(group::GroupCommand),
+    TestMotion(test_motion::TestMotion),
     DriveBase(drive_base::DriveBase),
     Tune(tune::Tune),
     Latency(latency::Latency),
     Record(record::Record),
+    Capture(capture::Capture),
     Export(export::Export),
     Fmu(fmu::Fmu),
     Gateway(gateway::Gateway),

@@ -48,7 +48,15 @@ pub(crate) struct Context {
     json: bool,
     embedded: bool,
     remembered: RefCell<Remembered>,
-    restorer: RefCell<Option<conform::Restorer>>,
+    restorer: RefCell<Option<Restorer>>,
+}
+
+/// What puts back what a command has written.
+pub(crate) enum Restorer {
+    /// Of a case of the conformance suite.
+    Conform(conform::Restorer),
+    /// Of a capture.
+    Capture(host::capture::Restorer),
 }
 
 /// A model that need not be found out.
@@ -178,7 +186,7 @@ impl Context {
     }
 
     /// Whatever ends the command, this puts back what it has written.
-    pub(crate) fn restore_at_end(&self, restorer: conform::Restorer) {
+    pub(crate) fn restore_at_end(&self, restorer: Restorer) {
         self.restorer.replace(Some(restorer));
     }
 
@@ -190,7 +198,10 @@ impl Context {
     /// Puts back what the command has written, if it has; what could not be.
     pub(crate) async fn restore(&self) -> Option<Vec<String>> {
         let restorer = self.restorer.take()?;
-        Some(restorer.restore().await)
+        Some(match restorer {
+            Restorer::Conform(restorer) => restorer.restore().await,
+            Restorer::Capture(restorer) => restorer.restore().await,
+        })
     }
 
     /// What stands behind the shaft of a drive, as the machine file says.

@@ -27,6 +27,7 @@ const GROUPS: &[CommandGroup] = &[
             "home",
             "group",
             "drive-base",
+            "test-motion",
             "stop",
             "quick-stop",
             "estop",
@@ -53,7 +54,10 @@ const GROUPS: &[CommandGroup] = &[
             "conform",
         ],
     },
-    CommandGroup { title: "Record and replay", commands: &["record", "plot", "decode", "convert", "replay"] },
+    CommandGroup {
+        title: "Record and replay",
+        commands: &["capture", "record", "plot", "decode", "convert", "replay"],
+    },
     CommandGroup { title: "Tools", commands: &["eds", "export", "fmu", "readings", "completions", "help"] },
 ];
 

@@ -47,6 +47,7 @@ use crate::args::{Cli, Command};
 use crate::command::look::departures::DepartureList;
 use crate::command::look::objects::{Objects, Whose};
 use crate::command::moving::drive::StopOutcome;
+use crate::command::moving::estop::Estop;
 use crate::command::tools::completions::ASKED_BY;
 use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
@@ -257,9 +258,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Conform(command) => command.run(global, format),
         Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Disable(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Estop(command) => {
-            stops(global, format, async |context| command.run(context).await.map(StopOutcome::all))
-        }
+        Command::Estop(command) => stops_all(global, format, command),
         Command::Stop(command) => stops(global, format, async |context| command.run(context).await),
         Command::QuickStop(command) => stops(global, format, async |context| command.run(context).await),
         Command::Reset(command) => on_bus(global, format, async |context| command.run(context).await),
@@ -275,6 +274,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Latency(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Boot(boot) => boot.run(global, format),
         Command::Supervise(command) => command.run(global, format),
+        Command::TestMotion(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Group(group) => group.run(global, format),
         Command::DriveBase(base) => base.run(global, format),
         Command::Plan(plan) => plan.run(global, format),
@@ -293,6 +293,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Dump(dump) => dump.run(global, format),
         Command::Decode(decode) => decode.run(global, format),
         Command::Convert(convert) => print(format, &convert.run(format.json)?),
+        Command::Capture(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Record(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Export(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Fmu(fmu) => print(format, &fmu.run()?),
@@ -315,6 +316,10 @@ fn list_objects(global: &Global, format: Format, objects: &Objects) -> Result<()
         Whose::Model(model) => print(format, &objects.list(model)?),
         Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
     }
+}
+
+fn stops_all(global: &Global, format: Format, command: &Estop) -> Result<(), Failure> {
+    stops(global, format, async |context| command.run(context).await.map(StopOutcome::all))
 }
 
 fn stops(

@@ -215,6 +215,7 @@ mod tests {
     /// A line of each command that the parser takes, on a bus where every option may have an effect.
     const LINES: &[&str] = &[
         "boot m.toml",
+        "capture 4 velocity",
         "check m.toml",
         "completions bash",
         "conform 4",
@@ -265,6 +266,7 @@ mod tests {
         "studio",
         "supervise m.toml",
         "sync",
+        "test-motion 4 steps",
         "time",
         "top",
         "torque 4 1A",

@@ -34,6 +34,7 @@ pub mod session;
 mod snapshot;
 mod state;
 pub mod stopping;
+pub mod test_motion;
 #[cfg(test)]
 mod tests;
 pub mod timeline;

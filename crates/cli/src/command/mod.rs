@@ -32,6 +32,7 @@ pub(crate) mod moving {
     pub(crate) mod group;
     pub(crate) mod home;
     pub(crate) mod motion;
+    pub(crate) mod test_motion;
 }
 
 pub(crate) mod configure {
@@ -60,6 +61,7 @@ pub(crate) mod network {
 }
 
 pub(crate) mod record_and_replay {
+    pub(crate) mod capture;
     pub(crate) mod convert;
     pub(crate) mod decode;
     pub(crate) mod plot;

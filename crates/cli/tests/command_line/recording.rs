@@ -218,3 +218,46 @@ fn the_page_tells_of_every_signal_with_its_unit() {
         assert!(page.contains(&row), "{row}");
     }
 }
+
+#[test]
+fn a_capture_is_a_record_with_what_belongs_to_it_and_says_how_it_was_had() {
+    let place = scratch("captures");
+    let file = place.join("step.mcap");
+    let name = file.to_str().unwrap();
+    let words = ["capture", "4", "velocity", "target_velocity", "--for", "200ms", "--notes", "cold", "-o", name];
+    let report = done(&[&words[..], &["--json"]].concat()).json();
+    let traces = report["captures"][0]["traces"].as_array().unwrap();
+    assert_eq!((&report["pace"], traces.len()), (&"event timer".into(), 2), "{report}");
+    for trace in traces {
+        assert_eq!((&trace["by"], &trace["period_s"], &trace["gaps"]), (&"TPDO1".into(), &0.001.into(), &0.into()));
+    }
+    let capture = recording::Capture::of(&recorded(&file), None).unwrap();
+    assert_eq!((capture.name.as_str(), capture.notes.as_str()), ("step", "cold"));
+    assert!(capture.model == "zlac8030l" && !capture.parameters.is_empty() && !capture.is_cut_off);
+    let drawn = done(&["plot", name, "-o", "-", "--json"]).json();
+    assert!(!drawn["picture"].as_str().unwrap().contains("capture {"), "the description is not an event");
+    let refused = ferrodrive(&["capture", "1", "velocity"]);
+    assert!(
+        refused.status == Some(1) && refused.err.contains("is fixed") && refused.err.contains("--sdo"),
+        "{}",
+        refused.err
+    );
+}
+
+#[test]
+fn a_test_motion_is_judged_by_what_was_sampled() {
+    let report =
+        done(&["test-motion", "4", "steps", "--speed", "60rpm", "--time", "1s", "--count", "2", "--json"]).json();
+    let runs = report["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 2);
+    for run in runs {
+        let steps = run["steps"].as_array().unwrap();
+        assert_eq!((&steps[0]["to"], &steps[1]["to"]), (&60.0.into(), &0.0.into()), "{run}");
+        // The ramp as delivered, 500 ms (6083h): 80 % of it from 10 % to 90 %.
+        let rise = steps[0]["rise_s"]["value"].as_f64().unwrap_or_else(|| panic!("{run}"));
+        assert!((0.2..0.6).contains(&rise), "{rise}");
+        assert!(run["heating"]["rms_a"].as_f64().unwrap() > 0.0);
+    }
+    let refused = ferrodrive(&["test-motion", "4", "sine", "--by", "90deg", "--frequency", "5"]);
+    assert!(refused.status == Some(1) && refused.err.contains("are allowed"), "{}", refused.err);
+}

@@ -70,7 +70,7 @@ pub struct Heating {
 /// Figures of a step from `from` to `to` whose demand changed at `at_s`; times ascend.
 ///
 /// # Errors
-/// A sentence: it is no step, or there are too few readings for any figure.
+/// A sentence: it is not a step, or there are too few readings for any figure.
 pub fn step(points: &[(f64, f64)], at_s: f64, from: f64, to: f64) -> Result<Step, String> {
     let way = to - from;
     if !way.is_finite() || way == 0.0 {

@@ -3,7 +3,7 @@
 //! In: the model's PDO rules, how its PDOs are set up, what is asked for, how fast, and what the bus has (bit rate, SYNC). Out: the
 //! configuration of some TPDOs with the values of their objects, or why there is none and what is possible instead.
 //!
-//! A TPDO is spare when nothing can come of it: it is off, it carries nothing, or it waits for a SYNC that nobody sends. One that is in
+//! A TPDO is spare when nothing can come of it: it is off, it carries nothing, or it waits for a SYNC that is not sent. One that is in
 //! use is taken only where the caller names it.
 
 use std::collections::BTreeMap;
@@ -17,6 +17,9 @@ use master::core::PdoMap;
 use master::pdo::{PdoConfig, PdoUnfit, TimerUnits, TransmissionType, most_objects, record_of, values_off};
 use master::plan::{NodeTraffic, Settings, plan as plan_bus};
 use words::failure::Failure;
+
+/// A TPDO as it is set up.
+type Tpdo = (PdoConfig, CobId);
 
 /// The bits of a PDO (CiA 301, 7.2.2.5).
 const BITS: u32 = u64::BITS;
@@ -33,7 +36,7 @@ pub struct Request<'a> {
     pub period: Duration,
     /// Of the bus.
     pub bitrate: Bitrate,
-    /// The period of SYNC where somebody sends it.
+    /// The period of SYNC where it is on the bus.
     pub sync: Option<Duration>,
     /// TPDOs that are taken although they are in use.
     pub take: &'a [PdoId],
@@ -288,7 +291,7 @@ fn no_room(
 fn on_the_bus(
     model: &'static Description,
     node: NodeId,
-    (now, spare): (&[(PdoConfig, CobId)], &[&(PdoConfig, CobId)]),
+    (now, spare): (&[Tpdo], &[&Tpdo]),
     request: &Request<'_>,
     pace: Pace,
     slots: &[Slot],
@@ -299,7 +302,7 @@ fn on_the_bus(
         let unfit = |error: PdoUnfit| refused(error.to_string()).of_kind("no_mapping");
         values.extend(slot.config.values(model, node).map_err(unfit)?);
     }
-    // A SYNC that is sent for the capture is not to bring what nobody waited for.
+    // A SYNC that is sent for the capture is not to bring TPDOs that did not come before.
     let is_asked_for = |pdo: PdoId| slots.iter().any(|slot| slot.config.pdo == pdo);
     for (config, cob_id) in spare.iter().filter(|_| pace == Pace::OwnSync) {
         let waits = cob_id.is_valid() && config.transmission.is_synchronous() && !config.map.0.is_empty();

@@ -98,7 +98,7 @@ fn tpdos_in_use_are_left_alone_unless_they_are_named() {
         };
         plan(model, node(), &delivered(model), &request)
     };
-    // TPDO1 and 2 go on events; 3 and 4 wait for a SYNC that nobody sends: 128 bits for 160.
+    // TPDO1 and 2 go on events; 3 and 4 wait for a SYNC that is not on the bus: 128 bits for 160.
     let failure = used(Vec::new()).expect_err("no room");
     let text = failure.to_string();
     assert_eq!(failure.kind, "no_room");

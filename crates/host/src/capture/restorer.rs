@@ -8,7 +8,7 @@ use master::parameters::roll_back;
 
 use crate::network::params::journal::Kept;
 
-/// Puts back what a capture has changed. A clone outlives a capture that is given up, for the caller that ends it; where nobody does,
+/// Puts back what a capture has changed. A clone outlives a capture that is given up, for the caller that ends it; without one,
 /// the journal stays on the disk, for `params rollback`.
 #[derive(Clone, Debug)]
 pub struct Restorer {

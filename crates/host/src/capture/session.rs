@@ -1,5 +1,6 @@
 //! A capture on a bus: the drive is made to send, what comes is collected, and everything is put back.
 
+use std::cell::Cell;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -60,6 +61,9 @@ pub enum Way {
     Sdo,
 }
 
+/// A column and its bits in a frame.
+type Field = (usize, std::ops::Range<u32>);
+
 /// A capture that runs: the drive sends.
 #[derive(Debug)]
 pub struct Running {
@@ -70,7 +74,7 @@ pub struct Running {
     period: Duration,
     log: Option<FrameLog>,
     /// Of each identifier the columns with the bits that they have.
-    fields: Vec<(u16, Vec<(usize, std::ops::Range<u32>)>)>,
+    fields: Vec<(u16, Vec<Field>)>,
     parameters: std::collections::BTreeMap<Mux, Vec<u8>>,
     rows: Rows,
     taken: Vec<LoggedFrame>,
@@ -134,7 +138,7 @@ impl Wanted {
 
     async fn begun(&self, drive: &Drive, restorer: &Restorer) -> Result<Running, Failure> {
         let node = drive.node();
-        // A drive that has one of them not says so before anything is written.
+        // What a drive does not have is refused before anything is written.
         for quantity in &self.quantities {
             node.upload(quantity.object).await?;
         }
@@ -236,7 +240,7 @@ impl Wanted {
     }
 }
 
-/// The period of a SYNC that somebody else sends: the median distance of those that were heard.
+/// The period of a SYNC that another node sends: the median distance of those that were heard.
 async fn heard_sync(drive: &Drive) -> Option<Duration> {
     let network = drive.node().network();
     let id = connection_set::SYNC.as_standard()?;
@@ -348,6 +352,37 @@ impl Running {
             }
         };
         Ok(self.capture(span, begun, cut_off))
+    }
+
+    /// Captures for as long as something else is being done, from now on.
+    ///
+    /// # Errors
+    /// Those of [`next`](Self::next), beside what came of the other.
+    pub async fn during<T>(&mut self, doing: impl Future<Output = T>) -> (T, Result<Taken, Failure>) {
+        let network = self.drive.node().network().clone();
+        (self.rows, self.lost) = (Rows::new(self.quantities.len(), self.period), 0);
+        self.has_come();
+        self.taken.clear();
+        let (begun, is_done) = (network.now(), Cell::new(false));
+        let doing = async {
+            let done = doing.await;
+            is_done.set(true);
+            done
+        };
+        let collecting = async {
+            while !is_done.get() {
+                self.collect().await?;
+                let heard_at = if self.rows.is_empty() { begun } else { self.rows.row(self.rows.len() - 1).0 };
+                if network.now() - heard_at > PATIENCE + self.period * 2 {
+                    return Ok(Some(self.silent(network.now() - heard_at)));
+                }
+            }
+            Ok(None)
+        };
+        let (done, cut_off) = futures_util::future::join(doing, collecting).await;
+        let duration = network.now() - begun;
+        let span = Span { duration, trigger: None, pre_trigger: Duration::ZERO };
+        (done, cut_off.map(|cut_off| self.capture(&span, Some(begun), cut_off)))
     }
 
     fn armed(&self, trigger: &Trigger) -> Result<(usize, Armed), Failure> {

@@ -8,7 +8,10 @@ use can::{Bitrate, Instant};
 use canopen::{Mux, NodeId};
 use host::capture::{Pace, Quantity, Restorer, Running, Span, Wanted, Way};
 use host::network::params::journal::roll_back_by;
+use host::test_motion::{Shape, beside, follow, points, steps};
+use master::cyclic::CyclicOptions;
 use master::drive::MotionOptions;
+use master::group::{AxisLimits, AxisSetup, Group};
 use master::units::{Ramp, Rpm};
 use master::{Drive, Network};
 use sim::machine::{Order, order};
@@ -244,7 +247,7 @@ fn a_drive_that_loses_its_supply_cuts_the_capture_off_and_what_came_is_kept() {
     assert_eq!(why.kind, "capture_cut_off");
     assert!(taken.capture.is_cut_off);
     drop(running);
-    // Nobody answers: what could not be put back is said, and the journal stays.
+    // The drive does not answer: what could not be put back is said, and the journal stays.
     assert!(!bench.run(restorer.restore()).is_empty());
     drop(restorer);
     assert!(path.exists());
@@ -287,5 +290,60 @@ fn a_sync_that_others_send_is_followed() {
     assert_eq!(running.plan().map(|plan| plan.pace), Some(Pace::Sync(2)));
     let taken = bench.run(running.next(&at_once(200))).expect("it is captured");
     assert!((taken.capture.traces[0].period_s - 4e-3).abs() < 1e-4);
+    bench.run(restorer.restore());
+}
+
+/// Twice the amplitude from end to end, whatever the drive takes its set-points as; and the way back at the end.
+#[test]
+fn a_sine_is_followed_run_after_run_while_it_is_captured() {
+    const CYCLE: Duration = Duration::from_millis(5);
+    let mut bench = Bench::new("zlac8030l");
+    let limits = AxisLimits { velocity_turns_s: 1.0, acceleration_turns_s2: 20.0, ..AxisLimits::careful() };
+    let amplitude_turns = 10.0 / 360.0;
+    let shape = Shape::Sine { amplitude_turns, hz: 2.0, periods: 2 };
+    let path = points(&shape, &limits, CYCLE.as_secs_f64()).expect("within its limits");
+    let drive = bench.drive.clone();
+    let mode = AxisSetup::best_mode(&drive).expect("it has one");
+    let axis = AxisSetup { drive: drive.clone(), mode, limits };
+    let mut group = bench.run(Group::open(&[axis], CYCLE, CyclicOptions::default())).expect("it opens");
+    let with_group = bench.tpdos();
+    let mut wanted = bench.wanted(&["position", "current"], None);
+    wanted.period = CYCLE;
+    let begun = bench.run(beside(&mut group, wanted.begin(&drive))).expect("the cycles go on");
+    let (mut running, restorer) = begun.expect("it begins");
+    assert_eq!(running.plan().map(|plan| plan.pace), Some(Pace::Sync(1)));
+    bench.run(group.enable()).expect("it is enabled");
+    for run in 0..2 {
+        let (followed, taken) = bench.run(running.during(follow(&mut group, &path)));
+        let followed = followed.unwrap_or_else(|error| panic!("run {run}: {error}"));
+        assert!((1.0..1.3).contains(&followed.took_s), "run {run}: {followed:?}");
+        assert!(followed.most_deg < 5.0 && followed.rms_deg <= followed.most_deg, "run {run}: {followed:?}");
+        let capture = taken.expect("it is captured").capture;
+        let trace = capture.trace("position_deg").expect("a position");
+        let ends = capture
+            .points(trace)
+            .map(|(_, deg)| deg)
+            .fold((f64::MAX, f64::MIN), |(low, high), deg| (low.min(deg), high.max(deg)));
+        assert!((ends.1 - ends.0 - 20.0).abs() < 1.5, "run {run}: {ends:?}");
+    }
+    bench.run(group.close()).expect("it closes");
+    assert_eq!(bench.run(restorer.restore()), Vec::<String>::new());
+    assert_eq!(bench.tpdos(), with_group);
+}
+
+#[test]
+fn steps_of_velocity_end_at_rest_with_both_edges_captured() {
+    let mut bench = Bench::new("zlac8030l");
+    let wanted = bench.wanted(&["velocity", "target_velocity"], None);
+    let (mut running, restorer) = bench.begin(&wanted).expect("it begins");
+    let drive = bench.drive.clone();
+    let (done, taken) = bench.run(running.during(steps(&drive, Rpm(60.0), None, Duration::from_millis(800))));
+    done.expect("it moves");
+    let capture = taken.expect("it is captured").capture;
+    let demand: Vec<f64> = capture.trace("target_velocity_rpm").expect("a demand").values.clone();
+    let edges: Vec<_> = demand.windows(2).filter(|pair| pair[0] != pair[1]).map(|pair| (pair[0], pair[1])).collect();
+    assert_eq!(edges, [(0.0, 60.0), (60.0, 0.0)]);
+    assert!(bench.world.report(4).expect("the drive").velocity_rpm.abs() < 1.0);
+    assert!(!bench.network.moved().contains(node()));
     bench.run(restorer.restore());
 }

@@ -1,4 +1,4 @@
-//! Frames of some identifiers, kept one by one with their times, for whoever measures: the process image has the newest alone.
+//! Frames of some identifiers, kept one by one with their times, for a program that measures: the process image has the newest alone.
 
 use std::collections::VecDeque;
 

@@ -45,6 +45,11 @@ impl Group {
         Ok(self.network.exchange(|io| runner.step(io)))
     }
 
+    /// The network that its drives are on.
+    pub const fn network(&self) -> &Network {
+        &self.network
+    }
+
     /// What the group is doing.
     pub const fn state(&self) -> GroupState {
         self.runner.state()

@@ -42,6 +42,9 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["watch", "4", "6064", "statusword", "1018:01", "--count", "2"], "watch"),
     (&["read", "4", "1018:*", "1000..100A"], "value"),
     (&["read", "4", "9000..9FFF"], "failure"),
+    (&["capture", "1", "velocity"], "failure"),
+    (&["test-motion", "4", "steps", "--time", "200ms"], "test_motion"),
+    (&["test-motion", "4", "sine", "--by", "5deg", "--periods", "1"], "test_motion"),
     (&["pdo", "show", "1", "4"], "pdo_show"),
     (&["pdo", "plan", "4", "tpdo1=statusword,6064", "--type", "1"], "pdo_plan"),
     (&["pdo", "apply", "4", "tpdo1=statusword,6064", "--type", "1"], "params_apply"),
@@ -179,6 +182,7 @@ fn files_and_logs_are_reported_in_the_same_form() {
         (&["convert", &log, &blf], "convert"),
         (&["replay", &log, "--skip-motion"], "replay"),
         (&["record", "4", "606C", "--out", &csv, "--for", "100ms"], "record"),
+        (&["capture", "4", "velocity", "--for", "50ms", "-o", &csv], "capture"),
     ] {
         hold(&ferrodrive(&[arguments, &["--json"]].concat()), definition, &format!("{arguments:?}"));
     }

@@ -113,7 +113,7 @@ fn word(text: &str) -> Result<Word, String> {
 }
 
 /// An angle with its unit: a group is spoken of in degrees, and a number alone would be counts of the drive.
-fn angle(text: &str) -> Result<Angle, String> {
+pub(super) fn angle(text: &str) -> Result<Angle, String> {
     let angle = text.parse().map_err(|error| format!("{error}"))?;
     if text.ends_with(|c: char| c.is_ascii_digit() || c == '.') {
         return Err(format!(
@@ -124,7 +124,7 @@ fn angle(text: &str) -> Result<Angle, String> {
 }
 
 /// A speed of the shaft: a group plans in turns.
-fn turning(text: &str) -> Result<Rpm, String> {
+pub(super) fn turning(text: &str) -> Result<Rpm, String> {
     match speed(text)? {
         Along::Turning(rpm) => Ok(rpm),
         Along::Metres(_) => {
@@ -134,7 +134,7 @@ fn turning(text: &str) -> Result<Rpm, String> {
 }
 
 /// A rate in turns/s^2.
-fn rate(text: &str) -> Result<f64, String> {
+pub(super) fn rate(text: &str) -> Result<f64, String> {
     match text.parse::<Ramp>() {
         Ok(Ramp::RpmPerSecond(rate)) if rate > 0.0 => Ok(rate / 60.0),
         Ok(_) => Err("expected a rate above 0, e.g. 120rpm/s: a change of speed does not take a fixed time".into()),
@@ -167,13 +167,22 @@ struct AxisMoved {
 }
 
 #[derive(Debug, Serialize)]
-struct AxisLimitValues {
+pub(super) struct AxisLimitValues {
     /// `null` for an axis without software limits.
     range_deg: Option<[f64; 2]>,
     velocity_rpm: f64,
     acceleration_rpm_s: f64,
     jerk_rpm_s2: f64,
     following_error_deg: f64,
+}
+
+impl AxisLimitValues {
+    /// `30 r/min, 60 (r/min)/s, -90 to 90 deg`.
+    pub(super) fn text(&self) -> String {
+        let Self { range_deg, velocity_rpm, acceleration_rpm_s, .. } = self;
+        let range = range_deg.map_or(String::new(), |[low, high]| format!(", {} to {} deg", Shown(low), Shown(high)));
+        format!("{} r/min, {} (r/min)/s{range}", Shown(*velocity_rpm), Shown(*acceleration_rpm_s))
+    }
 }
 
 impl From<&AxisLimits> for AxisLimitValues {
@@ -445,7 +454,7 @@ pub(in crate::command) async fn end_guards<'a>(
     Ok(reports)
 }
 
-async fn turns_of(drive: &Drive, angle: Angle) -> Result<Turns, Failure> {
+pub(super) async fn turns_of(drive: &Drive, angle: Angle) -> Result<Turns, Failure> {
     match angle {
         Angle::Turns(turns) => Ok(Turns(turns)),
         Angle::Counts(counts) => Ok(Turns(counts as f64 / drive.counts_per_turn().await?)),
@@ -487,10 +496,7 @@ impl Report for GroupMoved {
         let mut table = Table::new(&["node", "mode", "from", "to", "at", "largest lag", "limits"]);
         for axis in &self.axes {
             let deg = |value: f64| format!("{} deg", Shown(value));
-            let AxisLimitValues { range_deg, velocity_rpm, acceleration_rpm_s, .. } = axis.limits;
-            let range =
-                range_deg.map_or(String::new(), |[low, high]| format!(", {} to {} deg", Shown(low), Shown(high)));
-            let limits = format!("{} r/min, {} (r/min)/s{range}", Shown(velocity_rpm), Shown(acceleration_rpm_s));
+            let limits = axis.limits.text();
             let cells = [axis.from_deg, axis.to_deg, axis.at_deg, axis.largest_following_error_deg].map(deg);
             let [from, to, at, lag] = cells;
             table.row([axis.node.to_string(), axis.mode.clone(), from, to, at, lag, limits]);

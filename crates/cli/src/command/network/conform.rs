@@ -6,7 +6,7 @@ use canopen::{Mux, NodeId};
 use conform::{Capture, Case, CaseResult, Options, Outcome, Subject, Suite, SuiteError, all, html, junit, selected};
 use serde::Serialize;
 
-use crate::context::Context;
+use crate::context::{Context, Restorer};
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::{Format, Report, file_path};
@@ -89,7 +89,7 @@ impl Conform {
             timeout: context.timeout(),
         };
         let suite = Suite::new(context.network.clone(), capture, subject, options);
-        context.restore_at_end(suite.restorer());
+        context.restore_at_end(Restorer::Conform(suite.restorer()));
         let progress = |at: conform::CaseProgress<'_>| {
             if at.result.is_none() {
                 context.progress.count(format!("{} of {}: {} {}", at.number, at.of, at.case.id, at.case.title));

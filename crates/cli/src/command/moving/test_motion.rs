@@ -1,0 +1,420 @@
+//! `ferrodrive test-motion`: a motion with its limits, again and again, with figures of merit of each run.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use canopen::NodeId;
+use host::capture::merit::{self, Heating, Step};
+use host::capture::{Quantity, Running, Span, Taken, Wanted};
+use host::test_motion::{Followed, Shape, beside, follow, points, steps};
+use master::Drive;
+use master::group::{AxisLimits, AxisSetup, Group, GroupError};
+use master::units::{Angle, Ramp, Rpm, parse_duration};
+use recording::{Capture, Kind};
+use serde::Serialize;
+use words::node::node;
+
+use crate::command::record_and_replay::capture::{CaptureArgs, CaptureRow, USUAL_RATE, capture_file, numbered, save};
+use crate::command::cycles::CycleArgs;
+use super::group::{AxisLimitValues, angle, rate, turning, turns_of};
+use crate::command::repeat::period;
+use crate::context::{Context, Restorer};
+use crate::failure::Failure;
+use crate::guard::{GuardArgs, GuardReport};
+use crate::numbers::whole;
+use crate::output::Report;
+use plot::{Paint, Table};
+
+/// Move a drive by a test motion, n times, with figures of each run
+///
+/// SHAPE is back-and-forth, ramp, sine, chirp, prbs or path, sent point by point within the limits that are stated, or
+/// steps of velocity by the drive's own ramps. What is captured meanwhile gives rise, overshoot, settling and r.m.s.
+/// current, as far as the sampling shows them. The drive is without power afterwards; its spare TPDOs are as before.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive test-motion 4 steps --speed 60rpm --count 3 -o step.mcap\n  \
+    ferrodrive test-motion 4 sine --by 10deg --frequency 2 --velocity 90rpm")]
+pub(crate) struct TestMotion {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Shape of the motion
+    #[arg(value_name = "SHAPE")]
+    shape: ShapeName,
+    /// Distance of back-and-forth, amplitude of sine and chirp
+    #[arg(long, value_name = "ANGLE", value_parser = angle, default_value = "90deg")]
+    by: Angle,
+    /// Speed of steps, ramp and prbs
+    #[arg(long, value_name = "SPEED", value_parser = turning, default_value = "20rpm")]
+    speed: Rpm,
+    /// Frequency of sine, the first one of chirp, in Hz
+    #[arg(long, value_name = "HZ", default_value = "1")]
+    frequency: f64,
+    /// Last frequency of chirp, in Hz
+    #[arg(long, value_name = "HZ", default_value = "10")]
+    to_frequency: f64,
+    /// Periods of sine
+    #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=10_000_u32), default_value = "3", hide_short_help = true)]
+    periods: u32,
+    /// Time that steps and ramp keep their speed, of a bit of prbs, of all of chirp
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "500ms")]
+    time: Duration,
+    /// Capture whose position is the path
+    #[arg(long, value_name = "FILE", value_parser = capture_file)]
+    path: Option<PathBuf>,
+    /// Runs
+    #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=999_u32), default_value = "1")]
+    count: u32,
+    /// Limit of the speed (steps: of --speed)
+    #[arg(long, value_name = "SPEED", value_parser = turning, default_value = "60rpm")]
+    velocity: Rpm,
+    /// Limit of the acceleration; steps: the drive's own ramps without it
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    acceleration: Option<f64>,
+    /// Distance of the shaft from its set-point beyond which it is stopped
+    #[arg(long, value_name = "ANGLE", value_parser = angle, default_value = "72deg", hide_short_help = true)]
+    following_error: Angle,
+    /// Period of SYNC, in which points are sent
+    #[arg(long, value_name = "TIME", value_parser = period, default_value = "5ms", hide_short_help = true)]
+    period: Duration,
+    /// Quantities to capture meanwhile (default: of velocity, target_velocity and current those that the model has)
+    #[arg(long, value_name = "QUANTITY,..", value_delimiter = ',', hide_short_help = true)]
+    capture: Vec<String>,
+    #[command(flatten)]
+    how: CaptureArgs,
+    /// Write the captures to this file and NAME-2 and on, .mcap or .csv
+    #[arg(long, short, value_name = "FILE", value_parser = capture_file)]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    cycles: CycleArgs,
+    #[command(flatten)]
+    guard: GuardArgs,
+}
+
+/// The shapes by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum ShapeName {
+    /// There and back, at rest at both ends
+    BackAndForth,
+    /// Velocity at once, and off again
+    Steps,
+    /// Velocity up, kept, down, and backwards
+    Ramp,
+    /// Periods of a cosine
+    Sine,
+    /// A cosine of rising frequency
+    Chirp,
+    /// Velocity of pseudo-random sign
+    Prbs,
+    /// The position of a capture
+    Path,
+}
+
+/// The acceleration of a careful beginning, in turns/s^2: 600 (r/min)/s.
+const ACCELERATION_TURNS_S2: f64 = 10.0;
+/// How soon it is reached, in s.
+const ROUNDING_S: f64 = 0.1;
+
+/// What was moved, and how.
+#[derive(Debug, Serialize)]
+pub(crate) struct TestMotionReport {
+    node: u8,
+    shape: String,
+    limits: AxisLimitValues,
+    guard: GuardReport,
+    runs: Vec<RunRow>,
+}
+
+/// One run.
+#[derive(Debug, Serialize)]
+struct RunRow {
+    run: u32,
+    /// Null for steps, which have no set-point in cycles.
+    followed: Option<Followed>,
+    /// Up and down, of steps.
+    steps: Vec<Step>,
+    /// Why there are no figures of steps.
+    no_steps: Option<String>,
+    heating: Option<Heating>,
+    capture: CaptureRow,
+}
+
+/// What drives the shaft.
+enum Mover {
+    Steps(Drive),
+    Group(Box<Group>, Vec<f64>),
+}
+
+impl TestMotion {
+    /// Moves, captures, and reports each run.
+    pub(crate) async fn run(&self, context: &Context) -> Result<TestMotionReport, Failure> {
+        let drive = context.known_drive(self.node).await?;
+        let limits = self.limits(&drive).await?;
+        let stream = self.points(&drive, &limits).await?;
+        let names = self.captured(&drive).await?;
+        let usual = if stream.is_some() { self.period } else { USUAL_RATE };
+        let wanted = self.how.wanted(context, &drive, &names, usual).await?;
+        wanted.check(&Span { duration: Duration::from_secs(60), trigger: None, pre_trigger: Duration::ZERO })?;
+        let guard = self.guard.begin(context, &drive).await?;
+        let mover = match stream {
+            None => Ok(Mover::Steps(drive.clone())),
+            Some(points) => self.group(&drive, &limits).await.map(|group| Mover::Group(Box::new(group), points)),
+        };
+        let moved = match mover {
+            Ok(mover) => self.measured(context, &drive, mover, &wanted).await,
+            Err(failure) => Err(failure),
+        };
+        let (guard, _) = guard.end(context, &drive, false).await?;
+        let (node, shape) = (self.node.raw(), self.shape_name());
+        Ok(TestMotionReport { node, shape, limits: (&limits).into(), guard, runs: moved? })
+    }
+
+    async fn group(&self, drive: &Drive, limits: &AxisLimits) -> Result<Group, Failure> {
+        let axis = AxisSetup { drive: drive.clone(), mode: AxisSetup::best_mode(drive)?, limits: limits.clone() };
+        Ok(Group::open(&[axis], self.period, self.cycles.options()).await?)
+    }
+
+    /// The quantities that were named, or of the usual ones those that the model has.
+    async fn captured(&self, drive: &Drive) -> Result<Vec<String>, Failure> {
+        if !self.capture.is_empty() {
+            return Ok(self.capture.clone());
+        }
+        let mut names = Vec::new();
+        for name in ["velocity", "target_velocity", "current"] {
+            match Quantity::named(drive, name).await {
+                Ok(_) => names.push(name.to_owned()),
+                Err(failure) if failure.kind == "no_such_quantity" => {}
+                Err(failure) => return Err(failure.into()),
+            }
+        }
+        Ok(names)
+    }
+
+    fn shape_name(&self) -> String {
+        let value = clap::ValueEnum::to_possible_value(&self.shape);
+        value.map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    async fn limits(&self, drive: &Drive) -> Result<AxisLimits, Failure> {
+        let acceleration_turns_s2 = self.acceleration.unwrap_or(ACCELERATION_TURNS_S2);
+        let Rpm(velocity_rpm) = self.velocity;
+        let limits = AxisLimits {
+            range_turns: None,
+            velocity_turns_s: velocity_rpm / 60.0,
+            acceleration_turns_s2,
+            jerk_turns_s3: acceleration_turns_s2 / ROUNDING_S,
+            following_error_turns: turns_of(drive, self.following_error).await?.0.abs(),
+        };
+        limits.check(1).map_err(|error| Failure::from(GroupError::Path(error)))?;
+        Ok(limits)
+    }
+
+    /// The points of the shape; `None` for steps.
+    async fn points(&self, drive: &Drive, limits: &AxisLimits) -> Result<Option<Vec<f64>>, Failure> {
+        let by = turns_of(drive, self.by).await?.0;
+        let (Rpm(rpm), time_s) = (self.speed, self.time.as_secs_f64());
+        let refused = |why: String| {
+            let failure = Failure::new(format!("node {}: {} is not possible", self.node, self.shape_name()));
+            failure
+                .of_kind("out_of_limits")
+                .at_node(self.node)
+                .because(why)
+                .next("nothing was moved: change the shape or a limit")
+        };
+        let shape = match self.shape {
+            ShapeName::Steps if rpm.abs() > self.velocity.0 => {
+                return Err(
+                    refused(format!("a speed of {rpm} r/min, and {} r/min are allowed", self.velocity.0)).into()
+                );
+            }
+            ShapeName::Steps => return Ok(None),
+            ShapeName::BackAndForth => Shape::BackAndForth { by_turns: by },
+            ShapeName::Ramp => Shape::Ramp { velocity_turns_s: rpm / 60.0, hold_s: time_s },
+            ShapeName::Sine => Shape::Sine { amplitude_turns: by, hz: self.frequency, periods: self.periods },
+            ShapeName::Chirp => Shape::Chirp {
+                amplitude_turns: by,
+                from_hz: self.frequency,
+                to_hz: self.to_frequency,
+                duration_s: time_s,
+            },
+            ShapeName::Prbs => Shape::Prbs { velocity_turns_s: rpm / 60.0, bit_s: time_s },
+            ShapeName::Path => Shape::Path { points: self.recorded()? },
+        };
+        Ok(Some(points(&shape, limits, self.period.as_secs_f64()).map_err(refused)?))
+    }
+
+    /// The position of a capture, in turns.
+    fn recorded(&self) -> Result<Vec<(f64, f64)>, Failure> {
+        let path = self
+            .path
+            .as_deref()
+            .ok_or_else(|| Failure::usage("path needs --path FILE").next("give a capture that has position"))?;
+        let unusable = |why: String| {
+            let failure = Failure::bad_file(format!("{} cannot be moved along", path.display())).because(why);
+            failure.next("give a capture with position: ferrodrive capture NODE position -o FILE")
+        };
+        let capture = read(path).map_err(unusable)?;
+        let trace = capture.trace("position_deg").ok_or_else(|| unusable("it has no position_deg".to_owned()))?;
+        Ok(capture.points(trace).map(|(at, deg)| (at, deg / 360.0)).collect())
+    }
+
+    /// Sets the capture up, makes the runs, and puts everything back; what moves is at rest at its end.
+    async fn measured(
+        &self,
+        context: &Context,
+        drive: &Drive,
+        mut mover: Mover,
+        wanted: &Wanted,
+    ) -> Result<Vec<RunRow>, Failure> {
+        let runs = self.runs(context, drive, &mut mover, wanted).await;
+        let ended = match mover {
+            Mover::Steps(drive) => drive.disable().await.map_err(Failure::from),
+            Mover::Group(mut group, _) => {
+                let reason = if runs.is_err() { group.explain_stop().await } else { None };
+                let closed = group.close().await.map_err(Failure::from);
+                closed.map_err(|failure| reason.into_iter().fold(failure, Failure::because))
+            }
+        };
+        let left = context.restore().await.unwrap_or_default();
+        let runs = runs.and_then(|runs| ended.map(|()| runs));
+        match (runs, left.is_empty()) {
+            (Ok(runs), true) => Ok(runs),
+            (Ok(_), false) => Err(left.iter().fold(
+                Failure::new(format!("node {}: not everything was put back", self.node)).of_kind("not_put_back"),
+                |failure, left| failure.because(left),
+            )),
+            (Err(failure), _) => {
+                Err(left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}"))))
+            }
+        }
+    }
+
+    async fn runs(
+        &self,
+        context: &Context,
+        drive: &Drive,
+        mover: &mut Mover,
+        wanted: &Wanted,
+    ) -> Result<Vec<RunRow>, Failure> {
+        let began = match mover {
+            Mover::Steps(_) => wanted.begin(drive).await?,
+            Mover::Group(group, _) => beside(group, wanted.begin(drive)).await??,
+        };
+        let (mut running, restorer) = began;
+        context.restore_at_end(Restorer::Capture(restorer));
+        if let Mover::Group(group, _) = mover {
+            group.enable().await?;
+        }
+        let mut rows = Vec::new();
+        for run in 1..=self.count {
+            context.progress.show(format!("node {}: {}, run {run} of {}", self.node, self.shape_name(), self.count));
+            rows.push(self.once(run, mover, &mut running).await?);
+        }
+        Ok(rows)
+    }
+
+    async fn once(&self, run: u32, mover: &mut Mover, running: &mut Running) -> Result<RunRow, Failure> {
+        let (followed, taken) = match mover {
+            Mover::Steps(drive) => {
+                let ramp = self.acceleration.map(|rate| Ramp::RpmPerSecond(rate * 60.0));
+                let (done, taken) = running.during(steps(drive, self.speed, ramp, self.time)).await;
+                done?;
+                (None, taken)
+            }
+            Mover::Group(group, points) => {
+                let (done, taken) = running.during(follow(group, points)).await;
+                (Some(done?), taken)
+            }
+        };
+        let Taken { mut capture, cut_off } = taken?;
+        if let Some(failure) = cut_off {
+            return Err(failure.into());
+        }
+        let file = self.output.as_deref().map(|path| numbered(path, run));
+        capture.name = format!("{} {run}", self.shape_name());
+        if let Some(path) = file.as_deref() {
+            save(&capture, path)?;
+        }
+        let (steps, no_steps) = match (followed, steps_of(&capture)) {
+            (Some(_), _) => (Vec::new(), None),
+            (None, Ok(steps)) => (steps, None),
+            (None, Err(why)) => (Vec::new(), Some(why)),
+        };
+        let current = capture.trace("current_a").map(|trace| capture.points(trace).collect::<Vec<_>>());
+        let heating = current.and_then(|points| merit::heating(&points));
+        Ok(RunRow { run, followed, steps, no_steps, heating, capture: CaptureRow::new(&capture, file, running.ways()) })
+    }
+}
+
+/// The figures of each change of the velocity demand.
+fn steps_of(capture: &Capture) -> Result<Vec<Step>, String> {
+    let demand = capture.trace("target_velocity_rpm").ok_or("target_velocity was not captured")?;
+    let speed = capture.trace("velocity_rpm").ok_or("velocity was not captured")?;
+    let demand: Vec<(f64, f64)> = capture.points(demand).collect();
+    let speed: Vec<(f64, f64)> = capture.points(speed).collect();
+    let changes = demand.windows(2).filter(|pair| pair[0].1 != pair[1].1);
+    let changes: Vec<(f64, f64, f64)> = changes.map(|pair| (pair[1].0, pair[0].1, pair[1].1)).collect();
+    let ends = changes.iter().skip(1).map(|(at, ..)| *at).chain([f64::INFINITY]);
+    let parts = changes.iter().zip(ends).map(|((at, from, to), end)| {
+        let part: Vec<(f64, f64)> = speed.iter().copied().filter(|(time, _)| *time < end).collect();
+        merit::step(&part, *at, *from, *to)
+    });
+    parts.collect()
+}
+
+/// A capture from a file.
+fn read(path: &Path) -> Result<Capture, String> {
+    let kind = Kind::of_name(&path.to_string_lossy()).ok_or("expected NAME.mcap or NAME.csv")?;
+    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
+    Capture::of(&recording::read(kind, &bytes)?, None)
+}
+
+impl Report for TestMotionReport {
+    fn text(&self, paint: Paint) -> String {
+        let Self { node, shape, limits, guard, runs } = self;
+        let mut lines = vec![format!("node {node}: {shape}, {}", words::counted(runs.len(), "run"))];
+        lines.push(format!("  limits  {}", limits.text()));
+        lines.push(format!("  guard   {}", guard.text));
+        let mut table = Table::new(&["run", "what", "figure", "+-"]);
+        for row in runs {
+            for (what, figure, grid) in row.figures() {
+                table.row([row.run.to_string(), what, figure, grid]);
+            }
+        }
+        lines.push(table.plain(paint));
+        lines.extend(runs.iter().filter_map(|row| row.no_steps.as_ref().map(|why| format!("run {}: {why}", row.run))));
+        lines.extend(runs.iter().map(|row| row.capture.text(paint)));
+        lines.join("\n")
+    }
+}
+
+impl RunRow {
+    /// What, how much, and how exactly.
+    fn figures(&self) -> Vec<(String, String, String)> {
+        let mut figures = Vec::new();
+        let mut add = |what: String, value: String, grid: String| figures.push((what, value, grid));
+        if let Some(Followed { took_s, most_deg, rms_deg }) = self.followed {
+            add("following error".into(), format!("{most_deg:.3} deg at most, {rms_deg:.3} deg r.m.s."), String::new());
+            add("time".into(), format!("{took_s:.3} s"), String::new());
+        }
+        for step in &self.steps {
+            let of = format!("{} to {} r/min", step.from, step.to);
+            for (what, figure, unit, times) in [
+                ("rise", &step.rise_s, "ms", 1e3),
+                ("overshoot", &step.overshoot, "%", 100.0),
+                ("settling", &step.settling_s, "ms", 1e3),
+            ] {
+                let (value, grid) = match figure {
+                    merit::Figure::Is { value, grid } => {
+                        (format!("{:.1} {unit}", value * times), format!("{:.1} {unit}", grid * times))
+                    }
+                    merit::Figure::Unknown { why } => (why.clone(), String::new()),
+                };
+                add(format!("{what}, {of}"), value, grid);
+            }
+        }
+        if let Some(Heating { rms_a, a2s }) = self.heating {
+            add("current".into(), format!("{rms_a:.3} A r.m.s., {a2s:.3} A²·s"), String::new());
+        }
+        figures
+    }
+}

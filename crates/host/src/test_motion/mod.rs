@@ -1,0 +1,93 @@
+//! Test motions of one axis, again and again: a shape with its limits, sent point by point through a group of one axis, or steps of
+//! velocity by the drive's own ramps, and what was seen of each run.
+//!
+//! What moves here is stopped by what stops a group and `velocity`: both note what they have set in motion.
+
+mod shape;
+
+use std::pin::pin;
+use std::time::Duration;
+
+use futures_util::future::{Either, select};
+use master::group::{Group, GroupError, Phase, StreamOptions};
+use master::units::{Ramp, Rpm, Turns};
+use master::{Drive, Error, MotionOptions};
+use serde::Serialize;
+
+pub use shape::{Shape, points};
+
+/// How a run of a shape was followed, by the position that the drive shows in each cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Followed {
+    /// How long it took, in s.
+    pub took_s: f64,
+    /// The greatest distance of the shaft from its set-point, in degrees.
+    pub most_deg: f64,
+    /// Root of the mean of its square over the cycles.
+    pub rms_deg: f64,
+}
+
+/// Sends the points of a shape, relative to where the group holds, one in each cycle, and waits until it holds again.
+///
+/// # Errors
+/// Those of the group, which comes to rest then.
+pub async fn follow(group: &mut Group, points: &[f64]) -> Result<Followed, GroupError> {
+    let network = group.network().clone();
+    let from = group.points().first().map_or(0.0, |point| point.position_turns);
+    // At the end twice the same point: velocity and acceleration are zero then, and there is nothing left to be brought to rest.
+    let at_rest = points.last().into_iter().cycle().take(2);
+    group.start_stream(StreamOptions { capacity: points.len() + 2, prefill: 0, ..StreamOptions::default() })?;
+    for point in points.iter().chain(at_rest) {
+        group.push(&[Turns(from + point)])?;
+    }
+    group.end_stream();
+    let began = network.now();
+    let (mut most, mut squares, mut cycles) = (0.0_f64, 0.0, 0_u32);
+    loop {
+        let state = group.cycle().await?;
+        if let Some(cause) = state.cause {
+            return Err(GroupError::Stopped(cause));
+        }
+        if let Some(Some(error)) = group.following_errors().next() {
+            most = most.max(error.abs());
+            squares += error * error;
+            cycles += 1;
+        }
+        if !matches!(state.phase, Phase::Streaming | Phase::Stopping) {
+            break;
+        }
+    }
+    let took_s = (network.now() - began).as_secs_f64();
+    let rms = (squares / f64::from(cycles.max(1))).sqrt();
+    Ok(Followed { took_s, most_deg: most * 360.0, rms_deg: rms * 360.0 })
+}
+
+/// Does something else on the bus while a group goes on with its cycles: holding, or without power.
+///
+/// # Errors
+/// Those of the group's cycles.
+pub async fn beside<T>(group: &mut Group, what: impl Future<Output = T>) -> Result<T, GroupError> {
+    let mut what = pin!(what);
+    loop {
+        let cycle = pin!(group.cycle());
+        match select(what.as_mut(), cycle).await {
+            Either::Left((done, _)) => return Ok(done),
+            Either::Right((state, _)) => drop(state?),
+        }
+    }
+}
+
+/// Has the drive turn at this speed for a while, and stops it: two steps of its velocity demand, by its own ramps or by this one. The
+/// drive stays enabled.
+///
+/// # Errors
+/// Those of [`Drive::velocity`] and [`Drive::stop`].
+pub async fn steps(drive: &Drive, speed: Rpm, ramp: Option<Ramp>, hold: Duration) -> Result<(), Error> {
+    let options = MotionOptions { acceleration: ramp, deceleration: ramp, wait: false, ..MotionOptions::default() };
+    drive.velocity(speed, options).await?;
+    drive.supervise(hold).await?;
+    drive.stop().await?;
+    // What follows the stop belongs to the response.
+    drive.node().network().sleep(hold).await;
+    Ok(())
+}
