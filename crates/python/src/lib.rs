@@ -41,6 +41,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(master::whole::check_file, module)?)?;
     module.add_function(wrap_pyfunction!(master::whole::plan, module)?)?;
     module.add_function(wrap_pyfunction!(master::whole::explain, module)?)?;
+    module.add_function(wrap_pyfunction!(master::capture::capture, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_backup, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_compare, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_apply, module)?)?;

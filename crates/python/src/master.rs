@@ -3,6 +3,7 @@
 //! Blocking calls and coroutines are two ways to wait for a job; both are in Python (`ferrodrive/master.py`).
 
 pub(crate) mod axes;
+pub(crate) mod capture;
 mod from_file;
 mod job;
 mod order;

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional
+import math
+import os
+from array import array
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Optional, Union
 
+from . import _native
 from ._native import Job, model_name
-from .reports import DriveState, MotionReport
+from .reports import Capture, DriveState, MotionReport
 
 if TYPE_CHECKING:
     from .master import Network
@@ -35,6 +40,31 @@ class _Orders:
         given = {name: value for name, value in order.items() if value is not None}
         behind = {} if self.gear_ratio is None else {"gear_ratio": self.gear_ratio}
         return self.network._native.drive(self.node, self.model, {"do_": do_, "guessed": self.guessed, **behind, **given})
+
+
+    def _capture(self, quantities: tuple[str, ...], order: dict[str, Any]) -> Job:
+        journal = order.pop("journal")
+        whole = {**order, "quantities": list(quantities), "journal": None if journal is None else os.fspath(journal)}
+        return _native.capture(self.network._native, self.node, self.model, whole)
+
+
+def _captured(report: dict[str, Any]) -> Capture:
+    """The lists of a capture as arrays, which numpy takes without a copy."""
+    traces = report["traces"]
+    return {
+        "model": report["model"],
+        "trigger_s": report["trigger_s"],
+        "time_s": array("d", report["time_s"]),
+        "values": {
+            trace["quantity"]: array("d", (math.nan if value is None else value for value in trace["values"])) for trace in traces
+        },
+        "units": {trace["quantity"]: trace["unit"] for trace in traces},
+        "by": {trace["quantity"]: trace["by"] for trace in traces},
+        "period_s": {trace["quantity"]: trace["period_s"] for trace in traces},
+        "jitter_s": {trace["quantity"]: trace["jitter_s"] for trace in traces},
+        "gaps": {trace["quantity"]: trace["gaps"] for trace in traces},
+        "parameters": {name: bytes(value) for name, value in report["objects"]},
+    }
 
 
 def _angle(degrees: Optional[float], counts: Optional[int]) -> dict[str, Any]:
@@ -251,6 +281,41 @@ class Drive(_Orders):
         report: MotionReport = self.network._finish(self._begin("home", **order))
         return report
 
+    def capture(
+        self,
+        *quantities: str,
+        duration: float = 1.0,
+        period: float = 0.001,
+        trigger: Optional[str] = None,
+        pre_trigger: float = 0.0,
+        take: Sequence[str] = (),
+        sdo: bool = False,
+        journal: Optional[Union[str, "os.PathLike[str]"]] = None,
+    ) -> Capture:
+        """Captures quantities while the drive does what it does: spare TPDOs are mapped to them, and put back as they were. What
+        ``ferrodrive capture`` does.
+
+        :param quantities: ``velocity``, ``target_velocity``, ``current``, ``position`` and others, or objects by name or number
+        :param duration: in s, from the begin or the trigger
+        :param period: time between two readings in s
+        :param trigger: begins when a quantity passes a value: ``"velocity > 10"`` rising, ``"velocity < 10"`` falling
+        :param pre_trigger: what is kept of before the trigger, in s
+        :param take: TPDOs that are used although they are in use: ``["tpdo1"]``
+        :param sdo: read by SDO what cannot come by TPDO
+        :param journal: where the way back is kept meanwhile on a real bus; after a kill ``network.params(node).rollback()`` takes it
+        :raises MasterError: it cannot be had, with what is possible; it was cut off, with what came as ``report``
+
+        >>> capture = drive.capture("velocity", "current", duration=0.1, period=0.002)
+        >>> len(capture["time_s"]) == len(capture["values"]["velocity_rpm"])
+        True
+        >>> round(capture["period_s"]["velocity_rpm"], 4)
+        0.002
+        """
+        order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger}
+        order = {**order, "take": list(take), "sdo": sdo, "journal": journal}
+        return _captured(self.network._finish(self._capture(quantities, order)))
+
+
 
 class AsyncDrive(_Orders):
     """:class:`Drive` with coroutines, for several drives at the same time. From :meth:`Network.async_drive`. On a virtual bus the loop runs
@@ -357,3 +422,19 @@ class AsyncDrive(_Orders):
         order = {"counts": method, "speed_rpm": speed_rpm, "limit_s": within, "wait": wait}
         report: MotionReport = await self.network._finish_soon(self._begin("home", **order))
         return report
+
+    async def capture(
+        self,
+        *quantities: str,
+        duration: float = 1.0,
+        period: float = 0.001,
+        trigger: Optional[str] = None,
+        pre_trigger: float = 0.0,
+        take: Sequence[str] = (),
+        sdo: bool = False,
+        journal: Optional[Union[str, "os.PathLike[str]"]] = None,
+    ) -> Capture:
+        """As :meth:`Drive.capture`."""
+        order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger}
+        order = {**order, "take": list(take), "sdo": sdo, "journal": journal}
+        return _captured(await self.network._finish_soon(self._capture(quantities, order)))

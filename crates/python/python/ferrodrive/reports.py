@@ -5,6 +5,7 @@ An object is a text as the manuals write it (``6064h:00``). What is not known is
 
 from __future__ import annotations
 
+from array import array
 from typing import Any, Optional, TypedDict
 
 
@@ -39,6 +40,23 @@ class MotionReport(TypedDict):
 
     reached_after_s: Optional[float]
     notes: list[str]
+
+
+class Capture(TypedDict):
+    """Of :meth:`Drive.capture`: the times of the rows in s, and by the name of each quantity, with its unit in it, as many values (NaN where no
+    reading belongs to a time), its unit, the TPDO that it came by or ``SDO``, the period that was had, its largest deviation, and how often
+    readings are missing. ``parameters`` are those of the drive as they were, by object, in the order of the wire."""
+
+    model: str
+    trigger_s: Optional[float]
+    time_s: array[float]
+    values: dict[str, array[float]]
+    units: dict[str, str]
+    by: dict[str, str]
+    period_s: dict[str, Optional[float]]
+    jitter_s: dict[str, Optional[float]]
+    gaps: dict[str, int]
+    parameters: dict[str, bytes]
 
 
 class AxisState(TypedDict):

@@ -1,0 +1,133 @@
+//! Fast capture of a drive for Python: begun, waited for and put back as one job. The parts are those of `ferrodrive capture`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use can::Bitrate;
+use host::capture::{Quantity, Span, Taken, Trigger, Wanted, Way};
+use host::network::params::journal::default_path;
+use machine::file::pdo_id;
+use pyo3::prelude::*;
+use serde::Serialize;
+use words::failure::Failure;
+
+use super::job::Trouble;
+use super::value::Value;
+use super::whole::AskedDrive;
+use super::{Job, Network, duration};
+use crate::failure::bad_value;
+
+/// What is to be captured, in plain values.
+#[derive(FromPyObject)]
+pub(crate) struct CaptureOrder {
+    #[pyo3(item)]
+    quantities: Vec<String>,
+    #[pyo3(item)]
+    duration: f64,
+    #[pyo3(item)]
+    period: f64,
+    #[pyo3(item)]
+    trigger: Option<String>,
+    #[pyo3(item)]
+    pre_trigger: f64,
+    #[pyo3(item)]
+    take: Vec<String>,
+    #[pyo3(item)]
+    sdo: bool,
+    #[pyo3(item)]
+    journal: Option<PathBuf>,
+}
+
+/// What came of it.
+#[derive(Serialize)]
+struct Captured {
+    model: String,
+    trigger_s: Option<f64>,
+    time_s: Vec<f64>,
+    traces: Vec<CapturedTrace>,
+    /// Objects as `6083h:00` and their bytes in the order of the wire.
+    objects: Vec<(String, Vec<u8>)>,
+}
+
+#[derive(Serialize)]
+struct CapturedTrace {
+    quantity: String,
+    unit: String,
+    by: String,
+    /// None where no reading belongs to the time.
+    values: Vec<Option<f64>>,
+    period_s: Option<f64>,
+    jitter_s: Option<f64>,
+    gaps: usize,
+}
+
+/// Captures quantities of a drive, and puts everything back.
+#[pyfunction]
+pub(crate) fn capture(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    order: CaptureOrder,
+) -> PyResult<Job> {
+    let asked = AskedDrive::of(network.get(), node, model)?;
+    let bitrate = network.get().bitrate(py)?.unwrap_or(Bitrate::K500);
+    let trigger: Option<Trigger> = order.trigger.as_deref().map(str::parse).transpose().map_err(bad_value)?;
+    let take = order.take.iter().map(|text| pdo_id(text)).collect::<Result<_, _>>().map_err(bad_value)?;
+    let span = Span { duration: duration(order.duration)?, trigger, pre_trigger: duration(order.pre_trigger)? };
+    let period = duration(order.period)?;
+    if period < Duration::from_micros(50) {
+        return Err(bad_value("expected a period of 50 us or more between two readings"));
+    }
+    let journal = order.journal.unwrap_or_else(|| default_path(asked.node));
+    let mut wanted = Wanted {
+        quantities: Vec::new(),
+        period,
+        bitrate,
+        take,
+        by_sdo: order.sdo,
+        // A virtual bus ends with the program, and nothing is left to go back to.
+        journal: (!asked.is_virtual).then_some(journal),
+        on_kept: |_| (),
+    };
+    network.get().begin_said(py, async move {
+        let drive = asked.drive().await?;
+        for name in &order.quantities {
+            wanted.quantities.push(Quantity::named(&drive, name).await?);
+        }
+        wanted.check(&span)?;
+        let (mut running, restorer) = wanted.begin(&drive).await?;
+        let taken = running.next(&span).await;
+        let left = restorer.restore().await;
+        let Taken { capture, cut_off } = taken?;
+        let traces = capture.traces.iter().zip(running.ways()).map(|(trace, way)| CapturedTrace {
+            quantity: trace.quantity.clone(),
+            unit: trace.unit.clone(),
+            by: match way {
+                Way::Tpdo(pdo) => pdo.to_string(),
+                Way::Sdo => "SDO".to_owned(),
+            },
+            values: trace.values.iter().map(|value| known(*value)).collect(),
+            period_s: known(trace.period_s),
+            jitter_s: known(trace.jitter_s),
+            gaps: trace.gaps,
+        });
+        let objects = capture.parameters.iter().map(|(object, bytes)| (object.to_string(), bytes.clone()));
+        let (model, trigger_s, time_s) = (capture.model.clone(), capture.trigger_s, capture.time_s.clone());
+        let value =
+            Value::report(&Captured { model, trigger_s, time_s, traces: traces.collect(), objects: objects.collect() });
+        let not_put_back = (!left.is_empty()).then(|| {
+            let failure =
+                Failure::new(format!("node {}: not everything was put back", asked.node)).of_kind("not_put_back");
+            left.iter().fold(failure, Failure::because)
+        });
+        match cut_off.or(not_put_back) {
+            Some(failure) => Err(Trouble::Reported(failure, Box::new(value))),
+            None => Ok(value),
+        }
+    })
+}
+
+fn known(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
