@@ -107,6 +107,8 @@ impl HostedWorld {
             journals: None,
             world: Some(door),
             wire: Wire::default(),
+            // All drives are virtual.
+            allow_motion: true,
         };
         let (host, handle) = Host::new(network, setting);
         let hosting = Task::new(boxed(host.run(move || passed.lock().pop_front())));
