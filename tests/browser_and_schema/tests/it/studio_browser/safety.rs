@@ -269,16 +269,19 @@ async fn stop_is_on_the_screen_in_every_view_at_every_width() {
     let stage = Stage::open("widths").await;
     stage.click("#take").await;
     stage.find("#release").await;
-    for (width, height) in [(320, 568), (375, 667), (667, 375), (820, 1180), (1366, 768)] {
-        stage.device(width, height).await;
-        for view in VIEWS {
-            stage.script(&format!("document.querySelector('#tabs [data-name={view}]').click()")).await;
-            stage.find(&format!("#tabs [data-name={view}][aria-current=page]")).await;
-            for open in ["#group", "#homing", ".parameters details.group"] {
-                stage.script(&format!("const of = document.querySelector({open:?}); if (of) of.open = true")).await;
-            }
-            // What is fetched for it has come, and is drawn.
-            tokio::time::sleep(Duration::from_millis(400)).await;
+    for view in VIEWS {
+        stage.script(&format!("document.querySelector('#tabs [data-name={view}]').click()")).await;
+        stage.find(&format!("#tabs [data-name={view}][aria-current=page]")).await;
+        let open = "for (const css of ['#group', '#homing', '.parameters details.group']) { \
+                    const of = document.querySelector(css); if (of) of.open = true }";
+        stage.script(open).await;
+        // What is fetched for it has come, and is drawn.
+        tokio::time::sleep(Duration::from_millis(400)).await;
+        for (width, height) in [(320, 568), (375, 667), (667, 375), (820, 1180), (1366, 768)] {
+            stage.device(width, height).await;
+            stage.script(open).await;
+            // It is drawn at this width, with what was opened.
+            tokio::time::sleep(Duration::from_millis(50)).await;
             let seen = stage
                 .script(
                     "scrollTo(0, document.body.scrollHeight); \
