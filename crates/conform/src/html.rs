@@ -8,32 +8,9 @@ use crate::case::Group;
 use crate::cases;
 use crate::report::{CaseResult, Outcome, Report};
 
-const STYLE: &str = "
-:root{--ink:#1d2430;--dim:#5d6675;--line:#dfe3ea;--pass:#1a7f4b;--fail:#c0272d;--expected:#96650a;--na:#6b7382}
-*{box-sizing:border-box}body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);margin:0 auto;max-width:1080px;padding:32px 24px}
-h1{font-size:26px;margin:0 0 4px}h2{font-size:17px;margin:32px 0 8px;border-bottom:2px solid var(--ink);padding-bottom:4px}
-p{margin:6px 0;color:var(--dim)}dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 16px;margin:16px 0}
-dt{color:var(--dim)}dd{margin:0}.sum{display:flex;gap:12px;margin:20px 0;flex-wrap:wrap}
-.sum div{flex:1;min-width:120px;border:1px solid var(--line);border-top:4px solid;border-radius:6px;padding:10px 14px}
-.sum b{display:block;font-size:26px;line-height:1.2}
-.pass{color:var(--pass)}.fail{color:var(--fail)}.expected{color:var(--expected)}.na{color:var(--na)}
-.sum div span{color:var(--dim)}table{border-collapse:collapse;width:100%}
-td,th{text-align:left;vertical-align:top;padding:6px 10px 6px 0;border-bottom:1px solid var(--line)}
-th{font-weight:600;color:var(--dim);font-size:13px}td.id{white-space:nowrap;font-variant-numeric:tabular-nums}
-td.r{white-space:nowrap;font-weight:600}td.c{white-space:nowrap;color:var(--dim);font-size:13px}
-.why{color:var(--dim);font-size:13.5px;overflow-wrap:anywhere}details{margin-top:2px}summary{cursor:pointer;color:var(--dim);font-size:13px}
-pre{font:12.5px/1.45 ui-monospace,monospace;background:#f5f7fa;border-radius:4px;padding:8px 10px;margin:4px 0;overflow-x:auto}
-tr.f{background:#fdf3f3}footer{margin-top:32px;color:var(--dim);font-size:13px}
-@media print{details>pre{display:block}body{padding:0}}";
-
 /// The report as one self-contained page of HTML: no script, nothing that is loaded.
 pub fn html(report: &Report) -> String {
-    let mut out = String::from("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">");
-    let title = escaped(&format!("CANopen conformance: {}, node {}", report.model, report.node));
-    let _ = write!(
-        out,
-        "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{title}</title><style>{STYLE}</style></head><body>"
-    );
+    let mut out = String::new();
     head(&mut out, report);
     for group in groups() {
         let of_group = |case: &&CaseResult| cases::all().any(|row| row.id == case.id && row.group() == group);
@@ -44,10 +21,10 @@ pub fn html(report: &Report) -> String {
     }
     let _ = writeln!(
         out,
-        "<footer>Made by ferrodrive conform {}. Case numbers up to 50 are those that CiA's conformance test prints; numbers from 51 on and 402 are the suite's own. This is a report of a test, not a certificate of CiA.</footer></body></html>",
+        "<footer>Made by ferrodrive conform {}. Case numbers up to 50 are those that CiA's conformance test prints; numbers from 51 on and 402 are the suite's own. This is a report of a test, not a certificate of CiA.</footer>",
         env!("CARGO_PKG_VERSION")
     );
-    out
+    plot::html::page(&format!("CANopen conformance: {}, node {}", report.model, report.node), &out)
 }
 
 fn groups() -> Vec<Group> {

@@ -1,5 +1,6 @@
 //! What a person looks at: time plots as SVG (a poster of figures, each with stacked panels over one time axis, named
-//! sections and marked events), and tables with columns and colours for a terminal ([`Table`], [`Paint`]).
+//! sections and marked events), tables with columns and colours for a terminal ([`Table`],
+//! [`Paint`]), and the look of pages that are kept and printed ([`html`]).
 //!
 //! A [`Poster`] is plain data in; [`Poster::to_svg`] is text out. It has its own light background, so that it
 //! reads the same on a white page and in a dark one, and holds no script and no fonts. Long traces are thinned to
@@ -17,6 +18,7 @@
 //! ```
 
 mod draw;
+pub mod html;
 mod lanes;
 mod page;
 mod paint;
