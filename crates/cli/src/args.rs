@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::configure::{dcf, init, lss, params, program, sdo, store, tune};
-use crate::command::look::{dump, emcy, explain, objects, pdo, read, scan, studio, top, watch};
+use crate::command::look::{dump, emcy, explain, objects, pdo, read, report, scan, studio, top, watch};
 use crate::command::moving::{drive, drive_base, estop, group, home, motion, test_motion};
 use crate::command::network::{boot, check, conform, gateway, latency, nmt, plan, send, supervise, sync, time};
 use crate::command::record_and_replay::{capture, convert, decode, plot, record, replay};
@@ -53,6 +53,7 @@ pub(crate) enum Command {
     Send(send::Send),
     State(drive::State),
     Explain(explain::Explain),
+    Report(report::Report),
     Conform(conform::Conform),
     Enable(drive::Enable),
     Disable(drive::Disable),

@@ -14,7 +14,9 @@ const GROUPS: &[CommandGroup] = &[
     CommandGroup { title: "Simulate", commands: &["demo", "sim", "run", "world", "events"] },
     CommandGroup {
         title: "Look",
-        commands: &["scan", "state", "explain", "read", "watch", "objects", "pdo", "emcy", "dump", "top", "studio"],
+        commands: &[
+            "scan", "state", "explain", "report", "read", "watch", "objects", "pdo", "emcy", "dump", "top", "studio",
+        ],
     },
     CommandGroup {
         title: "Move",

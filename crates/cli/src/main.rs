@@ -255,6 +255,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Nmt(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::State(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Explain(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Report(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Conform(command) => command.run(global, format),
         Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Disable(command) => on_bus(global, format, async |context| command.run(context).await),

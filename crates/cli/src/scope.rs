@@ -254,6 +254,7 @@ mod tests {
         "record 4 6064 -o a.csv",
         "replay a.log",
         "reset 4",
+        "report 4 -o a.html",
         "restore 4",
         "program 4 firmware.bin",
         "run a.toml",

@@ -19,6 +19,7 @@ pub(crate) mod look {
     pub(crate) mod objects;
     pub(crate) mod pdo;
     pub(crate) mod read;
+    pub(crate) mod report;
     pub(crate) mod scan;
     pub(crate) mod studio;
     pub(crate) mod top;

@@ -57,7 +57,8 @@ fn signed(at: Instant, from: Instant) -> String {
     format!("{sign}{:.6}", (at.max(from) - at.min(from)).as_secs_f64())
 }
 
-fn absolute(unix: Duration) -> String {
+/// Date and time of day, UTC.
+pub(crate) fn absolute(unix: Duration) -> String {
     let (days, seconds) = (unix.as_secs() / SECONDS_A_DAY, unix.as_secs() % SECONDS_A_DAY);
     let (year, month, day) = civil_date(days);
     let (hours, minutes, seconds) = (seconds / 3600, seconds / 60 % 60, seconds % 60);

@@ -12,4 +12,5 @@ mod models;
 mod pages;
 mod params;
 mod records;
+mod report;
 mod virtual_bus;

@@ -7,11 +7,14 @@
 pub mod boot;
 pub mod check;
 pub mod explain;
+pub mod faults;
 pub mod heard;
 pub mod init;
 pub mod params;
+pub mod pdos;
 pub mod plan;
 pub mod program;
+pub mod report;
 pub mod scan;
 pub mod supervise;
 

@@ -129,6 +129,13 @@ fn each_command_prints_what_the_schema_says() {
 }
 
 #[test]
+fn a_report_about_a_node_prints_what_the_schema_says() {
+    let page = scratch("schema-report").path("report.html");
+    let page = page.as_str();
+    hold(&ferrodrive(&["report", "4", "-o", page, "--by", "somebody", "--json"]), "report", "report");
+}
+
+#[test]
 fn a_failure_says_what_to_do_next() {
     let nowhere = ["--record", "/no/such/folder/a.csv"];
     for arguments in [

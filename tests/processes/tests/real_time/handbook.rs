@@ -85,7 +85,7 @@ const FOLLOWED: [(&str, usize); 16] = [
     ("ci.md", 1),
     ("test-your-software.md", 10),
     ("logs.md", 11),
-    ("configure-a-drive.md", 12),
+    ("configure-a-drive.md", 13),
     ("two-axes-from-a-test.md", 0),
     ("add-an-object.md", 0),
     ("add-a-drive.md", 2),

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use can::BusFrame;
-use canopen::emcy::{Emcy as Message, EmcyErrorCode};
-use canopen::{AbortCode, Mux, NodeId};
-use devices::Description;
+use canopen::emcy::Emcy as Message;
+use canopen::{AbortCode, NodeId};
 use devices::faults::FaultRow;
+use host::network::faults::{RememberedError, hexadecimal, meaning, remembered};
 use master::Error;
 use master::decode::Decoded;
 use master::units::parse_duration;
@@ -60,9 +60,6 @@ struct Show {
 
 /// Nothing happens on an embedded bus by itself.
 const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
-
-/// The pre-defined error field. Source: CiA 301, 7.5.2.3.
-const ERROR_FIELD: u16 = 0x1003;
 
 /// An error, as it arrived or is remembered.
 #[derive(Debug, Serialize)]
@@ -123,18 +120,8 @@ impl WatchEmcy {
 impl Show {
     async fn run(&self, context: &Context) -> Result<Remembered, Failure> {
         let drive = context.drive(self.node).await?;
-        let count = drive.node().upload(Mux::new(ERROR_FIELD, 0)).await.map_err(|error| self.without_field(error))?;
-        let mut errors = Vec::new();
-        for sub_index in 1..=count.raw().min(254) as u8 {
-            match drive.node().upload(Mux::new(ERROR_FIELD, sub_index)).await {
-                Ok(value) => errors.push(ErrorEntry::remembered(self.node, value.raw(), drive.description())),
-                // Devices that count their places, and not the errors in them, refuse the empty ones.
-                Err(Error::Aborted { .. }) => break,
-                Err(error) => return Err(error.into()),
-            }
-        }
-        // An empty place holds 0, by some devices.
-        errors.retain(|error| error.code != 0 || error.manufacturer != "00 00");
+        let errors = remembered(&drive).await.map_err(|error| self.without_field(error))?;
+        let errors = errors.into_iter().map(|error| ErrorEntry::remembered(self.node, error)).collect();
         Ok(Remembered { node: self.node.raw(), errors })
     }
 
@@ -147,21 +134,6 @@ impl Show {
         failure
             .because("the node has no 1003h, so that it remembers no errors")
             .next(format!("ferrodrive state {} shows the present fault", self.node))
-    }
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ")
-}
-
-fn meaning(code: EmcyErrorCode, fault: Option<&FaultRow>) -> String {
-    match fault {
-        Some(fault) => fault.name.to_owned(),
-        // `2110h (current, CANopen device input side)`: the words are wanted.
-        None => {
-            let text = code.to_string();
-            text.split_once(" (").map_or(text.clone(), |(_, words)| words.trim_end_matches(')').to_owned())
-        }
     }
 }
 
@@ -179,20 +151,9 @@ impl ErrorEntry {
         }
     }
 
-    /// The low 16 bits are the error code, the high ones the maker's.
-    fn remembered(node: NodeId, raw: u32, model: Option<&'static Description>) -> Self {
-        let code = EmcyErrorCode(raw as u16);
-        let fault = model.and_then(|model| model.fault_reported_by(code));
-        Self {
-            t: None,
-            node: node.raw(),
-            code: code.0,
-            error_register: None,
-            manufacturer: hexadecimal(&((raw >> 16) as u16).to_le_bytes()),
-            name: meaning(code, fault),
-            remedy: fault.map(|fault| fault.remedy),
-            stamp: String::new(),
-        }
+    fn remembered(node: NodeId, error: RememberedError) -> Self {
+        let RememberedError { code, manufacturer, name, remedy } = error;
+        Self { t: None, node: node.raw(), code, error_register: None, manufacturer, name, remedy, stamp: String::new() }
     }
 }
 

@@ -11,7 +11,7 @@ use canopen::{CobId, NmtState, NodeId};
 use devices::Description;
 use master::Drive;
 use master::decode::{Decoded, Decoder};
-use master::pdo::{PdoConfig, Silence};
+use master::pdo::PdoConfig;
 use master::units::parse_duration;
 use serde::Serialize;
 
@@ -19,6 +19,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::frames::stamp::{Stamps, TimeForm};
 use crate::output::{Format, Report};
+use host::network::pdos::PdoSetup;
 use plot::Paint;
 use plot::Table;
 use words::decode::{self, decode};
@@ -81,33 +82,7 @@ struct PdoList {
 #[derive(Debug, Serialize)]
 struct OfNode {
     node: u8,
-    pdos: Vec<PdoRow>,
-}
-
-/// How one PDO is configured.
-#[derive(Debug, Serialize)]
-struct PdoRow {
-    /// `TPDO1`, counted from 1 as by CiA 301.
-    pdo: String,
-    /// The identifier.
-    id: u32,
-    /// It is sent, or taken.
-    valid: bool,
-    transmission: u8,
-    /// When it is sent, or takes effect.
-    when: String,
-    inhibit_ms: Option<f64>,
-    event_ms: Option<f64>,
-    objects: Vec<Mapped>,
-    /// Why it is silent, as far as that is known.
-    silent: Vec<String>,
-}
-
-#[derive(Debug, Serialize)]
-struct Mapped {
-    object: String,
-    name: Option<&'static str>,
-    bits: u8,
+    pdos: Vec<PdoSetup>,
 }
 
 /// A PDO that came.
@@ -160,7 +135,7 @@ impl Show {
             let pdos = drive.pdos().await?;
             heard.take();
             let row = |(config, cob_id): &(PdoConfig, CobId)| {
-                PdoRow::new(&drive, config, *cob_id, heard.why(context, &drive, config, *cob_id))
+                PdoSetup::new(drive.description(), config, *cob_id, &heard.why(context, &drive, config, *cob_id))
             };
             list.push(OfNode { node: node.raw(), pdos: pdos.iter().map(row).collect() });
         }
@@ -214,31 +189,6 @@ impl WatchPdo {
     }
 }
 
-impl PdoRow {
-    fn new(drive: &Drive, config: &PdoConfig, cob_id: CobId, silent: Vec<Silence>) -> Self {
-        let ms = |time: Option<Duration>| time.map(|time| time.as_secs_f64() * 1e3);
-        let mapped = config.map.0.iter().map(|record| Mapped {
-            object: record.mux.to_string(),
-            name: match drive.description() {
-                Some(model) => model.row(record.mux).map(|row| row.name),
-                None => master::decode::common_name(record.mux),
-            },
-            bits: record.bits,
-        });
-        Self {
-            pdo: config.pdo.to_string(),
-            id: cob_id.can_id().raw(),
-            valid: cob_id.is_valid(),
-            transmission: config.transmission.0,
-            when: config.when(),
-            inhibit_ms: ms(config.inhibit_time),
-            event_ms: ms(config.event_time),
-            objects: mapped.collect(),
-            silent: silent.iter().map(ToString::to_string).collect(),
-        }
-    }
-}
-
 impl PdoLine {
     fn new(
         decoder: &Decoder,
@@ -282,19 +232,15 @@ impl Report for PdoList {
         let mut table = Table::new(&["node", "pdo", "id", "type", "when", "inhibit", "timer", "carries"]);
         let ms = |time: Option<f64>| time.map_or_else(|| "-".into(), |time| format!("{time} ms"));
         for (of_node, row) in self.nodes.iter().flat_map(|of_node| of_node.pdos.iter().map(move |row| (of_node, row))) {
-            let carries = row.objects.iter().map(|mapped| match mapped.name {
-                Some(name) => format!("{} {name} ({})", mapped.object, mapped.bits),
-                None => format!("{} ({})", mapped.object, mapped.bits),
-            });
             table.row([
                 of_node.node.to_string(),
                 row.pdo.clone(),
-                if row.valid { format!("{:03X}h", row.id) } else { "off".into() },
+                row.id_text(),
                 row.transmission.to_string(),
                 row.when.clone(),
                 ms(row.inhibit_ms),
                 ms(row.event_ms),
-                carries.collect::<Vec<_>>().join(", "),
+                row.carries(),
             ]);
         }
         let mut lines = vec![table.plain(paint)];

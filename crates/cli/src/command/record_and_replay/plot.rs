@@ -81,7 +81,7 @@ pub(crate) struct Drawn {
 impl Plot {
     /// Draws it.
     pub(crate) fn draw(&self) -> Result<Drawn, Failure> {
-        let recorded = self.read()?;
+        let recorded = read_record(&self.file)?;
         let title = self.file.file_name().unwrap_or_default().to_string_lossy();
         let span = self.from..=self.to.unwrap_or(f64::INFINITY);
         if span.is_empty() {
@@ -111,21 +111,22 @@ impl Plot {
         let marks = figures().map(|figure| figure.events.len()).max().unwrap_or(0);
         Ok(Drawn { record: self.file.clone(), signals, marks, torn: recorded.torn, files, picture })
     }
+}
 
-    fn read(&self) -> Result<Recorded, Failure> {
-        let unreadable = |reason| {
-            Failure::bad_file(format!("cannot read the record {}", self.file.display()))
-                .because(reason)
-                .next("give a file that --record of this program has written")
-        };
-        let kind = Kind::of_name(&self.file.to_string_lossy()).ok_or_else(|| {
-            Failure::usage(format!("{} is not a record", self.file.display()))
-                .because("a record is called NAME.mcap or NAME.csv")
-                .next("make one, e.g. ferrodrive sim --drive zlac8030l@4 --record run.mcap")
-        })?;
-        let bytes = read_bytes(&self.file, LARGEST).map_err(unreadable)?;
-        read(kind, &bytes).map_err(|reason| unreadable(reason).of_kind("record"))
-    }
+/// What a file that --record has written holds.
+pub(super) fn read_record(path: &Path) -> Result<Recorded, Failure> {
+    let unreadable = |reason| {
+        Failure::bad_file(format!("cannot read the record {}", path.display()))
+            .because(reason)
+            .next("give a file that --record of this program has written")
+    };
+    let kind = Kind::of_name(&path.to_string_lossy()).ok_or_else(|| {
+        Failure::usage(format!("{} is not a record", path.display()))
+            .because("a record is called NAME.mcap or NAME.csv")
+            .next("make one, e.g. ferrodrive sim --drive zlac8030l@4 --record run.mcap")
+    })?;
+    let bytes = read_bytes(path, LARGEST).map_err(unreadable)?;
+    read(kind, &bytes).map_err(|reason| unreadable(reason).of_kind("record"))
 }
 
 /// Writes a picture where it is asked for; the text of it, if that is standard output.

@@ -41,7 +41,7 @@ pub struct DiffRow {
 }
 
 impl DiffRow {
-    fn new(model: Option<&'static Description>, difference: &Difference) -> Self {
+    pub(crate) fn new(model: Option<&'static Description>, difference: &Difference) -> Self {
         let object = difference.object;
         let shown = |bytes: &Option<Vec<u8>>| bytes.as_deref().map(|bytes| Shown::new(model, object, bytes));
         Self {

@@ -1,0 +1,131 @@
+//! `ferrodrive report`: what is worth keeping about a node, as one page.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use canopen::NodeId;
+use host::network::report::{Capture, CaptureFigure, Made, NodeReport};
+use recording::{Recorded, Subject, picture};
+use serde::Serialize;
+use transport::WallClock;
+use words::counted;
+use words::node::node;
+
+use crate::command::configure::dcf::{keep, new_file};
+use crate::command::record_and_replay::plot::read_record;
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::frames::stamp::absolute;
+use plot::{Figure, Paint};
+
+/// Write a report about a node: identity, what differs from delivery, limits, guard, faults, PDOs, captures
+///
+/// The report is one page of HTML that needs nothing else, and prints on A4. The node is only read: nothing is written to
+/// it, and it is not moved.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive report 4 -o wheel.html --by 'A. Fitter'\n  \
+    ferrodrive --bus can0 report 4 -o wheel.html --capture run.mcap")]
+pub(crate) struct Report {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Write the page to this file
+    #[arg(long, short, alias = "html", value_name = "FILE.html", value_parser = page_path)]
+    output: PathBuf,
+    /// Who makes the report
+    #[arg(long, value_name = "NAME")]
+    by: Option<String>,
+    /// Record of --record or `record`, whose curves and figures of this node belong to the report; may be repeated
+    #[arg(long, value_name = "FILE")]
+    capture: Vec<PathBuf>,
+    /// Overwrite an existing file
+    #[arg(long)]
+    force: bool,
+}
+
+fn page_path(text: &str) -> Result<PathBuf, String> {
+    if text.to_ascii_lowercase().ends_with(".html") {
+        Ok(text.into())
+    } else {
+        Err("expected FILE.html; --json prints the report for programs as well".into())
+    }
+}
+
+/// What was written where, and what it says.
+#[derive(Debug, Serialize)]
+pub(crate) struct Written {
+    file: String,
+    #[serde(flatten)]
+    report: NodeReport,
+}
+
+impl Report {
+    /// Reads the node and writes the page.
+    pub(crate) async fn run(&self, context: &Context) -> Result<Written, Failure> {
+        // Before minutes are spent on the bus.
+        new_file(Some(&self.output), self.force)?;
+        let captures = self.capture.iter().map(|path| capture(path, self.node)).collect::<Result<Vec<_>, _>>()?;
+        let clock = WallClock::start();
+        let now = clock.unix_zero() + Duration::from_nanos(clock.now().as_nanos());
+        // To the minute.
+        let at = format!("{} UTC", absolute(now).get(..16).unwrap_or_default());
+        let made = Made { at, by: self.by.clone(), bus: context.bus().to_string() };
+        let drive = context.known_drive(self.node).await?;
+        let mut report = NodeReport::read(&context.progress, &drive, made).await?;
+        report.captures = captures;
+        keep(&self.output, report.to_html().as_bytes(), self.force)?;
+        Ok(Written { file: self.output.display().to_string(), report })
+    }
+}
+
+/// What a record has of a node.
+fn capture(path: &Path, node: NodeId) -> Result<Capture, Failure> {
+    let Recorded { mut series, marks, torn } = read_record(path)?;
+    series.retain(|series| matches!(series.column.subject, Subject::Axis(place) if place.node == node.raw()));
+    let recorded = Recorded { series, marks, torn };
+    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let poster = picture(&file, &recorded, &[], 0.0..=f64::INFINITY).map_err(|reason| {
+        Failure::bad_file(format!("the record {} has nothing of node {node}", path.display()))
+            .because(reason)
+            .next("give a record of this node, or omit it")
+    })?;
+    let drawn: Vec<&Figure> = poster.rows.iter().flatten().collect();
+    // A node with several axes has a figure for each.
+    let axis = |figure: &Figure| if drawn.len() > 1 { format!("{}: ", figure.title) } else { String::new() };
+    let axis = &axis;
+    let figures = drawn.iter().flat_map(|figure| {
+        let traces = figure.panels.iter().flat_map(|panel| panel.traces.iter().map(move |trace| (panel, trace)));
+        traces.filter_map(move |(panel, trace)| {
+            let name = format!("{}{}, {}", axis(figure), panel.title, trace.label);
+            let (min, mean, max) = extent(&trace.points)?;
+            Some(CaptureFigure { name, unit: panel.unit.to_string(), min, mean, max })
+        })
+    });
+    Ok(Capture { figures: figures.collect(), file, picture: poster.to_svg() })
+}
+
+/// The least value, the mean of the samples and the most; `None` where no sample has a value.
+fn extent(points: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
+    let values = || points.iter().map(|(_, value)| *value).filter(|value| value.is_finite());
+    let (min, max) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
+    Some((min, values().sum::<f64>() / values().count() as f64, max))
+}
+
+impl crate::output::Report for Written {
+    fn text(&self, paint: Paint) -> String {
+        let report = &self.report;
+        let faults = report.remembered.as_ref().map_or(0, Vec::len);
+        let guard = if report.guard.stops { paint.good("stops") } else { paint.bad("goes on") };
+        let present = report.fault.as_ref().map_or_else(
+            || "no fault is present".to_owned(),
+            |fault| paint.bad(&format!("fault {:04X}h is present", fault.code)),
+        );
+        [
+            format!("node {} ({}): {}", report.node, report.model, self.file),
+            format!("{} of {} differ from delivery", report.differences.len(), counted(report.compared, "parameter")),
+            format!("{present}, {} remembered", counted(faults, "error")),
+            format!("{guard} when the program that moves it dies: {}", report.guard.text),
+        ]
+        .join("\n")
+    }
+}
