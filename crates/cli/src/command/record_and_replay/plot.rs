@@ -114,7 +114,7 @@ impl Plot {
 }
 
 /// What a file that --record has written holds.
-pub(super) fn read_record(path: &Path) -> Result<Recorded, Failure> {
+pub(in crate::command) fn read_record(path: &Path) -> Result<Recorded, Failure> {
     let unreadable = |reason| {
         Failure::bad_file(format!("cannot read the record {}", path.display()))
             .because(reason)
