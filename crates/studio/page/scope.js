@@ -360,6 +360,9 @@ export function scopeView(shared) {
   canvas.addEventListener("keydown", (event) => {
     const meaning = keyMeaning(event);
     if (!meaning) return;
+    // A key may come before the picture that it means is drawn.
+    const { from_s, to_s } = content();
+    extent = { ...frame(canvas.clientWidth), from_s, span_s: to_s - from_s };
     KEYS[meaning.does](meaning.by);
     event.preventDefault();
     event.stopPropagation();
