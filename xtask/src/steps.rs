@@ -122,9 +122,12 @@ pub(crate) const STEPS: &[Step] = &[
     },
 ];
 
+/// Gets what a step takes of others, or says why it cannot be had.
+pub(crate) type Fetch = fn() -> Result<(), String>;
+
 /// What steps take of others, in the order in which it is needed. It is fetched while the quick list computes, since a download
 /// leaves the processor idle; a step whose part cannot be had reports that itself.
-pub(crate) const FETCHES: &[(&str, fn() -> Result<(), String>)] = &[
+pub(crate) const FETCHES: &[(&str, Fetch)] = &[
     ("studio", browser::fetch),
     ("vcan", vcan::fetch),
     ("no_std", bare_metal::fetch),
