@@ -18,7 +18,7 @@ pub(crate) fn command(words: &[&str]) -> ExitCode {
         Ok(Choice::List) => {
             let when = |step: &Step| match step.when {
                 When::Quick => "quick ",
-                When::Busy | When::Waiting => "--all ",
+                When::Building | When::Busy | When::Waiting => "--all ",
                 When::Named => "--only",
             };
             STEPS.iter().for_each(|step| println!("{:10} {}  {}", step.name, when(step), step.does));

@@ -1,6 +1,6 @@
 //! Pages for people to keep, to send and to print: light, on A4 with what belongs together on one sheet.
 
-use crate::svg::escape;
+use crate::xml::escaped;
 
 const STYLE: &str = "
 :root{--ink:#1d2430;--dim:#5d6675;--line:#dfe3ea;--pass:#1a7f4b;--fail:#c0272d;--expected:#96650a;--na:#6b7382;color-scheme:light}
@@ -30,6 +30,6 @@ pub fn page(title: &str, body: &str) -> String {
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{}</title><style>{STYLE}</style></head>\
          <body>{body}</body></html>\n",
-        escape(title)
+        escaped(title)
     )
 }
