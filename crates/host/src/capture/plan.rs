@@ -16,6 +16,7 @@ use devices::Description;
 use master::core::PdoMap;
 use master::pdo::{PdoConfig, PdoUnfit, TimerUnits, TransmissionType, most_objects, record_of, values_off};
 use master::plan::{NodeTraffic, Settings, plan as plan_bus};
+use words::counted;
 use words::failure::Failure;
 
 /// A TPDO as it is set up.
@@ -340,9 +341,9 @@ fn on_the_bus(
         let failure = refused(format!("the bus is too slow for a reading every {:?}", request.period))
             .of_kind("bus_too_slow")
             .because(format!(
-                "{} TPDOs with {} objects would take {:.0} % of {} kbit/s",
-                slots.len(),
-                slots.iter().map(|slot| slot.config.map.0.len()).sum::<usize>(),
+                "{} with {} would take {:.0} % of {} kbit/s",
+                counted(slots.len(), "TPDO"),
+                counted(slots.iter().map(|slot| slot.config.map.0.len()).sum::<usize>(), "object"),
                 share * 100.0,
                 request.bitrate.bits_per_second() / 1000
             ));

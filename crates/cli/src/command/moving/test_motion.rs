@@ -222,9 +222,7 @@ impl TestMotion {
         };
         let shape = match self.shape {
             ShapeName::Steps if rpm.abs() > self.velocity.0 => {
-                return Err(
-                    refused(format!("a speed of {rpm} r/min, and {} r/min are allowed", self.velocity.0)).into()
-                );
+                return Err(refused(format!("a speed of {rpm} r/min, and {} r/min are allowed", self.velocity.0)));
             }
             ShapeName::Steps => return Ok(None),
             ShapeName::BackAndForth => Shape::BackAndForth { by_turns: by },

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use can::Instant;
-use canopen::od::{DataType, Entry};
+use canopen::NodeId;
 use canopen::pdo::{Direction, PdoId, PdoNumber};
-use canopen::{Mux, NodeId};
+use host::capture::{Form, Quantity};
 use master::core::Event;
-use master::decode::{common_name, common_row, common_type};
+use master::decode::{common_row, common_type};
 use master::pdo::TimerUnits;
 use master::units::parse_duration;
 use master::{Drive, Node};
@@ -19,7 +19,6 @@ use sim::Place;
 use words::counted;
 use words::node::node;
 use words::object::{ObjectArg, object};
-use words::unit::split_factor;
 
 use crate::command::configure::dcf::is_stdout;
 use crate::command::configure::sdo::resolve;
@@ -104,11 +103,9 @@ const TPDOS: u16 = 4;
 
 /// An object that is recorded.
 struct RecordedObject {
-    mux: Mux,
-    row: Option<&'static Entry>,
-    /// Its form in TPDOs, where that is another.
-    pdo_type: Option<(DataType, f64)>,
-    factor: f64,
+    quantity: Quantity,
+    /// Its type is known by a table.
+    is_typed: bool,
     column: Column,
 }
 
@@ -141,7 +138,7 @@ impl Record {
         let node = context.node(self.node);
         // Each has to answer once, before there is a file.
         for source in &sources {
-            node.upload(source.mux).await?;
+            node.upload(source.quantity.object).await?;
         }
         for number in (1..=TPDOS).filter_map(PdoNumber::new) {
             // A TPDO that does not exist, or whose mapping cannot be read, does not matter: then by SDO.
@@ -222,48 +219,28 @@ impl Record {
 
 impl RecordedObject {
     fn new(drive: &Drive, object: &ObjectArg) -> Result<Self, Failure> {
-        let id = drive.node().id();
         let (mux, row) = resolve(drive, object)?;
-        let row = if drive.description().is_some() { row } else { common_row(mux) };
-        if row.is_some_and(|row| !row.data_type.fits_cell()) {
-            return Err(Failure::usage(format!("{mux} is not a number of at most 32 bits, which a record requires"))
-                .at_node(id)
-                .at_object(mux)
-                .next(format!("ferrodrive objects {id} shows the types; ferrodrive read shows such an object once")));
-        }
-        let name = row.map(|row| row.name).or_else(|| common_name(mux));
-        let mut name = name.map_or_else(|| format!("object_{:04X}", mux.index), str::to_owned);
-        if mux.sub_index != 0 {
-            name = format!("{name}_{:02X}", mux.sub_index);
-        }
-        let (factor, unit) = row.map_or((1.0, ""), |row| factor_of(row.unit));
-        if let Some(ending) = ending(unit) {
-            name.push_str(ending);
-        }
-        let form = drive.description().and_then(|model| model.pdo.mapping.tpdo_form(mux));
-        let subject = Subject::Axis(Place::node(id.raw()));
-        let column = Column { subject, signal: name.into(), unit: unit.to_owned().into() };
-        let pdo_type = form.map(|form| (form.data_type, factor_of(form.unit).0));
-        Ok(Self { mux, row, pdo_type, factor, column })
+        let quantity = Quantity::of_object(drive, mux, row)?;
+        let subject = Subject::Axis(Place::node(drive.node().id().raw()));
+        let column = Column { subject, signal: quantity.name.clone().into(), unit: quantity.unit.clone().into() };
+        let is_typed = if drive.description().is_some() { row.is_some() } else { common_row(mux).is_some() };
+        Ok(Self { quantity, is_typed, column })
     }
 
     /// The value in its unit; not a number where the node does not give one.
     async fn value(&self, node: &Node, now: Instant, report: &mut RecordReport) -> f64 {
-        let received = node.network().received(node.id(), self.mux);
+        let Quantity { object, by_sdo, by_pdo, .. } = &self.quantity;
+        let received = node.network().received(node.id(), *object);
         if let Some(received) = received.filter(|received| now - received.at < PDO_FRESH) {
             report.by_pdo += 1;
-            let (data_type, factor) = match self.pdo_type {
-                Some(form) => form,
-                None => (self.row.map_or(DataType::Unsigned32, |row| row.data_type), self.factor),
-            };
-            return number(data_type, received.raw as u32) * factor;
+            return by_pdo.value(received.raw as u32);
         }
-        match node.upload(self.mux).await {
+        match node.upload(*object).await {
             Ok(payload) => {
                 report.by_sdo += 1;
-                let bytes = payload.as_bytes();
-                let data_type = self.row.map(|row| row.data_type).or_else(|| common_type(self.mux, bytes.len()));
-                number(data_type.unwrap_or(DataType::Unsigned32), payload.raw()) * self.factor
+                let by_length = common_type(*object, payload.as_bytes().len()).filter(|_| !self.is_typed);
+                let data_type = by_length.unwrap_or(by_sdo.data_type);
+                Form { data_type, ..*by_sdo }.value(payload.raw())
             }
             Err(_) => {
                 report.missing += 1;
@@ -271,29 +248,6 @@ impl RecordedObject {
             }
         }
     }
-}
-
-fn number(data_type: DataType, raw: u32) -> f64 {
-    if data_type == DataType::Real32 { f64::from(f32::from_bits(raw)) } else { data_type.value(raw) as f64 }
-}
-
-fn factor_of(unit: &'static str) -> (f64, &'static str) {
-    if unit.is_empty() { (1.0, "") } else { split_factor(unit) }
-}
-
-/// What a signal's name ends with for its unit, as the signals of a simulator do.
-fn ending(unit: &str) -> Option<&'static str> {
-    const ENDINGS: [(&str, &str); 8] = [
-        ("r/min", "_rpm"),
-        ("counts", "_counts"),
-        ("A", "_a"),
-        ("V", "_v"),
-        ("°C", "_c"),
-        ("rad", "_rad"),
-        ("°", "_deg"),
-        ("N·m", "_nm"),
-    ];
-    ENDINGS.iter().find(|(known, _)| *known == unit).map(|(_, ending)| *ending)
 }
 
 /// What a person wants marked in a picture.
