@@ -7,8 +7,8 @@ use crate::say::say;
 use crate::tally::Tally;
 use crate::test_programs::{self, How, REAL_TIME, SCHEMA_AND_BROWSER};
 use crate::{
-    bare_metal, browser, dist, examples, libtest, packages, page, peers, process, program, python, tidy, vcan, web, wheel,
-    workspace,
+    bare_metal, browser, dist, examples, libtest, packages, page, peers, process, program, python, tidy, vcan, web,
+    wheel, workspace,
 };
 
 /// One step: its name for `--only`, what it does for the progress line, when it runs, and the function that does it.

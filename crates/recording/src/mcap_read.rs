@@ -1,7 +1,6 @@
 //! An MCAP file, read back.
 
 use std::collections::HashMap;
-use std::io::Read as _;
 
 use can::Instant;
 use mcap::read::{LinearReader, Options};

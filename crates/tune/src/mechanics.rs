@@ -122,7 +122,7 @@ fn elastic_of([gain, viscous, delay, anti, anti_damping, split, damping]: [f64; 
     Mechanics { elastic: Some(elastic), ..rigid_of([gain, viscous, delay]) }
 }
 
-/// A damping by its logarithm. Noise may look like less than none, and with none nobody knows which way round a loop goes.
+/// A damping by its logarithm. Noise may look like less than none, and with none it is open which way round a loop goes.
 fn damped(logarithm: f64) -> f64 {
     logarithm.exp().max(LEAST_DAMPING)
 }

@@ -161,7 +161,7 @@ pub async fn find(drive: &Drive, request: &Request) -> Result<(TuneReport, Propo
             .next("ask for less, e.g. --phase-margin 30; or stiffen the coupling of the load"));
     };
     let after: Vec<(Mux, i64)> = proposed.gains.iter().map(|gain| (gain.object, gain.after)).collect();
-    // On the twin a large current hurts nobody.
+    // On the twin a large current does no harm.
     let wide = (how.0, Bounds { current_a: f64::MAX, travel_turns: f64::MAX, ..how.1 });
     let trials = [twin.try_out(&[], wide)?, twin.try_out(&after, wide)?];
     let elastic = found.mechanics.elastic;

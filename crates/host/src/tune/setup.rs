@@ -75,7 +75,7 @@ impl Setup {
         Some(i64::from_le_bytes(raw))
     }
 
-    /// Puts everything back, and says so when it was read.
+    /// Puts everything back, each value read back.
     ///
     /// # Errors
     /// What could not be put back; the journal stays then.

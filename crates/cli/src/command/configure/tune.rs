@@ -13,8 +13,8 @@ use master::parameters::Parameters;
 use master::units::{Amperes, Rpm, parse_duration};
 use words::node::node;
 
-use crate::command::cycles::CycleArgs;
 use super::params::journal::note_kept;
+use crate::command::cycles::CycleArgs;
 use crate::command::repeat::period;
 use crate::context::Context;
 use crate::failure::Failure;

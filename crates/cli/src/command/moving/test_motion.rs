@@ -14,9 +14,9 @@ use recording::{Capture, Kind};
 use serde::Serialize;
 use words::node::node;
 
-use crate::command::record_and_replay::capture::{CaptureArgs, CaptureRow, USUAL_RATE, capture_file, numbered, save};
-use crate::command::cycles::CycleArgs;
 use super::group::{AxisLimitValues, angle, rate, turning, turns_of};
+use crate::command::cycles::CycleArgs;
+use crate::command::record_and_replay::capture::{CaptureArgs, CaptureRow, USUAL_RATE, capture_file, numbered, save};
 use crate::command::repeat::period;
 use crate::context::{Context, Restorer};
 use crate::failure::Failure;
