@@ -48,6 +48,7 @@ use crate::command::look::departures::DepartureList;
 use crate::command::look::objects::{Objects, Whose};
 use crate::command::moving::drive::StopOutcome;
 use crate::command::moving::estop::Estop;
+use crate::command::network::check::Check;
 use crate::command::tools::completions::ASKED_BY;
 use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
@@ -279,9 +280,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Group(group) => group.run(global, format),
         Command::DriveBase(base) => base.run(global, format),
         Command::Plan(plan) => plan.run(global, format),
-        Command::Check(check) => {
-            check.run(global).and_then(|report| print_whole(format, &report, report.failure(check.strict())))
-        }
+        Command::Check(command) => check(global, format, command),
         Command::Init(init) => {
             init.run(global, typed.bus).and_then(|report| print_whole(format, &report, report.failure()))
         }
@@ -306,6 +305,10 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::ManPages(pages) => pages.run(scope::heeded()),
         Command::Options => print_line(&help::of_options(command_line())).map_err(Failure::of_stdout),
     }
+}
+
+fn check(global: &Global, format: Format, check: &Check) -> Result<(), Failure> {
+    check.run(global).and_then(|report| print_whole(format, &report, report.failure(check.strict())))
 }
 
 fn list_objects(global: &Global, format: Format, objects: &Objects) -> Result<(), Failure> {

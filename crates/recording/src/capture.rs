@@ -167,7 +167,7 @@ impl Capture {
             signal: trace.quantity.clone().into(),
             unit: trace.unit.clone().into(),
         });
-        let mut record = Record::begin(kind, target, &columns.collect::<Vec<_>>())?;
+        let mut record = Record::exact(kind, target, &columns.collect::<Vec<_>>())?;
         let (of, kind) = ("".into(), "".into());
         record.mark(&Mark { at: Instant::ZERO, of, kind, severity: Severity::Note, text: self.about() })?;
         let mut row = vec![f64::NAN; self.traces.len()];

@@ -51,6 +51,8 @@ pub struct Channels {
     subjects: Vec<Signals>,
     /// Columns that have a channel.
     width: usize,
+    /// Values are not rounded.
+    is_exact: bool,
     data: Encoder,
 }
 
@@ -67,14 +69,23 @@ const FRAMES_PLACE: usize = 0;
 const EVENTS_PLACE: usize = 1;
 
 impl Channels {
-    /// A channel for the frames, one for what happened, and one for each subject of these columns.
+    /// A channel for the frames, one for what happened, and one for each subject of these columns. Simulated values are rounded.
     pub fn of(columns: &[Column]) -> Self {
+        Self::begun(columns, false)
+    }
+
+    /// As [`of`](Self::of), of values that keep every digit: what was measured.
+    pub(super) fn exact(columns: &[Column]) -> Self {
+        Self::begun(columns, true)
+    }
+
+    fn begun(columns: &[Column], is_exact: bool) -> Self {
         let list = vec![
             Channel { topic: FRAMES.into(), schema_name: "can_msgs/msg/Frame".into(), schema: frame_schema() },
             // The name and the fields of a line of a log, as Foxglove knows them, and what kind of thing it is.
             Channel { topic: EVENTS.into(), schema_name: "foxglove_msgs/msg/Log".into(), schema: log_schema() },
         ];
-        let mut channels = Self { list, subjects: Vec::new(), width: 0, data: Encoder::default() };
+        let mut channels = Self { list, subjects: Vec::new(), width: 0, is_exact, data: Encoder::default() };
         channels.add(columns);
         channels
     }
@@ -90,7 +101,7 @@ impl Channels {
         for subject in subjects {
             let of_it = columns.iter().enumerate().filter(|(_, column)| column.subject == *subject);
             let (places, of_it): (Vec<usize>, Vec<&Column>) = of_it.unzip();
-            let bits = of_it.iter().map(|column| column.kept_bits());
+            let bits = of_it.iter().map(|column| column.kept_bits().filter(|_| !self.is_exact));
             let fields = places.iter().map(|place| self.width + place).zip(bits).collect();
             self.subjects.push(Signals { subject: subject.clone(), channel: self.list.len(), fields });
             self.list.push(channel_of(subject, &of_it));

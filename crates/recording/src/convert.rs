@@ -18,7 +18,7 @@ pub fn mcap_of_csv(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let mut lines = CsvLines::of(bytes)?;
     let memory = Memory::default();
     let broken = |error: io::Error| error.to_string();
-    let mut record = Record::begin(Kind::Mcap, Box::new(memory.clone()), &lines.columns).map_err(broken)?;
+    let mut record = Record::exact(Kind::Mcap, Box::new(memory.clone()), &lines.columns).map_err(broken)?;
     while let Some((at_s, values, text)) = lines.next()? {
         record.row(Instant::from_nanos((at_s * 1e9).round() as u64), values).map_err(broken)?;
         if let Some(mark) = note(at_s, text) {

@@ -7,7 +7,6 @@ use std::io;
 use can::Instant;
 
 use super::channels::{Channels, MESSAGE_ENCODING, SCHEMA_ENCODING, Sink};
-use super::column::Column;
 use super::mcap_writer::McapWriter;
 use super::piece::{Entry, Target};
 
@@ -27,9 +26,8 @@ impl Sink for McapWriter {
 }
 
 impl Mcap {
-    pub(super) fn begin(target: Box<dyn Target>, columns: &[Column]) -> io::Result<Self> {
+    pub(super) fn begin(target: Box<dyn Target>, channels: Channels) -> io::Result<Self> {
         let mut writer = McapWriter::begin(target, concat!("ferrodrive ", env!("CARGO_PKG_VERSION")))?;
-        let channels = Channels::of(columns);
         for channel in channels.list() {
             let schema = writer.schema(&channel.schema_name, SCHEMA_ENCODING, channel.schema.as_bytes())?;
             writer.channel(schema, &channel.topic, MESSAGE_ENCODING)?;

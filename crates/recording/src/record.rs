@@ -4,6 +4,7 @@ use std::io;
 
 use can::{Frame, Instant};
 
+use super::channels::Channels;
 use super::column::Column;
 use super::csv::Csv;
 use super::mcap_file::Mcap;
@@ -23,13 +24,30 @@ enum Writer {
 }
 
 impl Record {
-    /// Begins a file of this kind with these columns.
+    /// Begins a file of this kind with these columns. In MCAP simulated values are rounded: [`Channels::of`].
     ///
     /// # Errors
     /// What the target says.
     pub fn begin(kind: Kind, target: Box<dyn Target>, columns: &[Column]) -> io::Result<Self> {
+        Self::with(kind, target, columns, Channels::of)
+    }
+
+    /// As [`begin`](Self::begin), of what was measured: every digit is kept.
+    ///
+    /// # Errors
+    /// What the target says.
+    pub fn exact(kind: Kind, target: Box<dyn Target>, columns: &[Column]) -> io::Result<Self> {
+        Self::with(kind, target, columns, Channels::exact)
+    }
+
+    fn with(
+        kind: Kind,
+        target: Box<dyn Target>,
+        columns: &[Column],
+        channels: impl Fn(&[Column]) -> Channels,
+    ) -> io::Result<Self> {
         let writer = match kind {
-            Kind::Mcap => Writer::Mcap(Box::new(Mcap::begin(target, columns)?)),
+            Kind::Mcap => Writer::Mcap(Box::new(Mcap::begin(target, channels(columns))?)),
             Kind::Csv => Writer::Csv(Box::new(Csv::begin(target, columns)?)),
         };
         Ok(Self { writer })

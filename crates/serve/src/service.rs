@@ -320,7 +320,8 @@ mod tests {
         world.watch(true);
         let file = create_record(&path, kind).unwrap();
         let columns = [Column::of_axis(channel)];
-        let file = RecordFile::start(kind, file, &columns, Pace::Free, Messages::silent()).unwrap();
+        let record = recording::Record::begin(kind, Box::new(file), &columns).unwrap();
+        let file = RecordFile::start(record, Pace::Free, Messages::silent());
         let mut served =
             ServedWorld::new(world, Pacer::new(Clock::Manual, Speed::Times(1.0)), true, Messages::silent());
         let frames = BufWriter::new(create_log(&log, Format::Candump).unwrap());

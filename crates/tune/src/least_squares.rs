@@ -79,10 +79,11 @@ pub(crate) fn solve<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; 
         }
         matrix.swap(column, pivot);
         right.swap(column, pivot);
+        let pivot_row = matrix[column];
         for row in column + 1..N {
-            let share = matrix[row][column] / matrix[column][column];
-            for other in column..N {
-                matrix[row][other] -= share * matrix[column][other];
+            let share = matrix[row][column] / pivot_row[column];
+            for (value, above) in matrix[row].iter_mut().zip(pivot_row).skip(column) {
+                *value -= share * above;
             }
             right[row] -= share * right[column];
         }

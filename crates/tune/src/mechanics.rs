@@ -103,7 +103,7 @@ pub fn identify(response: &Response) -> Result<Mechanics, Unusable> {
     let found =
         if two < WORTH_A_MASS * one && elastic.elastic.is_some_and(|it| is_physical(&it)) { elastic } else { rigid };
     let off = crate::response::distance(response, |omega| found.response(omega));
-    if !(found.gain > 0.0) || off > MOST_OFF {
+    if found.gain.is_nan() || found.gain <= 0.0 || off > MOST_OFF {
         return Err(Unusable::NoModel(100.0 * off));
     }
     Ok(Mechanics { off, ..found })

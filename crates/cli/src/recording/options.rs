@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use devices::AxisId;
-use recording::{Column, Kind, columns_of_drives, select};
+use recording::{Column, Kind, Record, columns_of_drives, select};
 use sim::coupling::BodyState;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Place, World};
@@ -92,8 +92,8 @@ impl RecordOptions {
         let of_axes = channels.iter().map(|channel| Column::of_axis(*channel));
         let columns: Vec<Column> = of_axes.chain(bodies.iter().flat_map(Column::of_body)).collect();
         let period = self.record_period.unwrap_or(Duration::from_millis(1));
-        let file = create(path).and_then(|(kind, file)| RecordFile::start(kind, file, &columns, pace, messages));
-        let file = file.map_err(|error| cannot_write(path, &error))?;
+        let record = create(path).and_then(|(kind, file)| Record::begin(kind, Box::new(file), &columns));
+        let file = RecordFile::start(record.map_err(|error| cannot_write(path, &error))?, pace, messages);
         world.start_recording(Recorder::new(period, channels).with_bodies(&bodies));
         world.watch(true);
         Ok(Some(file))

@@ -30,6 +30,7 @@ fn commands() -> Vec<String> {
 /// A line of each command that takes a machine file.
 const LINES: &[&str] = &[
     "boot",
+    "capture 4 velocity -o a.mcap",
     "check",
     "conform 4",
     "dcf 4",
@@ -59,6 +60,7 @@ const LINES: &[&str] = &[
     "read 4 6064",
     "record 4 6064 -o a.csv",
     "replay a.log",
+    "report 4 -o a.html",
     "reset 4",
     "restore 4",
     "save 4",
@@ -70,9 +72,11 @@ const LINES: &[&str] = &[
     "studio",
     "supervise",
     "sync",
+    "test-motion 4 steps",
     "time",
     "top",
     "torque 4 1A",
+    "tune 4",
     "velocity 4 60rpm",
     "watch 4 6064",
     "write 4 6060 3",

@@ -1,10 +1,9 @@
 //! A record: of a world (`--record`), or of objects of nodes on any bus (`ferrodrive record`).
 
-use std::fs::File;
 use std::io;
 use std::time::Duration;
 
-use recording::{Batch, Column, Kind, Record};
+use recording::{Batch, Record};
 
 use super::background::{Background, Output, Pace, WaitingRules};
 use crate::messages::Messages;
@@ -14,13 +13,9 @@ use words::failure::Failure;
 pub struct RecordFile(Background<Batch>);
 
 impl RecordFile {
-    /// Writes to `file` from now on. Later errors are reported to `messages`.
-    ///
-    /// # Errors
-    /// That of writing the begin.
-    pub fn start(kind: Kind, file: File, columns: &[Column], pace: Pace, messages: Messages) -> io::Result<Self> {
-        let record = Record::begin(kind, Box::new(file), columns)?;
-        Ok(Self(Background::start(record, WaitingRules::of(pace), Some(messages))))
+    /// Writes this record from now on. Later errors are reported to `messages`.
+    pub fn start(record: Record, pace: Pace, messages: Messages) -> Self {
+        Self(Background::start(record, WaitingRules::of(pace), Some(messages)))
     }
 
     /// Takes a batch; one that the disk has no time for is left out and reported, where the clock does not wait.
@@ -57,7 +52,7 @@ impl Output<Batch> for Record {
 mod tests {
     use std::path::Path;
 
-    use recording::columns_of_drives;
+    use recording::{Kind, columns_of_drives};
     use scenario::{Runner, Scenario};
     use sim::Place;
     use sim::recorder::{Channel, Recorder, Signal};
@@ -89,7 +84,8 @@ mod tests {
             let file = crate::files::create_record(&path, Kind::Mcap).expect("a file");
             let columns = columns_of_drives([place]);
             let messages = Messages::silent();
-            let mut record = RecordFile::start(Kind::Mcap, file, &columns, Pace::Free, messages).expect("begun");
+            let record = Record::begin(Kind::Mcap, Box::new(file), &columns).expect("begun");
+            let mut record = RecordFile::start(record, Pace::Free, messages);
             let mut goes_on = true;
             while goes_on {
                 goes_on = (0..STEPS_A_BATCH).all(|_| runner.step());

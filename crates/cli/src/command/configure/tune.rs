@@ -37,11 +37,9 @@ enum WhichLoop {
 /// --current. The motion stops where it reaches --current or --travel. Afterwards the drive has the parameters that it had,
 /// unless --apply is given. Keep an emergency stop within reach, and the load free to turn.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples:\n  ferrodrive tune 4                                # the stiffest speed loop that leaves 40 degrees\n  \
+#[command(after_help = "Examples:\n  ferrodrive tune 4\n  \
     ferrodrive tune 4 --bandwidth 20 --loop position --picture tune.svg\n  \
-    ferrodrive --bus can0 tune 4 --speed 60rpm --current 8A --apply"
-)]
+    ferrodrive --bus can0 tune 4 --speed 60rpm --current 8A --apply")]
 pub(crate) struct Tune {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -148,9 +148,8 @@ impl Record {
         let (path, kind) = &self.out;
         let cannot = |error: std::io::Error| Failure::of_writing("the record", path, &error);
         let file = if is_stdout(path) { stdout_file() } else { create_record(path, *kind) };
-        let file = file.map_err(cannot)?;
-        let mut file =
-            RecordFile::start(*kind, file, &columns, Pace::RealTime, Messages::of_warnings()).map_err(cannot)?;
+        let record = file.and_then(|file| recording::Record::exact(*kind, Box::new(file), &columns)).map_err(cannot)?;
+        let mut file = RecordFile::start(record, Pace::RealTime, Messages::of_warnings());
         let mut report = RecordReport {
             file: path.display().to_string(),
             node: self.node.raw(),
