@@ -92,8 +92,8 @@ const LOOKING: &[Row] = &[
     },
     Row { words: &["param", "parameter", "parameters"], tips: &["params backup 4", "read 4 6081"] },
     Row {
-        words: &["tuning", "gains", "pid", "autotune"],
-        tips: &["tune 4", "objects 4 gain", "params backup 4 -o gains.toml"],
+        words: &["tuning", "gains", "pid"],
+        tips: &["objects 4 gain", "record 4 606C 6077 -o run.mcap --for 5s", "params backup 4 -o gains.toml"],
     },
     Row { words: &["log", "logger", "canlogger", "candump-log", "save-log"], tips: &["dump --log trace.log"] },
     Row { words: &["trace", "tracing", "spy"], tips: &["dump", "dump --log trace.log", "state 4 -v"] },
@@ -105,7 +105,6 @@ const LOOKING: &[Row] = &[
             "liveplotter",
             "tview",
             "telemetry",
-            "capture",
             "sample",
             "bag record",
             "bag",
@@ -180,6 +179,7 @@ const LOOKING: &[Row] = &[
 
 /// Words of who wants to change or to move something.
 const ACTING: &[Row] = &[
+    Row { words: &["autotune", "auto-tune"], tips: &["tune 4", "objects 4 gain"] },
     Row {
         words: &[
             "clear",

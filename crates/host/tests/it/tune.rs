@@ -162,7 +162,6 @@ fn random_wheels_are_identified_and_gains_proposed_for_them_are_stable_and_nearl
         }
     }
     // A loop that swings with half of its gains and less excites a heavy wheel too little.
-    eprintln!("of {count}: refused {refused:?}, worse {worse:?}");
     assert!(refused.len() * 20 <= count, "refused: {refused:#?}");
     assert!(worse.len() * 10 <= count, "worse than as delivered: {worse:?} of {count}");
 }
