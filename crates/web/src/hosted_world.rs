@@ -62,7 +62,7 @@ impl From<BadFile> for Failed {
 
 type Work = Task<Pin<Box<dyn Future<Output = ()>>>>;
 
-/// See the [module](self). It owns the world, the master on it, its host, and the conversation with the page.
+/// It owns the world, the master on it, its host, and the conversation with the page.
 pub struct HostedWorld {
     world: World,
     asks: WorldAsks,
