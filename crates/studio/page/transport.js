@@ -2,7 +2,7 @@
 // worker of its own that holds virtual drives. Messages and requests are the same.
 
 /** The worker of a page without a server. */
-const worker_at = document.documentElement.dataset.worker;
+const worker_at = globalThis.document?.documentElement.dataset.worker;
 
 /** A host behind a socket: `heard` and `closed` are called with each message, and when the connection is lost. */
 function overSocket(heard, closed) {
@@ -59,7 +59,12 @@ function machine() {
   return kept ? JSON.parse(kept) : { machine: document.getElementById("machine").textContent, files: {} };
 }
 
-/** A request to the host: `fetch` with a path. */
+/**
+ * A request to the host: `fetch` with a path.
+ * @param {string} path
+ * @param {RequestInit} [options]
+ * @returns {Promise<Response>}
+ */
 async function requestWorker(path, { body = null } = {}) {
   await beginning;
   if (!worker) throw new Error("the worker has ended");
@@ -78,7 +83,7 @@ export const request = worker_at ? requestWorker : (path, options) => fetch(path
 // Links to files that the host makes.
 if (worker_at) {
   addEventListener("click", async (event) => {
-    const link = event.target.closest?.("a[href^='/api/']");
+    const link = /** @type {HTMLAnchorElement} */ (/** @type {Element} */ (event.target).closest?.("a[href^='/api/']"));
     if (!link) return;
     event.preventDefault();
     const answer = await request(link.getAttribute("href"));

@@ -263,7 +263,7 @@ impl Bench {
         if current_a.abs() > most_a {
             let reason =
                 format!("its speed loop asked for {}, more than {}", Amperes(current_a.abs()), Amperes(most_a));
-            let stopped = self.stopped(reason).of_kind(TOO_MUCH_CURRENT);
+            let stopped = self.stopped(reason).of_kind("current_bound");
             return Err(stopped.next("allow more with --current, or less speed with --speed"));
         }
         if self.travel_turns > travel_turns {

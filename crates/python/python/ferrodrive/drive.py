@@ -311,7 +311,7 @@ class Drive(_Orders):
         >>> round(capture["period_s"]["velocity_rpm"], 4)
         0.002
         """
-        order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger}
+        order: dict[str, Any] = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger}
         order = {**order, "take": list(take), "sdo": sdo, "journal": journal}
         return _captured(self.network._finish(self._capture(quantities, order)))
 
@@ -435,6 +435,6 @@ class AsyncDrive(_Orders):
         journal: Optional[Union[str, "os.PathLike[str]"]] = None,
     ) -> Capture:
         """As :meth:`Drive.capture`."""
-        order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger}
+        order: dict[str, Any] = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger}
         order = {**order, "take": list(take), "sdo": sdo, "journal": journal}
         return _captured(await self.network._finish_soon(self._capture(quantities, order)))

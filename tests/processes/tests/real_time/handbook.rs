@@ -98,13 +98,14 @@ const FOLLOWED: [(&str, usize); 16] = [
 ];
 
 /// The pages whose commands are not run here, and why.
-const NOT_FOLLOWED: [(&str, &str); 14] = [
+const NOT_FOLLOWED: [(&str, &str); 15] = [
     ("adapters.md", "in virtual time: crates/cli/src/tests/pages.rs"),
     ("lss.md", "in virtual time: crates/cli/src/tests/pages.rs"),
     ("README.md", "the list of the pages"),
     ("canopen-python.md", "its programs are crates/python/tests/test_canopen_python.py"),
     ("faq.md", "it has no commands"),
     ("fmu.md", "it packs a library that is built beside the program: tests/peers/fmu.py"),
+    ("in-the-browser.md", "its page has a compiler of its own: cargo xtask test --only web"),
     ("library.md", "its command is cargo's: the examples' step"),
     ("gateway.md", "it serves until a signal, and a client speaks to it: gateway.rs"),
     ("physics-engine.md", "its programs are Python's: examples/mujoco, which holds the page to them"),

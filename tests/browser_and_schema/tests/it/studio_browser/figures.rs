@@ -126,7 +126,7 @@ async fn figures_of_twelve_objects_a_thousand_times_a_second() {
     done(&["--bus", &bus.address, "nmt", "all", "start"]);
     stage.click("#tabs [data-name=scope]").await;
     for node in NODES {
-        for object in OBJECTS.map(|object| format!("{node}:{object}")) {
+        for object in OBJECTS.map(|object| format!("{node}.{}", object.replace(':', "_"))) {
             stage.choose("#scope-object", &object).await;
             stage.find(&format!("[data-object='{object}']")).await;
         }
