@@ -31,7 +31,7 @@ pub enum Said {
     Binary,
 }
 
-/// The word that every message of a session has to show, of [`Conversation`].
+/// The word that every message of a session has to show, of a conversation.
 #[derive(Debug)]
 pub struct Word {
     /// The word.

@@ -308,7 +308,7 @@ class Drive(_Orders):
         >>> capture = drive.capture("velocity", "current", duration=0.1, period=0.002)
         >>> len(capture["time_s"]) == len(capture["values"]["velocity_rpm"])
         True
-        >>> round(capture["period_s"]["velocity_rpm"], 4)
+        >>> round(capture["period_s"]["velocity_rpm"] or 0.0, 4)
         0.002
         """
         order: dict[str, Any] = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger}
