@@ -126,7 +126,7 @@ async fn figures_of_twelve_objects_a_thousand_times_a_second() {
     done(&["--bus", &bus.address, "nmt", "all", "start"]);
     stage.click("#tabs [data-name=scope]").await;
     for node in NODES {
-        for object in OBJECTS.map(|object| format!("{node}.{}", object.replace(':', "_"))) {
+        for object in OBJECTS.map(|object| format!("{node}:{object}")) {
             stage.choose("#scope-object", &object).await;
             stage.find(&format!("[data-object='{object}']")).await;
         }
@@ -181,7 +181,7 @@ fn every_frame_is_a_sample(saved: &str) {
     let title = lines.next().expect("titles");
     let rows: Vec<Vec<&str>> = lines.collect();
     for node in NODES {
-        for object in OBJECTS.map(|object| format!("{node}:{object}")) {
+        for object in OBJECTS.map(|object| format!("{node}.{}", object.replace(':', "_"))) {
             let column = title.iter().position(|name| *name == object).unwrap_or_else(|| panic!("{object}: {title:?}"));
             let times = rows.iter().filter(|row| !row[column].is_empty());
             let times: Vec<f64> = times.map(|row| row[0].parse().expect("a time")).collect();
