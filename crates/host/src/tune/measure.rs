@@ -183,7 +183,6 @@ impl Bench {
         let drive = node.cyclic(mode, options).await.map_err(|error| failed(&error))?;
         let signal = |mux| node.node().signal_in(number, mux).map_err(|error| failed(&error));
         let network = node.node().network().clone();
-        network.sync(Some(period));
         let mut it = Self {
             position: signal(POSITION_ACTUAL_VALUE)?,
             current: signal(demand.object)?,
@@ -200,12 +199,28 @@ impl Bench {
             peak_a: 0.0,
             travel_turns: 0.0,
         };
-        for _ in 0..it.cycles(ENABLING_S) {
-            if it.step(Demand::Hold).await?.0.follows {
-                return Ok(it);
+        it.network.sync(Some(period));
+        let enabled = it.enable().await;
+        match enabled {
+            Ok(true) => return Ok(it),
+            // It may have power by now.
+            Ok(false) => it.stop().await?,
+            Err(failure) => {
+                let stopped = it.stop().await;
+                return Err(stopped.err().into_iter().fold(failure, Failure::because));
             }
         }
         Err(failed(&"it was not enabled within 2 s").next(format!("ferrodrive explain {}", node.node().id())))
+    }
+
+    /// Whether the drive follows within [`ENABLING_S`].
+    async fn enable(&mut self) -> Result<bool, Failure> {
+        for _ in 0..self.cycles(ENABLING_S) {
+            if self.step(Demand::Hold).await?.0.follows {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     fn cycles(&self, time_s: f64) -> usize {
@@ -370,6 +385,12 @@ impl Bench {
     /// # Errors
     /// It was not seen to stand within 3 s.
     pub async fn stop(mut self) -> Result<(), Failure> {
+        let stood = self.come_to_rest().await;
+        self.network.sync(None);
+        stood
+    }
+
+    async fn come_to_rest(&mut self) -> Result<(), Failure> {
         // First by its set-point: without power a wheel would run on. What stopped the measurement may stop this too.
         let (from, ramp) = (self.asked_rpm, self.cycles(RAMP_S));
         for n in (0..ramp).rev() {
@@ -384,11 +405,9 @@ impl Bench {
             let stands = state.velocity.is_some_and(|Rpm(rpm)| rpm.abs() < 1.0);
             stood = if stands || stood > 0 { stood + 1 } else { 0 };
             if stood > self.cycles(0.05) && state.is_without_power() && stands {
-                self.network.sync(None);
                 return Ok(());
             }
         }
-        self.network.sync(None);
         Err(Failure::new(format!("node {} was not seen to stand: it may still be moving", self.drive.node()))
             .at_node(self.drive.node())
             .next(format!("ferrodrive estop, and ferrodrive explain {}", self.node.node().id())))

@@ -164,7 +164,7 @@ impl Tune {
         report.applied = after.ripple_a() <= before.ripple_a().max(0.1 * request.bounds.current_a);
         if !report.applied {
             report.notes.push("its current swings with the new gains: it was given its former ones back".into());
-        } else if wants_back(context) {
+        } else if wants_back(context).await {
             report.applied = false;
             report.notes.push("it was given its former gains back".into());
         }
@@ -197,16 +197,22 @@ impl Tune {
     }
 }
 
-/// One key of a person at a terminal: b and Enter.
-fn wants_back(context: &Context) -> bool {
+/// One key of a person at a terminal: b and Enter. It is read beside what goes on: signs of life are sent, and Ctrl-C is heard.
+async fn wants_back(context: &Context) -> bool {
     if !stdin().is_terminal() || !std::io::stderr().is_terminal() {
         return false;
     }
     context.progress.clear();
     context.note("the drive stands, with the new gains. Enter keeps them; b and Enter goes back");
-    let mut line = String::new();
+    let (give, typed) = tokio::sync::oneshot::channel();
+    std::thread::spawn(move || {
+        let mut line = String::new();
+        let read = stdin().read_line(&mut line);
+        // The command may have ended.
+        let _ = give.send(read.is_ok_and(|_| line.trim().eq_ignore_ascii_case("b")));
+    });
     // An input that has ended keeps them.
-    stdin().read_line(&mut line).is_ok_and(|_| line.trim().eq_ignore_ascii_case("b"))
+    typed.await.unwrap_or(false)
 }
 
 impl Report for TuneReport {

@@ -171,9 +171,11 @@ pub(super) struct AxisLimitValues {
     /// `null` for an axis without software limits.
     range_deg: Option<[f64; 2]>,
     velocity_rpm: f64,
-    acceleration_rpm_s: f64,
-    jerk_rpm_s2: f64,
-    following_error_deg: f64,
+    /// `null` where the ramps are the drive's own.
+    acceleration_rpm_s: Option<f64>,
+    /// `null` where no path is followed.
+    jerk_rpm_s2: Option<f64>,
+    following_error_deg: Option<f64>,
 }
 
 impl AxisLimitValues {
@@ -181,7 +183,14 @@ impl AxisLimitValues {
     pub(super) fn text(&self) -> String {
         let Self { range_deg, velocity_rpm, acceleration_rpm_s, .. } = self;
         let range = range_deg.map_or(String::new(), |[low, high]| format!(", {} to {} deg", Shown(low), Shown(high)));
-        format!("{} r/min, {} (r/min)/s{range}", Shown(*velocity_rpm), Shown(*acceleration_rpm_s))
+        let ramp = acceleration_rpm_s.map(|rate| format!("{} (r/min)/s", Shown(rate)));
+        let ramp = ramp.unwrap_or_else(|| "by the drive's own ramps".to_owned());
+        format!("{} r/min, {ramp}{range}", Shown(*velocity_rpm))
+    }
+
+    /// Of a drive that keeps its own ramps, or this one in (r/min)/s, and follows no path.
+    pub(super) fn of_ramps(limits: &AxisLimits, acceleration_rpm_s: Option<f64>) -> Self {
+        Self { acceleration_rpm_s, jerk_rpm_s2: None, following_error_deg: None, ..limits.into() }
     }
 }
 
@@ -190,9 +199,9 @@ impl From<&AxisLimits> for AxisLimitValues {
         Self {
             range_deg: limits.range_turns.as_ref().map(|range| [range.start() * 360.0, range.end() * 360.0]),
             velocity_rpm: limits.velocity_turns_s * 60.0,
-            acceleration_rpm_s: limits.acceleration_turns_s2 * 60.0,
-            jerk_rpm_s2: limits.jerk_turns_s3 * 60.0,
-            following_error_deg: limits.following_error_turns * 360.0,
+            acceleration_rpm_s: Some(limits.acceleration_turns_s2 * 60.0),
+            jerk_rpm_s2: Some(limits.jerk_turns_s3 * 60.0),
+            following_error_deg: Some(limits.following_error_turns * 360.0),
         }
     }
 }

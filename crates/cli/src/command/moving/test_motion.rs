@@ -163,9 +163,15 @@ impl TestMotion {
             Ok(mover) => self.measured(context, &drive, mover, &wanted).await,
             Err(failure) => Err(failure),
         };
-        let (guard, _) = guard.end(context, &drive, false).await?;
-        let (node, shape) = (self.node.raw(), self.shape_name());
-        Ok(TestMotionReport { node, shape, limits: (&limits).into(), guard, runs: moved? })
+        let released = guard.end(context, &drive, false).await;
+        // What failed first is what there is to know.
+        let runs = moved?;
+        let (guard, _) = released?;
+        let limits = match self.shape {
+            ShapeName::Steps => AxisLimitValues::of_ramps(&limits, self.acceleration.map(|rate| rate * 60.0)),
+            _ => (&limits).into(),
+        };
+        Ok(TestMotionReport { node: self.node.raw(), shape: self.shape_name(), limits, guard, runs })
     }
 
     async fn group(&self, drive: &Drive, limits: &AxisLimits) -> Result<Group, Failure> {
