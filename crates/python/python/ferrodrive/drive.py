@@ -42,9 +42,11 @@ class _Orders:
         return self.network._native.drive(self.node, self.model, {"do_": do_, "guessed": self.guessed, **behind, **given})
 
 
-    def _capture(self, quantities: tuple[str, ...], order: dict[str, Any]) -> Job:
-        journal = order.pop("journal")
-        whole = {**order, "quantities": list(quantities), "journal": None if journal is None else os.fspath(journal)}
+    def _capture(
+        self, quantities: tuple[str, ...], take: Sequence[str], journal: Optional[Union[str, "os.PathLike[str]"]], **order: Any
+    ) -> Job:
+        kept = None if journal is None else os.fspath(journal)
+        whole = {**order, "quantities": list(quantities), "take": list(take), "journal": kept}
         return _native.capture(self.network._native, self.node, self.model, whole)
 
 
@@ -311,10 +313,8 @@ class Drive(_Orders):
         >>> round(capture["period_s"]["velocity_rpm"] or 0.0, 4)
         0.002
         """
-        order: dict[str, Any] = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger}
-        order = {**order, "take": list(take), "sdo": sdo, "journal": journal}
-        return _captured(self.network._finish(self._capture(quantities, order)))
-
+        order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger, "sdo": sdo}
+        return _captured(self.network._finish(self._capture(quantities, take, journal, **order)))
 
 
 class AsyncDrive(_Orders):
@@ -435,6 +435,5 @@ class AsyncDrive(_Orders):
         journal: Optional[Union[str, "os.PathLike[str]"]] = None,
     ) -> Capture:
         """As :meth:`Drive.capture`."""
-        order: dict[str, Any] = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger}
-        order = {**order, "take": list(take), "sdo": sdo, "journal": journal}
-        return _captured(await self.network._finish_soon(self._capture(quantities, order)))
+        order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger, "sdo": sdo}
+        return _captured(await self.network._finish_soon(self._capture(quantities, take, journal, **order)))
