@@ -116,6 +116,8 @@ test("the page finds its drives and turns one of them, and stops it", async () =
 
 test("the views get what they request", async () => {
   await run("location.hash = 'trace'; return true");
+  // What this page's own host reads is hidden at first.
+  await until("its switch", "const quiet = document.getElementById('trace-quiet'); quiet?.click(); return quiet !== null");
   await until("lines of the trace", "return [...document.querySelectorAll('.trace-list .trace-row')].some((row) => /6041h/.test(row.innerText))");
   await picture("trace");
   await run("location.hash = 'drive'; return true");
