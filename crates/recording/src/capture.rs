@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use sim::Place;
 use words::object::{ObjectArg, object};
 
-use super::column::{Column, Subject};
+use super::column::{Column, Subject, is_called};
 use super::piece::{Kind, Mark, Recorded, Severity, Target};
 use super::record::Record;
 
@@ -95,10 +95,9 @@ fn spacing<'a>(readings: impl Iterator<Item = (&'a f64, &'a f64)>) -> (f64, f64,
 }
 
 impl Capture {
-    /// A trace by the name of its quantity, or by the beginning of it: `velocity`.
+    /// A trace by the name of its quantity, with its unit or without: `velocity`.
     pub fn trace(&self, quantity: &str) -> Option<&Trace> {
-        let whole = self.traces.iter().find(|trace| trace.quantity == quantity);
-        whole.or_else(|| self.traces.iter().find(|trace| trace.quantity.starts_with(quantity)))
+        self.traces.iter().find(|trace| is_called(&trace.quantity, quantity))
     }
 
     /// The readings of a trace: time in s and value, without the times at which it has none.

@@ -123,24 +123,32 @@ impl FromStr for Column {
     }
 }
 
+/// How the name of a signal ends, and the unit that it says.
+const ENDINGS: [(&str, &str); 13] = [
+    ("_counts", "counts"),
+    ("_rpm", "r/min"),
+    ("_rad_s", "rad/s"),
+    ("_deg_s", "°/s"),
+    ("_m_s", "m/s"),
+    ("_rad", "rad"),
+    ("_deg", "°"),
+    ("_nm", "N·m"),
+    ("_a", "A"),
+    ("_v", "V"),
+    ("_c", "°C"),
+    ("_j", "J"),
+    ("_m", "m"),
+];
+
 /// The unit that a name ends with.
 fn unit_of(signal: &str) -> &'static str {
-    const ENDINGS: [(&str, &str); 13] = [
-        ("_counts", "counts"),
-        ("_rpm", "r/min"),
-        ("_rad_s", "rad/s"),
-        ("_deg_s", "°/s"),
-        ("_m_s", "m/s"),
-        ("_rad", "rad"),
-        ("_deg", "°"),
-        ("_nm", "N·m"),
-        ("_a", "A"),
-        ("_v", "V"),
-        ("_c", "°C"),
-        ("_j", "J"),
-        ("_m", "m"),
-    ];
     ENDINGS.iter().find(|(ending, _)| signal.ends_with(ending)).map_or("", |(_, unit)| unit)
+}
+
+/// Whether a signal has this name, with its unit or without: `velocity_rpm` is called `velocity`, `velocity_demand_rpm` is not.
+pub fn is_called(signal: &str, name: &str) -> bool {
+    let unit = signal.strip_prefix(name);
+    unit.is_some_and(|unit| unit.is_empty() || ENDINGS.iter().any(|(ending, _)| *ending == unit))
 }
 
 /// What is kept of a simulated value, by its unit: steps of 2 thousandths of 1 r/min, 1 mA, 8 mV, 16 mK, 8 urad, 0.5 mN·m, 8 mJ, 1 um.

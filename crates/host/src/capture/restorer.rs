@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use canopen::{Mux, NmtCommand};
-use master::Node;
 use master::parameters::roll_back;
+use master::{Drive, Node};
 
 use crate::network::params::journal::Kept;
 
@@ -29,8 +29,9 @@ pub(super) struct Changed {
 }
 
 impl Restorer {
-    pub(super) fn new(node: Node) -> Self {
-        Self { node, changed: Arc::default() }
+    /// Of a drive of which nothing has been changed yet.
+    pub fn of(drive: &Drive) -> Self {
+        Self { node: drive.node().clone(), changed: Arc::default() }
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Changed> {

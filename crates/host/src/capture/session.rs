@@ -1,16 +1,17 @@
 //! A capture on a bus: the drive is made to send, what comes is collected, and everything is put back.
 
-use std::cell::Cell;
 use std::path::PathBuf;
+use std::pin::pin;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::pdo::PdoId;
-use canopen::{Mux, NmtCommand, connection_set};
+use canopen::{Mux, NmtCommand, NmtState, connection_set};
+use futures_util::future::{Either, select};
 use master::core::LoggedFrame;
 use master::parameters::{Parameters, PlanOptions};
 use master::{Drive, FrameLog};
-use recording::{Capture, Trace};
+use recording::{Capture, Trace, is_called};
 use sim::Place;
 use words::failure::Failure;
 
@@ -61,8 +62,15 @@ pub enum Way {
     Sdo,
 }
 
-/// A column and its bits in a frame.
-type Field = (usize, std::ops::Range<u32>);
+/// A TPDO that brings readings.
+#[derive(Debug)]
+struct Source {
+    id: u16,
+    /// Columns with the bits that they have in the frame.
+    fields: Vec<(usize, std::ops::Range<u32>)>,
+    /// When it came last, or was first listened for.
+    heard_at: Instant,
+}
 
 /// A capture that runs: the drive sends.
 #[derive(Debug)]
@@ -73,8 +81,7 @@ pub struct Running {
     plan: Option<CapturePlan>,
     period: Duration,
     log: Option<FrameLog>,
-    /// Of each identifier the columns with the bits that they have.
-    fields: Vec<(u16, Vec<Field>)>,
+    sources: Vec<Source>,
     parameters: std::collections::BTreeMap<Mux, Vec<u8>>,
     rows: Rows,
     taken: Vec<LoggedFrame>,
@@ -92,6 +99,8 @@ pub struct Taken {
 
 /// How long SYNC of others is listened for.
 const LISTEN: Duration = Duration::from_millis(250);
+/// How long the second SYNC is waited for where one was heard.
+const SLOWEST_SYNC: Duration = Duration::from_secs(5);
 /// How often what came is collected.
 const COLLECT: Duration = Duration::from_millis(10);
 /// Frames that come between two looks at most: a bus of 1 Mbit/s carries some 20 in a millisecond; the program may be late.
@@ -120,19 +129,15 @@ impl Wanted {
         Ok(())
     }
 
-    /// Makes the drive send what is asked for. What it changes is in the [`Restorer`] from before it is changed.
+    /// Makes the drive send what is asked for. What it changes is in the restorer, which is of this drive, from before it is changed: it
+    /// leads back from a future that was dropped on the way too.
     ///
     /// # Errors
     /// What cannot be had, and what can; nothing is left changed then, unless the drive fell silent.
-    pub async fn begin(&self, drive: &Drive) -> Result<(Running, Restorer), Failure> {
-        let restorer = Restorer::new(drive.node().clone());
-        match self.begun(drive, &restorer).await {
-            Ok(running) => Ok((running, restorer)),
-            Err(failure) => Err(restorer
-                .restore()
-                .await
-                .iter()
-                .fold(failure, |failure, left| failure.because(format!("not put back: {left}")))),
+    pub async fn begin(&self, drive: &Drive, restorer: &Restorer) -> Result<Running, Failure> {
+        match self.begun(drive, restorer).await {
+            Ok(running) => Ok(running),
+            Err(failure) => Err(restorer.restore().await.iter().fold(failure, not_put_back)),
         }
     }
 
@@ -159,7 +164,7 @@ impl Wanted {
             plan: planned,
             period: self.period,
             log: None,
-            fields: Vec::new(),
+            sources: Vec::new(),
             parameters,
             rows: Rows::new(self.quantities.len(), self.period),
             taken: Vec::new(),
@@ -240,14 +245,23 @@ impl Wanted {
     }
 }
 
-/// The period of a SYNC that another node sends: the median distance of those that were heard.
+/// A failure, with what could not be put back after it.
+fn not_put_back(failure: Failure, left: &String) -> Failure {
+    failure.because(format!("not put back: {left}"))
+}
+
+/// The period of a SYNC that another node sends: the median distance of those that were heard. Where only one was, the next is waited
+/// for: a second producer would have every synchronous PDO of the bus come at another time.
 async fn heard_sync(drive: &Drive) -> Option<Duration> {
     let network = drive.node().network();
     let id = connection_set::SYNC.as_standard()?;
     let log = network.log_frames(&[id], LOG);
-    network.sleep(LISTEN).await;
     let mut heard = Vec::new();
-    log.take(&mut heard);
+    let began = network.now();
+    while heard.is_empty() && network.now() == began || heard.len() == 1 && network.now() - began < SLOWEST_SYNC {
+        network.sleep(LISTEN).await;
+        log.take(&mut heard);
+    }
     let mut distances: Vec<Duration> = heard.windows(2).map(|pair| pair[1].at - pair[0].at).collect();
     distances.sort_unstable();
     let median = distances.get(distances.len() / 2)?;
@@ -273,7 +287,8 @@ impl Running {
                 let is_by_it = self.ways[column] == Way::Tpdo(config.pdo);
                 Some((column, config.map.find(quantity.object).filter(|_| is_by_it)?))
             });
-            self.fields.push((*id, columns.collect()));
+            let heard_at = self.drive.node().network().now();
+            self.sources.push(Source { id: *id, fields: columns.collect(), heard_at });
         }
         let ids: Vec<u16> = plan.pdos.iter().map(|(_, id)| *id).collect();
         self.log = Some(self.drive.node().network().log_frames(&ids, LOG));
@@ -283,7 +298,9 @@ impl Running {
     async fn wait_for_first(&mut self, plan: &CapturePlan, restorer: &Restorer) -> Result<(), Failure> {
         let (network, node) = (self.drive.node().network().clone(), self.drive.node().clone());
         network.sleep(plan.period * 2 + COLLECT).await;
-        if !self.has_come() {
+        // One whose heartbeat shows that it is operational stays so: it may be moving by its PDOs.
+        let is_operational = node.facts().probable_state(self.drive.description()) == Some(NmtState::Operational);
+        if !self.has_come() && !is_operational {
             restorer.lock().started = true;
             node.nmt(NmtCommand::Start);
         }
@@ -298,7 +315,7 @@ impl Running {
                 ))
                 .of_kind("no_pdo")
                 .at_node(node.id())
-                .because("it was set up, reads back as it should, and the node was started")
+                .because("it was set up, reads back as it should, and the node is operational or was started")
                 .next(format!("ferrodrive pdo show {} says what a PDO waits for", node.id())));
             }
             network.sleep(COLLECT).await;
@@ -309,43 +326,42 @@ impl Running {
     /// Each of the TPDOs came at least once.
     fn has_come(&mut self) -> bool {
         self.lost += self.log.as_ref().map_or(0, |log| log.take(&mut self.taken));
-        self.fields.iter().all(|(id, _)| self.taken.iter().any(|frame| frame.id == *id))
+        self.sources.iter().all(|source| self.taken.iter().any(|frame| frame.id == source.id))
     }
 
     /// Takes the next capture: waits for its trigger, collects, and goes on sending for a further one.
     ///
     /// # Errors
-    /// The trigger is of a quantity that is not captured; a value by SDO does not come. A drive that falls silent cuts the capture off.
+    /// The trigger is of a quantity that is not captured. A drive that falls silent, or does not answer, cuts the capture off.
     pub async fn next(&mut self, span: &Span) -> Result<Taken, Failure> {
         let network = self.drive.node().network().clone();
         let mut watch = span.trigger.as_ref().map(|trigger| self.armed(trigger)).transpose()?;
-        (self.rows, self.lost) = (Rows::new(self.quantities.len(), self.period), 0);
-        // What came before belongs to no capture.
-        self.has_come();
-        self.taken.clear();
-        let mut begun = if watch.is_none() { Some(network.now()) } else { None };
-        let (mut looked_at, mut heard_at) = (0, network.now());
+        self.begin_anew();
+        let (mut begun, mut looked_at) = (None, 0);
         let cut_off = loop {
-            self.collect().await?;
+            if let Err(failure) = self.collect().await {
+                break Some(failure);
+            }
             let now = network.now();
             while looked_at < self.rows.len() {
                 let (at, values) = self.rows.row(looked_at);
-                heard_at = at;
+                // The newest row may be one of which a TPDO is still to come.
+                if looked_at + 1 == self.rows.len() && now - at < self.period {
+                    break;
+                }
                 looked_at += 1;
-                if let Some((column, armed)) = &mut watch
-                    && begun.is_none()
-                    && armed.passes(values[*column])
-                {
+                // Without a trigger it begins with its first reading.
+                if begun.is_none() && watch.as_mut().is_none_or(|(column, armed)| armed.passes(values[*column])) {
                     begun = Some(at);
                 }
             }
             if begun.is_some_and(|begun| now - begun >= span.duration + COLLECT) {
                 break None;
             }
-            if now - heard_at > PATIENCE + self.period * 2 {
-                break Some(self.silent(now - heard_at));
+            if let Some(failure) = self.fallen_silent() {
+                break Some(failure);
             }
-            if begun.is_none() {
+            if begun.is_none() && watch.is_some() {
                 let before = self.rows.len();
                 self.rows.forget_before(earlier(now, span.pre_trigger + COLLECT * 2));
                 looked_at -= before - self.rows.len();
@@ -354,44 +370,58 @@ impl Running {
         Ok(self.capture(span, begun, cut_off))
     }
 
-    /// Captures for as long as something else is being done, from now on.
-    ///
-    /// # Errors
-    /// Those of [`next`](Self::next), beside what came of the other.
-    pub async fn during<T>(&mut self, doing: impl Future<Output = T>) -> (T, Result<Taken, Failure>) {
+    /// Captures for as long as something else is being done, from now on: what came of both.
+    pub async fn during<T>(&mut self, doing: impl Future<Output = T>) -> (T, Taken) {
         let network = self.drive.node().network().clone();
+        self.begin_anew();
+        let begun = network.now();
+        let collected = {
+            let (doing, collecting) = (pin!(doing), pin!(self.until_cut_off()));
+            match select(doing, collecting).await {
+                // The other has its own cycles to keep: it is not made to wait for a round of readings.
+                Either::Left((done, _)) => Ok((done, None)),
+                Either::Right((failure, doing)) => Err((failure, doing.await)),
+            }
+        };
+        let (done, cut_off) = collected.unwrap_or_else(|(failure, done)| (done, Some(failure)));
+        self.take_frames();
+        let duration = network.now() - begun;
+        let span = Span { duration, trigger: None, pre_trigger: Duration::ZERO };
+        (done, self.capture(&span, Some(begun), cut_off))
+    }
+
+    /// Collects until nothing comes any more.
+    async fn until_cut_off(&mut self) -> Failure {
+        loop {
+            if let Err(failure) = self.collect().await {
+                return failure;
+            }
+            if let Some(failure) = self.fallen_silent() {
+                return failure;
+            }
+        }
+    }
+
+    /// Leaves out what came before: it belongs to no capture.
+    fn begin_anew(&mut self) {
+        let now = self.drive.node().network().now();
         (self.rows, self.lost) = (Rows::new(self.quantities.len(), self.period), 0);
         self.has_come();
         self.taken.clear();
-        let (begun, is_done) = (network.now(), Cell::new(false));
-        let doing = async {
-            let done = doing.await;
-            is_done.set(true);
-            done
-        };
-        let collecting = async {
-            while !is_done.get() {
-                self.collect().await?;
-                let heard_at = if self.rows.is_empty() { begun } else { self.rows.row(self.rows.len() - 1).0 };
-                if network.now() - heard_at > PATIENCE + self.period * 2 {
-                    return Ok(Some(self.silent(network.now() - heard_at)));
-                }
-            }
-            Ok(None)
-        };
-        let (done, cut_off) = futures_util::future::join(doing, collecting).await;
-        let duration = network.now() - begun;
-        let span = Span { duration, trigger: None, pre_trigger: Duration::ZERO };
-        (done, cut_off.map(|cut_off| self.capture(&span, Some(begun), cut_off)))
+        self.sources.iter_mut().for_each(|source| source.heard_at = now);
+    }
+
+    /// One of the TPDOs has stayed away for too long. What is read by SDO and does not come is a failure of its own.
+    fn fallen_silent(&self) -> Option<Failure> {
+        let heard_at = self.sources.iter().map(|source| source.heard_at).min()?;
+        let silence = self.drive.node().network().now() - heard_at;
+        (silence > PATIENCE + self.period * 2).then(|| self.silent(silence))
     }
 
     fn armed(&self, trigger: &Trigger) -> Result<(usize, Armed), Failure> {
         let asked = trigger.quantity.to_ascii_lowercase().replace('-', "_");
         let whole = self.quantities.iter().position(|quantity| quantity.name == asked);
-        let begins = || {
-            let with_unit = format!("{asked}_");
-            self.quantities.iter().position(|quantity| quantity.name.starts_with(&with_unit))
-        };
+        let begins = || self.quantities.iter().position(|quantity| is_called(&quantity.name, &asked));
         let column = whole.or_else(begins).ok_or_else(|| {
             let names = self.quantities.iter().map(|quantity| quantity.name.as_str()).collect::<Vec<_>>().join(", ");
             Failure::usage(format!("the trigger is of '{}', which is not captured", trigger.quantity))
@@ -426,12 +456,13 @@ impl Running {
     }
 
     fn take_frames(&mut self) {
-        let Self { log, taken, fields, quantities, rows, lost, .. } = self;
+        let Self { log, taken, sources, quantities, rows, lost, .. } = self;
         let Some(log) = log else { return };
         *lost += log.take(taken);
         for frame in taken.drain(..) {
-            let Some((_, fields)) = fields.iter().find(|(id, _)| *id == frame.id) else { continue };
-            let in_frame = fields.iter().filter(|(_, bits)| bits.end <= u32::from(frame.length) * 8);
+            let Some(source) = sources.iter_mut().find(|source| source.id == frame.id) else { continue };
+            source.heard_at = frame.at;
+            let in_frame = source.fields.iter().filter(|(_, bits)| bits.end <= u32::from(frame.length) * 8);
             let readings = in_frame.map(|(column, bits)| {
                 let mask = u64::MAX >> (u64::BITS - (bits.end - bits.start));
                 let raw = (frame.data >> bits.start & mask) as u32;

@@ -89,8 +89,8 @@ impl Bench {
     }
 
     fn begin(&mut self, wanted: &Wanted) -> Result<(Running, Restorer), Failure> {
-        let drive = self.drive.clone();
-        self.run(wanted.begin(&drive))
+        let (drive, restorer) = (self.drive.clone(), Restorer::of(&self.drive));
+        self.run(wanted.begin(&drive, &restorer)).map(|running| (running, restorer))
     }
 }
 
@@ -197,26 +197,19 @@ fn whatever_point_a_capture_is_ended_at_the_tpdos_are_as_they_were() {
                 let mut wanted = bench.wanted(&["velocity", "position"], Some(path.clone()));
                 wanted.period = 2 * MS;
                 let drive = bench.drive.clone();
-                let mut way_back = None;
-                let capturing = async {
-                    let (mut running, restorer) = wanted.begin(&drive).await?;
-                    way_back = Some(restorer);
-                    running.next(&at_once(10_000)).await
-                };
+                let restorer = Restorer::of(&drive);
+                let capturing = async { wanted.begin(&drive, &restorer).await?.next(&at_once(10_000)).await };
                 let end = block_on_for(&mut bench.world, Duration::from_millis(end_ms), capturing);
                 assert!(end.is_err(), "{name} {end_ms} ms: it came to its end: {:?}", end.map(|end| end.err()));
                 let at_the_end = path.exists();
                 changed += usize::from(at_the_end);
-                match way_back {
-                    // Ended: its owner leads it back.
-                    Some(restorer) if !killed => {
-                        assert_eq!(bench.run(restorer.restore()), Vec::<String>::new(), "{name} {end_ms} ms");
-                    }
-                    // Killed: another program does, by the journal.
-                    _ => {
-                        bench.begin_anew();
-                        roll_back(&mut bench, &path, (name, end_ms));
-                    }
+                if killed {
+                    // Another program leads it back, by the journal.
+                    bench.begin_anew();
+                    roll_back(&mut bench, &path, (name, end_ms));
+                } else {
+                    // Its owner does.
+                    assert_eq!(bench.run(restorer.restore()), Vec::<String>::new(), "{name} {end_ms} ms");
                 }
                 assert!(!path.exists(), "{name} {end_ms} ms");
                 let now = bench.tpdos();
@@ -309,8 +302,9 @@ fn a_sine_is_followed_run_after_run_while_it_is_captured() {
     let with_group = bench.tpdos();
     let mut wanted = bench.wanted(&["position", "current"], None);
     wanted.period = CYCLE;
-    let begun = bench.run(beside(&mut group, wanted.begin(&drive))).expect("the cycles go on");
-    let (mut running, restorer) = begun.expect("it begins");
+    let restorer = Restorer::of(&drive);
+    let begun = bench.run(beside(&mut group, wanted.begin(&drive, &restorer))).expect("the cycles go on");
+    let mut running = begun.expect("it begins");
     assert_eq!(running.plan().map(|plan| plan.pace), Some(Pace::Sync(1)));
     bench.run(group.enable()).expect("it is enabled");
     for run in 0..2 {
@@ -318,7 +312,8 @@ fn a_sine_is_followed_run_after_run_while_it_is_captured() {
         let followed = followed.unwrap_or_else(|error| panic!("run {run}: {error}"));
         assert!((1.0..1.3).contains(&followed.took_s), "run {run}: {followed:?}");
         assert!(followed.most_deg < 5.0 && followed.rms_deg <= followed.most_deg, "run {run}: {followed:?}");
-        let capture = taken.expect("it is captured").capture;
+        assert!(taken.cut_off.is_none(), "{:?}", taken.cut_off);
+        let capture = taken.capture;
         let trace = capture.trace("position_deg").expect("a position");
         let ends = capture
             .points(trace)
@@ -339,7 +334,8 @@ fn steps_of_velocity_end_at_rest_with_both_edges_captured() {
     let drive = bench.drive.clone();
     let (done, taken) = bench.run(running.during(steps(&drive, Rpm(60.0), None, Duration::from_millis(800))));
     done.expect("it moves");
-    let capture = taken.expect("it is captured").capture;
+    assert!(taken.cut_off.is_none(), "{:?}", taken.cut_off);
+    let capture = taken.capture;
     let demand: Vec<f64> = capture.trace("target_velocity_rpm").expect("a demand").values.clone();
     let edges: Vec<_> = demand.windows(2).filter(|pair| pair[0] != pair[1]).map(|pair| (pair[0], pair[1])).collect();
     assert_eq!(edges, [(0.0, 60.0), (60.0, 0.0)]);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use can::Bitrate;
-use host::capture::{Quantity, Span, Taken, Trigger, Wanted, Way};
+use host::capture::{Quantity, Restorer, Span, Taken, Trigger, Wanted, Way};
 use host::network::params::journal::default_path;
 use machine::file::pdo_id;
 use pyo3::prelude::*;
@@ -96,10 +96,20 @@ pub(crate) fn capture(
             wanted.quantities.push(Quantity::named(&drive, name).await?);
         }
         wanted.check(&span)?;
-        let (mut running, restorer) = wanted.begin(&drive).await?;
+        let restorer = Restorer::of(&drive);
+        let mut running = wanted.begin(&drive, &restorer).await?;
         let taken = running.next(&span).await;
         let left = restorer.restore().await;
-        let Taken { capture, cut_off } = taken?;
+        let not_put_back = (!left.is_empty()).then(|| {
+            Failure::new(format!("node {}: not everything was put back", asked.node))
+                .of_kind("not_put_back")
+                .at_node(drive.node().id())
+                .next("when it answers again: network.params(node).rollback()")
+        });
+        let with_left = |failure: Failure| {
+            left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}")))
+        };
+        let Taken { capture, cut_off } = taken.map_err(with_left)?;
         let traces = capture.traces.iter().zip(running.ways()).map(|(trace, way)| CapturedTrace {
             quantity: trace.quantity.clone(),
             unit: trace.unit.clone(),
@@ -116,12 +126,7 @@ pub(crate) fn capture(
         let (model, trigger_s, time_s) = (capture.model.clone(), capture.trigger_s, capture.time_s.clone());
         let value =
             Value::report(&Captured { model, trigger_s, time_s, traces: traces.collect(), objects: objects.collect() });
-        let not_put_back = (!left.is_empty()).then(|| {
-            let failure =
-                Failure::new(format!("node {}: not everything was put back", asked.node)).of_kind("not_put_back");
-            left.iter().fold(failure, Failure::because)
-        });
-        match cut_off.or(not_put_back) {
+        match cut_off.or(not_put_back).map(with_left) {
             Some(failure) => Err(Trouble::Reported(failure, Box::new(value))),
             None => Ok(value),
         }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use host::capture::merit::{self, Heating, Step};
-use host::capture::{Quantity, Running, Span, Taken, Wanted};
+use host::capture::{Quantity, Running, Span, Taken, Wanted, Way};
 use host::test_motion::{Followed, Shape, beside, follow, points, steps};
 use master::Drive;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError};
@@ -16,7 +16,9 @@ use words::node::node;
 
 use super::group::{AxisLimitValues, angle, rate, turning, turns_of};
 use crate::command::cycles::CycleArgs;
-use crate::command::record_and_replay::capture::{CaptureArgs, CaptureRow, USUAL_RATE, capture_file, numbered, save};
+use crate::command::record_and_replay::capture::{
+    CaptureArgs, CaptureRow, USUAL_RATE, capture_file, check_place, numbered, save,
+};
 use crate::command::repeat::period;
 use crate::context::{Context, Restorer};
 use crate::failure::Failure;
@@ -154,6 +156,7 @@ impl TestMotion {
         let usual = if stream.is_some() { self.period } else { USUAL_RATE };
         let wanted = self.how.wanted(context, &drive, &names, usual).await?;
         wanted.check(&Span { duration: Duration::from_secs(60), trigger: None, pre_trigger: Duration::ZERO })?;
+        check_place(self.output.as_deref())?;
         let guard = self.guard.begin(context, &drive).await?;
         let mover = match stream {
             None => Ok(Mover::Steps(drive.clone())),
@@ -261,7 +264,8 @@ impl TestMotion {
         Ok(capture.points(trace).map(|(at, deg)| (at, deg / 360.0)).collect())
     }
 
-    /// Sets the capture up, makes the runs, and puts everything back; what moves is at rest at its end.
+    /// Sets the capture up, makes the runs, and puts everything back; what moves is at rest at its end. Files are written then: a group has
+    /// cycles to keep. What was captured until a failure is written too.
     async fn measured(
         &self,
         context: &Context,
@@ -269,75 +273,89 @@ impl TestMotion {
         mut mover: Mover,
         wanted: &Wanted,
     ) -> Result<Vec<RunRow>, Failure> {
-        let runs = self.runs(context, drive, &mut mover, wanted).await;
+        let mut runs = Vec::new();
+        let moved = self.runs(context, drive, (&mut mover, wanted), &mut runs).await;
         let ended = match mover {
             Mover::Steps(drive) => drive.disable().await.map_err(Failure::from),
             Mover::Group(mut group, _) => {
-                let reason = if runs.is_err() { group.explain_stop().await } else { None };
+                let reason = if moved.is_err() { group.explain_stop().await } else { None };
                 let closed = group.close().await.map_err(Failure::from);
                 closed.map_err(|failure| reason.into_iter().fold(failure, Failure::because))
             }
         };
         let left = context.restore().await.unwrap_or_default();
-        let runs = runs.and_then(|runs| ended.map(|()| runs));
-        match (runs, left.is_empty()) {
-            (Ok(runs), true) => Ok(runs),
-            (Ok(_), false) => Err(left.iter().fold(
-                Failure::new(format!("node {}: not everything was put back", self.node)).of_kind("not_put_back"),
-                |failure, left| failure.because(left),
-            )),
-            (Err(failure), _) => {
-                Err(left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}"))))
+        let put_back = if left.is_empty() {
+            Ok(())
+        } else {
+            let failure = Failure::new(format!("node {}: not everything was put back", self.node));
+            let failure = failure.of_kind("not_put_back").at_node(self.node);
+            Err(left.iter().fold(failure, |failure, left| failure.because(left)))
+        };
+        let saved = self.saved(&mut runs);
+        // The first is what happened; the others are to be known too.
+        let failures = [moved, ended, put_back, saved].into_iter().filter_map(Result::err);
+        match failures.reduce(Failure::because) {
+            None => Ok(runs.into_iter().map(|(row, _)| row).collect()),
+            Some(failure) => {
+                let files = runs.iter().filter_map(|(row, _)| row.capture.file.as_deref());
+                Err(files.fold(failure, |failure, file| failure.because(format!("saved: {file}"))))
             }
         }
+    }
+
+    /// Writes the captures.
+    fn saved(&self, runs: &mut [(RunRow, Capture)]) -> Result<(), Failure> {
+        for (row, capture) in runs {
+            if let Some(path) = self.output.as_deref().map(|path| numbered(path, row.run)) {
+                save(capture, &path)?;
+                row.capture.file = Some(path.display().to_string());
+            }
+        }
+        Ok(())
     }
 
     async fn runs(
         &self,
         context: &Context,
         drive: &Drive,
-        mover: &mut Mover,
-        wanted: &Wanted,
-    ) -> Result<Vec<RunRow>, Failure> {
-        let began = match mover {
-            Mover::Steps(_) => wanted.begin(drive).await?,
-            Mover::Group(group, _) => beside(group, wanted.begin(drive)).await??,
+        (mover, wanted): (&mut Mover, &Wanted),
+        runs: &mut Vec<(RunRow, Capture)>,
+    ) -> Result<(), Failure> {
+        let restorer = host::capture::Restorer::of(drive);
+        context.restore_at_end(Restorer::Capture(restorer.clone()));
+        let mut running = match mover {
+            Mover::Steps(_) => wanted.begin(drive, &restorer).await?,
+            Mover::Group(group, _) => beside(group, wanted.begin(drive, &restorer)).await??,
         };
-        let (mut running, restorer) = began;
-        context.restore_at_end(Restorer::Capture(restorer));
         if let Mover::Group(group, _) = mover {
             group.enable().await?;
         }
-        let mut rows = Vec::new();
         for run in 1..=self.count {
             context.progress.show(format!("node {}: {}, run {run} of {}", self.node, self.shape_name(), self.count));
-            rows.push(self.once(run, mover, &mut running).await?);
+            let (moved, taken) = self.once(mover, &mut running).await;
+            let failure = moved.as_ref().err().cloned().or(taken.cut_off.map(Failure::from));
+            runs.push(self.row(run, moved.ok().flatten(), taken.capture, running.ways()));
+            failure.map_or(Ok(()), Err)?;
         }
-        Ok(rows)
+        Ok(())
     }
 
-    async fn once(&self, run: u32, mover: &mut Mover, running: &mut Running) -> Result<RunRow, Failure> {
-        let (followed, taken) = match mover {
+    async fn once(&self, mover: &mut Mover, running: &mut Running) -> (Result<Option<Followed>, Failure>, Taken) {
+        match mover {
             Mover::Steps(drive) => {
                 let ramp = self.acceleration.map(|rate| Ramp::RpmPerSecond(rate * 60.0));
                 let (done, taken) = running.during(steps(drive, self.speed, ramp, self.time)).await;
-                done?;
-                (None, taken)
+                (done.map(|()| None).map_err(Failure::from), taken)
             }
             Mover::Group(group, points) => {
                 let (done, taken) = running.during(follow(group, points)).await;
-                (Some(done?), taken)
+                (done.map(Some).map_err(Failure::from), taken)
             }
-        };
-        let Taken { mut capture, cut_off } = taken?;
-        if let Some(failure) = cut_off {
-            return Err(failure.into());
         }
-        let file = self.output.as_deref().map(|path| numbered(path, run));
+    }
+
+    fn row(&self, run: u32, followed: Option<Followed>, mut capture: Capture, ways: &[Way]) -> (RunRow, Capture) {
         capture.name = format!("{} {run}", self.shape_name());
-        if let Some(path) = file.as_deref() {
-            save(&capture, path)?;
-        }
         let (steps, no_steps) = match (followed, steps_of(&capture)) {
             (Some(_), _) => (Vec::new(), None),
             (None, Ok(steps)) => (steps, None),
@@ -345,7 +363,8 @@ impl TestMotion {
         };
         let current = capture.trace("current_a").map(|trace| capture.points(trace).collect::<Vec<_>>());
         let heating = current.and_then(|points| merit::heating(&points));
-        Ok(RunRow { run, followed, steps, no_steps, heating, capture: CaptureRow::new(&capture, file, running.ways()) })
+        let row = RunRow { run, followed, steps, no_steps, heating, capture: CaptureRow::new(&capture, None, ways) };
+        (row, capture)
     }
 }
 

@@ -131,7 +131,7 @@ pub(crate) struct CaptureReport {
 pub(crate) struct CaptureRow {
     name: String,
     /// Null where none was asked for.
-    file: Option<String>,
+    pub(in crate::command) file: Option<String>,
     rows: usize,
     duration_s: f64,
     trigger_s: Option<f64>,
@@ -193,9 +193,11 @@ impl Capture {
         let (trigger, pre_trigger) = (self.trigger.clone(), self.pre_trigger);
         let span = Span { duration: self.duration, trigger, pre_trigger };
         wanted.check(&span)?;
+        check_place(self.output.as_deref())?;
         context.progress.show(format!("node {}: setting its TPDOs up", self.node));
-        let (mut running, restorer) = wanted.begin(&drive).await?;
-        context.restore_at_end(Restorer::Capture(restorer));
+        let restorer = host::capture::Restorer::of(&drive);
+        context.restore_at_end(Restorer::Capture(restorer.clone()));
+        let mut running = wanted.begin(&drive, &restorer).await?;
         let captured = self.take(context, &mut running, &span).await;
         let mut report = CaptureReport::new(&drive, running.plan());
         // Whatever came of it, the drive is as it was before anything is reported.
@@ -249,6 +251,15 @@ pub(in crate::command) fn numbered(path: &Path, number: u32) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{stem}-{number}.{ending}"))
+}
+
+/// Refuses a file whose folder is not there, before anything is captured for it.
+pub(in crate::command) fn check_place(path: Option<&Path>) -> Result<(), Failure> {
+    let folder = path.and_then(Path::parent).filter(|folder| !folder.as_os_str().is_empty());
+    match (path, folder.map(std::fs::metadata)) {
+        (Some(path), Some(Err(error))) => Err(Failure::of_writing("the capture", path, &error)),
+        _ => Ok(()),
+    }
 }
 
 /// Writes a capture to its file.
