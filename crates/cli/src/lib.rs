@@ -54,5 +54,5 @@
 #[doc(inline)]
 pub use {
     can, canlog, canopen, cia402, conform, devices, drives, eds, fmu, host, machine, master, motion, plant, plot,
-    recording, scenario, serve, showcase, sim, studio, transport, tune, words,
+    recording, scenario, serve, showcase, sim, slcan, studio, transport, tune, words,
 };

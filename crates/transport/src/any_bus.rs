@@ -7,7 +7,7 @@ use crate::bus::{AsyncBus, BusError};
 use crate::cannelloni::CannelloniBus;
 use crate::log_bus::LogBus;
 use crate::reconnect::Reconnecting;
-use crate::slcan::SlcanBus;
+use crate::slcan_bus::SlcanBus;
 use crate::socketcand::SocketcandBus;
 use crate::udp_multicast::UdpMulticastBus;
 

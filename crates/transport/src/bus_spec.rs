@@ -9,7 +9,7 @@ use can::Bitrate;
 
 use crate::any_bus::{AnyBus, BusKind};
 use crate::reconnect::Reconnecting;
-use crate::slcan::SlcanPlace;
+use crate::slcan_bus::SlcanPlace;
 use crate::{BusError, CannelloniBus, LogBus, UdpMulticastBus, WallClock, socketcand, udp_multicast};
 
 /// Line speed of a serial adapter unless `?baud=` says otherwise. USB adapters ignore it.

@@ -5,7 +5,7 @@
 //! - [`Hub`] serves a bus to other programs over socketcand and slcan.
 //! - [`ModbusServer`] serves registers over Modbus TCP or RTU.
 //! - [`run_station`] drives a passive [`can::Station`] on a bus, [`run_world`] a virtual world behind a hub.
-//! - [`socketcand`], [`slcan`], [`cannelloni`] and [`udp_multicast`] are the wire formats, as pure codecs that any other program may use.
+//! - [`socketcand`], [`cannelloni`] and [`udp_multicast`] are the wire formats, as pure codecs that any other program may use.
 //!
 //! This crate holds the only clock ([`WallClock`]) and the sockets of all buses. Below the programs everything else is sans-IO.
 //!
@@ -61,7 +61,8 @@ mod raw_id;
 pub mod realtime;
 mod reconnect;
 mod run;
-pub mod slcan;
+mod slcan_bus;
+mod slcan_session;
 mod socketcan;
 pub mod socketcand;
 mod tcp;
@@ -83,7 +84,7 @@ pub use modbus::{
 };
 pub use note::{BusNotes, ControllerState, ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds, Note, Received};
 pub use run::{BusThread, BusThreadError, Heard, RealTimeWorld, run_station, run_world, waker_of};
-pub use slcan::SlcanBus;
+pub use slcan_bus::SlcanBus;
 #[cfg(target_os = "linux")]
 pub use socketcan::SocketCanBus;
 pub use socketcan::{InterfaceProblem, can_interfaces};

@@ -5,7 +5,7 @@
 use std::fmt::Debug;
 
 use can::Instant;
-use transport::{slcan, socketcand};
+use transport::socketcand;
 
 pub(super) const CANDUMP_SAMPLES: &[&[u8]] = &[
     b"(1700000000.123456) can0 604#4041600000000000",

@@ -24,7 +24,6 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::task::AbortHandle;
 
-use crate::slcan::SlcanSession;
 use crate::socketcan::class_of;
 use crate::socketcand::SocketcandSession;
 use crate::{AsyncBus, BusError, ErrorFrame, Note, Protocol, Received, ServeSpec, Vitals, WallClock, tcp};
@@ -273,7 +272,7 @@ impl HubState {
     fn admit(self: &Arc<Self>, stream: TcpStream, peer: SocketAddr, protocol: Protocol) {
         let session: Box<dyn Session> = match protocol {
             Protocol::Socketcand => Box::new(SocketcandSession::new(&self.options.bus, self.options.zero)),
-            Protocol::Slcan => Box::new(SlcanSession::new(self.options.bitrate)),
+            Protocol::Slcan => Box::new(slcan::Adapter::new(self.options.bitrate)),
         };
         let mut clients = self.lock();
         if clients.closed {

@@ -1,51 +1,28 @@
 //! A connection to an slcan adapter on a serial line, or to an slcan server over TCP.
 
 use std::collections::VecDeque;
-use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant};
 use canlog::{Finding, Place};
+use slcan::{Client, Event, Malformed, OpenError, Status};
 
-use super::codec::{Answer, Command, Decoder, Line, Malformed, bitrate_code};
-use super::status;
-use crate::link::{Link, within};
-use crate::note::{ControllerState, Note};
+use crate::link::Link;
+use crate::note::{ControllerState, ErrorFrame, ErrorKind, ErrorKinds, Note};
 use crate::reconnect::Reopen;
 use crate::{AsyncBus, BusError, Received, WallClock};
-
-/// How long an adapter may take for an answer. Some firmwares never acknowledge; those cost this much at opening.
-const PATIENCE: Duration = Duration::from_millis(500);
-
-/// How often the status flags are asked for: often enough for a person, and one frame's worth of the line.
-const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
 /// A bus behind an slcan adapter, its channel open.
 #[derive(Debug)]
 pub struct SlcanBus {
     link: Link,
-    decoder: Decoder<Answer>,
+    client: Client,
     clock: WallClock,
-    polling: Polling,
     /// As the flags were last.
     state: ControllerState,
-    /// What the flags showed and was not fetched yet: a handful.
+    /// What the adapter said and was not fetched yet.
     notes: VecDeque<Note>,
-    lines: usize,
     refused: u64,
     malformed: u64,
-}
-
-/// Whether the adapter reports its status flags.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Polling {
-    /// It does not.
-    Never,
-    /// Asked for the first time: answers come in the order of the commands, so a BEL that comes next says no.
-    Asked,
-    /// Asked, by one that answers.
-    AskedAgain,
-    /// It does, and is asked again then.
-    Due(Instant),
 }
 
 /// Where an adapter is, and the bit rate to select there.
@@ -98,129 +75,90 @@ impl SlcanBus {
 
     /// Closes the channel, so that the adapter stops acknowledging frames on the bus.
     pub async fn close(mut self) -> Result<(), BusError> {
-        self.link.send(|out| Command::Close.emit(out)).await
+        self.client.close();
+        self.flush().await
     }
 
     async fn begin(link: Link, bitrate: Option<Bitrate>, clock: &WallClock) -> Result<Self, BusError> {
-        let code = match bitrate {
-            Some(bitrate) => Some(bitrate_code(bitrate).ok_or(BusError::NoSlcanBitrate { bitrate })?),
-            None => None,
-        };
+        let not_selected = || BusError::NoSlcanBitrate { bitrate: bitrate.unwrap_or(Bitrate::K500) };
         let mut bus = Self {
             link,
-            decoder: Decoder::default(),
+            client: Client::open(bitrate, clock.now()).ok_or_else(not_selected)?,
             clock: clock.clone(),
-            polling: Polling::Never,
             state: ControllerState::ErrorActive,
             notes: VecDeque::new(),
-            lines: 0,
             refused: 0,
             malformed: 0,
         };
-        // What an earlier host left half typed ends here, and its channel closes. How many of these lines are answered
-        // differs between adapters; the answer to V shows that all of them have been.
-        for command in [Command::Empty, Command::Empty, Command::Close, Command::Version] {
-            bus.link.send(|out| command.emit(out)).await?;
-        }
-        let mut answered = bus.wait_for(|answer| matches!(answer, Answer::Version(_))).await?.is_some();
-        if let Some(code) = code {
-            answered |= bus.request(Command::SetBitrate(code), "the adapter does not offer this bit rate").await?;
-        }
-        let advice = if code.is_some() { "is the bit rate right?" } else { "select a bit rate with ?bitrate=500k" };
-        answered |= bus.request(Command::Open, advice).await?;
-        if !answered {
-            let expected = "an answer to V or O";
-            return Err(BusError::Silent { address: bus.link.address(), expected, protocol: "slcan" });
-        }
-        (bus.malformed, bus.lines) = (0, 0);
-        bus.polling = Polling::Asked;
-        bus.link.send(|out| Command::Status.emit(out)).await?;
-        Ok(bus)
-    }
-
-    /// Sends a command and waits for CR; true if it came, false if nothing came.
-    async fn request(&mut self, command: Command, advice: &str) -> Result<bool, BusError> {
-        self.link.send(|out| command.emit(out)).await?;
-        match self.wait_for(|answer| matches!(answer, Answer::Done | Answer::Refused)).await? {
-            Some(Answer::Refused) => {
-                let mut line = Vec::new();
-                command.emit(&mut line);
-                let request = String::from_utf8_lossy(line.trim_ascii_end()).into_owned();
-                Err(BusError::Refused { address: self.link.address(), request, said: advice.to_owned() })
+        loop {
+            bus.flush().await?;
+            match bus.client.poll_event() {
+                Some(Event::Opened) => return Ok(bus),
+                Some(Event::Failed(error)) => return Err(bus.not_opened(&error, bitrate)),
+                Some(_) => {}
+                None => bus.wait().await?,
             }
-            answer => Ok(answer.is_some()),
         }
     }
 
-    async fn wait_for(&mut self, wanted: impl Fn(&Answer) -> bool) -> Result<Option<Answer>, BusError> {
-        let clock = self.clock.clone();
-        let search = async {
-            loop {
-                match self.line().await? {
-                    Ok(answer) if wanted(&answer) => return Ok(answer),
-                    Ok(_) | Err(_) => {}
-                }
+    fn not_opened(&self, error: &OpenError, bitrate: Option<Bitrate>) -> BusError {
+        let address = self.link.address();
+        let (request, said) = match error {
+            OpenError::BitrateRefused(code) => (format!("S{code}"), "the adapter does not offer this bit rate"),
+            OpenError::OpenRefused if bitrate.is_some() => ("O".to_owned(), "is the bit rate right?"),
+            OpenError::OpenRefused => ("O".to_owned(), "select a bit rate with ?bitrate=500k"),
+            OpenError::Silent => {
+                return BusError::Silent { address, expected: "an answer to V or O", protocol: "slcan" };
             }
         };
-        within(&clock, PATIENCE, search).await.transpose()
+        BusError::Refused { address, request, said: said.to_owned() }
     }
 
-    /// The next line, for which it waits as long as it takes.
-    async fn line(&mut self) -> Result<Result<Answer, Malformed>, BusError> {
-        loop {
-            let decoder = &mut self.decoder;
-            match self.link.take(|input| decoder.next(input)) {
-                Some(line) => {
-                    self.lines += 1;
-                    return Ok(line);
-                }
-                None => self.link.fill().await?,
-            }
+    /// Sends what the client has for the adapter. Cancel-safe.
+    async fn flush(&mut self) -> Result<(), BusError> {
+        let client = &mut self.client;
+        if !client.has_output() {
+            return Ok(());
         }
+        self.link.send(|out| client.append_output(out)).await
     }
 
-    /// The next line, or `None` when the status flags are to be asked for.
-    async fn line_until_due(&mut self) -> Result<Option<Result<Answer, Malformed>>, BusError> {
-        let Polling::Due(at) = self.polling else { return self.line().await.map(Some) };
-        let clock = self.clock.clone();
+    /// Waits for bytes of the adapter, or until the client is due. Cancel-safe.
+    async fn wait(&mut self) -> Result<(), BusError> {
+        let (client, clock) = (&mut self.client, &self.clock);
         tokio::select! {
             biased;
-            line = self.line() => line.map(Some),
-            () = clock.sleep_until(at) => Ok(None),
+            filled = self.link.fill() => {
+                filled?;
+                self.link.take(|input| client.handle_input(std::mem::take(input), clock.now()));
+            }
+            () = clock.sleep_until_due(client.poll_timeout()) => client.handle_timeout(clock.now()),
         }
+        Ok(())
     }
 
-    fn handle_status(&mut self, flags: u8) {
-        self.polling = Polling::Due(self.clock.now() + STATUS_PERIOD);
-        let state = status::state(flags);
+    fn handle_status(&mut self, flags: Status) {
+        let state = state_of(flags);
         if std::mem::replace(&mut self.state, state) != state {
             self.notes.push_back(Note::State(state));
         }
-        self.notes.extend(status::happened(flags));
+        self.notes.extend(happened(flags));
     }
 
-    fn handle_refusal(&mut self) {
-        if self.polling == Polling::Asked {
-            self.polling = Polling::Never;
-        } else {
-            self.refused += 1;
-            self.notes.push_back(Note::SendQueueFull);
-        }
-    }
-
-    fn handle_malformed(&mut self, malformed: &Malformed) {
+    fn handle_malformed(&mut self, line: u64, malformed: &Malformed) {
         self.malformed += 1;
         let (text, reason) = match malformed {
             Malformed::TooLong => (String::new(), malformed.to_string()),
             Malformed::Syntax { text, expected } => (text.clone(), format!("expected {expected}")),
         };
-        self.notes.push_back(Note::TornRecord(Finding { place: Place::Line(self.lines as u64), text, reason }));
+        self.notes.push_back(Note::TornRecord(Finding { place: Place::Line(line), text, reason }));
     }
 }
 
 impl AsyncBus for SlcanBus {
     async fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        self.link.send(|out| Command::Transmit(*frame).emit(out)).await
+        self.client.transmit(frame);
+        self.flush().await
     }
 
     async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
@@ -228,20 +166,47 @@ impl AsyncBus for SlcanBus {
             if let Some(note) = self.notes.pop_front() {
                 return Ok((self.clock.now(), note.into()));
             }
-            match self.line_until_due().await? {
-                Some(Ok(Answer::Frame { frame, .. })) => return Ok((self.clock.now(), frame.into())),
-                Some(Ok(Answer::Status(flags))) => self.handle_status(flags),
-                Some(Ok(Answer::Refused)) => self.handle_refusal(),
-                Some(Ok(_)) => {}
-                Some(Err(malformed)) => self.handle_malformed(&malformed),
+            match self.client.poll_event() {
+                Some(Event::Frame(frame)) => return Ok((self.clock.now(), frame.into())),
+                Some(Event::Status(flags)) => self.handle_status(flags),
+                Some(Event::FrameRefused) => {
+                    self.refused += 1;
+                    self.notes.push_back(Note::SendQueueFull);
+                }
+                Some(Event::Malformed(line, malformed)) => self.handle_malformed(line, &malformed),
+                // Of the opening.
+                Some(Event::Opened | Event::Failed(_)) => {}
                 None => {
-                    // First, so that a call that is dropped here asks once all the same.
-                    self.polling = Polling::AskedAgain;
-                    self.link.send(|out| Command::Status.emit(out)).await?;
+                    self.flush().await?;
+                    self.wait().await?;
                 }
             }
         }
     }
+}
+
+/// The state of the controller by its flags.
+const fn state_of(flags: Status) -> ControllerState {
+    if flags.is_error_passive() {
+        ControllerState::ErrorPassive
+    } else if flags.is_error_warning() {
+        ControllerState::ErrorWarning
+    } else {
+        ControllerState::ErrorActive
+    }
+}
+
+/// What flags show beside the state.
+fn happened(flags: Status) -> impl Iterator<Item = Note> {
+    let lost = flags.is_arbitration_lost().then_some(ErrorKind::LostArbitration);
+    let error = ErrorFrame { kinds: lost.into_iter().collect::<ErrorKinds>(), ..ErrorFrame::default() };
+    [
+        flags.is_receive_lost().then_some(Note::Overrun { lost: None }),
+        flags.is_send_queue_full().then_some(Note::SendQueueFull),
+        (flags.is_arbitration_lost() || flags.is_bus_error()).then_some(Note::ErrorFrame(error)),
+    ]
+    .into_iter()
+    .flatten()
 }
 
 #[cfg(all(test, unix))]

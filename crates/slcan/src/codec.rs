@@ -331,7 +331,7 @@ impl<L: Line> Decoder<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, all};
+    use proptest::prelude::*;
 
     fn emitted(line: &impl Line) -> Vec<u8> {
         let mut out = Vec::new();
@@ -341,7 +341,20 @@ mod tests {
 
     fn decode<L: Line + PartialEq + std::fmt::Debug>(bytes: &[u8]) -> Vec<Result<L, Malformed>> {
         let mut decoder = Decoder::default();
-        all(bytes, |input| decoder.next(input))
+        let mut input = bytes;
+        std::iter::from_fn(|| decoder.next(&mut input)).collect()
+    }
+
+    fn any_frame() -> impl Strategy<Value = Frame> {
+        let id = prop_oneof![
+            (0..=CanId::MAX_STANDARD).prop_map(CanId::standard),
+            (0..=CanId::MAX_EXTENDED).prop_map(CanId::extended)
+        ];
+        let data = proptest::collection::vec(any::<u8>(), 0..=MAX_DATA_LENGTH);
+        (id, data, any::<bool>()).prop_map(|(id, data, is_remote)| match is_remote {
+            true => Frame::remote(id, data.len() as u8),
+            false => Frame::new(id, &data),
+        })
     }
 
     #[test]
@@ -394,13 +407,14 @@ mod tests {
         ] {
             assert_eq!(decode::<Answer>(&emitted(&answer)), [Ok(answer)]);
         }
-        let mut random = Random::new(0x5EED_0003);
-        for _ in 0..2_000 {
-            let frame = random.frame();
-            let stamp_ms = (random.next() & 1 == 0).then(|| random.below(60_000) as u16);
+    }
+
+    proptest! {
+        #[test]
+        fn any_frame_reads_as_it_was_written(frame in any_frame(), stamp_ms in proptest::option::of(0..60_000_u16)) {
             let answer = Answer::Frame { frame, stamp_ms };
-            assert_eq!(decode::<Command>(&emitted(&Command::Transmit(frame))), [Ok(Command::Transmit(frame))]);
-            assert_eq!(decode::<Answer>(&emitted(&answer)), [Ok(answer)]);
+            prop_assert_eq!(decode::<Command>(&emitted(&Command::Transmit(frame))), [Ok(Command::Transmit(frame))]);
+            prop_assert_eq!(decode::<Answer>(&emitted(&answer)), [Ok(answer)]);
         }
     }
 
@@ -441,16 +455,15 @@ mod tests {
         assert_eq!(decode::<Answer>(b"t100\x07z\r"), [Ok(Answer::Refused), Ok(Answer::Queued { extended: false })]);
     }
 
-    #[test]
-    fn random_bytes_never_panic_and_never_hide_what_follows() {
-        let words =
-            [&b"t"[..], b"T", b"r", b"R", b"100", b"00000100", b"8", b"1122334455667788", b"\r", b"\n", b"S6", b"Z1"];
-        let mut random = Random::new(0x5EED_0004);
-        for _ in 0..2_000 {
-            let mut stream = random.salad(&words, 30);
-            stream.extend_from_slice(b"\rN\r");
-            assert_eq!(decode::<Command>(&stream).last(), Some(&Ok(Command::SerialNumber)));
-            assert_eq!(decode::<Answer>(&stream).last(), Some(&Ok(Answer::SerialNumber(String::new()))));
+    proptest! {
+        /// How a stream may be cut is a law of `tests`.
+        #[test]
+        fn random_bytes_never_panic_and_never_hide_what_follows(
+            pieces in proptest::collection::vec("(t|T|r|R|100|00000100|8|1122334455667788|\r|\n|S6|Z1|.)", 0..30)
+        ) {
+            let stream = [pieces.concat().as_bytes(), b"\rN\r"].concat();
+            prop_assert_eq!(decode::<Command>(&stream).pop(), Some(Ok(Command::SerialNumber)));
+            prop_assert_eq!(decode::<Answer>(&stream).pop(), Some(Ok(Answer::SerialNumber(String::new()))));
         }
     }
 

@@ -1,13 +1,11 @@
 //! The adapter's side of one slcan connection, as LAWICEL's CANUSB behaves with auto-send on.
 
 use std::collections::VecDeque;
-use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant};
 
-use super::codec::{Answer, Command, Decoder, Line, bitrate_of_code};
-use super::status::BUS_ERROR;
-use crate::hub::{MAX_WAITING_REPLIES, Session};
+use crate::codec::{Answer, Command, Decoder, Line, bitrate_of_code};
+use crate::status::Status;
 
 /// Hardware version 1.0 (there is none), software version of this crate's first release.
 const VERSION: &str = "1001";
@@ -23,8 +21,12 @@ enum ChannelState {
     ListenOnly,
 }
 
+/// Answers that may wait to be fetched before no more commands are read: a client that only asks and never reads stops itself.
+const MAX_WAITING_REPLIES: usize = 64;
+
+/// One connection to an adapter; frames go to and come from the bus that its owner has.
 #[derive(Clone, Debug)]
-pub(crate) struct SlcanSession {
+pub struct Adapter {
     /// The rate of the bus served, if the client's choice is to be held against it.
     bus_bitrate: Option<Bitrate>,
     /// What the client selected; `None` for nothing, or for raw timing registers.
@@ -37,9 +39,9 @@ pub(crate) struct SlcanSession {
     replies: VecDeque<Answer>,
 }
 
-impl SlcanSession {
-    /// A session with its channel closed. With `bus_bitrate`, a client that selected another rate cannot open it.
-    pub(crate) fn new(bus_bitrate: Option<Bitrate>) -> Self {
+impl Adapter {
+    /// An adapter with its channel closed. With `bus_bitrate`, a client that selected another rate cannot open it.
+    pub fn new(bus_bitrate: Option<Bitrate>) -> Self {
         Self {
             bus_bitrate,
             bitrate: None,
@@ -97,8 +99,9 @@ impl SlcanSession {
     }
 }
 
-impl Session for SlcanSession {
-    fn receive(&mut self, input: &mut &[u8]) -> Option<Frame> {
+impl Adapter {
+    /// Consumes `input` until it yields a frame for the bus, or is used up, or too many answers wait to be fetched.
+    pub fn receive(&mut self, input: &mut &[u8]) -> Option<Frame> {
         while self.replies.len() < MAX_WAITING_REPLIES {
             let (answer, frame) = match self.decoder.next(input)? {
                 Ok(command) => self.handle(command),
@@ -112,31 +115,31 @@ impl Session for SlcanSession {
         None
     }
 
-    fn is_listening(&self) -> bool {
+    /// Whether the channel is open.
+    pub fn is_open(&self) -> bool {
         self.channel != ChannelState::Closed
     }
 
-    fn next_reply(&mut self, out: &mut Vec<u8>) -> Option<Duration> {
-        self.replies.pop_front()?.emit(out);
-        Some(Duration::ZERO)
+    /// Appends the next answer; false when none waits.
+    pub fn next_reply(&mut self, out: &mut Vec<u8>) -> bool {
+        let reply = self.replies.pop_front();
+        reply.iter().for_each(|reply| reply.emit(out));
+        reply.is_some()
     }
 
-    fn deliver(&mut self, at: Instant, frame: &Frame, out: &mut Vec<u8>) {
-        if self.is_listening() {
+    /// Appends a frame that was on the bus at `at`, if the channel is open.
+    pub fn deliver(&mut self, at: Instant, frame: &Frame, out: &mut Vec<u8>) {
+        if self.is_open() {
             let stamp = (at.as_nanos() / 1_000_000 % STAMP_PERIOD_MS) as u16;
             Answer::Frame { frame: *frame, stamp_ms: self.time_stamps.then_some(stamp) }.emit(out);
         }
     }
 
-    /// The protocol has no message for it: the status shows it.
-    fn deliver_error(&mut self, _: Instant, _: u32, _: &mut Vec<u8>) {
-        if self.is_listening() {
-            self.happened |= BUS_ERROR;
+    /// An error was on the bus: the protocol has no message for it, and the status shows it.
+    pub fn deliver_error(&mut self) {
+        if self.is_open() {
+            self.happened |= Status::BUS_ERROR.0;
         }
-    }
-
-    fn is_over(&self) -> bool {
-        false
     }
 }
 
@@ -144,63 +147,63 @@ impl Session for SlcanSession {
 mod tests {
     use super::*;
 
-    fn exchange(session: &mut SlcanSession, input: &str) -> (String, usize) {
+    fn exchange(adapter: &mut Adapter, input: &str) -> (String, usize) {
         let mut input = input.as_bytes();
-        let frames = std::iter::from_fn(|| session.receive(&mut input)).count();
+        let frames = std::iter::from_fn(|| adapter.receive(&mut input)).count();
         let mut out = Vec::new();
-        while session.next_reply(&mut out).is_some() {}
+        while adapter.next_reply(&mut out) {}
         (String::from_utf8(out).unwrap(), frames)
     }
 
-    fn heard(session: &mut SlcanSession, at: Instant) -> String {
+    fn heard(adapter: &mut Adapter, at: Instant) -> String {
         let mut out = Vec::new();
-        session.deliver(at, &"184#0102".parse().unwrap(), &mut out);
+        adapter.deliver(at, &"184#0102".parse().unwrap(), &mut out);
         String::from_utf8(out).unwrap()
     }
 
     #[test]
     fn a_closed_channel_neither_sends_nor_hears() {
-        let mut session = SlcanSession::new(None);
-        assert_eq!(exchange(&mut session, "t1000\rF\rC\r"), ("\x07\x07\x07".into(), 0));
-        assert_eq!(heard(&mut session, Instant::ZERO), "");
-        assert_eq!(exchange(&mut session, "S6\rO\r"), ("\r\r".into(), 0));
-        assert_eq!(exchange(&mut session, "t1000\rT000001001FF\rr1002\r"), ("z\rZ\rz\r".into(), 3));
-        assert_eq!(heard(&mut session, Instant::ZERO), "t18420102\r");
-        assert_eq!(exchange(&mut session, "C\rt1000\r"), ("\r\x07".into(), 0));
-        assert_eq!(heard(&mut session, Instant::ZERO), "");
+        let mut adapter = Adapter::new(None);
+        assert_eq!(exchange(&mut adapter, "t1000\rF\rC\r"), ("\x07\x07\x07".into(), 0));
+        assert_eq!(heard(&mut adapter, Instant::ZERO), "");
+        assert_eq!(exchange(&mut adapter, "S6\rO\r"), ("\r\r".into(), 0));
+        assert_eq!(exchange(&mut adapter, "t1000\rT000001001FF\rr1002\r"), ("z\rZ\rz\r".into(), 3));
+        assert_eq!(heard(&mut adapter, Instant::ZERO), "t18420102\r");
+        assert_eq!(exchange(&mut adapter, "C\rt1000\r"), ("\r\x07".into(), 0));
+        assert_eq!(heard(&mut adapter, Instant::ZERO), "");
     }
 
     #[test]
     fn listen_only_hears_and_refuses_to_send() {
-        let mut session = SlcanSession::new(None);
-        assert_eq!(exchange(&mut session, "L\rt1000\r"), ("\r\x07".into(), 0));
-        assert_eq!(heard(&mut session, Instant::ZERO), "t18420102\r");
+        let mut adapter = Adapter::new(None);
+        assert_eq!(exchange(&mut adapter, "L\rt1000\r"), ("\r\x07".into(), 0));
+        assert_eq!(heard(&mut adapter, Instant::ZERO), "t18420102\r");
     }
 
     #[test]
     fn the_status_reports_a_bus_error_once() {
-        let mut session = SlcanSession::new(None);
-        session.deliver_error(Instant::ZERO, 0x88, &mut Vec::new());
-        assert_eq!(exchange(&mut session, "O\rF\r").0, "\rF00\r", "a closed channel hears nothing");
-        session.deliver_error(Instant::ZERO, 0x88, &mut Vec::new());
+        let mut adapter = Adapter::new(None);
+        adapter.deliver_error();
+        assert_eq!(exchange(&mut adapter, "O\rF\r").0, "\rF00\r", "a closed channel hears nothing");
+        adapter.deliver_error();
         // LAWICEL's CANUSB manual, command F: bit 7 is the bus error; reading clears it.
-        assert_eq!(exchange(&mut session, "F\rF\r").0, "F80\rF00\r");
+        assert_eq!(exchange(&mut adapter, "F\rF\r").0, "F80\rF00\r");
     }
 
     #[test]
     fn settings_are_made_while_the_channel_is_closed() {
-        let mut session = SlcanSession::new(None);
-        assert_eq!(exchange(&mut session, "Z1\rs031C\rM00000000\rmFFFFFFFF\rX1\rO\r").0, "\r\r\r\r\r\r");
-        assert_eq!(exchange(&mut session, "Z0\rS6\rs031C\rO\rL\rM00000000\r").0, "\x07".repeat(6));
-        assert_eq!(heard(&mut session, Instant::from_millis(61_234)), "t1842010204D2\r");
-        assert_eq!(exchange(&mut session, "V\rN\rF\r\r").0, "V1001\rNFD01\rF00\r\r");
-        assert_eq!(exchange(&mut session, "M12345678\rP\rhello\rS9\r").0, "\x07".repeat(4));
+        let mut adapter = Adapter::new(None);
+        assert_eq!(exchange(&mut adapter, "Z1\rs031C\rM00000000\rmFFFFFFFF\rX1\rO\r").0, "\r\r\r\r\r\r");
+        assert_eq!(exchange(&mut adapter, "Z0\rS6\rs031C\rO\rL\rM00000000\r").0, "\x07".repeat(6));
+        assert_eq!(heard(&mut adapter, Instant::from_millis(61_234)), "t1842010204D2\r");
+        assert_eq!(exchange(&mut adapter, "V\rN\rF\r\r").0, "V1001\rNFD01\rF00\r\r");
+        assert_eq!(exchange(&mut adapter, "M12345678\rP\rhello\rS9\r").0, "\x07".repeat(4));
     }
 
     #[test]
     fn a_rate_that_is_not_the_buses_opens_nothing_where_that_is_asked_for() {
-        let mut session = SlcanSession::new(Some(Bitrate::K500));
-        assert_eq!(exchange(&mut session, "S8\rO\rL\rS6\rO\r").0, "\r\x07\x07\r\r");
-        assert_eq!(exchange(&mut SlcanSession::new(None), "S8\rO\r").0, "\r\r");
+        let mut adapter = Adapter::new(Some(Bitrate::K500));
+        assert_eq!(exchange(&mut adapter, "S8\rO\rL\rS6\rO\r").0, "\r\x07\x07\r\r");
+        assert_eq!(exchange(&mut Adapter::new(None), "S8\rO\r").0, "\r\r");
     }
 }
