@@ -1,25 +1,19 @@
 //! A virtual machine with a host and one page, in one thread: its caller has the clock, and moves it.
 
-use std::collections::VecDeque;
 use std::path::Path;
-use std::pin::Pin;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use can::{BusFrame, Instant, Listen, Tap};
-use futures_util::stream::poll_fn;
-use host::page::{Said, Word, serve};
-use host::{Host, HostHandle, Setting, Wire, WorldAsks, world_door};
+use can::{Instant, Tap};
+use host::{Setting, Wire, WorldAsks, world_door};
 use machine::file::Machine;
 use master::Network;
 use sim::World;
 use sim::command::{self, Service, perform};
-use sim::task::Task;
-use tokio::sync::mpsc;
 use words::document::BadFile;
 use words::models::with_files;
 
-use crate::requests::{Request, Response, respond};
+use crate::hosted::{Hosted, Passed};
+use crate::requests::{Request, Response};
 
 /// Longest wait for each answer of a node: virtual drives answer within some milliseconds.
 const TIMEOUT: Duration = Duration::from_millis(200);
@@ -32,12 +26,6 @@ const BOOT: Duration = Duration::from_secs(1);
 
 /// How often it is looked whether they are found.
 const STEP: Duration = Duration::from_millis(50);
-
-/// The page is the one of this module: no other can send a message.
-const WORD: &str = "page";
-
-/// Messages of the page that wait: each is taken when it comes.
-const WAITING: usize = 64;
 
 /// Why a call was refused: a word that programs may rely on, and words.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,19 +48,11 @@ impl From<BadFile> for Failed {
     }
 }
 
-type Work = Task<Pin<Box<dyn Future<Output = ()>>>>;
-
 /// It owns the world, the master on it, its host, and the conversation with the page.
 pub struct HostedWorld {
     world: World,
     asks: WorldAsks,
-    handle: HostHandle,
-    hosting: Work,
-    /// The conversation with the page.
-    conversation: Work,
-    said: mpsc::Sender<Said>,
-    sending: mpsc::Receiver<String>,
-    sent: Vec<String>,
+    hosted: Hosted,
 }
 
 impl core::fmt::Debug for HostedWorld {
@@ -110,11 +90,8 @@ impl HostedWorld {
             // All drives are virtual.
             allow_motion: true,
         };
-        let (host, handle) = Host::new(network, setting);
-        let hosting = Task::new(boxed(host.run(move || passed.lock().pop_front())));
-        let (conversation, said, sending) = converse(&handle);
-        let mut hosted = Self { world, asks, handle, hosting, conversation, said, sending, sent: Vec::new() };
-        hosted.settle();
+        let mut hosted = Self { world, asks, hosted: Hosted::new(network, setting, passed) };
+        hosted.join();
         let end = hosted.now() + SEARCH;
         while hosted.is_searching() && hosted.now() < end {
             hosted.run_until(hosted.now() + STEP);
@@ -124,14 +101,13 @@ impl HostedWorld {
 
     /// Whether the host has still to find its drives.
     fn is_searching(&self) -> bool {
-        let state = self.handle.states().borrow().snapshot();
+        let state = self.hosted.handle().states().borrow().snapshot();
         state.scanning || state.nodes.is_empty()
     }
 
     /// Begins the conversation with the page anew: what it moved in the one before is stopped, as with any end of a connection.
     pub fn join(&mut self) {
-        self.sent.clear();
-        (self.conversation, self.said, self.sending) = converse(&self.handle);
+        self.hosted.join();
         self.settle();
     }
 
@@ -142,14 +118,13 @@ impl HostedWorld {
 
     /// Hands on a message of the page, as it would send it over the studio's socket. Its answer is among what is sent.
     pub fn say(&mut self, message: &str) {
-        // There is room: the conversation takes each at once.
-        let _ = self.said.try_send(Said::Text(message.to_owned()));
+        self.hosted.say(message);
         self.settle();
     }
 
     /// What the page is to be sent since the last call: JSON objects, the first one the welcome.
     pub fn take_sent(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.sent)
+        self.hosted.take_sent()
     }
 
     /// Moves the world on.
@@ -166,7 +141,7 @@ impl HostedWorld {
 
     /// What a request of the page is answered.
     pub fn request(&self, request: &Request, body: &[u8]) -> Response {
-        respond(&self.handle, request, body)
+        self.hosted.request(request, body)
     }
 
     /// Does what a line says, and answers with a line of JSON: `4 supply 30`, `4 get`.
@@ -191,52 +166,9 @@ impl HostedWorld {
 
     /// Has host and page do what they can do now.
     fn settle(&mut self) {
-        loop {
-            let mut polled = false;
-            for task in [&mut self.hosting, &mut self.conversation] {
-                polled |= task.poll_if_woken().is_some();
-            }
-            if !polled {
-                return;
-            }
-            while let Ok(message) = self.sending.try_recv() {
-                self.sent.push(message);
-            }
+        while self.hosted.poll() {
             self.asks.answer(&mut self.world);
             self.world.refresh();
         }
-    }
-}
-
-/// Opens a session, and serves it: the conversation, where its messages go, and where those to the page come from.
-fn converse(handle: &HostHandle) -> (Work, mpsc::Sender<Said>, mpsc::Receiver<String>) {
-    let (said, mut saying) = mpsc::channel(WAITING);
-    let (to_page, sending) = mpsc::channel(1);
-    let page = handle.clone();
-    let conversation = async move {
-        let Some(session) = page.join().await else { return };
-        let word = Word { text: WORD.into(), is_same: |a, b| a == b };
-        serve(&page, session, word, poll_fn(move |context| saying.poll_recv(context)), to_page).await;
-    };
-    (Task::new(boxed(conversation)), said, sending)
-}
-
-fn boxed(future: impl Future<Output = ()> + 'static) -> Pin<Box<dyn Future<Output = ()>>> {
-    Box::pin(future)
-}
-
-/// The frames that have passed the master since the host has taken them.
-#[derive(Clone, Default)]
-struct Passed(Arc<Mutex<VecDeque<BusFrame>>>);
-
-impl Passed {
-    fn lock(&self) -> MutexGuard<'_, VecDeque<BusFrame>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Listen for Passed {
-    fn hear(&mut self, passed: BusFrame) {
-        self.lock().push_back(passed);
     }
 }

@@ -17,6 +17,7 @@
 
 mod abi;
 mod call;
+mod hosted;
 mod hosted_world;
 mod requests;
 
