@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use can::Instant;
+use can::{Bitrate, Instant};
 use scenario::{Runner, Scenario};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -11,6 +11,7 @@ use words::document::give;
 
 use crate::hosted_world::{Failed, HostedWorld};
 use crate::requests::{Request, Response};
+use crate::serial_host::{Line, SerialHost};
 
 /// The first line of a call. What else it needs is its body.
 #[derive(Debug, Deserialize)]
@@ -42,6 +43,26 @@ enum Call {
         /// In place of the scenario's own.
         seed: Option<u64>,
     },
+    /// A host for the bus behind a serial adapter, which replaces what was open; its port comes with `serial`.
+    OpenSerial {
+        /// What the bus is called.
+        name: String,
+        /// In bit/s.
+        bitrate: u32,
+        /// Unix time of `now_ns` 0, for logs.
+        #[serde(default)]
+        unix_ms: u64,
+        /// The clock of the caller.
+        now_ns: u64,
+    },
+    /// Brings a host on a serial adapter to this time, with what its port has brought in the body. The body of the answer has `wire` bytes
+    /// for the port, and then what the page is sent, a line for each message.
+    Serial {
+        /// The clock of the caller.
+        now_ns: u64,
+        /// What has happened to the port, or the page.
+        event: Option<PortEvent>,
+    },
     /// A data sheet, in the body, for machine files that name it.
     Give {
         /// As the machine file names it.
@@ -49,10 +70,25 @@ enum Call {
     },
 }
 
+/// What has happened to a port, or to the page that has it.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+enum PortEvent {
+    /// There is one.
+    Plugged,
+    /// It is lost; why.
+    Unplugged(String),
+    /// The page can no longer be relied on: its session ends, and what it moved is stopped.
+    LetGo(String),
+    /// The channel of the adapter is to be closed.
+    Close,
+}
+
 /// What carries out calls: it keeps the world that is open.
 #[derive(Default)]
 pub struct Library {
     world: Option<HostedWorld>,
+    serial: Option<SerialHost>,
 }
 
 impl core::fmt::Debug for Library {
@@ -77,15 +113,21 @@ impl Library {
             Call::Open { unix_ms } => {
                 let world = HostedWorld::open(text(body)?, Duration::from_millis(unix_ms))?;
                 let now = world.now();
-                self.world = Some(world);
+                (self.world, self.serial) = (Some(world), None);
                 Ok(answer(json!({ "now_ns": now.as_nanos() }), &[]))
             }
             Call::Join {} => {
-                self.world()?.join();
+                match &mut self.serial {
+                    Some(serial) => serial.join(),
+                    None => self.world()?.join(),
+                }
                 Ok(answer(json!({}), &[]))
             }
             Call::Say {} => {
-                self.world()?.say(text(body)?);
+                match &mut self.serial {
+                    Some(serial) => serial.say(text(body)?),
+                    None => self.world()?.say(text(body)?),
+                }
                 Ok(answer(json!({}), &[]))
             }
             Call::Run { to_ns } => {
@@ -95,7 +137,10 @@ impl Library {
                 Ok(answer(json!({ "now_ns": now.as_nanos() }), sent.join("\n").as_bytes()))
             }
             Call::Request(request) => {
-                let Response { status, kind, body } = self.world()?.request(&request, body);
+                let Response { status, kind, body } = match &self.serial {
+                    Some(serial) => serial.request(&request, body)?,
+                    None => self.world()?.request(&request, body),
+                };
                 Ok(answer(json!({ "status": status, "kind": kind }), &body))
             }
             Call::World {} => Ok(answer(json!({}), self.world()?.command(text(body)?)?.as_bytes())),
@@ -110,11 +155,43 @@ impl Library {
                 let outcome = Runner::new(&scenario, seed).map_err(bad)?.run();
                 Ok(answer(json!({ "outcome": outcome.to_json() }), &[]))
             }
+            Call::OpenSerial { name, bitrate, unix_ms, now_ns } => {
+                let bitrate =
+                    Bitrate::new(bitrate).ok_or_else(|| Failed::new("usage", "expected a bit rate in bit/s"))?;
+                let (zero, now) = (Duration::from_millis(unix_ms), Instant::from_nanos(now_ns));
+                (self.world, self.serial) = (None, Some(SerialHost::new(&name, bitrate, zero, now)?));
+                Ok(answer(json!({}), &[]))
+            }
+            Call::Serial { now_ns, event } => self.run_serial(Instant::from_nanos(now_ns), event, body),
             Call::Give { name } => {
                 give(Path::new(&name), body.to_vec());
                 Ok(answer(json!({}), &[]))
             }
         }
+    }
+
+    fn run_serial(&mut self, now: Instant, event: Option<PortEvent>, body: &[u8]) -> Result<Vec<u8>, Failed> {
+        let no_port = || Failed::new("no_bus", "no bus of a serial adapter is open: open one first");
+        let serial = self.serial.as_mut().ok_or_else(no_port)?;
+        serial.run(body, now);
+        match event {
+            Some(PortEvent::Plugged) => serial.plug(),
+            Some(PortEvent::Unplugged(why)) => serial.unplug(&why),
+            Some(PortEvent::LetGo(why)) => serial.let_go(&why),
+            Some(PortEvent::Close) => serial.close(),
+            None => {}
+        }
+        let (line, lost) = match serial.line() {
+            Line::Closed(why) => ("closed", why),
+            Line::Opening => ("opening", None),
+            Line::Open => ("open", None),
+        };
+        let let_go = serial.take_let_go().map(|let_go| json!({ "why": let_go.why, "moving": let_go.moving }));
+        let mut bytes = serial.take_output();
+        let head =
+            json!({ "wire": bytes.len(), "line": line, "lost": lost, "let_go": let_go, "moved": serial.moved() });
+        bytes.extend_from_slice(serial.take_sent().join("\n").as_bytes());
+        Ok(answer(head, &bytes))
     }
 
     fn world(&mut self) -> Result<&mut HostedWorld, Failed> {

@@ -51,7 +51,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     ("serve", &["can", "canlog", "host", "master", "recording", "scenario", "sim", "transport", "words"]),
     ("studio", &["can", "canlog", "canopen", "host", "machine", "master", "recording", "words"]),
-    ("web", &["can", "canopen", "host", "machine", "master", "scenario", "sim", "words"]),
+    ("web", &["can", "canopen", "host", "machine", "master", "scenario", "sim", "slcan", "words"]),
     (
         "python",
         &[

@@ -1,5 +1,7 @@
 //! The library as a page calls it, natively and in virtual time.
 
+mod serial;
+
 use std::path::Path;
 use std::time::Duration;
 

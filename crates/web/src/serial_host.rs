@@ -1,0 +1,317 @@
+//! A host and one page on the bus behind an slcan adapter: its caller has the port and the clock.
+//!
+//! The host begins when the adapter has opened its channel, and stays when the port is lost: what it had moved then gets its stop again
+//! as soon as there is a port. The page's session ends, and with it its control, whenever what it sees or sends can no longer be relied
+//! on: the page is hidden, this program was not run for a while, the port is lost, the adapter refuses frames or sends garbage.
+
+use std::time::Duration;
+
+use can::{Bitrate, Instant, Station, Tap};
+use host::stopping::Account;
+use host::{Setting, Wire};
+use master::Network;
+use slcan::{Client, Event, Status};
+
+use crate::hosted::{Hosted, Passed};
+use crate::hosted_world::Failed;
+use crate::requests::{Request, Response};
+
+/// Longest wait for each answer of a node, as the command line has it at first.
+const TIMEOUT: Duration = Duration::from_millis(500);
+
+/// A caller that comes every few milliseconds and was away for so long has slept, or was held up.
+const HELD_UP: Duration = Duration::from_secs(1);
+
+/// Lines in a row that are not slcan, and none that is between: the line is not to be relied on.
+const GARBLED: u32 = 10;
+
+/// What is said of drives that this host cannot reach.
+const WHO: &str = "this page";
+
+/// How the line to the bus is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// There is no port; why, behind the first one.
+    Closed(Option<String>),
+    /// The adapter is asked to open its channel.
+    Opening,
+    /// Frames come and go.
+    Open,
+}
+
+/// Why the page has lost control.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LetGo {
+    /// What happened.
+    pub why: String,
+    /// The drives that cannot be reached, and what they do by themselves.
+    pub moving: Vec<String>,
+}
+
+/// See the [module](self).
+pub struct SerialHost {
+    network: Network,
+    station: Tap<Network, Passed>,
+    passed: Passed,
+    setting: Setting,
+    wire: Wire,
+    bitrate: Bitrate,
+    /// While there is a port.
+    client: Option<Client>,
+    is_open: bool,
+    lost: Option<String>,
+    hosted: Option<Hosted>,
+    /// A page waits for the host.
+    is_page_waiting: bool,
+    garbled: u32,
+    let_go: Option<LetGo>,
+    now: Instant,
+}
+
+impl core::fmt::Debug for SerialHost {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("SerialHost").field("now", &self.now).field("line", &self.line()).finish_non_exhaustive()
+    }
+}
+
+impl SerialHost {
+    /// A host without a port. `name` is shown as that of the bus; `unix_zero` is the Unix time of [`Instant::ZERO`], for logs.
+    ///
+    /// # Errors
+    /// slcan has no such bit rate.
+    pub fn new(name: &str, bitrate: Bitrate, unix_zero: Duration, now: Instant) -> Result<Self, Failed> {
+        if slcan::bitrate_code(bitrate).is_none() {
+            let known = "10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k and 1M";
+            return Err(Failed::new("usage", format!("slcan cannot select {bitrate}; it knows {known}")));
+        }
+        let (network, passed, wire) = (Network::new(), Passed::default(), Wire::default());
+        let setting = Setting {
+            bus: name.into(),
+            bitrate: Some(bitrate),
+            timeout: TIMEOUT,
+            models: Default::default(),
+            gears: Default::default(),
+            interface: "can0".into(),
+            unix_zero,
+            journals: None,
+            world: None,
+            wire: wire.clone(),
+            allow_motion: false,
+        };
+        let mut station = Tap::new(network.clone(), passed.clone());
+        station.handle_timeout(now);
+        Ok(Self {
+            network,
+            station,
+            passed,
+            setting,
+            wire,
+            bitrate,
+            client: None,
+            is_open: false,
+            lost: None,
+            hosted: None,
+            is_page_waiting: false,
+            garbled: 0,
+            let_go: None,
+            now,
+        })
+    }
+
+    /// How the line is.
+    pub fn line(&self) -> Line {
+        match &self.client {
+            Some(_) if self.is_open => Line::Open,
+            Some(_) => Line::Opening,
+            None => Line::Closed(self.lost.clone()),
+        }
+    }
+
+    /// The nodes that the page has set in motion and that were not seen to stand since.
+    pub fn moved(&self) -> Vec<u8> {
+        self.network.moved().iter().map(|node| node.raw()).collect()
+    }
+
+    /// There is a port, whose adapter is asked to open its channel.
+    pub fn plug(&mut self) {
+        self.is_open = false;
+        self.client = Client::open(Some(self.bitrate), self.now);
+    }
+
+    /// The port is lost, with all that moved.
+    pub fn unplug(&mut self, why: &str) {
+        let was_open = std::mem::replace(&mut self.is_open, false);
+        (self.client, self.lost) = (None, Some(why.to_owned()));
+        if was_open {
+            let moving = Account::of_lost_bus(&self.network, WHO).iter().map(Account::text).collect();
+            self.wire.update(|health| health.state = Some("connection lost"));
+            self.end_session(format!("The adapter is lost: {why}"), moving);
+        }
+    }
+
+    /// Ends the session of the page, if there is one: what it moved is stopped, and control has to be taken anew.
+    pub fn let_go(&mut self, why: &str) {
+        self.end_session(why.to_owned(), Vec::new());
+    }
+
+    /// Begins a session for the page; as soon as the adapter has opened its channel.
+    pub fn join(&mut self) {
+        self.is_page_waiting = self.hosted.is_none();
+        if let Some(hosted) = &mut self.hosted {
+            hosted.join();
+        }
+        self.settle();
+    }
+
+    /// Hands on a message of the page.
+    pub fn say(&mut self, message: &str) {
+        if let Some(hosted) = &mut self.hosted {
+            hosted.say(message);
+        }
+        self.settle();
+    }
+
+    /// What a request of the page is answered.
+    ///
+    /// # Errors
+    /// The adapter has not opened its channel yet.
+    pub fn request(&self, request: &Request, body: &[u8]) -> Result<Response, Failed> {
+        let hosted =
+            self.hosted.as_ref().ok_or_else(|| Failed::new("no_bus", "the adapter has not opened its channel yet"))?;
+        Ok(hosted.request(request, body))
+    }
+
+    /// Takes what the port has brought, and brings everything to `now`. It is to be called every few milliseconds: a call after a longer
+    /// pause first stops what moved before it.
+    pub fn run(&mut self, input: &[u8], now: Instant) {
+        let now = now.max(self.now);
+        let pause = now - self.now;
+        if pause > HELD_UP {
+            let why = format!("The machine slept, or this page was held up, for {:.1} s", pause.as_secs_f64());
+            self.end_session(why, Vec::new());
+        }
+        self.now = now;
+        if let Some(client) = &mut self.client {
+            client.handle_input(input, now);
+            client.handle_timeout(now);
+        }
+        self.handle_events();
+        self.settle();
+    }
+
+    /// The bytes for the port.
+    pub fn take_output(&mut self) -> Vec<u8> {
+        self.client.as_mut().map(Client::take_output).unwrap_or_default()
+    }
+
+    /// Closes the channel of the adapter, as the last thing on its line.
+    pub fn close(&mut self) {
+        if let Some(client) = &mut self.client {
+            client.close();
+        }
+    }
+
+    /// What the page is to be sent since the last call: JSON objects.
+    pub fn take_sent(&mut self) -> Vec<String> {
+        self.hosted.as_mut().map(Hosted::take_sent).unwrap_or_default()
+    }
+
+    /// Why the session of the page has ended, once.
+    pub fn take_let_go(&mut self) -> Option<LetGo> {
+        self.let_go.take()
+    }
+
+    fn end_session(&mut self, why: String, moving: Vec<String>) {
+        self.is_page_waiting = false;
+        let Some(hosted) = &mut self.hosted else { return };
+        hosted.leave();
+        self.let_go = Some(LetGo { why, moving });
+        self.settle();
+    }
+
+    fn handle_events(&mut self) {
+        while let Some(event) = self.client.as_mut().and_then(Client::poll_event) {
+            match event {
+                Event::Opened => self.handle_opened(),
+                Event::Failed(error) => self.unplug(&error.to_string()),
+                Event::Frame(frame) => {
+                    self.garbled = 0;
+                    self.station.handle_frame(&frame, self.now);
+                    self.settle();
+                }
+                Event::Status(flags) => self.handle_status(flags),
+                Event::FrameRefused => {
+                    self.wire.update(|health| health.frames_lost += 1);
+                    let why = "The adapter answered BEL: a frame is lost. Is another node on, is the bit rate right, is the bus terminated?";
+                    self.distrust(why);
+                }
+                Event::Malformed(_, malformed) => {
+                    self.garbled += 1;
+                    if self.garbled == GARBLED {
+                        self.distrust(&format!("The adapter sends what is not slcan: {malformed}"));
+                    }
+                }
+            }
+        }
+    }
+
+    fn handle_opened(&mut self) {
+        (self.is_open, self.lost, self.garbled) = (true, None, 0);
+        self.wire.update(|health| health.state = None);
+        if self.hosted.is_some() {
+            return self.wire.tell("the connection to the bus is back");
+        }
+        self.station.handle_timeout(self.now);
+        let mut hosted = Hosted::new(self.network.clone(), self.setting.clone(), self.passed.clone());
+        if std::mem::take(&mut self.is_page_waiting) {
+            hosted.join();
+        }
+        self.hosted = Some(hosted);
+        self.settle();
+    }
+
+    fn handle_status(&mut self, flags: Status) {
+        self.garbled = 0;
+        self.wire.update(|health| {
+            health.state = Some(match (flags.is_error_passive(), flags.is_error_warning()) {
+                (true, _) => "error-passive",
+                (false, true) => "error-warning",
+                (false, false) => "error-active",
+            });
+            health.error_frames += u64::from(flags.is_bus_error() || flags.is_arbitration_lost());
+            health.frames_lost += u64::from(flags.is_receive_lost()) + u64::from(flags.is_send_queue_full());
+        });
+    }
+
+    /// The line cannot be relied on: nothing is to move by it. Without a motion it is said to whoever looks.
+    fn distrust(&mut self, why: &str) {
+        if self.network.moved().is_empty() {
+            self.wire.tell(why);
+        } else {
+            self.end_session(why.to_owned(), Vec::new());
+        }
+    }
+
+    /// Has host, page and master do what they can do now.
+    fn settle(&mut self) {
+        let Some(hosted) = &mut self.hosted else { return };
+        loop {
+            let mut has_run = hosted.poll();
+            if self.station.poll_timeout().is_some_and(|at| at <= self.now) || self.network.now() < self.now {
+                self.station.handle_timeout(self.now);
+                has_run = true;
+            }
+            while let Some(frame) = self.station.poll_transmit() {
+                // Without a channel a frame is lost, as that of a controller without a cable.
+                if let Some(client) = self.client.as_mut().filter(|_| self.is_open) {
+                    client.transmit(&frame);
+                }
+                self.station.handle_transmitted(&frame, self.now);
+                has_run = true;
+            }
+            if !has_run {
+                return;
+            }
+        }
+    }
+}
