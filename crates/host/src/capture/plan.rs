@@ -15,7 +15,7 @@ use canopen::{CobId, Mux, NodeId};
 use devices::Description;
 use master::core::PdoMap;
 use master::pdo::{PdoConfig, PdoUnfit, TimerUnits, TransmissionType, most_objects, record_of, values_off};
-use master::plan::{NodeTraffic, Settings, plan as plan_bus};
+use master::plan::{HostQueue, NodeTraffic, PlannedFrame, Purpose, Settings, plan as plan_bus};
 use words::counted;
 use words::failure::Failure;
 
@@ -27,6 +27,9 @@ const BITS: u32 = u64::BITS;
 
 /// Periods that are offered where the one that is asked for is too short for the bus.
 const PERIODS_MS: [u64; 9] = [1, 2, 5, 10, 20, 50, 100, 200, 500];
+
+/// Time between two SDO requests for which there has to be room: what a capture writes leads back within a few seconds then.
+const SDO_PERIOD: Duration = Duration::from_millis(100);
 
 /// What is asked of a drive.
 #[derive(Clone, Debug)]
@@ -108,11 +111,10 @@ pub fn plan(
     for pace in paces {
         // Where a TPDO does not take this pace, another may, or another pace.
         let suited: Vec<Slot> = spare.iter().filter_map(|tpdo| Slot::new(model, node, tpdo, pace, request)).collect();
+        let count = suited.len();
         match packed(&records, suited) {
             Ok(slots) => return on_the_bus(model, node, (now, &spare), request, pace, &slots, &refused),
-            Err(left) => {
-                room = Err((left, spare.iter().filter(|tpdo| suits(model, node, tpdo, pace, request)).count()))
-            }
+            Err(left) => room = Err((left, count)),
         }
     }
     let (left, spare) = room.err().unwrap_or_default();
@@ -232,16 +234,6 @@ impl Slot {
     }
 }
 
-fn suits(
-    model: &'static Description,
-    node: NodeId,
-    tpdo: &(PdoConfig, CobId),
-    pace: Pace,
-    request: &Request<'_>,
-) -> bool {
-    Slot::new(model, node, tpdo, pace, request).is_some()
-}
-
 /// Puts the records into as few TPDOs as they take, the longest first; or those that have no place.
 fn packed(records: &[MappingRecord], mut slots: Vec<Slot>) -> Result<Vec<Slot>, Vec<MappingRecord>> {
     let mut longest_first = records.to_vec();
@@ -327,17 +319,24 @@ fn on_the_bus(
         let timing = model.timing;
         let traffic =
             NodeTraffic { node, pdos: pdos.collect(), in_cycle: None, event_trigger, heartbeat: None, timing };
-        let cycle = match pace {
-            Pace::Sync(every) => period / u32::from(every),
-            Pace::OwnSync | Pace::EventTimer => period,
-        };
-        let planned = plan_bus(&[traffic], &Settings::new(cycle).cycle_alone(), request.bitrate);
-        (planned.fits() && planned.load < 1.0, planned.load)
+        let own = (pace == Pace::OwnSync).then_some(period);
+        let sync = own.or(match pace {
+            Pace::Sync(every) => Some(period / u32::from(every)),
+            Pace::OwnSync | Pace::EventTimer => request.sync,
+        });
+        let new = Settings::new(sync.unwrap_or(period));
+        let with_sdo = Settings { has_sync: sync.is_some(), sdo: Some(SDO_PERIOD), queue: HostQueue::Priority, ..new };
+        let planned = |settings: Settings| plan_bus(std::slice::from_ref(&traffic), &settings, request.bitrate);
+        // Everything is put back by SDO, whose identifiers are less urgent than those of all PDOs. What it delays is jitter, and shown.
+        let (alone, whole) = (planned(with_sdo.cycle_alone()), planned(with_sdo));
+        let mut sdo =
+            whole.frames.iter().filter(|frame| matches!(frame.purpose, Purpose::SdoRequest | Purpose::SdoAnswer));
+        (alone.fits() && whole.load < 1.0 && sdo.all(PlannedFrame::is_in_time), alone.load)
     };
     let (fits, share) = load(request.period, pace);
     if !fits {
-        let longer = PERIODS_MS.map(Duration::from_millis).into_iter().filter(|period| *period > request.period);
-        let slower = longer.clone().find(|period| load(*period, pace).0);
+        let mut longer = PERIODS_MS.map(Duration::from_millis).into_iter().filter(|period| *period > request.period);
+        let slower = longer.find(|period| load(*period, pace).0);
         let failure = refused(format!("the bus is too slow for a reading every {:?}", request.period))
             .of_kind("bus_too_slow")
             .because(format!(
@@ -346,7 +345,8 @@ fn on_the_bus(
                 counted(slots.iter().map(|slot| slot.config.map.0.len()).sum::<usize>(), "object"),
                 share * 100.0,
                 request.bitrate.bits_per_second() / 1000
-            ));
+            ))
+            .because("SDO, by which everything is put back, and EMCY have to have room beside them");
         let failure = slower.into_iter().fold(failure, |failure, period| {
             failure.next(format!("every {period:?} is possible with all of them: --rate {period:?}"))
         });

@@ -80,8 +80,14 @@ fn what_is_asked_for_is_packed_into_as_few_spare_tpdos_as_it_takes() {
     // 1 ms is 2 counts; type 255 goes by the timer alone.
     assert_eq!(plan.values[&Mux::new(0x1800, 5)], [2, 0]);
     assert_eq!(plan.values[&Mux::new(0x1800, 2)], [255]);
-    // Frames of 8 and 4 bytes have at most 135 and 95 bits (Davis et al., equation 1), and SYNC 55: in 500 bit times.
-    assert!((plan.load - (135.0 + 95.0 + 55.0) / 500.0).abs() < 1e-9, "{}", plan.load);
+    // Frames of 8 and 4 bytes have at most 135 and 95 bits (Davis et al., equation 1), in 500 bit times. SYNC is not sent.
+    assert!((plan.load - (135.0 + 95.0) / 500.0).abs() < 1e-9, "{}", plan.load);
+    // One that others send every 2 ms takes 55 of its bits in 1000 beside a timer that it does not divide.
+    let sync = Some(Duration::from_millis(2));
+    let beside = Asked { sync, period: Duration::from_micros(1500), ..asked(&[0x6041, 0x606C, 0x6077, 0x6064]) };
+    let beside = beside.of("zlac8030l").expect("it has room");
+    assert_eq!(beside.pace, Pace::EventTimer);
+    assert!((beside.load - (230.0 / 750.0 + 55.0 / 1000.0)).abs() < 1e-9, "{}", beside.load);
 }
 
 #[test]
@@ -131,9 +137,9 @@ fn a_bus_too_slow_says_which_rate_it_carries() {
     let slow = Asked { bitrate: Bitrate::K125, ..asked(&[0x606C, 0x6064, 0x6077]) };
     let (kind, text) = slow.refused("zlac8030l");
     assert_eq!(kind, "bus_too_slow");
-    // 135 + 75 + 55 bits at 125 kbit/s are 2.1 ms.
-    assert!(text.contains("212 % of 125 kbit/s") && text.contains("--rate 5ms"), "{text}");
-    let fits = Asked { period: Duration::from_millis(5), ..slow };
+    // 135 + 75 bits at 125 kbit/s are 1.68 ms: 84 % of 2 ms, and 3 % for SDO and EMCY.
+    assert!(text.contains("168 % of 125 kbit/s") && text.contains("--rate 2ms"), "{text}");
+    let fits = Asked { period: Duration::from_millis(2), ..slow };
     assert!(fits.of("zlac8030l").is_ok());
 }
 
@@ -146,4 +152,19 @@ fn what_cannot_be_mapped_is_named_with_the_way_that_is_left() {
     let (kind, text) = asked(&[0x606C, 0x1017]).refused("zlac8030l");
     assert_eq!(kind, "no_mapping");
     assert!(text.contains("1017h:00") && !text.contains("606Ch:00"), "{text}");
+}
+
+/// Two full TPDOs and SYNC are at most 325 bits of 345 at 50 kbit/s. In 100 ms, a request and an answer by SDO (CiA 301, 7.2.4: 8 bytes
+/// each, 135 bits) and an EMCY are 405 of 5000: 94 % without what leads back, 102 % with it.
+#[test]
+fn a_rate_that_leaves_sdo_without_a_place_on_the_bus_is_refused() {
+    let full = |period_us: u64| {
+        let (period, bitrate) = (Duration::from_micros(period_us), Bitrate::K50);
+        Asked { period, bitrate, ..asked(&[0x606C, 0x6064, 0x607A, 0x60FF]) }
+    };
+    let (kind, text) = full(6900).refused("zlac8030l");
+    assert_eq!(kind, "bus_too_slow");
+    assert!(text.contains("94 % of 50 kbit/s") && text.contains("by which everything is put back"), "{text}");
+    // 325 of 405 bits: 88 % with them.
+    assert_eq!(full(8100).of("zlac8030l").expect("it fits").pace, Pace::OwnSync);
 }

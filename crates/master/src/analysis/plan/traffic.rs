@@ -54,6 +54,8 @@ pub enum HostQueue {
 pub struct Settings {
     /// Period of SYNC, in which each RPDO is sent once.
     pub cycle: Duration,
+    /// SYNC is on the bus.
+    pub has_sync: bool,
     /// How much later than its grid the host sends SYNC and the RPDOs, at most.
     pub jitter: Duration,
     /// The queue of its controller.
@@ -76,6 +78,7 @@ impl Settings {
     pub const fn new(cycle: Duration) -> Self {
         Self {
             cycle,
+            has_sync: true,
             jitter: Duration::ZERO,
             queue: HostQueue::Fifo,
             sdo: Some(Duration::from_millis(10)),
@@ -311,12 +314,14 @@ fn of_host(nodes: &[NodeTraffic], settings: &Settings) -> Vec<Draft> {
         Draft { purpose, node, frame, deadline, by_host: true }
     };
     let in_cycle = |id, length| Queued { jitter: settings.jitter, ..queued(id, length, settings.cycle) };
-    let mut drafts = vec![draft(Purpose::Sync, None, in_cycle(connection_set::SYNC, 0))];
+    let sync = settings.has_sync.then(|| draft(Purpose::Sync, None, in_cycle(connection_set::SYNC, 0)));
+    let with = sync.as_ref().map(|_| SYNC);
+    let mut drafts = Vec::from_iter(sync);
     for node in nodes {
         for (config, cob_id) in node.pdos.iter().filter(|(config, cob_id)| is_sent(config, *cob_id)) {
             let is_sent = node.in_cycle.is_none_or(|number| number == config.pdo.number);
             if config.pdo.direction == Direction::Rpdo && is_sent {
-                let frame = Queued { with: Some(SYNC), ..in_cycle(cob_id.can_id(), config.map.bytes() as u8) };
+                let frame = Queued { with, ..in_cycle(cob_id.can_id(), config.map.bytes() as u8) };
                 drafts.push(draft(Purpose::Pdo(config.pdo), Some(node.node), frame));
             }
         }
@@ -374,6 +379,8 @@ fn of_node(
                 remarks.push(Remark::OnRequest(id, config.pdo));
                 continue;
             }
+            // Without SYNC it does not come.
+            transmission if transmission.is_synchronous() && !settings.has_sync => continue,
             transmission if transmission.is_synchronous() => {
                 frame.period = settings.cycle * u32::from(transmission.0.max(1));
                 frame.trigger = sync.map(|by| answer(by, node.timing.pdo_reaction));
