@@ -12,6 +12,6 @@ mod session;
 
 pub use plan::{CapturePlan, Pace, Request, plan};
 pub use quantity::{Form, Quantity, short_names};
-pub use restorer::Restorer;
+pub use restorer::{Restorer, SeenBy};
 pub use rows::Trigger;
 pub use session::{Running, Span, Taken, Wanted, Way};

@@ -3,6 +3,7 @@
 //! Readings of several TPDOs belong to one row if they come within half a period of the first of them and each quantity has one: they
 //! were taken together, and travelled one after the other. The time of a row is that of its first reading's frame.
 
+use std::collections::VecDeque;
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -13,25 +14,25 @@ use can::Instant;
 pub(super) struct Rows {
     width: usize,
     together: Duration,
-    times: Vec<Instant>,
+    times: VecDeque<Instant>,
     /// A row after the other.
-    values: Vec<f64>,
+    values: VecDeque<f64>,
 }
 
 impl Rows {
     /// Of so many quantities that come with this period.
     pub(super) fn new(width: usize, period: Duration) -> Self {
-        Self { width, together: period / 2, times: Vec::new(), values: Vec::new() }
+        Self { width, together: period / 2, times: VecDeque::new(), values: VecDeque::new() }
     }
 
     /// Readings of some quantities at one time: their columns and values. True if a new row begins with them.
     pub(super) fn add(&mut self, at: Instant, readings: impl Iterator<Item = (usize, f64)> + Clone) -> bool {
-        let joins = self.times.last().is_some_and(|last| {
-            let row = &self.values[self.values.len() - self.width..];
-            at - *last < self.together && readings.clone().all(|(column, _)| row[column].is_nan())
+        let joins = self.times.back().is_some_and(|last| {
+            let row = self.values.len() - self.width;
+            at - *last < self.together && readings.clone().all(|(column, _)| self.values[row + column].is_nan())
         });
         if !joins {
-            self.times.push(at);
+            self.times.push_back(at);
             self.values.resize(self.values.len() + self.width, f64::NAN);
         }
         let from = self.values.len() - self.width;
@@ -51,12 +52,17 @@ impl Rows {
         self.times.is_empty()
     }
 
-    /// Time and values of a row.
-    pub(super) fn row(&self, number: usize) -> (Instant, &[f64]) {
-        (self.times[number], &self.values[number * self.width..(number + 1) * self.width])
+    /// Time of a row.
+    pub(super) fn time(&self, number: usize) -> Instant {
+        self.times[number]
     }
 
-    /// Leaves out what is older than `from`.
+    /// Value of a column in a row; not a number without a reading.
+    pub(super) fn value(&self, number: usize, column: usize) -> f64 {
+        self.values[number * self.width + column]
+    }
+
+    /// Leaves out what is older than `from`: as much work as there are rows that go, however many stay.
     pub(super) fn forget_before(&mut self, from: Instant) {
         let keep = self.times.partition_point(|at| *at < from);
         self.times.drain(..keep);
@@ -149,7 +155,7 @@ mod tests {
         assert_eq!(columns[0][..2], [1.0, 4.0]);
         assert!(columns[0][2].is_nan() && columns[2][1].is_nan() && columns[2][2] == 6.0);
         rows.forget_before(us(1400));
-        assert_eq!((rows.len(), rows.row(0).0), (2, us(1400)));
+        assert_eq!((rows.len(), rows.time(0)), (2, us(1400)));
     }
 
     #[test]

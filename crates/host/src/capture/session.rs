@@ -320,6 +320,8 @@ impl Running {
             }
             network.sleep(COLLECT).await;
         }
+        let ids = self.sources.iter().map(|source| source.id).collect();
+        restorer.lock().sending = Some((ids, plan.period));
         Ok(())
     }
 
@@ -344,16 +346,18 @@ impl Running {
             }
             let now = network.now();
             while looked_at < self.rows.len() {
-                let (at, values) = self.rows.row(looked_at);
+                let at = self.rows.time(looked_at);
                 // The newest row may be one of which a TPDO is still to come.
                 if looked_at + 1 == self.rows.len() && now - at < self.period {
                     break;
                 }
-                looked_at += 1;
                 // Without a trigger it begins with its first reading.
-                if begun.is_none() && watch.as_mut().is_none_or(|(column, armed)| armed.passes(values[*column])) {
+                let mut passes =
+                    |(column, armed): &mut (usize, Armed)| armed.passes(self.rows.value(looked_at, *column));
+                if begun.is_none() && watch.as_mut().is_none_or(&mut passes) {
                     begun = Some(at);
                 }
+                looked_at += 1;
             }
             if begun.is_some_and(|begun| now - begun >= span.duration + COLLECT) {
                 break None;
@@ -484,10 +488,10 @@ impl Running {
     fn capture(&mut self, span: &Span, begun: Option<Instant>, mut cut_off: Option<Failure>) -> Taken {
         let begun = begun.unwrap_or_else(|| self.drive.node().network().now());
         self.rows.forget_before(earlier(begun, if span.trigger.is_some() { span.pre_trigger } else { Duration::ZERO }));
-        let first = if self.rows.is_empty() { begun } else { self.rows.row(0).0 };
+        let first = if self.rows.is_empty() { begun } else { self.rows.time(0) };
         // Without a trigger it begins with its first reading.
         let from = first.max(begun);
-        let rows = (0..self.rows.len()).take_while(|row| self.rows.row(*row).0 - from <= span.duration).count();
+        let rows = (0..self.rows.len()).take_while(|row| self.rows.time(*row) - from <= span.duration).count();
         let (mut time_s, columns) = self.rows.columns(first);
         time_s.truncate(rows);
         let traces = self.quantities.iter().zip(columns).map(|(quantity, mut values)| {

@@ -5,10 +5,8 @@
 
 mod shape;
 
-use std::pin::pin;
 use std::time::Duration;
 
-use futures_util::future::{Either, select};
 use master::group::{Group, GroupError, Phase, StreamOptions};
 use master::units::{Ramp, Rpm, Turns};
 use master::{Drive, Error, MotionOptions};
@@ -60,21 +58,6 @@ pub async fn follow(group: &mut Group, points: &[f64]) -> Result<Followed, Group
     let took_s = (network.now() - began).as_secs_f64();
     let rms = (squares / f64::from(cycles.max(1))).sqrt();
     Ok(Followed { took_s, most_deg: most * 360.0, rms_deg: rms * 360.0 })
-}
-
-/// Does something else on the bus while a group goes on with its cycles: holding, or without power.
-///
-/// # Errors
-/// Those of the group's cycles.
-pub async fn beside<T>(group: &mut Group, what: impl Future<Output = T>) -> Result<T, GroupError> {
-    let mut what = pin!(what);
-    loop {
-        let cycle = pin!(group.cycle());
-        match select(what.as_mut(), cycle).await {
-            Either::Left((done, _)) => return Ok(done),
-            Either::Right((state, _)) => drop(state?),
-        }
-    }
 }
 
 /// Has the drive turn at this speed for a while, and stops it: two steps of its velocity demand, by its own ramps or by this one. The

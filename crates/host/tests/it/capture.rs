@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
-use canopen::{Mux, NodeId};
-use host::capture::{Pace, Quantity, Restorer, Running, Span, Wanted, Way};
+use canopen::{Mux, NmtCommand, NodeId};
+use host::capture::{Pace, Quantity, Restorer, Running, SeenBy, Span, Wanted, Way};
 use host::network::params::journal::roll_back_by;
-use host::test_motion::{Shape, beside, follow, points, steps};
+use host::test_motion::{Shape, follow, points, steps};
 use master::cyclic::CyclicOptions;
 use master::drive::MotionOptions;
 use master::group::{AxisLimits, AxisSetup, Group};
@@ -184,6 +184,43 @@ fn a_trigger_keeps_what_was_before_it_and_is_armed_again() {
     bench.run(restorer.restore());
 }
 
+/// What is said of the NMT state is what was seen: a heartbeat, TPDOs that stop, or nothing; and that it did not work.
+#[test]
+fn that_a_node_is_pre_operational_again_is_said_as_it_was_seen() {
+    for (heartbeat_ms, expected) in [(0, SeenBy::Silence), (50, SeenBy::Heartbeat)] {
+        let mut bench = Bench::new("zlac8030l");
+        let drive = bench.drive.clone();
+        let time = u16::to_le_bytes(heartbeat_ms);
+        bench.run(drive.node().download(Mux::new(0x1017, 0), &time)).expect("it has a heartbeat");
+        let wanted = bench.wanted(&["velocity"], None);
+        let (_, restorer) = bench.begin(&wanted).expect("it begins");
+        assert_eq!(restorer.left_operational(), None);
+        assert_eq!(bench.run(restorer.restore()), Vec::<String>::new());
+        assert_eq!(restorer.left_operational(), Some(expected));
+    }
+    // Another master starts it again and again: that is not said to be as before.
+    let mut bench = Bench::new("zlac8030l");
+    let wanted = bench.wanted(&["velocity"], None);
+    let (_, restorer) = bench.begin(&wanted).expect("it begins");
+    let other = Network::new();
+    bench.world.add_station(other.clone());
+    let starting = async {
+        loop {
+            other.node(node()).nmt(NmtCommand::Start);
+            other.sleep(MS).await;
+        }
+    };
+    let left = bench.run(async {
+        let (restoring, starting) = (std::pin::pin!(restorer.restore()), std::pin::pin!(starting));
+        match futures_util::future::select(restoring, starting).await {
+            futures_util::future::Either::Left((left, _)) => left,
+            futures_util::future::Either::Right(((), _)) => unreachable!("it starts the node for ever"),
+        }
+    });
+    assert_eq!(left, ["NMT state: it still sends PDOs"]);
+    assert_eq!(restorer.left_operational(), None);
+}
+
 /// The law: at whatever point it is ended, by whichever way back, the TPDOs read as they did before.
 #[test]
 fn whatever_point_a_capture_is_ended_at_the_tpdos_are_as_they_were() {
@@ -303,7 +340,7 @@ fn a_sine_is_followed_run_after_run_while_it_is_captured() {
     let mut wanted = bench.wanted(&["position", "current"], None);
     wanted.period = CYCLE;
     let restorer = Restorer::of(&drive);
-    let begun = bench.run(beside(&mut group, wanted.begin(&drive, &restorer))).expect("the cycles go on");
+    let begun = bench.run(group.beside(wanted.begin(&drive, &restorer)));
     let mut running = begun.expect("it begins");
     assert_eq!(running.plan().map(|plan| plan.pace), Some(Pace::Sync(1)));
     bench.run(group.enable()).expect("it is enabled");

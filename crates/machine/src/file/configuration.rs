@@ -210,6 +210,13 @@ pub fn pdo_id(text: &str) -> Result<PdoId, String> {
     })
 }
 
+/// `tpdo1`, of those that a device sends.
+pub fn tpdo_id(text: &str) -> Result<PdoId, String> {
+    let pdo = pdo_id(text)?;
+    let is_sent = pdo.direction == Direction::Tpdo;
+    is_sent.then_some(pdo).ok_or_else(|| format!("'{text}' is not a TPDO; expected tpdo1 to tpdo512"))
+}
+
 /// An entry for an object that is named as people name objects.
 pub fn mapped(model: &'static Description, pdo: PdoId, name: &str) -> Result<canopen::pdo::MappingRecord, String> {
     let (mux, _) = object(name)?.resolve(Some(model.dictionary))?;

@@ -27,7 +27,7 @@ use sim::machine::{Realism, TimingMode};
 use sim::{Place, Source, Stimulus, VirtualDrive, World};
 
 use bodies::Joined;
-pub use configuration::{mapped, pdo_id};
+pub use configuration::{mapped, pdo_id, tpdo_id};
 pub use cycles::{BASE_PERIOD, CyclePlan, GROUP_PERIOD, TOLERANCE, TooFull, speed_mode, too_full, too_full_at};
 pub use motion::{AxisPlan, BasePlan, GroupPlan, WATCHDOG};
 use seat::Seat;

@@ -289,11 +289,17 @@ impl Group {
     /// cycles go on meanwhile. `None` where no drive was the cause, or it has nothing to say.
     pub async fn explain_stop(&mut self) -> Option<Error> {
         let question = self.explanation()?;
+        self.beside(question).await
+    }
+
+    /// Awaits something else on the bus while the group goes on with its cycles: holding, or without power. Where no SYNC comes there are
+    /// no cycles; the next [`cycle`](Self::cycle) says so.
+    pub async fn beside<T>(&mut self, what: impl Future<Output = T>) -> T {
         let runner = &mut self.runner;
         let step = |io: &mut Exchange<'_>| {
             runner.step(io);
         };
-        self.network.ask_beside_cycles(question, step).await
+        self.network.ask_beside_cycles(what, step).await
     }
 
     /// The question of [`explain_stop`](Self::explain_stop) alone, for a group that is stepped elsewhere meanwhile.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use host::capture::merit::{self, Heating, Step};
 use host::capture::{Quantity, Running, Span, Taken, Wanted, Way};
-use host::test_motion::{Followed, Shape, beside, follow, points, steps};
+use host::test_motion::{Followed, Shape, follow, points, steps};
 use master::Drive;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError};
 use master::units::{Angle, Ramp, Rpm, parse_duration};
@@ -325,7 +325,7 @@ impl TestMotion {
         context.restore_at_end(Restorer::Capture(restorer.clone()));
         let mut running = match mover {
             Mover::Steps(_) => wanted.begin(drive, &restorer).await?,
-            Mover::Group(group, _) => beside(group, wanted.begin(drive, &restorer)).await??,
+            Mover::Group(group, _) => group.beside(wanted.begin(drive, &restorer)).await?,
         };
         if let Mover::Group(group, _) = mover {
             group.enable().await?;

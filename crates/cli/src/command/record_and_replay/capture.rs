@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use can::Bitrate;
 use canopen::NodeId;
-use canopen::pdo::{Direction, PdoId};
-use host::capture::{CapturePlan, Quantity, Running, Span, Taken, Trigger, Wanted, Way};
-use machine::file::pdo_id;
+use canopen::pdo::PdoId;
+use host::capture::{CapturePlan, Quantity, Running, SeenBy, Span, Taken, Trigger, Wanted, Way};
+use machine::file::tpdo_id;
 use master::Drive;
 use master::units::parse_duration;
 use recording::{Capture as Captured, Kind, Trace};
@@ -77,7 +77,7 @@ pub(in crate::command) struct CaptureArgs {
     #[arg(long, value_name = "TIME", value_parser = rate)]
     rate: Option<Duration>,
     /// Use this TPDO too, although it is in use: tpdo1; its listeners miss it meanwhile
-    #[arg(long, value_name = "TPDO", value_parser = tpdo, hide_short_help = true)]
+    #[arg(long, value_name = "TPDO", value_parser = tpdo_id, hide_short_help = true)]
     take: Vec<PdoId>,
     /// Read by SDO what cannot come by TPDO
     #[arg(long)]
@@ -92,13 +92,6 @@ pub(in crate::command) struct CaptureArgs {
 
 pub(in crate::command) fn capture_file(text: &str) -> Result<PathBuf, String> {
     Kind::of_name(text).map(|_| text.into()).ok_or_else(|| "a capture is called NAME.mcap or NAME.csv".to_owned())
-}
-
-fn tpdo(text: &str) -> Result<PdoId, String> {
-    match pdo_id(text)? {
-        pdo if pdo.direction == Direction::Tpdo => Ok(pdo),
-        _ => Err("expected a TPDO, e.g. tpdo1".to_owned()),
-    }
 }
 
 /// `1ms`, or `500Hz`.
@@ -123,6 +116,10 @@ pub(crate) struct CaptureReport {
     pace: Option<String>,
     /// Share of the bus's time that this node's TPDOs and SYNC take at most.
     load: Option<f64>,
+    /// By what the node was seen to be pre-operational again (`heartbeat`, `silence`, `nothing`); null where it was operational before.
+    nmt_back: Option<&'static str>,
+    #[serde(skip)]
+    left_operational: Option<SeenBy>,
     captures: Vec<CaptureRow>,
 }
 
@@ -204,6 +201,8 @@ impl Capture {
         let left = context.restore().await.unwrap_or_default();
         let (rows, failure) = captured;
         report.captures = rows;
+        report.left_operational = restorer.left_operational();
+        report.nmt_back = report.left_operational.map(SeenBy::word);
         let failure = match (failure, left.is_empty()) {
             (None, true) => return Ok(report),
             (Some(failure), _) => failure,
@@ -276,6 +275,8 @@ impl CaptureReport {
             model: drive.description().map_or_else(String::new, |model| model.name.to_owned()),
             pace: plan.map(|plan| plan.pace.words()),
             load: plan.map(|plan| (plan.load * 1e4).round() / 1e4),
+            nmt_back: None,
+            left_operational: None,
             captures: Vec::new(),
         }
     }
@@ -330,7 +331,8 @@ impl Report for CaptureReport {
             }
             _ => String::new(),
         };
-        parts.push(format!("{how}node {} is set up as it was before", self.node));
+        let nmt = self.left_operational.map_or_else(String::new, |seen| format!("; {}", seen.words()));
+        parts.push(format!("{how}the PDOs of node {} are set up as they were before{nmt}", self.node));
         parts.join("\n")
     }
 }
