@@ -29,7 +29,7 @@ const NEWTON_DONE: f64 = 1e-12;
 /// Assumed: damping over stiffness of a load gear's torsion, that of the joints' gears.
 const TORSION_DAMPING_S: f64 = 50e-6;
 /// Inertia of a load gear's output wheel over the motor's, seen through the gear. The gear's equations need some.
-const OUTPUT_WHEEL_SHARE: f64 = 0.01;
+pub const OUTPUT_WHEEL_SHARE: f64 = 0.01;
 
 /// Dry friction that is greater at rest. The friction of a fast shaft is the load's `coulomb_nm`.
 #[derive(Debug, Clone, Copy, PartialEq)]

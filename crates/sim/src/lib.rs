@@ -59,6 +59,7 @@ pub use devices::AxisId;
 pub use drive::{Brake, Levels, MotorData, OutputShaft, PowerPhase, Report, VirtualDrive, VirtualDriveClone};
 pub use drives::{Fidelity, RegisterError};
 pub use mechanics::Mechanics;
+pub use plant::attachment::OUTPUT_WHEEL_SHARE;
 pub use plant::physics::Physics;
 pub use prng::Prng;
 pub use refused::Refused;

@@ -1,4 +1,4 @@
-//! Gains from one wish, within what a drive's parameters can hold.
+//! Gains from one objective, within what a drive's parameters can hold.
 //!
 //! Of all gains that keep the margins, those with the greatest integral gain are taken: they let a load push the speed away by
 //! the least (K. J. Åström, T. Hägglund, "Advanced PID Control", 2006, 6.7: integral gain maximised under a limit of the sensitivity).
@@ -15,12 +15,13 @@ use crate::mechanics::Mechanics;
 const POINTS: usize = 200;
 const DECADES: f64 = 5.0;
 const CLOSE_RAD: f64 = 0.3;
+const SMALL: f64 = 0.1;
 const HALVINGS: usize = 12;
 /// Largest sensitivity: the least distance of the loop from -1 is its inverse (same source, 4.6: 1.4 to 2).
 const SENSITIVITY: f64 = 2.0;
 /// Least factor by which the loop gain may grow.
 const GAIN_MARGIN: f64 = 2.0;
-/// Phase margin where only a bandwidth was wished for.
+/// Phase margin where the objective is a bandwidth.
 const PHASE_MARGIN_DEG: f64 = 40.0;
 /// Gains that are tried: so many of each, this far below and above those of the drive.
 const STEPS: i32 = 40;
@@ -28,13 +29,23 @@ const SPAN: f64 = 30.0;
 /// Integral times that are tried, in times of the crossover.
 const INTEGRAL_TIMES: [f64; 7] = [2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0];
 
-/// What a person asks for.
+/// What the gains are to reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Wish {
+pub enum Objective {
     /// Where the loop gain falls to one, Hz.
     Bandwidth(f64),
     /// Degrees that are left at the crossover; as fast as that allows.
     PhaseMargin(f64),
+}
+
+impl Objective {
+    /// Least phase margin that goes with it.
+    pub fn phase_deg(self) -> f64 {
+        match self {
+            Self::PhaseMargin(degrees) => degrees,
+            Self::Bandwidth(_) => PHASE_MARGIN_DEG,
+        }
+    }
 }
 
 /// How far a loop is from being unstable.
@@ -42,7 +53,7 @@ pub enum Wish {
 pub struct Margins {
     /// Where the loop gain falls to one for the last time, Hz.
     pub crossover_hz: f64,
-    /// Least phase that is left where the loop gain is one.
+    /// Least phase that is left where the loop gain is one; negative where it is turned beyond half a turn.
     pub phase_deg: f64,
     /// Factor by which the loop gain may grow.
     pub gain: f64,
@@ -63,7 +74,7 @@ pub struct Proposal {
     pub filter_s: f64,
     /// What they give.
     pub margins: Margins,
-    /// The wish is not granted as a whole: a margin that has to be kept ends before.
+    /// The bandwidth of the objective is not reached: a margin that has to be kept ends before.
     pub is_limited: bool,
 }
 
@@ -77,7 +88,7 @@ pub fn margins(mechanics: &Mechanics, around: &Loop, highest_hz: f64) -> Margins
     margins_of(open_loop(mechanics, around), highest_hz)
 }
 
-/// A loop over its frequencies, closer where `1 + L` turns: at a resonance it does so within a hertz.
+/// A loop over its frequencies, closer where `1 + L` or `L` turns: at a resonance it does so within a hertz.
 fn sampled(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Vec<(f64, Complex<f64>)> {
     let at = |hz: f64| (hz, open(TAU * hz));
     let mut all = vec![at(highest_hz * 10f64.powf(-DECADES))];
@@ -85,7 +96,10 @@ fn sampled(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Vec<(f64, Com
         let mut ahead = vec![at(highest_hz * 10f64.powf(DECADES * (n as f64 / (POINTS - 1) as f64 - 1.0)))];
         while let Some(next) = ahead.pop() {
             let last = all[all.len() - 1];
-            let turns = ((1.0 + next.1) / (1.0 + last.1)).arg().abs() > CLOSE_RAD;
+            // Far below a gain of one its phase says nothing.
+            let is_small = last.1.norm().max(next.1.norm()) < SMALL;
+            let turns = ((1.0 + next.1) / (1.0 + last.1)).arg().abs() > CLOSE_RAD
+                || !is_small && (next.1 / last.1).arg().abs() > CLOSE_RAD;
             if turns && ahead.len() < HALVINGS {
                 ahead.extend([next, at((last.0 * next.0).sqrt())]);
             } else {
@@ -102,9 +116,9 @@ fn margins_of(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Margins {
     let mut margins =
         Margins { crossover_hz: 0.0, phase_deg: 180.0, gain: f64::INFINITY, sensitivity: 0.0, is_stable: false };
     let all = sampled(open, highest_hz);
-    let first = (1.0 + all[0].1).arg();
     // Integrators turn it back by up to half a turn and more: it comes from there.
-    let mut turned = if first > 0.0 { first - TAU } else { first };
+    let back = |first: f64| if first > 0.0 { first - TAU } else { first };
+    let (mut turned, mut phase) = (back((1.0 + all[0].1).arg()), back(all[0].1.arg()));
     for pair in all.windows(2) {
         let [(last_hz, before), (hz, now)] = [pair[0], pair[1]];
         turned += ((1.0 + now) / (1.0 + before)).arg();
@@ -113,9 +127,11 @@ fn margins_of(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Margins {
             // Between the two the logarithm of the gain is nearly straight.
             let share = before.norm().ln() / (before.norm() / now.norm()).ln();
             margins.crossover_hz = last_hz * (hz / last_hz).powf(share);
-            let phase = (-before).arg() + share * (now / before).arg();
-            margins.phase_deg = margins.phase_deg.min(phase.abs().to_degrees());
+            let left = PI + phase + share * (now / before).arg();
+            // Ahead of the current, half a turn is as far away on the other side.
+            margins.phase_deg = margins.phase_deg.min(left.min(TAU - left).to_degrees());
         }
+        phase += (now / before).arg();
         // Through the negative real axis.
         if before.im * now.im < 0.0 && now.re < 0.0 && now.norm() < 1.0 {
             margins.gain = margins.gain.min(2.0 / (now.norm() + before.norm()));
@@ -137,15 +153,12 @@ impl Margins {
 pub fn propose(
     mechanics: &Mechanics,
     around: &Loop,
-    wish: Wish,
+    objective: Objective,
     highest_hz: f64,
     filters_s: &[f64],
     can_hold: impl Fn(f64, f64) -> bool,
 ) -> Option<Proposal> {
-    let phase_deg = match wish {
-        Wish::PhaseMargin(degrees) => degrees,
-        Wish::Bandwidth(_) => PHASE_MARGIN_DEG,
-    };
+    let phase_deg = objective.phase_deg();
     let mut best: Option<(f64, Proposal)> = None;
     for &filter_s in filters_s {
         for step in -STEPS..=STEPS {
@@ -167,16 +180,16 @@ pub fn propose(
                 if !margins.keeps(phase_deg) {
                     continue;
                 }
-                let worth = match wish {
-                    Wish::PhaseMargin(_) => candidate.integral,
+                let worth = match objective {
+                    Objective::PhaseMargin(_) => candidate.integral,
                     // As near as can be; of the same, the stiffer one.
-                    Wish::Bandwidth(hz) => {
+                    Objective::Bandwidth(hz) => {
                         -(margins.crossover_hz / hz).ln().abs() + 1e-3 * candidate.integral / around.integral
                     }
                 };
-                let is_limited = match wish {
-                    Wish::PhaseMargin(_) => false,
-                    Wish::Bandwidth(hz) => (margins.crossover_hz / hz).ln().abs() > 0.1,
+                let is_limited = match objective {
+                    Objective::PhaseMargin(_) => false,
+                    Objective::Bandwidth(hz) => (margins.crossover_hz / hz).ln().abs() > 0.1,
                 };
                 if best.as_ref().is_none_or(|(most, _)| worth > *most) {
                     best = Some((worth, Proposal { proportional, integral, filter_s, margins, is_limited }));
@@ -234,7 +247,9 @@ mod tests {
             assert!(margins.is_stable, "{gain}: {margins:?}");
         }
         for gain in [800.0, 1000.0, 3000.0] {
-            assert!(!margins_of(integrator(gain), 1000.0).is_stable, "{gain}");
+            let margins = margins_of(integrator(gain), 1000.0);
+            let left = 90.0 - (gain * LATE_S).to_degrees();
+            assert!(!margins.is_stable && (margins.phase_deg - left).abs() < 2.0, "{gain}: {margins:?}, {left}");
         }
     }
 
@@ -272,9 +287,10 @@ mod tests {
         Loop { proportional: 0.5, integral: 1.0, filter_s: 1e-3, asked_late_s: 1e-3, seen_late_s: 1e-3, off: 0.0 };
 
     #[test]
-    fn a_wish_for_phase_is_kept_and_a_greater_one_makes_the_loop_slower() {
-        let of =
-            |degrees| propose(&MECHANICS, &AROUND, Wish::PhaseMargin(degrees), 1000.0, &[1e-3], |_, _| true).unwrap();
+    fn a_phase_margin_is_kept_and_a_greater_one_makes_the_loop_slower() {
+        let of = |degrees| {
+            propose(&MECHANICS, &AROUND, Objective::PhaseMargin(degrees), 1000.0, &[1e-3], |_, _| true).unwrap()
+        };
         let (fast, slow) = (of(45.0), of(70.0));
         assert!(fast.margins.phase_deg >= 45.0 && slow.margins.phase_deg >= 70.0, "{fast:?} {slow:?}");
         assert!(fast.margins.crossover_hz > slow.margins.crossover_hz, "{fast:?} {slow:?}");
@@ -283,7 +299,7 @@ mod tests {
     #[test]
     fn a_bandwidth_is_met_or_said_to_be_limited_and_gains_that_the_drive_cannot_hold_are_not_proposed() {
         let of = |hz, most: f64| {
-            propose(&MECHANICS, &AROUND, Wish::Bandwidth(hz), 1000.0, &[1e-3], |kp, _| kp <= most).unwrap()
+            propose(&MECHANICS, &AROUND, Objective::Bandwidth(hz), 1000.0, &[1e-3], |kp, _| kp <= most).unwrap()
         };
         let met = of(10.0, 100.0);
         assert!((met.margins.crossover_hz / 10.0 - 1.0).abs() < 0.1 && !met.is_limited, "{met:?}");

@@ -21,7 +21,7 @@ const CLIPPED: f64 = 0.85;
 /// One period of a speed that is added to a steady one; its peak is 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Excitation {
-    period_s: f64,
+    sample_s: f64,
     values: Vec<f64>,
     lines: Vec<usize>,
 }
@@ -37,14 +37,17 @@ impl Excitation {
         }
         let len = (period_s / sample_s).round() as usize;
         let (least_hz, most_hz) = (1.0 / (len as f64 * sample_s), 0.5 / sample_s);
+        let band = Unusable::Band { from_hz, to_hz, least_hz, most_hz };
         if !(from_hz >= least_hz * (1.0 - 1e-9) && to_hz <= most_hz && from_hz < to_hz) {
-            return Err(Unusable::Band { from_hz, to_hz, least_hz, most_hz });
+            return Err(band);
         }
         let lines = spaced((from_hz / least_hz).round() as usize, ((to_hz / least_hz) as usize).min(len / 2 - 1));
+        // No sine of the band fits into the period a whole number of times.
+        let Some(&first) = lines.first() else { return Err(band) };
         let amplitudes: Vec<_> = lines.iter().map(|line| (*line as f64).powf(SLOPE)).collect();
         let whole: f64 = amplitudes.iter().map(|amplitude| amplitude * amplitude).sum();
         // Schroeder: the moment at which a line has its phase stationary goes through the period as the power below it grows.
-        let (mut delay, mut phase, mut previous) = (0.0, 0.0, lines[0]);
+        let (mut delay, mut phase, mut previous) = (0.0, 0.0, first);
         let spectrum = lines.iter().zip(&amplitudes).map(|(line, amplitude)| {
             phase -= TAU * delay * (line - previous) as f64;
             delay += amplitude * amplitude / whole;
@@ -53,7 +56,7 @@ impl Excitation {
         });
         let spectrum = spectrum.collect();
         let values = flattened(len, &lines, spectrum);
-        Ok(Self { period_s: sample_s, values, lines })
+        Ok(Self { sample_s, values, lines })
     }
 
     /// Samples in a period.
@@ -68,7 +71,7 @@ impl Excitation {
 
     /// Time between two samples, s.
     pub fn sample_s(&self) -> f64 {
-        self.period_s
+        self.sample_s
     }
 
     /// The value at sample `n`, periodically; from -1 to 1.
@@ -136,6 +139,8 @@ mod tests {
         for band in [(0.1, 100.0), (1.0, 600.0), (50.0, 20.0), (f64::NAN, 1.0)] {
             assert!(matches!(Excitation::new(1e-3, 2.0, band), Err(Unusable::Band { .. })), "{band:?}");
         }
+        // Sines that fit are 0.5 Hz apart, and there is none from 1.35 to 1.45 Hz.
+        assert!(matches!(Excitation::new(1e-3, 2.0, (1.35, 1.45)), Err(Unusable::Band { .. })));
         assert!(matches!(Excitation::new(0.0, 2.0, (1.0, 2.0)), Err(Unusable::Period(_))));
         assert!(matches!(Excitation::new(1e-3, f64::NAN, (1.0, 2.0)), Err(Unusable::Period(_))));
     }

@@ -1,4 +1,4 @@
-//! Motor drives identified from samples, and gains for their loops from one wish.
+//! Motor drives identified from samples, and gains for their loops from one objective.
 //!
 //! In: [`Samples`] of a drive that follows a speed (set-point, current demand, position, all at one rate), and currents that
 //! it takes at steady speeds. Out: a frequency [`Response`] with its coherence, the [`Mechanics`] and [`Friction`] behind it,
@@ -42,7 +42,7 @@ mod samples;
 
 pub use bode::bode;
 pub use controller::{Loop, identify_loop};
-pub use design::{Margins, Proposal, Wish, margins, propose, propose_position};
+pub use design::{Margins, Objective, Proposal, margins, propose, propose_position};
 pub use excitation::Excitation;
 pub use friction::{Friction, SteadyRun, fit_friction};
 pub use mechanics::{Elastic, Mechanics, identify};

@@ -80,7 +80,8 @@ pub enum Unusable {
     },
     /// The excitation cannot be made.
     #[error(
-        "frequencies {from_hz} to {to_hz} Hz: expected ascending ones from {least_hz} Hz (one period) to {most_hz} Hz (half of the sampling rate)"
+        "frequencies {from_hz} to {to_hz} Hz: expected ascending ones from {least_hz} Hz (one period) to {most_hz} Hz (half of the sampling \
+         rate), with a multiple of {least_hz} Hz between them"
     )]
     Band {
         /// Lowest that was asked for.

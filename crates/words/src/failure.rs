@@ -102,11 +102,32 @@ impl Failure {
         self
     }
 
+    /// With what had failed before it as a reason.
+    #[must_use]
+    pub fn after(mut self, earlier: Self) -> Self {
+        self.because.push(earlier.what);
+        self.because.extend(earlier.because);
+        self.next.extend(earlier.next);
+        self
+    }
+
     /// Adds advice.
     #[must_use]
     pub fn next(mut self, advice: impl fmt::Display) -> Self {
         self.next.push(advice.to_string());
         self
+    }
+}
+
+/// What was done, and how it ended. Where both failed, the end comes first: a shaft that may still turn, or a value that was not put
+/// back, matters more than why.
+///
+/// # Errors
+/// What failed.
+pub fn both<T>(done: Result<T, Failure>, ended: Result<(), Failure>) -> Result<T, Failure> {
+    match (done, ended) {
+        (Err(why), Err(end)) => Err(end.after(why)),
+        (done, ended) => done.and_then(|done| ended.map(|()| done)),
     }
 }
 

@@ -4,7 +4,7 @@ use devices::{Loops, Quantity, Scale};
 use sim::MotorData;
 use tune::{BackEmf, Friction, Loop, Mechanics, Response, Unusable};
 
-use super::measure::Measurement;
+use super::bench::Measurement;
 use super::setup::Setup;
 
 /// What a drive and its load are.
@@ -18,9 +18,9 @@ pub struct Found {
     pub plant: Mechanics,
     /// Currents that steady motion takes.
     pub friction: Friction,
-    /// The speed loop as it was while it was measured.
-    pub around: Loop,
-    /// The share of the drive's own gains that it had then.
+    /// The speed loop with the drive's own gains: those that it was measured with may have been lower.
+    pub own: Loop,
+    /// The share of the drive's own gains with which it was measured.
     pub gain_share: f64,
     /// Torque per ampere: the motor's, from its data.
     pub torque_constant_nm_a: f64,
@@ -39,6 +39,9 @@ impl Found {
         };
         let filter_s = loops.speed_filter.and_then(value).unwrap_or(0.0);
         let around = tune::identify_loop(&response, filter_s)?;
+        let (proportional, integral) = setup.shares(measured.gain_share);
+        let own =
+            Loop { proportional: around.proportional / proportional, integral: around.integral / integral, ..around };
         let plant = tune::identify(&response)?;
         let current = loops.current.and_then(|(kp, ki)| value(kp).zip(value(ki)));
         let response = current.map_or_else(
@@ -50,7 +53,7 @@ impl Found {
             plant,
             friction: tune::fit_friction(&measured.runs)?,
             response,
-            around,
+            own,
             gain_share: measured.gain_share,
             torque_constant_nm_a: motor.windings.torque_constant_nm_a(),
         })
@@ -73,7 +76,7 @@ impl Found {
 
     /// What comes late in the speed loop, from the current that it asks for to the speed that it compares, its filter apart.
     pub fn loop_delay_s(&self) -> f64 {
-        self.plant.delay_s + self.around.seen_late_s
+        self.plant.delay_s + self.own.seen_late_s
     }
 }
 

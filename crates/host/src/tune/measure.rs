@@ -1,422 +1,54 @@
-//! A drive that is measured cycle by cycle, within bounds.
+//! A measurement of a drive, with lower gains where its own make it swing.
 
 use std::time::Duration;
 
-use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
-use cia402::object::POSITION_ACTUAL_VALUE;
-use cia402::{ModeOfOperation, RAD_S_PER_RPM};
-use devices::{Loops, Scale};
-use master::core::{PdoMap, Signal};
-use master::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand};
-use master::pdo::{PdoConfig, TimerUnits, TransmissionType};
-use master::units::{Amperes, Rpm};
-use master::{Drive, Network};
-use tune::{Excitation, Samples, SteadyRun};
-use words::failure::Failure;
+use devices::Loops;
+use master::Drive;
+use master::cyclic::CyclicOptions;
+use words::failure::{Failure, both};
 
-/// What the motion of a measurement keeps to. Beyond one of them it is stopped.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// Highest speed that is asked for.
-    pub speed_rpm: f64,
-    /// Most current that the speed loop may ask for, A.
-    pub current_a: f64,
-    /// Turns of the shaft to either side of where it stood.
-    pub travel_turns: f64,
-}
+use super::bench::{Bench, Bounds, Excursion, Measurement, TOO_MUCH_CURRENT, excitation};
+use super::setup::Setup;
 
-impl Default for Bounds {
-    /// A wheel on a bench: 120 r/min, the 15 A that it is rated for, forty turns.
-    fn default() -> Self {
-        Self { speed_rpm: 120.0, current_a: 15.0, travel_turns: 40.0 }
-    }
-}
+/// How often gains are halved before a speed loop that swings is given up.
+const HALVINGS: u32 = 4;
 
-/// What was measured.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Measurement {
-    /// Currents at steady speeds.
-    pub runs: Vec<SteadyRun>,
-    /// The excitation and its answer.
-    pub samples: Samples,
-    /// What was asked for beside a steady speed, as a share of its peak.
-    pub excitation: Excitation,
-    /// Peak of the excitation, r/min.
-    pub amplitude_rpm: f64,
-    /// By how much the gains were lowered meanwhile: 1 for not at all.
-    pub gain_share: f64,
-    /// The most that the speed loop asked for, A.
-    pub peak_a: f64,
-    /// The farthest that the shaft was from where it had stood, in turns.
-    pub travel_turns: f64,
-}
-
-/// How a drive answers a step of its set-point.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StepResponse {
-    /// Time between two samples, s.
-    pub period_s: f64,
-    /// From which speed to which, r/min.
-    pub step_rpm: (f64, f64),
-    /// Speed, r/min.
-    pub speed_rpm: Vec<f64>,
-    /// Current demand, A.
-    pub current_a: Vec<f64>,
-}
-
-impl StepResponse {
-    /// Integral of the absolute error from the step on, in r/min s: the less, the better.
-    pub fn error(&self) -> f64 {
-        self.speed_rpm.iter().map(|speed| (self.step_rpm.1 - speed).abs()).sum::<f64>() * self.period_s
-    }
-
-    /// By how much the speed goes beyond where it should, as a share of the step.
-    pub fn overshoot(&self) -> f64 {
-        let (from, to) = self.step_rpm;
-        let share = |speed: &f64| (speed - to) / (to - from);
-        self.speed_rpm.iter().map(share).fold(0.0, f64::max)
-    }
-
-    /// Root mean square of what the current does in the last half: that of a loop that is not stable does not end.
-    pub fn ripple_a(&self) -> f64 {
-        ripple(&self.current_a[self.current_a.len() / 2..], self.period_s)
-    }
-}
-
-/// Root mean square about a mean that follows slowly: what is still on its way to its end does not swing.
-fn ripple(values: &[f64], period_s: f64) -> f64 {
-    let span = ((SLOW_S / period_s) as usize).clamp(1, values.len().max(1));
-    let off = values.windows(span).map(|window| window[span / 2] - window.iter().sum::<f64>() / span as f64);
-    let (sum, count) = off.fold((0.0, 0.0_f64), |(sum, count), off| (sum + off * off, count + 1.0));
-    (sum / count.max(1.0)).sqrt()
-}
-
-/// What a failure is called where the current was at its bound.
-pub(super) const TOO_MUCH_CURRENT: &str = "current_bound";
-/// From one speed to the next, and until it is steady.
-const RAMP_S: f64 = 0.3;
-const SETTLING_S: f64 = 0.4;
-const STEADY_S: f64 = 0.6;
-/// Speeds at which friction is measured, as shares of the highest, there and back in turns.
-const STEADY_SHARES: [f64; 6] = [0.35, -0.35, 1.0, -1.0, 0.65, -0.65];
-/// Speed on which the excitation lies, as a share of the highest: the shaft never turns back, where dry friction would change its sign.
-const BIAS_SHARE: f64 = 0.5;
-/// The excitation's peak, as a share of the highest speed: to begin with, and at most.
-const SMALL: f64 = 0.08;
-const LARGEST: f64 = 0.4;
-/// Share of the bound of the current that it may take.
-const ENOUGH_CURRENT: f64 = 0.7;
-/// A current that swings by more than this share of its bound at a steady speed is that of a loop that is not stable.
-const SWINGS: f64 = 0.02;
-/// Swings of a loop are faster than this.
-const SLOW_S: f64 = 0.1;
-/// A speed is taken from positions that are so far apart.
-const SPEED_OVER_S: f64 = 8e-3;
-const PERIOD_S: f64 = 2.0;
-const PERIODS: usize = 6;
-const LOWEST_HZ: f64 = 1.0;
-/// Share of the sampling rate.
-const HIGHEST: f64 = 0.125;
-/// Cycles that a drive has to be enabled in.
-const ENABLING_S: f64 = 2.0;
-
-/// A drive that is ready to be measured: enabled, its shaft held at no speed.
-#[derive(Debug)]
-pub struct Bench {
-    network: Network,
-    node: Drive,
-    drive: CyclicDrive,
-    position: Signal<i64>,
-    current: Signal<i64>,
-    counts_per_turn: f64,
-    current_per_count: f64,
-    bounds: Bounds,
-    period: Duration,
-    began_at: Option<f64>,
-    /// By how much the gains are lowered: see [`Measurement`].
-    pub gain_share: f64,
-    /// What was asked for last, r/min.
-    asked_rpm: f64,
-    /// See [`Measurement`].
-    pub peak_a: f64,
-    /// See [`Measurement`].
-    pub travel_turns: f64,
-}
-
-impl Bench {
-    /// Maps what is measured, and enables the drive. [`Setup`](super::Setup) puts it back.
-    ///
-    /// # Errors
-    /// What the drive refuses, or that nothing shows the current that its speed loop asks for.
-    pub async fn open(
-        node: &Drive,
-        loops: &Loops,
-        period: Duration,
-        bounds: Bounds,
-        options: CyclicOptions,
-    ) -> Result<Self, Failure> {
-        let failed = |reason: &dyn std::fmt::Display| {
-            Failure::new(format!("node {} cannot be measured", node.node().id()))
-                .at_node(node.node().id())
-                .because(reason)
-        };
-        let mode = ModeOfOperation::PROFILE_VELOCITY;
-        let demand = loops.demand.ok_or_else(|| {
-            failed(&"no object shows the current that its speed loop asks for, with its sign")
-                .next("feed a capture of another instrument in as a file")
-        })?;
-        let Scale::PerCount(current_per_count) = demand.scale else {
-            return Err(failed(&"the current that its speed loop asks for has no fixed unit"));
-        };
-        for (object, value) in loops.without_ramps {
-            write(node, *object, *value).await?;
-        }
-        node.configure_cyclic(mode).await.map_err(|error| failed(&error))?;
-        // The second TPDO: the first has the statusword.
-        let number = PdoNumber::at(1).unwrap_or(PdoNumber::FIRST);
-        let model = node.description().ok_or_else(|| failed(&"its model is not known"))?;
-        let record = |mux| model.row(mux).map(|row| MappingRecord { mux, bits: (row.data_type.size() * 8) as u8 });
-        let map = PdoMap([POSITION_ACTUAL_VALUE, demand.object].into_iter().filter_map(record).collect());
-        let config = PdoConfig::new(PdoId { direction: Direction::Tpdo, number }, map)
-            .transmission(TransmissionType::EVERY_SYNC);
-        node.node().configure_pdo(&config, TimerUnits::of(model)).await.map_err(|error| failed(&error))?;
-        let drive = node.cyclic(mode, options).await.map_err(|error| failed(&error))?;
-        let signal = |mux| node.node().signal_in(number, mux).map_err(|error| failed(&error));
-        let network = node.node().network().clone();
-        let mut it = Self {
-            position: signal(POSITION_ACTUAL_VALUE)?,
-            current: signal(demand.object)?,
-            counts_per_turn: node.counts_per_turn().await?,
-            node: node.clone(),
-            network,
-            drive,
-            current_per_count,
-            bounds,
-            period,
-            began_at: None,
-            gain_share: 1.0,
-            asked_rpm: 0.0,
-            peak_a: 0.0,
-            travel_turns: 0.0,
-        };
-        it.network.sync(Some(period));
-        let enabled = it.enable().await;
-        match enabled {
-            Ok(true) => return Ok(it),
-            // It may have power by now.
-            Ok(false) => it.stop().await?,
-            Err(failure) => {
-                let stopped = it.stop().await;
-                return Err(stopped.err().into_iter().fold(failure, Failure::because));
-            }
-        }
-        Err(failed(&"it was not enabled within 2 s").next(format!("ferrodrive explain {}", node.node().id())))
-    }
-
-    /// Whether the drive follows within [`ENABLING_S`].
-    async fn enable(&mut self) -> Result<bool, Failure> {
-        for _ in 0..self.cycles(ENABLING_S) {
-            if self.step(Demand::Hold).await?.0.follows {
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-
-    fn cycles(&self, time_s: f64) -> usize {
-        (time_s / self.period.as_secs_f64()).round() as usize
-    }
-
-    fn stopped(&self, reason: impl std::fmt::Display) -> Failure {
-        Failure::new(format!("node {}: the measurement was stopped", self.drive.node()))
-            .at_node(self.drive.node())
-            .because(reason)
-    }
-
-    /// One cycle: what it is to do, and what it shows.
-    async fn step(&mut self, demand: Demand) -> Result<(CyclicState, Option<(i64, i64)>), Failure> {
-        self.network.next_sync().await.map_err(|error| self.stopped(error))?;
-        let (state, position, current) = self.network.exchange(|io| {
-            let state = self.drive.step(io, demand);
-            (state, io.read_fresh(self.position, 1), io.read_fresh(self.current, 1))
-        });
-        Ok((state, position.zip(current)))
-    }
-
-    /// Asks for these speeds in r/min, one in each cycle, and samples what comes of it.
-    ///
-    /// # Errors
-    /// A bound was reached, the drive refused, or a sample is missing. The drive is to be [`stop`](Self::stop)ped.
-    pub async fn follow(&mut self, speeds_rpm: impl IntoIterator<Item = f64>) -> Result<Samples, Failure> {
-        let mut samples = Samples { period_s: self.period.as_secs_f64(), ..Samples::default() };
-        let mut before = None;
-        for asked in speeds_rpm {
-            let (state, shown) = self.step(Demand::Velocity(Rpm(asked))).await?;
-            self.asked_rpm = asked;
-            if let Some(refusal) = state.refused {
-                return Err(self.stopped(refusal));
-            }
-            let cycle = self.network.cycle().map(|cycle| cycle.number);
-            let late = before.zip(cycle).is_some_and(|(before, now)| now != before + 1);
-            let Some((position, current)) = shown.filter(|_| !late) else {
-                let reason = "a sample is missing: this program was late, or the bus has no room for the drive's TPDOs";
-                return Err(self.stopped(reason).next("give --realtime (Linux), or a longer --period"));
-            };
-            before = cycle;
-            let (turns, current_a) = (position as f64 / self.counts_per_turn, current as f64 * self.current_per_count);
-            self.keep_bounds(turns, current_a)?;
-            samples.push(asked * RAD_S_PER_RPM, current_a, turns * std::f64::consts::TAU);
-        }
-        Ok(samples)
-    }
-
-    fn keep_bounds(&mut self, turns: f64, current_a: f64) -> Result<(), Failure> {
-        let began = *self.began_at.get_or_insert(turns);
-        self.travel_turns = self.travel_turns.max((turns - began).abs());
-        self.peak_a = self.peak_a.max(current_a.abs());
-        let Bounds { current_a: most_a, travel_turns, .. } = self.bounds;
-        if current_a.abs() > most_a {
-            let reason =
-                format!("its speed loop asked for {}, more than {}", Amperes(current_a.abs()), Amperes(most_a));
-            let stopped = self.stopped(reason).of_kind("current_bound");
-            return Err(stopped.next("allow more with --current, or less speed with --speed"));
-        }
-        if self.travel_turns > travel_turns {
-            let reason =
-                format!("the shaft is {:.1} turns from where it stood, more than {travel_turns}", self.travel_turns);
-            return Err(self.stopped(reason).next("allow more with --travel, or less speed with --speed"));
-        }
-        Ok(())
-    }
-
-    /// Comes to a speed without a step, and lets it settle.
-    async fn approach(&mut self, rpm: f64) -> Result<(), Failure> {
-        // With lower gains it takes longer, and swings more slowly on its way.
-        let (from, ramp) = (self.asked_rpm, self.cycles(RAMP_S));
-        let settling = self.cycles(SETTLING_S / self.gain_share.powf(1.5));
-        self.follow((1..=ramp).map(|n| from + (rpm - from) * n as f64 / ramp as f64)).await?;
-        self.follow(std::iter::repeat_n(rpm, settling)).await?;
-        Ok(())
-    }
-
-    /// Turns steadily.
-    async fn steady(&mut self, rpm: f64) -> Result<(SteadyRun, f64), Failure> {
-        self.approach(rpm).await?;
-        let samples = self.follow(std::iter::repeat_n(rpm, self.cycles(STEADY_S))).await?;
-        let (first, last) = (samples.position_rad[0], samples.position_rad[samples.len() - 1]);
-        let run = SteadyRun {
-            speed_rad_s: (last - first) / ((samples.len() - 1) as f64 * samples.period_s),
-            current_a: samples.current_a.iter().sum::<f64>() / samples.len() as f64,
-        };
-        Ok((run, ripple(&samples.current_a, samples.period_s)))
-    }
-
-    /// Whether the speed loop swings by itself at half of the highest speed.
-    ///
-    /// # Errors
-    /// See [`follow`](Self::follow).
-    pub async fn swings(&mut self) -> Result<bool, Failure> {
-        match self.steady(BIAS_SHARE * self.bounds.speed_rpm).await {
-            Ok((_, ripple_a)) => Ok(ripple_a > SWINGS * self.bounds.current_a),
-            Err(failure) if failure.kind == TOO_MUCH_CURRENT => Ok(true),
+/// Measures a drive; [`Setup::put_back`] undoes what was written for that. Gains with which the speed loop swings by itself are
+/// halved meanwhile.
+///
+/// # Errors
+/// What stopped it, and that it was not seen to stand.
+pub async fn measure(
+    drive: &Drive,
+    setup: &Setup,
+    loops: &Loops,
+    (period, bounds, options): (Duration, Bounds, CyclicOptions),
+    excursion: &mut Excursion,
+) -> Result<Measurement, Failure> {
+    let excitation = excitation(period)?;
+    let mut share = 1.0;
+    for left in (0..=HALVINGS).rev() {
+        setup.prepare(drive, share).await?;
+        let mut bench = Bench::open(drive, loops, period, bounds, options, *excursion).await?;
+        bench.gain_share = share;
+        let swings = bench.swings().await;
+        let measured = match swings {
+            Ok(false) => match bench.measure(&excitation).await {
+                // With lower gains the same speeds take less.
+                Err(failure) if failure.kind == TOO_MUCH_CURRENT && left > 0 => Ok(None),
+                measured => measured.map(Some),
+            },
+            Ok(true) => Ok(None),
             Err(failure) => Err(failure),
+        };
+        *excursion = bench.excursion;
+        if let Some(measurement) = both(measured, bench.stop().await)? {
+            return Ok(measurement);
         }
+        share *= 0.5;
     }
-
-    /// Steady speeds, then an excitation that grows until it is seen well, within the bounds.
-    ///
-    /// # Errors
-    /// See [`follow`](Self::follow).
-    pub async fn measure(&mut self) -> Result<Measurement, Failure> {
-        let unusable = |error: tune::Unusable| Failure::new("the excitation cannot be made").because(error);
-        let mut runs = Vec::new();
-        for share in STEADY_SHARES {
-            runs.push(self.steady(share * self.bounds.speed_rpm).await?.0);
-        }
-        let sample_s = self.period.as_secs_f64();
-        let band = (LOWEST_HZ, HIGHEST / sample_s);
-        let excitation = Excitation::new(sample_s, PERIOD_S, band).map_err(unusable)?;
-        let bias = BIAS_SHARE * self.bounds.speed_rpm;
-        self.approach(bias).await?;
-        // One small period shows how much current it takes, and so how much larger it may be.
-        let small_rpm = SMALL * self.bounds.speed_rpm;
-        let before_a = std::mem::take(&mut self.peak_a);
-        self.follow((0..excitation.len()).map(|n| bias + small_rpm * excitation.at(n))).await?;
-        let factor = ENOUGH_CURRENT * self.bounds.current_a / self.peak_a.max(f64::MIN_POSITIVE);
-        self.peak_a = self.peak_a.max(before_a);
-        let amplitude_rpm = (small_rpm * factor).min(LARGEST * self.bounds.speed_rpm);
-        let values = (0..PERIODS * excitation.len()).map(|n| bias + amplitude_rpm * excitation.at(n));
-        let samples = self.follow(values).await?;
-        let (peak_a, travel_turns) = (self.peak_a, self.travel_turns);
-        Ok(Measurement { runs, samples, excitation, amplitude_rpm, gain_share: self.gain_share, peak_a, travel_turns })
-    }
-
-    /// A step of the set-point, from half of the highest speed to three quarters.
-    ///
-    /// # Errors
-    /// See [`follow`](Self::follow).
-    pub async fn step_response(&mut self, time_s: f64) -> Result<StepResponse, Failure> {
-        let step_rpm = (0.5 * self.bounds.speed_rpm, 0.75 * self.bounds.speed_rpm);
-        self.approach(step_rpm.0).await?;
-        self.answer(step_rpm, time_s).await
-    }
-
-    /// The same without a step, at the speed after it: for a load that comes on.
-    ///
-    /// # Errors
-    /// See [`follow`](Self::follow).
-    pub async fn hold_response(&mut self, time_s: f64) -> Result<StepResponse, Failure> {
-        let rpm = 0.75 * self.bounds.speed_rpm;
-        self.answer((0.0, rpm), time_s).await
-    }
-
-    async fn answer(&mut self, step_rpm: (f64, f64), time_s: f64) -> Result<StepResponse, Failure> {
-        let samples = self.follow(std::iter::repeat_n(step_rpm.1, self.cycles(time_s))).await?;
-        // One count in one sample is a large speed.
-        let span = self.cycles(SPEED_OVER_S).max(1);
-        let spans = samples.position_rad.windows(span + 1);
-        let per_span = 1.0 / (span as f64 * samples.period_s * RAD_S_PER_RPM);
-        let speed_rpm = spans.map(|positions| (positions[span] - positions[0]) * per_span).collect();
-        Ok(StepResponse { period_s: samples.period_s, step_rpm, speed_rpm, current_a: samples.current_a })
-    }
-
-    /// No power, and no SYNC any more, once it stands.
-    ///
-    /// # Errors
-    /// It was not seen to stand within 3 s.
-    pub async fn stop(mut self) -> Result<(), Failure> {
-        let stood = self.come_to_rest().await;
-        self.network.sync(None);
-        stood
-    }
-
-    async fn come_to_rest(&mut self) -> Result<(), Failure> {
-        // First by its set-point: without power a wheel would run on. What stopped the measurement may stop this too.
-        let (from, ramp) = (self.asked_rpm, self.cycles(RAMP_S));
-        for n in (0..ramp).rev() {
-            let down = Demand::Velocity(Rpm(from * n as f64 / ramp as f64));
-            if self.step(down).await?.0.refused.is_some() {
-                break;
-            }
-        }
-        let mut stood = 0;
-        for _ in 0..self.cycles(3.0) {
-            let (state, _) = self.step(if stood == 0 { Demand::Hold } else { Demand::Off }).await?;
-            let stands = state.velocity.is_some_and(|Rpm(rpm)| rpm.abs() < 1.0);
-            stood = if stands || stood > 0 { stood + 1 } else { 0 };
-            if stood > self.cycles(0.05) && state.is_without_power() && stands {
-                return Ok(());
-            }
-        }
-        Err(Failure::new(format!("node {} was not seen to stand: it may still be moving", self.drive.node()))
-            .at_node(self.drive.node())
-            .next(format!("ferrodrive estop, and ferrodrive explain {}", self.node.node().id())))
-    }
-}
-
-/// Writes a number to an object of whatever width.
-pub(super) async fn write(drive: &Drive, object: canopen::Mux, value: i64) -> Result<(), Failure> {
-    let row = drive.description().and_then(|model| model.row(object));
-    let width = row.map_or(4, |row| row.data_type.size());
-    Ok(drive.node().download(object, &value.to_le_bytes()[..width.min(8)]).await?)
+    let id = drive.node().id();
+    Err(Failure::new(format!("node {id}: its speed loop swings by itself, even with a sixteenth of its gains"))
+        .at_node(id)
+        .next("look for a loose coupling or a wrong number of encoder lines"))
 }

@@ -5,6 +5,8 @@
 //! Everything moves by [`master::cyclic::CyclicDrive`], so that what stops such a motion stops this one. What is written for the
 //! measurement is put back at its end, however it ends; where the program dies, by the journal.
 
+mod applied;
+mod bench;
 mod found;
 mod measure;
 mod proposed;
@@ -12,23 +14,18 @@ mod report;
 mod setup;
 mod twin;
 
+pub use applied::{step, tune};
+pub use bench::{Bench, Bounds, Excursion, Measurement, StepResponse};
 pub use found::Found;
-pub use measure::{Bench, Bounds, Measurement, StepResponse};
-pub use proposed::{Gain, Proposed};
-pub use report::{GainRow, MarginRow, Request, TuneReport, find, step};
+pub use measure::measure;
+pub use proposed::{Gain, Proposed, Unreachable};
+pub use report::{GainRow, MarginRow, Request, TuneReport, find};
 pub use setup::Setup;
 pub use twin::{Trial, Twin, motor_of};
 
-use std::time::Duration;
-
 use devices::{Description, Loops};
 use master::Drive;
-use master::cyclic::CyclicOptions;
 use words::failure::Failure;
-
-/// How often gains are halved before a speed loop that swings is given up, and what is left of them then.
-const HALVINGS: u32 = 4;
-const LEAST_SHARE: f64 = 1.0 / 16.0;
 
 /// How a drive's loops are set, or why nothing of it can be tuned, and what would be possible instead.
 ///
@@ -49,56 +46,4 @@ pub fn loops_of(drive: &Drive) -> Result<(&'static Description, &'static Loops),
             .because("its description names no gains of a speed loop with an object that shows the current that it asks for")
             .next("ferrodrive objects MODEL lists what can be set by hand; a stepper has ramps and currents instead of gains")
     })
-}
-
-/// Measures a drive, and puts back what was written for that, however it ends. Gains with which the speed loop swings by itself
-/// are halved meanwhile.
-///
-/// # Errors
-/// What stopped it; that not everything could be put back.
-pub async fn measure(
-    drive: &Drive,
-    setup: &Setup,
-    loops: &Loops,
-    (period, bounds, options): (Duration, Bounds, CyclicOptions),
-) -> Result<Measurement, Failure> {
-    let mut share = 1.0;
-    for _ in 0..=HALVINGS {
-        lower(drive, setup, loops, share).await?;
-        let mut bench = Bench::open(drive, loops, period, bounds, options).await?;
-        bench.gain_share = share;
-        let swings = bench.swings().await;
-        let measured = match swings {
-            Ok(false) => match bench.measure().await {
-                // With lower gains the same speeds take less.
-                Err(failure) if failure.kind == measure::TOO_MUCH_CURRENT && share > LEAST_SHARE => Ok(None),
-                measured => measured.map(Some),
-            },
-            Ok(true) => Ok(None),
-            Err(failure) => Err(failure),
-        };
-        let stopped = bench.stop().await;
-        if let Some(measurement) = measured? {
-            stopped?;
-            return Ok(measurement);
-        }
-        stopped?;
-        share *= 0.5;
-    }
-    let id = drive.node().id();
-    Err(Failure::new(format!("node {id}: its speed loop swings by itself, even with a sixteenth of its gains"))
-        .at_node(id)
-        .next("look for a loose coupling or a wrong number of encoder lines"))
-}
-
-/// Both gains of the speed loop at this share of what they were.
-async fn lower(drive: &Drive, setup: &Setup, loops: &Loops, share: f64) -> Result<(), Failure> {
-    for object in [loops.speed_proportional, loops.speed_integral.object()] {
-        if share < 1.0
-            && let Some(had) = setup.had(object)
-        {
-            measure::write(drive, object, (had as f64 * share).round() as i64).await?;
-        }
-    }
-    Ok(())
 }

@@ -4,23 +4,28 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use canopen::Mux;
+use devices::Description;
 use master::Drive;
 use master::cyclic::CyclicOptions;
 use plot::{Colour, Figure, Panel, Poster, Style, Trace};
 use serde::Serialize;
-use tune::{Margins, Response, Wish};
-use words::failure::Failure;
+use tune::{Margins, Objective, Unusable};
+use words::failure::{Failure, both};
 
-use super::{Bench, Bounds, Found, Proposed, Setup, StepResponse, Trial, Twin, loops_of, measure, motor_of};
+use super::{
+    Bounds, Excursion, Found, Measurement, Proposed, Setup, StepResponse, Trial, Twin, Unreachable, loops_of, measure,
+    motor_of,
+};
 
-/// How long the answer of the drive to a step is looked at.
-const ANSWER_S: f64 = 0.5;
+/// Shortest and longest time between two samples: 1 ms and 4096 counts a turn show what there is to see, and a tenth of the rate is to
+/// be beyond a loop's bandwidth.
+const PERIODS: std::ops::RangeInclusive<Duration> = Duration::from_micros(500)..=Duration::from_millis(10);
 
 /// What is asked for.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// What the speed loop is to be.
-    pub wish: Wish,
+    /// What the speed loop is to reach.
+    pub objective: Objective,
     /// The gain of the position loop too.
     pub with_position: bool,
     /// Time from one sample to the next.
@@ -35,6 +40,34 @@ pub struct Request {
     pub journal: Option<PathBuf>,
     /// Hears what to do about a journal that stays.
     pub on_kept: fn(&str),
+    /// Write the proposed values to the drive, and try them there.
+    pub apply: bool,
+    /// Longest time for that transaction.
+    pub within: Duration,
+}
+
+impl Request {
+    /// Whether a measurement can be made so.
+    ///
+    /// # Errors
+    /// What is out of range, and what is not.
+    pub fn check(&self) -> Result<(), Failure> {
+        if !PERIODS.contains(&self.period) {
+            let what =
+                format!("expected a period from {:?} to {:?}, got {:?}", PERIODS.start(), PERIODS.end(), self.period);
+            return Err(Failure::usage(what).next("1 ms suits a bus of 1 Mbit/s, e.g. --period 1ms"));
+        }
+        let Bounds { speed_rpm, current_a, travel_turns } = self.bounds;
+        for (what, unit, value) in
+            [("speed", "r/min", speed_rpm), ("current", "A", current_a), ("travel", "turns", travel_turns)]
+        {
+            if value.is_nan() || value <= 0.0 {
+                return Err(Failure::usage(format!("expected a {what} above 0 {unit}, got {value} {unit}"))
+                    .next("it bounds the motion of the measurement; nothing was moved"));
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What was found and is proposed. Torques and inertia are those at the motor's shaft.
@@ -84,6 +117,9 @@ pub struct TuneReport {
     pub position: Option<MarginRow>,
     /// A step of the set-point and a load on the twin: integral of the absolute error, r/min s, before and after.
     pub twin_error: [f64; 2],
+    /// Of the step alone, with the proposed values.
+    #[serde(skip)]
+    pub twin_step: StepResponse,
     /// The same of a step on the drive, once the values were tried there.
     pub drive_error: Option<[f64; 2]>,
     /// The drive has the proposed values.
@@ -132,7 +168,12 @@ impl From<Margins> for MarginRow {
 ///
 /// # Errors
 /// What stopped it, what is not possible with this drive, and that not everything could be put back.
-pub async fn find(drive: &Drive, request: &Request) -> Result<(TuneReport, Proposed), Failure> {
+pub async fn find(
+    drive: &Drive,
+    request: &Request,
+    excursion: &mut Excursion,
+) -> Result<(TuneReport, Proposed), Failure> {
+    request.check()?;
     let (model, loops) = loops_of(drive)?;
     let id = drive.node().id();
     let failed = |reason: &dyn std::fmt::Display| {
@@ -143,30 +184,41 @@ pub async fn find(drive: &Drive, request: &Request) -> Result<(TuneReport, Propo
         motor.windings.flux_linkage_wb *= constant / motor.windings.torque_constant_nm_a();
     }
     let how = (request.period, request.bounds);
-    let setup = Setup::begin(drive, (model, loops), request.journal.as_deref(), request.on_kept).await?;
-    let measured = measure(drive, &setup, loops, (how.0, how.1, request.cyclic)).await;
+    let setup = Setup::begin(drive, (model, loops), true, request.journal.as_deref(), request.on_kept).await?;
+    let measured = measure(drive, &setup, loops, (how.0, how.1, request.cyclic), excursion).await;
     let gains = gains_of(&setup, loops);
     let had = Setup::clone_values(&setup);
-    let put_back = setup.put_back(drive).await;
-    let measured = measured?;
-    put_back?;
+    let measured = both(measured, setup.put_back(drive).await)?;
     let found = Found::of(&measured, &had, loops, &motor).map_err(|error| failed(&error))?;
     let twin = Twin::new((model, loops), &found, &motor, gains);
-    let share = lowered(&had, loops, measured.gain_share);
-    let of_twin = twin.measure(&share, how)?;
-    let seen = Found::of(&of_twin, &had, loops, &motor).map_err(|error| failed(&error))?;
-    let twin_off = between(&found.response, &seen.response);
-    let Some(proposed) = Proposed::of(&found, &had, (model, loops), request.wish, request.with_position) else {
-        return Err(failed(&"no gains keep the phase margin that was asked for")
-            .next("ask for less, e.g. --phase-margin 30; or stiffen the coupling of the load"));
-    };
+    let of_twin = twin.measure(&had.lowered(measured.gain_share), how)?;
+    let twin_off = between(&measured, &of_twin).map_err(|error| failed(&error))?;
+    let proposed = Proposed::of(&found, &had, (model, loops), request.objective, request.with_position);
+    let proposed = proposed.map_err(|reason| match reason {
+        Unreachable::Margins { .. } => {
+            failed(&reason).next("ask for less, e.g. --phase-margin 30; or stiffen the coupling of the load")
+        }
+        _ => failed(&reason),
+    })?;
     let after: Vec<(Mux, i64)> = proposed.gains.iter().map(|gain| (gain.object, gain.after)).collect();
     // On the twin a large current does no harm.
     let wide = (how.0, Bounds { current_a: f64::MAX, travel_turns: f64::MAX, ..how.1 });
     let trials = [twin.try_out(&[], wide)?, twin.try_out(&after, wide)?];
-    let elastic = found.mechanics.elastic;
     let report = TuneReport {
-        node: id.raw(),
+        twin_off,
+        peak_a: excursion.peak_a,
+        travel_turns: excursion.travel_turns,
+        notes: notes(&found, &proposed, request),
+        ..rows(id.raw(), model, &found, &proposed, &trials)
+    };
+    Ok((report, proposed))
+}
+
+/// What is found and proposed, as rows.
+fn rows(node: u8, model: &Description, found: &Found, proposed: &Proposed, trials: &[Trial; 2]) -> TuneReport {
+    let elastic = found.mechanics.elastic;
+    TuneReport {
+        node,
         model: model.name,
         inertia_kg_m2: found.inertia_kg_m2(),
         dry_friction_nm: found.dry_nm(),
@@ -179,45 +231,27 @@ pub async fn find(drive: &Drive, request: &Request) -> Result<(TuneReport, Propo
         coherent: found.response.coherent().count(),
         frequencies: found.response.lines.len(),
         model_off: found.mechanics.off,
-        twin_off,
+        twin_off: 0.0,
         gain_share: found.gain_share,
-        peak_a: measured.peak_a,
-        travel_turns: measured.travel_turns,
+        peak_a: 0.0,
+        travel_turns: 0.0,
         gains: proposed.gains.iter().map(GainRow::from).collect(),
         before: proposed.before.into(),
         after: proposed.after.into(),
         position: proposed.position.map(MarginRow::from),
         twin_error: [trials[0].error(), trials[1].error()],
+        twin_step: trials[1].step.clone(),
         drive_error: None,
         applied: false,
-        notes: notes(&found, &proposed, request),
-        picture: picture(model.title, &found, &trials),
-    };
-    Ok((report, proposed))
+        notes: Vec::new(),
+        picture: picture(model.title, found, trials),
+    }
 }
 
 impl From<&super::Gain> for GainRow {
     fn from(gain: &super::Gain) -> Self {
         Self { object: gain.object.to_string(), name: gain.name, before: gain.before, after: gain.after }
     }
-}
-
-/// How the drive itself answers a step of its set-point with the gains that it has. What was written for that is put back.
-///
-/// # Errors
-/// What stopped it, and that not everything could be put back.
-pub async fn step(drive: &Drive, request: &Request) -> Result<StepResponse, Failure> {
-    let (model, loops) = loops_of(drive)?;
-    let setup = Setup::begin(drive, (model, loops), request.journal.as_deref(), request.on_kept).await?;
-    let answer = async {
-        let mut bench = Bench::open(drive, loops, request.period, request.bounds, request.cyclic).await?;
-        let answer = bench.step_response(ANSWER_S).await;
-        let stopped = bench.stop().await;
-        answer.and_then(|answer| stopped.map(|()| answer))
-    };
-    let answer = answer.await;
-    let put_back = setup.put_back(drive).await;
-    answer.and_then(|answer| put_back.map(|()| answer))
 }
 
 /// The values of the loops' objects.
@@ -229,19 +263,15 @@ fn gains_of(setup: &Setup, loops: &devices::Loops) -> Vec<(Mux, i64)> {
     all.filter_map(|object| Some((object, setup.had(object)?))).collect()
 }
 
-/// The gains of the speed loop as they were lowered for the measurement.
-fn lowered(setup: &Setup, loops: &devices::Loops, share: f64) -> Vec<(Mux, i64)> {
-    let gains = [loops.speed_proportional, loops.speed_integral.object()];
-    gains.into_iter().filter_map(|gain| Some((gain, (setup.had(gain)? as f64 * share).round() as i64))).collect()
-}
-
-/// How far two responses are apart where both are coherent.
-fn between(drive: &Response, twin: &Response) -> f64 {
+/// How far the responses of drive and twin are apart where both are coherent: per current demand, as each was measured.
+fn between(drive: &Measurement, twin: &Measurement) -> Result<f64, Unusable> {
+    let response = |it: &Measurement| tune::response(&it.samples, Some(&it.excitation));
+    let (drive, twin) = (response(drive)?, response(twin)?);
     let nearest = |omega: f64| {
         let off = |line: &&tune::Line| (line.omega() - omega).abs();
         twin.lines.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|line| line.plant)
     };
-    tune::distance(drive, |omega| nearest(omega).unwrap_or_default())
+    Ok(tune::distance(&drive, |omega| nearest(omega).unwrap_or_default()))
 }
 
 fn notes(found: &Found, proposed: &Proposed, request: &Request) -> Vec<String> {

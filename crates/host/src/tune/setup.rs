@@ -5,10 +5,12 @@ use std::path::Path;
 
 use canopen::Mux;
 use canopen::pdo::PdoId;
-use devices::{Description, Loops};
-use master::Drive;
+use cia402::object::MODES_OF_OPERATION;
+use devices::{Description, Integral, Loops};
 use master::parameters::{Parameters, PlanOptions, from_any_state, roll_back};
+use master::{Drive, Error};
 
+use super::bench::write;
 use crate::network::params::journal::Kept;
 use crate::network::params::source;
 use machine::parameters::journal::Journal;
@@ -17,7 +19,9 @@ use words::failure::Failure;
 /// A drive whose parameters are going to be changed for a measurement.
 #[derive(Debug)]
 pub struct Setup {
-    /// What it had: each object that is going to be written, and gains.
+    model: &'static Description,
+    loops: Loops,
+    /// What it had: each object that is going to be written, and what sets its loops.
     before: BTreeMap<Mux, Vec<u8>>,
     undo: Vec<(Mux, Vec<u8>)>,
     kept: Option<Kept>,
@@ -25,46 +29,49 @@ pub struct Setup {
 
 impl Setup {
     /// Reads what is going to be changed, and keeps the way back in a journal, if one is named. Writes nothing to the drive.
+    /// Gains are put back where they may be lowered.
     ///
     /// # Errors
     /// The drive is at work, or does not answer; a journal of an earlier transaction is there.
     pub async fn begin(
         drive: &Drive,
         (model, loops): (&'static Description, &Loops),
+        lowers_gains: bool,
         journal: Option<&Path>,
         on_kept: fn(&str),
     ) -> Result<Self, Failure> {
         drive.check_at_rest().await.map_err(source::refused)?;
-        let gains = [loops.speed_proportional, loops.speed_integral.object(), loops.position_proportional.object];
-        let ramps = loops.without_ramps.iter().map(|(object, _)| *object);
-        let rows = model.dictionary.rows().iter().map(|row| row.mux());
-        let pdos = rows.filter(|mux| PdoId::of_object(mux.index).is_some());
-        let filter = loops.speed_filter.map(|filter| filter.object);
-        let mut before = BTreeMap::new();
-        // Not changed, and looked at: how the current loop is set.
+        let gains = [loops.speed_proportional, loops.speed_integral.object()];
+        // Not changed, and looked at.
         let current = loops.current.into_iter().flat_map(|(kp, ki)| [kp.object, ki.object]);
-        for object in gains.into_iter().chain(filter).chain(current).chain(ramps).chain(pdos) {
-            // What this device does not have is not written either.
-            if let Ok(value) = drive.node().upload(object).await {
-                before.insert(object, value.as_bytes().to_vec());
+        let others = [loops.position_proportional.object].into_iter().chain(loops.speed_filter.map(|it| it.object));
+        let ramps = loops.without_ramps.iter().map(|(object, _)| *object);
+        let rows = model.dictionary.rows().iter().filter(|row| row.access.is_writable()).map(|row| row.mux());
+        let pdos = rows.filter(|mux| PdoId::of_object(mux.index).is_some());
+        let changed: Vec<Mux> = ramps.chain(pdos).chain([MODES_OF_OPERATION]).collect();
+        let (mut before, mut written) = (BTreeMap::new(), BTreeMap::new());
+        for object in changed.iter().copied().chain(gains).chain(current).chain(others) {
+            match drive.node().upload(object).await {
+                Ok(value) => {
+                    let value = value.as_bytes().to_vec();
+                    if changed.contains(&object) || lowers_gains && gains.contains(&object) {
+                        written.insert(object, value.clone());
+                    }
+                    before.insert(object, value);
+                }
+                // What this device does not have is not written either.
+                Err(Error::Aborted { .. }) => {}
+                Err(error) => return Err(error.into()),
             }
         }
-        let writable = |mux: &Mux| model.row(*mux).is_some_and(|row| row.access.is_writable());
-        before.retain(|object, _| writable(object));
-        let id = drive.node().id();
-        let undo = from_any_state(Some(model), id, &before);
-        let wanted = Parameters::default();
-        let identity = drive.plan_parameters(&wanted, PlanOptions::default()).await.map_err(source::refused)?.identity;
-        let kept = match journal {
-            Some(path) => Some(Kept::create(path, &Journal { node: id, identity, undo: undo.clone() }, on_kept)?),
-            None => None,
-        };
-        Ok(Self { before, undo, kept })
+        let undo = from_any_state(Some(model), drive.node().id(), &written);
+        let kept = keep(drive, journal, &undo, on_kept).await?;
+        Ok(Self { model, loops: *loops, before, undo, kept })
     }
 
     /// The same values without a way back.
     pub(super) fn clone_values(&self) -> Self {
-        Self { before: self.before.clone(), undo: Vec::new(), kept: None }
+        Self { before: self.before.clone(), undo: Vec::new(), kept: None, ..*self }
     }
 
     /// What an object had.
@@ -73,6 +80,54 @@ impl Setup {
         let mut raw = [0; 8];
         raw.get_mut(..bytes.len())?.copy_from_slice(bytes);
         Some(i64::from_le_bytes(raw))
+    }
+
+    /// The least and the largest value of an object.
+    pub(super) fn range(&self, object: Mux) -> (i64, i64) {
+        self.model.row(object).and_then(|row| row.integer_limits()).unwrap_or((0, i64::from(u16::MAX)))
+    }
+
+    /// The gains of the speed loop at this share of what they were, as far as their objects go. A time stays.
+    pub(super) fn lowered(&self, share: f64) -> Vec<(Mux, i64)> {
+        let integral = match self.loops.speed_integral {
+            Integral::Gain(object) => Some(object),
+            Integral::Time(_) => None,
+        };
+        let lowered = |object: Mux| {
+            let had = self.had(object)?;
+            let least = self.range(object).0.max(1);
+            Some((object, ((had as f64 * share).round() as i64).max(least).min(had)))
+        };
+        [Some(self.loops.speed_proportional), integral].into_iter().flatten().filter_map(lowered).collect()
+    }
+
+    /// The shares that proportional and integral gain really have then.
+    pub(super) fn shares(&self, share: f64) -> (f64, f64) {
+        let lowered = self.lowered(share);
+        let of = |object: Mux| {
+            let (now, had) = (lowered.iter().find(|(other, _)| *other == object)?.1, self.had(object)?);
+            (had != 0).then_some(now as f64 / had as f64)
+        };
+        let proportional = of(self.loops.speed_proportional).unwrap_or(1.0);
+        (proportional, of(self.loops.speed_integral.object()).unwrap_or(proportional))
+    }
+
+    /// Set-points take effect at once, and the gains of the speed loop are lowered to this share.
+    ///
+    /// # Errors
+    /// What the drive refuses.
+    pub(super) async fn prepare(&self, drive: &Drive, share: f64) -> Result<(), Failure> {
+        for (object, value) in self.loops.without_ramps {
+            if self.before.contains_key(object) {
+                write(drive, *object, *value).await?;
+            }
+        }
+        if share < 1.0 {
+            for (object, value) in self.lowered(share) {
+                write(drive, object, value).await?;
+            }
+        }
+        Ok(())
     }
 
     /// Puts everything back, each value read back.
@@ -85,8 +140,23 @@ impl Setup {
             return self.kept.map_or(Ok(()), Kept::remove);
         }
         Err(Failure::new(format!("node {}: not everything could be put back after the measurement", drive.node().id()))
+            .of_kind("not_put_back")
             .at_node(drive.node().id())
             .because(undone)
             .next("power the drive off and on: nothing was stored"))
     }
+}
+
+/// A journal with these writes, if a place for it is named.
+pub(super) async fn keep(
+    drive: &Drive,
+    path: Option<&Path>,
+    undo: &[(Mux, Vec<u8>)],
+    on_kept: fn(&str),
+) -> Result<Option<Kept>, Failure> {
+    let Some(path) = path else { return Ok(None) };
+    let nothing = Parameters::default();
+    let identity = drive.plan_parameters(&nothing, PlanOptions::default()).await.map_err(source::refused)?.identity;
+    let journal = Journal { node: drive.node().id(), identity, undo: undo.to_vec() };
+    Kept::create(path, &journal, on_kept).map(Some)
 }

@@ -9,14 +9,12 @@ use devices::{AxisId, Description, Loops};
 use master::cyclic::CyclicOptions;
 use master::{Drive, Network};
 use sim::machine::{Order, order};
-use sim::{MotorData, Place, World};
+use sim::{MotorData, OUTPUT_WHEEL_SHARE, Place, World};
 use words::failure::Failure;
 
+use super::bench::{Bench, Bounds, Excursion, Measurement, StepResponse, excitation, write};
 use super::found::Found;
-use super::measure::{Bench, Bounds, Measurement, StepResponse, write};
 
-/// A load's gear has an output wheel of this share of the rotor's inertia (crate `plant`).
-const WHEEL_SHARE: f64 = 0.01;
 const NODE: NodeId = NodeId::MIN;
 /// How long the answer to a step and to a load is looked at.
 const ANSWER_S: f64 = 0.5;
@@ -32,8 +30,9 @@ pub struct Twin {
     pub load: Vec<String>,
     /// Objects that have not their factory values.
     values: Vec<(Mux, i64)>,
+    /// What pushes its shaft in one direction, N m; positive against positive motion.
+    load_nm: f64,
     torque_constant_nm_a: f64,
-    seed: u64,
 }
 
 /// How a drive behaves with some gains.
@@ -67,13 +66,12 @@ impl Twin {
         values: Vec<(Mux, i64)>,
     ) -> Self {
         let rotor = motor.rotor;
-        let wheel = if found.mechanics.elastic.is_some() { WHEEL_SHARE * rotor.inertia_kg_m2 } else { 0.0 };
+        let wheel = if found.mechanics.elastic.is_some() { OUTPUT_WHEEL_SHARE * rotor.inertia_kg_m2 } else { 0.0 };
         let inertia = (found.inertia_kg_m2() - rotor.inertia_kg_m2 - wheel).max(0.0);
         let (dry, viscous) = (found.dry_nm() - rotor.coulomb_nm, found.viscous_nm_s() - rotor.viscous_nm_s);
         let mut load = vec![
             format!("load inertia {inertia}"),
             format!("load friction {} viscous {}", dry.max(0.0), viscous.max(0.0)),
-            format!("load torque {}", found.friction.load_a * found.torque_constant_nm_a),
         ];
         if let Some(elastic) = found.mechanics.elastic {
             // Both masses against each other.
@@ -81,13 +79,33 @@ impl Twin {
             load.push(format!("load gear 1 0 {}", (TAU * elastic.resonance_hz).powi(2) * reduced));
         }
         let torque_constant_nm_a = found.torque_constant_nm_a;
-        Self { model, loops: *loops, load, values, torque_constant_nm_a, seed: 1 }
+        let load_nm = found.friction.load_a * torque_constant_nm_a;
+        Self { model, loops: *loops, load, values, load_nm, torque_constant_nm_a }
     }
 
     /// A virtual drive with a load of these words, whatever was found.
     pub fn with_load((model, loops): (&'static Description, &Loops), load: Vec<String>, motor: &MotorData) -> Self {
         let torque_constant_nm_a = motor.windings.torque_constant_nm_a();
-        Self { model, loops: *loops, load, values: Vec::new(), torque_constant_nm_a, seed: 1 }
+        Self { model, loops: *loops, load, values: Vec::new(), load_nm: 0.0, torque_constant_nm_a }
+    }
+
+    fn failed(&self, reason: impl std::fmt::Display) -> Failure {
+        Failure::new(format!("the twin of a {} cannot be made", self.model.title)).because(reason)
+    }
+
+    /// What stopped a trial of the twin says nothing of the drive, which is at rest by then.
+    fn stopped(&self, failure: Failure) -> Failure {
+        let what = format!("the twin of a {}, not the drive, failed its trial", self.model.title);
+        // Its node and its advice are those of the twin.
+        let failure = Failure { next: Vec::new(), subject: Default::default(), ..failure };
+        Failure::new(what).after(failure).next("the drive is at rest, with what it had; nothing was proposed")
+    }
+
+    fn push(&self, world: &mut World, torque_nm: f64) -> Result<(), Failure> {
+        let present = sim::Stimulus::LoadTorque(torque_nm);
+        let applied = world.apply(Place::node(NODE.raw()), &present).map_err(|error| self.failed(error))?;
+        // A refusal would leave it without a load, which the comparison would not show.
+        applied.map_err(|error| self.failed(error))
     }
 
     /// A world with the twin alone, booted.
@@ -95,26 +113,28 @@ impl Twin {
     /// # Errors
     /// The model cannot be built, or has not what hangs on its shaft.
     pub fn world(&self) -> Result<(World, Drive), Failure> {
-        let failed = |reason: &dyn std::fmt::Display| Failure::new("the twin cannot be made").because(reason);
-        let mut world = World::new(Bitrate::M1, self.seed);
+        let mut world = World::new(Bitrate::M1, 1);
         let network = Network::new();
         world.add_station(network.clone());
-        let machine = order(self.model, &Order::new(self.model, NODE, Bitrate::M1)).map_err(|error| failed(&error))?;
-        world.add_drive(NODE.raw(), machine).map_err(|error| failed(&error))?;
+        let machine = order(self.model, &Order::new(self.model, NODE, Bitrate::M1)).map_err(|it| self.failed(it))?;
+        world.add_drive(NODE.raw(), machine).map_err(|error| self.failed(error))?;
         for words in &self.load {
-            let stimulus = words.parse().map_err(|error: sim::stimulus::StimulusError| failed(&error))?;
-            let applied = world.apply(Place::node(NODE.raw()), &stimulus).map_err(|error| failed(&error))?;
-            applied.map_err(|error| failed(&error))?;
+            let stimulus = words.parse().map_err(|error: sim::stimulus::StimulusError| self.failed(error))?;
+            let applied = world.apply(Place::node(NODE.raw()), &stimulus).map_err(|error| self.failed(error))?;
+            applied.map_err(|error| self.failed(error))?;
+        }
+        if self.load_nm != 0.0 {
+            self.push(&mut world, self.load_nm)?;
         }
         world.run_for(Duration::from_secs(1));
         Ok((world, Drive::new(network.node(NODE), self.model)))
     }
 
     async fn open(&self, drive: &Drive, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Bench, Failure> {
-        for (object, value) in self.values.iter().chain(values) {
+        for (object, value) in self.values.iter().chain(self.loops.without_ramps).chain(values) {
             write(drive, *object, *value).await?;
         }
-        Bench::open(drive, &self.loops, how.0, how.1, CyclicOptions::default()).await
+        Bench::open(drive, &self.loops, how.0, how.1, CyclicOptions::default(), Excursion::default()).await
     }
 
     /// The same measurement as of the drive.
@@ -123,8 +143,9 @@ impl Twin {
     /// What stopped it.
     pub fn measure(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Measurement, Failure> {
         let (mut world, drive) = self.world()?;
-        let run = async { self.open(&drive, values, how).await?.measure().await };
-        sim::block_on(&mut world, run).map_err(|error| Failure::new(error.to_string()))?
+        let excitation = excitation(how.0)?;
+        let run = async { self.open(&drive, values, how).await?.measure(&excitation).await };
+        sim::block_on(&mut world, run).map_err(|error| self.failed(error))?.map_err(|failure| self.stopped(failure))
     }
 
     /// How it behaves with these values of its gains: a step of the set-point, and a load.
@@ -133,16 +154,13 @@ impl Twin {
     /// What stopped it.
     pub fn try_out(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Trial, Failure> {
         let (mut world, drive) = self.world()?;
-        let ended = |error: sim::BlockOnError| Failure::new(error.to_string());
-        let mut bench = sim::block_on(&mut world, self.open(&drive, values, how)).map_err(ended)??;
-        let step = sim::block_on(&mut world, bench.step_response(ANSWER_S)).map_err(ended)??;
-        let torque_nm = LOAD_A * self.torque_constant_nm_a;
-        let present = sim::Stimulus::LoadTorque(torque_nm);
-        // A refusal would leave it without a load, which the comparison would not show.
-        let applied =
-            world.apply(Place::node(NODE.raw()), &present).map_err(|error| Failure::new(error.to_string()))?;
-        applied.map_err(|error| Failure::new(error.to_string()))?;
-        let load = sim::block_on(&mut world, bench.hold_response(ANSWER_S)).map_err(ended)??;
+        let ended = |error: sim::BlockOnError| self.failed(error);
+        let stopped = |failure: Failure| self.stopped(failure);
+        let mut bench = sim::block_on(&mut world, self.open(&drive, values, how)).map_err(ended)?.map_err(stopped)?;
+        let step =
+            sim::block_on(&mut world, bench.step_response(f64::MAX, ANSWER_S)).map_err(ended)?.map_err(stopped)?;
+        self.push(&mut world, self.load_nm + LOAD_A * self.torque_constant_nm_a)?;
+        let load = sim::block_on(&mut world, bench.hold_response(ANSWER_S)).map_err(ended)?.map_err(stopped)?;
         Ok(Trial { step, load })
     }
 }

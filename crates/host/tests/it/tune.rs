@@ -5,11 +5,15 @@ use std::time::Duration;
 
 use canopen::Mux;
 use devices::{Description, Loops};
-use host::tune::{Bounds, Found, Proposed, Setup, Twin, loops_of, measure, motor_of};
+use host::network::params::journal::roll_back_by;
+use host::tune::{
+    Bounds, Excursion, Found, Proposed, Request, Setup, StepResponse, Twin, find, loops_of, measure, motor_of, tune,
+};
 use master::Drive;
 use master::cyclic::CyclicOptions;
 use sim::{MotorData, Prng, World};
-use tune::Wish;
+use tune::Objective;
+use words::failure::Failure;
 
 const PERIOD: Duration = Duration::from_millis(1);
 
@@ -83,8 +87,9 @@ struct Measured {
 fn identified(world: &mut World, drive: &Drive, motor: &MotorData) -> Result<Measured, tune::Unusable> {
     let (model, loops) = loops_of(drive).unwrap();
     let run = async {
-        let setup = Setup::begin(drive, (model, loops), None, |_| ()).await.unwrap();
-        let measured = measure(drive, &setup, loops, (PERIOD, Bounds::default(), CyclicOptions::default())).await;
+        let setup = Setup::begin(drive, (model, loops), true, None, |_| ()).await.unwrap();
+        let how = (PERIOD, Bounds::default(), CyclicOptions::default());
+        let measured = measure(drive, &setup, loops, how, &mut Excursion::default()).await;
         (setup, measured)
     };
     let (setup, measured) = sim::block_on(world, run).unwrap();
@@ -142,19 +147,22 @@ fn random_wheels_are_identified_and_gains_proposed_for_them_are_stable_and_nearl
             }
         };
         hold(number, &found, &load.truth(&motor));
-        let proposed = Proposed::of(&found, &setup, model, Wish::PhaseMargin(40.0), false).unwrap();
+        let proposed = Proposed::of(&found, &setup, model, Objective::PhaseMargin(40.0), false).unwrap();
         let after: Vec<(Mux, i64)> = proposed.gains.iter().map(|gain| (gain.object, gain.after)).collect();
         // The plant itself, with a step of the set-point and of the load.
         let how = (PERIOD, Bounds { current_a: 30.0, ..Bounds::default() });
         let (old, new) = (plant.try_out(&[], how).unwrap(), plant.try_out(&after, how).unwrap());
         // A slow loop may still be on its way at the end: it comes nearer, and does not swing.
-        let off = |answer: &host::tune::StepResponse, last: usize| {
+        let off = |answer: &StepResponse, last: usize| {
             let from = answer.speed_rpm.len() - last;
             (answer.speed_rpm[from..from + 100].iter().sum::<f64>() / 100.0 - answer.step_rpm.1).abs()
         };
         for answer in [&new.step, &new.load] {
             let (before, end, ripple_a) = (off(answer, 200), off(answer, 100), answer.ripple_a());
-            assert!(end < before + 1.0, "machine {number} does not settle: {before} {end} {proposed:?}");
+            assert!(
+                end < before.max(1.0) && end < 3.0,
+                "machine {number} does not settle: {before} {end} {proposed:?}"
+            );
             assert!(ripple_a < 1.5, "machine {number} swings by {ripple_a} A: {proposed:?}");
         }
         if new.error() >= old.error() {
@@ -173,7 +181,8 @@ fn what_is_written_for_a_measurement_is_put_back_and_a_bound_that_is_reached_sto
     let loops = model.axes[0].loops.as_ref().unwrap();
     let plant = Twin::with_load((model, loops), vec!["load inertia 0.02".into()], &motor);
     let (mut world, drive) = plant.world().unwrap();
-    let objects = [Mux::new(0x6083, 0), Mux::new(0x1A01, 1), Mux::new(0x1801, 2), Mux::new(0x201D, 0)];
+    let objects =
+        [(0x6083, 0), (0x1A01, 1), (0x1801, 2), (0x201D, 0), (0x6060, 0)].map(|(index, sub)| Mux::new(index, sub));
     let read = |world: &mut World| {
         let all = async {
             let mut values = Vec::new();
@@ -186,13 +195,8 @@ fn what_is_written_for_a_measurement_is_put_back_and_a_bound_that_is_reached_sto
     };
     let before = read(&mut world);
     let bounds = Bounds { travel_turns: 0.5, ..Bounds::default() };
-    let run = async {
-        let setup = Setup::begin(&drive, (model, loops), None, |_| ()).await.unwrap();
-        let failure = measure(&drive, &setup, loops, (PERIOD, bounds, CyclicOptions::default())).await.unwrap_err();
-        setup.put_back(&drive).await.unwrap();
-        failure
-    };
-    let failure = sim::block_on(&mut world, run).unwrap();
+    let request = Request { bounds, ..request() };
+    let failure = sim::block_on(&mut world, find(&drive, &request, &mut Excursion::default())).unwrap().unwrap_err();
     assert!(failure.because[0].contains("turns from where it stood, more than 0.5"), "{failure:?}");
     assert_eq!(read(&mut world), before);
     assert!(world.report(1).unwrap().velocity_rpm.abs() < 1.0);
@@ -206,4 +210,145 @@ fn a_drive_without_gains_is_refused_with_what_is_possible_instead() {
     let failure = loops_of(&drive).unwrap_err();
     assert!(failure.what.contains("ZLIM42C") || failure.what.contains("ZLIM42-C"), "{failure:?}");
     assert!(failure.next[0].contains("ramps and currents"), "{failure:?}");
+}
+
+fn request() -> Request {
+    Request {
+        objective: Objective::PhaseMargin(40.0),
+        with_position: false,
+        period: PERIOD,
+        bounds: Bounds::default(),
+        cyclic: CyclicOptions::default(),
+        torque_constant_nm_a: None,
+        journal: None,
+        on_kept: |_| (),
+        apply: false,
+        within: Duration::from_secs(60),
+    }
+}
+
+/// A wheel with a load of these words.
+fn wheel(load: &[&str]) -> Twin {
+    let model = devices::model("zlac8030l").unwrap();
+    let loops = model.axes[0].loops.as_ref().unwrap();
+    Twin::with_load((model, loops), load.iter().map(|&words| words.to_owned()).collect(), &motor_of(model).unwrap())
+}
+
+#[test]
+fn a_drive_that_is_lost_in_a_measurement_is_said_not_to_have_been_seen_to_stand_and_why_it_was_stopped() {
+    let (mut world, drive) = wheel(&["load inertia 0.02"]).world().unwrap();
+    let request = request();
+    let mut excursion = Excursion::default();
+    let mut run = Box::pin(find(&drive, &request, &mut excursion));
+    let limit = Duration::from_secs(4);
+    assert!(matches!(sim::block_on_for(&mut world, limit, &mut run), Err(sim::BlockOnError::OutOfTime { .. })));
+    let station = world.drive_id(1).unwrap();
+    world.cut(station);
+    let failure: Failure = sim::block_on(&mut world, run).unwrap().unwrap_err();
+    assert!(failure.what.contains("not everything could be put back"), "{failure:?}");
+    let text = failure.to_string();
+    assert!(text.contains("was not seen to stand: it may still be moving"), "{text}");
+    assert!(text.contains("a sample is missing"), "{text}");
+}
+
+/// How often the drive is enabled for it, with lower gains or new ones, makes no difference to the shaft.
+#[test]
+fn current_and_travel_are_those_of_the_whole_measurement() {
+    let (mut world, drive) = wheel(&["load inertia 0.02"]).world().unwrap();
+    let (model, loops) = loops_of(&drive).unwrap();
+    let mut excursion = Excursion::default();
+    let run = async {
+        let setup = Setup::begin(&drive, (model, loops), true, None, |_| ()).await.unwrap();
+        let bounds = Bounds { travel_turns: 5.0, ..Bounds::default() };
+        let how = (PERIOD, bounds, CyclicOptions::default());
+        let first = host::tune::step(&drive, &Request { bounds, ..request() }, 30.0, &mut excursion).await;
+        let gone = excursion.travel_turns;
+        assert!(first.is_ok() && gone > 1.0, "{first:?} {gone}");
+        let second = measure(&drive, &setup, loops, how, &mut excursion).await.unwrap_err();
+        setup.put_back(&drive).await.unwrap();
+        (gone, second)
+    };
+    let (gone, failure) = sim::block_on(&mut world, run).unwrap();
+    let counts =
+        sim::block_on(&mut world, drive.node().upload(cia402::object::POSITION_ACTUAL_VALUE)).unwrap().unwrap();
+    let turns = f64::from(i32::from_le_bytes(counts.as_bytes().try_into().unwrap())) / 4096.0;
+    // And what it takes to stop.
+    assert!(turns > 4.0 && turns < 5.5 && excursion.travel_turns > 5.0, "{gone} {turns} {excursion:?}");
+    assert!(failure.because[0].contains("turns from where it stood, more than 5"), "{failure:?}");
+}
+
+fn gains(world: &mut World, drive: &Drive) -> Vec<Vec<u8>> {
+    let (_, loops) = loops_of(drive).unwrap();
+    let objects = [loops.speed_proportional, loops.speed_integral.object(), loops.speed_filter.unwrap().object];
+    let all = async {
+        let mut values = Vec::new();
+        for object in objects {
+            values.push(drive.node().upload(object).await.unwrap().as_bytes().to_vec());
+        }
+        values
+    };
+    sim::block_on(world, all).unwrap()
+}
+
+#[test]
+fn a_program_that_ends_before_the_new_gains_are_kept_leaves_the_former_ones_in_a_journal() {
+    let (mut world, drive) = wheel(&["load inertia 0.05"]).world().unwrap();
+    let before = gains(&mut world, &drive);
+    let folder = std::env::temp_dir().join(format!("ferrodrive-tune-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir(&folder).unwrap();
+    let journal = folder.join("ferrodrive-node1.journal");
+    let request = Request { apply: true, journal: Some(journal.clone()), ..request() };
+    // It ends while a person is asked.
+    let mut run = Box::pin(tune(&drive, &request, &(), std::future::pending()));
+    let limit = Duration::from_secs(60);
+    let ended = sim::block_on_for(&mut world, limit, &mut run);
+    assert!(matches!(ended, Err(sim::BlockOnError::OutOfTime { .. })), "{ended:?}");
+    drop(run);
+    assert_ne!(gains(&mut world, &drive), before);
+    assert!(!journal.exists());
+    let former = folder.join("ferrodrive-node1.gains.journal");
+    let back = sim::block_on(&mut world, roll_back_by(&former, &drive)).unwrap().unwrap();
+    assert_eq!((back.put_back, gains(&mut world, &drive)), (3, before.clone()));
+    // And a person who wants them back has them, with nothing left over.
+    let run = tune(&drive, &request, &(), std::future::ready(true));
+    let report = sim::block_on(&mut world, run).unwrap().unwrap();
+    assert!(!report.applied && report.drive_error.is_some(), "{report:?}");
+    assert_eq!(report.notes.last().map(String::as_str), Some("it was given its former gains back"));
+    assert_eq!(gains(&mut world, &drive), before);
+    // Empty.
+    std::fs::remove_dir(&folder).unwrap();
+}
+
+/// Its friction holds it without power. What holds a load that pushes all the time is there beside the one that comes on: steady currents add up.
+#[test]
+fn a_load_that_pushes_all_the_time_pushes_the_twin_too() {
+    let plant = wheel(&["load inertia 0.02", "load friction 2 viscous 0.01", "load torque 1.5"]);
+    let (mut world, drive) = plant.world().unwrap();
+    let model = devices::model("zlac8030l").unwrap();
+    let motor = motor_of(model).unwrap();
+    let Measured { found, model, .. } = identified(&mut world, &drive, &motor).unwrap();
+    let load_a = found.friction.load_a;
+    assert!(relative(load_a * motor.windings.torque_constant_nm_a(), 1.5) < 0.05, "{load_a}");
+    let twin = Twin::new(model, &found, &motor, Vec::new());
+    let trial = twin.try_out(&[], (PERIOD, Bounds { current_a: 30.0, ..Bounds::default() })).unwrap();
+    let speed = trial.load.step_rpm.1 * cia402::RAD_S_PER_RPM;
+    let held_a = found.friction.dry_a + found.friction.viscous_a_s_rad * speed + load_a;
+    let steady_a = |answer: &StepResponse| answer.current_a[answer.current_a.len() - 100..].iter().sum::<f64>() / 100.0;
+    let [before, after] = [&trial.step, &trial.load].map(steady_a);
+    assert!(relative(before, held_a) < 0.1 && relative(after - before, 4.5) < 0.1, "{before} {after} {held_a}");
+}
+
+#[test]
+fn what_no_motion_can_be_measured_with_is_refused_before_anything_moves() {
+    let with = |change: fn(&mut Request)| {
+        let mut request = request();
+        change(&mut request);
+        request.check().unwrap_err()
+    };
+    let period = with(|request| request.period = Duration::from_micros(100));
+    assert!(period.is_usage && period.what.contains("500\u{b5}s to 10ms"), "{period:?}");
+    assert!(with(|request| request.bounds.speed_rpm = 0.0).what.contains("a speed above 0 r/min"));
+    assert!(with(|request| request.bounds.current_a = f64::NAN).what.contains("a current above 0 A"));
+    assert!(with(|request| request.bounds.travel_turns = -1.0).what.contains("a travel above 0 turns"));
 }

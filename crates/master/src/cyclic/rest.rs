@@ -46,6 +46,14 @@ impl NotAtRest {
     }
 }
 
+impl CyclicDrive {
+    /// Whether its shaft was seen to stand for 50 ms, and for as long anew without power where it had power until then. `None`
+    /// before that, while it was waited for less than two seconds.
+    pub fn at_rest(&self, waited: Duration) -> Option<Result<(), NotAtRest>> {
+        at_rest([self], waited)
+    }
+}
+
 /// What became of drives that were to stand so long ago: `None` while it is not known, `Ok` once all were seen to stand.
 pub(crate) fn at_rest<'a>(
     drives: impl IntoIterator<Item = &'a CyclicDrive>,

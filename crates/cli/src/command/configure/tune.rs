@@ -5,11 +5,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use canopen::NodeId;
-use host::network::params::Transaction;
 use host::network::params::journal::default_path;
-use host::tune::{Bounds, Proposed, Request, TuneReport, find, step};
-use master::Drive;
-use master::parameters::Parameters;
+use host::tune::{Bounds, Request, TuneReport};
 use master::units::{Amperes, Rpm, parse_duration};
 use words::node::node;
 
@@ -47,10 +44,10 @@ pub(crate) struct Tune {
     /// Which loops
     #[arg(long = "loop", value_enum, default_value = "speed")]
     which: WhichLoop,
-    /// Wish: where the gain of the speed loop is to fall to one, in Hz
+    /// Objective: where the gain of the speed loop is to fall to one, in Hz
     #[arg(long, value_name = "HZ", value_parser = hertz, conflicts_with = "phase_margin")]
     bandwidth: Option<f64>,
-    /// Wish: degrees that are to be left there; as stiff as that allows
+    /// Objective: degrees that are to be left there; as stiff as that allows
     #[arg(long, value_name = "DEGREES", default_value = "40", value_parser = degrees)]
     phase_margin: f64,
     /// Highest speed of the measurement
@@ -108,9 +105,10 @@ fn constant(text: &str) -> Result<f64, String> {
 
 impl Tune {
     fn request(&self, context: &Context) -> Request {
-        let wish = self.bandwidth.map_or(tune::Wish::PhaseMargin(self.phase_margin), tune::Wish::Bandwidth);
+        let objective =
+            self.bandwidth.map_or(tune::Objective::PhaseMargin(self.phase_margin), tune::Objective::Bandwidth);
         Request {
-            wish,
+            objective,
             with_position: self.which == WhichLoop::Position,
             period: self.period,
             bounds: Bounds {
@@ -122,17 +120,19 @@ impl Tune {
             torque_constant_nm_a: self.torque_constant,
             journal: (!context.is_embedded()).then(|| default_path(self.node)),
             on_kept: note_kept,
+            apply: self.apply,
+            within: self.within,
         }
     }
 
     /// Measures and proposes; and writes, if that was asked for.
     pub(crate) async fn run(&self, context: &Context) -> Result<TuneReport, Failure> {
+        let request = self.request(context);
+        request.check()?;
         let drive = context.known_drive(self.node).await?;
         host::tune::loops_of(&drive)?;
-        let request = self.request(context);
-        context.progress.show(format!("node {}: measuring, about half a minute", self.node));
         let guard = self.guard.begin(context, &drive).await?;
-        let done = self.carry_out(context, &drive, &request).await;
+        let done = host::tune::tune(&drive, &request, &context.progress, wants_back(context)).await;
         let released = Guard::end(guard, context, &drive, false).await;
         let report = done?;
         released?;
@@ -141,59 +141,6 @@ impl Tune {
             written.map_err(|error| Failure::of_writing("the picture", path, &error))?;
         }
         Ok(report)
-    }
-
-    async fn carry_out(&self, context: &Context, drive: &Drive, request: &Request) -> Result<TuneReport, Failure> {
-        let (mut report, proposed) = find(drive, request).await?;
-        if !self.apply {
-            return Ok(report);
-        }
-        context.progress.show(format!("node {}: a step with the gains that it has", self.node));
-        let before = step(drive, request).await?;
-        self.write(context, drive, &proposed, true).await?;
-        context.progress.show(format!("node {}: the same step with the new gains", self.node));
-        // Whatever stops it: gains that do not hold the shaft do not stay.
-        let after = match step(drive, request).await {
-            Ok(after) => after,
-            Err(failure) => {
-                self.write(context, drive, &proposed, false).await?;
-                return Err(failure.because("it was given its former gains back").into());
-            }
-        };
-        report.drive_error = Some([before.error(), after.error()]);
-        report.applied = after.ripple_a() <= before.ripple_a().max(0.1 * request.bounds.current_a);
-        if !report.applied {
-            report.notes.push("its current swings with the new gains: it was given its former ones back".into());
-        } else if wants_back(context).await {
-            report.applied = false;
-            report.notes.push("it was given its former gains back".into());
-        }
-        if !report.applied {
-            self.write(context, drive, &proposed, false).await?;
-        }
-        Ok(report)
-    }
-
-    /// The proposed values, or those of before, as a transaction.
-    async fn write(&self, context: &Context, drive: &Drive, proposed: &Proposed, new: bool) -> Result<(), Failure> {
-        let mut wanted = Parameters::default();
-        for gain in &proposed.gains {
-            let width =
-                drive.description().and_then(|model| model.row(gain.object)).map_or(2, |row| row.data_type.size());
-            let value = if new { gain.after } else { gain.before };
-            wanted.values.insert(gain.object, value.to_le_bytes()[..width.min(8)].to_vec());
-        }
-        let transaction = Transaction {
-            address: false,
-            save: false,
-            prove: None,
-            within: self.within,
-            journal: (!context.is_embedded()).then(|| default_path(self.node)),
-            on_kept: note_kept,
-        };
-        let what = if new { "proposed gains" } else { "former gains" };
-        transaction.apply(&context.progress, drive, &wanted, what.to_owned()).await?;
-        Ok(())
     }
 }
 

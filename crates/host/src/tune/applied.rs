@@ -1,0 +1,171 @@
+//! The proposed gains on the drive itself: written, tried, and kept or taken back.
+
+use std::path::{Path, PathBuf};
+
+use canopen::Mux;
+use cia402::RAD_S_PER_RPM;
+use master::Drive;
+use master::parameters::Parameters;
+use tune::Objective;
+use words::failure::{Failure, both};
+
+use super::bench::{ENOUGH_CURRENT, SWINGS};
+use super::setup::keep;
+use super::{Bench, Excursion, Proposed, Request, Setup, StepResponse, TuneReport, find, loops_of};
+use crate::network::Progress;
+use crate::network::params::Transaction;
+use crate::network::params::journal::Kept;
+
+/// How long the answer of the drive to a step is looked at.
+const ANSWER_S: f64 = 0.5;
+/// By how much a drive may be worse than its twin.
+const MORE_THAN_TWIN: f64 = 1.3;
+const BACK: &str = "it was given its former gains back";
+
+/// Measures a drive, finds gains, and has it try them, if that was asked for. It keeps them where its current does not swing, its
+/// error is not larger, and `wants_back` is false, which is asked last. Else the drive has in the end what it had.
+///
+/// # Errors
+/// What stopped it, what is not possible with this drive, and that not everything could be put back.
+pub async fn tune(
+    drive: &Drive,
+    request: &Request,
+    progress: &impl Progress,
+    wants_back: impl Future<Output = bool>,
+) -> Result<TuneReport, Failure> {
+    let id = drive.node().id();
+    let mut excursion = Excursion::default();
+    progress.show(format!("node {id}: measuring, about half a minute"));
+    let (mut report, proposed) = find(drive, request, &mut excursion).await?;
+    if !request.apply {
+        return Ok(report);
+    }
+    progress.show(format!("node {id}: a step with the gains that it has"));
+    // The first thing that a step does to the current is proportional to it.
+    let most_rpm = ENOUGH_CURRENT * request.bounds.current_a / proposed.proportional_a_s_rad / RAD_S_PER_RPM;
+    let before = step(drive, request, most_rpm, &mut excursion).await?;
+    let undo: Vec<_> =
+        proposed.gains.iter().map(|gain| (gain.object, bytes(drive, gain.object, gain.before))).collect();
+    // Until the new gains are kept or gone: whatever ends the program meanwhile.
+    let path = request.journal.as_deref().map(former_gains);
+    let kept = keep(drive, path.as_deref(), &undo, request.on_kept).await?;
+    let after = match write(drive, request, &proposed, (true, progress)).await {
+        Ok(()) => {
+            progress.show(format!("node {id}: the same step with the new gains"));
+            step(drive, request, most_rpm, &mut excursion).await
+        }
+        Err(failure) => Err(failure),
+    };
+    (report.peak_a, report.travel_turns) = (excursion.peak_a, excursion.travel_turns);
+    // Why they do not stay: gains that were not seen to hold the shaft do not, whatever stopped it.
+    let objection = match after {
+        Err(failure) => Err(failure),
+        Ok(after) => {
+            report.drive_error = Some([before.error(), after.error()]);
+            match objection(&before, &after, request, &report) {
+                None if wants_back.await => Ok(Some(BACK.to_owned())),
+                why => Ok(why.map(|why| format!("{why}: {BACK}"))),
+            }
+        }
+    };
+    if let Ok(None) = objection {
+        report.applied = true;
+        kept.map_or(Ok(()), Kept::remove)?;
+        return Ok(report);
+    }
+    let back = go_back(drive, request, &proposed, kept, progress).await;
+    if let (Err(failure), Ok(())) = (&objection, &back) {
+        return Err(failure.clone().because(BACK));
+    }
+    let still = |back| Failure::new(format!("node {id}: it still has the new gains")).at_node(id).after(back);
+    report.notes.extend(both(objection, back.map_err(still))?);
+    Ok(report)
+}
+
+/// Why the new gains do not stay.
+fn objection(before: &StepResponse, after: &StepResponse, request: &Request, report: &TuneReport) -> Option<String> {
+    // The encoder's counts make the current ripple with high gains: on the twin as on the drive.
+    let of_twin_a = MORE_THAN_TWIN * report.twin_step.ripple_a();
+    let most_a = before.ripple_a().max(SWINGS * request.bounds.current_a).max(of_twin_a);
+    // A drive that is to be slower than it was may be off by more.
+    let most_error = match request.objective {
+        Objective::PhaseMargin(_) => before.error(),
+        Objective::Bandwidth(_) => {
+            let size = |answer: &StepResponse| answer.step_rpm.1 - answer.step_rpm.0;
+            let of_twin = report.twin_step.error() * size(after) / size(&report.twin_step);
+            before.error().max(MORE_THAN_TWIN * of_twin)
+        }
+    };
+    if after.ripple_a() > most_a {
+        return Some(format!(
+            "its current swings by {:.2} A with the new gains, more than {most_a:.2} A",
+            after.ripple_a()
+        ));
+    }
+    (after.error() > most_error).then(|| {
+        format!("its error after a step is {:.2} r/min s with the new gains, more than {most_error:.2}", after.error())
+    })
+}
+
+/// How the drive itself answers a step of its set-point, of this size at most, with the gains that it has. What was written for that is put back.
+///
+/// # Errors
+/// What stopped it, and that not everything could be put back.
+pub async fn step(
+    drive: &Drive,
+    request: &Request,
+    most_rpm: f64,
+    excursion: &mut Excursion,
+) -> Result<StepResponse, Failure> {
+    let (model, loops) = loops_of(drive)?;
+    let setup = Setup::begin(drive, (model, loops), false, request.journal.as_deref(), request.on_kept).await?;
+    let answer = async {
+        setup.prepare(drive, 1.0).await?;
+        let mut bench = Bench::open(drive, loops, request.period, request.bounds, request.cyclic, *excursion).await?;
+        let answer = bench.step_response(most_rpm, ANSWER_S).await;
+        *excursion = bench.excursion;
+        both(answer, bench.stop().await)
+    };
+    let answer = answer.await;
+    both(answer, setup.put_back(drive).await)
+}
+
+/// Where the former gains are kept, beside the journal of a transaction.
+fn former_gains(journal: &Path) -> PathBuf {
+    journal.with_extension("gains.journal")
+}
+
+fn bytes(drive: &Drive, object: Mux, value: i64) -> Vec<u8> {
+    let width = drive.description().and_then(|model| model.row(object)).map_or(2, |row| row.data_type.size());
+    value.to_le_bytes()[..width.min(8)].to_vec()
+}
+
+/// The former gains; their journal stays where that fails.
+async fn go_back(
+    drive: &Drive,
+    request: &Request,
+    proposed: &Proposed,
+    kept: Option<Kept>,
+    progress: &impl Progress,
+) -> Result<(), Failure> {
+    write(drive, request, proposed, (false, progress)).await?;
+    kept.map_or(Ok(()), Kept::remove)
+}
+
+/// The proposed values, or those of before, as a transaction. Its way back is the journal of the former gains.
+async fn write(
+    drive: &Drive,
+    request: &Request,
+    proposed: &Proposed,
+    (new, progress): (bool, &impl Progress),
+) -> Result<(), Failure> {
+    let mut wanted = Parameters::default();
+    for gain in &proposed.gains {
+        let value = if new { gain.after } else { gain.before };
+        wanted.values.insert(gain.object, bytes(drive, gain.object, value));
+    }
+    let (within, on_kept) = (request.within, request.on_kept);
+    let transaction = Transaction { address: false, save: false, prove: None, within, journal: None, on_kept };
+    let what = if new { "proposed gains" } else { "former gains" };
+    transaction.apply(progress, drive, &wanted, what.to_owned()).await.map(drop)
+}
