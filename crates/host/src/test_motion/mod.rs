@@ -3,15 +3,14 @@
 //!
 //! What moves here is stopped by what stops a group and `velocity`: both note what they have set in motion.
 
+mod runs;
 mod shape;
 
-use std::time::Duration;
-
 use master::group::{Group, GroupError, Phase, StreamOptions};
-use master::units::{Ramp, Rpm, Turns};
-use master::{Drive, Error, MotionOptions};
+use master::units::Turns;
 use serde::Serialize;
 
+pub use runs::{Figures, Motion, Run, Travel, run, steps};
 pub use shape::{Shape, points};
 
 /// How a run of a shape was followed, by the position that the drive shows in each cycle.
@@ -58,19 +57,4 @@ pub async fn follow(group: &mut Group, points: &[f64]) -> Result<Followed, Group
     let took_s = (network.now() - began).as_secs_f64();
     let rms = (squares / f64::from(cycles.max(1))).sqrt();
     Ok(Followed { took_s, most_deg: most * 360.0, rms_deg: rms * 360.0 })
-}
-
-/// Has the drive turn at this speed for a while, and stops it: two steps of its velocity demand, by its own ramps or by this one. The
-/// drive stays enabled.
-///
-/// # Errors
-/// Those of [`Drive::velocity`] and [`Drive::stop`].
-pub async fn steps(drive: &Drive, speed: Rpm, ramp: Option<Ramp>, hold: Duration) -> Result<(), Error> {
-    let options = MotionOptions { acceleration: ramp, deceleration: ramp, wait: false, ..MotionOptions::default() };
-    drive.velocity(speed, options).await?;
-    drive.supervise(hold).await?;
-    drive.stop().await?;
-    // What follows the stop belongs to the response.
-    drive.node().network().sleep(hold).await;
-    Ok(())
 }

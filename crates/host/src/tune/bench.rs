@@ -275,7 +275,8 @@ impl Bench {
         }
         if gone_turns > travel_turns {
             let reason = format!("the shaft is {gone_turns:.1} turns from where it stood, more than {travel_turns}");
-            return Err(self.stopped(reason).next("allow more with --travel, or less speed with --speed"));
+            let stopped = self.stopped(reason).of_kind("travel_bound");
+            return Err(stopped.next("allow more with --travel, or less speed with --speed"));
         }
         Ok(())
     }

@@ -369,7 +369,7 @@ fn steps_of_velocity_end_at_rest_with_both_edges_captured() {
     let wanted = bench.wanted(&["velocity", "target_velocity"], None);
     let (mut running, restorer) = bench.begin(&wanted).expect("it begins");
     let drive = bench.drive.clone();
-    let (done, taken) = bench.run(running.during(steps(&drive, Rpm(60.0), None, Duration::from_millis(800))));
+    let (done, taken) = bench.run(running.during(steps(&drive, Rpm(60.0), None, Duration::from_millis(800), None)));
     done.expect("it moves");
     assert!(taken.cut_off.is_none(), "{:?}", taken.cut_off);
     let capture = taken.capture;

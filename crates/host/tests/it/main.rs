@@ -6,4 +6,5 @@ mod clients;
 mod control;
 mod init;
 mod params;
+mod stopping;
 mod tune;

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
-use host::capture::merit::{self, Heating, Step};
-use host::capture::{Quantity, Running, Span, Taken, Wanted, Way};
-use host::test_motion::{Followed, Shape, follow, points, steps};
+use host::capture::merit::{self, Heating};
+use host::capture::{Quantity, Wanted};
+use host::test_motion::{Figures, Followed, Motion, Run, Shape, points, run};
 use master::Drive;
-use master::group::{AxisLimits, AxisSetup, Group, GroupError};
+use master::group::{AxisLimits, GroupError};
 use master::units::{Angle, Ramp, Rpm, parse_duration};
 use recording::{Capture, Kind};
 use serde::Serialize;
@@ -72,6 +72,9 @@ pub(crate) struct TestMotion {
     /// Limit of the acceleration; steps: the drive's own ramps without it
     #[arg(long, value_name = "RATE", value_parser = rate)]
     acceleration: Option<f64>,
+    /// Farthest that the shaft may turn from where it stands, in turns: farther points are refused, and steps are stopped there
+    #[arg(long, value_name = "TURNS", value_parser = turns)]
+    travel: Option<f64>,
     /// Distance of the shaft from its set-point beyond which it is stopped
     #[arg(long, value_name = "ANGLE", value_parser = angle, default_value = "72deg", hide_short_help = true)]
     following_error: Angle,
@@ -130,20 +133,9 @@ pub(crate) struct TestMotionReport {
 #[derive(Debug, Serialize)]
 struct RunRow {
     run: u32,
-    /// Null for steps, which have no set-point in cycles.
-    followed: Option<Followed>,
-    /// Up and down, of steps.
-    steps: Vec<Step>,
-    /// Why there are no figures of steps.
-    no_steps: Option<String>,
-    heating: Option<Heating>,
+    #[serde(flatten)]
+    figures: Figures,
     capture: CaptureRow,
-}
-
-/// What drives the shaft.
-enum Mover {
-    Steps(Drive),
-    Group(Box<Group>, Vec<f64>),
 }
 
 impl TestMotion {
@@ -151,21 +143,14 @@ impl TestMotion {
     pub(crate) async fn run(&self, context: &Context) -> Result<TestMotionReport, Failure> {
         let drive = context.known_drive(self.node).await?;
         let limits = self.limits(&drive).await?;
-        let stream = self.points(&drive, &limits).await?;
+        let motion = self.motion(&drive, &limits).await?;
         let names = self.captured(&drive).await?;
-        let usual = if stream.is_some() { self.period } else { USUAL_RATE };
+        let usual = if matches!(motion, Motion::Points { .. }) { self.period } else { USUAL_RATE };
         let wanted = self.how.wanted(context, &drive, &names, usual).await?;
-        wanted.check(&Span { duration: Duration::from_secs(60), trigger: None, pre_trigger: Duration::ZERO })?;
+        wanted.check(&motion.span())?;
         check_place(self.output.as_deref())?;
         let guard = self.guard.begin(context, &drive).await?;
-        let mover = match stream {
-            None => Ok(Mover::Steps(drive.clone())),
-            Some(points) => self.group(&drive, &limits).await.map(|group| Mover::Group(Box::new(group), points)),
-        };
-        let moved = match mover {
-            Ok(mover) => self.measured(context, &drive, mover, &wanted).await,
-            Err(failure) => Err(failure),
-        };
+        let moved = self.measured(context, (&drive, &motion), &wanted).await;
         let released = guard.end(context, &drive, false).await;
         // What failed first is what there is to know.
         let runs = moved?;
@@ -175,11 +160,6 @@ impl TestMotion {
             _ => (&limits).into(),
         };
         Ok(TestMotionReport { node: self.node.raw(), shape: self.shape_name(), limits, guard, runs })
-    }
-
-    async fn group(&self, drive: &Drive, limits: &AxisLimits) -> Result<Group, Failure> {
-        let axis = AxisSetup { drive: drive.clone(), mode: AxisSetup::best_mode(drive)?, limits: limits.clone() };
-        Ok(Group::open(&[axis], self.period, self.cycles.options()).await?)
     }
 
     /// The quantities that were named, or of the usual ones those that the model has.
@@ -217,8 +197,8 @@ impl TestMotion {
         Ok(limits)
     }
 
-    /// The points of the shape; `None` for steps.
-    async fn points(&self, drive: &Drive, limits: &AxisLimits) -> Result<Option<Vec<f64>>, Failure> {
+    /// What a run sends.
+    async fn motion(&self, drive: &Drive, limits: &AxisLimits) -> Result<Motion, Failure> {
         let by = turns_of(drive, self.by).await?.0;
         let (Rpm(rpm), time_s) = (self.speed, self.time.as_secs_f64());
         let refused = |why: String| {
@@ -233,7 +213,10 @@ impl TestMotion {
             ShapeName::Steps if rpm.abs() > self.velocity.0 => {
                 return Err(refused(format!("a speed of {rpm} r/min, and {} r/min are allowed", self.velocity.0)));
             }
-            ShapeName::Steps => return Ok(None),
+            ShapeName::Steps => {
+                let ramp = self.acceleration.map(|rate| Ramp::RpmPerSecond(rate * 60.0));
+                return Ok(Motion::Steps { speed: self.speed, ramp, hold: self.time });
+            }
             ShapeName::BackAndForth => Shape::BackAndForth { by_turns: by },
             ShapeName::Ramp => Shape::Ramp { velocity_turns_s: rpm / 60.0, hold_s: time_s },
             ShapeName::Sine => Shape::Sine { amplitude_turns: by, hz: self.frequency, periods: self.periods },
@@ -246,7 +229,11 @@ impl TestMotion {
             ShapeName::Prbs => Shape::Prbs { velocity_turns_s: rpm / 60.0, bit_s: time_s },
             ShapeName::Path => Shape::Path { points: self.recorded()? },
         };
-        Ok(Some(points(&shape, limits, self.period.as_secs_f64()).map_err(refused)?))
+        let points = points(&shape, limits, self.period.as_secs_f64()).map_err(refused)?;
+        let cyclic = self.cycles.options();
+        let motion = Motion::Points { points, limits: limits.clone(), period: self.period, cyclic };
+        self.travel.map_or(Ok(()), |travel| motion.check_travel(self.count, travel)).map_err(refused)?;
+        Ok(motion)
     }
 
     /// The position of a capture, in turns.
@@ -269,20 +256,17 @@ impl TestMotion {
     async fn measured(
         &self,
         context: &Context,
-        drive: &Drive,
-        mut mover: Mover,
+        moved: (&Drive, &Motion),
         wanted: &Wanted,
     ) -> Result<Vec<RunRow>, Failure> {
+        let restorer = host::capture::Restorer::of(moved.0);
+        context.restore_at_end(Restorer::Capture(restorer.clone()));
         let mut runs = Vec::new();
-        let moved = self.runs(context, drive, (&mut mover, wanted), &mut runs).await;
-        let ended = match mover {
-            Mover::Steps(drive) => drive.disable().await.map_err(Failure::from),
-            Mover::Group(mut group, _) => {
-                let reason = if moved.is_err() { group.explain_stop().await } else { None };
-                let closed = group.close().await.map_err(Failure::from);
-                closed.map_err(|failure| reason.into_iter().fold(failure, Failure::because))
-            }
+        let begins = |run| {
+            context.progress.show(format!("node {}: {}, run {run} of {}", self.node, self.shape_name(), self.count));
         };
+        let moved = run(moved, (wanted, &restorer), (self.count, self.travel), &mut runs, begins).await;
+        let mut runs: Vec<_> = runs.into_iter().map(|run| self.row(run)).collect();
         let left = context.restore().await.unwrap_or_default();
         let put_back = if left.is_empty() {
             Ok(())
@@ -293,7 +277,7 @@ impl TestMotion {
         };
         let saved = self.saved(&mut runs);
         // The first is what happened; the others are to be known too.
-        let failures = [moved, ended, put_back, saved].into_iter().filter_map(Result::err);
+        let failures = [moved.map_err(Failure::from), put_back, saved].into_iter().filter_map(Result::err);
         match failures.reduce(Failure::because) {
             None => Ok(runs.into_iter().map(|(row, _)| row).collect()),
             Some(failure) => {
@@ -314,74 +298,17 @@ impl TestMotion {
         Ok(())
     }
 
-    async fn runs(
-        &self,
-        context: &Context,
-        drive: &Drive,
-        (mover, wanted): (&mut Mover, &Wanted),
-        runs: &mut Vec<(RunRow, Capture)>,
-    ) -> Result<(), Failure> {
-        let restorer = host::capture::Restorer::of(drive);
-        context.restore_at_end(Restorer::Capture(restorer.clone()));
-        let mut running = match mover {
-            Mover::Steps(_) => wanted.begin(drive, &restorer).await?,
-            Mover::Group(group, _) => group.beside(wanted.begin(drive, &restorer)).await?,
-        };
-        if let Mover::Group(group, _) = mover {
-            group.enable().await?;
-        }
-        for run in 1..=self.count {
-            context.progress.show(format!("node {}: {}, run {run} of {}", self.node, self.shape_name(), self.count));
-            let (moved, taken) = self.once(mover, &mut running).await;
-            let failure = moved.as_ref().err().cloned().or(taken.cut_off.map(Failure::from));
-            runs.push(self.row(run, moved.ok().flatten(), taken.capture, running.ways()));
-            failure.map_or(Ok(()), Err)?;
-        }
-        Ok(())
-    }
-
-    async fn once(&self, mover: &mut Mover, running: &mut Running) -> (Result<Option<Followed>, Failure>, Taken) {
-        match mover {
-            Mover::Steps(drive) => {
-                let ramp = self.acceleration.map(|rate| Ramp::RpmPerSecond(rate * 60.0));
-                let (done, taken) = running.during(steps(drive, self.speed, ramp, self.time)).await;
-                (done.map(|()| None).map_err(Failure::from), taken)
-            }
-            Mover::Group(group, points) => {
-                let (done, taken) = running.during(follow(group, points)).await;
-                (done.map(Some).map_err(Failure::from), taken)
-            }
-        }
-    }
-
-    fn row(&self, run: u32, followed: Option<Followed>, mut capture: Capture, ways: &[Way]) -> (RunRow, Capture) {
-        capture.name = format!("{} {run}", self.shape_name());
-        let (steps, no_steps) = match (followed, steps_of(&capture)) {
-            (Some(_), _) => (Vec::new(), None),
-            (None, Ok(steps)) => (steps, None),
-            (None, Err(why)) => (Vec::new(), Some(why)),
-        };
-        let current = capture.trace("current_a").map(|trace| capture.points(trace).collect::<Vec<_>>());
-        let heating = current.and_then(|points| merit::heating(&points));
-        let row = RunRow { run, followed, steps, no_steps, heating, capture: CaptureRow::new(&capture, None, ways) };
+    fn row(&self, Run { number, figures, mut capture, ways }: Run) -> (RunRow, Capture) {
+        capture.name = format!("{} {number}", self.shape_name());
+        let row = RunRow { run: number, figures, capture: CaptureRow::new(&capture, None, &ways) };
         (row, capture)
     }
 }
 
-/// The figures of each change of the velocity demand.
-fn steps_of(capture: &Capture) -> Result<Vec<Step>, String> {
-    let demand = capture.trace("target_velocity_rpm").ok_or("target_velocity was not captured")?;
-    let speed = capture.trace("velocity_rpm").ok_or("velocity was not captured")?;
-    let demand: Vec<(f64, f64)> = capture.points(demand).collect();
-    let speed: Vec<(f64, f64)> = capture.points(speed).collect();
-    let changes = demand.windows(2).filter(|pair| pair[0].1 != pair[1].1);
-    let changes: Vec<(f64, f64, f64)> = changes.map(|pair| (pair[1].0, pair[0].1, pair[1].1)).collect();
-    let ends = changes.iter().skip(1).map(|(at, ..)| *at).chain([f64::INFINITY]);
-    let parts = changes.iter().zip(ends).map(|((at, from, to), end)| {
-        let part: Vec<(f64, f64)> = speed.iter().copied().filter(|(time, _)| *time < end).collect();
-        merit::step(&part, *at, *from, *to)
-    });
-    parts.collect()
+fn turns(text: &str) -> Result<f64, String> {
+    let most = 0.001..=10_000.0;
+    let turns = text.parse().ok().filter(|turns| most.contains(turns));
+    turns.ok_or_else(|| format!("expected turns from {} to {}, got '{text}'", most.start(), most.end()))
 }
 
 /// A capture from a file.
@@ -404,7 +331,9 @@ impl Report for TestMotionReport {
             }
         }
         lines.push(table.plain(paint));
-        lines.extend(runs.iter().filter_map(|row| row.no_steps.as_ref().map(|why| format!("run {}: {why}", row.run))));
+        lines.extend(
+            runs.iter().filter_map(|row| row.figures.no_steps.as_ref().map(|why| format!("run {}: {why}", row.run))),
+        );
         lines.extend(runs.iter().map(|row| row.capture.text(paint)));
         lines.join("\n")
     }
@@ -415,11 +344,11 @@ impl RunRow {
     fn figures(&self) -> Vec<(String, String, String)> {
         let mut figures = Vec::new();
         let mut add = |what: String, value: String, grid: String| figures.push((what, value, grid));
-        if let Some(Followed { took_s, most_deg, rms_deg }) = self.followed {
+        if let Some(Followed { took_s, most_deg, rms_deg }) = self.figures.followed {
             add("following error".into(), format!("{most_deg:.3} deg at most, {rms_deg:.3} deg r.m.s."), String::new());
             add("time".into(), format!("{took_s:.3} s"), String::new());
         }
-        for step in &self.steps {
+        for step in &self.figures.steps {
             let of = format!("{} to {} r/min", step.from, step.to);
             for (what, figure, unit, times) in [
                 ("rise", &step.rise_s, "ms", 1e3),
@@ -435,7 +364,7 @@ impl RunRow {
                 add(format!("{what}, {of}"), value, grid);
             }
         }
-        if let Some(Heating { rms_a, a2s }) = self.heating {
+        if let Some(Heating { rms_a, a2s }) = self.figures.heating {
             add("current".into(), format!("{rms_a:.3} A r.m.s., {a2s:.3} A²·s"), String::new());
         }
         figures

@@ -7,12 +7,13 @@
 mod another_master;
 mod blind;
 mod everything;
+mod process;
 mod second_try;
 mod stream;
 
 use std::time::Duration;
 
-use can::{Bitrate, Frame, Instant, Station};
+use can::{Bitrate, Instant};
 use cia402::ModeOfOperation;
 use devices::{Description, HostWatch, model};
 use master::base::{Base, BaseLimits, Geometry, Twist, WheelSetup};
@@ -26,47 +27,7 @@ use sim::machine::{Order, order};
 use sim::{Place, StationId, Stimulus, World, block_on};
 
 use crate::support::{INVERTER, node};
-
-/// A program with its master, which may be killed, or frozen for a while.
-#[derive(Clone)]
-struct Process {
-    network: Network,
-    killed: bool,
-    /// Until then nothing of it runs; what comes meanwhile waits.
-    frozen_until: Option<Instant>,
-    mailbox: Vec<Frame>,
-}
-
-impl Station for Process {
-    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        if self.killed {
-            return;
-        }
-        match self.frozen_until {
-            Some(until) if now < until => self.mailbox.push(*frame),
-            _ => self.network.handle_frame(frame, now),
-        }
-    }
-
-    fn handle_timeout(&mut self, now: Instant) {
-        if self.killed || self.frozen_until.is_some_and(|until| now < until) {
-            return;
-        }
-        self.frozen_until = None;
-        for frame in self.mailbox.drain(..) {
-            self.network.handle_frame(&frame, now);
-        }
-        self.network.handle_timeout(now);
-    }
-
-    fn poll_transmit(&mut self) -> Option<Frame> {
-        if self.killed || self.frozen_until.is_some() { None } else { self.network.poll_transmit() }
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        if self.killed { None } else { self.frozen_until.or_else(|| self.network.poll_timeout()) }
-    }
-}
+use process::Process;
 
 /// The nodes of one model, two of them: a group and a base have two axes.
 const NODES: [u8; 2] = [1, 2];
@@ -85,8 +46,7 @@ impl Bench {
     fn new(name: &str) -> Self {
         let mut world = World::new(Bitrate::M1, 11);
         let network = Network::new();
-        let process = Process { network: network.clone(), killed: false, frozen_until: None, mailbox: Vec::new() };
-        let process = world.add_station(process);
+        let process = world.add_station(Process::of(&network));
         let description = described(name);
         let drives = NODES.map(|number| {
             let id = node(number);
