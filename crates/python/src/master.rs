@@ -12,6 +12,8 @@ mod runner;
 mod slot;
 pub(crate) mod supervise;
 pub(crate) mod tap;
+pub(crate) mod test_motion;
+pub(crate) mod tune;
 mod value;
 pub(crate) mod whole;
 

@@ -10,7 +10,7 @@ use master::group::{Group, GroupError, Phase, StreamOptions};
 use master::units::Turns;
 use serde::Serialize;
 
-pub use runs::{Figures, Motion, Run, Travel, run, steps};
+pub use runs::{Figures, Motion, Run, Travel, limits, run, steps, usual_quantities};
 pub use shape::{Shape, points};
 
 /// How a run of a shape was followed, by the position that the drive shows in each cycle.

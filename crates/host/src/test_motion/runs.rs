@@ -14,12 +14,16 @@ use words::failure::{Failure, both};
 
 use super::{Followed, follow};
 use crate::capture::merit::{self, Heating, Step};
-use crate::capture::{Restorer, Running, Span, Taken, Wanted, Way};
+use crate::capture::{Quantity, Restorer, Running, Span, Taken, Wanted, Way};
 
 /// How often it is looked where a shaft is that turns by its drive's own ramps.
 const LOOK: Duration = Duration::from_millis(10);
 /// The ramp that is reckoned with where the drive's own is taken.
 const OWN_RAMP: Duration = Duration::from_secs(1);
+/// The acceleration of a careful beginning, in turns/s^2: 600 (r/min)/s.
+const ACCELERATION_TURNS_S2: f64 = 10.0;
+/// How soon it is reached, in s.
+const ROUNDING_S: f64 = 0.1;
 
 /// What is sent in a run.
 #[derive(Clone, Debug)]
@@ -187,6 +191,44 @@ pub async fn steps(
         Some(travel) => travel.check(drive).await,
         None => Ok(()),
     }
+}
+
+/// Limits of a motion: its velocity, its acceleration in turns/s² (that of a careful beginning, 600 (r/min)/s, without one), reached
+/// within 0.1 s, and how far the shaft may be from its set-point, in turns.
+///
+/// # Errors
+/// What of them makes no sense.
+pub fn limits(
+    Rpm(velocity_rpm): Rpm,
+    acceleration_turns_s2: Option<f64>,
+    following_error_turns: f64,
+) -> Result<AxisLimits, Failure> {
+    let acceleration_turns_s2 = acceleration_turns_s2.unwrap_or(ACCELERATION_TURNS_S2);
+    let limits = AxisLimits {
+        range_turns: None,
+        velocity_turns_s: velocity_rpm / 60.0,
+        acceleration_turns_s2,
+        jerk_turns_s3: acceleration_turns_s2 / ROUNDING_S,
+        following_error_turns,
+    };
+    limits.check(1).map_err(|error| Failure::from(GroupError::Path(error)))?;
+    Ok(limits)
+}
+
+/// What is captured of a motion where nothing is named: what its figures need, as far as the model has it.
+///
+/// # Errors
+/// The drive does not answer.
+pub async fn usual_quantities(drive: &Drive) -> Result<Vec<String>, Failure> {
+    let mut names = Vec::new();
+    for name in ["velocity", "target_velocity", "current"] {
+        match Quantity::named(drive, name).await {
+            Ok(_) => names.push(name.to_owned()),
+            Err(failure) if failure.kind == "no_such_quantity" => {}
+            Err(failure) => return Err(failure),
+        }
+    }
+    Ok(names)
 }
 
 enum Mover<'a> {

@@ -21,6 +21,7 @@ pub use measure::measure;
 pub use proposed::{Gain, Proposed, Unreachable};
 pub use report::{GainRow, MarginRow, Request, TuneReport, find};
 pub use setup::Setup;
+pub use ::tune::Objective;
 pub use twin::{Trial, Twin, motor_of};
 
 use devices::{Description, Loops};

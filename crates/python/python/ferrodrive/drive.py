@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import os
 from array import array
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 from . import _native
 from ._native import Job, model_name
-from .reports import Capture, DriveState, MotionReport
+from .reports import Capture, DriveState, MotionReport, TestMotionRun, Tuning
 
 if TYPE_CHECKING:
     from .master import Network
@@ -48,6 +48,19 @@ class _Orders:
         kept = None if journal is None else os.fspath(journal)
         whole = {**order, "quantities": list(quantities), "take": list(take), "journal": kept}
         return _native.capture(self.network._native, self.node, self.model, whole)
+
+    def _whole(
+        self,
+        begin: Callable[[Any, int, Optional[str], dict[str, Any]], Job],
+        journal: Optional[Union[str, "os.PathLike[str]"]],
+        order: dict[str, Any],
+    ) -> Job:
+        kept = None if journal is None else os.fspath(journal)
+        return begin(self.network._native, self.node, self.model, {**order, "journal": kept})
+
+
+def _runs(report: dict[str, Any]) -> list[TestMotionRun]:
+    return [{**run, "capture": _captured(run["capture"])} for run in report["runs"]]  # type: ignore[typeddict-item]
 
 
 def _captured(report: dict[str, Any]) -> Capture:
@@ -316,6 +329,126 @@ class Drive(_Orders):
         order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger, "sdo": sdo}
         return _captured(self.network._finish(self._capture(quantities, take, journal, **order)))
 
+    def test_motion(
+        self,
+        shape: str,
+        *quantities: str,
+        by: float = 90.0,
+        speed_rpm: float = 20.0,
+        frequency: float = 1.0,
+        to_frequency: float = 10.0,
+        periods: int = 3,
+        time: float = 0.5,
+        path: Sequence[tuple[float, float]] = (),
+        count: int = 1,
+        velocity_rpm: float = 60.0,
+        acceleration_rpm_s: Optional[float] = None,
+        travel_turns: Optional[float] = None,
+        following_error: float = 72.0,
+        period: float = 0.005,
+        capture_period: Optional[float] = None,
+        sdo: bool = False,
+        journal: Optional[Union[str, "os.PathLike[str]"]] = None,
+    ) -> list[TestMotionRun]:
+        """Moves it by a test motion, ``count`` times, each captured, with figures. The drive is without power afterwards, and its spare TPDOs are
+        as they were. What ``ferrodrive test-motion`` does.
+
+        :param shape: ``back-and-forth``, ``ramp``, ``sine``, ``chirp``, ``prbs``, ``path``, point by point within the limits; or ``steps`` of
+            velocity by the drive's own ramps
+        :param quantities: what is captured; without any velocity, its target and current
+        :param by: distance or amplitude in degrees
+        :param speed_rpm: of steps, ramp and prbs
+        :param frequency: of sine, the first one of chirp, in Hz
+        :param to_frequency: the last one of chirp
+        :param periods: of sine
+        :param time: that steps and ramp keep their speed, of a bit of prbs, of all of chirp, in s
+        :param path: times in s and degrees
+        :param velocity_rpm: limit of the speed
+        :param acceleration_rpm_s: limit of the acceleration in (r/min)/s; without it 600, and of steps the drive's own ramps
+        :param travel_turns: farther points are refused, and steps are stopped there
+        :param following_error: degrees from its set-point beyond which it is stopped
+        :param period: of SYNC, in which points are sent, in s
+        :param capture_period: time between two readings in s
+        :param sdo: read by SDO what cannot come by TPDO
+        :param journal: as of :meth:`capture`
+        :raises MasterError: it was stopped, or cannot be captured, with the runs that were made as ``report``
+
+        >>> runs = drive.test_motion("sine", "velocity", by=10, periods=1, count=2)
+        >>> [run["run"] for run in runs]
+        [1, 2]
+        >>> (runs[0]["followed"] or {})["most_deg"] < 10
+        True
+        """
+        order = {
+            "shape": shape,
+            "by_deg": by,
+            "speed_rpm": speed_rpm,
+            "frequency_hz": frequency,
+            "to_frequency_hz": to_frequency,
+            "periods": periods,
+            "time": time,
+            "path": list(path),
+            "count": count,
+            "velocity_rpm": velocity_rpm,
+            "acceleration_rpm_s": acceleration_rpm_s,
+            "travel_turns": travel_turns,
+            "following_error_deg": following_error,
+            "period": period,
+            "quantities": list(quantities),
+            "capture_period": capture_period or (0.001 if shape == "steps" else period),
+            "sdo": sdo,
+        }
+        return _runs(self.network._finish(self._whole(_native.test_motion, journal, order)))
+
+    def tune(
+        self,
+        *,
+        bandwidth: Optional[float] = None,
+        phase_margin: float = 40.0,
+        position: bool = False,
+        speed_rpm: float = 120.0,
+        current_a: float = 15.0,
+        travel_turns: float = 40.0,
+        period: float = 0.001,
+        torque_constant: Optional[float] = None,
+        apply: bool = False,
+        journal: Optional[Union[str, "os.PathLike[str]"]] = None,
+    ) -> Tuning:
+        """Finds gains for its loops: it is measured, a twin of it is made, gains are proposed and tried on the twin, and then on the drive. The
+        shaft turns to and fro. What ``ferrodrive tune`` does.
+
+        :param bandwidth: where the gain of the speed loop is to fall to one, in Hz; instead of a phase margin
+        :param phase_margin: degrees that are to be left there; as stiff as that allows
+        :param position: the loop of position too
+        :param speed_rpm: highest speed of the measurement
+        :param current_a: the most that the speed loop may ask for
+        :param travel_turns: farthest that the shaft may turn from where it stands
+        :param period: time between two samples in s
+        :param torque_constant: N m per A of another motor than the model's own
+        :param apply: write the values to the drive and measure once more; it has its former ones back where they are not better
+        :param journal: as of :meth:`capture`
+        :raises MasterError: it was stopped, what is not possible with this drive, or that not everything could be put back
+
+        >>> try:
+        ...     drive.tune()
+        ... except ferrodrive.MasterError as error:
+        ...     error.kind
+        'no_gains'
+        """
+        order = {
+            "bandwidth_hz": bandwidth,
+            "phase_margin_deg": phase_margin,
+            "position": position,
+            "speed_rpm": speed_rpm,
+            "current_a": current_a,
+            "travel_turns": travel_turns,
+            "period": period,
+            "torque_constant_nm_a": torque_constant,
+            "apply": apply,
+        }
+        report: Tuning = self.network._finish(self._whole(_native.tune_drive, journal, order))
+        return report
+
 
 class AsyncDrive(_Orders):
     """:class:`Drive` with coroutines, for several drives at the same time. From :meth:`Network.async_drive`. On a virtual bus the loop runs
@@ -437,3 +570,75 @@ class AsyncDrive(_Orders):
         """As :meth:`Drive.capture`."""
         order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger, "sdo": sdo}
         return _captured(await self.network._finish_soon(self._capture(quantities, take, journal, **order)))
+
+    async def test_motion(
+        self,
+        shape: str,
+        *quantities: str,
+        by: float = 90.0,
+        speed_rpm: float = 20.0,
+        frequency: float = 1.0,
+        to_frequency: float = 10.0,
+        periods: int = 3,
+        time: float = 0.5,
+        path: Sequence[tuple[float, float]] = (),
+        count: int = 1,
+        velocity_rpm: float = 60.0,
+        acceleration_rpm_s: Optional[float] = None,
+        travel_turns: Optional[float] = None,
+        following_error: float = 72.0,
+        period: float = 0.005,
+        capture_period: Optional[float] = None,
+        sdo: bool = False,
+        journal: Optional[Union[str, "os.PathLike[str]"]] = None,
+    ) -> list[TestMotionRun]:
+        """As :meth:`Drive.test_motion`."""
+        order = {
+            "shape": shape,
+            "by_deg": by,
+            "speed_rpm": speed_rpm,
+            "frequency_hz": frequency,
+            "to_frequency_hz": to_frequency,
+            "periods": periods,
+            "time": time,
+            "path": list(path),
+            "count": count,
+            "velocity_rpm": velocity_rpm,
+            "acceleration_rpm_s": acceleration_rpm_s,
+            "travel_turns": travel_turns,
+            "following_error_deg": following_error,
+            "period": period,
+            "quantities": list(quantities),
+            "capture_period": capture_period or (0.001 if shape == "steps" else period),
+            "sdo": sdo,
+        }
+        return _runs(await self.network._finish_soon(self._whole(_native.test_motion, journal, order)))
+
+    async def tune(
+        self,
+        *,
+        bandwidth: Optional[float] = None,
+        phase_margin: float = 40.0,
+        position: bool = False,
+        speed_rpm: float = 120.0,
+        current_a: float = 15.0,
+        travel_turns: float = 40.0,
+        period: float = 0.001,
+        torque_constant: Optional[float] = None,
+        apply: bool = False,
+        journal: Optional[Union[str, "os.PathLike[str]"]] = None,
+    ) -> Tuning:
+        """As :meth:`Drive.tune`."""
+        order = {
+            "bandwidth_hz": bandwidth,
+            "phase_margin_deg": phase_margin,
+            "position": position,
+            "speed_rpm": speed_rpm,
+            "current_a": current_a,
+            "travel_turns": travel_turns,
+            "period": period,
+            "torque_constant_nm_a": torque_constant,
+            "apply": apply,
+        }
+        report: Tuning = await self.network._finish_soon(self._whole(_native.tune_drive, journal, order))
+        return report

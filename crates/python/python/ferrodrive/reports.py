@@ -59,6 +59,49 @@ class Capture(TypedDict):
     parameters: dict[str, bytes]
 
 
+class TestMotionRun(TypedDict):
+    """A run of :meth:`Drive.test_motion`, as ``docs/json.md`` has it: ``followed`` of points (how long it took, and the distance from the
+    set-point), ``steps`` of steps with rise, overshoot and settling, ``heating`` of the current; and what was captured."""
+
+    run: int
+    followed: Optional[dict[str, float]]
+    steps: list[dict[str, Any]]
+    no_steps: Optional[str]
+    heating: Optional[dict[str, float]]
+    capture: Capture
+
+
+class Tuning(TypedDict):
+    """Of :meth:`Drive.tune`, as ``docs/json.md`` has it: what was found, the gains that are proposed, their margins, and the errors on the
+    twin and on the drive, before and after."""
+
+    node: int
+    model: str
+    inertia_kg_m2: float
+    dry_friction_nm: float
+    viscous_friction_nm_s: float
+    load_nm: float
+    torque_constant_nm_a: float
+    anti_resonance_hz: Optional[float]
+    resonance_hz: Optional[float]
+    loop_delay_ms: float
+    coherent: int
+    frequencies: int
+    model_off: float
+    twin_off: float
+    gain_share: float
+    peak_a: float
+    travel_turns: float
+    gains: list[dict[str, Any]]
+    before: dict[str, Any]
+    after: dict[str, Any]
+    position: Optional[dict[str, Any]]
+    twin_error: list[float]
+    drive_error: Optional[list[float]]
+    applied: bool
+    notes: list[str]
+
+
 class AxisState(TypedDict):
     """An axis of a group in its last cycle."""
 

@@ -4,10 +4,12 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use can::Bitrate;
+use canopen::NodeId;
 use host::capture::{Quantity, Restorer, Span, Taken, Trigger, Wanted, Way};
 use host::network::params::journal::default_path;
 use machine::file::pdo_id;
 use pyo3::prelude::*;
+use recording::Capture;
 use serde::Serialize;
 use words::failure::Failure;
 
@@ -40,7 +42,7 @@ pub(crate) struct CaptureOrder {
 
 /// What came of it.
 #[derive(Serialize)]
-struct Captured {
+pub(super) struct Captured {
     model: String,
     trigger_s: Option<f64>,
     time_s: Vec<f64>,
@@ -59,6 +61,41 @@ struct CapturedTrace {
     period_s: Option<f64>,
     jitter_s: Option<f64>,
     gaps: usize,
+}
+
+impl Captured {
+    pub(super) fn of(capture: &Capture, ways: &[Way]) -> Self {
+        let traces = capture.traces.iter().zip(ways).map(|(trace, way)| CapturedTrace {
+            quantity: trace.quantity.clone(),
+            unit: trace.unit.clone(),
+            by: match way {
+                Way::Tpdo(pdo) => pdo.to_string(),
+                Way::Sdo => "SDO".to_owned(),
+            },
+            values: trace.values.iter().map(|value| known(*value)).collect(),
+            period_s: known(trace.period_s),
+            jitter_s: known(trace.jitter_s),
+            gaps: trace.gaps,
+        });
+        let objects = capture.parameters.iter().map(|(object, bytes)| (object.to_string(), bytes.clone()));
+        let (model, trigger_s, time_s) = (capture.model.clone(), capture.trigger_s, capture.time_s.clone());
+        Self { model, trigger_s, time_s, traces: traces.collect(), objects: objects.collect() }
+    }
+}
+
+/// What could not be put back.
+pub(super) fn not_put_back(node: NodeId, left: &[String]) -> Option<Failure> {
+    (!left.is_empty()).then(|| {
+        Failure::new(format!("node {node}: not everything was put back"))
+            .of_kind("not_put_back")
+            .at_node(node)
+            .next("when it answers again: network.params(node).rollback()")
+    })
+}
+
+/// With what could not be put back.
+pub(super) fn with_left(failure: Failure, left: &[String]) -> Failure {
+    left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}")))
 }
 
 /// Captures quantities of a drive, and puts everything back.
@@ -100,34 +137,10 @@ pub(crate) fn capture(
         let mut running = wanted.begin(&drive, &restorer).await?;
         let taken = running.next(&span).await;
         let left = restorer.restore().await;
-        let not_put_back = (!left.is_empty()).then(|| {
-            Failure::new(format!("node {}: not everything was put back", asked.node))
-                .of_kind("not_put_back")
-                .at_node(drive.node().id())
-                .next("when it answers again: network.params(node).rollback()")
-        });
-        let with_left = |failure: Failure| {
-            left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}")))
-        };
-        let Taken { capture, cut_off } = taken.map_err(with_left)?;
-        let traces = capture.traces.iter().zip(running.ways()).map(|(trace, way)| CapturedTrace {
-            quantity: trace.quantity.clone(),
-            unit: trace.unit.clone(),
-            by: match way {
-                Way::Tpdo(pdo) => pdo.to_string(),
-                Way::Sdo => "SDO".to_owned(),
-            },
-            values: trace.values.iter().map(|value| known(*value)).collect(),
-            period_s: known(trace.period_s),
-            jitter_s: known(trace.jitter_s),
-            gaps: trace.gaps,
-        });
-        let objects = capture.parameters.iter().map(|(object, bytes)| (object.to_string(), bytes.clone()));
-        let (model, trigger_s, time_s) = (capture.model.clone(), capture.trigger_s, capture.time_s.clone());
-        let value =
-            Value::report(&Captured { model, trigger_s, time_s, traces: traces.collect(), objects: objects.collect() });
-        match cut_off.or(not_put_back).map(with_left) {
-            Some(failure) => Err(Trouble::Reported(failure, Box::new(value))),
+        let Taken { capture, cut_off } = taken.map_err(|failure| with_left(failure, &left))?;
+        let value = Value::report(&Captured::of(&capture, running.ways()));
+        match cut_off.or(not_put_back(asked.node, &left)) {
+            Some(failure) => Err(Trouble::Reported(with_left(failure, &left), Box::new(value))),
             None => Ok(value),
         }
     })

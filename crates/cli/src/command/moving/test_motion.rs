@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
+use host::capture::Wanted;
 use host::capture::merit::{self, Heating};
-use host::capture::{Quantity, Wanted};
-use host::test_motion::{Figures, Followed, Motion, Run, Shape, points, run};
+use host::test_motion::{Figures, Followed, Motion, Run, Shape, limits, points, run, usual_quantities};
 use master::Drive;
-use master::group::{AxisLimits, GroupError};
+use master::group::AxisLimits;
 use master::units::{Angle, Ramp, Rpm, parse_duration};
 use recording::{Capture, Kind};
 use serde::Serialize;
@@ -114,11 +114,6 @@ enum ShapeName {
     Path,
 }
 
-/// The acceleration of a careful beginning, in turns/s^2: 600 (r/min)/s.
-const ACCELERATION_TURNS_S2: f64 = 10.0;
-/// How soon it is reached, in s.
-const ROUNDING_S: f64 = 0.1;
-
 /// What was moved, and how.
 #[derive(Debug, Serialize)]
 pub(crate) struct TestMotionReport {
@@ -142,9 +137,13 @@ impl TestMotion {
     /// Moves, captures, and reports each run.
     pub(crate) async fn run(&self, context: &Context) -> Result<TestMotionReport, Failure> {
         let drive = context.known_drive(self.node).await?;
-        let limits = self.limits(&drive).await?;
+        let following = turns_of(&drive, self.following_error).await?.0.abs();
+        let limits = limits(self.velocity, self.acceleration, following)?;
         let motion = self.motion(&drive, &limits).await?;
-        let names = self.captured(&drive).await?;
+        let names = match self.capture.is_empty() {
+            true => usual_quantities(&drive).await?,
+            false => self.capture.clone(),
+        };
         let usual = if matches!(motion, Motion::Points { .. }) { self.period } else { USUAL_RATE };
         let wanted = self.how.wanted(context, &drive, &names, usual).await?;
         wanted.check(&motion.span())?;
@@ -162,39 +161,9 @@ impl TestMotion {
         Ok(TestMotionReport { node: self.node.raw(), shape: self.shape_name(), limits, guard, runs })
     }
 
-    /// The quantities that were named, or of the usual ones those that the model has.
-    async fn captured(&self, drive: &Drive) -> Result<Vec<String>, Failure> {
-        if !self.capture.is_empty() {
-            return Ok(self.capture.clone());
-        }
-        let mut names = Vec::new();
-        for name in ["velocity", "target_velocity", "current"] {
-            match Quantity::named(drive, name).await {
-                Ok(_) => names.push(name.to_owned()),
-                Err(failure) if failure.kind == "no_such_quantity" => {}
-                Err(failure) => return Err(failure.into()),
-            }
-        }
-        Ok(names)
-    }
-
     fn shape_name(&self) -> String {
         let value = clap::ValueEnum::to_possible_value(&self.shape);
         value.map_or_else(String::new, |value| value.get_name().to_owned())
-    }
-
-    async fn limits(&self, drive: &Drive) -> Result<AxisLimits, Failure> {
-        let acceleration_turns_s2 = self.acceleration.unwrap_or(ACCELERATION_TURNS_S2);
-        let Rpm(velocity_rpm) = self.velocity;
-        let limits = AxisLimits {
-            range_turns: None,
-            velocity_turns_s: velocity_rpm / 60.0,
-            acceleration_turns_s2,
-            jerk_turns_s3: acceleration_turns_s2 / ROUNDING_S,
-            following_error_turns: turns_of(drive, self.following_error).await?.0.abs(),
-        };
-        limits.check(1).map_err(|error| Failure::from(GroupError::Path(error)))?;
-        Ok(limits)
     }
 
     /// What a run sends.

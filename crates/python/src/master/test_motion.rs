@@ -1,0 +1,170 @@
+//! Test motions of a drive, for Python: the parts are those of `ferrodrive test-motion`.
+
+use std::path::PathBuf;
+
+use can::Bitrate;
+use host::capture::{Quantity, Restorer, Wanted};
+use host::network::params::journal::default_path;
+use host::test_motion::{Figures, Motion, Run, Shape, limits, points, run, usual_quantities};
+use master::cyclic::CyclicOptions;
+use master::units::{Ramp, Rpm};
+use pyo3::prelude::*;
+use serde::Serialize;
+use words::failure::Failure;
+
+use super::capture::{Captured, not_put_back, with_left};
+use super::job::Trouble;
+use super::value::Value;
+use super::whole::AskedDrive;
+use super::{Job, Network, duration};
+use crate::failure::bad_value;
+
+/// What is to be moved, in plain values.
+#[derive(FromPyObject)]
+pub(crate) struct TestMotionOrder {
+    #[pyo3(item)]
+    shape: String,
+    #[pyo3(item)]
+    by_deg: f64,
+    #[pyo3(item)]
+    speed_rpm: f64,
+    #[pyo3(item)]
+    frequency_hz: f64,
+    #[pyo3(item)]
+    to_frequency_hz: f64,
+    #[pyo3(item)]
+    periods: u32,
+    #[pyo3(item)]
+    time: f64,
+    /// Times in s, and degrees.
+    #[pyo3(item)]
+    path: Vec<(f64, f64)>,
+    #[pyo3(item)]
+    count: u32,
+    #[pyo3(item)]
+    velocity_rpm: f64,
+    #[pyo3(item)]
+    acceleration_rpm_s: Option<f64>,
+    #[pyo3(item)]
+    travel_turns: Option<f64>,
+    #[pyo3(item)]
+    following_error_deg: f64,
+    #[pyo3(item)]
+    period: f64,
+    #[pyo3(item)]
+    quantities: Vec<String>,
+    #[pyo3(item)]
+    capture_period: f64,
+    #[pyo3(item)]
+    sdo: bool,
+    #[pyo3(item)]
+    journal: Option<PathBuf>,
+}
+
+/// What came of it.
+#[derive(Serialize)]
+struct TestMotionReport {
+    runs: Vec<RunReport>,
+}
+
+#[derive(Serialize)]
+struct RunReport {
+    run: u32,
+    #[serde(flatten)]
+    figures: Figures,
+    capture: Captured,
+}
+
+impl TestMotionOrder {
+    fn motion(&self) -> Result<Motion, String> {
+        let (speed, acceleration) = (Rpm(self.speed_rpm), self.acceleration_rpm_s);
+        let hold = std::time::Duration::try_from_secs_f64(self.time).map_err(|error| error.to_string())?;
+        let limits =
+            limits(Rpm(self.velocity_rpm), acceleration.map(|rate| rate / 60.0), self.following_error_deg / 360.0);
+        let limits = limits.map_err(|failure| failure.what)?;
+        let (amplitude_turns, velocity_turns_s) = (self.by_deg / 360.0, self.speed_rpm / 60.0);
+        let shape = match self.shape.as_str() {
+            "steps" if speed.0.abs() > self.velocity_rpm => {
+                return Err(format!(
+                    "steps of {} r/min, and {} r/min are allowed: velocity_rpm",
+                    speed.0, self.velocity_rpm
+                ));
+            }
+            "steps" => return Ok(Motion::Steps { speed, ramp: acceleration.map(Ramp::RpmPerSecond), hold }),
+            "back-and-forth" => Shape::BackAndForth { by_turns: amplitude_turns },
+            "ramp" => Shape::Ramp { velocity_turns_s, hold_s: self.time },
+            "sine" => Shape::Sine { amplitude_turns, hz: self.frequency_hz, periods: self.periods },
+            "chirp" => Shape::Chirp {
+                amplitude_turns,
+                from_hz: self.frequency_hz,
+                to_hz: self.to_frequency_hz,
+                duration_s: self.time,
+            },
+            "prbs" => Shape::Prbs { velocity_turns_s, bit_s: self.time },
+            "path" => Shape::Path { points: self.path.iter().map(|(at, deg)| (*at, deg / 360.0)).collect() },
+            other => {
+                return Err(format!(
+                    "expected a shape of steps, back-and-forth, ramp, sine, chirp, prbs and path, got {other:?}"
+                ));
+            }
+        };
+        let period = std::time::Duration::try_from_secs_f64(self.period).map_err(|error| error.to_string())?;
+        let points = points(&shape, &limits, self.period)?;
+        Ok(Motion::Points { points, limits, period, cyclic: CyclicOptions::default() })
+    }
+}
+
+/// Makes runs of a test motion, each captured, and puts everything back.
+#[pyfunction]
+pub(crate) fn test_motion(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    order: TestMotionOrder,
+) -> PyResult<Job> {
+    let asked = AskedDrive::of(network.get(), node, model)?;
+    let bitrate = network.get().bitrate(py)?.unwrap_or(Bitrate::K500);
+    let motion = order.motion().map_err(bad_value)?;
+    order.travel_turns.map_or(Ok(()), |travel| motion.check_travel(order.count, travel)).map_err(bad_value)?;
+    let journal = order.journal.unwrap_or_else(|| default_path(asked.node));
+    let mut wanted = Wanted {
+        quantities: Vec::new(),
+        period: duration(order.capture_period)?,
+        bitrate,
+        take: Vec::new(),
+        by_sdo: order.sdo,
+        // A virtual bus ends with the program, and nothing is left to go back to.
+        journal: (!asked.is_virtual).then_some(journal),
+        on_kept: |_| (),
+    };
+    network.get().begin_said(py, async move {
+        let drive = asked.drive().await?;
+        let names = if order.quantities.is_empty() { usual_quantities(&drive).await? } else { order.quantities };
+        for name in &names {
+            wanted.quantities.push(Quantity::named(&drive, name).await?);
+        }
+        wanted.check(&motion.span())?;
+        let guarded = matches!(motion, Motion::Steps { .. });
+        if guarded {
+            drive.guard(master::drive::SwitchedOff::Leave).await.map_err(Failure::from)?;
+        }
+        let (restorer, mut runs) = (Restorer::of(&drive), Vec::new());
+        let how = (order.count, order.travel_turns);
+        let moved = run((&drive, &motion), (&wanted, &restorer), how, &mut runs, |_| ()).await;
+        let left = restorer.restore().await;
+        // One that was not seen to stand keeps its watch.
+        let released = if guarded && moved.is_ok() { drive.release_guard().await } else { Ok(()) };
+        let rows = runs.into_iter().map(|Run { number, figures, capture, ways }| RunReport {
+            run: number,
+            figures,
+            capture: Captured::of(&capture, &ways),
+        });
+        let value = Value::report(&TestMotionReport { runs: rows.collect() });
+        let failed = moved.err().or(not_put_back(asked.node, &left)).or(released.err().map(Failure::from));
+        match failed {
+            Some(failure) => Err(Trouble::Reported(with_left(failure, &left), Box::new(value))),
+            None => Ok(value),
+        }
+    })
+}
