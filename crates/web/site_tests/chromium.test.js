@@ -1,90 +1,20 @@
 // The page in headless Chromium, from a folder below a static host's root: the same runs, a motion, and a page without a network.
 
 import assert from "node:assert/strict";
-import { execFileSync, spawn } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { createServer } from "node:http";
-import { tmpdir } from "node:os";
-import { extname, join, normalize } from "node:path";
+import { execFileSync } from "node:child_process";
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
 import { after, before, test } from "node:test";
 
-const { SITE, FERRODRIVE, SCENARIOS, PICTURES } = process.env;
-const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm", ".tgz": "application/gzip" };
-/** A loaded machine is slow; what hangs is ended. */
-const PATIENCE_MS = 120_000;
+import { address, asked, begin, end, go, picture, run, server, until } from "../site_tools/browser.js";
 
-let server, driver, session, profile, address;
-const asked = [];
+const { FERRODRIVE, SCENARIOS } = process.env;
 
-function serve() {
-  server = createServer((request, answer) => {
-    const path = new URL(request.url, "http://host").pathname;
-    asked.push(path);
-    const name = normalize(path.replace(/^\/try\//, "")) || "index.html";
-    try {
-      const content = readFileSync(join(SITE, name === "." ? "index.html" : name));
-      answer.writeHead(200, { "content-type": TYPES[extname(name)] ?? "text/html" }).end(content);
-    } catch {
-      answer.writeHead(404).end();
-    }
-  });
-  return new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
-}
-
-async function webdriver(method, path, body) {
-  const answer = await fetch(`${driver.address}/session${path}`, { method, body: body && JSON.stringify(body) });
-  const { value } = await answer.json();
-  if (value?.error) throw new Error(`${value.error}: ${value.message}`);
-  return value;
-}
-
-const run = (script, ...args) => webdriver("POST", `/${session}/execute/async`, { script: `const done = arguments[arguments.length - 1]; (async () => { ${script} })().then(done, (error) => done({ failed: String(error) }));`, args });
-
-async function until(what, script, ...args) {
-  const end = performance.now() + PATIENCE_MS;
-  for (;;) {
-    const value = await run(script, ...args);
-    if (value && !value.failed) return value;
-    if (performance.now() > end) {
-      await picture("failed");
-      throw new Error(`${what}: ${JSON.stringify(value)}; the page: ${await run("return document.body.innerText.slice(0, 2000)")}`);
-    }
-    await new Promise((resolve) => setTimeout(resolve, 50));
-  }
-}
-
-async function picture(name) {
-  if (PICTURES) writeFileSync(join(PICTURES, `web_${name}.png`), Buffer.from(await webdriver("GET", `/${session}/screenshot`), "base64"));
-}
-
-before(async () => {
-  await serve();
-  address = `http://127.0.0.1:${server.address().port}/try/`;
-  profile = mkdtempSync(join(tmpdir(), "ferrodrive-web-"));
-  const child = spawn("chromedriver", ["--port=0"], { stdio: ["ignore", "pipe", "ignore"] });
-  const port = await new Promise((resolve, reject) => {
-    child.stdout.on("data", (said) => {
-      const found = /successfully on port (\d+)/.exec(String(said));
-      if (found) resolve(found[1]);
-    });
-    child.on("error", reject);
-  });
-  driver = { child, address: `http://127.0.0.1:${port}` };
-  const args = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking", "--no-first-run", "--window-size=1280,900", `--user-data-dir=${profile}`];
-  const made = await fetch(`${driver.address}/session`, { method: "POST", body: JSON.stringify({ capabilities: { alwaysMatch: { "goog:chromeOptions": { args }, timeouts: { script: PATIENCE_MS } } } }) });
-  session = (await made.json()).value.sessionId;
-});
-
-after(async () => {
-  if (session) await webdriver("DELETE", `/${session}`).catch(() => {});
-  driver?.child.kill();
-  server?.close();
-  server?.closeAllConnections();
-  if (profile) rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
-});
+before(() => begin());
+after(end);
 
 test("the page finds its drives and turns one of them, and stops it", async () => {
-  await webdriver("POST", `/${session}/url`, { url: address });
+  await go(address);
   await until("four drives", "return document.querySelectorAll('#view table tbody tr').length >= 4");
   await picture("bus");
   const { first_motion_ms } = await until(
@@ -167,7 +97,7 @@ test("a data sheet that is dropped on the page joins the machine at the next fre
 });
 
 test("a machine that is refused says why, and the first one stands in for it", async () => {
-  await webdriver("POST", `/${session}/url`, { url: `${address}?refused#machine=${encodeURIComponent("[[drive]]\nmodel = 'zlac9'\nnode = 4\n")}` });
+  await go(`${address}?refused#machine=${encodeURIComponent("[[drive]]\nmodel = 'zlac9'\nnode = 4\n")}`);
   await until("why", "return /refused.*line 2.*zlac9/s.test(document.getElementById('machine-status').innerText)");
   await until("four drives", "return document.querySelectorAll('#view table tbody tr').length >= 4");
   await picture("refused");
@@ -175,7 +105,7 @@ test("a machine that is refused says why, and the first one stands in for it", a
 
 test("a link holds a machine, which its server never sees", async () => {
   const machine = '[[drive]]\nmodel = "zlim42c"\nnode = 77\n';
-  await webdriver("POST", `/${session}/url`, { url: `${address}?again#machine=${encodeURIComponent(machine)}` });
+  await go(`${address}?again#machine=${encodeURIComponent(machine)}`);
   await until("node 77 alone", "return document.querySelectorAll('#view table tbody tr').length === 1 && /77/.test(document.querySelector('#view table tbody').innerText)");
   assert.equal(asked.some((path) => path.includes("zlim")), false);
   await run("sessionStorage.clear(); return true");
@@ -186,6 +116,6 @@ test("once loaded the page works without a network, and has asked for nothing bu
   assert.deepEqual(asked.filter((path) => !path.startsWith("/try/") && path !== "/favicon.ico"), []);
   server.close();
   server.closeAllConnections();
-  await webdriver("POST", `/${session}/url`, { url: address });
+  await go(address);
   await until("four drives, offline", "return document.querySelectorAll('#view table tbody tr').length >= 4");
 });

@@ -1,0 +1,91 @@
+// Headless Chromium with the page of SITE, from a folder below a static host's root, moved by its WebDriver.
+
+import { spawn } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { createServer } from "node:http";
+import { tmpdir } from "node:os";
+import { extname, join, normalize } from "node:path";
+
+const { SITE, PICTURES } = process.env;
+const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm", ".tgz": "application/gzip" };
+/** A loaded machine is slow; what hangs is ended. */
+const PATIENCE_MS = 120_000;
+
+let driver, session, profile;
+/** The paths that the browser has asked for. */
+export const asked = [];
+export let server, address;
+
+/** `answered` may answer a request in place of the folder, by returning true; `changed` may change the text of a file. */
+function serve({ answered = () => false, changed = (_, content) => content }) {
+  server = createServer((request, answer) => {
+    const path = new URL(request.url, "http://host").pathname;
+    asked.push(path);
+    if (answered(path, answer)) return;
+    const name = normalize(path.replace(/^\/try\//, "")) || "index.html";
+    try {
+      const content = readFileSync(join(SITE, name === "." ? "index.html" : name));
+      answer.writeHead(200, { "content-type": TYPES[extname(name)] ?? "text/html" }).end(changed(name, content));
+    } catch {
+      answer.writeHead(404).end();
+    }
+  });
+  return new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+}
+
+async function webdriver(method, path, body) {
+  const answer = await fetch(`${driver.address}/session${path}`, { method, body: body && JSON.stringify(body) });
+  const { value } = await answer.json();
+  if (value?.error) throw new Error(`${value.error}: ${value.message}`);
+  return value;
+}
+
+/** A command of WebDriver to the session. */
+export const command = (method, path, body) => webdriver(method, `/${session}${path}`, body);
+
+export const go = (url) => command("POST", "/url", { url });
+
+export const run = (script, ...args) => command("POST", "/execute/async", { script: `const done = arguments[arguments.length - 1]; (async () => { ${script} })().then(done, (error) => done({ failed: String(error) }));`, args });
+
+export async function until(what, script, ...args) {
+  const end = performance.now() + PATIENCE_MS;
+  for (;;) {
+    const value = await run(script, ...args);
+    if (value && !value.failed) return value;
+    if (performance.now() > end) {
+      await picture("failed");
+      throw new Error(`${what}: ${JSON.stringify(value)}; the page: ${await run("return document.body.innerText.slice(0, 2000)")}`);
+    }
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+}
+
+export async function picture(name) {
+  if (PICTURES) writeFileSync(join(PICTURES, `web_${name}.png`), Buffer.from(await command("GET", "/screenshot"), "base64"));
+}
+
+export async function begin(serving = {}) {
+  await serve(serving);
+  address = `http://127.0.0.1:${server.address().port}/try/`;
+  profile = mkdtempSync(join(tmpdir(), "ferrodrive-web-"));
+  const child = spawn("chromedriver", ["--port=0"], { stdio: ["ignore", "pipe", "ignore"] });
+  const port = await new Promise((resolve, reject) => {
+    child.stdout.on("data", (said) => {
+      const found = /successfully on port (\d+)/.exec(String(said));
+      if (found) resolve(found[1]);
+    });
+    child.on("error", reject);
+  });
+  driver = { child, address: `http://127.0.0.1:${port}` };
+  const args = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking", "--no-first-run", "--window-size=1280,900", `--user-data-dir=${profile}`];
+  const made = await fetch(`${driver.address}/session`, { method: "POST", body: JSON.stringify({ capabilities: { alwaysMatch: { "goog:chromeOptions": { args }, timeouts: { script: PATIENCE_MS } } } }) });
+  session = (await made.json()).value.sessionId;
+}
+
+export async function end() {
+  if (session) await webdriver("DELETE", `/${session}`).catch(() => {});
+  driver?.child.kill();
+  server?.close();
+  server?.closeAllConnections();
+  if (profile) rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
+}
