@@ -135,7 +135,7 @@ fn index(page: &str, own: &Path) -> Result<String, String> {
     let changes = [
         ("<html lang=\"en\">", "<html lang=\"en\" data-worker=\"worker.js\">".to_owned()),
         ("<meta charset=\"utf-8\">\n", format!("<meta charset=\"utf-8\">\n{head}")),
-        ("</head>", "<link rel=\"stylesheet\" href=\"web.css\">\n<script type=\"module\" src=\"machines.js\"></script>\n</head>".to_owned()),
+        ("</head>", "<link rel=\"stylesheet\" href=\"web.css\">\n<script type=\"module\" src=\"machines.js\"></script>\n<script type=\"module\" src=\"serial.js\"></script>\n</head>".to_owned()),
     ];
     changes.iter().try_fold(page.to_owned(), |page, (from, to)| {
         if page.matches(from).count() != 1 {

@@ -3,6 +3,8 @@
 
 /** The worker of a page without a server. */
 const worker_at = globalThis.document?.documentElement.dataset.worker;
+/** The serial adapter that this tab has in place of virtual drives, in such a page. */
+const serial = worker_at ? JSON.parse(sessionStorage.getItem("serial")) : null;
 
 /** A host behind a socket: `heard` and `closed` are called with each message, and when the connection is lost. */
 function overSocket(heard, closed) {
@@ -25,7 +27,7 @@ const beginning = new Promise((resolve) => (begun = resolve));
 
 /** The machine lives as long as its worker: a connection that is opened again is a new session with it. */
 function inWorker(heard, closed) {
-  worker ??= new Worker(worker_at, { type: "module" });
+  worker ??= new Worker(serial ? "serial_worker.js" : worker_at, { type: "module" });
   const mine = worker;
   const lose = (why) => {
     if (worker !== mine) return;
@@ -41,7 +43,12 @@ function inWorker(heard, closed) {
     else if (data.ended !== undefined) {
       // Not again and again: the next one is the first one.
       if (data.refused) sessionStorage.removeItem("machine");
-      lose(data.refused ? `The machine was refused. ${data.ended}` : `The virtual machine has ended, and begins anew: ${data.ended}`);
+      if (serial) lose(`The host in this page has ended, and what it moved stops by its own watch alone: ${data.ended}`);
+      else lose(data.refused ? `The machine was refused. ${data.ended}` : `The virtual machine has ended, and begins anew: ${data.ended}`);
+    } else if (data.event !== undefined) {
+      dispatchEvent(new CustomEvent(data.event, { detail: data.detail }));
+      // The session is over; the host goes on.
+      if (data.closes) closed();
     } else {
       answers.get(data.answer)?.resolve(new Response(data.body, { status: data.status, headers: { "content-type": data.kind } }));
       answers.delete(data.answer);
@@ -53,8 +60,12 @@ function inWorker(heard, closed) {
   return { isOpen: () => worker === mine, send: (text) => mine.postMessage({ say: text }), close: () => {} };
 }
 
-/** The machine file that this tab keeps, and data sheets that it names; a base with two wheels, and two axes, at first. */
+/** Hands a message to the worker, behind those before. */
+export const tellWorker = (message) => worker?.postMessage(message);
+
+/** The adapter, or the machine file that this tab keeps, and data sheets that it names; a base with two wheels, and two axes, at first. */
 function machine() {
+  if (serial) return { serial };
   const kept = sessionStorage.getItem("machine");
   return kept ? JSON.parse(kept) : { machine: document.getElementById("machine").textContent, files: {} };
 }

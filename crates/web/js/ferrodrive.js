@@ -34,8 +34,8 @@ async function compileFrom(url) {
 const bytes = (body) => (typeof body === "string" ? new TextEncoder().encode(body) : new Uint8Array(body));
 const text = (body) => new TextDecoder().decode(body);
 
-/** One instance of the module: calls are a line of JSON and a body, and so are their answers. */
-class Library {
+/** For the workers of the page. One instance of the module: calls are a line of JSON and a body, and so are their answers. */
+export class Library {
   static async make() {
     const library = new Library();
     library.exports = (await WebAssembly.instantiate(await compile(), {})).exports;

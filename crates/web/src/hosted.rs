@@ -63,10 +63,10 @@ impl Hosted {
         self.conversation = Some(Conversation { work: Task::new(boxed(work)), said, sending });
     }
 
-    /// Ends the conversation: what the page moved is stopped.
-    pub(crate) fn leave(&mut self) {
-        self.conversation = None;
+    /// Ends the conversation, if there is one: what the page moved is stopped.
+    pub(crate) fn leave(&mut self) -> bool {
         self.sent.clear();
+        self.conversation.take().is_some()
     }
 
     /// Hands on a message of the page, as it would send it over the studio's socket. Without a conversation it is lost.

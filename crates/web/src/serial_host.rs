@@ -64,6 +64,8 @@ pub struct SerialHost {
     /// A page waits for the host.
     is_page_waiting: bool,
     garbled: u32,
+    /// It has been said that the adapter refuses frames, since it opened its channel.
+    is_refusal_said: bool,
     let_go: Option<LetGo>,
     now: Instant,
 }
@@ -113,6 +115,7 @@ impl SerialHost {
             hosted: None,
             is_page_waiting: false,
             garbled: 0,
+            is_refusal_said: false,
             let_go: None,
             now,
         })
@@ -224,8 +227,10 @@ impl SerialHost {
     fn end_session(&mut self, why: String, moving: Vec<String>) {
         self.is_page_waiting = false;
         let Some(hosted) = &mut self.hosted else { return };
-        hosted.leave();
-        self.let_go = Some(LetGo { why, moving });
+        // Once for each session, however often the adapter refuses.
+        if hosted.leave() || !moving.is_empty() {
+            self.let_go = Some(LetGo { why, moving });
+        }
         self.settle();
     }
 
@@ -243,7 +248,9 @@ impl SerialHost {
                 Event::FrameRefused => {
                     self.wire.update(|health| health.frames_lost += 1);
                     let why = "The adapter answered BEL: a frame is lost. Is another node on, is the bit rate right, is the bus terminated?";
-                    self.distrust(why);
+                    if !std::mem::replace(&mut self.is_refusal_said, true) || !self.network.moved().is_empty() {
+                        self.distrust(why);
+                    }
                 }
                 Event::Malformed(_, malformed) => {
                     self.garbled += 1;
@@ -256,7 +263,7 @@ impl SerialHost {
     }
 
     fn handle_opened(&mut self) {
-        (self.is_open, self.lost, self.garbled) = (true, None, 0);
+        (self.is_open, self.lost, self.garbled, self.is_refusal_said) = (true, None, 0, false);
         self.wire.update(|health| health.state = None);
         if self.hosted.is_some() {
             return self.wire.tell("the connection to the bus is back");

@@ -1,0 +1,115 @@
+// Real drives by a cable: a serial CAN adapter (slcan), which a person chooses, and what is said before anything moves by it.
+
+import { choice } from "./page/choice.js";
+import { h, renew, setText, toggle } from "./page/dom.js";
+import { tellWorker } from "./page/transport.js";
+
+const BITRATES = { "10k": 10_000, "20k": 20_000, "50k": 50_000, "100k": 100_000, "125k": 125_000, "250k": 250_000, "500k": 500_000, "800k": 800_000, "1M": 1_000_000 };
+const kept = JSON.parse(sessionStorage.getItem("serial"));
+
+const rate = Object.keys(BITRATES).find((text) => BITRATES[text] === kept?.bitrate) ?? "500k";
+const bitrate = choice("serial-bitrate", "Bit rate of the bus", Object.keys(BITRATES).map((text) => ({ value: text, text })), { value: rate });
+const baud = h("input", { id: "serial-baud", type: "number", min: "9600", max: "4000000", value: String(kept?.baud ?? 115_200), inputmode: "numeric" });
+const ready = toggle("serial-ready", "An emergency stop that takes the power away is within reach", false, () => (choose.disabled = !ready.checked));
+const choose = h("button", { type: "button", id: "serial-choose", class: "primary", disabled: true, onclick: begin }, "Choose the adapter …");
+const refused = h("p", { class: "bad", role: "alert", id: "serial-refused" });
+
+/** The page asks for the port on a click, as browsers require, and its worker opens it. One adapter at a time. */
+async function begin() {
+  setText(refused, "");
+  try {
+    const port = await navigator.serial.requestPort();
+    for (const other of await navigator.serial.getPorts()) if (other !== port) await other.forget();
+    const { usbVendorId, usbProductId } = port.getInfo();
+    const id = (number) => number.toString(16).padStart(4, "0");
+    const name = usbVendorId === undefined ? "serial adapter" : `USB ${id(usbVendorId)}:${id(usbProductId)}`;
+    sessionStorage.setItem("serial", JSON.stringify({ name, bitrate: BITRATES[bitrate.value], baud: Number(baud.value) }));
+    location.reload();
+  } catch (error) {
+    setText(refused, error.name === "NotFoundError" ? "No adapter was chosen." : `The adapter cannot be used: ${error.message}`);
+  }
+}
+
+const lacking = !isSecureContext
+  ? "Browsers open serial ports for pages from https or from this machine alone: this one is neither."
+  : "This browser has no Web Serial. Chrome, Edge, Opera and Chromium on a computer have it; Firefox and Safari do not. Without it the program ferrodrive reaches the same adapters.";
+
+const item = (text) => h("li", {}, text);
+const dialog = h(
+  "dialog",
+  { id: "serial", "aria-label": "Real drives by a cable" },
+  h("button", { type: "button", class: "close", onclick: () => dialog.close() }, "Close"),
+  h("h2", {}, "Real drives by a cable"),
+  h("p", {}, "A USB or serial CAN adapter that speaks slcan (CANable with slcan firmware, LAWICEL and alike). Real motors will turn."),
+  h("h3", {}, "This page stops what it moved when"),
+  h("ul", {}, item("you press STOP, Esc or Space"), item("the tab is hidden, closed or loaded again"), item("the page hangs for 3 s (a jog: 0.2 s)"), item("the machine wakes, or the browser was held up for 1 s"), item("the adapter refuses frames, or sends what is not slcan")),
+  h("h3", {}, "It cannot stop anything when"),
+  h("ul", {}, item("the machine sleeps, or the browser crashes"), item("the adapter or its cable is pulled out"), item("the tab is closed and the browser lets nothing more be sent")),
+  h("p", {}, "Then only a drive's own watch over this page stops it. The page sets that watch before a drive moves, and shows for each drive what it does. A drive that has none moves only after you have accepted that."),
+  ...("serial" in navigator
+    ? [
+        h("div", { class: "row" }, h("span", {}, "Bit rate of the bus ", bitrate), h("label", {}, "Speed of a serial line ", baud, " baud")),
+        h("p", { class: "row" }, ready, choose),
+        refused,
+      ]
+    : [h("p", { class: "bad", id: "serial-lacking" }, lacking)]),
+);
+document.body.append(dialog);
+
+const top = document.getElementById("top");
+const status = h("span", { id: "serial-status", role: "status" });
+top.append(h("button", { type: "button", id: "serial-open", title: "Real drives, by a serial CAN adapter", onclick: () => dialog.show() }, "Cable …"), status);
+
+const alert = h("div", { id: "serial-alert", role: "alert", hidden: true });
+document.getElementById("alerts").prepend(alert);
+
+if (kept) attach();
+
+/** This tab has an adapter in place of virtual drives. */
+function attach() {
+  document.documentElement.classList.add("cable");
+  const detach = h("button", { type: "button", id: "serial-leave", title: "Stop what this page moved, close the adapter, and go back to virtual drives" }, "Disconnect");
+  top.append(detach);
+  let leaving = false;
+  detach.addEventListener("click", () => {
+    if (leaving) return left();
+    leaving = true;
+    setText(detach, "Stopping … (again: at once)");
+    tellWorker({ leave: true });
+  });
+  function left() {
+    sessionStorage.removeItem("serial");
+    location.reload();
+  }
+  addEventListener("serial-left", left);
+
+  addEventListener("serial-line", ({ detail: { line, why, hosts } }) => {
+    const texts = { open: "connected", opening: "opening …", closed: why ?? "opening …" };
+    status.className = line === "open" ? "good" : line === "opening" ? "quiet" : "bad";
+    // An attempt each second: the reason of the last one stays until the channel opens.
+    if (line === "opening" && status.dataset.line === "closed") return;
+    status.dataset.line = line;
+    setText(status, `${kept.name} at ${rate}: ${texts[line]}`);
+    if (line === "closed" && !hosts && why) say(`No bus yet: ${why}`, []);
+    else if (line === "open" && alert.dataset.early) alert.hidden = true;
+  });
+  addEventListener("serial-let-go", ({ detail: { why, moving } }) => say(`${why.replace(/\.$/, "")}. What this page moved is stopped as far as it can be reached, and nothing moves until you take control again.`, moving));
+
+  // A page that nobody sees moves nothing.
+  const let_go = (why) => tellWorker({ let_go: why });
+  document.addEventListener("visibilitychange", () => document.hidden && let_go("The tab was hidden"));
+  document.addEventListener("freeze", () => let_go("The browser froze the tab"));
+  addEventListener("pagehide", () => let_go("The page was closed"));
+  // Files would replace the machine.
+  addEventListener("drop", (event) => (event.preventDefault(), event.stopImmediatePropagation()), { capture: true });
+}
+
+function say(why, moving) {
+  alert.hidden = false;
+  if (why.startsWith("No bus yet")) alert.dataset.early = "1";
+  else delete alert.dataset.early;
+  renew(alert, JSON.stringify([why, moving]), () => [
+    h("p", {}, why, " ", h("button", { type: "button", onclick: () => (alert.hidden = true) }, "Seen")),
+    ...moving.map((text) => h("p", { class: "urgent" }, text)),
+  ]);
+}

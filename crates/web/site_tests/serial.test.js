@@ -1,0 +1,162 @@
+// The page with a serial CAN adapter, in headless Chromium: an emulated port that ends at `ferrodrive sim --serve slcan`. What the drives do is
+// read from that program, not from the page. What the host behind the port does is tested in virtual time (`tests/it/serial.rs`).
+
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { createInterface } from "node:readline";
+import { after, before, test } from "node:test";
+
+import { address, begin, command, end, go, picture, run, server, until } from "../site_tools/browser.js";
+import { Adapter } from "../site_tools/serial_port.js";
+
+let sim, adapter, lines;
+/** A page that waits for this hangs. */
+let release = null;
+
+before(async () => {
+  sim = spawn(process.env.FERRODRIVE, ["sim", "--drive", "zlac8030l@4", "--drive", "zlim42c@2", "--serve", "slcan://127.0.0.1:0"], { stdio: ["pipe", "pipe", "inherit"] });
+  lines = createInterface({ input: sim.stdout })[Symbol.asyncIterator]();
+  const ready = (await lines.next()).value;
+  adapter = new Adapter(Number(/slcan:\/\/127\.0\.0\.1:(\d+)/.exec(ready)[1]));
+  const { answered, changed } = adapter.serving;
+  const hang = (path, answer) => path === "/hang" && ((release = () => answer.end("go on")), true);
+  await begin({ answered: (path, answer) => hang(path, answer) || answered(path, answer), changed });
+  server.on("upgrade", (request, socket) => adapter.accept(request, socket));
+});
+
+after(async () => {
+  await end();
+  sim?.kill();
+});
+
+/** What the drive does, by the program that computes it. */
+async function drive(node) {
+  sim.stdin.write(`${node} get\n`);
+  return JSON.parse((await lines.next()).value);
+}
+
+/** Waits, as long as it takes, until a drive stands. */
+async function stands(node) {
+  while (Math.abs((await drive(node)).velocity_rpm) >= 1) await new Promise((resolve) => setTimeout(resolve, 20));
+}
+
+const LINK = `const { ask, link } = await import(new URL("page/link.js", location.href)); if (!link.fresh) return null;`;
+const text = (id) => run(`return document.getElementById("${id}")?.innerText ?? ""`);
+
+/** Chooses the adapter as a person does, and waits until the channel is open and both drives are found. */
+async function attach(bitrate = "500k") {
+  await until("the button", "const button = document.getElementById('serial-open'); button?.click(); return button !== null");
+  await run(`document.querySelector("#serial-bitrate button").click(); document.querySelector("#serial-bitrate li[data-value='${bitrate}']").click(); return true`);
+  assert.equal(await run("return document.getElementById('serial-choose').disabled"), true, "before an emergency stop is at hand");
+  await run("document.getElementById('serial-ready').click(); return true");
+  await picture("serial_dialog");
+  await run("document.getElementById('serial-choose').click(); return true");
+}
+
+const found = () => until("both drives", `${LINK} return link.state.nodes.length === 2 && link.state.nodes.every(({ drive }) => drive)`);
+
+/** Takes control and turns the wheel, also where the machine of the test is so loaded that the worker stops it once. */
+async function turn() {
+  do {
+    await until(
+      "the wheel turns",
+      `${LINK}
+       if (link.state.controller === null) await ask({ do: "take_control" });
+       const turned = await ask({ do: "velocity", node: 4, rpm: 60 });
+       return turned.ok ? true : { failed: JSON.stringify(turned) };`,
+    );
+  } while (Math.abs((await drive(4)).velocity_rpm - 60) > 5);
+  adapter.heard = "";
+}
+
+/** A quick stop of the wheel by SDO: a download to 6040h (CiA 301, 7.2.4.3.3) with bits 7, 2 and 1 as 0, 0, 1 (CiA 402-2, table 28). */
+const is_stopped_by_page = () => [...adapter.heard.matchAll(/t60482B406000(..)/g)].some(([, low]) => (parseInt(low, 16) & 0x86) === 2);
+
+test("what stops and what cannot is said before an adapter is chosen; its drives are found, moved and stopped", async () => {
+  await go(address);
+  await attach();
+  await found();
+  assert.match(await text("serial-status"), /USB 1d50:606f at 500k: connected/);
+  assert.equal(await run("return getComputedStyle(document.getElementById('machine-choice')).display"), "none");
+  await picture("serial_bus");
+  await turn();
+  await run("location.hash = 'motion'; return true");
+  await until("what a drive without a watch does", `return /Node 2: if the studio dies, nothing stops it/.test(document.getElementById("view").innerText)`);
+  await picture("serial_motion");
+  await run("document.getElementById('stop').dispatchEvent(new PointerEvent('pointerdown')); return true");
+  await stands(4);
+});
+
+test("a drive that nothing would stop moves only after that was accepted", async () => {
+  const { kind } = await until("an answer", `${LINK} return { kind: (await ask({ do: "velocity", node: 2, rpm: 30 })).error?.kind ?? "moved" }`);
+  assert.equal(kind, "unguarded");
+  assert.ok(Math.abs((await drive(2)).velocity_rpm) < 1);
+});
+
+test("a tab that is hidden stops what it moved, and has to take control anew", async () => {
+  await turn();
+  const before = await command("GET", "/window");
+  const { handle } = await command("POST", "/window/new", { type: "tab" });
+  await command("POST", "/window", { handle });
+  await stands(4);
+  assert.ok(is_stopped_by_page());
+  await command("DELETE", "/window");
+  await command("POST", "/window", { handle: before });
+  await until("the reason", `return /The tab was hidden/.test(document.getElementById("serial-alert").innerText)`);
+  await until("a session without control", `${LINK} return link.state.controller === null`);
+  await picture("serial_hidden");
+});
+
+test("a page that hangs is stopped by its worker", async () => {
+  await turn();
+  // A request that blocks the page, until the drive was seen to stand.
+  const hangs = run(`const request = new XMLHttpRequest(); request.open("GET", "/hang", false); request.send(); return request.responseText`);
+  while (!release) await new Promise((resolve) => setTimeout(resolve, 20));
+  await stands(4);
+  assert.ok(is_stopped_by_page());
+  release();
+  assert.equal(await hangs, "go on");
+});
+
+test("an adapter that answers BEL ends what moves", async () => {
+  await turn();
+  adapter.refuses = true;
+  await stands(4);
+  await until("the reason", `return /BEL/.test(document.getElementById("serial-alert").innerText)`);
+  adapter.refuses = false;
+});
+
+test("a cable that is pulled is said with what may still move, and what moved is seen to stand when it is back", async () => {
+  await found();
+  await turn();
+  adapter.pull();
+  await until("the reason", `const text = document.getElementById("serial-alert").innerText; return /The adapter is lost/.test(text) && /node 4 may still be moving/.test(text)`);
+  await until("what is missing", `return /is it plugged in/.test(document.getElementById("serial-status").innerText)`);
+  await picture("serial_pulled");
+  // By its own watch: no adapter is there.
+  await stands(4);
+  adapter.plugged = true;
+  await until("it is connected again", `return /connected/.test(document.getElementById("serial-status").innerText)`);
+  await until("it was seen to stand", `${LINK} return link.state.nodes.every(({ stop_unseen }) => !stop_unseen)`);
+});
+
+test("a tab that is closed, and one that takes leave, stop what they moved", async () => {
+  await found();
+  await turn();
+  await run("location.reload(); return true").catch(() => {});
+  await stands(4);
+  await found();
+  await turn();
+  await run("document.getElementById('serial-leave').click(); return true");
+  await stands(4);
+  assert.ok(is_stopped_by_page());
+  await until("virtual drives", `${LINK} return link.state.bus.name === "sim"`);
+  assert.match(adapter.heard, /C\r$/, "the channel is closed as the last thing");
+});
+
+test("a wrong bit rate is said", async () => {
+  await attach("250k");
+  await until("why", `return /the adapter refused 'O': is the bit rate right\\?/.test(document.getElementById("serial-status").innerText)`);
+  assert.match(await text("serial-alert"), /No bus yet/);
+  await picture("serial_refused");
+});
