@@ -3,6 +3,7 @@
 use std::fmt;
 use std::pin::Pin;
 
+use canopen::sdo::parameter::is_further_server;
 use cia402::ModeOfOperation;
 use devices::PowerStyle;
 
@@ -112,6 +113,8 @@ pub enum Need {
     Writable(u16),
     /// This sub-index of an object.
     Sub(u16, u8),
+    /// An SDO server beside the first one.
+    FurtherServer,
     /// A receive PDO.
     Rpdo,
     /// A transmit PDO.
@@ -138,6 +141,7 @@ impl Need {
             Self::Index(index) => description.has_index(index),
             Self::Writable(index) => subject.row(index, 0).is_some_and(|row| row.access.is_writable()),
             Self::Sub(index, sub_index) => subject.row(index, sub_index).is_some(),
+            Self::FurtherServer => subject.rows().any(|row| is_further_server(row.index)),
             Self::Rpdo => subject.pdos(0x1400).next().is_some(),
             Self::Tpdo => subject.pdos(0x1800).next().is_some(),
             Self::Lss => description.lss,
@@ -166,6 +170,7 @@ impl fmt::Display for Need {
             Self::Index(index) => write!(f, "the device has no object {index:04X}h"),
             Self::Writable(index) => write!(f, "the device has no object {index:04X}h that can be written"),
             Self::Sub(index, sub_index) => write!(f, "the device has no object {index:04X}h:{sub_index:02X}"),
+            Self::FurtherServer => f.write_str("the device has no SDO server beside the first one: 1201h to 127Fh"),
             Self::Rpdo => f.write_str("the device has no receive PDO"),
             Self::Tpdo => f.write_str("the device has no transmit PDO"),
             Self::Lss => f.write_str("the device is not said to have LSS"),

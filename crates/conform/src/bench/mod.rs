@@ -52,6 +52,8 @@ pub(crate) struct Bench {
     pinned: Vec<Frame>,
     watched: Vec<CanId>,
     counting: Option<(CanId, usize, Option<Frame>)>,
+    /// Identifiers of the SDO server that is asked: request and reply.
+    server: (CanId, CanId),
 }
 
 impl Bench {
@@ -59,7 +61,20 @@ impl Bench {
         let Options { timeout, allow_store, .. } = *options;
         let restorer = Restorer::new(network.node(subject.node).with_timeout(timeout), subject);
         let (evidence, pinned, watched) = (VecDeque::new(), Vec::new(), Vec::new());
-        Self { network, subject, allow_store, timeout, restorer, capture, evidence, pinned, watched, counting: None }
+        let server = default_server(subject.node);
+        Self {
+            network,
+            subject,
+            allow_store,
+            timeout,
+            restorer,
+            capture,
+            evidence,
+            pinned,
+            watched,
+            counting: None,
+            server,
+        }
     }
 
     pub(crate) const fn node(&self) -> NodeId {
@@ -73,6 +88,13 @@ impl Bench {
         self.pinned.clear();
         self.watched.clear();
         self.counting = None;
+        self.server = default_server(self.node());
+    }
+
+    /// SDO requests go to this server from now on, until the case ends: identifiers of its requests and replies.
+    pub(crate) fn ask_server(&mut self, server: (CanId, CanId)) {
+        self.watch(server.1);
+        self.server = server;
     }
 
     /// The frames that show what was seen, in candump form.
@@ -195,6 +217,11 @@ impl Bench {
         }
         self.evidence.push_back(passed.frame);
     }
+}
+
+/// The server that every node has, 1200h.
+pub(crate) fn default_server(node: NodeId) -> (CanId, CanId) {
+    (connection_set::sdo_request(node), connection_set::sdo_reply(node))
 }
 
 /// Ends a case: the node was expected to send something.

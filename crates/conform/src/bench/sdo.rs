@@ -3,7 +3,7 @@
 use can::Frame;
 use canopen::od::DataType;
 use canopen::sdo::wire::{Payload, Reply, Request, Segment};
-use canopen::{AbortCode, Mux, connection_set};
+use canopen::{AbortCode, Mux};
 
 use super::{Bench, SILENCE, ms};
 use crate::finding::{Finding, Verdict, fail};
@@ -18,7 +18,7 @@ const MOST_SEGMENTS: usize = 1 << 16;
 impl Bench {
     /// Sends eight bytes to the server and takes its answer.
     pub(crate) async fn exchange(&mut self, request: [u8; 8]) -> Result<[u8; 8], Finding> {
-        let frame = Frame::full(connection_set::sdo_request(self.node()), request);
+        let frame = Frame::full(self.server.0, request);
         let Some(answer) = self.ask(frame).await else {
             fail!("no answer to {frame} within {} ms", self.timeout.as_millis());
         };
@@ -37,7 +37,7 @@ impl Bench {
 
     /// The server's next frame.
     pub(crate) async fn answer(&mut self) -> Option<Frame> {
-        let reply = connection_set::sdo_reply(self.node());
+        let reply = self.server.1;
         let heard = self.wait_for(self.timeout, |frame| frame.id() == reply && !frame.is_remote()).await;
         heard.map(|passed| passed.frame)
     }
@@ -51,7 +51,7 @@ impl Bench {
 
     /// A frame of the server that was not asked for.
     pub(crate) async fn further_answer(&mut self) -> Option<Frame> {
-        let reply = connection_set::sdo_reply(self.node());
+        let reply = self.server.1;
         self.wait_for(SILENCE, |frame| frame.id() == reply).await.map(|passed| passed.frame)
     }
 
@@ -119,8 +119,7 @@ impl Bench {
 
     /// Aborts what is under way, as a client does; that is not answered.
     pub(crate) async fn end_transfer(&mut self, mux: Mux) {
-        let id = connection_set::sdo_request(self.node());
-        self.send(Frame::full(id, Request::Abort(mux, AbortCode::GENERAL).emit()));
+        self.send(Frame::full(self.server.0, Request::Abort(mux, AbortCode::GENERAL).emit()));
         self.pause(ms(10)).await;
     }
 

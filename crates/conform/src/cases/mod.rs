@@ -13,6 +13,7 @@ mod pdo;
 mod pdo_mapping;
 mod sdo;
 mod sdo_block;
+mod sdo_servers;
 mod sdo_transfer;
 mod sync;
 
@@ -22,6 +23,7 @@ const TABLES: &[&[Case]] = &[
     sdo::CASES,
     sdo_transfer::CASES,
     sdo_block::CASES,
+    sdo_servers::CASES,
     pdo::CASES,
     pdo_mapping::CASES,
     dictionary::CASES,

@@ -114,7 +114,7 @@ async fn wrong_toggle(bench: &mut Bench) -> Verdict {
 }
 
 /// An upload of a long object, up to its initiation.
-async fn begin_upload(bench: &mut Bench) -> Result<&'static Entry, Finding> {
+pub(super) async fn begin_upload(bench: &mut Bench) -> Result<&'static Entry, Finding> {
     let row = long_object(bench)?;
     let answer = bench.exchange(Request::InitiateUpload(row.mux()).emit()).await?;
     match Reply::parse(&answer) {

@@ -49,12 +49,15 @@ pub(crate) fn complete() -> &'static Description {
     keep(&Eds::load(sheet(&[]).as_bytes()).unwrap().eds).unwrap()
 }
 
-/// The same with a SYNC start value, and the date of the configuration.
+/// The same with a SYNC start value, the date of the configuration, and a second SDO server, off as delivered.
 pub(crate) fn extended() -> &'static Description {
     const FURTHER: &[Row] = &[
         (0x1020, 0, U8, "const", "2", NO, &[]),
         (0x1020, 1, U32, "rw", "0", NO, &[]),
         (0x1020, 2, U32, "rw", "0", NO, &[]),
+        (0x1201, 0, U8, "const", "2", NO, &[]),
+        (0x1201, 1, U32, "rw", "0x80000000", NO, &[]),
+        (0x1201, 2, U32, "rw", "0x80000000", NO, &[]),
         (0x1800, 6, U8, "rw", "0", NO, &[]),
     ];
     keep(&Eds::load(sheet(FURTHER).as_bytes()).unwrap().eds).unwrap()
