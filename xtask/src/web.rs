@@ -2,6 +2,7 @@
 //! host as WebAssembly, and the JavaScript package of both for npm.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
@@ -38,7 +39,15 @@ pub(crate) fn command(words: &[&str]) -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    match module("web").and_then(|module| make(&module, &folder)) {
+    if !words.is_empty() && !may_be_replaced(&folder) {
+        eprintln!(
+            "{}: it is not empty, and not a page that this command has made; name a new folder",
+            folder.display()
+        );
+        return ExitCode::from(2);
+    }
+    let module = Rust::found(TARGET, &self::folder()).and_then(|rust| module(&rust, "web"));
+    match module.and_then(|module| make(&module, &folder)) {
         Ok(()) => {
             println!("{}", folder.display());
             ExitCode::SUCCESS
@@ -55,9 +64,14 @@ pub(crate) fn step() -> Tally {
     if let Err(reason) = debian::install(PROGRAMS) {
         return Tally::skipped(reason);
     }
-    let module = match module("web") {
-        Ok(module) => module,
+    // A machine without the target cannot do this; a crate that does not compile for it is a failure.
+    let rust = match Rust::found(TARGET, &folder()) {
+        Ok(rust) => rust,
         Err(reason) => return Tally::skipped(reason),
+    };
+    let module = match module(&rust, "web") {
+        Ok(module) => module,
+        Err(error) => return Tally::failed(error),
     };
     let (folder, pictures) = (folder().join("tested"), folder().join("pictures"));
     let made = make(&module, &folder).and_then(|()| fs::create_dir_all(&pictures).map_err(|error| error.to_string()));
@@ -81,9 +95,16 @@ fn site() -> PathBuf {
     folder().join("site")
 }
 
+/// Whether the folder is new, empty, or one that was made here: what stands in it is removed.
+fn may_be_replaced(folder: &Path) -> bool {
+    let is_ours = folder.join("ferrodrive.wasm").is_file() && folder.join("index.html").is_file();
+    is_ours
+        || fs::read_dir(folder)
+            .map_or_else(|error| error.kind() == io::ErrorKind::NotFound, |mut found| found.next().is_none())
+}
+
 /// Builds the module in a profile.
-fn module(profile: &str) -> Result<PathBuf, String> {
-    let rust = Rust::found(TARGET, &folder())?;
+fn module(rust: &Rust, profile: &str) -> Result<PathBuf, String> {
     let words = ["rustc", "--profile", profile, "--package", "ferrodrive-web", "--crate-type", "cdylib"];
     quietly(&mut rust.cargo(&words))?;
     Ok(rust.built(profile).join("web.wasm"))
@@ -224,4 +245,23 @@ fn all_files(folder: &Path) -> Result<Vec<PathBuf>, String> {
 
 fn read(path: &Path) -> Result<String, String> {
     fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_of_others_is_not_replaced() {
+        let folder = workspace::target().join("tmp/replaced");
+        let _ = fs::remove_dir_all(&folder);
+        assert!(may_be_replaced(&folder), "it is not there");
+        fs::create_dir_all(&folder).expect("a folder");
+        assert!(may_be_replaced(&folder), "it is empty");
+        fs::write(folder.join("index.html"), "").expect("a file");
+        assert!(!may_be_replaced(&folder), "the page of others");
+        fs::write(folder.join("ferrodrive.wasm"), "").expect("a file");
+        assert!(may_be_replaced(&folder), "one that was made here");
+        assert!(!may_be_replaced(&folder.join("index.html")), "a file");
+    }
 }

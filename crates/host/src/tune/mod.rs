@@ -14,6 +14,7 @@ mod report;
 mod setup;
 mod twin;
 
+pub use ::tune::Objective;
 pub use applied::{step, tune};
 pub use bench::{Bench, Bounds, Excursion, Measurement, StepResponse};
 pub use found::Found;
@@ -21,7 +22,6 @@ pub use measure::measure;
 pub use proposed::{Gain, Proposed, Unreachable};
 pub use report::{GainRow, MarginRow, Request, TuneReport, find};
 pub use setup::Setup;
-pub use ::tune::Objective;
 pub use twin::{Trial, Twin, motor_of};
 
 use devices::{Description, Loops};

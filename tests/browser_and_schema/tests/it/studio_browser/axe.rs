@@ -9,7 +9,7 @@ use super::safety::VIEWS;
 
 /// Where `cargo xtask test --only studio` puts it.
 fn axe() -> String {
-    let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("../npm/node_modules/axe-core/axe.min.js");
+    let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("../npm/axe-core/node_modules/axe-core/axe.min.js");
     std::fs::read_to_string(&file).unwrap_or_else(|error| {
         panic!("{}: {error}; cargo xtask test --only studio installs axe-core there", file.display())
     })
