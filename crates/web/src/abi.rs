@@ -26,6 +26,8 @@ pub extern "C" fn reserve(length: usize) -> *mut u8 {
             OUTPUT.with(|output| *output.borrow_mut() = failed("defect", &defect));
         }));
     });
+    // What ends the module without a panic (memory, stack) leaves no answer, and not that of the call before.
+    OUTPUT.with(|output| output.borrow_mut().clear());
     INPUT.with(|input| {
         let mut input = input.borrow_mut();
         input.clear();

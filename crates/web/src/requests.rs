@@ -48,6 +48,9 @@ pub(crate) fn respond(handle: &HostHandle, request: &Request, body: &[u8]) -> Re
         "/api/power-states" => Ok(of_text(JSON, host::page::power_states())),
         "/api/faults" => parameters::<Since>(query).map(|Since { since }| of_json(&handle.timeline().since(since))),
         "/api/trace" => trace(handle, query),
+        "/api/trace/identifiers" => parameters::<Asked>(query)
+            .and_then(Asked::understand)
+            .map(|query| of_json(&query.identifiers(&handle.trace().held()))),
         "/api/trace.log" => log(handle, query),
         "/api/series" => {
             let asked = parameters::<AskedSeries>(query).and_then(AskedSeries::understand);
@@ -61,13 +64,20 @@ pub(crate) fn respond(handle: &HostHandle, request: &Request, body: &[u8]) -> Re
             handle.stop_all();
             Ok(of_json(&json!({ "ok": true })))
         }
-        "/api/recording.mcap" => {
-            let why = "a page without a server does not make MCAP files: save a CSV";
-            return trouble(501, "not_here", why);
+        "/api/recording.mcap" => return not_here("does not make MCAP files: save a CSV"),
+        "/api/recording" => {
+            return not_here("does not read records and logs: the studio does (ferrodrive studio)");
+        }
+        "/api/trace.asc" | "/api/trace.blf" | "/api/trace.pcapng" => {
+            return not_here("saves the trace as a candump log only; ferrodrive convert makes the other forms of it");
         }
         _ => return trouble(404, "not_found", "there is nothing at this path"),
     };
     answered.unwrap_or_else(|why| trouble(400, "malformed", &why))
+}
+
+fn not_here(why: &str) -> Response {
+    trouble(501, "not_here", &format!("a page without a server {why}"))
 }
 
 fn trace(handle: &HostHandle, query: &str) -> Result<Response, String> {

@@ -3,7 +3,11 @@
 //! A reader asks for what came after the frames that it has, and adds the parts up: each answer costs only the frames in between.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::time::Duration;
 
+use can::{BusFrame, Instant};
+use master::decode::Decoded;
 use serde::Serialize;
 
 use super::line::Line;
@@ -35,35 +39,56 @@ pub struct Identifiers {
     identifiers: Vec<Identifier>,
 }
 
+/// What is known of one while the frames pass. Only the last frame of each becomes a line: texts for all cost most of the time.
+struct Passing {
+    count: u64,
+    first: Instant,
+    least: Option<Duration>,
+    most: Option<Duration>,
+    last: (u64, BusFrame, Decoded),
+}
+
+impl Passing {
+    fn new(number: u64, passed: &BusFrame, decoded: &Decoded) -> Self {
+        let last = (number, *passed, decoded.clone());
+        Self { count: 1, first: passed.at, least: None, most: None, last }
+    }
+
+    fn take(&mut self, number: u64, passed: &BusFrame, decoded: &Decoded) {
+        let apart = passed.at - self.last.1.at;
+        self.least = Some(self.least.map_or(apart, |least| least.min(apart)));
+        self.most = Some(self.most.map_or(apart, |most| most.max(apart)));
+        self.count += 1;
+        self.last = (number, *passed, decoded.clone());
+    }
+
+    fn ended(self) -> Identifier {
+        let Self { count, first, least, most, last: (number, passed, decoded) } = self;
+        let last = Line::of_frame(number, &passed, &decoded);
+        let first_s = (first - Instant::ZERO).as_secs_f64();
+        let ms = |time: Duration| time.as_nanos() as f64 / 1e6;
+        Identifier { id: last.id.clone(), count, first_s, least_ms: least.map(ms), most_ms: most.map(ms), last }
+    }
+}
+
 impl Query {
     /// The frames that match, by identifier, in the order of identifiers: standard ones before extended ones.
     pub fn identifiers(&self, held: &Held) -> Identifiers {
         let (floor, to) = self.bounds(held);
-        let from = floor.max(to.saturating_sub(MOST_SEARCHED));
-        let mut found: BTreeMap<(bool, u32), Identifier> = BTreeMap::new();
+        // A reader of a studio that was started anew has seen more than there is.
+        let from = floor.max(to.saturating_sub(MOST_SEARCHED)).min(to);
+        let mut found: BTreeMap<(bool, u32), Passing> = BTreeMap::new();
         self.each(held, from, to, |number, passed, decoded, _| {
-            let line = Line::of_frame(number, passed, decoded);
-            if !line.has(self.words()) {
+            if !self.words().is_empty() && !Line::of_frame(number, passed, decoded).has(self.words()) {
                 return;
             }
             let id = passed.frame.id();
-            let one = found.entry((id.is_extended(), id.raw())).or_insert_with(|| Identifier {
-                id: line.id.clone(),
-                count: 0,
-                first_s: line.at_s,
-                least_ms: None,
-                most_ms: None,
-                last: line.clone(),
-            });
-            if one.count > 0 {
-                let apart_ms = (line.at_s - one.last.at_s) * 1e3;
-                one.least_ms = Some(one.least_ms.map_or(apart_ms, |least| least.min(apart_ms)));
-                one.most_ms = Some(one.most_ms.map_or(apart_ms, |most| most.max(apart_ms)));
+            match found.entry((id.is_extended(), id.raw())) {
+                Entry::Vacant(place) => drop(place.insert(Passing::new(number, passed, decoded))),
+                Entry::Occupied(mut one) => one.get_mut().take(number, passed, decoded),
             }
-            one.count += 1;
-            one.last = line;
         });
         let skipped = self.after().map_or(0, |after| from.saturating_sub(after));
-        Identifiers { from, to, skipped, identifiers: found.into_values().collect() }
+        Identifiers { from, to, skipped, identifiers: found.into_values().map(Passing::ended).collect() }
     }
 }

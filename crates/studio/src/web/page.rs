@@ -1,4 +1,4 @@
-//! The files of the page, embedded in the program, and the tables that it draws.
+//! The files of the page, embedded in the program.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::Write;
@@ -122,7 +122,7 @@ fn prepared((name, plain): (&'static str, String)) -> File {
     let packed = packer.write_all(plain.as_bytes()).and_then(|()| packer.finish()).unwrap_or_default();
     let mut hasher = DefaultHasher::new();
     plain.hash(&mut hasher);
-    File { name, tag: format!("\"{:016x}\"", hasher.finish()), plain, packed }
+    File { name, tag: format!("W/\"{:016x}\"", hasher.finish()), plain, packed }
 }
 
 fn kind(name: &str) -> &'static str {
@@ -134,7 +134,8 @@ fn kind(name: &str) -> &'static str {
 }
 
 /// A file of the page, compressed if the browser takes that. What the browser has already is not sent again: it asks by the tag of
-/// the content (RFC 9110, 8.8.3), since another version of the studio may answer at the same address.
+/// the content, since another version of the studio may answer at the same address. The tag is a weak one, because it is the same for
+/// both codings (RFC 9110, 8.8.3.3).
 pub(super) fn file(name: &str, asked: &HeaderMap) -> Response {
     let Some(file) = files().iter().find(|file| file.name == name) else {
         return trouble(StatusCode::NOT_FOUND, "not_found", "the page has no such file");

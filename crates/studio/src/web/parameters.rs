@@ -36,10 +36,15 @@ pub(super) async fn toml(
         Err(rejection) => return malformed(&rejection.body_text()),
     };
     let Some(node) = node else { return malformed("expected a node-ID from 1 to 127") };
-    let Ok(_permit) = files.try_acquire() else {
+    let Ok(permit) = files.try_acquire_owned() else {
         return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another file is being read: try again");
     };
-    match tokio::task::spawn_blocking(move || of_dcf(&dcf, node)).await {
+    let work = move || {
+        // It goes on if the client goes away, and so does its turn.
+        let _permit = permit;
+        of_dcf(&dcf, node)
+    };
+    match tokio::task::spawn_blocking(work).await {
         Ok(Ok(parameters)) => ([(CONTENT_TYPE, "application/toml")], sheet::print(&parameters, None)).into_response(),
         Ok(Err(why)) => malformed(&why),
         Err(_) => trouble(StatusCode::SERVICE_UNAVAILABLE, "over", "the studio is ending"),

@@ -23,10 +23,15 @@ pub(super) const LARGEST: usize = 32 << 20;
 
 /// Converts a CSV to MCAP, in another thread than the task that moves drives.
 pub(super) async fn mcap(records: Arc<Semaphore>, csv: Bytes) -> Response {
-    let Ok(_permit) = records.try_acquire() else {
+    let Ok(permit) = records.try_acquire_owned() else {
         return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another record is being converted: try again");
     };
-    match tokio::task::spawn_blocking(move || mcap_of_csv(&csv)).await {
+    let work = move || {
+        // It goes on if the client goes away, and so does its turn.
+        let _permit = permit;
+        mcap_of_csv(&csv)
+    };
+    match tokio::task::spawn_blocking(work).await {
         Ok(Ok(file)) => ([(CONTENT_TYPE, "application/octet-stream")], file).into_response(),
         Ok(Err(why)) => trouble(StatusCode::BAD_REQUEST, "malformed", &why),
         Err(_) => trouble(StatusCode::SERVICE_UNAVAILABLE, "over", "the studio is ending"),
@@ -77,10 +82,11 @@ pub(super) async fn values(
         Ok(Query(Named { name })) => name,
         Err(rejection) => return trouble(StatusCode::BAD_REQUEST, "malformed", &rejection.body_text()),
     };
-    let Ok(_permit) = records.try_acquire() else {
+    let Ok(permit) = records.try_acquire_owned() else {
         return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another record is being read: try again");
     };
     let work = move || {
+        let _permit = permit;
         let values = of_file(&handle, &name, &file)?;
         serde_json::to_string(&values).map_err(|error| error.to_string())
     };

@@ -61,15 +61,9 @@ async fn decoded(
     asked: InQuery,
     work: impl FnOnce(&Query, &Held) -> serde_json::Result<String> + Send + 'static,
 ) -> Response {
-    let query = match understand(asked) {
-        Ok(query) => query,
-        Err(refusal) => return *refusal,
-    };
-    let Ok(_decoding) = doors.decoding.acquire().await else { return over() };
-    let held = handle.trace().held();
-    match tokio::task::spawn_blocking(move || work(&query, &held)).await {
-        Ok(Ok(json)) => json_text(json),
-        _ => over(),
+    match understand(asked) {
+        Ok(query) => held(handle, doors, move |held| work(&query, held)).await,
+        Err(refusal) => *refusal,
     }
 }
 
@@ -80,13 +74,26 @@ pub(super) async fn series(
     asked: Result<InAddress<AskedSeries>, QueryRejection>,
 ) -> Response {
     let asked = asked.map_err(|rejection| rejection.body_text()).and_then(|InAddress(asked)| asked.understand());
-    let query = match asked {
-        Ok(query) => query,
-        Err(why) => return trouble(StatusCode::BAD_REQUEST, "malformed", &why),
-    };
-    let Ok(_decoding) = doors.decoding.acquire().await else { return over() };
+    match asked {
+        Ok(query) => held(handle, doors, move |held| serde_json::to_string(&query.values(held))).await,
+        Err(why) => trouble(StatusCode::BAD_REQUEST, "malformed", &why),
+    }
+}
+
+/// What is made of the frames that are held, when it is this reader's turn. The turn ends with the work, which goes on if the reader
+/// goes away.
+async fn held(
+    handle: HostHandle,
+    doors: Doors,
+    work: impl FnOnce(&Held) -> serde_json::Result<String> + Send + 'static,
+) -> Response {
+    let Ok(turn) = doors.decoding.acquire_owned().await else { return over() };
     let held = handle.trace().held();
-    match tokio::task::spawn_blocking(move || serde_json::to_string(&query.values(&held))).await {
+    let work = move || {
+        let _turn = turn;
+        work(&held)
+    };
+    match tokio::task::spawn_blocking(work).await {
         Ok(Ok(json)) => json_text(json),
         _ => over(),
     }

@@ -117,6 +117,9 @@ fn requests_are_answered_as_by_the_studio() {
     assert_eq!((status, table["states"].as_array().map(Vec::len)), (200, Some(8)), "CiA 402-2, 8.2 has eight states");
     let (status, trace) = page.get("/api/trace?count=3&node=4");
     assert_eq!((status, trace["lines"].as_array().map(Vec::len)), (200, Some(3)));
+    let (status, identifiers) = page.get("/api/trace/identifiers?node=4");
+    let of_pdo = identifiers["identifiers"].as_array().and_then(|all| all.iter().find(|one| one["id"] == "704"));
+    assert_eq!((status, of_pdo.map(|one| one["last"]["kind"] == "heartbeat")), (200, Some(true)), "{identifiers}");
     let log = page.world.request(&Request { path: "/api/trace.log?node=4".into() }, &[]);
     let log = String::from_utf8(log.body).expect("text");
     assert!(log.lines().count() > 10 && log.starts_with('(') && log.contains(" can0 "), "{log}");
@@ -126,10 +129,39 @@ fn requests_are_answered_as_by_the_studio() {
         ("/api/series?objects=4", 400, "malformed"),
         ("/api/parameters.toml?node=0", 400, "malformed"),
         ("/api/recording.mcap", 501, "not_here"),
+        ("/api/recording?name=x.csv", 501, "not_here"),
+        ("/api/trace.asc", 501, "not_here"),
+        ("/api/trace.blf", 501, "not_here"),
+        ("/api/trace.pcapng", 501, "not_here"),
         ("/api/nothing", 404, "not_found"),
     ] {
         let (got, body) = page.get(path);
         assert_eq!((got, body["error"]["kind"].as_str()), (status, Some(kind)), "{path}: {body}");
+    }
+}
+
+/// What a script of the page requests is answered or said not to be here: nothing is unknown.
+#[test]
+fn whatever_the_page_requests_is_known() {
+    let page = Page::on(WHEEL);
+    let scripts = concat!(env!("CARGO_MANIFEST_DIR"), "/../studio/page");
+    let mut paths = std::collections::BTreeSet::new();
+    for script in std::fs::read_dir(scripts).expect("the page").flatten().map(|entry| entry.path()) {
+        let Ok(text) = std::fs::read_to_string(&script) else { continue };
+        for part in text.split("/api/").skip(1) {
+            let path: String =
+                part.chars().take_while(|char| char.is_ascii_alphanumeric() || "-./".contains(*char)).collect();
+            paths.insert(path);
+        }
+    }
+    // `/api/${..}`: one of several, each of which stands elsewhere, too.
+    paths.remove("");
+    // The page of a studio with a password.
+    paths.remove("login");
+    assert!(paths.len() > 8, "{paths:?}");
+    for path in paths {
+        let (status, body) = page.get(&format!("/api/{path}"));
+        assert_ne!(status, 404, "{path}: {body}");
     }
 }
 
