@@ -95,10 +95,9 @@ function attach() {
   });
   addEventListener("serial-let-go", ({ detail: { why, moving } }) => say(`${why.replace(/\.$/, "")}. What this page moved is stopped as far as it can be reached, and nothing moves until you take control again.`, moving));
 
-  // A page that nobody sees moves nothing.
+  // A page that is not seen moves nothing.
   const let_go = (why) => tellWorker({ let_go: why });
   document.addEventListener("visibilitychange", () => document.hidden && let_go("The tab was hidden"));
-  document.addEventListener("freeze", () => let_go("The browser froze the tab"));
   addEventListener("pagehide", () => let_go("The page was closed"));
   // Files would replace the machine.
   addEventListener("drop", (event) => (event.preventDefault(), event.stopImmediatePropagation()), { capture: true });

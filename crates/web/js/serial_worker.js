@@ -149,7 +149,7 @@ async function leave() {
   if (mine) {
     run("close");
     cable = null;
-    // An adapter that takes nothing keeps nobody.
+    // Also from an adapter that takes nothing any more.
     await Promise.race([mine.flushing, new Promise((resolve) => setTimeout(resolve, PAUSE_MS))]);
     await release(mine);
   }

@@ -20,7 +20,8 @@ before(async () => {
   adapter = new Adapter(Number(/slcan:\/\/127\.0\.0\.1:(\d+)/.exec(ready)[1]));
   const { answered, changed } = adapter.serving;
   const hang = (path, answer) => path === "/hang" && ((release = () => answer.end("go on")), true);
-  await begin({ answered: (path, answer) => hang(path, answer) || answered(path, answer), changed });
+  const probe = (path, answer) => path === "/try/probe.js" && (answer.writeHead(200, { "content-type": "text/javascript" }).end("postMessage(typeof navigator.serial?.getPorts)"), true);
+  await begin({ answered: (path, answer) => hang(path, answer) || probe(path, answer) || answered(path, answer), changed });
   server.on("upgrade", (request, socket) => adapter.accept(request, socket));
 });
 
@@ -107,6 +108,16 @@ test("a tab that is hidden stops what it moved, and has to take control anew", a
   await picture("serial_hidden");
 });
 
+test("a tab that the browser freezes stops what it moved", async () => {
+  await turn();
+  const cycle = (state) => command("POST", "/goog/cdp/execute", { cmd: "Page.setWebLifecycleState", params: { state } });
+  await cycle("frozen");
+  await stands(4);
+  assert.ok(is_stopped_by_page());
+  await cycle("active");
+  await found();
+});
+
 test("a page that hangs is stopped by its worker", async () => {
   await turn();
   // A request that blocks the page, until the drive was seen to stand.
@@ -159,4 +170,14 @@ test("a wrong bit rate is said", async () => {
   await until("why", `return /the adapter refused 'O': is the bit rate right\\?/.test(document.getElementById("serial-status").innerText)`);
   assert.match(await text("serial-alert"), /No bus yet/);
   await picture("serial_refused");
+});
+
+test("the browser has Web Serial in workers; one that has none says what does", async () => {
+  const kind = await run(`return new Promise((resolve) => (new Worker("probe.js").onmessage = ({ data }) => resolve(data)))`);
+  assert.equal(kind, "function");
+  await run("sessionStorage.clear(); return true");
+  await go(`${address}?lacking`);
+  await until("the button", "const button = document.getElementById('serial-open'); button?.click(); return button !== null");
+  assert.match(await text("serial-lacking"), /has no Web Serial.*Firefox and Safari do not/);
+  assert.equal(await run("return document.getElementById('serial-choose')"), null);
 });

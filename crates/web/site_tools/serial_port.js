@@ -7,6 +7,7 @@ import { connect } from "node:net";
 /** What stands in for Web Serial in the page and its worker. */
 const MOCK = `
 {
+  if (location.search === "?lacking") delete Navigator.prototype.serial;
   const lost = (why) => new DOMException(why, "NetworkError");
   class Port {
     getInfo() {
@@ -36,7 +37,7 @@ const MOCK = `
   const serial = new EventTarget();
   serial.requestPort = async () => (await fetch("/port/choose"), port);
   serial.getPorts = async () => ((await (await fetch("/port/is")).json()) ? [port] : []);
-  Object.defineProperty(navigator, "serial", { value: serial, configurable: true });
+  if (location.search !== "?lacking") Object.defineProperty(navigator, "serial", { value: serial, configurable: true });
 }
 `;
 

@@ -1,4 +1,4 @@
-//! A host and its conversation with one page, in the thread of whoever polls them.
+//! A host and its conversation with one page, in the thread of their caller.
 
 use std::collections::VecDeque;
 use std::pin::Pin;

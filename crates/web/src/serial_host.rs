@@ -290,7 +290,7 @@ impl SerialHost {
         });
     }
 
-    /// The line cannot be relied on: nothing is to move by it. Without a motion it is said to whoever looks.
+    /// The line cannot be relied on: nothing is to move by it. Without a motion it is news.
     fn distrust(&mut self, why: &str) {
         if self.network.moved().is_empty() {
             self.wire.tell(why);
