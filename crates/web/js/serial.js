@@ -2,6 +2,7 @@
 
 import { choice } from "./page/choice.js";
 import { h, renew, setText, toggle } from "./page/dom.js";
+import { link } from "./page/link.js";
 import { tellWorker } from "./page/transport.js";
 
 const BITRATES = { "10k": 10_000, "20k": 20_000, "50k": 50_000, "100k": 100_000, "125k": 125_000, "250k": 250_000, "500k": 500_000, "800k": 800_000, "1M": 1_000_000 };
@@ -44,7 +45,7 @@ const dialog = h(
   h("h3", {}, "This page stops what it moved when"),
   h("ul", {}, item("you press STOP, Esc or Space"), item("the tab is hidden, closed or loaded again"), item("the page hangs for 3 s (a jog: 0.2 s)"), item("the machine wakes, or the browser was held up for 1 s"), item("the adapter refuses frames, or sends what is not slcan")),
   h("h3", {}, "It cannot stop anything when"),
-  h("ul", {}, item("the machine sleeps, or the browser crashes"), item("the adapter or its cable is pulled out"), item("the tab is closed and the browser lets nothing more be sent")),
+  h("ul", {}, item("the machine sleeps, or the browser crashes or freezes"), item("the adapter or its cable is pulled out"), item("the tab is closed and the browser lets nothing more be sent")),
   h("p", {}, "Then only a drive's own watch over this page stops it. The page sets that watch before a drive moves, and shows for each drive what it does. A drive that has none moves only after you have accepted that."),
   ...("serial" in navigator
     ? [
@@ -93,7 +94,15 @@ function attach() {
     if (line === "closed" && !hosts && why) say(`No bus yet: ${why}`, []);
     else if (line === "open" && alert.dataset.early) alert.hidden = true;
   });
-  addEventListener("serial-let-go", ({ detail: { why, moving } }) => say(`${why.replace(/\.$/, "")}. What this page moved is stopped as far as it can be reached, and nothing moves until you take control again.`, moving));
+  addEventListener("serial-let-go", ({ detail: { why, moved, moving } }) => {
+    // The adapter, and errors of the browser, end with a full stop or without.
+    const what = why.replace(/\.$/, "");
+    const had_control = link.welcome !== null && link.state?.controller === link.welcome.session;
+    const nodes = `node${moved.length > 1 ? "s" : ""} ${moved.join(", ")}`;
+    if (moving.length) say(`${what}.`, moving);
+    else if (moved.length) say(`${what}: a quick stop was ordered for ${nodes}. Nothing moves until you take control again.`, []);
+    else if (had_control) say(`${what}: control has to be taken again.`, []);
+  });
 
   // A page that is not seen moves nothing.
   const let_go = (why) => tellWorker({ let_go: why });

@@ -9,7 +9,7 @@ import { extname, join, normalize } from "node:path";
 const { SITE, PICTURES } = process.env;
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm", ".tgz": "application/gzip" };
 /** A loaded machine is slow; what hangs is ended. */
-const PATIENCE_MS = 120_000;
+export const PATIENCE_MS = 120_000;
 
 let driver, session, profile;
 /** The paths that the browser has asked for. */

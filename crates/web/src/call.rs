@@ -186,7 +186,9 @@ impl Library {
             Line::Opening => ("opening", None),
             Line::Open => ("open", None),
         };
-        let let_go = serial.take_let_go().map(|let_go| json!({ "why": let_go.why, "moving": let_go.moving }));
+        let let_go = serial
+            .take_let_go()
+            .map(|let_go| json!({ "why": let_go.why, "moved": let_go.moved, "moving": let_go.moving }));
         let mut bytes = serial.take_output();
         let head =
             json!({ "wire": bytes.len(), "line": line, "lost": lost, "let_go": let_go, "moved": serial.moved() });

@@ -44,6 +44,8 @@ pub enum Line {
 pub struct LetGo {
     /// What happened.
     pub why: String,
+    /// The nodes that it had set in motion, for which a quick stop was ordered.
+    pub moved: Vec<u8>,
     /// The drives that cannot be reached, and what they do by themselves.
     pub moving: Vec<String>,
 }
@@ -226,10 +228,11 @@ impl SerialHost {
 
     fn end_session(&mut self, why: String, moving: Vec<String>) {
         self.is_page_waiting = false;
+        let moved = self.moved();
         let Some(hosted) = &mut self.hosted else { return };
         // Once for each session, however often the adapter refuses.
         if hosted.leave() || !moving.is_empty() {
-            self.let_go = Some(LetGo { why, moving });
+            self.let_go = Some(LetGo { why, moved, moving });
         }
         self.settle();
     }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use can::{Bitrate, Frame, Instant, Station};
 use serde_json::{Value, json};
 use slcan::Adapter;
-use web::{Line, SerialHost};
+use web::{LetGo, Line, SerialHost};
 
 const DRIVES: &str =
     "bitrate = \"500k\"\n[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n\n[[drive]]\nmodel = \"zlim42c\"\nnode = 2\n";
@@ -271,7 +271,8 @@ fn a_hidden_page_stops_what_it_moved_and_loses_control() {
     let mut cable = Cable::turning();
     cable.host.let_go("The page was hidden");
     cable.exchange();
-    assert_eq!(cable.let_go(), ("The page was hidden".into(), vec![]));
+    let expected = LetGo { why: "The page was hidden".into(), moved: vec![4], moving: vec![] };
+    assert_eq!(cable.host.take_let_go(), Some(expected));
     cable.rests_and_control_is_free();
 }
 
