@@ -43,6 +43,8 @@ pub(crate) struct Context {
     pub(crate) world: Option<WorldDoor>,
     /// What the bus says beside frames.
     pub(crate) wire: Wire,
+    /// The highest counter of SYNC, where it has one.
+    pub(crate) sync_counter: Option<u8>,
     timeout: Duration,
     models: BTreeMap<NodeId, Stated>,
     json: bool,
@@ -97,8 +99,15 @@ impl Context {
             BusSpec::Sim { file: Some(path) } => file::read(path).ok(),
             _ => None,
         };
+        let machine = of_bus.or_else(|| global.machine.clone());
+        // What is typed comes after the file, and overrules it.
+        let of_file = machine.iter().flat_map(Machine::sdo_servers);
+        network.choose_sdo_servers(of_file.chain(global.sdo_servers.iter().copied()).collect::<Vec<_>>());
+        let sync_counter = global.sync_counter.or(machine.as_ref().and_then(|machine| machine.sync_counter));
+        network.sync_counter(sync_counter);
         Self {
-            machine: of_bus.or_else(|| global.machine.clone()),
+            machine,
+            sync_counter,
             world: None,
             wire: Wire::default(),
             network,
@@ -297,6 +306,8 @@ impl Context {
     /// Quick stop, whatever the node is doing, unless it soon says that its motor has no power (statusword bit 4): a drive
     /// without the state machine would energise the motor to hold it.
     pub(crate) async fn quick_stop(&self, id: NodeId) -> Result<(), Error> {
+        // Nor does it wait for the record of a server.
+        self.network.choose_sdo_servers([]);
         let statusword = self.network.node(id).with_timeout(GLANCE).read::<u16>(STATUSWORD).await.map(Statusword);
         let enabled = |word: Statusword| word.state() == Some(PowerState::OperationEnabled);
         if statusword.is_ok_and(|word| !word.has(Statusword::VOLTAGE_ENABLED) && !enabled(word)) {

@@ -9,15 +9,26 @@ use sim::World;
 use transport::BusSpec;
 
 use crate::failure::Failure;
+use crate::numbers::whole;
 use crate::recording::{LogPath, log_path};
 use machine::file::Machine;
 use words::drive::node_model;
 use words::models::Description;
+use words::node::node;
 
 /// A time that is not zero, within which something is to happen.
 pub(crate) fn some_time(text: &str) -> Result<Duration, String> {
     let time = master::units::parse_duration(text).map_err(|error| error.to_string())?;
     if time.is_zero() { Err("expected a time above 0, e.g. 500ms".into()) } else { Ok(time) }
+}
+
+/// NODE=NUMBER as the record of that server: 1 is the default one, 1200h.
+fn sdo_server(text: &str) -> Result<(NodeId, u16), String> {
+    let Some((at, number)) = text.split_once('=') else {
+        return Err(format!("'{text}' is incomplete; expected NODE=NUMBER, e.g. 4=2 for the server of 1201h"));
+    };
+    let number = number.parse().ok().and_then(machine::file::sdo_server_record);
+    Ok((node(at)?, number.ok_or("expected the number of an SDO server, 1 to 128: 2 is that of 1201h")?))
 }
 
 /// What every command takes.
@@ -39,9 +50,20 @@ pub(crate) struct Global {
     #[arg(long = "model", value_name = "NODE=MODEL", value_parser = node_model, global = true)]
     pub(crate) models: Vec<(NodeId, &'static Description)>,
 
+    /// SDO server of a node that is asked: 2 is that of 1201h, up to 128, 127Fh (e.g. 4=2); may be repeated
+    ///
+    /// For a device that another master asks too: neither takes the other's answers. The record is read at the default
+    /// server, 1, with the first request.
+    #[arg(long = "sdo-server", value_name = "NODE=NUMBER", value_parser = sdo_server, global = true)]
+    pub(crate) sdo_servers: Vec<(NodeId, u16)>,
+
+    /// Add a counter to the SYNC that the command sends, from 1 up to this, equal to 1019h of the devices
+    #[arg(long, alias = "counter", value_name = "OVERFLOW", value_parser = |text: &str| whole(text, 2..=240_u8), global = true)]
+    pub(crate) sync_counter: Option<u8>,
+
     /// Machine file: the models of the nodes and their gears; on a virtual bus also its drives
     ///
-    /// On a real bus the `model`, `node` and `units` of each [[drive]] are used, and the groups and bases. On the
+    /// On a real bus the `model`, `node`, `units` and `sdo_server` of each [[drive]] are used, `sync_counter`, and the groups and bases. On the
     /// virtual bus of a command's own it is the short form of --bus sim:FILE.toml, and `sim` serves the drives that it
     /// describes. A command that takes a machine file as an argument takes it here too.
     #[arg(id = "machine", long = "machine", value_name = "FILE.toml", env = "FERRODRIVE_MACHINE", global = true)]

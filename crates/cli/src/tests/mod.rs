@@ -13,4 +13,5 @@ mod pages;
 mod params;
 mod records;
 mod report;
+mod servers;
 mod virtual_bus;

@@ -29,7 +29,7 @@ fn frames_are_sent_as_they_are_typed() {
 
 #[test]
 fn sync_comes_at_its_rate_and_with_its_counter() {
-    let shown = done(&["sync", "--every", "10ms", "--count", "5", "--counter", "3", "-v"]);
+    let shown = done(&["sync", "--every", "10ms", "--count", "5", "--sync-counter", "3", "-v"]);
     let syncs: Vec<(f64, &str)> = shown
         .err
         .lines()

@@ -19,7 +19,7 @@ use words::document::reader::{Field, Table};
 use words::object::object;
 
 /// Keys of a drive that are for its master.
-pub(super) const KEYS: &[&str] = &["pdos", "limits", "heartbeat", "guarding", "start_up"];
+pub(super) const KEYS: &[&str] = &["pdos", "limits", "heartbeat", "guarding", "start_up", "sdo_server"];
 
 const PDOS: &str = "a table of PDOs, e.g. { tpdo1 = { objects = [\"statusword\"], type = 1 } }";
 const PDO: &str = "\"off\", or a table of objects, type, inhibit, event, id";
@@ -27,6 +27,8 @@ const OBJECTS: &str = "a list of objects, e.g. [\"statusword\", \"position_actua
 const TIME: &str = "a time as text, e.g. \"100ms\"";
 const GUARDING: &str = "a table of time and factor, e.g. { time = \"100ms\", factor = 3 }";
 const FACTOR: &str = "a life time factor, 1 to 255";
+const SDO_SERVER: &str = "the number of an SDO server, 1 to 128: 2 is that of 1201h";
+const SYNC_COUNTER: &str = "the highest counter of SYNC, 2 to 240";
 const LIMITS: &str = "a table of position, speed, torque, current, e.g. { speed = \"100rpm\" }";
 const BOUNDS: &str = "two bounds, [low, high]";
 const START_UP: &str = "a table of objects and their values, e.g. { 1017 = 200 }";
@@ -70,6 +72,24 @@ pub(super) fn values(
         }
     }
     all.values
+}
+
+/// The record of an SDO server by its number, 1 to 128: 1200h is the first, which every node has. Source: CiA 301, 7.5.2.33.
+pub const fn sdo_server_record(number: u16) -> Option<u16> {
+    if matches!(number, 1..=128) { Some(0x11FF + number) } else { None }
+}
+
+/// The record of the SDO server by which a master asks a drive.
+pub(super) fn sdo_server(table: &Table<'_>) -> Result<Option<u16>, Problem> {
+    let Some(field) = table.get("sdo_server") else { return Ok(None) };
+    sdo_server_record(field.whole(SDO_SERVER)?).map(Some).ok_or_else(|| field.wrong(SDO_SERVER))
+}
+
+/// The highest counter of SYNC, as 1019h takes it (CiA 301, 7.5.2.22).
+pub(super) fn sync_counter(file: &Table<'_>) -> Result<Option<u8>, Problem> {
+    let Some(field) = file.get("sync_counter") else { return Ok(None) };
+    let highest = field.whole(SYNC_COUNTER)?;
+    if matches!(highest, 2..=240) { Ok(Some(highest)) } else { Err(field.wrong(SYNC_COUNTER)) }
 }
 
 struct Collected<'a> {

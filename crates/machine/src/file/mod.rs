@@ -8,6 +8,7 @@ mod bodies;
 mod configuration;
 mod cycles;
 mod fidelity;
+mod fields;
 mod motion;
 mod seat;
 mod surroundings;
@@ -15,7 +16,6 @@ mod units;
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::str::FromStr;
 
 use can::{Bitrate, Instant};
 use canopen::{Mux, NodeId};
@@ -27,11 +27,12 @@ use sim::machine::{Realism, TimingMode};
 use sim::{Place, Source, Stimulus, VirtualDrive, World};
 
 use bodies::Joined;
-pub use configuration::{mapped, pdo_id, tpdo_id};
+pub use configuration::{mapped, pdo_id, sdo_server_record, tpdo_id};
 pub use cycles::{BASE_PERIOD, CyclePlan, GROUP_PERIOD, TOLERANCE, TooFull, speed_mode, too_full, too_full_at};
+use fields::{noted, optional_word, rate};
 pub use motion::{AxisPlan, BasePlan, GroupPlan, WATCHDOG};
 use seat::Seat;
-use words::document::reader::{self, Field, Parameters as Placeholders, Table};
+use words::document::reader::{self, Parameters as Placeholders, Table};
 use words::document::{BadFile, Located, Problem, read_text};
 use words::drive::DriveSpec;
 use words::models::{Description, resolve_in};
@@ -47,7 +48,8 @@ pub const SEED: u64 = 1;
 const MOST_DRIVES: usize = 127;
 
 /// What a machine file may say of its bus.
-pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "timing", "fidelity", "drive", "body", "group", "base"];
+pub const BUS_KEYS: &[&str] =
+    &["bitrate", "seed", "realism", "timing", "fidelity", "sync_counter", "drive", "body", "group", "base"];
 
 /// What it may say of a drive.
 pub const DRIVE_KEYS: &[&str] = &[
@@ -70,6 +72,7 @@ pub const DRIVE_KEYS: &[&str] = &[
     "heartbeat",
     "guarding",
     "start_up",
+    "sdo_server",
 ];
 
 /// A machine as its file describes it.
@@ -85,6 +88,8 @@ pub struct Machine {
     pub timing: Option<TimingMode>,
     /// How much of its drives is computed, where it is given; a drive may have its own.
     pub fidelity: Option<Fidelity>,
+    /// The highest counter of the SYNC that a master produces, 1019h of the devices; without one it has no counter.
+    pub sync_counter: Option<u8>,
     /// The drives, each at a node of its own.
     pub drives: Vec<Placed>,
     /// Those that a master moves as one.
@@ -113,6 +118,8 @@ pub struct Placed {
     start_up: BTreeMap<Mux, Vec<u8>>,
     /// What stands behind its shaft.
     gear: Gear,
+    /// The record of the SDO server by which a master asks it, where the file says one.
+    sdo_server: Option<u16>,
 }
 
 /// The machine that the file at `path` describes. Data sheets that it names are looked for beside it.
@@ -162,17 +169,13 @@ impl Machine {
     pub fn from_table(file: &Table<'_>, folder: &Path) -> Result<Self, Vec<Problem>> {
         let mut problems = file.strangers(BUS_KEYS);
         let bitrate = noted(file.get("bitrate").map(|field| rate(&field)).transpose(), &mut problems);
-        let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose();
-        let seed = noted(seed, &mut problems);
-        let realism =
-            noted(file.get("realism").map(|field| word(&field, "\"ideal\" or \"full\"")).transpose(), &mut problems);
-        let timing =
-            noted(file.get("timing").map(|field| word(&field, "\"device\" or \"ideal\"")).transpose(), &mut problems);
-        let fidelity = noted(
-            file.get("fidelity").map(|field| word(&field, "\"full\" or \"mechanical\"")).transpose(),
-            &mut problems,
-        );
-        let mut machine = Self { bitrate, seed, realism, timing, fidelity, ..Self::default() };
+        let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on"));
+        let seed = noted(seed.transpose(), &mut problems);
+        let realism = noted(optional_word(file, "realism", "\"ideal\" or \"full\""), &mut problems);
+        let timing = noted(optional_word(file, "timing", "\"device\" or \"ideal\""), &mut problems);
+        let fidelity = noted(optional_word(file, "fidelity", "\"full\" or \"mechanical\""), &mut problems);
+        let sync_counter = noted(configuration::sync_counter(file), &mut problems);
+        let mut machine = Self { bitrate, seed, realism, timing, fidelity, sync_counter, ..Self::default() };
         let expected = "a table of its own for each drive, begun by [[drive]]";
         let tables = file.get("drive").map_or(Ok(Vec::new()), |field| field.list(expected));
         let tables = tables.unwrap_or_else(|problem| {
@@ -232,6 +235,11 @@ impl Machine {
             revision_number: known(model.revision_number),
         };
         Some(Parameters { identity, node: Some(node), values: placed.start_up.clone() })
+    }
+
+    /// The records of the SDO servers by which a master asks nodes, where it says them.
+    pub fn sdo_servers(&self) -> impl Iterator<Item = (NodeId, u16)> {
+        self.drives.iter().filter_map(|drive| Some((drive.spec.node, drive.sdo_server?)))
     }
 
     /// The writes that set a node up so, whatever it has, in the order of CiA 301; none for a node that is not in the file, or
@@ -338,26 +346,9 @@ impl From<DriveSpec> for Placed {
             keys: Vec::new(),
             start_up: BTreeMap::new(),
             gear: Gear::DIRECT,
+            sdo_server: None,
         }
     }
-}
-
-/// The value, or its problem among the others.
-fn noted<T: Default>(value: Result<T, Problem>, problems: &mut Vec<Problem>) -> T {
-    value.unwrap_or_else(|problem| {
-        problems.push(problem);
-        T::default()
-    })
-}
-
-fn rate(field: &Field<'_>) -> Result<Bitrate, Problem> {
-    let expected = "a bit rate as text, e.g. \"500k\"";
-    field.text(expected)?.parse().map_err(|error| field.problem(format!("{error}")))
-}
-
-/// A word that stands for a value, one of those expected.
-fn word<T: FromStr>(field: &Field<'_>, expected: &'static str) -> Result<T, Problem> {
-    field.text(expected)?.parse().map_err(|_| field.wrong(expected))
 }
 
 impl Placed {
@@ -418,11 +409,12 @@ impl Placed {
         }
         let start_up = configuration::values(table, spec.description(), id, &mut problems);
         let gear = noted(units::gear(table), &mut problems);
+        let sdo_server = noted(configuration::sdo_server(table), &mut problems);
         let of_master = |key: &str| key == units::KEY || configuration::KEYS.contains(&key);
         let of_simulator = |key: &&str| !matches!(*key, "model" | "node") && !of_master(key);
         let keys = DRIVE_KEYS.iter().copied().filter(|key| of_simulator(key) && table.get(key).is_some());
         if problems.is_empty() {
-            Ok(Self { spec, source, source_at, shaft, around, keys: keys.collect(), start_up, gear })
+            Ok(Self { spec, source, source_at, shaft, around, keys: keys.collect(), start_up, gear, sdo_server })
         } else {
             Err(problems)
         }
@@ -576,6 +568,21 @@ mod tests {
             "{bad}"
         );
         assert!(refusal(&format!("{DRIVE}supply_v = 300")).starts_with("line 4, column 12: supply of node 4"));
+    }
+
+    /// CiA 301, 7.5.2.33: the record of the nth server is 1200h + n - 1; 7.5.2.22: a counter of 2 to 240.
+    #[test]
+    fn servers_and_the_counter_of_sync_are_for_a_master() {
+        let machine = parsed(&format!("sync_counter = 240\n{DRIVE}sdo_server = 2"));
+        let servers: Vec<_> = machine.sdo_servers().map(|(node, record)| (node.raw(), record)).collect();
+        assert_eq!((machine.sync_counter, &servers[..]), (Some(240), &[(4, 0x1201)][..]));
+        assert_eq!(machine.unused_by_a_master(), None);
+        for number in [0, 129, -1] {
+            assert!(refusal(&format!("{DRIVE}sdo_server = {number}")).contains("expected the number of an SDO server"));
+        }
+        for counter in [1, 241] {
+            assert!(refusal(&format!("sync_counter = {counter}\n{DRIVE}")).contains("2 to 240"), "{counter}");
+        }
     }
 
     #[test]

@@ -79,6 +79,8 @@ impl Network {
         let began = self.now();
         self.nmt_all(NmtCommand::EnterPreOperational);
         self.quick_stop_moved();
+        // A stop waits for no record of a server.
+        self.choose_sdo_servers([]);
         let expected: NodeSet = self.seen().iter().chain(models.keys().copied()).collect();
         let (first, others): (Vec<_>, Vec<_>) = NodeId::all().partition(|node| expected.contains(*node));
         let turns = others.chunks(WINDOW).enumerate().flat_map(|(number, window)| {

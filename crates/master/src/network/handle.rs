@@ -44,6 +44,8 @@ pub(super) struct NetworkState {
     models: Models,
     /// What watches this program, by node.
     guards: BTreeMap<NodeId, ArmedGuard>,
+    /// SDO servers that nodes are to be asked by, whose records are still to be read.
+    chosen_servers: BTreeMap<NodeId, u16>,
     /// Axes that belong to a group or a base, by the place of their controlword.
     pub(super) claims: BTreeSet<(NodeId, Mux)>,
 }
@@ -129,6 +131,22 @@ impl Network {
     /// Looks for nodes among these models from now on.
     pub fn set_models(&self, models: Models) {
         self.lock().models = models;
+    }
+
+    /// Asks these nodes by other SDO servers than the default one, given by their records (1201h to 127Fh), in place of what was chosen
+    /// before. Each record is read when its node is first asked for something, whoever asks; a request fails as
+    /// [`Node::use_sdo_server`](super::Node::use_sdo_server) does where there is none. What stops an axis before that goes to the default
+    /// server and waits for nothing.
+    pub fn choose_sdo_servers(&self, servers: impl IntoIterator<Item = (NodeId, u16)>) {
+        self.lock().chosen_servers = servers.into_iter().collect();
+    }
+
+    pub(super) fn chosen_server(&self, node: NodeId) -> Option<u16> {
+        self.lock().chosen_servers.get(&node).copied()
+    }
+
+    pub(super) fn forget_chosen_server(&self, node: NodeId) {
+        self.lock().chosen_servers.remove(&node);
     }
 
     /// What has been seen of a node.

@@ -70,17 +70,22 @@ impl Node {
     pub async fn use_sdo_server(&self, record: u16) -> Result<SdoServer, Error> {
         let server =
             if record == 0x1200 { SdoServer::default_of(self.id) } else { self.further_server(record).await? };
+        self.network.forget_chosen_server(self.id);
         self.network.submit(Command::UseSdoServer(self.id, server));
         Ok(server)
     }
 
     async fn further_server(&self, record: u16) -> Result<SdoServer, Error> {
-        let request = CobId(self.read(Mux::new(record, 1)).await?);
-        let reply = CobId(self.read(Mux::new(record, 2)).await?);
+        let request = self.cob_id(Mux::new(record, 1)).await?;
+        let reply = self.cob_id(Mux::new(record, 2)).await?;
         let Some((request, reply)) = parameter::identifiers(request, reply) else {
             return Err(Error::NoSdoServer { node: self.id, record });
         };
         Ok(SdoServer { request: CanId::standard(request), reply })
+    }
+
+    async fn cob_id(&self, mux: Mux) -> Result<CobId, Error> {
+        Ok(CobId(self.number(mux, self.exchange(mux, Transfer::Upload).await?)?))
     }
 
     /// SDO upload: the bytes of an object, as they came.
@@ -104,7 +109,10 @@ impl Node {
     /// # Errors
     /// As [`upload`](Self::upload); [`Error::WrongLength`] when the object is not as long as a `T`.
     pub async fn read<T: Scalar>(&self, mux: Mux) -> Result<T, Error> {
-        let payload = self.upload(mux).await?;
+        self.number(mux, self.upload(mux).await?)
+    }
+
+    fn number<T: Scalar>(&self, mux: Mux, payload: Payload) -> Result<T, Error> {
         let (expected, received) = (T::DATA_TYPE.size(), payload.as_bytes().len());
         if expected == received {
             Ok(T::from_raw(payload.raw()))
@@ -191,6 +199,14 @@ impl Node {
     }
 
     async fn transfer(&self, mux: Mux, transfer: Transfer) -> Result<Payload, Error> {
+        if let Some(record) = self.network.chosen_server(self.id) {
+            self.use_sdo_server(record).await?;
+        }
+        self.exchange(mux, transfer).await
+    }
+
+    /// By the server in use.
+    async fn exchange(&self, mux: Mux, transfer: Transfer) -> Result<Payload, Error> {
         let access = if transfer == Transfer::Upload { Access::Read } else { Access::Write };
         let request = Request { node: self.id, mux, transfer, timeout: self.timeout };
         let outcome = Pending::request(self.network.clone(), request).await;

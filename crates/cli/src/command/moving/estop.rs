@@ -78,6 +78,8 @@ impl Estop {
 
 /// `stop all`: each by its ramp; it stays enabled.
 pub(crate) async fn stop_all(context: &Context) -> Result<StopReport, Failure> {
+    // A stop waits for no record of a server.
+    context.network.choose_sdo_servers([]);
     let asked = NodeId::all().map(|id| async move {
         let answer = context.network.node(id).with_timeout(PATIENCE).read::<u16>(STATUSWORD).await;
         let expected = context.stated_model(id).is_some() || context.network.facts(id).seen_at.is_some();

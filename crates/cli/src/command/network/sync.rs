@@ -8,7 +8,6 @@ use serde::Serialize;
 use crate::command::repeat::{Pace, Repeat};
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::numbers::whole;
 use crate::output::Report;
 use plot::Paint;
 
@@ -18,13 +17,10 @@ use plot::Paint;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 sync\n  \
     ferrodrive --bus slcan:///dev/ttyACM0 sync --every 10ms --count 1000\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0 sync --every 10ms --counter 240")]
+    ferrodrive --bus slcan:///dev/ttyACM0 sync --every 10ms --sync-counter 240")]
 pub(crate) struct SyncCommand {
     #[command(flatten)]
     repeat: Repeat,
-    /// Add a counter from 1 up to this, equal to 1019h of the devices
-    #[arg(long, value_name = "OVERFLOW", value_parser = |text: &str| whole(text, 2..=240_u8))]
-    counter: Option<u8>,
     /// Identifier, if 1005h of the devices is not 80h
     #[arg(long, value_name = "ID", value_parser = identifier)]
     id: Option<CanId>,
@@ -56,7 +52,7 @@ impl SyncCommand {
         let mut sent = 0;
         while times.is_none_or(|times| sent < times) {
             pace.wait().await;
-            let counter = self.counter.map(|overflow| (sent % u64::from(overflow)) as u8 + 1);
+            let counter = context.sync_counter.map(|overflow| (sent % u64::from(overflow)) as u8 + 1);
             context.network.transmit(Sync { counter }.emit(id));
             sent += 1;
             context.progress.show(format!("{sent} SYNC"));

@@ -53,6 +53,32 @@ fn a_drive_that_is_reached_again_is_stopped_by_a_second_try() {
     }
 }
 
+/// The record is read with the first request; a stop before that asks the default server, and waits for nothing.
+#[test]
+fn a_chosen_server_is_used_from_the_first_request_on_and_delays_no_stop() {
+    let mut bus = Bus::new(vec![zlac8030l(4).u32(0x1201, 1, 0x680).u32(0x1201, 2, 0x690)]);
+    let network = bus.network.clone();
+    let drive = master::Drive::new(network.node(node(4)), model("zlac8030l").unwrap());
+    network.choose_sdo_servers([(node(4), 0x1201)]);
+    let axes = bus.block_on(async { network.stop_everything(&[(node(4), model("zlac8030l").unwrap())].into()).await });
+    assert!(matches!(&axes[..], [axis] if axis.outcome.is_ok()), "{axes:?}");
+    assert!(bus.frames().iter().all(|frame| !frame.starts_with("604#400112") && !frame.starts_with("680#")));
+
+    network.choose_sdo_servers([(node(4), 0x1201)]);
+    let short = drive.node().clone().with_timeout(Duration::from_millis(20));
+    // The toy answers at its default server only.
+    bus.block_on(async { short.read::<u32>(canopen::Mux::new(0x1000, 0)).await }).unwrap_err();
+    let frames = bus.frames();
+    let asked: Vec<&str> =
+        frames.iter().filter(|frame| frame[4..].starts_with("40")).map(|frame| &frame[..12]).collect();
+    assert_eq!(asked[asked.len() - 3..], ["604#40011201", "604#40011202", "680#40001000"]);
+    // Where the record is missing, the request is not sent by another server in secret.
+    bus.block_on(async { drive.node().use_sdo_server(0x1200).await }).unwrap();
+    network.choose_sdo_servers([(node(4), 0x1202)]);
+    let refused = bus.block_on(async { drive.node().read::<u32>(canopen::Mux::new(0x1000, 0)).await }).unwrap_err();
+    assert_eq!(refused.object(), Some(canopen::Mux::new(0x1202, 1)));
+}
+
 /// The toy has the record of a further server and does not answer there, as a device whose server another client has made invalid.
 #[test]
 fn a_drive_whose_further_server_is_gone_is_stopped_through_the_default_one() {
