@@ -45,9 +45,11 @@ pub struct Client {
     timeout: Duration,
     state: State,
     deadline: Instant,
-    /// When the transfer began, and how long it may take in all.
-    began: Instant,
+    /// How long an upload may take in all, and when that is over.
     limit: Duration,
+    ends_at: Instant,
+    /// Of the time for a reply, for what is done with each segment of a block.
+    half_timeout_ns: u64,
     request: Option<[u8; LENGTH]>,
     /// The end of an upload of blocks, which goes out before any other request.
     closing: Option<[u8; LENGTH]>,
@@ -131,8 +133,9 @@ impl Client {
             timeout,
             state: State::Idle,
             deadline: Instant::FAR_FUTURE,
-            began: Instant::ZERO,
             limit: Duration::MAX,
+            ends_at: Instant::FAR_FUTURE,
+            half_timeout_ns: half_ns(timeout),
             request: None,
             closing: None,
             abandoned: None,
@@ -144,6 +147,7 @@ impl Client {
     /// Time allowed for each reply, from the next request on.
     pub const fn set_timeout(&mut self, timeout: Duration) {
         self.timeout = timeout;
+        self.half_timeout_ns = half_ns(timeout);
     }
 
     /// True while a transfer is under way.
@@ -209,7 +213,7 @@ impl Client {
             return None;
         }
         let mux = self.mux()?;
-        if self.is_stray(frame.padded()) {
+        if self.abandoned.is_some() && self.is_stray(frame.padded()) {
             return None;
         }
         let advanced = if let State::UploadBlocks { .. } = self.state {
@@ -243,7 +247,7 @@ impl Client {
     /// Time has reached `now`.
     pub fn handle_timeout(&mut self, now: Instant) -> Option<Failure> {
         let mux = self.mux().filter(|_| now >= self.deadline)?;
-        let is_endless = now >= self.began + self.limit;
+        let is_endless = now >= self.ends_at;
         let endless = match self.state {
             State::UploadSegments { received, .. } if is_endless => Some(received),
             State::UploadBlocks { receiver, .. } if is_endless => Some(receiver.written()),
@@ -376,7 +380,7 @@ impl Client {
         let segments =
             declared.map_or(UNDECLARED_SEGMENTS, |bytes| bytes.div_ceil(MAX_SEGMENT) as u32).saturating_add(1);
         self.limit = self.timeout.saturating_mul(segments);
-        self.began = now;
+        self.ends_at = now + self.limit;
         Ok(declared)
     }
 
@@ -426,7 +430,7 @@ impl Client {
         self.foreign = None;
         self.deadline = now + self.timeout;
         if let State::UploadSegments { .. } = state {
-            self.deadline = self.deadline.min(self.began + self.limit);
+            self.deadline = self.deadline.min(self.ends_at);
         }
     }
 
@@ -457,6 +461,12 @@ impl Client {
             | State::BlocksSent { mux } => Some(mux),
         }
     }
+}
+
+/// Half of a time in nanoseconds, as long as an [`Instant`] can be at most.
+const fn half_ns(time: Duration) -> u64 {
+    let half = time.as_nanos() / 2;
+    if half > u64::MAX as u128 { u64::MAX } else { half as u64 }
 }
 
 fn expect_mux(expected: Mux, received: Mux) -> Result<(), Failure> {

@@ -67,15 +67,27 @@ impl Sender {
         }
         let begin = (self.confirmed + usize::from(self.sent)) * MAX_SEGMENT;
         let end = (begin + MAX_SEGMENT).min(self.length);
-        let part = data.get(begin..end).unwrap_or_default();
+        let mut bytes = [0; MAX_SEGMENT];
+        // All but the last are full: of a length that is known, neither sum nor copy needs a loop.
+        if let Some(full) = data.get(begin..end).and_then(|part| <&[u8; MAX_SEGMENT]>::try_from(part).ok()) {
+            bytes = *full;
+            self.add_to_sum(&bytes, end);
+        } else {
+            let part = data.get(begin..end).unwrap_or_default();
+            bytes[..part.len()].copy_from_slice(part);
+            self.add_to_sum(part, end);
+        }
+        self.sent += 1;
+        Some(Segment { last: end == self.length, sequence: self.sent, bytes }.emit())
+    }
+
+    /// Over each segment once, however often it is sent.
+    #[inline(always)]
+    fn add_to_sum(&mut self, part: &[u8], end: usize) {
         if self.checked && end > self.summed {
             self.sum = checksum(self.sum, part);
             self.summed = end;
         }
-        let mut bytes = [0; MAX_SEGMENT];
-        bytes[..part.len()].copy_from_slice(part);
-        self.sent += 1;
-        Some(Segment { last: end == self.length, sequence: self.sent, bytes }.emit())
     }
 
     /// A confirmation has come, also of a block of which not everything was handed out yet: its receiver did not wait longer.

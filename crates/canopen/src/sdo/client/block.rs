@@ -89,8 +89,8 @@ impl Client {
     ) -> Result<Option<Outcome>, Failure> {
         let State::UploadBlocks { mux, declared, receiver } = &mut self.state else { return Ok(None) };
         let mux = *mux;
-        if let wire::Reply::Abort(_, code) = wire::Reply::parse(raw)
-            && raw[0] == ABORT
+        if raw[0] == ABORT
+            && let wire::Reply::Abort(_, code) = wire::Reply::parse(raw)
         {
             return Err(Failure::Aborted { mux, code });
         }
@@ -172,12 +172,12 @@ impl Client {
         if let Some(confirmation) = receiver.confirm_early() {
             self.request = Some(Request::Acknowledge(confirmation).emit());
         }
-        self.deadline = (now + self.timeout / 2).min(self.began + self.limit);
+        self.wait_for_segment(now);
         true
     }
 
     fn wait_for_segment(&mut self, now: Instant) {
-        self.deadline = (now + self.timeout / 2).min(self.began + self.limit);
+        self.deadline = now.plus_nanos(self.half_timeout_ns).min(self.ends_at);
     }
 }
 
