@@ -11,6 +11,8 @@ canopen::objects! {
     STATUSWORD = 0x6041, 0;
     /// vl target velocity (velocity mode), in r/min of the motor while 604Bh and 604Ch are 1.
     VL_TARGET_VELOCITY = 0x6042, 0;
+    /// vl velocity min max amount (velocity mode): the least speed but standstill, in units of 6044h.
+    VL_VELOCITY_MIN_AMOUNT = 0x6046, 1;
     /// vl velocity min max amount (velocity mode): the greatest speed, in units of 6044h.
     VL_VELOCITY_MAX_AMOUNT = 0x6046, 2;
     /// Modes of operation: the mode that is asked for.

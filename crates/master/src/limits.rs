@@ -23,6 +23,8 @@ pub struct Limits {
     pub resolution: Option<Setting>,
     /// What holds back what a value effects, and from which magnitude on, in counts.
     pub held_to: Option<(i64, Setting)>,
+    /// What raises what a smaller value but 0 effects, and to which magnitude, in counts.
+    pub raised_to: Option<(i64, Setting)>,
 }
 
 /// An object that has a say in the limits of another, and its value.
@@ -58,10 +60,11 @@ impl Limits {
         (self.low..=self.high).contains(&value) && listed
     }
 
-    /// The setting that holds this value back, if one does.
-    pub fn holding_back(&self, value: i64) -> Option<Setting> {
-        let (most, setting) = self.held_to?;
-        (value.unsigned_abs() > most.unsigned_abs()).then_some(setting)
+    /// The magnitude that this value effects in place of its own, and by which setting, if one holds it back or raises it.
+    pub fn changed(&self, value: i64) -> Option<(i64, Setting)> {
+        let magnitude = value.unsigned_abs();
+        let held = self.held_to.filter(|(most, _)| magnitude > most.unsigned_abs());
+        held.or(self.raised_to.filter(|(least, _)| value != 0 && magnitude < least.unsigned_abs()))
     }
 
     /// How many counts make one of the unit.
@@ -87,8 +90,11 @@ impl fmt::Display for Limits {
         if let Some(setting) = self.resolution {
             write!(f, ", by {setting}")?;
         }
-        match self.held_to {
-            Some((most, setting)) => write!(f, "; it acts up to {most}, by {setting}"),
+        if let Some((most, setting)) = self.held_to {
+            write!(f, "; it acts up to {most}, by {setting}")?;
+        }
+        match self.raised_to {
+            Some((least, setting)) => write!(f, "; what is less but 0 acts as {least}, by {setting}"),
             None => Ok(()),
         }
     }

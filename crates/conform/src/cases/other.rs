@@ -19,7 +19,7 @@ pub(crate) const CASES: &[Case] = &[
     case!("OTHER 06", "Refuse the signature backwards for 1010h:02", "CiA 301, 7.5.2.13", [Need::Sub(0x1010, 2)], [], |bench| wrong_signature(bench, 0x1010, 2, *b"evas")),
     case!("OTHER 07", "Refuse a wrong signature for 1011h:02", "CiA 301, 7.5.2.14", [Need::Sub(0x1011, 2)], [], |bench| wrong_signature(bench, 0x1011, 2, *b"wron")),
     case!("OTHER 08", "Refuse the signature backwards for 1011h:02", "CiA 301, 7.5.2.14", [Need::Sub(0x1011, 2)], [], |bench| wrong_signature(bench, 0x1011, 2, *b"daol")),
-    case!("OTHER 09", "1020h is kept by save, and is 0 once the configuration has changed", "CiA 301, 7.5.2.23", [Need::Index(0x1020), STORE, Need::Store], [], configuration_date),
+    case!("OTHER 09", "1020h is kept by save, and is 0 once another command changes what is saved", "CiA 301, 7.5.2.23", [Need::Index(0x1020), STORE, Need::Store], [], configuration_date),
     case!("OTHER 10", "Refuse identifiers that nothing may use", "CiA 301, 7.3.5", [], [], restricted),
     case!("OTHER 51", "1010h says how it stores, with bit 0 or 1", "CiA 301, 7.5.2.13", [Need::Sub(0x1010, 1)], [], says_how),
     case!("OTHER 52", "Saved values are there after a reset, and delivered ones after a restore", "CiA 301, 7.5.2.14", [STORE, Need::Writable(0x1017), Need::Store], [], save_and_reset),

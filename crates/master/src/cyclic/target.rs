@@ -42,7 +42,7 @@ impl Target {
             _ => return Err(Refusal::WrongKind),
         };
         let limits = &self.limits;
-        if !limits.take(raw) || limits.holding_back(raw).is_some() {
+        if !limits.take(raw) || limits.changed(raw).is_some() {
             return Err(Refusal::OutOfLimits { asked: raw, bound: self.limits.into() });
         }
         self.check_step(raw, period)?;

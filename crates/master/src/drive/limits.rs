@@ -4,7 +4,7 @@
 
 use canopen::Mux;
 use canopen::od::{Entry, HeldTo};
-use cia402::object::{VL_TARGET_VELOCITY, VL_VELOCITY_MAX_AMOUNT};
+use cia402::object::{VL_TARGET_VELOCITY, VL_VELOCITY_MAX_AMOUNT, VL_VELOCITY_MIN_AMOUNT};
 use devices::Scale;
 
 use super::handle::Drive;
@@ -35,17 +35,22 @@ impl Drive {
                 let setting = refused_is_none(self.setting(object).await)?;
                 setting.map(|setting| (setting.value * counts * scale, setting))
             }
-            None => self.greatest_amount(row.mux()).await?,
+            None => {
+                let greatest = self.amount(row.mux(), VL_VELOCITY_MAX_AMOUNT).await?;
+                greatest.map(|(counts, setting)| (counts as i64, setting))
+            }
         };
+        let least = self.amount(row.mux(), VL_VELOCITY_MIN_AMOUNT).await?;
+        let raised_to = least.map(|(counts, setting)| (counts.ceil() as i64, setting));
         let (low, high) = row.limits_at(scale);
         let (object, Entry { name, unit, values: listed, .. }) = (row.mux(), *row);
-        Ok(Limits { object, name, unit, low, high, listed, resolution, held_to })
+        Ok(Limits { object, name, unit, low, high, listed, resolution, held_to, raised_to })
     }
 
-    /// What holds back the target of an axis that turns in velocity mode (vl): the greatest amount, 6046h:02, in counts of the
-    /// target; 0 limits nothing.
-    async fn greatest_amount(&self, target: Mux) -> Result<Option<(i64, Setting)>, Error> {
-        let amount = self.place(VL_VELOCITY_MAX_AMOUNT);
+    /// What limits the target of an axis that turns in velocity mode (vl): the greatest amount, 6046h:02, or the least, 6046h:01, to
+    /// which a drive raises a smaller target (CiA 402-2, vl velocity min max amount), in counts of the target; 0 limits nothing.
+    async fn amount(&self, target: Mux, amount: Mux) -> Result<Option<(f64, Setting)>, Error> {
+        let amount = self.place(amount);
         let Some(Scale::Factors { times, over }) = self.scale_of_velocity_mode(target) else { return Ok(None) };
         if self.row(amount, "find out its limits").is_err() {
             return Ok(None);
@@ -54,7 +59,7 @@ impl Drive {
         let Some(setting) = setting else { return Ok(None) };
         // Amounts lack the set-point factor (604Bh), which is the first of the target's.
         let factor = self.product([times[0], None]).await? / self.product([over[0], None]).await?;
-        Ok(Some(((setting.value as f64 / factor.abs()) as i64, setting)))
+        Ok(Some((setting.value as f64 / factor.abs(), setting)))
     }
 
     fn scale_of_velocity_mode(&self, target: Mux) -> Option<Scale> {
@@ -84,14 +89,14 @@ impl Drive {
     }
 
     /// As [`check_number`](Self::check_number), for what is to take effect: a value that the drive would take and hold
-    /// back is refused too.
+    /// back, or raise, is refused too.
     pub(crate) async fn check_effect(&self, mux: Mux, value: i64) -> Result<&'static Entry, Error> {
         let row = self.check_number(mux, value).await?;
         if row.held_to.is_none() && self.scale_of_velocity_mode(mux).is_none() || value == 0 {
             return Ok(row);
         }
         let limits = self.limits_of(row).await?;
-        if limits.holding_back(value).is_none() { Ok(row) } else { Err(self.out_of_limits(value, limits)) }
+        if limits.changed(value).is_none() { Ok(row) } else { Err(self.out_of_limits(value, limits)) }
     }
 
     fn out_of_limits(&self, asked: i64, limits: Limits) -> Error {

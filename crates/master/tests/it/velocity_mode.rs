@@ -88,6 +88,26 @@ fn a_stop_stands_although_the_drive_has_a_least_speed() {
     assert!(bench.rpm().abs() < 1.0, "{}", bench.rpm());
 }
 
+/// CiA 402-2, vl velocity min max amount: a target below the least is raised to it, of either sign; one of 0 stands still.
+#[test]
+fn a_speed_that_the_drive_would_raise_is_refused_before_anything_moves() {
+    let mut bench = Bench::new();
+    bench.run(async |drive| drive.node().write(mux(0x6046, 1), 100_u32).await).unwrap();
+    for slow in [50.0, -99.0] {
+        let error = bench.run(async |drive| drive.velocity(Rpm(slow), options()).await).unwrap_err();
+        let Error::OutOfLimits { limits, .. } = &error else { panic!("{error}") };
+        assert_eq!(limits.raised_to.map(|(least, setting)| (least, setting.object)), Some((100, mux(0x6046, 1))));
+        assert!(error.to_string().contains("what is less but 0 acts as 100, by 6046h:01"), "{error}");
+        assert_eq!((bench.number(0x6042, 0), bench.rpm().abs() < 1.0), (0, true));
+    }
+    bench.run(async |drive| drive.velocity(Rpm(100.0), options()).await).unwrap();
+    assert!((bench.rpm() - 100.0).abs() < 10.0, "{}", bench.rpm());
+    // The drive does as the standard says with what it is written all the same.
+    bench.run(async |drive| drive.node().write(mux(0x6042, 0), 50_i16).await).unwrap();
+    bench.run(async |drive| drive.supervise(Duration::from_millis(200)).await.or(Ok::<(), Error>(()))).unwrap();
+    assert!((bench.rpm() - 100.0).abs() < 5.0, "{}", bench.rpm());
+}
+
 #[test]
 fn factors_of_the_drive_scale_the_target_and_limits_refuse_it_before_anything_moves() {
     let mut bench = Bench::new();

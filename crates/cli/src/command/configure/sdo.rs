@@ -160,9 +160,8 @@ fn note(drive: &Drive, mux: Mux, number: Option<i64>, limits: Option<&Limits>) -
         let node = drive.node().id();
         return Some(format!("it takes effect at the next restart, if it is stored by then: ferrodrive save {node}"));
     }
-    let (limits, setting) = limits.and_then(|limits| Some((limits, limits.holding_back(number?)?)))?;
-    let most = limits.held_to.map_or(0, |(most, _)| most);
-    Some(format!("the drive limits it to {most}, by {setting}"))
+    let (magnitude, setting) = limits.zip(number).and_then(|(limits, number)| limits.changed(number))?;
+    Some(format!("the drive limits it to {magnitude}, by {setting}"))
 }
 
 /// A refusal of a value, with what the object takes now and where that comes from.

@@ -134,7 +134,8 @@ struct By {
 
 impl Now {
     fn of(limits: &Limits) -> Self {
-        let settings = limits.resolution.into_iter().chain(limits.held_to.map(|(_, setting)| setting));
+        let amounts = [limits.held_to, limits.raised_to].into_iter().flatten().map(|(_, setting)| setting);
+        let settings = limits.resolution.into_iter().chain(amounts);
         let by = settings.map(|Setting { object, name, value, since_restart }| By {
             object: object.to_string(),
             name,
