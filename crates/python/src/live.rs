@@ -1,7 +1,7 @@
 //! A master on a real bus: a thread that runs it, and the jobs it is given.
 //!
 //! The thread ends with its handle. Before it does, what it was asked is given up, every drive that this program has set in
-//! motion is quick-stopped, and the guards of those that stand are released.
+//! motion is quick-stopped, the guards of those that stand are released, and what captures have changed is put back.
 
 use can::Tap;
 use host::stopping::{still_moving, stop};
@@ -15,6 +15,7 @@ use tokio::task::{JoinSet, LocalSet};
 use transport::{BusNotes, BusSpec, Note};
 use words::failure::with_causes;
 
+use crate::master::WaysBack;
 use crate::master::tap::Traffic;
 use crate::world::Job;
 
@@ -68,13 +69,13 @@ impl Live {
     ///
     /// # Errors
     /// Why the bus does not open.
-    pub(crate) fn open(spec: BusSpec, network: Network, traffic: Traffic) -> Result<Self, String> {
+    pub(crate) fn open(spec: BusSpec, network: Network, traffic: Traffic, ways_back: WaysBack) -> Result<Self, String> {
         let (jobs, incoming) = mpsc::unbounded_channel();
         let opened = Opened::default();
         let said = Arc::new(Said::of(&spec));
         let (reported, noted) = (Arc::clone(&opened), Arc::clone(&said));
         let thread = thread::Builder::new().name("ferrodrive master".into());
-        let thread = thread.spawn(move || run(&spec, (network, traffic), incoming, &reported, &noted));
+        let thread = thread.spawn(move || run(&spec, (network, traffic, ways_back), incoming, &reported, &noted));
         let thread = thread.map_err(|error| format!("cannot start a thread: {error}"))?;
         let mut result = opened.0.lock().unwrap_or_else(PoisonError::into_inner);
         let result = loop {
@@ -126,7 +127,7 @@ impl Drop for Live {
 /// The thread: opens the bus, says how that went, and runs until the handle is gone or the bus is lost.
 fn run(
     spec: &BusSpec,
-    (network, traffic): (Network, Traffic),
+    (network, traffic, ways_back): (Network, Traffic, WaysBack),
     incoming: mpsc::UnboundedReceiver<Job>,
     opened: &Opened,
     said: &Said,
@@ -147,7 +148,7 @@ fn run(
         };
         report(Ok(()));
         let station = Tap::new(network.clone(), traffic);
-        let work = work_through(&network, incoming);
+        let work = work_through(&network, &ways_back, incoming);
         match bus.run((&network, THIS), station, work, |_, note| said.note(note)).await {
             Ok(moving) => said.lock().moving = moving,
             Err(LostBus { error, moving }) => {
@@ -159,7 +160,11 @@ fn run(
 }
 
 /// Does the jobs that come, side by side, until no sender is left; then drops them and stops what moves.
-async fn work_through(network: &Network, mut incoming: mpsc::UnboundedReceiver<Job>) -> Vec<String> {
+async fn work_through(
+    network: &Network,
+    ways_back: &WaysBack,
+    mut incoming: mpsc::UnboundedReceiver<Job>,
+) -> Vec<String> {
     let mut running = JoinSet::new();
     loop {
         tokio::select! {
@@ -172,7 +177,9 @@ async fn work_through(network: &Network, mut incoming: mpsc::UnboundedReceiver<J
         }
     }
     running.shutdown().await;
-    stop_what_moves(network).await
+    let mut left = stop_what_moves(network).await;
+    left.extend(ways_back.restore().await);
+    left
 }
 
 /// Who lets go of drives here.

@@ -33,8 +33,8 @@ use pyo3::prelude::*;
 use transport::BusSpec;
 use words::models::{Description, with_files};
 
-pub(crate) use job::Job;
 use job::Trouble;
+pub(crate) use job::{Job, WaysBack};
 use order::{Order, duration};
 use runner::Runner;
 use tap::Traffic;
@@ -51,6 +51,8 @@ pub(crate) struct Network {
     core: Core,
     traffic: Traffic,
     runner: Arc<Runner>,
+    /// What is to be put back when it is closed.
+    ways_back: WaysBack,
     closed: AtomicBool,
     /// What a machine file says of its drives.
     machine: Option<Arc<Machine>>,
@@ -70,7 +72,7 @@ impl Network {
         state.jobs.note_master();
         let machine = machine.or_else(|| state.machine());
         drop(state);
-        Ok(Self::new(core, traffic, Runner::World(shared), machine))
+        Ok(Self::new((core, traffic), Runner::World(shared), WaysBack::default(), machine))
     }
 
     /// A master on a real bus: `socketcand://HOST:PORT/can0`, `slcan:///dev/ttyACM0?bitrate=500k`; with the machine file that says what
@@ -80,9 +82,10 @@ impl Network {
         let spec: BusSpec = bus.parse().map_err(bad_value)?;
         let machine = read_machine_of(py, machine)?;
         let (core, traffic) = (Core::new(), Traffic::default());
-        let live = py.detach(|| Live::open(spec, core.clone(), traffic.clone()));
+        let ways_back = WaysBack::default();
+        let live = py.detach(|| Live::open(spec, core.clone(), traffic.clone(), ways_back.clone()));
         let live = live.map_err(|reason| wrong_use(format!("bus {bus}: {reason}")))?;
-        Ok(Self::new(core, traffic, Runner::Live(Mutex::new(Some(live))), machine))
+        Ok(Self::new((core, traffic), Runner::Live(Mutex::new(Some(live))), ways_back, machine))
     }
 
     /// Stops what this program has set in motion, and leaves the real bus; what was not seen to stand, in words.
@@ -96,12 +99,13 @@ impl Network {
     /// The same in a world, whose owner has to move it: everything else that was asked of this network is given up, and the
     /// network is silent when this has ended.
     fn close_in_world(&self, py: Python<'_>) -> PyResult<Job> {
-        let core = self.core.clone();
+        let (core, ways_back) = (self.core.clone(), self.ways_back.clone());
         if let Runner::World(shared) = &*self.runner {
             shared.lock(py)?.jobs.cancel_all_of(self.owner());
         }
         let job = self.begin(py, async move {
-            let moving = stop_what_moves(&core).await;
+            let mut moving = stop_what_moves(&core).await;
+            moving.extend(ways_back.restore().await);
             core.fall_silent();
             Ok(Value::List(moving.into_iter().map(Value::Text).collect()))
         });
@@ -236,13 +240,19 @@ fn read_machine_of(py: Python<'_>, path: Option<PathBuf>) -> PyResult<Option<Arc
 }
 
 impl Network {
-    fn new(core: Core, traffic: Traffic, runner: Runner, machine: Option<Arc<Machine>>) -> Self {
+    fn new(
+        (core, traffic): (Core, Traffic),
+        runner: Runner,
+        ways_back: WaysBack,
+        machine: Option<Arc<Machine>>,
+    ) -> Self {
         let described = machine.iter().flat_map(|machine| machine.models()).map(|(_, model)| model);
         core.set_models(with_files(described));
         Self {
             core,
             traffic,
             runner: Arc::new(runner),
+            ways_back,
             closed: AtomicBool::new(false),
             machine,
             identified: Arc::default(),
@@ -306,8 +316,18 @@ impl Network {
         py: Python<'_>,
         work: impl Future<Output = Result<Value, Trouble>> + Send + 'static,
     ) -> PyResult<Job> {
+        self.begin_leading_back(py, work, None)
+    }
+
+    /// As [`begin_said`](Self::begin_said), of work that has ways back: when it is given up it ends with them.
+    fn begin_leading_back(
+        &self,
+        py: Python<'_>,
+        work: impl Future<Output = Result<Value, Trouble>> + Send + 'static,
+        ways_back: Option<WaysBack>,
+    ) -> PyResult<Job> {
         self.check_open()?;
-        let (job, future) = Job::new(work, &self.runner);
+        let (job, future) = Job::new(work, ways_back, &self.runner);
         match &*self.runner {
             Runner::World(shared) => job.set_number(shared.lock(py)?.jobs.begin(self.owner(), future)),
             Runner::Live(live) => {

@@ -124,3 +124,79 @@ def test_a_network_is_watched_by_a_coroutine_beside_others(world):
         await supervisor.close()
 
     run(world, main)
+
+
+def tpdos(network, node):
+    """What is set up of a node's first TPDO, which a capture may change."""
+    return [network.upload(node, 0x1800, sub) for sub in (1, 2)] + [network.upload(node, 0x1A00, sub) for sub in range(0, 3)]
+
+
+def test_a_capture_that_is_given_up_puts_back_what_it_has_changed():
+    world = ferrodrive.World()
+    world.add("zlac8030l", node=4)
+    world.wait_until_booted()
+    with ferrodrive.Network(world) as network:
+        before = tpdos(network, 4)
+    changed = []
+
+    async def main(network):
+        drive = network.async_drive(4, "zlac8030l")
+        capture = asyncio.ensure_future(drive.capture("velocity", duration=60.0))
+        await asyncio.sleep(2)
+        changed.append(await network.async_upload(4, 0x1A00, 0))
+        capture.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await capture
+        await asyncio.sleep(2)
+
+    run(world, main)
+    with ferrodrive.Network(world) as network:
+        assert changed != [before[2]]
+        assert tpdos(network, 4) == before
+
+
+def test_a_network_that_is_closed_beside_a_capture_puts_back_what_it_has_changed():
+    world = ferrodrive.World()
+    world.add("zlac8030l", node=4)
+    world.wait_until_booted()
+    with ferrodrive.Network(world) as network:
+        before = tpdos(network, 4)
+
+    async def main():
+        network = ferrodrive.Network(world)
+        capture = asyncio.ensure_future(network.async_drive(4, "zlac8030l").capture("velocity", duration=60.0))
+        await asyncio.sleep(2)
+        capture.cancel()
+        await asyncio.sleep(0)
+        network.close()
+
+    with ferrodrive.virtual_time(world):
+        asyncio.run(main())
+    with ferrodrive.Network(world) as network:
+        assert tpdos(network, 4) == before
+
+
+def test_a_capture_that_is_cut_off_reports_what_came_as_a_whole_one_does():
+    world = ferrodrive.World()
+    drive = world.add("zlac8030l", node=4)
+    world.wait_until_booted()
+
+    async def main(network):
+        capture = asyncio.ensure_future(network.async_drive(4, "zlac8030l").capture("velocity", duration=60.0))
+        await asyncio.sleep(2)
+        drive.apply("power off")
+        with pytest.raises(ferrodrive.MasterError) as caught:
+            await capture
+        return caught.value
+
+    error = run(world, main)
+    assert error.kind == "capture_cut_off"
+    values = error.report["values"]["velocity_rpm"]
+    assert len(values) == len(error.report["time_s"]) > 1000
+    assert all(abs(value) < 1 for value in values)
+    assert math.isclose(error.report["period_s"]["velocity_rpm"], 0.001, rel_tol=0.01)
+
+
+def test_an_rpdo_is_not_taken_for_a_capture(world):
+    with ferrodrive.Network(world) as network, pytest.raises(ValueError, match="'rpdo1' is not a TPDO"):
+        network.drive(1, "cia402").capture("velocity", take=["rpdo1"])

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import os
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 from . import _native
 from ._native import Job, model_name
+from .errors import MasterError
 from .reports import Capture, DriveState, MotionReport, TestMotionRun, Tuning
 
 if TYPE_CHECKING:
@@ -80,6 +82,17 @@ def _captured(report: dict[str, Any]) -> Capture:
         "gaps": {trace["quantity"]: trace["gaps"] for trace in traces},
         "parameters": {name: bytes(value) for name, value in report["objects"]},
     }
+
+
+@contextmanager
+def _reported_as_captured() -> Iterator[None]:
+    """What came of a capture that was cut off is the same as of a whole one."""
+    try:
+        yield
+    except MasterError as error:
+        if error.report is not None:
+            error.report = _captured(error.report)
+        raise
 
 
 def _angle(degrees: Optional[float], counts: Optional[int]) -> dict[str, Any]:
@@ -327,7 +340,8 @@ class Drive(_Orders):
         0.002
         """
         order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger, "sdo": sdo}
-        return _captured(self.network._finish(self._capture(quantities, take, journal, **order)))
+        with _reported_as_captured():
+            return _captured(self.network._finish(self._capture(quantities, take, journal, **order)))
 
     def test_motion(
         self,
@@ -569,7 +583,8 @@ class AsyncDrive(_Orders):
     ) -> Capture:
         """As :meth:`Drive.capture`."""
         order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger, "sdo": sdo}
-        return _captured(await self.network._finish_soon(self._capture(quantities, take, journal, **order)))
+        with _reported_as_captured():
+            return _captured(await self.network._finish_soon(self._capture(quantities, take, journal, **order)))
 
     async def test_motion(
         self,

@@ -127,8 +127,17 @@ class Network(Whole):
         except BaseException:
             if not keep:
                 job.cancel()
+            if job.leads_back:
+                self._await_way_back(job)
             raise
         return self._result(job)
+
+    def _await_way_back(self, job: Job) -> None:
+        """Lets what was given up put back what it has changed. Where others move the time, that goes on by itself."""
+        if self._world is None:
+            job.wait()
+        elif taking_part(self._world) is None:
+            self._move_world(self._world, job)
 
     def _result(self, job: Job) -> Any:
         """The result of a job that has ended, with what the bus said meanwhile as warnings."""

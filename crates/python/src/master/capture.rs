@@ -7,7 +7,7 @@ use can::Bitrate;
 use canopen::NodeId;
 use host::capture::{Quantity, Restorer, Span, Taken, Trigger, Wanted, Way};
 use host::network::params::journal::default_path;
-use machine::file::pdo_id;
+use machine::file::tpdo_id;
 use pyo3::prelude::*;
 use recording::Capture;
 use serde::Serialize;
@@ -16,7 +16,7 @@ use words::failure::Failure;
 use super::job::Trouble;
 use super::value::Value;
 use super::whole::AskedDrive;
-use super::{Job, Network, duration};
+use super::{Job, Network, WaysBack, duration};
 use crate::failure::bad_value;
 
 /// What is to be captured, in plain values.
@@ -110,7 +110,7 @@ pub(crate) fn capture(
     let asked = AskedDrive::of(network.get(), node, model)?;
     let bitrate = network.get().bitrate(py)?.unwrap_or(Bitrate::K500);
     let trigger: Option<Trigger> = order.trigger.as_deref().map(str::parse).transpose().map_err(bad_value)?;
-    let take = order.take.iter().map(|text| pdo_id(text)).collect::<Result<_, _>>().map_err(bad_value)?;
+    let take = order.take.iter().map(|text| tpdo_id(text)).collect::<Result<_, _>>().map_err(bad_value)?;
     let span = Span { duration: duration(order.duration)?, trigger, pre_trigger: duration(order.pre_trigger)? };
     let period = duration(order.period)?;
     if period < Duration::from_micros(50) {
@@ -127,23 +127,30 @@ pub(crate) fn capture(
         journal: (!asked.is_virtual).then_some(journal),
         on_kept: |_| (),
     };
-    network.get().begin_said(py, async move {
+    // Each job has ways back of its own, which the network's hold too: it may be closed meanwhile.
+    let (own, of_network) = (WaysBack::default(), network.get().ways_back.clone());
+    let ways_back = own.clone();
+    let work = async move {
         let drive = asked.drive().await?;
         for name in &order.quantities {
             wanted.quantities.push(Quantity::named(&drive, name).await?);
         }
         wanted.check(&span)?;
         let restorer = Restorer::of(&drive);
+        [&own, &of_network].into_iter().for_each(|ways_back| ways_back.add(restorer.clone()));
         let mut running = wanted.begin(&drive, &restorer).await?;
         let taken = running.next(&span).await;
         let left = restorer.restore().await;
+        // What is left is in what this reports.
+        of_network.remove(&restorer);
         let Taken { capture, cut_off } = taken.map_err(|failure| with_left(failure, &left))?;
         let value = Value::report(&Captured::of(&capture, running.ways()));
         match cut_off.or(not_put_back(asked.node, &left)) {
             Some(failure) => Err(Trouble::Reported(with_left(failure, &left), Box::new(value))),
             None => Ok(value),
         }
-    })
+    };
+    network.get().begin_leading_back(py, work, Some(ways_back))
 }
 
 fn known(value: f64) -> Option<f64> {

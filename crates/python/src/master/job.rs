@@ -4,9 +4,10 @@ use std::future::poll_fn;
 use std::pin::pin;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::task::Poll;
+use std::task::{Poll, Waker};
 use std::time::Duration;
 
+use host::capture::Restorer;
 use master::Error;
 use pyo3::prelude::*;
 use words::failure::Failure;
@@ -26,6 +27,39 @@ pub(crate) struct Job {
     number: AtomicU64,
     runner: Arc<Runner>,
     outcome: Arc<Outcome>,
+    /// Given up, it goes on until what it has changed is put back.
+    leads_back: bool,
+}
+
+/// The ways back of what is going on in a network, for whoever ends it.
+#[derive(Clone, Default)]
+pub(crate) struct WaysBack(Arc<Mutex<Vec<Restorer>>>);
+
+impl WaysBack {
+    fn lock(&self) -> MutexGuard<'_, Vec<Restorer>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Something is going to be changed.
+    pub(super) fn add(&self, restorer: Restorer) {
+        self.lock().push(restorer);
+    }
+
+    /// What it led back from is as it was.
+    pub(super) fn remove(&self, restorer: &Restorer) {
+        self.lock().retain(|other| !other.is_same(restorer));
+    }
+
+    /// Puts everything back; what could not be, in words.
+    pub(crate) async fn restore(&self) -> Vec<String> {
+        let restorers = std::mem::take(&mut *self.lock());
+        let mut left = Vec::new();
+        for restorer in restorers {
+            let node = restorer.node();
+            left.extend(restorer.restore().await.iter().map(|left| format!("node {node}: not put back: {left}")));
+        }
+        left
+    }
 }
 
 /// Why a job did not do what it should.
@@ -98,6 +132,8 @@ struct JobState {
     reported: bool,
     /// The result is not wanted any more, or will never come.
     given_up: bool,
+    /// Of whoever works on it, to look again.
+    waker: Option<Waker>,
     /// Called when it has ended.
     callback: Option<Py<PyAny>>,
 }
@@ -118,8 +154,11 @@ impl Outcome {
 struct Reporter(Arc<Outcome>);
 
 impl Reporter {
-    fn is_given_up(&self) -> bool {
-        self.0.lock().given_up
+    /// True once it is given up; until then `waker` is called when it is.
+    fn is_given_up(&self, waker: &Waker) -> bool {
+        let mut state = self.0.lock();
+        state.waker = (!state.given_up).then(|| waker.clone());
+        state.given_up
     }
 
     fn report(&self, result: Option<Result<Value, Trouble>>) {
@@ -152,23 +191,32 @@ impl Drop for Reporter {
 
 impl Job {
     /// A job, and the future that does it.
+    /// One that is given up goes the ways back that it has, if any, before it ends.
     pub(super) fn new(
         work: impl Future<Output = Result<Value, Trouble>> + Send + 'static,
+        ways_back: Option<WaysBack>,
         runner: &Arc<Runner>,
     ) -> (Self, world::Job) {
         let outcome = Arc::new(Outcome::default());
         let reporter = Reporter(Arc::clone(&outcome));
+        let leads_back = ways_back.is_some();
         let future = async move {
-            let mut work = pin!(work);
-            // Dropping the work takes back what it asked the network for.
-            let result = poll_fn(|context| match reporter.is_given_up() {
-                true => Poll::Ready(None),
-                false => work.as_mut().poll(context).map(Some),
-            });
-            let result = result.await;
+            let result = {
+                let mut work = pin!(work);
+                // Dropping the work takes back what it asked the network for.
+                let result = poll_fn(|context| match reporter.is_given_up(context.waker()) {
+                    true => Poll::Ready(None),
+                    false => work.as_mut().poll(context).map(Some),
+                });
+                result.await
+            };
+            if let (None, Some(ways_back)) = (&result, ways_back) {
+                // What could not be put back stays in the journal of a real bus; nobody waits for an answer any more.
+                ways_back.restore().await;
+            }
             reporter.report(result);
         };
-        (Self { number: AtomicU64::new(0), runner: Arc::clone(runner), outcome }, Box::pin(future))
+        (Self { number: AtomicU64::new(0), runner: Arc::clone(runner), outcome, leads_back }, Box::pin(future))
     }
 
     pub(super) fn set_number(&self, number: u64) {
@@ -187,7 +235,14 @@ impl Job {
     /// True when it has ended, one way or the other.
     #[getter]
     fn ended(&self) -> bool {
-        self.outcome.lock().has_ended()
+        let state = self.outcome.lock();
+        if self.leads_back { state.reported } else { state.has_ended() }
+    }
+
+    /// True for one that puts back what it has changed when it is given up, and ends after that.
+    #[getter]
+    const fn leads_back(&self) -> bool {
+        self.leads_back
     }
 
     /// Waits for its end on a real bus.
@@ -195,7 +250,7 @@ impl Job {
         while !self.ended() {
             py.detach(|| {
                 let state = self.outcome.lock();
-                if !state.has_ended() {
+                if !state.reported && (self.leads_back || !state.given_up) {
                     drop(self.outcome.ended.wait_timeout(state, NAP));
                 }
             });
@@ -218,9 +273,14 @@ impl Job {
 
     /// Gives it up. What it asked for is taken back; what a drive has received already stays.
     fn cancel(&self, py: Python<'_>) -> PyResult<()> {
-        self.outcome.lock().given_up = true;
-        if let Runner::World(shared) = &*self.runner {
-            shared.lock(py)?.jobs.cancel(self.number());
+        let waker = {
+            let mut state = self.outcome.lock();
+            state.given_up = true;
+            state.waker.take()
+        };
+        match &*self.runner {
+            Runner::World(shared) if !self.leads_back => shared.lock(py)?.jobs.cancel(self.number()),
+            _ => waker.into_iter().for_each(Waker::wake),
         }
         Ok(())
     }
