@@ -14,6 +14,7 @@ mod live;
 mod master;
 mod scenario;
 mod sheets;
+mod ways_back;
 mod world;
 
 use pyo3::prelude::*;

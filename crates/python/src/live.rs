@@ -15,8 +15,8 @@ use tokio::task::{JoinSet, LocalSet};
 use transport::{BusNotes, BusSpec, Note};
 use words::failure::with_causes;
 
-use crate::master::WaysBack;
 use crate::master::tap::Traffic;
+use crate::ways_back::WaysBack;
 use crate::world::Job;
 
 /// What the bus says that may wait for a program: each kind comes once, only a connection may come and go for ever.

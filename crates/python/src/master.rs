@@ -33,8 +33,8 @@ use pyo3::prelude::*;
 use transport::BusSpec;
 use words::models::{Description, with_files};
 
+pub(crate) use job::Job;
 use job::Trouble;
-pub(crate) use job::{Job, WaysBack};
 use order::{Order, duration};
 use runner::Runner;
 use tap::Traffic;
@@ -43,6 +43,7 @@ use value::Value;
 use crate::failure::{bad_value, raised, wrong_use};
 use crate::live::{Live, stop_what_moves};
 use crate::sheets::{model_of, node_id};
+use crate::ways_back::WaysBack;
 use crate::world::World;
 
 /// A CANopen network as its master sees it; `ferrodrive.Network` is what users have.

@@ -303,40 +303,11 @@ fn on_the_bus(
             values.extend(values_off(model, config.pdo, node).unwrap_or_default());
         }
     }
-    let load = |period: Duration, pace: Pace| {
-        let timed = |config: &mut PdoConfig| {
-            if pace == Pace::EventTimer && is_asked_for(config.pdo) {
-                config.event_time = Some(period);
-                config.inhibit_time = Some(period);
-            }
-        };
-        let pdos = now.iter().filter(|(config, _)| config.pdo.direction == Direction::Tpdo).map(|(config, cob_id)| {
-            let (mut config, cob_id) = config.with_values(*cob_id, &values, model);
-            timed(&mut config);
-            (config, cob_id)
-        });
-        let event_trigger = model.pdo.event_trigger;
-        let timing = model.timing;
-        let traffic =
-            NodeTraffic { node, pdos: pdos.collect(), in_cycle: None, event_trigger, heartbeat: None, timing };
-        let own = (pace == Pace::OwnSync).then_some(period);
-        let sync = own.or(match pace {
-            Pace::Sync(every) => Some(period / u32::from(every)),
-            Pace::OwnSync | Pace::EventTimer => request.sync,
-        });
-        let new = Settings::new(sync.unwrap_or(period));
-        let with_sdo = Settings { has_sync: sync.is_some(), sdo: Some(SDO_PERIOD), queue: HostQueue::Priority, ..new };
-        let planned = |settings: Settings| plan_bus(std::slice::from_ref(&traffic), &settings, request.bitrate);
-        // Everything is put back by SDO, whose identifiers are less urgent than those of all PDOs. What it delays is jitter, and shown.
-        let (alone, whole) = (planned(with_sdo.cycle_alone()), planned(with_sdo));
-        let mut sdo =
-            whole.frames.iter().filter(|frame| matches!(frame.purpose, Purpose::SdoRequest | Purpose::SdoAnswer));
-        (alone.fits() && whole.load < 1.0 && sdo.all(PlannedFrame::is_in_time), alone.load)
-    };
-    let (fits, share) = load(request.period, pace);
+    let load = |period: Duration| bus_with(model, node, now, &values, (request, pace, period), is_asked_for);
+    let (fits, share) = load(request.period);
     if !fits {
         let mut longer = PERIODS_MS.map(Duration::from_millis).into_iter().filter(|period| *period > request.period);
-        let slower = longer.find(|period| load(*period, pace).0);
+        let slower = longer.find(|period| load(*period).0);
         let failure = refused(format!("the bus is too slow for a reading every {:?}", request.period))
             .of_kind("bus_too_slow")
             .because(format!(
@@ -354,6 +325,43 @@ fn on_the_bus(
     }
     let pdos = slots.iter().filter_map(|slot| Some((slot.config.clone(), slot.cob_id.can_id().as_standard()?)));
     Ok(CapturePlan { pdos: pdos.collect(), pace, period: request.period, values, load: share })
+}
+
+/// Whether the bus carries this node's PDOs with these values, and the share of its time that its TPDOs and SYNC take.
+fn bus_with(
+    model: &'static Description,
+    node: NodeId,
+    now: &[Tpdo],
+    values: &BTreeMap<Mux, Vec<u8>>,
+    (request, pace, period): (&Request<'_>, Pace, Duration),
+    is_asked_for: impl Fn(PdoId) -> bool,
+) -> (bool, f64) {
+    let timed = |config: &mut PdoConfig| {
+        if pace == Pace::EventTimer && is_asked_for(config.pdo) {
+            config.event_time = Some(period);
+            config.inhibit_time = Some(period);
+        }
+    };
+    let pdos = now.iter().filter(|(config, _)| config.pdo.direction == Direction::Tpdo).map(|(config, cob_id)| {
+        let (mut config, cob_id) = config.with_values(*cob_id, values, model);
+        timed(&mut config);
+        (config, cob_id)
+    });
+    let event_trigger = model.pdo.event_trigger;
+    let timing = model.timing;
+    let traffic = NodeTraffic { node, pdos: pdos.collect(), in_cycle: None, event_trigger, heartbeat: None, timing };
+    let own = (pace == Pace::OwnSync).then_some(period);
+    let sync = own.or(match pace {
+        Pace::Sync(every) => Some(period / u32::from(every)),
+        Pace::OwnSync | Pace::EventTimer => request.sync,
+    });
+    let new = Settings::new(sync.unwrap_or(period));
+    let with_sdo = Settings { has_sync: sync.is_some(), sdo: Some(SDO_PERIOD), queue: HostQueue::Priority, ..new };
+    let planned = |settings: Settings| plan_bus(std::slice::from_ref(&traffic), &settings, request.bitrate);
+    // Everything is put back by SDO, whose identifiers are less urgent than those of all PDOs. What it delays is jitter, and shown.
+    let (alone, whole) = (planned(with_sdo.cycle_alone()), planned(with_sdo));
+    let mut sdo = whole.frames.iter().filter(|frame| matches!(frame.purpose, Purpose::SdoRequest | Purpose::SdoAnswer));
+    (alone.fits() && whole.load < 1.0 && sdo.all(PlannedFrame::is_in_time), alone.load)
 }
 
 #[cfg(test)]

@@ -39,7 +39,7 @@ pub(super) struct Changed {
 /// By what a node was seen to be pre-operational again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SeenBy {
-    /// Its heartbeat says so.
+    /// Its heartbeat has that state.
     Heartbeat,
     /// TPDOs that came until then have stopped.
     Silence,

@@ -293,7 +293,7 @@ impl Group {
     }
 
     /// Awaits something else on the bus while the group goes on with its cycles: holding, or without power. Where no SYNC comes there are
-    /// no cycles; the next [`cycle`](Self::cycle) says so.
+    /// no cycles; the next [`cycle`](Self::cycle) is a [`GroupError::NoCycle`].
     pub async fn beside<T>(&mut self, what: impl Future<Output = T>) -> T {
         let runner = &mut self.runner;
         let step = |io: &mut Exchange<'_>| {

@@ -16,8 +16,9 @@ use words::failure::Failure;
 use super::job::Trouble;
 use super::value::Value;
 use super::whole::AskedDrive;
-use super::{Job, Network, WaysBack, duration};
+use super::{Job, Network, duration};
 use crate::failure::bad_value;
+use crate::ways_back::WaysBack;
 
 /// What is to be captured, in plain values.
 #[derive(FromPyObject)]

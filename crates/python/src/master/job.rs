@@ -7,7 +7,6 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Poll, Waker};
 use std::time::Duration;
 
-use host::capture::Restorer;
 use master::Error;
 use pyo3::prelude::*;
 use words::failure::Failure;
@@ -16,6 +15,7 @@ use super::runner::Runner;
 use super::value::Value;
 use crate::failure::{how_to_say, master_error, wrong_use};
 use crate::live::Live;
+use crate::ways_back::WaysBack;
 use crate::world;
 
 /// How long a waiting thread is deaf to signals (Ctrl-C).
@@ -29,37 +29,6 @@ pub(crate) struct Job {
     outcome: Arc<Outcome>,
     /// Given up, it goes on until what it has changed is put back.
     leads_back: bool,
-}
-
-/// The ways back of what is going on in a network, for whoever ends it.
-#[derive(Clone, Default)]
-pub(crate) struct WaysBack(Arc<Mutex<Vec<Restorer>>>);
-
-impl WaysBack {
-    fn lock(&self) -> MutexGuard<'_, Vec<Restorer>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Something is going to be changed.
-    pub(super) fn add(&self, restorer: Restorer) {
-        self.lock().push(restorer);
-    }
-
-    /// What it led back from is as it was.
-    pub(super) fn remove(&self, restorer: &Restorer) {
-        self.lock().retain(|other| !other.is_same(restorer));
-    }
-
-    /// Puts everything back; what could not be, in words.
-    pub(crate) async fn restore(&self) -> Vec<String> {
-        let restorers = std::mem::take(&mut *self.lock());
-        let mut left = Vec::new();
-        for restorer in restorers {
-            let node = restorer.node();
-            left.extend(restorer.restore().await.iter().map(|left| format!("node {node}: not put back: {left}")));
-        }
-        left
-    }
 }
 
 /// Why a job did not do what it should.
@@ -132,7 +101,7 @@ struct JobState {
     reported: bool,
     /// The result is not wanted any more, or will never come.
     given_up: bool,
-    /// Of whoever works on it, to look again.
+    /// Has the work be polled again.
     waker: Option<Waker>,
     /// Called when it has ended.
     callback: Option<Py<PyAny>>,
@@ -211,7 +180,7 @@ impl Job {
                 result.await
             };
             if let (None, Some(ways_back)) = (&result, ways_back) {
-                // What could not be put back stays in the journal of a real bus; nobody waits for an answer any more.
+                // What could not be put back stays in the journal of a real bus; no caller waits for an answer any more.
                 ways_back.restore().await;
             }
             reporter.report(result);

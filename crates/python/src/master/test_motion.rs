@@ -18,6 +18,7 @@ use super::value::Value;
 use super::whole::AskedDrive;
 use super::{Job, Network, duration};
 use crate::failure::bad_value;
+use crate::ways_back::WaysBack;
 
 /// What is to be moved, in plain values.
 #[derive(FromPyObject)]
@@ -138,7 +139,9 @@ pub(crate) fn test_motion(
         journal: (!asked.is_virtual).then_some(journal),
         on_kept: |_| (),
     };
-    network.get().begin_said(py, async move {
+    let (own, of_network) = (WaysBack::default(), network.get().ways_back.clone());
+    let ways_back = own.clone();
+    let work = async move {
         let drive = asked.drive().await?;
         let names = if order.quantities.is_empty() { usual_quantities(&drive).await? } else { order.quantities };
         for name in &names {
@@ -150,9 +153,11 @@ pub(crate) fn test_motion(
             drive.guard(master::drive::SwitchedOff::Leave).await.map_err(Failure::from)?;
         }
         let (restorer, mut runs) = (Restorer::of(&drive), Vec::new());
+        [&own, &of_network].into_iter().for_each(|ways_back| ways_back.add(restorer.clone()));
         let how = (order.count, order.travel_turns);
         let moved = run((&drive, &motion), (&wanted, &restorer), how, &mut runs, |_| ()).await;
         let left = restorer.restore().await;
+        of_network.remove(&restorer);
         // One that was not seen to stand keeps its watch.
         let released = if guarded && moved.is_ok() { drive.release_guard().await } else { Ok(()) };
         let rows = runs.into_iter().map(|Run { number, figures, capture, ways }| RunReport {
@@ -166,5 +171,6 @@ pub(crate) fn test_motion(
             Some(failure) => Err(Trouble::Reported(with_left(failure, &left), Box::new(value))),
             None => Ok(value),
         }
-    })
+    };
+    network.get().begin_leading_back(py, work, Some(ways_back))
 }

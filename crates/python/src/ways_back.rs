@@ -1,0 +1,36 @@
+//! What is to be put back of the captures that go on in a network.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use host::capture::Restorer;
+
+/// The ways back of what is going on in a network, for what ends it.
+#[derive(Clone, Default)]
+pub(crate) struct WaysBack(Arc<Mutex<Vec<Restorer>>>);
+
+impl WaysBack {
+    fn lock(&self) -> MutexGuard<'_, Vec<Restorer>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Something is going to be changed.
+    pub(crate) fn add(&self, restorer: Restorer) {
+        self.lock().push(restorer);
+    }
+
+    /// What it led back from is as it was.
+    pub(crate) fn remove(&self, restorer: &Restorer) {
+        self.lock().retain(|other| !other.is_same(restorer));
+    }
+
+    /// Puts everything back; what could not be, in words.
+    pub(crate) async fn restore(&self) -> Vec<String> {
+        let restorers = std::mem::take(&mut *self.lock());
+        let mut left = Vec::new();
+        for restorer in restorers {
+            let node = restorer.node();
+            left.extend(restorer.restore().await.iter().map(|left| format!("node {node}: not put back: {left}")));
+        }
+        left
+    }
+}
