@@ -23,6 +23,27 @@ pub struct Loops {
     pub without_ramps: &'static [(Mux, i64)],
     /// How often the loops are computed.
     pub period: Duration,
+    /// What the speed loop is, where no object shows what it asks for.
+    pub stated: Option<StatedLoop>,
+    /// Gains change by so many counts, where their last digits mean something else.
+    pub gain_step: i64,
+    /// A speed of the motor at which it can be measured, r/min.
+    pub usual_rpm: f64,
+}
+
+/// A speed loop that cannot be measured from outside, as it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StatedLoop {
+    /// What one count of the proportional gain is worth, A/(rad/s), as an amplitude.
+    pub a_s_rad: f64,
+    /// What one count of the integral time is worth, s.
+    pub integral_s: f64,
+    /// Time constant of the filter of the speed, s.
+    pub filter_s: f64,
+    /// What comes late in it, the filter apart, s.
+    pub late_s: f64,
+    /// Amplitude of a phase's current for each ampere of the actual current.
+    pub amplitude: f64,
 }
 
 /// How the integral part of a loop is set.

@@ -8,6 +8,7 @@ use cia402::{ModeOfOperation, PowerState};
 use devices::{AxisId, Description};
 use drives::{Fidelity, RegisterError};
 use plant::FreeRun;
+use plant::gear::GearModel;
 use plant::mechanics::RotorModel;
 use plant::physics::Physics;
 use plant::pmsm::PmsmModel;
@@ -24,8 +25,8 @@ pub struct MotorData {
     pub rotor: RotorModel,
     /// Windings and magnets.
     pub windings: PmsmModel,
-    /// Motor turns per turn of the output shaft, where a reducer is built in.
-    pub reducer: Option<f64>,
+    /// The reducer, where one is built in.
+    pub gear: Option<GearModel>,
 }
 
 /// A drive joined to its physics: firmware, motor, load, supply and sensors as one station.

@@ -60,6 +60,7 @@ pub use drive::{Brake, Levels, MotorData, OutputShaft, PowerPhase, Report, Virtu
 pub use drives::{Fidelity, RegisterError};
 pub use mechanics::Mechanics;
 pub use plant::attachment::OUTPUT_WHEEL_SHARE;
+pub use plant::gear::GearModel;
 pub use plant::physics::Physics;
 pub use prng::Prng;
 pub use refused::Refused;

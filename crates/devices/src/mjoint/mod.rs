@@ -23,6 +23,7 @@ use crate::description::{
     Description, Edition, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Section, Write,
 };
 use crate::faults::Faults;
+use crate::loops::{Integral, Loops, StatedLoop};
 use crate::placement::Placement;
 use crate::terminals::{Input, InputSignal, Meaning, Terminals};
 use crate::timing::Timing;
@@ -114,8 +115,31 @@ const AXIS: AxisDescription = AxisDescription {
     interpolation: Some(Duration::from_millis(2)),
     homing: Some(HOMING),
     terminals: Terminals::NONE,
-    loops: None,
+    loops: Some(LOOPS),
     units: UNITS,
+};
+
+/// 5.04 prints the gains' ranges, and of units those of the integral time alone. What a count is worth is assumed, as are filter and
+/// delays (`drives::mjoint::gains`): the window and the hold of a period, the current loop's 3000 rad/s. The ones digits of 60F9h:01
+/// and 60FBh:01 choose the polarities of an input and an output.
+const LOOPS: Loops = Loops {
+    demand: None,
+    speed_proportional: Mux::new(0x60F9, 1),
+    speed_integral: Integral::Time(Mux::new(0x60F9, 2)),
+    speed_filter: None,
+    position_proportional: Quantity::new(0x60FB, 1, 0.02),
+    current: None,
+    without_ramps: &[(object::PROFILE_ACCELERATION, NO_RAMP_FROM as i64)],
+    period: Duration::from_micros(500),
+    stated: Some(StatedLoop {
+        a_s_rad: 0.2 / 3000.0,
+        integral_s: 1e-3,
+        filter_s: 0.2e-3,
+        late_s: 0.25e-3 + 0.25e-3 + 1.0 / 3000.0,
+        amplitude: core::f64::consts::SQRT_2,
+    }),
+    gain_step: 10,
+    usual_rpm: 600.0,
 };
 
 const STORAGE: ParameterStorage = ParameterStorage {

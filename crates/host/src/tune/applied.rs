@@ -1,6 +1,7 @@
 //! The proposed gains on the drive itself: written, tried, and kept or taken back.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use canopen::Mux;
 use cia402::RAD_S_PER_RPM;
@@ -11,7 +12,7 @@ use words::failure::{Failure, both};
 
 use super::bench::{ENOUGH_CURRENT, SWINGS};
 use super::setup::keep;
-use super::{Bench, Excursion, Proposed, Request, Setup, StepResponse, TuneReport, find, loops_of};
+use super::{Bench, Excursion, Proposed, Reader, Request, Setup, StepResponse, TuneReport, find, loops_of};
 use crate::network::Progress;
 use crate::network::params::Transaction;
 use crate::network::params::journal::Kept;
@@ -121,6 +122,12 @@ pub async fn step(
     let setup = Setup::begin(drive, (model, loops), false, request.journal.as_deref(), request.on_kept).await?;
     let answer = async {
         setup.prepare(drive, 1.0).await?;
+        if loops.demand.is_none() {
+            let mut reader = Reader::of(drive, request.bounds, *excursion)?;
+            let answer = reader.step_response(most_rpm, Duration::from_secs_f64(ANSWER_S)).await;
+            *excursion = reader.excursion;
+            return both(answer, reader.stop().await);
+        }
         let mut bench = Bench::open(drive, loops, request.period, request.bounds, request.cyclic, *excursion).await?;
         let answer = bench.step_response(most_rpm, ANSWER_S).await;
         *excursion = bench.excursion;

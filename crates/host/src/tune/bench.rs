@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use canopen::NodeId;
 use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
 use cia402::object::POSITION_ACTUAL_VALUE;
 use cia402::{ModeOfOperation, RAD_S_PER_RPM};
@@ -23,6 +24,38 @@ pub struct Bounds {
     pub current_a: f64,
     /// Turns of the shaft to either side of where it stood.
     pub travel_turns: f64,
+}
+
+impl Bounds {
+    /// Whether what was reached is within them.
+    pub(super) fn keep(&self, seen: &Excursion, current_a: f64, id: NodeId) -> Result<(), Failure> {
+        let stopped = |reason: String| {
+            Failure::new(format!("node {id}: the measurement was stopped")).at_node(id).because(reason)
+        };
+        if current_a.abs() > self.current_a {
+            let (asked, most) = (Amperes(current_a.abs()), Amperes(self.current_a));
+            return Err(stopped(format!("its speed loop asked for {asked}, more than {most}"))
+                .of_kind(CURRENT_KIND)
+                .next("allow more with --current, or less speed with --speed"));
+        }
+        let (gone, most) = (seen.travel_turns, self.travel_turns);
+        if gone > most {
+            return Err(stopped(format!("the shaft is {gone:.1} turns from where it stood, more than {most}"))
+                .of_kind("travel_bound")
+                .next("allow more with --travel, or less speed with --speed"));
+        }
+        Ok(())
+    }
+}
+
+impl Excursion {
+    /// With what is seen now.
+    pub(super) fn reached(mut self, turns: f64, current_a: f64) -> Self {
+        let began = *self.began_turns.get_or_insert(turns);
+        self.travel_turns = self.travel_turns.max((turns - began).abs());
+        self.peak_a = self.peak_a.max(current_a.abs());
+        self
+    }
 }
 
 impl Default for Bounds {
@@ -92,7 +125,7 @@ fn ripple(values: &[f64], period_s: f64) -> f64 {
 }
 
 /// What a failure is called where the current was at its bound.
-pub(super) const TOO_MUCH_CURRENT: &str = "current_bound";
+pub(super) const CURRENT_KIND: &str = "current_bound";
 /// From one speed to the next, and until it is steady.
 const RAMP_S: f64 = 0.3;
 const SETTLING_S: f64 = 0.4;
@@ -261,24 +294,8 @@ impl Bench {
     }
 
     fn keep_bounds(&mut self, turns: f64, current_a: f64) -> Result<(), Failure> {
-        let seen = &mut self.excursion;
-        let began = *seen.began_turns.get_or_insert(turns);
-        seen.travel_turns = seen.travel_turns.max((turns - began).abs());
-        seen.peak_a = seen.peak_a.max(current_a.abs());
-        let gone_turns = seen.travel_turns;
-        let Bounds { current_a: most_a, travel_turns, .. } = self.bounds;
-        if current_a.abs() > most_a {
-            let reason =
-                format!("its speed loop asked for {}, more than {}", Amperes(current_a.abs()), Amperes(most_a));
-            let stopped = self.stopped(reason).of_kind(TOO_MUCH_CURRENT);
-            return Err(stopped.next("allow more with --current, or less speed with --speed"));
-        }
-        if gone_turns > travel_turns {
-            let reason = format!("the shaft is {gone_turns:.1} turns from where it stood, more than {travel_turns}");
-            let stopped = self.stopped(reason).of_kind("travel_bound");
-            return Err(stopped.next("allow more with --travel, or less speed with --speed"));
-        }
-        Ok(())
+        self.excursion = self.excursion.reached(turns, current_a);
+        self.bounds.keep(&self.excursion, current_a, self.drive.node())
     }
 
     /// Comes to a speed without a step, and lets it settle.
@@ -310,7 +327,7 @@ impl Bench {
     pub async fn swings(&mut self) -> Result<bool, Failure> {
         match self.steady(BIAS_SHARE * self.bounds.speed_rpm).await {
             Ok((_, ripple_a)) => Ok(ripple_a > SWINGS * self.bounds.current_a),
-            Err(failure) if failure.kind == TOO_MUCH_CURRENT => Ok(true),
+            Err(failure) if failure.kind == CURRENT_KIND => Ok(true),
             Err(failure) => Err(failure),
         }
     }

@@ -11,7 +11,8 @@ use super::setup::Setup;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// The measured frequency response, per actual current where the current loop is known.
-    pub response: Response,
+    /// `None` of a drive that is known by readings.
+    pub response: Option<Response>,
     /// One or two masses.
     pub mechanics: Mechanics,
     /// What the speed loop sees: the same per current demand. What the current loop lets through of the back-emf damps it.
@@ -52,7 +53,7 @@ impl Found {
             mechanics: tune::identify(&response)?,
             plant,
             friction: tune::fit_friction(&measured.runs)?,
-            response,
+            response: Some(response),
             own,
             gain_share: measured.gain_share,
             torque_constant_nm_a: motor.windings.torque_constant_nm_a(),

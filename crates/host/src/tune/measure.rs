@@ -7,7 +7,7 @@ use master::Drive;
 use master::cyclic::CyclicOptions;
 use words::failure::{Failure, both};
 
-use super::bench::{Bench, Bounds, Excursion, Measurement, TOO_MUCH_CURRENT, excitation};
+use super::bench::{Bench, Bounds, CURRENT_KIND, Excursion, Measurement, excitation};
 use super::setup::Setup;
 
 /// How often gains are halved before a speed loop that swings is given up.
@@ -35,7 +35,7 @@ pub async fn measure(
         let measured = match swings {
             Ok(false) => match bench.measure(&excitation).await {
                 // With lower gains the same speeds take less.
-                Err(failure) if failure.kind == TOO_MUCH_CURRENT && left > 0 => Ok(None),
+                Err(failure) if failure.kind == CURRENT_KIND && left > 0 => Ok(None),
                 measured => measured.map(Some),
             },
             Ok(true) => Ok(None),

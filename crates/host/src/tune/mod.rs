@@ -1,8 +1,11 @@
 //! Finding gains for a drive's loops: it is measured, a twin of it is made, gains are proposed and tried on the twin, and then on
 //! the drive (crate `tune` has the mathematics).
 //!
+//! Where no object shows what the speed loop asks for (a joint), the drive turns by its own ramps, is read by SDO, and its twin's load
+//! is changed until both show the same currents.
+//!
 //! In: a drive of a model whose description says how its loops are set ([`devices::Loops`]), and [`Bounds`] that its motion keeps to.
-//! Everything moves by [`master::cyclic::CyclicDrive`], so that what stops such a motion stops this one. What is written for the
+//! Everything moves by [`master::cyclic::CyclicDrive`] or [`Drive::velocity`], so that what stops such a motion stops this one. What is written for the
 //! measurement is put back at its end, however it ends; where the program dies, by the journal.
 
 mod applied;
@@ -10,6 +13,7 @@ mod bench;
 mod found;
 mod measure;
 mod proposed;
+mod readings;
 mod report;
 mod setup;
 mod twin;
@@ -20,6 +24,7 @@ pub use bench::{Bench, Bounds, Excursion, Measurement, StepResponse};
 pub use found::Found;
 pub use measure::measure;
 pub use proposed::{Gain, Proposed, Unreachable};
+pub use readings::{Currents, OutputLoad, Reader, Shaft};
 pub use report::{GainRow, MarginRow, Request, TuneReport, find};
 pub use setup::Setup;
 pub use twin::{Trial, Twin, motor_of};
@@ -44,7 +49,7 @@ pub fn loops_of(drive: &Drive) -> Result<(&'static Description, &'static Loops),
         Failure::new(format!("node {id}: of the {} it is not known how its loops are set", model.title))
             .at_node(id)
             .of_kind("no_gains")
-            .because("its description names no gains of a speed loop with an object that shows the current that it asks for")
+            .because("its description names no gains of a speed loop")
             .next("ferrodrive objects MODEL lists what can be set by hand; a stepper has ramps and currents instead of gains")
     })
 }

@@ -115,7 +115,9 @@ impl Proposed {
             let gain = tune::propose_position(&found.plant, &around, phase_deg, highest_hz, late_s);
             let (gain, margins) = gain.ok_or(Unreachable::Position)?;
             let (low, high) = setup.range(object);
-            values.push((object, ((gain / worth) as i64).clamp(low.max(1), high)));
+            let (before, step) = (setup.had(object).unwrap_or_default(), loops.gain_step);
+            let wanted = before + ((gain / worth - before as f64) / step as f64).floor() as i64 * step;
+            values.push((object, wanted.clamp(low.max(1), high)));
             position = Some(margins);
         }
         let name = |object| model.row(object).map_or("", |row| row.name);
@@ -137,6 +139,7 @@ struct SpeedObjects<'a> {
     proportional: (Mux, i64),
     integral: (Mux, i64),
     is_time: bool,
+    gain_step: i64,
     filter: Option<Filter>,
 }
 
@@ -164,6 +167,7 @@ impl<'a> SpeedObjects<'a> {
             setup,
             proportional: had(loops.speed_proportional)?,
             integral: had(loops.speed_integral.object())?,
+            gain_step: loops.gain_step,
             is_time: matches!(loops.speed_integral, Integral::Time(_)),
             filter: filter.filter(|filter| setup.had(filter.object).is_some()),
         })
@@ -173,7 +177,9 @@ impl<'a> SpeedObjects<'a> {
     fn counts(&self, proportional: f64, integral: f64) -> Option<(i64, i64)> {
         let count = |(object, had): (Mux, i64), factor: f64| {
             let (low, high) = self.setup.range(object);
-            let wanted = (had as f64 * factor).round() as i64;
+            // Digits that mean something else stay.
+            let step = self.gain_step;
+            let wanted = had + ((had as f64 * (factor - 1.0)) / step as f64).round() as i64 * step;
             (low.max(1)..=high).contains(&wanted).then_some(wanted)
         };
         // A time is the proportional gain over the integral one.

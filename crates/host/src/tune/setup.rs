@@ -5,6 +5,7 @@ use std::path::Path;
 
 use canopen::Mux;
 use canopen::pdo::PdoId;
+use cia402::ModeOfOperation;
 use cia402::object::MODES_OF_OPERATION;
 use devices::{Description, Integral, Loops};
 use master::parameters::{Parameters, PlanOptions, from_any_state, roll_back};
@@ -54,7 +55,10 @@ impl Setup {
             match drive.node().upload(object).await {
                 Ok(value) => {
                     let value = value.as_bytes().to_vec();
-                    if changed.contains(&object) || lowers_gains && gains.contains(&object) {
+                    // To write a mode of homing begins one on some drives.
+                    let starts_homing = object == MODES_OF_OPERATION && value == [ModeOfOperation::HOMING.0 as u8];
+                    let changed = changed.contains(&object) && !starts_homing;
+                    if changed || lowers_gains && gains.contains(&object) {
                         written.insert(object, value.clone());
                     }
                     before.insert(object, value);

@@ -14,12 +14,15 @@ use words::failure::Failure;
 
 use super::bench::{Bench, Bounds, Excursion, Measurement, StepResponse, excitation, write};
 use super::found::Found;
+use super::readings::{Currents, Reader};
 
 const NODE: NodeId = NodeId::MIN;
 /// How long the answer to a step and to a load is looked at.
 const ANSWER_S: f64 = 0.5;
 /// The load that comes on, by the current that holds it.
 const LOAD_A: f64 = 4.5;
+/// The same of a motor with a reducer, at its output.
+const OUTPUT_LOAD_A: f64 = 1.0;
 
 /// A twin: what is built anew for each trial.
 #[derive(Clone, Debug)]
@@ -29,10 +32,12 @@ pub struct Twin {
     /// What hangs on its shaft, as words of a world.
     pub load: Vec<String>,
     /// Objects that have not their factory values.
-    values: Vec<(Mux, i64)>,
+    pub(super) values: Vec<(Mux, i64)>,
     /// What pushes its shaft in one direction, N m; positive against positive motion.
     load_nm: f64,
     torque_constant_nm_a: f64,
+    /// Turns of the motor for one of its output.
+    ratio: f64,
 }
 
 /// How a drive behaves with some gains.
@@ -79,14 +84,16 @@ impl Twin {
             load.push(format!("load gear 1 0 {}", (TAU * elastic.resonance_hz).powi(2) * reduced));
         }
         let torque_constant_nm_a = found.torque_constant_nm_a;
+        let ratio = motor.gear.map_or(1.0, |gear| gear.ratio);
         let load_nm = found.friction.load_a * torque_constant_nm_a;
-        Self { model, loops: *loops, load, values, load_nm, torque_constant_nm_a }
+        Self { model, loops: *loops, load, values, load_nm, torque_constant_nm_a, ratio }
     }
 
     /// A virtual drive with a load of these words, whatever was found.
     pub fn with_load((model, loops): (&'static Description, &Loops), load: Vec<String>, motor: &MotorData) -> Self {
         let torque_constant_nm_a = motor.windings.torque_constant_nm_a();
-        Self { model, loops: *loops, load, values: Vec::new(), load_nm: 0.0, torque_constant_nm_a }
+        let ratio = motor.gear.map_or(1.0, |gear| gear.ratio);
+        Self { model, loops: *loops, load, values: Vec::new(), load_nm: 0.0, torque_constant_nm_a, ratio }
     }
 
     fn failed(&self, reason: impl std::fmt::Display) -> Failure {
@@ -131,9 +138,7 @@ impl Twin {
     }
 
     async fn open(&self, drive: &Drive, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Bench, Failure> {
-        for (object, value) in self.values.iter().chain(self.loops.without_ramps).chain(values) {
-            write(drive, *object, *value).await?;
-        }
+        self.write(drive, values).await?;
         Bench::open(drive, &self.loops, how.0, how.1, CyclicOptions::default(), Excursion::default()).await
     }
 
@@ -144,8 +149,7 @@ impl Twin {
     pub fn measure(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Measurement, Failure> {
         let (mut world, drive) = self.world()?;
         let excitation = excitation(how.0)?;
-        let run = async { self.open(&drive, values, how).await?.measure(&excitation).await };
-        sim::block_on(&mut world, run).map_err(|error| self.failed(error))?.map_err(|failure| self.stopped(failure))
+        self.run(&mut world, async { self.open(&drive, values, how).await?.measure(&excitation).await })
     }
 
     /// How it behaves with these values of its gains: a step of the set-point, and a load.
@@ -154,13 +158,62 @@ impl Twin {
     /// What stopped it.
     pub fn try_out(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Trial, Failure> {
         let (mut world, drive) = self.world()?;
-        let ended = |error: sim::BlockOnError| self.failed(error);
-        let stopped = |failure: Failure| self.stopped(failure);
-        let mut bench = sim::block_on(&mut world, self.open(&drive, values, how)).map_err(ended)?.map_err(stopped)?;
-        let step =
-            sim::block_on(&mut world, bench.step_response(f64::MAX, ANSWER_S)).map_err(ended)?.map_err(stopped)?;
-        self.push(&mut world, self.load_nm + LOAD_A * self.torque_constant_nm_a)?;
-        let load = sim::block_on(&mut world, bench.hold_response(ANSWER_S)).map_err(ended)?.map_err(stopped)?;
+        let (step, load) = match self.loops.demand {
+            Some(_) => self.trial_of_samples(&mut world, &drive, values, how)?,
+            None => self.trial_of_readings(&mut world, &drive, values, how.1)?,
+        };
         Ok(Trial { step, load })
+    }
+
+    fn trial_of_samples(
+        &self,
+        world: &mut World,
+        drive: &Drive,
+        values: &[(Mux, i64)],
+        how: (Duration, Bounds),
+    ) -> Result<(StepResponse, StepResponse), Failure> {
+        let mut bench = self.run(world, self.open(drive, values, how))?;
+        let step = self.run(world, bench.step_response(f64::MAX, ANSWER_S))?;
+        self.push(world, self.load_nm + LOAD_A * self.torque_constant_nm_a)?;
+        let load = self.run(world, bench.hold_response(ANSWER_S))?;
+        Ok((step, load))
+    }
+
+    fn trial_of_readings(
+        &self,
+        world: &mut World,
+        drive: &Drive,
+        values: &[(Mux, i64)],
+        bounds: Bounds,
+    ) -> Result<(StepResponse, StepResponse), Failure> {
+        let answer = Duration::from_secs_f64(ANSWER_S);
+        let mut reader = Reader::of(drive, bounds, Excursion::default())?;
+        self.run(world, self.write(drive, values))?;
+        let step = self.run(world, reader.step_response(f64::MAX, answer))?;
+        self.push(world, self.load_nm + OUTPUT_LOAD_A * self.torque_constant_nm_a * self.ratio)?;
+        let load = self.run(world, reader.hold_response(answer))?;
+        Ok((step, load))
+    }
+
+    /// The currents that it shows with its load.
+    ///
+    /// # Errors
+    /// What stopped it.
+    pub fn currents(&self, bounds: Bounds) -> Result<Currents, Failure> {
+        let (mut world, drive) = self.world()?;
+        let mut reader = Reader::of(&drive, bounds, Excursion::default())?;
+        self.run(&mut world, self.write(&drive, &[]))?;
+        self.run(&mut world, reader.measure())
+    }
+
+    async fn write(&self, drive: &Drive, values: &[(Mux, i64)]) -> Result<(), Failure> {
+        for (object, value) in self.values.iter().chain(self.loops.without_ramps).chain(values) {
+            write(drive, *object, *value).await?;
+        }
+        Ok(())
+    }
+
+    fn run<T>(&self, world: &mut World, what: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
+        sim::block_on(world, what).map_err(|error| self.failed(error))?.map_err(|failure| self.stopped(failure))
     }
 }

@@ -8,3 +8,4 @@ mod init;
 mod params;
 mod stopping;
 mod tune;
+mod tune_joint;

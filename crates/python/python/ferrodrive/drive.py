@@ -420,7 +420,7 @@ class Drive(_Orders):
         bandwidth: Optional[float] = None,
         phase_margin: float = 40.0,
         position: bool = False,
-        speed_rpm: float = 120.0,
+        speed_rpm: Optional[float] = None,
         current_a: float = 15.0,
         travel_turns: float = 40.0,
         period: float = 0.001,
@@ -434,7 +434,7 @@ class Drive(_Orders):
         :param bandwidth: where the gain of the speed loop is to fall to one, in Hz; instead of a phase margin
         :param phase_margin: degrees that are to be left there; as stiff as that allows
         :param position: the loop of position too
-        :param speed_rpm: highest speed of the measurement
+        :param speed_rpm: highest speed of the measurement, of the motor's shaft: 120 without it, of a joint 600
         :param current_a: the most that the speed loop may ask for
         :param travel_turns: farthest that the shaft may turn from where it stands
         :param period: time between two samples in s
@@ -635,7 +635,7 @@ class AsyncDrive(_Orders):
         bandwidth: Optional[float] = None,
         phase_margin: float = 40.0,
         position: bool = False,
-        speed_rpm: float = 120.0,
+        speed_rpm: Optional[float] = None,
         current_a: float = 15.0,
         travel_turns: float = 40.0,
         period: float = 0.001,

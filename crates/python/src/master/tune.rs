@@ -26,7 +26,7 @@ pub(crate) struct TuneOrder {
     #[pyo3(item)]
     position: bool,
     #[pyo3(item)]
-    speed_rpm: f64,
+    speed_rpm: Option<f64>,
     #[pyo3(item)]
     current_a: f64,
     #[pyo3(item)]
@@ -53,12 +53,12 @@ pub(crate) fn tune_drive(
     let asked = AskedDrive::of(network.get(), node, model)?;
     let objective = order.bandwidth_hz.map_or(Objective::PhaseMargin(order.phase_margin_deg), Objective::Bandwidth);
     let journal = order.journal.unwrap_or_else(|| default_path(asked.node));
-    let request = Request {
+    let mut request = Request {
         objective,
         with_position: order.position,
         period: duration(order.period)?,
         bounds: Bounds {
-            speed_rpm: order.speed_rpm.abs(),
+            speed_rpm: order.speed_rpm.unwrap_or(Bounds::default().speed_rpm).abs(),
             current_a: order.current_a.abs(),
             travel_turns: order.travel_turns,
         },
@@ -73,6 +73,9 @@ pub(crate) fn tune_drive(
     request.check().map_err(|failure| bad_value(failure.what))?;
     network.get().begin_said(py, async move {
         let drive = asked.drive().await?;
+        if order.speed_rpm.is_none() {
+            request.bounds.speed_rpm = host::tune::loops_of(&drive)?.1.usual_rpm;
+        }
         let report = host::tune::tune(&drive, &request, &(), std::future::ready(false)).await?;
         Ok(Value::report(&report))
     })

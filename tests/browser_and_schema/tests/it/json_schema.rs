@@ -45,6 +45,9 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["capture", "1", "velocity"], "failure"),
     (&["test-motion", "4", "steps", "--time", "1s"], "test_motion"),
     (&["test-motion", "4", "sine", "--by", "5deg", "--periods", "1"], "test_motion"),
+    (&["tune", "4", "--loop", "position", "--apply"], "tune"),
+    (&["tune", "2"], "failure"),
+    (&["tune", "4", "--period", "50us"], "failure"),
     (&["pdo", "show", "1", "4"], "pdo_show"),
     (&["pdo", "plan", "4", "tpdo1=statusword,6064", "--type", "1"], "pdo_plan"),
     (&["pdo", "apply", "4", "tpdo1=statusword,6064", "--type", "1"], "params_apply"),
@@ -245,7 +248,7 @@ fn the_page_names_every_command_and_shows_a_failure() {
     hold(&example, "failure", "the example of the page");
 }
 
-/// The kinds of errors in the sources: `of_kind("..")`, `kind: ".."`, `new("..", ` of control errors, and the words of `fn kind`.
+/// The kinds of errors in the sources: `of_kind("..")`, `_KIND: &str = ".."`, `kind: ".."`, `new("..", ` of control errors, and the words of `fn kind`.
 fn kinds_in(text: &str) -> Vec<String> {
     let word = |rest: &str| {
         let (word, _) = rest.split_once('"')?;
@@ -254,6 +257,7 @@ fn kinds_in(text: &str) -> Vec<String> {
     let behind = |mark: &str| text.split(mark).skip(1).filter_map(word).collect::<Vec<_>>();
     let mut kinds = [
         behind("of_kind(\""),
+        behind("_KIND: &str = \""),
         behind(" kind: \""),
         behind("\"kind\":\""),
         behind("Self::new(\""),

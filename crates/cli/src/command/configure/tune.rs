@@ -31,7 +31,7 @@ enum WhichLoop {
 /// Find gains for the loops of a drive: measure it, try them on its twin, then on the drive
 ///
 /// The shaft turns to and fro at steady speeds, and then at one speed with an excitation on top that grows to a share of
-/// --current. The motion stops where it reaches --current or --travel. Afterwards the drive has the parameters that it had,
+/// --current; that of a joint, whose loops are not seen from outside, is turned round by its own ramps instead. The motion stops where it reaches --current or --travel. Afterwards the drive has the parameters that it had,
 /// unless --apply is given. Keep an emergency stop within reach, and the load free to turn.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive tune 4\n  \
@@ -50,9 +50,9 @@ pub(crate) struct Tune {
     /// Objective: degrees that are to be left there; as stiff as that allows
     #[arg(long, value_name = "DEGREES", default_value = "40", value_parser = degrees)]
     phase_margin: f64,
-    /// Highest speed of the measurement
-    #[arg(long, value_name = "SPEED", default_value = "120rpm")]
-    speed: Rpm,
+    /// Highest speed of the measurement, of the motor's shaft (default: 120rpm, of a joint 600rpm)
+    #[arg(long, value_name = "SPEED")]
+    speed: Option<Rpm>,
     /// Most current that the speed loop may ask for meanwhile
     #[arg(long, value_name = "CURRENT", default_value = "15A")]
     current: Amperes,
@@ -104,7 +104,7 @@ fn constant(text: &str) -> Result<f64, String> {
 }
 
 impl Tune {
-    fn request(&self, context: &Context) -> Request {
+    fn request(&self, context: &Context, usual_rpm: f64) -> Request {
         let objective =
             self.bandwidth.map_or(tune::Objective::PhaseMargin(self.phase_margin), tune::Objective::Bandwidth);
         Request {
@@ -112,7 +112,7 @@ impl Tune {
             with_position: self.which == WhichLoop::Position,
             period: self.period,
             bounds: Bounds {
-                speed_rpm: self.speed.0.abs(),
+                speed_rpm: self.speed.map_or(usual_rpm, |Rpm(rpm)| rpm.abs()),
                 current_a: self.current.0.abs(),
                 travel_turns: self.travel,
             },
@@ -127,10 +127,10 @@ impl Tune {
 
     /// Measures and proposes; and writes, if that was asked for.
     pub(crate) async fn run(&self, context: &Context) -> Result<TuneReport, Failure> {
-        let request = self.request(context);
-        request.check()?;
         let drive = context.known_drive(self.node).await?;
-        host::tune::loops_of(&drive)?;
+        let (_, loops) = host::tune::loops_of(&drive)?;
+        let request = self.request(context, loops.usual_rpm);
+        request.check()?;
         let guard = self.guard.begin(context, &drive).await?;
         let done = host::tune::tune(&drive, &request, &context.progress, wants_back(context)).await;
         let released = Guard::end(guard, context, &drive, false).await;
@@ -168,18 +168,28 @@ impl Report for TuneReport {
             "node {} ({}): inertia {:.4} kg·m², dry friction {:.3} N·m, viscous {:.4} N·m·s/rad, load {:.2} N·m",
             self.node, self.model, self.inertia_kg_m2, self.dry_friction_nm, self.viscous_friction_nm_s, self.load_nm
         )];
+        let is_measured = self.frequencies > 0;
         lines.push(match (self.anti_resonance_hz, self.resonance_hz) {
-            (Some(anti), Some(resonance)) => format!("anti-resonance {anti:.1} Hz, resonance {resonance:.1} Hz"),
+            (Some(anti), Some(resonance)) if is_measured => {
+                format!("anti-resonance {anti:.1} Hz, resonance {resonance:.1} Hz")
+            }
+            (Some(anti), Some(resonance)) => {
+                format!("anti-resonance {anti:.1} Hz, resonance {resonance:.1} Hz, by the data of its reducer")
+            }
             _ => "no resonance was found".to_owned(),
         });
-        lines.push(format!(
-            "delay of the speed loop {:.1} ms; coherent at {} of {} frequencies; the model is {:.0} % off, the twin {:.0} %",
-            self.loop_delay_ms,
-            self.coherent,
-            self.frequencies,
-            100.0 * self.model_off,
-            100.0 * self.twin_off
-        ));
+        lines.push(if is_measured {
+            format!(
+                "delay of the speed loop {:.1} ms; coherent at {} of {} frequencies; the model is {:.0} % off, the twin {:.0} %",
+                self.loop_delay_ms,
+                self.coherent,
+                self.frequencies,
+                100.0 * self.model_off,
+                100.0 * self.twin_off
+            )
+        } else {
+            format!("the currents of its twin are {:.1} % off", 100.0 * self.twin_off)
+        });
         lines.push(format!("it took {:.1} A at most, and {:.1} turns to one side", self.peak_a, self.travel_turns));
         let mut table = Table::new(&["object", "name", "has", "proposed"]);
         for row in &self.gains {

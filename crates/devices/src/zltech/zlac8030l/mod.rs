@@ -105,6 +105,9 @@ const LOOPS: Loops = Loops {
     current: Some((Quantity::new(0x2019, 0, 1e-3), Quantity::new(0x201A, 0, 1.0))),
     without_ramps: &[(Mux::new(0x6083, 0), 0), (Mux::new(0x6084, 0), 0)],
     period: Duration::from_micros(500),
+    stated: None,
+    gain_step: 1,
+    usual_rpm: 120.0,
 };
 
 /// All objects are in one list.

@@ -7,6 +7,7 @@ use drives::engine::axis::Demand;
 use drives::engine::device::ResetTimes;
 use drives::{Fidelity, Firmware, RegisterError, Resting};
 use plant::attachment::Attachment;
+use plant::gear::GearModel;
 use plant::mechanics::RotorData;
 use plant::physics::Physics;
 use plant::rest::{Rested, rest};
@@ -193,8 +194,8 @@ pub trait Assembly: Clone + Send + 'static {
     /// How many of those are a turn of the motor's shaft.
     fn counts_per_turn(&self, axis: AxisId) -> u32;
 
-    /// Motor turns per turn of the output shaft, where a reducer is built in.
-    fn reducer(&self) -> Option<f64> {
+    /// The reducer, where one is built in.
+    fn gear(&self) -> Option<&GearModel> {
         None
     }
 
@@ -215,7 +216,7 @@ pub trait Assembly: Clone + Send + 'static {
         let motor = self.motor_at(axis);
         ShaftFacts {
             counts_per_turn: self.counts_per_turn(axis),
-            reducer: self.reducer(),
+            reducer: self.gear().map(|gear| gear.ratio),
             rotor_inertia_kg_m2: motor.rotor_model().inertia_kg_m2,
             load_angle: motor.load_angle(),
         }

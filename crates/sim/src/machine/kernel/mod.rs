@@ -444,8 +444,8 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn motor(&self, axis: AxisId) -> Option<MotorData> {
         let motor = self.assembly.motor_at(axis);
-        let (rotor, reducer) = (*motor.rotor_model(), self.assembly.reducer());
-        motor.pmsm_model().map(|windings| MotorData { rotor, windings: *windings, reducer })
+        let (rotor, gear) = (*motor.rotor_model(), self.assembly.gear().copied());
+        motor.pmsm_model().map(|windings| MotorData { rotor, windings: *windings, gear })
     }
 
     fn check_couple(&self, axis: AxisId) -> Result<(), Refused> {

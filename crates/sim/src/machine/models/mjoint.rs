@@ -16,7 +16,7 @@ use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
 use drives::{Fidelity, RegisterError};
 use plant::absolute_encoder::BatteryState;
-use plant::gear::GearData;
+use plant::gear::{GearData, GearModel};
 use plant::pmsm::Phase;
 use plant::rest::is_at_rest;
 use plant::supply::SupplyData;
@@ -321,8 +321,8 @@ impl Assembly for Joint {
         COUNTS_PER_TURN
     }
 
-    fn reducer(&self) -> Option<f64> {
-        Some(self.motor.model.gear.ratio)
+    fn gear(&self) -> Option<&GearModel> {
+        Some(&self.motor.model.gear)
     }
 
     fn free_run(&self, _axis: AxisId) -> Option<FreeRun> {
