@@ -75,3 +75,16 @@ def test_a_tuning_that_is_given_up_leaves_the_shaft_at_rest(world):
     assert abs(world[4].velocity_rpm) < 1
     world.run_for(2.0)
     assert abs(world[4].velocity_rpm) < 1
+
+
+def test_a_joint_is_tuned_by_what_its_twin_shows():
+    world = ferrodrive.World(bitrate=1_000_000)
+    world.add("m4230e17b50", node=1)
+    world[1].set_load_inertia(0.15)
+    with ferrodrive.Network(world) as network:
+        network.wait_for(1)
+        found = network.drive(1, "m4230e17b50").tune(position=True)
+    # The rotor's inertia of the manual, and the load and the flange (crate plant) behind a ratio of 50.
+    assert found["inertia_kg_m2"] == pytest.approx(0.69e-4 + (0.15 + 7e-5) / 2500, rel=0.05)
+    assert [gain["object"] for gain in found["gains"]] == ["60F9h:01", "60F9h:02", "60FBh:01"]
+    assert found["after"]["stable"] and found["position"]["stable"] and found["frequencies"] == 0

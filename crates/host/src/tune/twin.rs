@@ -9,7 +9,7 @@ use devices::{AxisId, Description, Loops};
 use master::cyclic::CyclicOptions;
 use master::{Drive, Network};
 use sim::machine::{Order, order};
-use sim::{MotorData, OUTPUT_WHEEL_SHARE, Place, World};
+use sim::{Fidelity, MotorData, OUTPUT_WHEEL_SHARE, Place, World};
 use words::failure::Failure;
 
 use super::bench::{Bench, Bounds, Excursion, Measurement, StepResponse, excitation, write};
@@ -120,10 +120,15 @@ impl Twin {
     /// # Errors
     /// The model cannot be built, or has not what hangs on its shaft.
     pub fn world(&self) -> Result<(World, Drive), Failure> {
+        self.world_at(Fidelity::Full)
+    }
+
+    fn world_at(&self, fidelity: Fidelity) -> Result<(World, Drive), Failure> {
         let mut world = World::new(Bitrate::M1, 1);
         let network = Network::new();
         world.add_station(network.clone());
-        let machine = order(self.model, &Order::new(self.model, NODE, Bitrate::M1)).map_err(|it| self.failed(it))?;
+        let ordered = Order { fidelity, ..Order::new(self.model, NODE, Bitrate::M1) };
+        let machine = order(self.model, &ordered).map_err(|error| self.failed(error))?;
         world.add_drive(NODE.raw(), machine).map_err(|error| self.failed(error))?;
         for words in &self.load {
             let stimulus = words.parse().map_err(|error: sim::stimulus::StimulusError| self.failed(error))?;
@@ -200,7 +205,8 @@ impl Twin {
     /// # Errors
     /// What stopped it.
     pub fn currents(&self, bounds: Bounds) -> Result<Currents, Failure> {
-        let (mut world, drive) = self.world()?;
+        // What is shown is filtered: nothing of a current loop is seen in it.
+        let (mut world, drive) = self.world_at(Fidelity::Mechanical)?;
         let mut reader = Reader::of(&drive, bounds, Excursion::default())?;
         self.run(&mut world, self.write(&drive, &[]))?;
         self.run(&mut world, reader.measure())

@@ -162,13 +162,27 @@ async fn wants_back(context: &Context) -> bool {
     typed.await.unwrap_or(false)
 }
 
+/// A joint's inertia is a thousandth of a wheel's.
+fn three_digits(value: f64) -> String {
+    let decimals = (2.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 12.0) as usize;
+    format!("{value:.decimals$}")
+}
+
 impl Report for TuneReport {
     fn text(&self, paint: Paint) -> String {
-        let mut lines = vec![format!(
-            "node {} ({}): inertia {:.4} kg·m², dry friction {:.3} N·m, viscous {:.4} N·m·s/rad, load {:.2} N·m",
-            self.node, self.model, self.inertia_kg_m2, self.dry_friction_nm, self.viscous_friction_nm_s, self.load_nm
-        )];
         let is_measured = self.frequencies > 0;
+        let mut lines = vec![format!(
+            "node {} ({}): inertia {} kg·m², dry friction {} N·m, viscous {} N·m·s/rad",
+            self.node,
+            self.model,
+            three_digits(self.inertia_kg_m2),
+            three_digits(self.dry_friction_nm),
+            three_digits(self.viscous_friction_nm_s)
+        )];
+        // Of a joint it is not known.
+        if is_measured {
+            lines[0].push_str(&format!(", load {:.2} N·m", self.load_nm));
+        }
         lines.push(match (self.anti_resonance_hz, self.resonance_hz) {
             (Some(anti), Some(resonance)) if is_measured => {
                 format!("anti-resonance {anti:.1} Hz, resonance {resonance:.1} Hz")
@@ -207,7 +221,7 @@ impl Report for TuneReport {
         lines.push(String::new());
         lines.push(margins("speed loop, as it is ", &self.before));
         lines.push(margins("speed loop, proposed ", &self.after));
-        lines.extend(self.position.iter().map(|row| margins("position loop around", row)));
+        lines.extend(self.position.iter().map(|row| margins("position loop around it", row)));
         let error = |[before, after]: [f64; 2]| format!("{before:.2} r/min s before, {after:.2} after");
         lines.push(format!("error after a step and a load, on the twin: {}", error(self.twin_error)));
         if let Some(errors) = self.drive_error {
