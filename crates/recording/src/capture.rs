@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use sim::Place;
 use words::object::{ObjectArg, object};
 
-use super::column::{Column, Subject, is_called};
+use super::column::{Column, Subject, is_called, unit_of};
 use super::piece::{Kind, Mark, Recorded, Severity, Target};
 use super::record::Record;
 
@@ -69,6 +69,9 @@ struct About {
     model: String,
     trigger_s: Option<f64>,
     parameters: BTreeMap<String, String>,
+    /// By the names of the quantities, the units that these names do not have: CSV keeps a unit in the name alone.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    units: BTreeMap<String, String>,
 }
 
 /// A gap is a distance of more than so many periods.
@@ -138,6 +141,7 @@ impl Capture {
         let mut time_s: Vec<f64> = of_it().flat_map(|series| series.points.iter().filter_map(with_value)).collect();
         time_s.sort_by(f64::total_cmp);
         time_s.dedup();
+        let About { name, notes, model, trigger_s, parameters, mut units } = about(recorded)?;
         let traces = of_it().map(|series| {
             let mut values = vec![f64::NAN; time_s.len()];
             for (at, value) in series.points.iter().filter(|(_, value)| value.is_finite()) {
@@ -146,11 +150,11 @@ impl Capture {
                 }
             }
             let Column { signal, unit, .. } = &series.column;
-            Trace::new(signal.clone().into_owned(), unit.clone().into_owned(), values, &time_s)
+            let unit = units.remove(signal.as_ref()).unwrap_or_else(|| unit.clone().into_owned());
+            Trace::new(signal.clone().into_owned(), unit, values, &time_s)
         });
         let mut traces: Vec<Trace> = traces.collect();
         traces.sort_by(|a, b| a.quantity.cmp(&b.quantity));
-        let About { name, notes, model, trigger_s, parameters } = about(recorded)?;
         let parameters = parameters.iter().map(|(object, value)| parameter(object, value)).collect::<Result<_, _>>()?;
         let is_cut_off = recorded.torn;
         Ok(Self { name, notes, model, place, trigger_s, time_s, traces, parameters, is_cut_off })
@@ -181,12 +185,14 @@ impl Capture {
 
     fn about(&self) -> String {
         let hex = |bytes: &Vec<u8>| bytes.iter().map(|byte| format!("{byte:02X}")).collect::<String>();
+        let unnamed = self.traces.iter().filter(|trace| unit_of(&trace.quantity) != trace.unit);
         let about = About {
             name: self.name.clone(),
             notes: self.notes.clone(),
             model: self.model.clone(),
             trigger_s: self.trigger_s,
             parameters: self.parameters.iter().map(|(object, value)| (object.to_string(), hex(value))).collect(),
+            units: unnamed.map(|trace| (trace.quantity.clone(), trace.unit.clone())).collect(),
         };
         // Names and texts alone: nothing in it has no form in JSON.
         format!("capture {}", serde_json::to_string(&about).unwrap_or_default())
@@ -232,6 +238,9 @@ mod tests {
             trigger_s: Some(0.012),
             traces: vec![
                 Trace::new("current_a".into(), "A".into(), current, &time_s),
+                // Units that their names do not have: none, and another than it ends with.
+                Trace::new("motor_current".into(), "mA".into(), vec![250.0; 50], &time_s),
+                Trace::new("phase_a".into(), String::new(), vec![1.0; 50], &time_s),
                 Trace::new("velocity_rpm".into(), "r/min".into(), speed, &time_s),
             ],
             time_s,
@@ -261,7 +270,7 @@ mod tests {
     fn period_and_jitter_are_those_of_the_readings_and_a_gap_is_not_jitter() {
         let made = capture();
         let periods: Vec<f64> = made.traces.iter().map(|trace| (trace.period_s * 1e6).round()).collect();
-        assert_eq!(periods, [2000.0, 1000.0]);
+        assert_eq!(periods, [2000.0, 1000.0, 1000.0, 1000.0]);
         // Readings of 1 ms of which one is 0.2 ms late, and two are lost.
         let time_s = [0.0, 1.0, 2.2, 3.0, 6.0, 7.0].map(|ms| ms * 1e-3);
         let trace = Trace::new("x".into(), String::new(), vec![0.0; 6], &time_s);

@@ -141,8 +141,13 @@ const ENDINGS: [(&str, &str); 13] = [
 ];
 
 /// The unit that a name ends with.
-fn unit_of(signal: &str) -> &'static str {
+pub(super) fn unit_of(signal: &str) -> &'static str {
     ENDINGS.iter().find(|(ending, _)| signal.ends_with(ending)).map_or("", |(_, unit)| unit)
+}
+
+/// What the name of a signal ends with for its unit: `_rpm` for `r/min`; empty for a unit that names do not have.
+pub fn ending_of(unit: &str) -> &'static str {
+    ENDINGS.iter().find(|(_, known)| *known == unit).map_or("", |(ending, _)| ending)
 }
 
 /// Whether a signal has this name, with its unit or without: `velocity_rpm` is called `velocity`, `velocity_demand_rpm` is not.

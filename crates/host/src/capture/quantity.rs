@@ -11,6 +11,7 @@ use cia402::object::{POSITION_ACTUAL_VALUE, TARGET_POSITION};
 use devices::Units;
 use master::Drive;
 use master::decode::{common_name, common_row};
+use recording::ending_of;
 use words::failure::Failure;
 use words::object::ObjectArg;
 use words::unit::split_factor;
@@ -101,18 +102,6 @@ const SHORT: [Short; 13] = [
     of_model("driver_temperature", Kind::Own("°C"), |units| units.driver_temperature),
 ];
 
-/// What a signal's name ends with for its unit, as the signals of a simulator do.
-const ENDINGS: [(&str, &str); 8] = [
-    ("r/min", "_rpm"),
-    ("counts", "_counts"),
-    ("A", "_a"),
-    ("V", "_v"),
-    ("°C", "_c"),
-    ("rad", "_rad"),
-    ("°", "_deg"),
-    ("N·m", "_nm"),
-];
-
 /// The short names, for messages.
 pub fn short_names() -> String {
     SHORT.map(|short| short.name).join(", ")
@@ -156,12 +145,11 @@ impl Quantity {
             name = format!("{name}_{:02X}", mux.sub_index);
         }
         let (factor, unit) = row.map_or((1.0, ""), |row| factor_of(row.unit));
-        let ending = ENDINGS.iter().find(|(known, _)| *known == unit).map_or("", |(_, ending)| *ending);
         let data_type = row.map_or(DataType::Unsigned32, |row| row.data_type);
         let form = drive.description().and_then(|model| model.pdo.mapping.tpdo_form(mux));
         let by_sdo = Form { data_type, factor };
         let by_pdo = form.map_or(by_sdo, |form| Form { data_type: form.data_type, factor: factor_of(form.unit).0 });
-        Ok(Self { name: name + ending, unit: unit.to_owned(), object: mux, by_sdo, by_pdo })
+        Ok(Self { name: name + ending_of(unit), unit: unit.to_owned(), object: mux, by_sdo, by_pdo })
     }
 
     async fn of_short(drive: &Drive, Short { name, kind, place }: &Short) -> Result<Self, Failure> {
@@ -212,8 +200,7 @@ impl Quantity {
         let ratio = if found.by_sdo.factor == 0.0 { 1.0 } else { found.by_pdo.factor / found.by_sdo.factor };
         found.by_sdo.factor = step;
         found.by_pdo.factor = step * ratio;
-        let ending = ENDINGS.iter().find(|(known, _)| *known == unit).map_or("", |(_, ending)| *ending);
-        (found.name, found.unit) = (format!("{name}{ending}"), unit.to_owned());
+        (found.name, found.unit) = (format!("{name}{}", ending_of(unit)), unit.to_owned());
         Ok(found)
     }
 }
