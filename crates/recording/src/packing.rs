@@ -32,8 +32,8 @@ mod packer {
         }
     }
 
-    pub(super) fn unpack(data: &[u8], size: u64, plain: &mut Vec<u8>) -> io::Result<usize> {
-        zstd::Decoder::new(data).and_then(|data| data.take(size).read_to_end(plain))
+    pub(super) fn unpack(data: &[u8], size: u64, plain: &mut Vec<u8>) -> Result<io::Result<usize>, String> {
+        Ok(zstd::Decoder::new(data).and_then(|data| data.take(size).read_to_end(plain)))
     }
 }
 
@@ -57,8 +57,8 @@ mod packer {
         }
     }
 
-    pub(super) fn unpack(_: &[u8], _: u64, _: &mut Vec<u8>) -> io::Result<usize> {
-        Err(io::ErrorKind::Unsupported.into())
+    pub(super) fn unpack(_: &[u8], _: u64, _: &mut Vec<u8>) -> Result<io::Result<usize>, String> {
+        Err("its chunks are compressed with 'zstd', which is not read in a page; use the ferrodrive program".into())
     }
 }
 
@@ -72,7 +72,7 @@ pub(super) fn unpacked(compression: &str, data: &[u8], size: u64) -> Result<io::
     let mut plain = Vec::new();
     let read = match compression {
         "" => data.take(size).read_to_end(&mut plain),
-        ZSTD => packer::unpack(data, size, &mut plain),
+        ZSTD => packer::unpack(data, size, &mut plain)?,
         LZ4 => lz4_flex::frame::FrameDecoder::new(data).take(size).read_to_end(&mut plain),
         other => {
             return Err(format!("its chunks are compressed with '{other}'; expected '{ZSTD}', '{LZ4}', or none"));
