@@ -104,7 +104,13 @@ impl Channels {
             let bits = of_it.iter().map(|column| column.kept_bits().filter(|_| !self.is_exact));
             let fields = places.iter().map(|place| self.width + place).zip(bits).collect();
             self.subjects.push(Signals { subject: subject.clone(), channel: self.list.len(), fields });
-            self.list.push(channel_of(subject, &of_it));
+            let mut channel = channel_of(subject, &of_it);
+            // Of "left arm" and "left-arm" the second is "BodyLeftArm2": readers keep the first of a name.
+            let is_taken = |name: &String| self.list.iter().any(|other| other.schema_name == *name);
+            let numbered = (2..).map(|number| format!("{}{number}", channel.schema_name));
+            let free = std::iter::once(channel.schema_name.clone()).chain(numbered).find(|name| !is_taken(name));
+            channel.schema_name = free.unwrap_or_default();
+            self.list.push(channel);
         }
         self.width += columns.len();
     }
@@ -210,7 +216,6 @@ fn channel_of(subject: &Subject, columns: &[&Column]) -> Channel {
         schema.push_str(&format!("float64 {name}{comment}\n"));
         names.push(name);
     }
-    // A name of its own for each subject: readers keep the first of a name.
     let words = subject.title().replace(|letter: char| !letter.is_ascii_alphanumeric(), " ");
     let type_name: String = words.split_whitespace().map(capitalised).collect();
     let prefix = if matches!(subject, Subject::Body(_)) { "Body" } else { "" };
@@ -259,7 +264,15 @@ mod tests {
 
     #[test]
     fn fields_have_names_that_readers_take_and_types_one_for_each_subject() {
-        let names = ["4.606C_00", "4.velocity rpm", "4.velocity_rpm", "5.2.current_a", "left arm.x_m"];
+        let names = [
+            "4.606C_00",
+            "4.velocity rpm",
+            "4.velocity_rpm",
+            "5.2.current_a",
+            "left arm.x_m",
+            "left-arm.x_m",
+            "left_arm.x_m",
+        ];
         let columns: Vec<Column> = names.iter().map(|name| name.parse().expect("a column")).collect();
         let channels = Channels::of(&columns);
         let found: Vec<(&str, &str, &str)> = channels.list()[2..]
@@ -275,6 +288,8 @@ mod tests {
                 ("/node/4", "ferrodrive_msgs/msg/Node4", of_4),
                 ("/node/5/2", "ferrodrive_msgs/msg/Node5Axis2", "float64 current_a  # A\n"),
                 ("/body/left arm", "ferrodrive_msgs/msg/BodyLeftArm", "float64 x_m  # m\n"),
+                ("/body/left-arm", "ferrodrive_msgs/msg/BodyLeftArm2", "float64 x_m  # m\n"),
+                ("/body/left_arm", "ferrodrive_msgs/msg/BodyLeftArm3", "float64 x_m  # m\n"),
             ]
         );
     }
