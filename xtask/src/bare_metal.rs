@@ -12,8 +12,13 @@ use crate::tally::Tally;
 use crate::{tidy, workspace};
 
 /// A microcontroller with a floating-point unit and no operating system.
-const TARGET: Target =
-    Target { name: "thumbv7em-none-eabihf", crates: "core", features: "compiler-builtins-mem", opt_level: "\"s\"" };
+const TARGET: Target = Target {
+    name: "thumbv7em-none-eabihf",
+    crates: "core",
+    features: "compiler-builtins-mem",
+    opt_level: "\"s\"",
+    panic: "abort",
+};
 
 /// The programs of `benches/bare_metal`: where each begins, and what it is.
 const PROGRAMS: [(&str, &str); 2] =

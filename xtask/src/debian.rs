@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::process::{self, quietly};
 use crate::say::say;
 
-/// Installs those of these programs that are missing: each with the package that it is in.
+/// Installs those of these programs that are missing: each with the package that it is in, or several.
 ///
 /// # Errors
 /// A sentence: which are missing, and why they cannot be installed.
@@ -16,7 +16,7 @@ pub(crate) fn install(programs: &[(&str, &str)]) -> Result<(), String> {
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let missing: Vec<&str> =
-        programs.iter().filter(|(program, _)| !there(program)).map(|(_, package)| *package).collect();
+        programs.iter().filter(|(program, _)| !there(program)).flat_map(|(_, packages)| packages.split(' ')).collect();
     if missing.is_empty() {
         return Ok(());
     }

@@ -12,6 +12,7 @@ use std::process::{Command, ExitCode};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
+use crate::cross::Cross;
 use crate::say::say;
 use crate::tally::Tally;
 use crate::{pgo, process, program, python, wheel, workspace};
@@ -23,13 +24,20 @@ const LICENCE_NAMES: &[&str] = &["LICENSE", "LICENCE", "COPYING", "COPYRIGHT", "
 
 const CHECKSUMS: &str = "SHA256SUMS";
 
-/// Runs `cargo xtask dist`.
-pub(crate) fn command() -> ExitCode {
+/// Runs `cargo xtask dist [ARCHITECTURE]`.
+pub(crate) fn command(architecture: Option<&str>) -> ExitCode {
     let folder = workspace::root().join("dist");
-    let made = release_binary().and_then(|(program, how)| {
-        println!("{how}");
-        make(&program, "dist", &folder)
-    });
+    let made = match architecture {
+        Some(name) => Cross::found(name).and_then(|cross| {
+            let binaries =
+                Binaries { program: cross.program("dist")?, speaker: program::built()?, cross: Some(&cross) };
+            make(&binaries, "dist", &folder)
+        }),
+        None => release_binary().and_then(|(program, how)| {
+            println!("{how}");
+            make(&Binaries::own(program), "dist", &folder)
+        }),
+    };
     match made {
         Ok(notes) => {
             notes.iter().for_each(|note| println!("{note}"));
@@ -46,13 +54,32 @@ pub(crate) fn command() -> ExitCode {
 /// The dist step of `cargo xtask test`: the release as the tests' profile makes it, used on a machine without anything else.
 pub(crate) fn step() -> Tally {
     let folder = workspace::target().join("dist-test");
-    let made = program::built().and_then(|program| make(&program, "dev", &folder.join("dist")));
+    let made = program::built().and_then(|program| make(&Binaries::own(program), "dev", &folder.join("dist")));
+    tried(made, || try_it(&folder, None))
+}
+
+/// The aarch64 step: the same for another architecture, whose programs are run by an emulator.
+pub(crate) fn cross_step() -> Tally {
+    let cross = match Cross::found("aarch64") {
+        Ok(cross) => cross,
+        Err(reason) => return Tally::skipped(reason),
+    };
+    let folder = workspace::target().join("dist-test-aarch64");
+    let built = cross
+        .program("dev")
+        .and_then(|program| Ok(Binaries { program, speaker: program::built()?, cross: Some(&cross) }));
+    let made = built.and_then(|binaries| make(&binaries, "dev", &folder.join("dist")));
+    tried(made, || try_it(&folder, Some(&cross)))
+}
+
+/// What a release that was made, with these notes, is worth.
+fn tried(made: Result<Vec<String>, String>, tries: impl FnOnce() -> Vec<(&'static str, Result<(), String>)>) -> Tally {
     let notes = match made {
         Ok(notes) => notes,
         Err(error) => return Tally::failed(error),
     };
     let mut tally = Tally::default();
-    for (what, outcome) in try_it(&folder) {
+    for (what, outcome) in tries() {
         say(format_args!("{what}: {}", outcome.as_ref().map_or_else(|error| error.as_str(), |()| "ok")));
         tally.add(&outcome.map_or_else(|error| Tally::failed(format!("{what}: {error}")), |()| Tally::passed()));
     }
@@ -68,29 +95,49 @@ fn release_binary() -> Result<(PathBuf, String), String> {
     }
 }
 
+/// What a release is made of.
+struct Binaries<'a> {
+    /// The binary that is released.
+    program: PathBuf,
+    /// One that this machine runs: it prints manual pages, completions and data sheets.
+    speaker: PathBuf,
+    /// The tools of another architecture.
+    cross: Option<&'a Cross>,
+}
+
+impl Binaries<'_> {
+    /// For machines like this one.
+    fn own(program: PathBuf) -> Self {
+        Self { speaker: program.clone(), program, cross: None }
+    }
+}
+
 /// The name of the archive without its ending, and of the folder in it: `ferrodrive-0.1.0-x86_64-linux`.
-fn archive_name() -> String {
-    let (version, architecture, system) = (env!("CARGO_PKG_VERSION"), std::env::consts::ARCH, std::env::consts::OS);
+fn archive_name(cross: Option<&Cross>) -> String {
+    let (version, system) = (env!("CARGO_PKG_VERSION"), std::env::consts::OS);
+    let architecture = cross.map_or(std::env::consts::ARCH, |cross| cross.architecture.name);
     format!("ferrodrive-{version}-{architecture}-{system}")
 }
 
 /// Makes the folder anew; returns what could not be in it, and why.
-fn make(program: &Path, profile: &str, release: &Path) -> Result<Vec<String>, String> {
+fn make(binaries: &Binaries<'_>, profile: &str, release: &Path) -> Result<Vec<String>, String> {
+    let Binaries { program, speaker, cross } = binaries;
     let _ = fs::remove_dir_all(release);
     let mut notes = Vec::new();
-    let folder = &release.join(archive_name());
+    let folder = &release.join(archive_name(*cross));
     let binary = folder.join("bin").join(program.file_name().unwrap_or_default());
     copy(program, &binary)?;
     // The names of functions are most of a binary; what a panic says needs none.
-    if !process::works("strip", &[&binary.to_string_lossy()]) {
+    let name = binary.to_string_lossy();
+    if !cross.map_or_else(|| process::works("strip", &[&name]), |cross| cross.strip(&name)) {
         notes.push("the binary is not stripped: there is no `strip` here".to_owned());
     }
-    let run = |words: &[&str]| process::output(Command::new(&binary).args(words));
+    let run = |words: &[&str]| process::output(Command::new(speaker).args(words));
     run(&["man-pages", &folder.join("man/man1").to_string_lossy()])?;
     for (shell, name) in SHELLS {
         write(&folder.join("completions").join(name), &run(&["completions", shell])?)?;
     }
-    for model in models(&binary)? {
+    for model in models(speaker)? {
         write(&folder.join("eds").join(format!("{model}.eds")), &run(&["eds", &model])?)?;
     }
     for name in ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"] {
@@ -99,7 +146,7 @@ fn make(program: &Path, profile: &str, release: &Path) -> Result<Vec<String>, St
     let mut packages = foreign_packages("Cargo.toml", "ferrodrive")?;
     match python::environment(python::VENV, python::REQUIREMENTS) {
         Ok(python) => {
-            let wheel = add_wheel(&python, profile, &binary, release)?;
+            let wheel = add_wheel(&python, profile, (&binary, *cross), release)?;
             packages.extend(foreign_packages("crates/python/Cargo.toml", "ferrodrive-python")?);
             notes.extend(
                 wheel::tag(&wheel).err().map(|reason| format!("the wheel is for machines like this one: {reason}")),
@@ -108,23 +155,28 @@ fn make(program: &Path, profile: &str, release: &Path) -> Result<Vec<String>, St
         Err(reason) => notes.push(format!("no wheel: {reason}")),
     }
     licences(packages, &folder.join("licences"))?;
-    pack(release)?;
+    pack(release, &archive_name(*cross))?;
     write(&release.join(CHECKSUMS), &checksums(release)?)?;
     Ok(notes)
 }
 
 /// The folder of the archive becomes the archive.
-fn pack(release: &Path) -> Result<(), String> {
-    let (name, archive) = (archive_name(), format!("{}.tar.gz", archive_name()));
-    process::output(Command::new("tar").current_dir(release).args(["-czf", &archive, &name]))?;
-    fs::remove_dir_all(release.join(&name)).map_err(|error| format!("{name}: {error}"))
+fn pack(release: &Path, name: &str) -> Result<(), String> {
+    let archive = format!("{name}.tar.gz");
+    process::output(Command::new("tar").current_dir(release).args(["-czf", &archive, name]))?;
+    fs::remove_dir_all(release.join(name)).map_err(|error| format!("{name}: {error}"))
 }
 
 /// The wheel around this binary, in `folder`.
-fn add_wheel(python: &Path, profile: &str, binary: &Path, folder: &Path) -> Result<PathBuf, String> {
-    if profile != "dev" {
+fn add_wheel(
+    python: &Path,
+    profile: &str,
+    (binary, cross): (&Path, Option<&Cross>),
+    folder: &Path,
+) -> Result<PathBuf, String> {
+    if profile != "dev" || cross.is_some() {
         fs::create_dir_all(folder).map_err(|error| error.to_string())?;
-        return python::wheel(python, profile, Some(binary), folder);
+        return python::wheel(python, profile, Some(binary), cross, folder);
     }
     // The tests' own is the same wheel.
     let wheel = python::wheel_of_tests()?;
@@ -212,7 +264,7 @@ fn files_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// The steps of a user of a release: check the sums, run the program on its own, and install the wheel.
-fn try_it(folder: &Path) -> Vec<(&'static str, Result<(), String>)> {
+fn try_it(folder: &Path, cross: Option<&Cross>) -> Vec<(&'static str, Result<(), String>)> {
     let (dist, empty) = (folder.join("dist"), folder.join("empty"));
     let _ = fs::remove_dir_all(&empty);
     if let Err(error) = fs::create_dir_all(&empty) {
@@ -220,19 +272,23 @@ fn try_it(folder: &Path) -> Vec<(&'static str, Result<(), String>)> {
     }
     let mut tried = vec![
         ("every file is listed, with its sum", sums_agree(&dist)),
-        ("the archive is unpacked in an empty folder", unpack(&dist, &empty)),
+        ("the archive is unpacked in an empty folder", unpack(&dist, &empty, &archive_name(cross))),
     ];
-    let unpacked = empty.join(archive_name());
-    tried.push(("its program reads a virtual drive", program_works(&unpacked, &empty)));
+    let unpacked = empty.join(archive_name(cross));
+    tried.push(("its program reads a virtual drive", program_works(&unpacked, &empty, cross)));
     tried.push(("manual pages, completions, data sheets and licences have words", parts_have_words(&unpacked)));
-    if let Some(wheel) = wheel_in(&dist) {
-        tried.push(("the wheel works in a new environment", wheel_works(&wheel, &unpacked, &empty)));
+    match (wheel_in(&dist), cross) {
+        (Some(wheel), None) => {
+            tried.push(("the wheel works in a new environment", wheel_works(&wheel, &unpacked, &empty)));
+        }
+        (Some(wheel), Some(cross)) => tried.push(("the wheel is one for all its machines", is_for_all(&wheel, cross))),
+        (None, _) => {}
     }
     tried
 }
 
-fn unpack(dist: &Path, empty: &Path) -> Result<(), String> {
-    let archive = dist.join(format!("{}.tar.gz", archive_name()));
+fn unpack(dist: &Path, empty: &Path, name: &str) -> Result<(), String> {
+    let archive = dist.join(format!("{name}.tar.gz"));
     process::output(Command::new("tar").current_dir(empty).arg("-xzf").arg(archive)).map(|_| ())
 }
 
@@ -245,11 +301,25 @@ fn sums_agree(dist: &Path) -> Result<(), String> {
     if checksums(dist)? == listed { Ok(()) } else { Err("the sums are not those of the files".into()) }
 }
 
-fn program_works(unpacked: &Path, empty: &Path) -> Result<(), String> {
-    let mut program = Command::new(unpacked.join("bin").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX)));
-    program.current_dir(empty).env_clear().args(["--json", "read", "4", "6041h"]);
-    let answer = process::output(&mut program)?;
+fn program_works(unpacked: &Path, empty: &Path, cross: Option<&Cross>) -> Result<(), String> {
+    let program = unpacked.join("bin").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX));
+    let mut program = match cross {
+        Some(cross) => cross.run(&program),
+        None => {
+            let mut program = Command::new(program);
+            program.env_clear();
+            program
+        }
+    };
+    let answer = process::output(program.current_dir(empty).args(["--json", "read", "4", "6041h"]))?;
     if answer.contains("6041") { Ok(()) } else { Err(format!("it answered {answer}")) }
+}
+
+/// Its tag, which auditwheel gives by the files in it, names the architecture, any Linux and any Python. No Python of it is here to try.
+fn is_for_all(wheel: &Path, cross: &Cross) -> Result<(), String> {
+    let (name, architecture) = (wheel.file_name().unwrap_or_default().to_string_lossy(), cross.architecture.name);
+    let is_tagged = name.contains("-abi3-manylinux") && name.ends_with(&format!("_{architecture}.whl"));
+    if is_tagged { Ok(()) } else { Err(format!("it is called {name}")) }
 }
 
 fn parts_have_words(unpacked: &Path) -> Result<(), String> {

@@ -9,6 +9,7 @@ mod bench;
 mod bench_peers;
 mod browser;
 mod conform_peers;
+mod cross;
 mod debian;
 mod defects;
 mod dist;
@@ -54,7 +55,7 @@ The project's own chores.
   cargo xtask defects [--only NUMBER]..    do the tests notice what is wrong: defects put into a copy of the tree, one at a time
   cargo xtask wheel              the Python package, in dist/: the library, the binary, the interface for python-can
   cargo xtask web [-o FOLDER]    the studio with virtual drives in it, as static files; and the JavaScript package
-  cargo xtask dist               what is released, in dist/: an archive of the program, the wheel, checksums
+  cargo xtask dist [aarch64]     what is released, in dist/: an archive of the program, the wheel, checksums
   cargo xtask pgo                the binary to release, optimised by what a training run does
   cargo xtask bench [--compare COMMIT] [ROW..]    what frames, control periods and cycles cost, in instructions; paired with a commit
   cargo xtask times [ROW..]      how long the first commands, the tests and pip take, each from a fresh clone
@@ -70,7 +71,8 @@ fn main() -> ExitCode {
         ["test", rest @ ..] => test::command(rest),
         ["tidy"] => tidy::command(),
         ["defects", rest @ ..] => defects::command(rest),
-        ["dist"] => dist::command(),
+        ["dist"] => dist::command(None),
+        ["dist", architecture] => dist::command(Some(architecture)),
         ["web", rest @ ..] => web::command(rest),
         ["wheel"] => wheel::command(),
         ["pgo"] => pgo::command(),

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
+use crate::cross::Cross;
 use crate::say::say;
 use crate::tally::Tally;
 use crate::{process, program, workspace};
@@ -64,14 +65,20 @@ pub(crate) fn wheel_of_tests() -> Result<PathBuf, String> {
     static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
     let build = || {
         let python = environment(VENV, REQUIREMENTS)?;
-        wheel(&python, "dev", Some(&program::built()?), &workspace::target().join("wheel"))
+        wheel(&python, "dev", Some(&program::built()?), None, &workspace::target().join("wheel"))
     };
     BUILT.get_or_init(build).clone()
 }
 
 /// Builds the wheel in a cargo profile, around a binary that is there already or with one of its own, into an emptied folder;
 /// returns its path.
-pub(crate) fn wheel(python: &Path, profile: &str, program: Option<&Path>, folder: &Path) -> Result<PathBuf, String> {
+pub(crate) fn wheel(
+    python: &Path,
+    profile: &str,
+    program: Option<&Path>,
+    cross: Option<&Cross>,
+    folder: &Path,
+) -> Result<PathBuf, String> {
     for old in wheels_in(folder) {
         std::fs::remove_file(&old).map_err(|error| format!("{}: {error}", old.display()))?;
     }
@@ -79,8 +86,16 @@ pub(crate) fn wheel(python: &Path, profile: &str, program: Option<&Path>, folder
     let mut pip = pip(python);
     // The environment has the build's needs, in pinned versions.
     pip.args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]).arg(folder).arg(".");
-    if profile == "dev" {
-        pip.arg(format!("--config-settings=build-args=--profile dev --locked --features {SHARED_BUILD}"));
+    match cross {
+        Some(cross) => {
+            let target = cross.target();
+            pip.arg(format!("--config-settings=build-args=--profile {profile} --locked --target {target}"));
+            cross.set_tools(&mut pip);
+        }
+        None if profile == "dev" => {
+            pip.arg(format!("--config-settings=build-args=--profile dev --locked --features {SHARED_BUILD}"));
+        }
+        None => {}
     }
     pip.env("FERRODRIVE_PROFILE", profile).env("CARGO_TARGET_DIR", workspace::target());
     pip.envs(program.map(|program| ("FERRODRIVE_PROGRAM", program)));

@@ -120,6 +120,12 @@ pub(crate) const STEPS: &[Step] = &[
         when: When::Named,
         run: web::step,
     },
+    Step {
+        name: "aarch64",
+        does: "what is released for aarch64, by cross tools, its program run by QEMU; everything is compiled anew",
+        when: When::Named,
+        run: dist::cross_step,
+    },
 ];
 
 /// Gets what a step takes of others, or says why it cannot be had.

@@ -22,6 +22,8 @@ pub(crate) struct Target {
     /// As `-Zbuild-std-features` takes them.
     pub(crate) features: &'static str,
     pub(crate) opt_level: &'static str,
+    /// `abort` or `unwind`.
+    pub(crate) panic: &'static str,
 }
 
 /// A Rust that builds for a target.
@@ -64,11 +66,16 @@ impl Rust {
     pub(crate) fn cargo(&self, words: &[&str]) -> Command {
         let mut cargo = workspace::cargo();
         cargo.args(words).args(["--quiet", "--target", self.target.name]).arg("--target-dir").arg(&self.built);
+        self.set_sysroot(&mut cargo);
+        cargo
+    }
+
+    /// Has Cargo, or what starts it, use this sysroot.
+    pub(crate) fn set_sysroot(&self, command: &mut Command) {
         if let Some(sysroot) = &self.sysroot {
             // As Cargo separates them: a path may have spaces.
-            cargo.env("CARGO_ENCODED_RUSTFLAGS", format!("--sysroot\u{1f}{}", sysroot.display()));
+            command.env("CARGO_ENCODED_RUSTFLAGS", format!("--sysroot\u{1f}{}", sysroot.display()));
         }
-        cargo
     }
 
     /// What was built in a profile.
@@ -115,9 +122,9 @@ impl Made {
     fn build(&self, library: &Path, folder: &Path) -> Result<Vec<PathBuf>, String> {
         let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
         std::fs::create_dir_all(folder.join("src")).map_err(failed)?;
-        let opt_level = self.target.opt_level;
+        let Target { opt_level, panic, .. } = self.target;
         let manifest = format!(
-            "[package]\nname = \"empty\"\nedition = \"2024\"\n[workspace]\n[profile.release]\nopt-level = {opt_level}\npanic = \"abort\"\n"
+            "[package]\nname = \"empty\"\nedition = \"2024\"\n[workspace]\n[profile.release]\nopt-level = {opt_level}\npanic = \"{panic}\"\n"
         );
         std::fs::write(folder.join("Cargo.toml"), manifest).map_err(failed)?;
         std::fs::write(folder.join("src/lib.rs"), "#![no_std]\n").map_err(failed)?;

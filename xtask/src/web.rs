@@ -17,8 +17,13 @@ use crate::tally::Tally;
 use crate::{debian, page, program, workspace};
 
 /// A page, and node.
-const TARGET: Target =
-    Target { name: "wasm32-unknown-unknown", crates: "std,panic_abort", features: "", opt_level: "\"s\"" };
+const TARGET: Target = Target {
+    name: "wasm32-unknown-unknown",
+    crates: "std,panic_abort",
+    features: "",
+    opt_level: "\"s\"",
+    panic: "abort",
+};
 
 /// Nothing is fetched from anywhere but the page's own host, and nothing in the page is a script but its files.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; \

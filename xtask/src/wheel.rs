@@ -14,7 +14,7 @@ const PACKAGES: &str = "auditwheel==6.8.2\npatchelf==0.19.3.0\n";
 pub(crate) fn command() -> ExitCode {
     let built = program::of_dist().and_then(|program| {
         let python = python::environment(python::VENV, python::REQUIREMENTS)?;
-        python::wheel(&python, "dist", Some(&program), &workspace::root().join("dist"))
+        python::wheel(&python, "dist", Some(&program), None, &workspace::root().join("dist"))
     });
     match built {
         Ok(wheel) => {
