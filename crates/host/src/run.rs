@@ -127,6 +127,7 @@ impl Host {
             asking: self.authority.asking(),
             speed_limit_rpm: self.authority.controller().and_then(|session| self.speed_limits.get(&session).copied()),
             happenings: self.inbox.timeline.revision(),
+            stops: self.stops,
             logs_saved: self.inbox.trace.logs_saved(),
             changes: self.changes.count(),
             nodes: self.nodes.iter().map(|(id, node)| self.view(*id, node, now)).collect(),

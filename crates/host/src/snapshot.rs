@@ -34,6 +34,8 @@ pub struct Snapshot {
     pub speed_limit_rpm: Option<f64>,
     /// Rises when there is something new at `/api/faults`.
     pub happenings: u64,
+    /// How often everything was stopped: by a press of stop, or by the host alone what this program has moved.
+    pub stops: u64,
     /// How often the trace was saved since the studio started.
     pub logs_saved: u64,
     /// Number of changes to the world around virtual drives.

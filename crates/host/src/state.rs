@@ -87,6 +87,8 @@ pub struct Host {
     pub(crate) unseen_stops: BTreeMap<NodeId, u32>,
     /// The last reported stop of each node, and its time.
     pub(crate) stops_reported: BTreeMap<NodeId, (Instant, &'static str)>,
+    /// Counts the stops of everything, and of everything that this program has moved.
+    pub(crate) stops: u64,
     /// Several drives as one motion.
     pub(crate) group: Option<GroupRun>,
     pub(crate) listening: Vec<Listening>,
@@ -139,6 +141,7 @@ impl Host {
             accepted: BTreeSet::new(),
             unseen_stops: BTreeMap::new(),
             stops_reported: BTreeMap::new(),
+            stops: 0,
             group: None,
             listening: Vec::new(),
             parameters: Transactions::default(),

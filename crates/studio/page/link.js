@@ -28,7 +28,7 @@ export const link = {
 /** What the studio says to a page that it does not let in: it was started anew, with another token. */
 let turned_away = null;
 
-const listeners = { state: [], news: [], change: [], sight: [], stop: [], asked: [] };
+const listeners = { state: [], news: [], change: [], sight: [], halt: [], stop: [], asked: [] };
 let connection = null;
 let seq = 0;
 const waiting = new Map();
@@ -41,7 +41,8 @@ let last_at = performance.now();
 /**
  * Calls `listener` with each state ("state"), each piece of news ("news"), when the connection opens or closes ("change"), when the
  * shown state becomes current or stale, and repeatedly while it is stale ("sight": `{ fresh, connected, age_ms, refused }`), and with
- * the outcome of a press of stop ("stop": `{ confirmed, after_ms }`), and with each command that is sent ("asked").
+ * the outcome of a press of stop ("stop": `{ confirmed, after_ms }`), and with each command that is sent ("asked"). "halt" comes when
+ * everything is stopped: true before a press of stop on this page is sent, false when the host reports a stop, whoever caused it.
  */
 export function on(what, listener) {
   listeners[what].push(listener);
@@ -50,12 +51,14 @@ export function on(what, listener) {
 const emit = (what, value) => listeners[what].forEach((listener) => listener(value));
 
 /** True if this page may move drives. */
-export const inControl = () => link.welcome !== null && link.fresh && link.state?.controller === link.welcome.session;
+export const inControl = () => link.welcome !== null && performance.now() - seen_at <= OLD_MS && link.state?.controller === link.welcome.session;
 
 const refused = (kind, message) => Promise.resolve({ ok: false, error: { kind, message } });
 
 /** Sends a command; resolves with the answer, and never rejects. */
 export function ask(command) {
+  // After sleep a timer of another file may run before that of this one.
+  look();
   if (!link.welcome || !connection?.isOpen()) return refused("no_connection", "There is no connection to the studio.");
   if (!link.fresh && command.do !== "stop_all") return refused("no_picture", "Nothing was sent: the state of the studio is stale.");
   seq += 1;
@@ -70,6 +73,7 @@ export function ask(command) {
  * the host that moves the drives confirms it; that the web server has taken the request does not.
  */
 export function stopAll() {
+  emit("halt", true);
   const began = performance.now();
   let confirmed = false;
   let reported = false;
@@ -95,12 +99,15 @@ function take(message) {
       seq = 0;
       emit("change", true);
       break;
-    case "state":
+    case "state": {
+      const before = link.state;
       link.state = message;
       seen_at = last_at = performance.now();
       look();
+      if (before && before.stops !== message.stops) emit("halt", false);
       emit("state", message);
       break;
+    }
     case "answer":
       waiting.get(message.seq)?.(message);
       waiting.delete(message.seq);

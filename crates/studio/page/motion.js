@@ -28,27 +28,23 @@ function jogger(shared, speed, report, isAccepted) {
     // A press of stop, or another command, reports itself.
     if (!answer.ok && answer.error.kind !== "stopped" && answer.error.kind !== "replaced") {
       report("Jog", answer);
-      if (held === jog) drop();
+      if (held === jog) end();
     }
   }
 
   async function hold(jog) {
     const answer = await ask({ do: "jog_hold", node: jog.node });
     // Stopped, or held again too late: it does not restart by itself.
-    if (!answer.ok && held === jog) drop();
+    if (!answer.ok && held === jog) end();
   }
 
-  function drop() {
-    if (!held) return null;
+  /** Asked for also where the studio has stopped it already: a recorded jog ends with its stop. */
+  function end() {
+    if (!held) return;
     clearInterval(held.timer);
     const { node } = held;
     held = null;
-    return node;
-  }
-
-  function end() {
-    const node = drop();
-    if (node !== null) ask({ do: "jog_end", node });
+    ask({ do: "jog_end", node });
   }
 
   function button(text, direction, title) {

@@ -37,11 +37,37 @@ const ROWS = {
 /** Whether a command is one that a sequence has. */
 export const isRecorded = ({ do: word }) => Object.hasOwn(ROWS, word);
 
-/** What is kept of a command that was sent; null if it is not recorded. A jog is a turn that ends with a stop. */
-export function recorded(command) {
-  if (command.do === "jog") return { do: "velocity", node: command.node, rpm: command.rpm, rpm_per_s: null };
-  if (command.do === "jog_end") return { do: "stop", node: command.node };
-  return isRecorded(command) ? { ...command } : null;
+/** Commands that leave the motion of a drive as it is, a jog too. */
+const LEAVE_MOTION = ["enable", "reset_fault"];
+
+/**
+ * What is kept of commands that are sent: `take(command)` and `end()` give lists of commands. A jog is a turn that ends with a stop,
+ * at the latest when the recording ends. Stop is a quick stop of each recorded node.
+ */
+export function recorder() {
+  const [nodes, jogs] = [new Set(), new Set()];
+  const end = () => {
+    const open = [...jogs];
+    jogs.clear();
+    return open.map((node) => ({ do: "stop", node }));
+  };
+  function take(command) {
+    const { do: word, node } = command;
+    if (word === "stop_all") {
+      jogs.clear();
+      return [...nodes].map((node) => ({ do: "quick_stop", node }));
+    }
+    if (word === "jog_end") return jogs.delete(node) ? [{ do: "stop", node }] : [];
+    if (word !== "jog" && !isRecorded(command)) return [];
+    nodes.add(node);
+    if (word === "jog") {
+      jogs.add(node);
+      return [{ do: "velocity", node, rpm: command.rpm, rpm_per_s: null }];
+    }
+    if (!LEAVE_MOTION.includes(word)) jogs.delete(node);
+    return [{ ...command }];
+  }
+  return { take, end };
 }
 
 /** Shorter pauses are the time that a press takes. */

@@ -1,13 +1,14 @@
 // The sequence of the Motion view: recorded, kept by the browser, shown as code, and played again.
 
-import { ask, inControl, link, on } from "./link.js";
+import { ask, inControl, link, on, stopAll } from "./link.js";
 import { choice } from "./choice.js";
 import { h, setText, toggle } from "./dom.js";
-import { commandLine, keptSteps, python, recorded, scenario, shownStep } from "./sequence.js";
+import { commandLine, keptSteps, python, recorder, scenario, shownStep } from "./sequence.js";
 import { keep, kept } from "./settings.js";
 
 const KEY = "sequence";
 const MOST = 200;
+const STOPS = ["stop", "quick_stop"];
 const FORMS = [
   { value: "line", text: "as command line", file: "sequence.sh" },
   { value: "python", text: "as Python", file: "sequence.py" },
@@ -17,19 +18,21 @@ const FORMS = [
 /** `isAccepted` asks once about drives that nothing stops if the studio dies. */
 export function sequencePanel(isAccepted) {
   const record = toggle("sequence-record", "Record", false, () => (record.checked ? begin() : end()), { title: "Records what is commanded in this page, until pressed again" });
-  const play = toggle("sequence-play", "Play", false, () => (play.checked ? run() : halt("ended by the button")), { title: "Sends the recorded commands with their pauses; Stop ends it" });
+  const play = toggle("sequence-play", "Play", false, () => (play.checked ? run() : halt("ended by the button")), { title: "Sends the recorded commands with their pauses. Whatever ends it before the last one stops the drives that it has commanded" });
   const clear = h("button", { type: "button", id: "sequence-clear", onclick: () => change([]) }, "Clear");
   const form = choice("sequence-form", "Show", FORMS, { value: "line", onchange: () => draw() });
   const save = h("button", { type: "button", id: "sequence-save", onclick: saveText }, "Save");
   const status = h("span", { class: "quiet", role: "status", id: "sequence-status" });
   const list = h("ol", { class: "sequence", "aria-label": "Recorded commands" });
   const text = h("pre", { class: "code", id: "sequence-text", tabindex: "0", "aria-label": "The sequence as text" });
-  const hint = h("p", { class: "quiet" }, "A jog is recorded as a turn that ends with a stop. Motions are sent with the pauses between what was done, whether they were reached or not.");
+  const hint = h("p", { class: "quiet" }, "A jog is recorded as a turn that ends with a stop, and Stop as a quick stop of each drive. Motions are sent with the pauses between what was done, whether they were reached or not.");
   const root = h("details", { class: "homing", id: "sequence" }, h("summary", {}, "Sequence: record, play, show as code"), h("div", { class: "bar" }, record, play, clear, form, save, status), list, text, hint);
   let steps = keptSteps(kept(KEY, []));
-  /** When the step before was sent; null while nothing is recorded. */
-  let before = null;
-  /** The play under way; a new object each time. */
+  /** What records; null while nothing is recorded. */
+  let recording = null;
+  /** When the step before was sent. */
+  let before = 0;
+  /** The play under way, a new object each time: the nodes that it has commanded. */
   let playing = null;
 
   function change(to) {
@@ -41,34 +44,62 @@ export function sequencePanel(isAccepted) {
   function begin() {
     halt("");
     change([]);
-    before = performance.now();
+    recording = recorder();
     setText(status, "recording");
   }
 
   function end() {
-    before = null;
+    if (recording) append(recording.end());
+    recording = null;
     setText(status, "");
   }
 
-  on("asked", (command) => {
-    const what = before === null || playing ? null : recorded(command);
-    if (!what) return;
-    if (steps.length >= MOST) return setText(status, `at most ${MOST} commands: recording has ended`);
+  function append(commands) {
+    if (!commands.length) return;
     const now = performance.now();
     const after_s = steps.length ? (now - before) / 1e3 : 0;
     before = now;
-    change([...steps, { after_s, command: what }]);
+    change([...steps, ...commands.map((command, at) => ({ after_s: at > 0 ? 0 : after_s, command }))]);
+  }
+
+  on("asked", (command) => {
+    if (!recording || playing) return;
+    const commands = recording.take(command);
+    const full = commands.length > 0 && steps.length >= MOST;
+    // A stop is kept also behind the last one.
+    if (!full || commands.every(({ do: word }) => STOPS.includes(word))) append(commands);
+    if (!full) return;
+    record.click();
+    setText(status, `at most ${MOST} commands: recording has ended`);
   });
 
-  /** Ends a play; what it has set in motion is stopped by Stop, or by the next command. */
-  function halt(why) {
+  /** Ends a play. What it has commanded is stopped, unless `stops` is false: something else does. */
+  function halt(why, stops = true) {
     if (!playing) return;
+    const { nodes } = playing;
     playing = null;
     play.checked = false;
     setText(status, why);
+    if (stops) stopNodes(nodes);
   }
-  on("stop", () => halt("ended by Stop"));
+
+  /** By their ramps; where that is refused, everything is quick-stopped. */
+  async function stopNodes(nodes) {
+    const answers = await Promise.all([...nodes].map((node) => ask({ do: "stop", node })));
+    // A drive that has got a later command, or a quick stop, obeys that.
+    if (answers.some(({ ok, error }) => !ok && error.kind !== "replaced" && error.kind !== "stopped")) stopAll();
+  }
+
+  on("halt", (here) => {
+    // The press follows at once. Of a stop from elsewhere a command may have been sent behind it.
+    const again = playing && !here && inControl();
+    halt("ended by Stop", false);
+    if (again) stopAll();
+  });
   on("change", (connected) => connected || halt("ended: the connection to the studio was lost"));
+  on("sight", ({ fresh }) => fresh || halt("ended: the state of the studio was stale"));
+  // Timers of a hidden page are late.
+  document.addEventListener("visibilitychange", () => document.hidden && halt("ended: the page was hidden"));
 
   async function run() {
     play.checked = false;
@@ -76,19 +107,20 @@ export function sequencePanel(isAccepted) {
     if (!inControl()) return setText(status, "take control first");
     if (!isAccepted(new Set(steps.map(({ command }) => command.node)))) return;
     if (record.checked) record.click();
-    const mine = {};
+    const mine = { nodes: new Set() };
     playing = mine;
     play.checked = true;
     for (const [at, { after_s, command }] of steps.entries()) {
       if (at > 0) await new Promise((resolve) => setTimeout(resolve, after_s * 1e3));
       if (playing !== mine) return;
       setText(status, `${at + 1} of ${steps.length}: ${shownStep(steps[at], 0)}`);
+      mine.nodes.add(command.node);
       // Not awaited: the next command comes when it came, and replaces a motion that is not done.
       ask(command).then((answer) => {
         if (playing === mine && !answer.ok && answer.error.kind !== "replaced") halt(`ended at ${at + 1}: ${answer.error.message}`);
       });
     }
-    if (playing === mine) halt(`all ${steps.length} commands were sent`);
+    if (playing === mine) halt(`all ${steps.length} commands were sent`, false);
   }
 
   function code() {

@@ -1,5 +1,5 @@
 // The send window of the Trace view: frames as they are, once or in cycles. A cycle is the page's own: it ends with the page, with
-// control, and with Stop.
+// control, and with a stop of everything.
 
 import { ask, inControl, on } from "./link.js";
 import { h, setText, toggle } from "./dom.js";
@@ -53,7 +53,10 @@ export function sendWindow() {
         const ms = cycleOf(cycle.value);
         if (ms === null) throw new Error("expected a period in ms");
         count = 0;
-        if ((await send()) && cyclic.checked) timer = setInterval(send, ms);
+        if (!(await send()) || !cyclic.checked) return;
+        // Off and on again meanwhile: the other one has begun too.
+        clearInterval(timer);
+        timer = setInterval(send, ms);
       } catch (error) {
         end();
         say(error.message, true);
@@ -80,7 +83,7 @@ export function sendWindow() {
   }
 
   const endAll = () => rows.forEach((row) => row.end());
-  on("stop", endAll);
+  on("halt", endAll);
   on("state", () => inControl() || endAll());
   const before = kept(KEY, [NEW]);
   for (const frame of Array.isArray(before) ? before.slice(0, MOST) : [NEW]) append(frame);

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { commandLine, keptSteps, python, recorded, scenario, shownStep } from "../page/sequence.js";
+import { commandLine, keptSteps, python, recorder, scenario, shownStep } from "../page/sequence.js";
 
 const steps = [
   { after_s: 3, command: { do: "enable", node: 4 } },
@@ -46,9 +46,30 @@ test("a scenario has the machine and a host", () => {
 });
 
 test("a jog is a turn with a stop, and what only looks is not recorded", () => {
-  assert.deepEqual(recorded({ do: "jog", node: 4, rpm: -60 }), { do: "velocity", node: 4, rpm: -60, rpm_per_s: null });
-  assert.deepEqual(recorded({ do: "jog_end", node: 4 }), { do: "stop", node: 4 });
-  for (const word of ["jog_hold", "alive", "read_objects", "help", "constructor", "stop_all"]) assert.equal(recorded({ do: word, node: 4 }), null, word);
+  const { take, end } = recorder();
+  assert.deepEqual(take({ do: "jog", node: 4, rpm: -60 }), [{ do: "velocity", node: 4, rpm: -60, rpm_per_s: null }]);
+  assert.deepEqual(take({ do: "jog_end", node: 4 }), [{ do: "stop", node: 4 }]);
+  for (const word of ["jog_hold", "jog_end", "alive", "read_objects", "help", "constructor"]) assert.deepEqual(take({ do: word, node: 4 }), [], word);
+  assert.deepEqual(end(), []);
+});
+
+test("Stop is a quick stop of each recorded node, and ends a jog", () => {
+  const { take, end } = recorder();
+  assert.deepEqual(take({ do: "stop_all" }), [], "nothing was commanded");
+  take({ do: "velocity", node: 2, rpm: 60, rpm_per_s: null });
+  take({ do: "jog", node: 4, rpm: 60 });
+  assert.deepEqual(take({ do: "stop_all" }), [{ do: "quick_stop", node: 2 }, { do: "quick_stop", node: 4 }]);
+  assert.deepEqual(take({ do: "jog_end", node: 4 }), [], "it has ended");
+  assert.deepEqual(end(), []);
+});
+
+test("a jog that is held when recording ends, gets its stop; one that another motion replaced, does not", () => {
+  const { take, end } = recorder();
+  take({ do: "jog", node: 4, rpm: 60 });
+  take({ do: "enable", node: 4 });
+  take({ do: "jog", node: 2, rpm: 60 });
+  take({ do: "move", node: 2, degrees: 90, relative: true, rpm: null });
+  assert.deepEqual(end(), [{ do: "stop", node: 4 }]);
 });
 
 test("what is kept and is not a step is left out", () => {

@@ -25,6 +25,7 @@ const RESTING_LOOKS: u32 = 2;
 impl Host {
     /// Quick-stops every drive of the bus that may move, including those moved by other programs.
     pub(crate) fn stop_everything(&mut self, why: &'static str) {
+        self.stops += 1;
         let enabled = self.nodes.iter().filter(|(_, node)| node.may_move()).map(|(id, _)| *id);
         let nodes: BTreeSet<_> = enabled.chain(self.in_motion()).collect();
         self.quick_stop(nodes, why);
@@ -32,6 +33,7 @@ impl Host {
 
     /// Quick-stops what this studio has set in motion.
     pub(crate) fn stop_moved(&mut self, why: &'static str) {
+        self.stops += 1;
         let nodes = self.in_motion();
         self.quick_stop(nodes, why);
     }

@@ -127,6 +127,26 @@ fn a_stop_that_comes_by_two_channels_is_reported_once() {
     });
 }
 
+/// What a page sends on its own (a sequence, a cyclic frame) ends with a stop from elsewhere: it sees that there was one.
+#[test]
+fn a_stop_of_everything_is_counted_whoever_caused_it() {
+    play(async |stage| {
+        let count = |stage: &Stage| stage.state()["stops"].as_u64().expect("a number");
+        let (mut page, mut other) = (stage.page().await, stage.page().await);
+        page.must(SessionCommand::TakeControl {}).await;
+        page.must(velocity(WHEEL, 60.0)).await;
+        stage.sleep(200).await;
+        let before = count(stage);
+        other.must(SessionCommand::StopAll {}).await;
+        stage.sleep(200).await;
+        assert_eq!(count(stage), before + 1, "a press on another page");
+        page.must(velocity(WHEEL, 60.0)).await;
+        // The page is silent for longer than its presence lasts.
+        stage.sleep(4000).await;
+        assert_eq!(count(stage), before + 2, "a silent page");
+    });
+}
+
 /// The stepper has no watch over its host, so it keeps turning when its cable is cut.
 #[test]
 fn a_drive_that_a_stop_does_not_reach_is_shown_until_it_is_seen_at_rest() {
