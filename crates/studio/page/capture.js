@@ -1,6 +1,7 @@
 // A capture: the values of some time, kept by themselves. Independent of the page.
 //
-// `{ id, name, taken, zero_s, shift_s, columns, marks }`: `taken` is the date and time of the day as text; `zero_s` is the time that is laid
+// `{ id, name, taken, zero_s, from_s, shift_s, columns, marks }`: `taken` is the date and time of the day as text; `from_s` is where its
+// picture begins, behind a first sample that only draws the line to the edge (absent: at the first sample); `zero_s` is the time that is laid
 // over that of other captures, of the trigger or of the begin; `shift_s` moves it by hand. A column is
 // `{ field, node, label, unit, decimals, steps, times, values }` with times in s, rising; a mark `{ time_s, node, text }`.
 //
@@ -33,7 +34,7 @@ export const lastOf = ({ columns }) => Math.max(...columns.map(({ times }) => ti
 
 /** How much later a capture is drawn over a picture that begins at `from_s` and has its own zero at `zero_s`, null without one. */
 export function shiftOf(capture, alignment, { from_s, zero_s }) {
-  const by = { zero: (zero_s ?? from_s) - capture.zero_s, start: from_s - firstOf(capture), time: 0 }[alignment];
+  const by = { zero: (zero_s ?? from_s) - capture.zero_s, start: from_s - (capture.from_s ?? firstOf(capture)), time: 0 }[alignment];
   return by + capture.shift_s;
 }
 
@@ -50,8 +51,9 @@ export function difference(one, other) {
 /**
  * A formula over series: `series(field)` gives one or null. It is computed at the times of the one with the most samples, within the
  * times that all have; the others are straight lines between their samples. Empty without values.
+ * Integrals begin at `begin_s`.
  */
-export function computed({ fields, compute }, series) {
+export function computed({ fields, compute }, series, begin_s = -Infinity) {
   const all = new Map(fields.map((field) => [field, series(field)]));
   const given = [...all.values()];
   if (!given.length || given.some((one) => one === null || one.length < 2)) return new Series(Infinity);
@@ -66,7 +68,7 @@ export function computed({ fields, compute }, series) {
   };
   const found = new Series(Infinity);
   if (!times.length) return found;
-  const values = compute(times, column);
+  const values = compute(times, column, begin_s);
   // What is not a number (a root of a negative one, a division by zero) is left out.
   values.forEach((value, at) => Number.isFinite(value) && found.push(times[at], value));
   return found;

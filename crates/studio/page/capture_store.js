@@ -56,6 +56,9 @@ export async function keepCapture(capture) {
 export const storeCapture = (capture) => change((store) => store.put(capture));
 
 export async function deleteCapture(capture) {
-  captures.splice(captures.indexOf(capture), 1);
+  const at = captures.indexOf(capture);
+  // A second click.
+  if (at < 0) return;
+  captures.splice(at, 1);
   await change((store) => store.delete(capture.id));
 }

@@ -1,4 +1,4 @@
-// A quantity computed from others: `speed * 2 * pi / 60 * current`. Independent of the page.
+// A quantity computed from others: `d(speed)`. Independent of the page.
 //
 // A formula is parsed once and computed for whole series at a time. It has numbers, + - * / ^, brackets, the constants pi and e, the
 // time t in s, the values of a drive by name, objects as [4:606C:00], and the functions below.
@@ -17,31 +17,38 @@ function derivative([values], times) {
   });
 }
 
-/** The integral over time in s from the first sample that is shown, of straight lines between samples. */
-function integral([values], times) {
+/** The integral over time in s from the first sample at or after `begin_s`, of straight lines between samples; without those to one that is not finite. */
+function integral([values], times, begin_s) {
   let sum = 0;
   return values.map((value, at) => {
-    if (at > 0) sum += ((value + values[at - 1]) / 2) * (times[at] - times[at - 1]);
+    if (times[at] < begin_s) return NaN;
+    const area = ((value + values[at - 1]) / 2) * (times[at] - times[at - 1]);
+    if (times[at - 1] >= begin_s && Number.isFinite(area)) sum += area;
     return sum;
   });
 }
 
-/** The mean of the samples within the last `span_s` seconds. */
+/** The mean of the finite samples within the last seconds, as many as the second column has everywhere. */
 function mean([values, spans], times) {
-  let [first, sum] = [0, 0];
+  let [first, sum, count] = [0, 0, 0];
+  const take = (value, sign) => {
+    if (!Number.isFinite(value)) return;
+    sum += sign * value;
+    count += sign;
+  };
   return values.map((value, at) => {
-    sum += value;
-    while (times[first] < times[at] - spans[at]) {
-      sum -= values[first];
+    take(value, 1);
+    while (first < at && times[first] < times[at] - spans[at]) {
+      take(values[first], -1);
       first += 1;
     }
-    return sum / (at - first + 1);
+    return count > 0 ? sum / count : NaN;
   });
 }
 
 /**
  * By name: how many arguments, and what is computed of their columns and of the times.
- * @type {Record<string, [number, (columns: Float64Array[], times: Float64Array) => Float64Array]>}
+ * @type {Record<string, [number, (columns: Float64Array[], times: Float64Array, begin_s: number) => Float64Array]>}
  */
 const FUNCTIONS = {
   abs: [1, pointwise(Math.abs)],
@@ -88,8 +95,8 @@ function tokens(text) {
 const DEEPEST = 60;
 
 /**
- * A formula: `fields` are the values that it takes, and `compute(times, column)` its value at each time, where `column(field)` gives
- * those of a field. Throws an error that says what is wrong.
+ * A formula: `fields` are the values that it takes, and `compute(times, column, begin_s)` its value at each time, where `column(field)` gives
+ * those of a field and integrals begin at `begin_s`. Throws an error that says what is wrong.
  */
 export function formula(text) {
   const all = tokens(text);
@@ -102,6 +109,7 @@ export function formula(text) {
     if (!isSign(sign)) throw wrong(`'${sign}'`);
     at += 1;
   };
+  const isVariable = ({ kind, text: word }) => kind === "object" || (kind === "word" && (word === "t" || Object.hasOwn(NAMES, word)));
   const constant = (value) => (times) => new Float64Array(times.length).fill(value);
   const value = (field) => {
     fields.add(field);
@@ -121,14 +129,17 @@ export function formula(text) {
     if (!Object.hasOwn(FUNCTIONS, name)) throw new Error(`'${name}' is not a function; expected ${Object.keys(FUNCTIONS).join(", ")}`);
     const [count, of] = FUNCTIONS[name];
     need("(");
+    const begins = [at];
     const given = [sum()];
     while (isSign(",")) {
       at += 1;
+      begins.push(at);
       given.push(sum());
     }
     need(")");
     if (given.length !== count) throw new Error(`${name} takes ${count} ${count === 1 ? "value" : "values"}, not ${given.length}`);
-    return (times, column) => of(given.map((one) => one(times, column)), times);
+    if (of === mean && all.slice(begins.at(-1), at).some(isVariable)) throw new Error("mean takes a number of seconds that does not change");
+    return (times, column, begin_s) => of(given.map((one) => one(times, column, begin_s)), times, begin_s);
   }
 
   function atom() {
@@ -157,14 +168,14 @@ export function formula(text) {
     if (isSign("-")) {
       at += 1;
       const [zero, of] = [constant(0), signed()];
-      found = (times, column) => OPERATORS["-"]([zero(times), of(times, column)]);
+      found = (times, column, begin_s) => OPERATORS["-"]([zero(times), of(times, column, begin_s)]);
     } else {
       const base = atom();
       found = base;
       if (isSign("^")) {
         at += 1;
         const power = signed();
-        found = (times, column) => OPERATORS["^"]([base(times, column), power(times, column)]);
+        found = (times, column, begin_s) => OPERATORS["^"]([base(times, column, begin_s), power(times, column, begin_s)]);
       }
     }
     depth -= 1;
@@ -177,7 +188,7 @@ export function formula(text) {
       const operator = OPERATORS[all[at].text];
       at += 1;
       const [before, right] = [left, next()];
-      left = (times, column) => operator([before(times, column), right(times, column)]);
+      left = (times, column, begin_s) => operator([before(times, column, begin_s), right(times, column, begin_s)]);
     }
     return left;
   }

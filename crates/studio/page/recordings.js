@@ -5,8 +5,9 @@ import { request } from "./transport.js";
 
 /** `4.velocity_rpm`, `4.606C_00`: what a column is called in a record. */
 export function titleOf({ node, field }) {
-  const name = field.includes(":") ? field.split(":").slice(1).join("_") : field.startsWith("=") ? `computed_${field.slice(1).replace(/\W+/g, "_")}` : field;
-  return `${node ?? "computed"}.${name}`;
+  // A column of a file that names no node keeps its name.
+  if (node === null) return field;
+  return `${node}.${field.includes(":") ? field.split(":").slice(1).join("_") : field}`;
 }
 
 /** The field and the node of a column of a record. */

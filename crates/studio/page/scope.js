@@ -20,7 +20,7 @@ import { edge } from "./scope_edge.js";
 import { gestures, keyMeaning } from "./scope_pointer.js";
 import { measured } from "./scope_readout.js";
 import { scalePanel } from "./scope_scales.js";
-import { overlaid, panesOf } from "./scope_source.js";
+import { overlaid, panesOf, partnerOf } from "./scope_source.js";
 import { kept, keep } from "./settings.js";
 import { SvgPen } from "./svg_pen.js";
 import { trigger } from "./scope_trigger.js";
@@ -164,7 +164,7 @@ export function scopeView(shared) {
 
   /** The panes of it. */
   function drawn({ sources, from_s, to_s, marks }) {
-    const all = panesOf(sources, { definitions: computed.definitions(), hidden, subtracts: captures.subtracts() });
+    const all = panesOf(sources, { definitions: computed.definitions(), hidden, subtracts: captures.subtracts(), from_s });
     for (const one of all) if (trip.isOn() && trip.field() === one.key) one.level = trip.level();
     return { panes: all, from_s, to_s, cursors, markers: marks.map(({ time_s, text }) => ({ time_s, text: cut(text) })) };
   }
@@ -172,14 +172,14 @@ export function scopeView(shared) {
   /** What is shown now, as a capture. */
   function shownCapture() {
     const { sources, from_s, to_s, marks } = content();
-    return captureOf(sources[0].columns.map((one) => ({ ...one, series: one.series.cut(from_s, to_s) })), marks.filter(({ time_s }) => time_s >= from_s && time_s <= to_s), frozen?.zero_s ?? from_s);
+    return captureOf(sources[0].columns.map((one) => ({ ...one, series: one.series.cut(from_s, to_s) })), marks.filter(({ time_s }) => time_s >= from_s && time_s <= to_s), frozen?.zero_s ?? from_s, from_s);
   }
 
-  function captureOf(columns, marks, zero_s) {
+  function captureOf(columns, marks, zero_s, from_s) {
     const taken = new Date();
     const filled = columns.filter((one) => one.series.length > 0).map(({ series: of, ...column }) => ({ ...column, ...samplesOf(of) }));
     const name = taken.toLocaleTimeString("en-GB");
-    return filled.length ? { id: crypto.randomUUID(), name, taken: taken.toISOString(), zero_s, shift_s: 0, columns: filled, marks } : null;
+    return filled.length ? { id: crypto.randomUUID(), name, taken: taken.toISOString(), zero_s, from_s, shift_s: 0, columns: filled, marks } : null;
   }
 
   function colours() {
@@ -188,18 +188,20 @@ export function scopeView(shared) {
     return { card: of("--card"), line: of("--line"), quiet: of("--quiet"), text: of("--text"), warn: of("--warn"), lines: ["--accent", "--bad", "--good", "--warn"].map(of) };
   }
 
-  /** Each line over the line of the same name of the value below. */
+  /** Each line over that of the same source and node of the value below; one without is left out. */
   function overBelow({ panes: all, from_s, to_s }) {
     const under = all.find(({ key }) => key === below.value) ?? all[0];
-    const over = (line) => against((under.lines.find(({ name }) => name === line.name) ?? under.lines[0]).series, line.series, from_s, to_s);
-    return all.filter((one) => one !== under).map((one) => ({ ...one, label: `${one.label} over ${under.label}`, lines: one.lines.map((line) => ({ name: line.name, ...over(line) })) }));
+    return all.filter((one) => one !== under).map((one) => ({ ...one, label: `${one.label} over ${under.label}`, lines: one.lines.flatMap((line) => {
+      const partner = partnerOf(line, under.lines);
+      return partner ? [{ name: line.name, isCapture: line.isCapture, ...against(partner.series, line.series, from_s, to_s) }] : [];
+    }) })).filter(({ lines }) => lines.length);
   }
 
   function paint(pen, width, height, now) {
     pen.font = "12px system-ui, sans-serif";
     const layout = { scales, together: together.checked, first: scale.pane() };
     if (frequencies.checked) {
-      const all = now.panes.map((one) => ({ ...one, key: `Hz ${one.key}`, lines: one.lines.map(({ name, series: of }) => ({ name, spectrum: spectrum(of, now.from_s, now.to_s) })) }));
+      const all = now.panes.map((one) => ({ ...one, key: `Hz ${one.key}`, lines: one.lines.map(({ name, isCapture, series: of }) => ({ name, isCapture, spectrum: spectrum(of, now.from_s, now.to_s) })) }));
       return overFrequency(pen, width, height, colours(), all, layout);
     }
     if (!across.checked || !now.panes.length) return overTime(pen, width, height, colours(), now, layout);
@@ -256,7 +258,9 @@ export function scopeView(shared) {
   function watchTrigger() {
     if (frozen && !(frozen.byTrigger && trip.comesAgain())) return;
     const source = heard().find((one) => one.field === trip.field())?.series ?? series(shared.node, trip.field());
-    const held = trip.look(source, Number(seconds.value), crossing);
+    const isAwaited = ({ node, field, series: of }) => of.length > 0 && (field.includes(":") || nodes().includes(node));
+    const least_s = trip.isOn() ? Math.min(...live().filter(isAwaited).map((one) => one.series.last_s())) : Infinity;
+    const held = trip.look(source, Number(seconds.value), crossing, least_s);
     if (held === null) return;
     freeze({ ...held, byTrigger: true });
     if (keeps.checked) captures.keep();

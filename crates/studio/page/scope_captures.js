@@ -1,6 +1,6 @@
 // The captures of the scope: kept, loaded from a file, chosen to be laid over the picture.
 
-import { ALIGNMENTS } from "./capture.js";
+import { ALIGNMENTS, freeName } from "./capture.js";
 import { captures, deleteCapture, keepCapture, loadCaptures, storeCapture } from "./capture_store.js";
 import { choice } from "./choice.js";
 import { count, h, setText, toggle } from "./dom.js";
@@ -77,7 +77,7 @@ export function capturePanel({ take, open }) {
     const name = h("input", { value: capture.name, size: "28", maxlength: LONGEST_NAME, "aria-label": "Name of the capture" });
     name.addEventListener("change", () => {
       if (name.value.trim() === "") return (name.value = capture.name);
-      capture.name = name.value.trim();
+      capture.name = freeName(name.value.trim(), captures.filter((one) => one !== capture));
       trying(() => storeCapture(capture));
     });
     const shift = h("input", { type: "number", step: "any", value: String(capture.shift_s), class: "short", "aria-label": `Move ${capture.name} by so many seconds` });

@@ -10,7 +10,7 @@ const MOST = 12;
 /** A definition `{ name, unit, text, parsed }`; throws what is wrong with it. */
 export function defined({ name, unit = "", text }) {
   const [of, has] = [String(name ?? "").trim(), String(unit).trim()];
-  if (!of) throw new Error("expected a name, such as power");
+  if (!of) throw new Error("expected a name, such as acceleration");
   return { name: of, unit: has, text: String(text), parsed: formula(String(text)) };
 }
 
@@ -27,11 +27,11 @@ export const keptDefinitions = (list) =>
 /** A form that defines a quantity, and the defined ones with a button that removes each. */
 export function computedPanel() {
   const field = (id, label, size, placeholder) => h("input", { id, size: String(size), placeholder, "aria-label": label, spellcheck: "false" });
-  const [name, text, unit] = [field("computed-name", "Name of the quantity", 10, "power"), field("computed-formula", "Formula", 34, "speed * 2 * pi / 60 * current"), field("computed-unit", "Unit", 6, "W")];
+  const [name, text, unit] = [field("computed-name", "Name of the quantity", 10, "acceleration"), field("computed-formula", "Formula", 34, "d(speed)"), field("computed-unit", "Unit", 6, "r/min/s")];
   const status = h("span", { class: "bad", role: "status", id: "computed-status" });
   const shown = h("span", { class: "chooser", role: "group", "aria-label": "Computed quantities" });
   const form = h("form", { class: "bar", onsubmit: add }, name, h("span", { class: "quiet" }, "="), text, unit, h("button", { id: "computed-add" }, "Compute"), shown, status);
-  const root = h("details", { class: "plain-details" }, h("summary", {}, "Compute a quantity"), form, h("p", { class: "quiet" }, `A formula may have ${LANGUAGE}. d is the derivative in 1/s, int the integral in s, mean(x, y) the mean of the last y seconds.`));
+  const root = h("details", { class: "plain-details" }, h("summary", {}, "Compute a quantity"), form, h("p", { class: "quiet" }, `A formula may have ${LANGUAGE}. d is the derivative in 1/s, int the integral in s from where the picture begins, mean(x, y) the mean of the last y seconds. What is kept or saved has the values that are read; a computed quantity is computed anew from them.`));
   let definitions = keptDefinitions(kept(KEY, []));
 
   function store() {

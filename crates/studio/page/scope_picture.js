@@ -119,9 +119,9 @@ function legend(pen, colours, { label, unit, decimals, showsNewest = true }, lin
   pen.fillStyle = colour;
   pen.fillText(label, at, y);
   at += pen.measureText(label).width + 10;
-  lines.forEach(({ name, ys, to, from, look }) => {
+  lines.forEach(({ name, ys, to, from, look, isCapture }) => {
     const newest = showsNewest && to > from ? ` ${number(ys[to - 1], decimals)} ${unit}` : "";
-    const text = `${lines.length > 1 ? `${name}:` : ""}${newest}`.trim();
+    const text = `${lines.length > 1 || isCapture ? `${name}:` : ""}${newest}`.trim();
     pen.fillStyle = lines.length > 1 || colour !== colours.text ? colours.lines[look % colours.lines.length] : colours.text;
     pen.fillText(text, at, y);
     at += pen.measureText(text).width + 14;
@@ -221,7 +221,7 @@ export function overTime(pen, width, height, colours, { panes, from_s, to_s, cur
   const { left, right } = frame(width);
   const x = (at_s) => left + ((at_s - from_s) / (to_s - from_s)) * (right - left);
   const drawn = panes.map((one) => {
-    const lines = one.lines.map(({ name, series }) => {
+    const lines = one.lines.map(({ name, isCapture, series }) => {
       const from = Math.max(series.at(from_s) - 1, series.start);
       return { name, xs: series.times, ys: series.values, from, to: Math.min(series.at(to_s) + 1, series.end) };
     });

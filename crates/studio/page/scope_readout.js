@@ -14,13 +14,13 @@ const tooFew = (few) => `too few readings: ${few} in the rise, expected at least
 
 /** The lines of the readout of a picture; `steps`: with the step response of each line. */
 export function measured({ panes, from_s, to_s, cursors }, steps) {
-  const all = panes.flatMap(({ lines, ...quantity }) => lines.map((one) => ({ ...quantity, ...one, label: lines.length > 1 ? `${quantity.label} of ${one.name}` : quantity.label })));
+  const all = panes.flatMap(({ lines, ...quantity }) => lines.map((one) => ({ ...quantity, ...one, label: lines.length > 1 || one.isCapture ? `${quantity.label} of ${one.name}` : quantity.label })));
   const lines = [];
-  const [a, b] = cursors.map((at_s) => (at_s === null ? null : all.map((one) => one.series.value(at_s))));
+  const [a, b] = cursors.map((at_s) => (at_s === null ? null : all.map((one) => (at_s > one.series.last_s() ? null : one.series.value(at_s)))));
   const listed = (values) => all.map(({ label, unit, decimals }, at) => `${label} ${number(values[at], decimals)} ${unit}`).join(", ");
   [a, b].forEach((values, which) => {
     if (values?.some((value) => value !== null)) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: ${listed(values)}`);
-    else if (values) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: no reading that early`);
+    else if (values) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: no reading there`);
   });
   if (a && b) {
     const differences = all.map((_, at) => (a[at] === null || b[at] === null ? null : b[at] - a[at]));

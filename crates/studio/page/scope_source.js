@@ -22,7 +22,7 @@ export function overlaid() {
 export const fieldOf = ({ name }) => `=${name}`;
 
 /** The computed quantities of a source, for each node that has what they take. */
-function computedColumns({ columns }, definitions) {
+function computedColumns({ columns }, definitions, from_s) {
   const nodes = [...new Set(columns.map(({ node }) => node))];
   return definitions.flatMap((one) => {
     const { name, unit, parsed } = one;
@@ -31,7 +31,7 @@ function computedColumns({ columns }, definitions) {
     return (isOfOne ? [null] : nodes)
       .map((node) => {
         const series = (field) => columns.find((column) => column.field === field && (field.includes(":") || column.node === node))?.series ?? null;
-        return { field: fieldOf(one), node, label: name, unit, decimals: 3, series: computed(parsed, series) };
+        return { field: fieldOf(one), node, label: name, unit, decimals: 3, series: computed(parsed, series, from_s) };
       })
       .filter(({ series }) => series.length > 0);
   });
@@ -39,25 +39,34 @@ function computedColumns({ columns }, definitions) {
 
 const nameOf = (source, { node }) => [node === null ? "" : `node ${node}`, source.name].filter(Boolean).join(", ");
 
+/** Two units that are both known, and are not the same. */
+const differ = (one, other) => Boolean(one && other && one !== other);
+
+/** The line of the same source and node, or one of that source without a node; undefined where there is none. */
+export const partnerOf = ({ source, node }, lines) => [node, null].map((of) => lines.find((one) => one.source === source && one.node === of)).find(Boolean);
+
 /**
  * The panes of these sources. `definitions` are computed quantities `{ name, unit, parsed }`; fields in `hidden` are left out; with
- * `subtracts`, a further pane for each has the shown values less those of each capture.
+ * `subtracts`, a further pane for each has the shown values less those of each capture. Integrals begin at `from_s`, those of captures at their
+ * own begin. A line has its `source`, an index, and its `node`.
  */
-export function panesOf(sources, { definitions = [], hidden = new Set(), subtracts = false }) {
+export function panesOf(sources, { definitions = [], hidden = new Set(), subtracts = false, from_s = -Infinity }) {
   const panes = new Map();
   const differences = new Map();
   const add = (to, key, column, line) => {
     const { label, unit, decimals, steps } = column;
-    if (!to.has(key)) to.set(key, { key, field: column.field, label, unit, decimals, steps, lines: [] });
-    to.get(key).lines.push(line);
+    // A file may have a value in another unit.
+    const own = differ(to.get(key)?.unit, unit) ? `${key} ${unit}` : key;
+    if (!to.has(own)) to.set(own, { key: own, field: column.field, label, unit, decimals, steps, lines: [] });
+    to.get(own).lines.push(line);
   };
-  const whole = sources.map((source) => ({ ...source, columns: [...source.columns, ...computedColumns(source, definitions)] }));
+  const whole = sources.map((source, at) => ({ ...source, at, columns: [...source.columns, ...computedColumns(source, definitions, at ? -Infinity : from_s)] }));
   const [base, ...others] = whole;
   for (const source of whole) {
     for (const column of source.columns) {
-      const { field, series } = column;
+      const { field, node, series } = column;
       if (hidden.has(field) || series.length === 0) continue;
-      add(panes, field, column, { name: nameOf(source, column), series });
+      add(panes, field, column, { name: nameOf(source, column), source: source.at, isCapture: source.at > 0, node, series });
     }
   }
   if (subtracts) {
@@ -65,9 +74,9 @@ export function panesOf(sources, { definitions = [], hidden = new Set(), subtrac
       for (const column of source.columns) {
         const { field, node } = column;
         const own = base.columns.find((one) => one.field === field && one.node === node);
-        if (hidden.has(field) || !own) continue;
+        if (hidden.has(field) || !own || differ(own.unit, column.unit)) continue;
         const series = difference(own.series, column.series);
-        if (series.length) add(differences, `${field} −`, { ...column, label: `${column.label}: difference`, steps: false }, { name: `less ${nameOf(source, column)}`, series });
+        if (series.length) add(differences, `${field} −`, { ...column, label: `${column.label}: difference`, steps: false }, { name: `less ${nameOf(source, column)}`, source: source.at, isCapture: true, node, series });
       }
     }
   }

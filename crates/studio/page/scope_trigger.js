@@ -3,6 +3,9 @@
 import { choice } from "./choice.js";
 import { h, setText } from "./dom.js";
 
+/** How long, in s, the other values may lag behind the source: the picture waits for them. */
+const LAG_S = 0.5;
+
 /** `release` is called when a held picture is to be released. `offer` sets the possible sources. */
 export function trigger(release) {
   const of = (id, label, options) => choice(id, label, options.map(([value, text]) => ({ value, text })));
@@ -23,8 +26,8 @@ export function trigger(release) {
   }
   for (const one of [mode, field, edge, level, before]) one.addEventListener("change", arm);
 
-  /** The picture that is to be held: `end_s`, and `zero_s`, when it crossed; or null. `crossing` returns when a series crosses a level after a time. */
-  function look(series, span_s, crossing) {
+  /** The picture that is to be held: `end_s`, and `zero_s`, when it crossed; or null. `crossing` returns when a series crosses a level after a time; `least_s` is when the value that lags most was read. */
+  function look(series, span_s, crossing, least_s) {
     if (mode.value === "off" || !series.length) {
       setText(status, "");
       return null;
@@ -33,7 +36,8 @@ export function trigger(release) {
     came_s ??= crossing(series, Number(level.value), edge.value, armed_s);
     setText(status, came_s === null ? "waiting" : `fired at ${came_s.toFixed(3)} s`);
     const after_s = span_s * (1 - Math.min(100, Math.max(0, Number(before.value))) / 100);
-    if (came_s === null || series.last_s() < came_s + after_s) return null;
+    const missing_s = came_s === null ? Infinity : came_s + after_s - series.last_s();
+    if (missing_s > 0 || (least_s < came_s + after_s && missing_s > -LAG_S)) return null;
     const held = { end_s: came_s + after_s, zero_s: came_s };
     [armed_s, came_s] = [held.end_s, null];
     return held;

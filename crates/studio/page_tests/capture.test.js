@@ -3,10 +3,11 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { against, difference, freeName, noRoomFor, seriesOf, shiftOf } from "../page/capture.js";
+import { against, difference, freeName, noRoomFor, samplesOf, seriesOf, shiftOf } from "../page/capture.js";
 import { captureOf, placeOf, recordOf, titleOf } from "../page/recordings.js";
-import { overlaid, panesOf } from "../page/scope_source.js";
+import { overlaid, panesOf, partnerOf } from "../page/scope_source.js";
 import { defined, keptDefinitions } from "../page/scope_computed.js";
+import { measured } from "../page/scope_readout.js";
 
 const column = (times, of, more = {}) => ({ field: "velocity_rpm", node: 4, label: "Speed", unit: "r/min", decimals: 1, times: Float64Array.from(times), values: Float64Array.from(times, of), ...more });
 const grid = (from_s, count, step_s) => Array.from({ length: count }, (_, at) => from_s + at * step_s);
@@ -21,6 +22,44 @@ test("captures are aligned by trigger, by begin, or by the time of the bus, and 
   // Without a trigger the zero of the picture is where it begins.
   assert.equal(shiftOf(one, "zero", { from_s: 100, zero_s: null }), 90);
   assert.equal(shiftOf({ ...one, shift_s: 0.25 }, "start", picture), 92.25);
+});
+
+test("a picture that is kept and laid over itself by its begin is not moved", () => {
+  const running = seriesOf(column(grid(0, 40, 0.5), Math.sin));
+  // From between two samples: the one before is kept too, so that the line reaches the edge.
+  const { times, values } = running.cut(5.2, 15.2);
+  const own = capture([{ ...column([], () => 0), times, values }], { from_s: 5.2 });
+  assert.equal(times[0], 5);
+  assert.equal(shiftOf(own, "start", { from_s: 5.2, zero_s: null }), 0);
+  const live = { name: "", columns: [{ ...column([], () => 0), series: running }] };
+  const [, less] = panesOf([live, overlaid()(own, "start", { from_s: 5.2, zero_s: null })], { subtracts: true });
+  assert.ok(less.lines[0].series.length > 10);
+  assert.ok(samplesOf(less.lines[0].series).values.every((value) => Math.abs(value) < 1e-12));
+});
+
+test("values of two units stand in two panes, and have no difference", () => {
+  const source = (name, unit) => ({ name, columns: [column([0, 1, 2], () => 1, { unit })].map((one) => ({ ...one, series: seriesOf(one) })) });
+  const panes = panesOf([source("", "r/min"), source("file", "rad/s"), source("log", "")], { subtracts: true });
+  assert.deepEqual(panes.map(({ key, unit, lines }) => [key, unit, lines.map(({ name }) => name)]), [
+    ["velocity_rpm", "r/min", ["node 4", "node 4, log"]],
+    ["velocity_rpm −", "", ["less node 4, log"]],
+    ["velocity_rpm rad/s", "rad/s", ["node 4, file"]],
+  ]);
+});
+
+test("a value is drawn over that of its own source and node, or over none", () => {
+  const lines = [{ source: 0, node: 4 }, { source: 1, node: 4, name: "node 4, a" }, { source: 2, node: 4, name: "node 4, a" }, { source: 3, node: null }];
+  assert.equal(partnerOf({ source: 2, node: 4 }, lines), lines[2], "two captures of one name");
+  assert.equal(partnerOf({ source: 3, node: 4 }, lines), lines[3]);
+  assert.equal(partnerOf({ source: 0, node: 2 }, lines), undefined);
+});
+
+test("the readout gives no value where a line has none, and names a capture", () => {
+  const source = (name, count) => ({ name, columns: [column(grid(0, count, 1), () => 7)].map((one) => ({ ...one, series: seriesOf(one) })) });
+  const empty = { name: "", columns: [] };
+  const read = (at_s) => measured({ panes: panesOf([empty, source("old", 4)], {}), from_s: 0, to_s: 10, cursors: [at_s, null] }, false);
+  assert.equal(read(3), "A at 3.000 s: Speed of node 4, old 7.0 r/min");
+  assert.equal(read(3.5), "A at 3.500 s: no reading there");
 });
 
 test("the difference of two lines is a line, where both are known", () => {
@@ -88,6 +127,7 @@ test("a record has the names of the command line, both ways", () => {
     assert.deepEqual(placeOf(title), { node: 4, field });
   }
   assert.deepEqual(placeOf("5.2.velocity_rpm"), { node: null, field: "5.2.velocity_rpm" });
+  for (const field of ["5.2.velocity_rpm", "base.x_m"]) assert.equal(titleOf(placeOf(field)), field);
   assert.deepEqual(placeOf("base.x_m"), { node: null, field: "base.x_m" });
   const one = capture([column([0.5, 1.5], () => 2), column([1, 1.5], () => 3, { field: "4:606C:00" })], { marks: [{ time_s: 1.2, node: 4, text: 'node 4: "hard", over-voltage' }] });
   // RFC 4180: a quotation mark in a quoted field is written twice.

@@ -47,6 +47,8 @@ test("what is wrong with a formula is said", () => {
     ["hypot(1)", /hypot takes 2 values, not 1/],
     ["abs(1, 2)", /abs takes 1 value, not 2/],
     ["[4:606C]", /\[4:606C\] is not an object of a node/],
+    ["mean(speed, t)", /mean takes a number of seconds/],
+    ["mean(1, [4:606C:00])", /mean takes a number of seconds/],
     ["1 $ 2", /'\$' where an operator/],
     [`${"(".repeat(5000)}1${")".repeat(5000)}`, /more than 60 brackets/],
     [`${"-".repeat(5000)}1`, /more than 60 brackets/],
@@ -81,6 +83,23 @@ test("the mean of the last seconds lags a ramp by half of them", () => {
   assert.ok(Math.abs(smooth.value(0.8 + 1e-6) - 7 * 0.7) < 7 * 0.001);
   const object = computed(formula("[4:606c:00] / 10"), (field) => (field === "4:606C:00" ? ramp : null));
   assert.ok(Math.abs(object.value(1) - 0.7) < 1e-12);
+});
+
+test("an integral begins where it is wanted, and a sample without a value spoils neither it nor a mean", () => {
+  const times = grid(1001, 0.001);
+  const line = seriesOf(column(times, (time_s) => 2 * time_s));
+  const area = computed(formula("int(speed)"), () => line, 0.5);
+  assert.deepEqual([area.first_s(), area.value(0.5)], [0.5, 0]);
+  assert.ok(Math.abs(area.value(1) - (1 - 0.25)) < 1e-9);
+  // 1/x is infinite at 0.5 s: what is before and behind stays known.
+  const through = seriesOf(column(grid(11, 0.1), (time_s) => Math.round(time_s * 10) - 5));
+  const inverse = computed(formula("int(1 / speed)"), () => through);
+  assert.equal(inverse.length, 11);
+  assert.ok(Math.abs(inverse.value(1)) < 1e-12, "odd around its middle");
+  const smooth = computed(formula("mean(1 / speed, 0.15)"), () => through);
+  assert.ok(Math.abs(smooth.value(1) - (1 / 4 + 1 / 5) / 2) < 1e-12, `${smooth.value(1)}`);
+  // One second, given as a sum.
+  assert.equal(computed(formula("mean(speed, 0.5 + 0.5)"), () => line).length, 1001);
 });
 
 test("what has no value, or is not a number, is left out", () => {
