@@ -46,7 +46,7 @@ fn a_hall_fault_is_reported_with_its_remedy_and_can_be_reset() {
 
     let state = sim::block_on(&mut world, drive.state()).unwrap().unwrap();
     assert_eq!(state.power, Some(PowerState::Fault));
-    assert_eq!(state.fault_code, 0x0200);
+    assert_eq!(state.fault_code, Some(0x0200));
     println!("the drive says: {}. {}", state.faults[0].name, state.faults[0].remedy);
 
     // Asking it to move now fails with an explanation instead of a timeout.

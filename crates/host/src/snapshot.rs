@@ -129,8 +129,8 @@ pub struct DriveView {
     pub mode: Option<i8>,
     /// The mode of operation in words.
     pub mode_name: Option<&'static str>,
-    /// 603Fh, or what the drive has in its place.
-    pub fault_code: u16,
+    /// 603Fh, or what the drive has in its place; `None` where it refuses to show it.
+    pub fault_code: Option<u16>,
     /// What it reports.
     pub faults: Vec<FaultView>,
     /// Position in counts.

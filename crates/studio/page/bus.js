@@ -82,9 +82,9 @@ export function busView(shared, open) {
       pointed(cells[7], "fault", drive?.faults[0]?.name ?? "none", node.node);
       setText(cells[5], drive?.angle_degrees === null || !drive ? "–" : `${number(drive.angle_degrees, 1)}°`);
       setText(cells[6], drive?.velocity_rpm === null || !drive ? "–" : `${number(drive.velocity_rpm, 1)} r/min`);
-      const fault = drive && drive.fault_code !== 0 ? `${hex(drive.fault_code, 4)} ${drive.faults.map((row) => row.name).join(", ")}` : "none";
+      const fault = drive?.fault_code ? `${hex(drive.fault_code, 4)} ${drive.faults.map((row) => row.name).join(", ")}` : drive?.fault_code === 0 ? "none" : "not known";
       setText(cells[7], node.trouble ? node.trouble : drive ? fault : "–");
-      cells[7].className = node.trouble || (drive && drive.fault_code !== 0) ? "bad" : "";
+      cells[7].className = node.trouble || drive?.fault_code ? "bad" : "";
       setText(cells[8], [node.vendor_id, node.product_code, node.revision_number].map((part) => hex(part, 1)).join(" : "));
     });
     setText(empty, nodes.length ? "" : state.nodes.length ? "No node has these words." : state.scanning ? "Asking all 127 node-IDs …" : "No node answers. Check supply, cable, termination (60 Ω between CAN_H and CAN_L) and bit rate, then scan again.");

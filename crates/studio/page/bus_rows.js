@@ -1,6 +1,6 @@
 // Which nodes the Bus view lists, in which order, and what is said of all of them. Independent of the page.
 
-export const hasFault = ({ drive }) => Boolean(drive && drive.fault_code !== 0);
+export const hasFault = ({ drive }) => Boolean(drive?.fault_code);
 export const isSilent = ({ trouble }) => Boolean(trouble);
 
 const text = (value) => value ?? "";

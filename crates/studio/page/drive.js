@@ -123,6 +123,7 @@ export function driveView(shared, report) {
     renew(faults, drive ? `${node.node} ${drive.fault_code} ${drive.faults.length}` : "", () => {
       if (!drive) return [];
       if (drive.fault_code === 0) return [h("li", { class: "good" }, "None")];
+      if (drive.fault_code === null) return [h("li", {}, "Not known: the drive refuses to show its fault code")];
       const rows = drive.faults.map((row) => h("li", { class: "bad" }, term("fault", row.name, node.node), h("p", {}, row.remedy)));
       const reset = h("li", { class: "plain" }, remedyBar(buttonsOf(`ferrodrive reset ${node.node}`), report));
       return [...(rows.length ? rows : [h("li", { class: "bad" }, `${hex(drive.fault_code, 4)}: not in the drive's description`)]), reset];

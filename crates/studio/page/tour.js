@@ -20,7 +20,7 @@ const powered = (node) => ["Operation enabled", "Quick stop active", "Fault reac
 const isBack = (state, before) => sum(state, "can_roll_back") < sum(before, "can_roll_back");
 /** Nothing turns, and no motor has power. */
 const isAtRest = (state) => !drives(state).some((node) => fast(node) || powered(node));
-const faulty = (node) => node.drive.fault_code !== 0;
+const faulty = (node) => Boolean(node.drive.fault_code);
 
 /**
  * Each step: what to do, the view and the control, and the condition on the state. `before` is the state at which the step

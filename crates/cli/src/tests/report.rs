@@ -68,8 +68,8 @@ fn guard_limits_and_a_fault_are_reported_as_the_model_has_them() {
 #[test]
 fn a_capture_is_drawn_with_the_figures_of_this_node() {
     let (bench, folder) = (VirtualBus::of(&["zlac8030l@4"]), scratch("report_capture"));
-    let record = "t_s,4.velocity_rpm,5.velocity_rpm,mark\n0,0,7,\n0.1,10,7,\n0.2,50,7,\n0.3,-20,7,\n";
-    let (record, page) = (folder.write("run.csv", record), folder.path("report.html"));
+    let whole = "t_s,4.velocity_rpm,5.velocity_rpm,mark\n0,0,7,\n0.1,10,7,\n0.2,50,7,\n0.3,-20,7,\n";
+    let (record, page) = (folder.write("run.csv", whole), folder.path("report.html"));
     let report = bench.json(&["report", "4", "-o", &page, "--capture", &record]);
     let figures = json!([{ "name": "Velocity, actual", "unit": "r/min", "min": -20, "mean": 10, "max": 50 }]);
     let found = &report["captures"][0];
@@ -77,7 +77,15 @@ fn a_capture_is_drawn_with_the_figures_of_this_node() {
     let as_float = |value: &Value| serde_json::from_str::<Value>(&value.to_string().replace(".0", "")).unwrap();
     assert_eq!(as_float(&found["figures"]), figures);
     let page = std::fs::read_to_string(&page).unwrap();
+    assert!(found["cut_off"] == false && !page.contains("The end of this record is missing"), "{found}");
     assert!(page.contains("<figure><svg") && page.contains("-20.000 r/min") && !page.contains("5.velocity"), "{page}");
+
+    // As a power failure leaves it: its last line is not whole.
+    let (torn, page) = (folder.write("torn.csv", &whole[..whole.len() - 2]), folder.path("torn.html"));
+    let report = bench.json(&["report", "4", "-o", &page, "--capture", &torn]);
+    let found = &report["captures"][0];
+    assert!(found["cut_off"] == true && found["figures"][0]["min"].as_f64() == Some(0.0), "{found}");
+    assert!(std::fs::read_to_string(&page).unwrap().contains("The end of this record is missing"));
 }
 
 #[test]

@@ -175,7 +175,7 @@ mod tests {
             style: devices::PowerStyle::Cia402,
             own_bits: &[],
             mode: Some(mode),
-            fault_code: 0,
+            fault_code: Some(0),
             faults: Vec::new(),
             position: None,
             angle: None,

@@ -81,7 +81,7 @@ impl Host {
         let rows: Vec<_> = model.map(|model| rows(model, view)).unwrap_or_default();
         let codes: Vec<_> = match rows.as_slice() {
             // A code that is in no table is a fault too.
-            [] => Some(view.fault_code).filter(|code| *code != 0).into_iter().map(Some).collect(),
+            [] => view.fault_code.filter(|code| *code != 0).into_iter().map(Some).collect(),
             rows => rows.iter().map(|row| Some(row.code)).collect(),
         };
         self.inbox.timeline.end_but(at, id, Kind::Fault, &codes);

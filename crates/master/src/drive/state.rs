@@ -25,8 +25,8 @@ pub struct DriveState {
     pub own_bits: &'static [(u16, &'static str)],
     /// 6061h, or 6060h of a drive without it.
     pub mode: Option<ModeOfOperation>,
-    /// The model's fault code; 0 for none.
-    pub fault_code: u16,
+    /// The model's fault code, 0 for none; `None` where the drive refuses its object.
+    pub fault_code: Option<u16>,
     /// What the code means and what to do.
     pub faults: Vec<&'static FaultRow>,
     /// Position in counts.
@@ -58,8 +58,8 @@ impl Drive {
         let statusword = self.statusword().await?;
         let mode = refused_is_none(self.mode().await)?;
         let fault_code =
-            refused_is_none(self.node.upload(self.fault_code()).await)?.map_or(0, |payload| payload.raw() as u16);
-        let faults = self.description.map(|description| faults_in(description, fault_code)).unwrap_or_default();
+            refused_is_none(self.node.upload(self.fault_code()).await)?.map(|payload| payload.raw() as u16);
+        let faults = self.description.zip(fault_code).map(|(model, code)| faults_in(model, code)).unwrap_or_default();
         let position = refused_is_none(self.node.read::<i32>(self.place(POSITION_ACTUAL_VALUE)).await)?
             .map(|raw| Counts(raw.into()));
         let angle = match (position, self.axis_description()) {

@@ -18,12 +18,13 @@ class Fault(TypedDict):
 
 class DriveState(TypedDict):
     """Of :meth:`Drive.state`. ``power`` is the state by CiA 402-2, ``mode`` the number of 6061h, ``position`` in counts of the drive,
-    ``angle_deg`` and ``velocity_rpm`` those of the output. What the model does not have is None."""
+    ``angle_deg`` and ``velocity_rpm`` those of the output. What the model does not have or
+    the drive refuses is None."""
 
     statusword: int
     power: Optional[str]
     mode: Optional[int]
-    fault_code: int
+    fault_code: Optional[int]
     faults: list[Fault]
     position: Optional[int]
     angle_deg: Optional[float]

@@ -93,7 +93,7 @@ pub(super) fn state(state: &DriveState) -> Value {
         ("statusword", Value::Integer(state.statusword.0.into())),
         ("power", state.power.map_or(Value::None, |power| Value::Text(power.name().to_owned()))),
         ("mode", state.mode.map_or(Value::None, |mode| Value::Integer(mode.0.into()))),
-        ("fault_code", Value::Integer(state.fault_code.into())),
+        ("fault_code", state.fault_code.map_or(Value::None, |code| Value::Integer(code.into()))),
         ("faults", Value::List(faults.collect())),
         ("position", state.position.map_or(Value::None, |position| Value::Integer(position.0))),
         ("angle_deg", real(state.angle.map(|angle| angle.0))),

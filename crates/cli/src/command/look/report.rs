@@ -101,7 +101,7 @@ fn capture(path: &Path, node: NodeId) -> Result<Capture, Failure> {
             Some(CaptureFigure { name, unit: panel.unit.to_string(), min, mean, max })
         })
     });
-    Ok(Capture { figures: figures.collect(), file, picture: poster.to_svg() })
+    Ok(Capture { figures: figures.collect(), file, is_cut_off: torn, picture: poster.to_svg() })
 }
 
 /// The least value, the mean of the samples and the most; `None` where no sample has a value.
@@ -114,18 +114,30 @@ fn extent(points: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
 impl crate::output::Report for Written {
     fn text(&self, paint: Paint) -> String {
         let report = &self.report;
-        let faults = report.remembered.as_ref().map_or(0, Vec::len);
-        let guard = if report.guard.stops { paint.good("stops") } else { paint.bad("goes on") };
-        let present = report.fault.as_ref().map_or_else(
-            || "no fault is present".to_owned(),
-            |fault| paint.bad(&format!("fault {:04X}h is present", fault.code)),
-        );
-        [
+        let present = match (&report.fault, &report.fault_not_known) {
+            (Some(fault), _) => paint.bad(&format!("fault present: {}", fault.text())),
+            (None, None) => "no fault is present".to_owned(),
+            (None, Some(why)) => format!("whether a fault is present is not known ({why})"),
+        };
+        let remembered = match (&report.remembered, &report.remembered_not_known) {
+            (Some(errors), _) => format!("{} remembered", counted(errors.len(), "error")),
+            (None, None) => "errors are not remembered (1003h does not exist)".to_owned(),
+            (None, Some(why)) => format!("remembered errors are not known ({why})"),
+        };
+        let when = "when the program that moves it dies";
+        let guard = match report.guard.stops {
+            Some(true) => format!("{} {when}: {}", paint.good("stops"), report.guard.text),
+            Some(false) => format!("{} {when}: {}", paint.bad("goes on"), report.guard.text),
+            None => format!("what it does {when} is not known: {}", report.guard.text),
+        };
+        let cut = report.captures.iter().filter(|capture| capture.is_cut_off);
+        let cut = cut.map(|capture| format!("{} of {}", paint.bad("the end is missing"), capture.file));
+        let lines = [
             format!("node {} ({}): {}", report.node, report.model, self.file),
             format!("{} of {} differ from delivery", report.differences.len(), counted(report.compared, "parameter")),
-            format!("{present}, {} remembered", counted(faults, "error")),
-            format!("{guard} when the program that moves it dies: {}", report.guard.text),
-        ]
-        .join("\n")
+            format!("{present}, {remembered}"),
+            guard,
+        ];
+        lines.into_iter().chain(cut).collect::<Vec<_>>().join("\n")
     }
 }

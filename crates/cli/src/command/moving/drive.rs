@@ -138,7 +138,8 @@ pub(crate) struct StateReport {
     mode_name: Option<&'static str>,
     statusword: u16,
     bits: Vec<&'static str>,
-    fault_code: u16,
+    /// Null where the drive refuses to show it.
+    fault_code: Option<u16>,
     faults: Vec<FaultReport>,
     #[serde(flatten)]
     pub(crate) motion: ShaftMotion,
@@ -281,8 +282,8 @@ impl StateReport {
 
     /// Faults and what to do about them; nothing without one. `gap` lines the texts up with others.
     pub(crate) fn fault_lines(&self, paint: Paint, gap: &str) -> Vec<String> {
-        if self.fault_code != 0 && self.faults.is_empty() {
-            return vec![format!("  fault {gap}{}", paint.bad(&format!("{:04X}h", self.fault_code)))];
+        if let Some(code) = self.fault_code.filter(|code| *code != 0 && self.faults.is_empty()) {
+            return vec![format!("  fault {gap}{}", paint.bad(&format!("{code:04X}h")))];
         }
         let lines = self.faults.iter().flat_map(|fault| {
             let name = paint.bad(&format!("{:04X}h {}", fault.code, fault.name));
@@ -325,8 +326,10 @@ impl Report for StateReport {
         let mut lines = vec![format!("node {}{model}: {}, {mode}", self.node, paint.strong(self.state))];
         lines.push(format!("  statusword  {:04X}h  {}", self.statusword, self.bits.join(", ")));
         lines.extend(self.fault_lines(paint, "      "));
-        if self.fault_code == 0 {
-            lines.push("  fault       none".into());
+        match self.fault_code {
+            Some(0) => lines.push("  fault       none".into()),
+            Some(_) => {}
+            None => lines.push("  fault       not known: the drive refuses to show its fault code".into()),
         }
         lines.push(format!("  motion      {}", self.motion.text()));
         if let Some(gear) = &self.gear {

@@ -30,11 +30,18 @@ impl NodeReport {
         let by = self.made.by.as_ref().map_or_else(String::new, |by| format!(", by {by}"));
         let _ = write!(out, "<p>{}</p>", escaped(&format!("{}{by}, on {}", self.made.at, self.made.bus)));
         let faults = self.remembered.as_ref().map_or(0, Vec::len) + usize::from(self.fault.is_some());
-        let (stops, watch) = if self.guard.stops { ("pass", "Stops") } else { ("fail", "Goes on") };
+        let (stops, watch) = match self.guard.stops {
+            Some(true) => ("pass", "Stops"),
+            Some(false) => ("fail", "Goes on"),
+            None => ("na", "Not known"),
+        };
+        let not_known = self.fault_not_known.is_some() || self.remembered_not_known.is_some();
+        let faults_seen =
+            if not_known { "faults seen; others are not known" } else { "faults, present and remembered" };
         let count = |class: &str, count: usize| if count > 0 { class.to_owned() } else { "na".to_owned() };
         let tiles = [
             (count("expected", self.differences.len()), self.differences.len().to_string(), "differ from delivery"),
-            (count("fail", faults), faults.to_string(), "faults, present and remembered"),
+            (count("fail", faults), faults.to_string(), faults_seen),
             (stops.to_owned(), watch.to_owned(), "when its host dies"),
         ];
         out.push_str("<div class=\"sum\">");
@@ -72,30 +79,29 @@ impl NodeReport {
         let row = |row: &super::LimitRow| [code(&row.object), escaped(row.name), escaped(&row.value.text)];
         table(out, "Limits and protections", ["Object", "Name", "Value"], self.limits.iter().map(row).collect());
         out.push_str("<h2>Guard</h2>");
-        let class = if self.guard.stops { "pass" } else { "fail" };
         let text = format!("When the program that moves and guards it dies, {}.", self.guard.text);
-        let _ = write!(out, "<p class=\"{class}\">{}</p>", escaped(&text));
+        match self.guard.stops {
+            Some(true) => classed(out, "pass", &text),
+            Some(false) => classed(out, "fail", &text),
+            None => paragraph(out, &format!("Not known: {}.", self.guard.text)),
+        }
     }
 
     fn faults(&self, out: &mut String) {
         out.push_str("<h2>Faults seen</h2>");
-        match &self.fault {
-            None => paragraph(out, "No fault is present."),
-            Some(fault) => {
-                let (names, remedies) = (fault.names.join(", or "), fault.remedies.join(" "));
-                let _ = write!(
-                    out,
-                    "<p class=\"fail\">Present: {:04X}h {}</p><p>{}</p>",
-                    fault.code,
-                    escaped(&names),
-                    escaped(&remedies)
-                );
+        match (&self.fault, &self.fault_not_known) {
+            (None, None) => paragraph(out, "No fault is present."),
+            (None, Some(why)) => paragraph(out, &format!("Not known whether a fault is present: {why}.")),
+            (Some(fault), _) => {
+                classed(out, "fail", &format!("Present: {}", fault.text()));
+                paragraph(out, &fault.remedies.join(" "));
             }
         }
-        match &self.remembered {
-            None => paragraph(out, "It has no object 1003h, so that it remembers no errors."),
-            Some(errors) if errors.is_empty() => paragraph(out, "It remembers no errors (1003h)."),
-            Some(errors) => {
+        match (&self.remembered, &self.remembered_not_known) {
+            (None, None) => paragraph(out, "It has no object 1003h, so that it remembers no errors."),
+            (None, Some(why)) => paragraph(out, &format!("Not known which errors it remembers: {why}.")),
+            (Some(errors), _) if errors.is_empty() => paragraph(out, "It remembers no errors (1003h)."),
+            (Some(errors), _) => {
                 let row = |(place, error): (usize, &RememberedError)| {
                     let remedy = error.remedy.unwrap_or_default();
                     [
@@ -135,6 +141,9 @@ fn capture(out: &mut String, capture: &Capture) {
     };
     let title = format!("Capture: {}", capture.file);
     table(out, &title, ["Signal", "Least", "Mean", "Most"], capture.figures.iter().map(row).collect());
+    if capture.is_cut_off {
+        classed(out, "fail", "The end of this record is missing: what came after is in neither figures nor picture.");
+    }
     let _ = write!(out, "<figure>{}</figure>", capture.picture);
 }
 
@@ -151,6 +160,10 @@ fn facts(out: &mut String, title: &str, first: &[Fact], others: &[Fact]) {
 
 fn paragraph(out: &mut String, text: &str) {
     let _ = write!(out, "<p>{}</p>", escaped(text));
+}
+
+fn classed(out: &mut String, class: &str, text: &str) {
+    let _ = write!(out, "<p class=\"{class}\">{}</p>", escaped(text));
 }
 
 /// What does not break over two lines.

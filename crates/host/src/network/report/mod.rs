@@ -3,11 +3,14 @@
 //! ([`NodeReport::to_html`]).
 
 mod html;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 
-use canopen::Mux;
 use canopen::object::{MANUFACTURER_DEVICE_NAME, MANUFACTURER_SOFTWARE_VERSION, SERIAL_NUMBER};
+use canopen::{AbortCode, Mux};
+use cia402::PowerState;
 use devices::Description;
 use devices::row::is_parameter;
 use master::drive::{DriveState, HostLoss};
@@ -60,10 +63,14 @@ pub struct NodeReport {
     pub limits: Vec<LimitRow>,
     /// What it does when the program that moves it dies.
     pub guard: Guard,
-    /// The fault that it shows now.
+    /// The fault that it shows now; `None` if it was seen to have none, or `fault_not_known`.
     pub fault: Option<PresentFault>,
-    /// The errors that it remembers (1003h), newest first; `None` if it has no such object.
+    /// Why it was not seen whether it has a fault.
+    pub fault_not_known: Option<String>,
+    /// The errors that it remembers (1003h), newest first; `None` if it has no such object, or `remembered_not_known`.
     pub remembered: Option<Vec<RememberedError>>,
+    /// Why the errors that it remembers were not seen.
+    pub remembered_not_known: Option<String>,
     /// Records of runs.
     pub captures: Vec<Capture>,
 }
@@ -102,8 +109,8 @@ pub struct LimitRow {
 /// What a drive does when the program that moves it dies.
 #[derive(Debug, Serialize)]
 pub struct Guard {
-    /// It stops by itself, if the program guards it.
-    pub stops: bool,
+    /// It stops by itself, if the program guards it; `None` where it refuses to show that.
+    pub stops: Option<bool>,
     /// In words, with the object that sets it.
     pub text: String,
 }
@@ -111,8 +118,8 @@ pub struct Guard {
 /// A fault that a drive shows.
 #[derive(Debug, Serialize)]
 pub struct PresentFault {
-    /// In the drive's own codes.
-    pub code: u16,
+    /// In the drive's own codes; `None` where its state alone shows a fault.
+    pub code: Option<u16>,
     /// What it may be.
     pub names: Vec<&'static str>,
     /// What to do.
@@ -126,6 +133,9 @@ pub struct Capture {
     pub file: String,
     /// What it has of this node.
     pub figures: Vec<CaptureFigure>,
+    /// The end of it is missing: it ends earlier than the run.
+    #[serde(rename = "cut_off")]
+    pub is_cut_off: bool,
     /// The picture of it, as SVG.
     #[serde(skip)]
     pub picture: String,
@@ -146,6 +156,16 @@ pub struct CaptureFigure {
     pub max: f64,
 }
 
+impl PresentFault {
+    /// Its code and what it may be: `0004h over-current, or short circuit`.
+    pub fn text(&self) -> String {
+        match self.code {
+            Some(code) => format!("{code:04X}h {}", self.names.join(", or ")).trim_end().to_owned(),
+            None => "the state is a fault, and the drive shows no code of it".to_owned(),
+        }
+    }
+}
+
 impl NodeReport {
     /// Reads all of it, without captures.
     ///
@@ -157,7 +177,9 @@ impl NodeReport {
         let (compared, differences) = from_delivery(model, drive, &parameters);
         let pdos = drive.pdos().await?;
         let pdos = pdos.iter().map(|(config, cob_id)| PdoSetup::new(Some(model), config, *cob_id, &[])).collect();
-        let state = answered(drive.state().await)?;
+        let (state, state_refused) = seen(drive.state().await)?;
+        let (fault, fault_not_known) = present_fault(state.as_ref(), state_refused);
+        let (remembered, remembered_not_known) = of_memory(remembered(drive).await)?;
         Ok(Self {
             node: backup.node,
             model: model.name,
@@ -165,7 +187,8 @@ impl NodeReport {
             manual: model.manual,
             made,
             identity: identity(drive, model, &parameters).await?,
-            fault: state.as_ref().and_then(present_fault),
+            fault,
+            fault_not_known,
             state: state.as_ref().map(facts_of).unwrap_or_default(),
             compared,
             not_compared: parameters.values.len() - compared,
@@ -174,7 +197,8 @@ impl NodeReport {
             pdos,
             limits: limits(model, &parameters),
             guard: guard(answered(drive.host_loss_if_guarded().await)?),
-            remembered: answered(remembered(drive).await)?,
+            remembered,
+            remembered_not_known,
             captures: Vec::new(),
         })
     }
@@ -182,10 +206,25 @@ impl NodeReport {
 
 /// What a node refuses is `None`; only silence is an error.
 fn answered<T>(read: Result<T, Error>) -> Result<Option<T>, Failure> {
+    seen(read).map(|(value, _)| value)
+}
+
+/// What was read, or why a node refuses it; only silence is an error.
+fn seen<T>(read: Result<T, Error>) -> Result<(Option<T>, Option<String>), Failure> {
     match read {
-        Ok(value) => Ok(Some(value)),
-        Err(Error::Aborted { .. } | Error::UnknownModel { .. }) => Ok(None),
+        Ok(value) => Ok((Some(value), None)),
+        Err(error @ (Error::Aborted { .. } | Error::UnknownModel { .. })) => Ok((None, Some(error.to_string()))),
         Err(error) => Err(error.into()),
+    }
+}
+
+/// The errors that it remembers, or why they were not seen. A node without the object remembers none, which is known.
+fn of_memory(
+    read: Result<Vec<RememberedError>, Error>,
+) -> Result<(Option<Vec<RememberedError>>, Option<String>), Failure> {
+    match read {
+        Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT, .. }) => Ok((None, None)),
+        read => seen(read),
     }
 }
 
@@ -251,13 +290,16 @@ fn facts_of(state: &DriveState) -> Vec<Fact> {
     facts.into_iter().filter_map(|(name, value)| Some(fact(name, value?))).collect()
 }
 
-fn present_fault(state: &DriveState) -> Option<PresentFault> {
-    let faults = || state.faults.iter();
-    (state.fault_code != 0).then(|| PresentFault {
-        code: state.fault_code,
-        names: faults().map(|fault| fault.name).collect(),
-        remedies: faults().map(|fault| fault.remedy).collect(),
-    })
+/// The fault that is shown by code or state, or why it is not known whether there is one.
+fn present_fault(state: Option<&DriveState>, refused: Option<String>) -> (Option<PresentFault>, Option<String>) {
+    let Some(state) = state else { return (None, refused) };
+    let code = state.fault_code.filter(|code| *code != 0);
+    if code.is_some() || matches!(state.power, Some(PowerState::Fault | PowerState::FaultReactionActive)) {
+        let (names, remedies) = state.faults.iter().map(|fault| (fault.name, fault.remedy)).unzip();
+        return (Some(PresentFault { code, names, remedies }), None);
+    }
+    // A code of 0 was seen, where there is one.
+    (None, state.fault_code.is_none().then(|| "the drive refuses to show its fault code".to_owned()))
 }
 
 fn limits(model: &'static Description, parameters: &Parameters) -> Vec<LimitRow> {
@@ -272,7 +314,7 @@ fn limits(model: &'static Description, parameters: &Parameters) -> Vec<LimitRow>
 
 fn guard(loss: Option<HostLoss>) -> Guard {
     match loss {
-        Some(loss) => Guard { stops: loss.stops_after().is_some(), text: loss.to_string() },
-        None => Guard { stops: false, text: "the device refuses to show the object that sets its watch".into() },
+        Some(loss) => Guard { stops: Some(loss.stops_after().is_some()), text: loss.to_string() },
+        None => Guard { stops: None, text: "the device refuses to show the object that sets its watch".into() },
     }
 }

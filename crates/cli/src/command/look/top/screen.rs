@@ -135,12 +135,13 @@ fn node_line(node: &NodeView, is_chosen: bool, look: Look) -> Line<'static> {
     let number = |value: Option<f64>, decimals: usize| {
         value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
     };
-    let faulted = drive.is_some_and(|drive| drive.fault_code != 0);
-    let state = match (drive, &node.trouble) {
-        (_, Some(_)) => "no answer".to_owned(),
-        (Some(drive), _) if faulted => format!("! fault {:04X}h", drive.fault_code),
-        (Some(drive), _) => node.doing.or(drive.state).unwrap_or("-").to_owned(),
-        (None, _) => "-".to_owned(),
+    let fault = drive.and_then(|drive| drive.fault_code).filter(|code| *code != 0);
+    let faulted = fault.is_some();
+    let state = match (drive, fault, &node.trouble) {
+        (_, _, Some(_)) => "no answer".to_owned(),
+        (_, Some(code), _) => format!("! fault {code:04X}h"),
+        (Some(drive), None, _) => node.doing.or(drive.state).unwrap_or("-").to_owned(),
+        (None, None, _) => "-".to_owned(),
     };
     let heard = node.heartbeat_age_ms.map_or_else(
         || "-".to_owned(),

@@ -30,7 +30,7 @@ fn state() -> Snapshot {
     let faulted = DriveView {
         at_s: 12.5,
         state: Some("Fault"),
-        fault_code: 1,
+        fault_code: Some(1),
         faults: vec![FaultView { name: "over-voltage", remedy: "Lower the supply." }],
         velocity_rpm: Some(0.0),
         supply_v: Some(71.0),
