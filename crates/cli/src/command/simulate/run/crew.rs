@@ -59,7 +59,7 @@ impl Crew {
                 let results = results.clone();
                 let (next, taken, work) = (&next, &taken, &work);
                 scope.spawn(move || {
-                    let _releases = taken.on_panic();
+                    let _ends = taken.on_panic(&self.stop);
                     while !self.stop.load(Ordering::Acquire) {
                         let number = next.fetch_add(1, Ordering::Relaxed);
                         if number >= count {
@@ -73,6 +73,8 @@ impl Crew {
                 });
             }
             drop(results);
+            // A panic of `take` ends the work too: nobody takes what the others would go on to make.
+            let _ends = taken.on_panic(&self.stop);
             let mut early = BTreeMap::new();
             let mut first = 0;
             for (number, result) in incoming {
@@ -109,9 +111,9 @@ impl Taken {
         self.waiting.fetch_sub(1, Ordering::SeqCst);
     }
 
-    /// While this lives, a panic of its thread has no other one wait for a result that never comes.
-    fn on_panic(&self) -> OnPanic<'_> {
-        OnPanic(self)
+    /// While this lives, a panic of its thread ends the work, and has no other one wait for a result that never comes.
+    fn on_panic<'a>(&'a self, stop: &'a AtomicBool) -> OnPanic<'a> {
+        OnPanic(self, stop)
     }
 
     /// So many have been taken. Either it sees who waits, or they see the count: both are in one order (SeqCst).
@@ -125,11 +127,13 @@ impl Taken {
 }
 
 /// See [`Taken::on_panic`].
-struct OnPanic<'a>(&'a Taken);
+struct OnPanic<'a>(&'a Taken, &'a AtomicBool);
 
 impl Drop for OnPanic<'_> {
     fn drop(&mut self) {
         if std::thread::panicking() {
+            // First, since those who wait go on with what they have begun and look at it after.
+            self.1.store(true, Ordering::Release);
             self.0.show(u64::MAX);
         }
     }
@@ -164,7 +168,13 @@ mod tests {
     #[test]
     #[should_panic(expected = "a scoped thread panicked")]
     fn a_piece_that_panics_ends_the_work_and_does_not_hang_it() {
-        crew(3).work(3 * AHEAD, |number| assert_ne!(number, 0, "the first piece panics"), |_, ()| {});
+        crew(3).work(1 << 40, |number| assert_ne!(number, 0, "the first piece panics"), |_, ()| {});
+    }
+
+    #[test]
+    #[should_panic(expected = "the first result is refused")]
+    fn a_panic_of_who_takes_the_results_ends_the_work() {
+        crew(3).work(1 << 40, |_| (), |number, ()| assert_ne!(number, 0, "the first result is refused"));
     }
 
     #[test]
