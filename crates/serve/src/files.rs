@@ -67,9 +67,34 @@ pub fn create_log(path: &Path, format: Format) -> io::Result<File> {
 
 /// An empty file to write a record to: a new one, or one that is empty or a record already.
 pub fn create_record(path: &Path, kind: Kind) -> io::Result<File> {
+    let (begin, what) = record_begin(kind);
+    create_or_replace(path, begin, what)
+}
+
+/// Whether [`create_record`] would write to what is there at present: nothing in a folder, or a record that can be written. Nothing is
+/// made, and nothing is changed.
+///
+/// # Errors
+/// Those of [`create_record`], but for a folder in which no file can be made.
+pub fn check_record(path: &Path, kind: Kind) -> io::Result<()> {
+    let (begin, what) = record_begin(kind);
+    match open_replaceable(path, begin, what) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            match fs::metadata(folder)?.is_dir() {
+                true => Ok(()),
+                false => Err(io::ErrorKind::NotADirectory.into()),
+            }
+        }
+        opened => opened.map(drop),
+    }
+}
+
+/// How a record begins, and what it is called.
+fn record_begin(kind: Kind) -> (&'static [u8], &'static str) {
     match kind {
-        Kind::Mcap => create_or_replace(path, b"\x89MCAP0\r\n", "an MCAP file"),
-        Kind::Csv => create_or_replace(path, b"t_s,", "a record"),
+        Kind::Mcap => (b"\x89MCAP0\r\n", "an MCAP file"),
+        Kind::Csv => (b"t_s,", "a record"),
     }
 }
 
@@ -84,6 +109,14 @@ fn create_or_replace(path: &Path, begin: &[u8], what: &str) -> io::Result<File> 
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
         created => return created,
     }
+    let mut file = open_replaceable(path, begin, what)?;
+    file.set_len(0)?;
+    io::Seek::rewind(&mut file)?;
+    Ok(file)
+}
+
+/// A file that is there, and is empty or begins with `begin`; its contents are as they were.
+fn open_replaceable(path: &Path, begin: &[u8], what: &str) -> io::Result<File> {
     let mut file = open_regular(path, OpenOptions::new().read(true).write(true))?;
     let mut first = Vec::new();
     (&mut file).take(begin.len() as u64).read_to_end(&mut first)?;
@@ -91,8 +124,6 @@ fn create_or_replace(path: &Path, begin: &[u8], what: &str) -> io::Result<File> 
         let reason = format!("it exists and is not {what}; remove it or choose another name");
         return Err(io::Error::new(io::ErrorKind::AlreadyExists, reason));
     }
-    file.set_len(0)?;
-    io::Seek::rewind(&mut file)?;
     Ok(file)
 }
 
@@ -139,12 +170,22 @@ mod tests {
         fs::write(&csv, "t_s,4.velocity_rpm,mark\n").unwrap();
         assert!(create_record(&csv, Kind::Mcap).unwrap_err().to_string().contains("not an MCAP file"));
         for (path, kind) in [(&mcap, Kind::Mcap), (&csv, Kind::Csv)] {
+            let before = fs::read(path).unwrap();
+            check_record(path, kind).unwrap();
+            assert_eq!(fs::read(path).unwrap(), before);
             drop(create_record(path, kind).unwrap());
             assert_eq!(fs::read(path).unwrap(), b"");
         }
         fs::write(&csv, "name,price\n").unwrap();
         assert!(create_record(&csv, Kind::Csv).unwrap_err().to_string().contains("not a record"));
+        assert!(check_record(&csv, Kind::Csv).unwrap_err().to_string().contains("not a record"));
         assert_eq!(fs::read(&csv).unwrap(), b"name,price\n");
+        // A free name stays free; one in a file, or in a folder that is not there, is not one.
+        let free = place.join("free.csv");
+        check_record(&free, Kind::Csv).unwrap();
+        assert!(!free.exists());
+        assert!(check_record(&csv.join("in_a_file.csv"), Kind::Csv).is_err());
+        assert_eq!(check_record(&place.join("no/a.csv"), Kind::Csv).unwrap_err().kind(), io::ErrorKind::NotFound);
         fs::remove_dir_all(place).unwrap();
     }
 

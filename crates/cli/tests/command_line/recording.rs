@@ -246,6 +246,26 @@ fn a_capture_is_a_record_with_what_belongs_to_it_and_says_how_it_was_had() {
 }
 
 #[test]
+fn a_file_of_others_under_one_of_the_names_is_seen_before_anything_is_captured_or_moved() {
+    let place = scratch("captures-of-others");
+    let [name, second] = ["step.csv", "step-2.csv"].map(|name| place.join(name));
+    std::fs::write(&second, "name,price\n").unwrap();
+    let file = name.to_str().unwrap();
+    let motion = ["test-motion", "4", "steps", "--speed", "60rpm", "--time", "500ms"];
+    for words in [&["capture", "4", "velocity", "--for", "20ms"][..], &motion] {
+        let refused = ferrodrive(&[words, &["--count", "2", "-o", file]].concat());
+        assert_eq!(refused.status, Some(1), "{words:?}: {}", refused.err);
+        assert!(refused.err.contains("step-2.csv") && refused.err.contains("not a record"), "{}", refused.err);
+        // The first capture was not taken.
+        assert!(!name.exists(), "{words:?}");
+    }
+    let in_a_file = second.join("step.csv");
+    let refused = ferrodrive(&["capture", "4", "velocity", "-o", in_a_file.to_str().unwrap()]);
+    assert!(refused.status == Some(1) && refused.err.contains("cannot write the capture"), "{}", refused.err);
+    assert_eq!(std::fs::read_to_string(&second).unwrap(), "name,price\n");
+}
+
+#[test]
 fn a_test_motion_is_judged_by_what_was_sampled() {
     let report =
         done(&["test-motion", "4", "steps", "--speed", "60rpm", "--time", "1s", "--count", "2", "--json"]).json();

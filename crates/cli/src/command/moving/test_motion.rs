@@ -147,7 +147,7 @@ impl TestMotion {
         let usual = if matches!(motion, Motion::Points { .. }) { self.period } else { USUAL_RATE };
         let wanted = self.how.wanted(context, &drive, &names, usual).await?;
         wanted.check(&motion.span())?;
-        check_place(self.output.as_deref())?;
+        check_place(self.output.as_deref(), self.count)?;
         let guard = self.guard.begin(context, &drive).await?;
         let moved = self.measured(context, (&drive, &motion), &wanted).await;
         let released = guard.end(context, &drive, false).await;

@@ -12,7 +12,7 @@ use master::Drive;
 use master::units::parse_duration;
 use recording::{Capture as Captured, Kind, Trace};
 use serde::Serialize;
-use serve::files::create_record;
+use serve::files::{check_record, create_record};
 use words::counted;
 use words::node::node;
 
@@ -190,7 +190,7 @@ impl Capture {
         let (trigger, pre_trigger) = (self.trigger.clone(), self.pre_trigger);
         let span = Span { duration: self.duration, trigger, pre_trigger };
         wanted.check(&span)?;
-        check_place(self.output.as_deref())?;
+        check_place(self.output.as_deref(), self.count)?;
         context.progress.show(format!("node {}: setting its TPDOs up", self.node));
         let restorer = host::capture::Restorer::of(&drive);
         context.restore_at_end(Restorer::Capture(restorer.clone()));
@@ -252,18 +252,22 @@ pub(in crate::command) fn numbered(path: &Path, number: u32) -> PathBuf {
     path.with_file_name(format!("{stem}-{number}.{ending}"))
 }
 
-/// Refuses a file whose folder is not there, before anything is captured for it.
-pub(in crate::command) fn check_place(path: Option<&Path>) -> Result<(), Failure> {
-    let folder = path.and_then(Path::parent).filter(|folder| !folder.as_os_str().is_empty());
-    match (path, folder.map(std::fs::metadata)) {
-        (Some(path), Some(Err(error))) => Err(Failure::of_writing("the capture", path, &error)),
-        _ => Ok(()),
+/// Refuses files that [`save`] could not write, as they are at present, before anything is captured for them.
+pub(in crate::command) fn check_place(path: Option<&Path>, count: u32) -> Result<(), Failure> {
+    for path in path.iter().flat_map(|path| (1..=count).map(|number| numbered(path, number))) {
+        check_record(&path, kind_of(&path)).map_err(|error| Failure::of_writing("the capture", &path, &error))?;
     }
+    Ok(())
+}
+
+/// By the name, which [`capture_file`] has looked at.
+fn kind_of(path: &Path) -> Kind {
+    Kind::of_name(&path.to_string_lossy()).unwrap_or(Kind::Csv)
 }
 
 /// Writes a capture to its file.
 pub(in crate::command) fn save(capture: &Captured, path: &Path) -> Result<(), Failure> {
-    let kind = Kind::of_name(&path.to_string_lossy()).unwrap_or(Kind::Csv);
+    let kind = kind_of(path);
     let written = create_record(path, kind).and_then(|file| capture.write(kind, Box::new(file)));
     written.map_err(|error| Failure::of_writing("the capture", path, &error))
 }
