@@ -46,7 +46,7 @@ pub struct Mapped {
 impl PdoSetup {
     /// A PDO of a model.
     pub fn new(model: Option<&'static Description>, config: &PdoConfig, cob_id: CobId, silent: &[Silence]) -> Self {
-        let ms = |time: Option<Duration>| time.map(|time| time.as_secs_f64() * 1e3);
+        let ms = |time: Option<Duration>| time.map(|time| time.as_nanos() as f64 / 1e6);
         let mapped = config.map.0.iter().map(|record| Mapped {
             object: record.mux.to_string(),
             name: name(model, record.mux),
