@@ -134,7 +134,15 @@ fn what_cannot_be_gone_on_with_or_merged_is_refused_with_its_place_and_stays_as_
     let table = folder.path("table.jsonl");
     let go_on = format!("ferrodrive run {scenario} --seeds 1..2 --shard 2/2 -o {torn} --resume");
     refused(&["-o", &table, "--merge", &half, &torn], 1, ["shard 2/2 has 1 of its 2 runs", &go_on]);
-    assert!(!Path::new(&table).exists(), "a table that is not whole is not left");
+    let part = format!("{table}.part");
+    let is_left = |path: &str| Path::new(path).exists();
+    assert!(!is_left(&table) && !is_left(&part), "a table that is not whole is not left");
+    // What a merge that was killed leaves is not the table, and is not taken for one that is whole.
+    std::fs::write(&part, "head").unwrap();
+    refused(&["-o", &table, "--merge", &half, &torn], 1, [".part already exists", "then remove it"]);
+    assert!(!is_left(&table) && read(&part) == "head");
+    std::fs::remove_file(&part).unwrap();
+    refused(&["-o", &half, "--merge", &half, &torn], 1, ["half.jsonl already exists", "another --output"]);
     refused(&["--merge", &table], 1, ["cannot use the results", "can be read"]);
 
     refused(&["-o", "results.txt"], 2, ["NAME.jsonl", "results.txt"]);

@@ -83,8 +83,12 @@ fn create(path: &Path, if_it_exists: &str) -> Result<File, Failure> {
         if error.kind() != std::io::ErrorKind::AlreadyExists {
             return Failure::of_writing("the results", path, &error);
         }
-        Failure::new(format!("{} already exists", path.display())).of_kind("file_exists").next(if_it_exists)
+        already_exists(path, if_it_exists)
     })
+}
+
+fn already_exists(path: &Path, next: &str) -> Failure {
+    Failure::new(format!("{} already exists", path.display())).of_kind("file_exists").next(next)
 }
 
 /// Adds what is whole to the summary. Makes the last of these runs again: what the head does not have (a data sheet, another build of
@@ -107,6 +111,44 @@ fn go_through(file: &File, sweep: &Sweep, summary: &mut Summary) -> Result<(u64,
     Ok((reader.runs(), reader.bytes()))
 }
 
+/// A file that becomes NAME when it is whole: until then it is NAME.part, which a merge that is killed leaves.
+struct Whole<'a> {
+    path: &'a Path,
+    part: PathBuf,
+    file: BufWriter<File>,
+}
+
+impl<'a> Whole<'a> {
+    fn begin(path: &'a Path) -> Result<Self, Failure> {
+        if path.symlink_metadata().is_ok() {
+            return Err(already_exists(path, "remove it, or give another --output"));
+        }
+        let mut part = path.as_os_str().to_owned();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        let file = create(&part, "another merge writes it; or one was ended before it was whole, then remove it")?;
+        Ok(Self { path, part, file: BufWriter::new(file) })
+    }
+
+    fn write(&mut self, line: &str) -> Result<(), Failure> {
+        self.file.write_all(line.as_bytes()).map_err(|error| Failure::of_writing("the results", &self.part, &error))
+    }
+
+    /// Gives it its name, if all of it was `taken`; else it is removed.
+    fn end(self, taken: Result<(), Failure>) -> Result<(), Failure> {
+        let Self { path, part, mut file } = self;
+        let on_disk = |file: &mut BufWriter<File>| file.flush().and_then(|()| file.get_ref().sync_all());
+        let written = taken.and_then(|()| {
+            let named = on_disk(&mut file).and_then(|()| std::fs::rename(&part, path));
+            named.map_err(|error| Failure::of_writing("the results", path, &error))
+        });
+        if written.is_err() {
+            let _ = std::fs::remove_file(&part);
+        }
+        written
+    }
+}
+
 /// Adds the results of all parts to `summary`, and writes them to one file if one is given.
 pub(super) fn merge_files(
     parts: &[PathBuf],
@@ -119,15 +161,8 @@ pub(super) fn merge_files(
         .iter()
         .map(|path| File::open(path).map(BufReader::new).map_err(|error| unusable(path, &ResultsError::Read(error))));
     let opened = opened.collect::<Result<Vec<_>, _>>()?;
-    let mut merged = match output {
-        None => None,
-        Some(path) => Some((path, BufWriter::new(create(path, "remove it, or give another --output")?))),
-    };
-    let failed = |path: &Path, error: std::io::Error| Failure::of_writing("the results", path, &error);
-    let mut write = |line: &str| match &mut merged {
-        None => Ok(()),
-        Some((path, file)) => file.write_all(line.as_bytes()).map_err(|error| failed(path, error)),
-    };
+    let mut merged = output.map(Whole::begin).transpose()?;
+    let mut write = |line: &str| merged.as_mut().map_or(Ok(()), |merged| merged.write(line));
     let taken = write(&head(sweep, Shard::WHOLE)).and_then(|()| {
         let take = |line: &str, result: &RunResult| {
             summary.add(sweep, result);
@@ -135,14 +170,10 @@ pub(super) fn merge_files(
         };
         merge(sweep, opened, take).map_err(|error| of_merge(parts, error, again))
     });
-    let Some((path, mut file)) = merged else { return taken };
-    let written =
-        taken.and_then(|()| file.flush().and_then(|()| file.get_ref().sync_all()).map_err(|error| failed(path, error)));
-    if written.is_err() {
-        // A table that is not whole would be taken for one that is.
-        let _ = std::fs::remove_file(path);
+    match merged {
+        None => taken,
+        Some(merged) => merged.end(taken),
     }
-    written
 }
 
 fn of_merge(parts: &[PathBuf], error: MergeError<Failure>, again: &str) -> Failure {
