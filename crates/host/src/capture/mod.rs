@@ -14,4 +14,4 @@ pub use plan::{CapturePlan, Pace, Request, plan};
 pub use quantity::{Form, Quantity, short_names};
 pub use restorer::{Restorer, SeenBy};
 pub use rows::Trigger;
-pub use session::{Running, Span, Taken, Wanted, Way};
+pub use session::{Running, Span, Taken, Wanted, Way, not_put_back, with_left};

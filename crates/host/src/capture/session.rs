@@ -1,12 +1,13 @@
 //! A capture on a bus: the drive is made to send, what comes is collected, and everything is put back.
 
+use std::fmt;
 use std::path::PathBuf;
 use std::pin::pin;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::pdo::PdoId;
-use canopen::{Mux, NmtCommand, NmtState, connection_set};
+use canopen::{Mux, NmtCommand, NmtState, NodeId, connection_set};
 use futures_util::future::{Either, select};
 use master::core::LoggedFrame;
 use master::parameters::{Parameters, PlanOptions};
@@ -60,6 +61,16 @@ pub enum Way {
     Tpdo(PdoId),
     /// By SDO, one request after the other.
     Sdo,
+}
+
+impl fmt::Display for Way {
+    /// `TPDO1`, `SDO`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tpdo(pdo) => pdo.fmt(f),
+            Self::Sdo => f.write_str("SDO"),
+        }
+    }
 }
 
 /// A TPDO that brings readings.
@@ -137,7 +148,7 @@ impl Wanted {
     pub async fn begin(&self, drive: &Drive, restorer: &Restorer) -> Result<Running, Failure> {
         match self.begun(drive, restorer).await {
             Ok(running) => Ok(running),
-            Err(failure) => Err(restorer.restore().await.iter().fold(failure, not_put_back)),
+            Err(failure) => Err(with_left(failure, &restorer.restore().await)),
         }
     }
 
@@ -245,9 +256,15 @@ impl Wanted {
     }
 }
 
+/// That not everything of a node was put back; `None` if nothing is left. How to do it later is for who reports it to say.
+pub fn not_put_back(node: NodeId, left: &[String]) -> Option<Failure> {
+    let failure = || Failure::new(format!("node {node}: not everything was put back"));
+    (!left.is_empty()).then(|| failure().of_kind("not_put_back").at_node(node))
+}
+
 /// A failure, with what could not be put back after it.
-fn not_put_back(failure: Failure, left: &String) -> Failure {
-    failure.because(format!("not put back: {left}"))
+pub fn with_left(failure: Failure, left: &[String]) -> Failure {
+    left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}")))
 }
 
 /// The period of a SYNC that another node sends: the median distance of those that were heard. Where only one was, the next is waited

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use can::Bitrate;
 use canopen::NodeId;
-use host::capture::{Quantity, Restorer, Span, Taken, Trigger, Wanted, Way};
+use host::capture::{Quantity, Restorer, Span, Taken, Trigger, Wanted, Way, with_left};
 use host::network::params::journal::default_path;
 use machine::file::tpdo_id;
 use pyo3::prelude::*;
@@ -69,10 +69,7 @@ impl Captured {
         let traces = capture.traces.iter().zip(ways).map(|(trace, way)| CapturedTrace {
             quantity: trace.quantity.clone(),
             unit: trace.unit.clone(),
-            by: match way {
-                Way::Tpdo(pdo) => pdo.to_string(),
-                Way::Sdo => "SDO".to_owned(),
-            },
+            by: way.to_string(),
             values: trace.values.iter().map(|value| known(*value)).collect(),
             period_s: known(trace.period_s),
             jitter_s: known(trace.jitter_s),
@@ -86,17 +83,8 @@ impl Captured {
 
 /// What could not be put back.
 pub(super) fn not_put_back(node: NodeId, left: &[String]) -> Option<Failure> {
-    (!left.is_empty()).then(|| {
-        Failure::new(format!("node {node}: not everything was put back"))
-            .of_kind("not_put_back")
-            .at_node(node)
-            .next("when it answers again: network.params(node).rollback()")
-    })
-}
-
-/// With what could not be put back.
-pub(super) fn with_left(failure: Failure, left: &[String]) -> Failure {
-    left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}")))
+    let next = "when it answers again: network.params(node).rollback()";
+    host::capture::not_put_back(node, left).map(|failure| failure.next(next))
 }
 
 /// Captures quantities of a drive, and puts everything back.

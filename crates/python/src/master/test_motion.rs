@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use can::Bitrate;
-use host::capture::{Quantity, Restorer, Wanted};
+use host::capture::{Quantity, Restorer, Wanted, with_left};
 use host::network::params::journal::default_path;
 use host::test_motion::{Figures, Motion, Run, Shape, limits, points, run, usual_quantities};
 use master::cyclic::CyclicOptions;
@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use serde::Serialize;
 use words::failure::Failure;
 
-use super::capture::{Captured, not_put_back, with_left};
+use super::capture::{Captured, not_put_back};
 use super::job::Trouble;
 use super::value::Value;
 use super::whole::AskedDrive;

@@ -17,7 +17,7 @@ use words::node::node;
 use super::group::{AxisLimitValues, angle, rate, turning, turns_of};
 use crate::command::cycles::CycleArgs;
 use crate::command::record_and_replay::capture::{
-    CaptureArgs, CaptureRow, USUAL_RATE, capture_file, check_place, numbered, save,
+    CaptureArgs, CaptureRow, USUAL_RATE, capture_file, check_place, not_put_back, numbered, save,
 };
 use crate::command::repeat::period;
 use crate::context::{Context, Restorer};
@@ -237,13 +237,11 @@ impl TestMotion {
         let moved = run(moved, (wanted, &restorer), (self.count, self.travel), &mut runs, begins).await;
         let mut runs: Vec<_> = runs.into_iter().map(|run| self.row(run)).collect();
         let left = context.restore().await.unwrap_or_default();
-        let put_back = if left.is_empty() {
-            Ok(())
-        } else {
-            let failure = Failure::new(format!("node {}: not everything was put back", self.node));
-            let failure = failure.of_kind("not_put_back").at_node(self.node);
-            Err(left.iter().fold(failure, |failure, left| failure.because(left)))
+        let put_back = not_put_back(self.node, &left);
+        let with_left = |failure: Failure| {
+            left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}")))
         };
+        let put_back = put_back.map_or(Ok(()), |failure| Err(with_left(failure)));
         let saved = self.saved(&mut runs);
         // The first is what happened; the others are to be known too.
         let failures = [moved.map_err(Failure::from), put_back, saved].into_iter().filter_map(Result::err);

@@ -203,13 +203,9 @@ impl Capture {
         report.captures = rows;
         report.left_operational = restorer.left_operational();
         report.nmt_back = report.left_operational.map(SeenBy::word);
-        let failure = match (failure, left.is_empty()) {
-            (None, true) => return Ok(report),
-            (Some(failure), _) => failure,
-            (None, false) => Failure::new(format!("node {}: not everything was put back", self.node))
-                .of_kind("not_put_back")
-                .at_node(self.node)
-                .next(format!("when it answers again: ferrodrive params rollback {}", self.node)),
+        let failure = match failure.or(not_put_back(self.node, &left)) {
+            None => return Ok(report),
+            Some(failure) => failure,
         };
         let failure = left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}")));
         let saved = report.captures.iter().filter_map(|row| row.file.as_deref());
@@ -260,6 +256,12 @@ pub(in crate::command) fn check_place(path: Option<&Path>, count: u32) -> Result
     Ok(())
 }
 
+/// That not everything of a node was put back, and what to do; `None` if nothing is left.
+pub(in crate::command) fn not_put_back(node: NodeId, left: &[String]) -> Option<Failure> {
+    let next = format!("when it answers again: ferrodrive params rollback {node}");
+    host::capture::not_put_back(node, left).map(|failure| Failure::from(failure).next(next))
+}
+
 /// By the name, which [`capture_file`] has looked at.
 fn kind_of(path: &Path) -> Kind {
     Kind::of_name(&path.to_string_lossy()).unwrap_or(Kind::Csv)
@@ -308,10 +310,7 @@ impl TraceRow {
         Self {
             quantity: trace.quantity.clone(),
             unit: trace.unit.clone(),
-            by: match way {
-                Way::Tpdo(pdo) => pdo.to_string(),
-                Way::Sdo => "SDO".to_owned(),
-            },
+            by: way.to_string(),
             readings: values().count(),
             // To a tenth of a microsecond: what a bus has between two frames is longer.
             period_s: known((trace.period_s * 1e7).round() / 1e7),
