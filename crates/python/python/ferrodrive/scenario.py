@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Optional, Union
@@ -245,7 +246,8 @@ def sweep_table(path: Union[str, os.PathLike[str]]) -> Any:
     Columns: ``run`` and ``seed`` (``uint64``), ``values.NAME`` for each parameter that is swept (``double`` where all of its values
     are numbers, else ``string``), ``passed`` (``bool``), ``end_s`` (``double``, virtual time), ``figures.NAME`` (``double``, in the
     units of the scenario), ``digest``, ``asked`` and ``seen`` (``string``). What a run does not have is null: a figure with nothing to
-    measure, what failed in a run that passed. A file that is not one of results raises :class:`ValueError`.
+    measure, what failed in a run that passed. A file that is not one of results raises :class:`ValueError`; one
+    with fewer runs than its head says warns of that.
 
     >>> with open("results.jsonl", "w") as file:
     ...     _ = file.write(sweep.head() + sweep.line(0) + sweep.line(1))
@@ -257,13 +259,19 @@ def sweep_table(path: Union[str, os.PathLike[str]]) -> Any:
 
     with open(path, "rb") as file:
         try:
-            columns = json.loads(file.readline())["columns"]
-        except (ValueError, KeyError, TypeError) as error:
+            head = json.loads(file.readline())
+            columns = head["columns"]
+            index, count = map(int, head["shard"].split("/"))
+            runs = len(range(index - 1, head["runs"], count))
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             wanted = "expected that of what `ferrodrive run --seeds -o NAME.jsonl` writes"
             raise ValueError(f"{os.fspath(path)}, line 1: not the head of a file of results; {wanted}") from error
         lines = file.read()
     # What a process that was killed left of a line is not a result.
     lines = lines[: lines.rfind(b"\n") + 1]
+    has = lines.count(b"\n")
+    if has < runs:
+        warnings.warn(f"{os.fspath(path)} has {has} of its {runs} runs: the sweep has not ended", stacklevel=2)
     kinds = [(name, pyarrow.type_for_alias(kind)) for name, kind in columns]
     if not lines:
         return pyarrow.schema(kinds).empty_table()
