@@ -117,8 +117,8 @@ fn a_joint_moves_and_says_its_values_in_the_scales_of_the_manual() {
     joint.0.run_for(Duration::from_millis(500));
     // 1/2000 A, without a sign.
     let (said_a, true_a) = (f64::from(joint.word(CURRENT)) / 2000.0, joint.truth().current_a.abs());
-    assert!((said_a - true_a).abs() < 0.2 + 0.3 * true_a, "{said_a} A said, {true_a} A true");
-    assert!(true_a > 0.1, "a load that cannot be felt proves nothing: {true_a} A");
+    assert!(true_a > 0.3, "a load that cannot be felt proves nothing: {true_a} A");
+    assert!((said_a - true_a).abs() < 0.05 + 0.1 * true_a, "{said_a} A said, {true_a} A true");
 }
 
 #[test]
