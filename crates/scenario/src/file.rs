@@ -314,10 +314,7 @@ fn machine(file: &Table<'_>, folder: &Path) -> Many<(Machine, String)> {
     let path = folder.join(field.words(EXPECTED).map_err(single)?);
     let unusable =
         |reason: String| vec![field.problem(format!("the machine file {} cannot be used:\n{reason}", path.display()))];
-    let text = read_text(&path).map_err(unusable)?;
-    let machine = Machine::parse_in(&text, path.parent().unwrap_or(Path::new("")));
-    let machine = machine.map_err(|bad| unusable(bad.named(path.display().to_string()).to_string()))?;
-    Ok((machine, text))
+    machine::file::read_with_text(&path).map_err(unusable)
 }
 
 /// The parameters and their values, in the words that they are put into texts with.

@@ -127,8 +127,17 @@ pub struct Placed {
 /// # Errors
 /// What is wrong with the file.
 pub fn read(path: &Path) -> Result<Machine, String> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    Machine::parse_in(&read_text(path)?, folder).map_err(|bad| bad.named(path.display().to_string()).to_string())
+    read_with_text(path).map(|(machine, _)| machine)
+}
+
+/// As [`read`], with the text of the file.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn read_with_text(path: &Path) -> Result<(Machine, String), String> {
+    let text = read_text(path)?;
+    let machine = Machine::parse_in(&text, path.parent().unwrap_or(Path::new("")));
+    machine.map(|machine| (machine, text)).map_err(|bad| bad.named(path.display().to_string()).to_string())
 }
 
 /// The machine of `--machine`.
