@@ -146,6 +146,10 @@ impl Summary {
         let sweep = self.sweep.get();
         let result: RunResult = serde_json::from_str(line).map_err(bad_value)?;
         sweep.check(result.run)?;
+        if !result.is_of(&sweep.sweep) {
+            let (run, seed) = (result.run, result.seed);
+            return Err(bad_value(format!("it is the result of run {run}, seed {seed}, of another sweep")));
+        }
         self.summary.lock().unwrap_or_else(PoisonError::into_inner).add(&sweep.sweep, &result);
         Ok(())
     }

@@ -251,6 +251,12 @@ def test_the_lines_of_a_sweep_are_the_file_of_the_command_line_and_of_its_shards
     assert rounded(summary.report()) == rounded(printed)
     with pytest.raises(ValueError, match="EOF|expected"):
         summary.add_line(lines[0][:20])
+    # The same number of runs, with other seeds.
+    other = ferrodrive.Sweep(random, range(2, 12)).summary()
+    with pytest.raises(ValueError, match="the result of run 0, seed 1, of another sweep"):
+        other.add_line(lines[0])
+    other.add_line(ferrodrive.Sweep(random, range(2, 12)).line(0))
+    assert other.report()["runs"] == 1
     with pytest.raises(IndexError):
         ferrodrive.Sweep(random).summary().add_line(lines[-1])
 

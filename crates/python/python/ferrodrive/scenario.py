@@ -219,7 +219,8 @@ class SweepSummary:
             self._native.add(number, [], ("the machine and the scenario", str(came)))
 
     def add_line(self, line: str) -> None:
-        """Adds what came of a run, by its line of :meth:`Sweep.line` or of a file of results.
+        """Adds what came of a run, by its line of :meth:`Sweep.line` or of a file of results. The line of another sweep raises
+        :class:`ValueError`.
 
         >>> summary = sweep.summary()
         >>> summary.add_line(sweep.line(0))

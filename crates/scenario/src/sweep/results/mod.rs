@@ -110,6 +110,12 @@ impl RunResult {
         result
     }
 
+    /// Whether it is of the run of its number in this sweep, by seed and values.
+    pub fn is_of(&self, sweep: &Sweep) -> bool {
+        let is_key = |(seed, values)| (self.seed, &self.values) == (seed, &values);
+        self.run < sweep.runs && is_key(key(sweep, self.run))
+    }
+
     /// Its line, with the line end.
     pub fn to_line(&self) -> String {
         line(self)

@@ -4,7 +4,7 @@ use std::io::{self, BufRead, Read};
 
 use serde_json::Value;
 
-use super::{ResultsError, RunResult, head, head_fields, key};
+use super::{ResultsError, RunResult, head, head_fields};
 use crate::sweep::{Shard, Sweep};
 
 /// Longest line in bytes: what was seen in a run that failed is a sentence.
@@ -120,8 +120,7 @@ impl<'a, R: BufRead> Reader<'a, R> {
         let not_a_result = |reason: String| format!("expected the result of run {number}: {reason}");
         let text = String::from_utf8(text).map_err(|error| not_a_result(error.to_string()))?;
         let result: RunResult = serde_json::from_str(&text).map_err(|error| not_a_result(error.to_string()))?;
-        let (seed, values) = key(self.sweep, number);
-        if (result.run, result.seed) == (number, seed) && result.values == values {
+        if result.run == number && result.is_of(self.sweep) {
             Ok((text, result))
         } else {
             Err(not_a_result(format!("it is that of run {}, seed {}", result.run, result.seed)))
