@@ -131,7 +131,7 @@ impl crate::output::Report for Written {
             None => format!("what it does {when} is not known: {}", report.guard.text),
         };
         let cut = report.captures.iter().filter(|capture| capture.is_cut_off);
-        let cut = cut.map(|capture| format!("{} of {}", paint.bad("the end is missing"), capture.file));
+        let cut = cut.map(|capture| format!("{}: {}", capture.file, paint.bad("the end of this record is missing")));
         let lines = [
             format!("node {} ({}): {}", report.node, report.model, self.file),
             format!("{} of {} differ from delivery", report.differences.len(), counted(report.compared, "parameter")),
