@@ -8,6 +8,7 @@ mod from_file;
 mod job;
 mod order;
 pub(crate) mod params;
+pub(crate) mod report;
 mod runner;
 mod slot;
 pub(crate) mod supervise;

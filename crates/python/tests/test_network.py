@@ -3,6 +3,7 @@
 import json
 import math
 import pathlib
+import re
 import subprocess
 import time
 import typing
@@ -345,6 +346,27 @@ def test_what_fails_under_a_watch_is_raised_before_what_its_end_says(world, netw
             raise KeyError("mine")
 
 
+def test_the_report_about_a_node_is_the_page_of_the_command_line(tmp_path):
+    file, record = EXAMPLES / "machine.toml", tmp_path / "run.csv"
+    record.write_text("t_s,4.velocity_rpm\n0,10\n0.5,30\n", encoding="utf-8")
+    pages = tmp_path / "program.html", tmp_path / "python.html"
+    program = [ferrodrive.simulator.program(), "--json", "--bus", f"sim:{file}", "report", "4", "--capture", record, "-o", pages[0]]
+    subprocess.run(program, capture_output=True, check=True, timeout=60)
+    with ferrodrive.Network(ferrodrive.World.machine(file)) as network:
+        network.wait_for(4)
+        network.sleep(1)
+        report = network.report(4, pages[1], captures=[record])
+        # By hand: the mean of the samples.
+        assert [figure["mean"] for figure in report["captures"][0]["figures"]] == [20.0]
+        with pytest.raises(FileExistsError, match="force=True"):
+            network.report(4, pages[1])
+        with pytest.raises(ferrodrive.MasterError, match="not a record of node 1"):
+            network.report(1, tmp_path / "other.html", captures=[record])
+        assert not (tmp_path / "other.html").exists()
+    sections = [re.findall(r"<h[12][^>]*>[^<]*", page.read_text(encoding="utf-8")) for page in pages]
+    assert sections[0] == sections[1] and len(sections[0]) > 5
+
+
 def test_the_types_of_reports_have_the_fields_that_there_are(network, tmp_path):
     network.boot()
     parameters, kept, wanted = network.params(1), tmp_path / "kept.toml", tmp_path / "wanted.toml"
@@ -355,6 +377,7 @@ def test_the_types_of_reports_have_the_fields_that_there_are(network, tmp_path):
         "BootReport": network.boot(),
         "PlanReport": network.plan(),
         "ExplainReport": network.explain(1),
+        "NodeReport": network.report(1, tmp_path / "sheet.html"),
         "CheckReport": network.check(EXAMPLES / "base.toml"),
         "BackupReport": parameters.backup(),
         "ParametersPlan": parameters.plan(wanted),

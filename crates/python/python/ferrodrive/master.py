@@ -62,6 +62,7 @@ class Network(Whole):
 
     def __init__(self, bus: Union[World, str], *, machine: Optional[File] = None) -> None:
         self._world = bus if isinstance(bus, World) else None
+        self._bus = "virtual world" if isinstance(bus, World) else bus
         path = None if machine is None else os.fspath(machine)
         self._machine = path if path is not None else getattr(bus, "machine_file", None)
         if isinstance(bus, World):

@@ -254,6 +254,30 @@ class ExplainReport(TypedDict):
     pdos: list[ExplainedPdo]
 
 
+class NodeReport(TypedDict):
+    """Of :meth:`Network.report`: what its page has, but for the pictures."""
+
+    node: int
+    model: str
+    title: str
+    manual: str
+    at: str
+    by: Optional[str]
+    bus: str
+    identity: list[dict[str, Any]]
+    state: list[dict[str, Any]]
+    compared: int
+    not_compared: int
+    differences: list[dict[str, Any]]
+    refused: list[dict[str, Any]]
+    pdos: list[dict[str, Any]]
+    limits: list[dict[str, Any]]
+    guard: dict[str, Any]
+    fault: Optional[dict[str, Any]]
+    remembered: Optional[list[dict[str, Any]]]
+    captures: list[dict[str, Any]]
+
+
 class _CheckReport(TypedDict):
     ok: bool
     file: str

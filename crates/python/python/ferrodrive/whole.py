@@ -1,16 +1,18 @@
-"""What is asked of a network as a whole, blocking and as coroutines: who is there, its boot-up, its description, its load, and why a
-drive does not move."""
+"""What is asked of a network as a whole, blocking and as coroutines: who is there, its boot-up, its description, its load, why a
+drive does not move, and the report about a node."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from datetime import datetime, timezone
 from typing import Any, Optional, Union, cast
 
 from . import _native
 from ._native import Job
 from ._native import Network as NativeNetwork
 from .parameters import File
-from .reports import BootReport, CheckReport, ExplainReport, PlanReport, ScanReport
+from .reports import BootReport, CheckReport, ExplainReport, NodeReport, PlanReport, ScanReport
 from .supervisor import path_of
 
 
@@ -19,6 +21,8 @@ class Whole:
 
     _native: NativeNetwork
     _machine: Optional[str]
+    #: The bus as it was named.
+    _bus: str
 
     def _finish(self, job: Job) -> Any:
         raise NotImplementedError
@@ -186,3 +190,65 @@ class Whole:
 
     def _explain(self, node: int, model: Optional[str], watch: float) -> Job:
         return _native.explain(self._native, node, model, watch)
+
+    def report(
+        self,
+        node: int,
+        path: File,
+        model: Optional[str] = None,
+        *,
+        by: Optional[str] = None,
+        captures: Sequence[File] = (),
+        force: bool = False,
+    ) -> NodeReport:
+        """Writes a page about a node that prints well: identity, what differs from delivery, limits, guard, faults, PDOs, captures. What
+        ``ferrodrive report`` does. Reads only.
+
+        :param path: the page, ``NAME.html``
+        :param model: as for :meth:`drive`
+        :param by: who makes it
+        :param captures: records (MCAP, CSV) whose curves and figures of this node belong to it
+        :param force: overwrite an existing file
+        :raises FileExistsError: the file is there, without ``force``
+        :raises MasterError: the node is silent, or its model is not known; a record is not one of this node
+
+        >>> network.report(5, "sheet.html", force=True)["fault"] is None
+        True
+        """
+        page = _new_page(path, force)
+        return _kept(page, force, self._finish(self._report(node, model, by, captures)))
+
+    async def async_report(
+        self,
+        node: int,
+        path: File,
+        model: Optional[str] = None,
+        *,
+        by: Optional[str] = None,
+        captures: Sequence[File] = (),
+        force: bool = False,
+    ) -> NodeReport:
+        """As :meth:`report`."""
+        page = _new_page(path, force)
+        return _kept(page, force, await self._finish_soon(self._report(node, model, by, captures)))
+
+    def _report(self, node: int, model: Optional[str], by: Optional[str], captures: Sequence[File]) -> Job:
+        at = datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
+        return _native.report(self._native, node, model, (at, by, self._bus), [os.fspath(path) for path in captures])
+
+
+def _new_page(path: File, force: bool) -> str:
+    """A file for a page, looked at before anything is read on the bus."""
+    name = os.fspath(path)
+    if not name.lower().endswith(".html"):
+        raise ValueError(f"expected a path that ends in .html, got {name!r}")
+    if not force and os.path.exists(name):
+        raise FileExistsError(f"{name} exists; force=True overwrites it")
+    return name
+
+
+def _kept(path: str, force: bool, read: tuple[NodeReport, str]) -> NodeReport:
+    report, page = read
+    with open(path, "w" if force else "x", encoding="utf-8", newline="\n") as kept:
+        kept.write(page)
+    return report

@@ -2,6 +2,7 @@
 //! records of runs, as one report. It only reads. The command line, the studio and Python make the same page of it
 //! ([`NodeReport::to_html`]).
 
+mod capture;
 mod html;
 #[cfg(test)]
 mod tests;
