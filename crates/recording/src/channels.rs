@@ -75,7 +75,7 @@ impl Channels {
     }
 
     /// As [`of`](Self::of), of values that keep every digit: what was measured.
-    pub(super) fn exact(columns: &[Column]) -> Self {
+    pub fn exact(columns: &[Column]) -> Self {
         Self::begun(columns, true)
     }
 

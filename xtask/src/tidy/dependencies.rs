@@ -31,6 +31,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("fmu", &["can", "sim", "words"]),
     ("machine", &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives", "sim", "master", "words"]),
     ("recording", &["can", "canopen", "plot", "sim", "words"]),
+    ("foxglove", &["can", "recording"]),
     ("scenario", &["can", "canopen", "cia402", "devices", "machine", "master", "sim", "words"]),
     (
         "host",
@@ -49,7 +50,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "words",
         ],
     ),
-    ("serve", &["can", "canlog", "host", "master", "recording", "scenario", "sim", "transport", "words"]),
+    ("serve", &["can", "canlog", "foxglove", "host", "master", "recording", "scenario", "sim", "transport", "words"]),
     ("studio", &["can", "canlog", "canopen", "host", "machine", "master", "recording", "words"]),
     ("web", &["can", "canopen", "host", "machine", "master", "scenario", "sim", "slcan", "words"]),
     (
