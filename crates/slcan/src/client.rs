@@ -238,6 +238,8 @@ impl Client {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
     use crate::Adapter;
 
@@ -310,6 +312,27 @@ mod tests {
         assert!(matches!(found[1], Event::Malformed(3, Malformed::Syntax { .. })), "{found:?}");
         assert!(matches!(found[3], Event::Malformed(5, Malformed::TooLong)), "{found:?}");
         assert_eq!(found.len(), 5);
+    }
+
+    proptest! {
+        /// Whatever an adapter sends, however it is cut: the same events and bytes, and an end of the opening.
+        #[test]
+        fn any_bytes_are_taken_the_same_however_they_are_cut(
+            pieces in proptest::collection::vec("(\r|\u{7}|V1\r|z\r|F00\r|t1000\r|t1|@|.)", 0..30)
+        ) {
+            let made = |bytes: &[&[u8]]| {
+                let mut client = Client::open(Some(Bitrate::K500), ms(0)).expect("S6");
+                bytes.iter().for_each(|piece| client.handle_input(piece, ms(0)));
+                while let Some(at) = client.poll_timeout() {
+                    client.handle_timeout(at);
+                }
+                (events(&mut client), client.take_output())
+            };
+            let stream = pieces.concat();
+            let whole = made(&[stream.as_bytes()]);
+            prop_assert!(whole.0.iter().any(|event| matches!(event, Event::Opened | Event::Failed(_))));
+            prop_assert_eq!(made(&stream.as_bytes().chunks(1).collect::<Vec<_>>()), whole);
+        }
     }
 
     #[test]
