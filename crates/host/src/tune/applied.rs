@@ -124,6 +124,7 @@ pub async fn step(
         setup.prepare(drive, 1.0).await?;
         if loops.demand.is_none() {
             let mut reader = Reader::of(drive, request.bounds, *excursion)?;
+            reader.guard(request.cyclic.guard).await?;
             let answer = reader.step_response(most_rpm, Duration::from_secs_f64(ANSWER_S)).await;
             *excursion = reader.excursion;
             return both(answer, reader.stop().await);

@@ -10,6 +10,7 @@ use std::time::Duration;
 use can::Instant;
 use devices::{Loops, Quantity, StatedLoop};
 use master::cyclic::NotAtRest;
+use master::drive::SwitchedOff;
 use master::units::{Ramp, Rpm};
 use master::{Drive, MotionOptions};
 use sim::{GearModel, MotorData};
@@ -59,6 +60,7 @@ pub struct Reader {
     bounds: Bounds,
     /// What this measurement had come to before, and has come to now.
     pub excursion: Excursion,
+    is_guarded: bool,
 }
 
 impl Reader {
@@ -77,7 +79,19 @@ impl Reader {
             );
         };
         let drive = Drive::new(drive.node().clone(), model);
-        Ok(Self { drive, speed, current, bounds, excursion })
+        Ok(Self { drive, speed, current, bounds, excursion, is_guarded: false })
+    }
+
+    /// Has it stop by itself when this program dies, if that is asked for; until it was seen to stand.
+    ///
+    /// # Errors
+    /// It does not answer, or refuses.
+    pub async fn guard(&mut self, guard: Option<SwitchedOff>) -> Result<(), Failure> {
+        if let Some(switched_off) = guard {
+            self.drive.guard(switched_off).await?;
+            self.is_guarded = true;
+        }
+        Ok(())
     }
 
     fn now(&self) -> Instant {
@@ -199,10 +213,12 @@ impl Reader {
             let unseen = Failure::new(NotAtRest::NotSeen { node }.to_string()).of_kind("not_stopped").at_node(node);
             unseen.next(format!("ferrodrive estop, and ferrodrive explain {node}")).after(error.into())
         });
-        match self.drive.disable().await {
-            Ok(()) => stood,
-            Err(error) => both(Err(error.into()), stood),
+        let off = self.drive.disable().await;
+        both(off.map_err(Failure::from), stood)?;
+        if self.is_guarded {
+            self.drive.release_guard().await?;
         }
+        Ok(())
     }
 }
 

@@ -192,7 +192,7 @@ pub async fn find(
     let had = Setup::clone_values(&setup);
     let (found, twin, twin_off) = match (loops.demand, loops.stated, motor.gear) {
         (None, Some(stated), Some(gear)) => {
-            let currents = both(currents(drive, &setup, how.1, excursion).await, setup.put_back(drive).await)?;
+            let currents = both(currents(drive, &setup, request, excursion).await, setup.put_back(drive).await)?;
             let shaft = Shaft { motor: &motor, gear: &gear, stated: &stated };
             by_readings((model, loops), &shaft, &had, (&currents, how.1))?
         }
@@ -231,11 +231,12 @@ pub async fn find(
 async fn currents(
     drive: &Drive,
     setup: &Setup,
-    bounds: Bounds,
+    request: &Request,
     excursion: &mut Excursion,
 ) -> Result<Currents, Failure> {
     setup.prepare(drive, 1.0).await?;
-    let mut reader = Reader::of(drive, bounds, *excursion)?;
+    let mut reader = Reader::of(drive, request.bounds, *excursion)?;
+    reader.guard(request.cyclic.guard).await?;
     let currents = reader.measure().await;
     *excursion = reader.excursion;
     both(currents, reader.stop().await)
