@@ -42,7 +42,7 @@ let last_at = performance.now();
  * Calls `listener` with each state ("state"), each piece of news ("news"), when the connection opens or closes ("change"), when the
  * shown state becomes current or stale, and repeatedly while it is stale ("sight": `{ fresh, connected, age_ms, refused }`), and with
  * the outcome of a press of stop ("stop": `{ confirmed, after_ms }`), and with each command that is sent ("asked"). "halt" comes when
- * everything is stopped: true before a press of stop on this page is sent, false when the host reports a stop, whoever caused it.
+ * everything is stopped: true before a press of stop on this page is sent, false when the host reports a stop of any cause.
  */
 export function on(what, listener) {
   listeners[what].push(listener);

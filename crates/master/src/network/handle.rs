@@ -134,7 +134,7 @@ impl Network {
     }
 
     /// Asks these nodes by other SDO servers than the default one, given by their records (1201h to 127Fh), in place of what was chosen
-    /// before. Each record is read when its node is first asked for something, whoever asks; a request fails as
+    /// before. Each record is read when its node is first asked for something; a request fails as
     /// [`Node::use_sdo_server`](super::Node::use_sdo_server) does where there is none. What stops an axis before that goes to the default
     /// server and waits for nothing.
     pub fn choose_sdo_servers(&self, servers: impl IntoIterator<Item = (NodeId, u16)>) {

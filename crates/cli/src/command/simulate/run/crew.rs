@@ -73,7 +73,7 @@ impl Crew {
                 });
             }
             drop(results);
-            // A panic of `take` ends the work too: nobody takes what the others would go on to make.
+            // A panic of `take` ends the work too: what the others would go on to make would not be taken.
             let _ends = taken.on_panic(&self.stop);
             let mut early = BTreeMap::new();
             let mut first = 0;
