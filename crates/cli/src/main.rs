@@ -284,7 +284,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Init(init) => {
             init.run(global, typed.bus).and_then(|report| print_whole(format, &report, report.failure()))
         }
-        Command::Plot(plot) => print(format, &plot.draw()?),
+        Command::Plot(plot) => print(format, &plot.draw(global)?),
         Command::Readings(readings) => print(format, &readings.list()?),
         Command::Eds(eds) => eds.run(format),
         Command::Dcf(command) => on_bus(global, format, async |context| command.run(context).await),

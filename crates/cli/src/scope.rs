@@ -86,7 +86,12 @@ const UNHEEDED: [Unheeded; 16] = [
         why: "it reads a log and writes another, and looks at no frame",
         next: "omit it; the second file is the log that is written",
     },
-    Unheeded { command: "plot", options: ALL, why: "it draws a file", next: "omit it" },
+    Unheeded {
+        command: "plot",
+        options: &[BUS, TIMEOUT, VERBOSE, REALTIME, LOG],
+        why: "it draws a file; of a log, --model and --machine name the models",
+        next: "omit it",
+    },
     Unheeded { command: "fmu", options: ALL, why: "it packs a file, and asks no bus", next: "omit it" },
     Unheeded { command: "man-pages", options: ALL, why: "a manual page depends on none of them", next: "omit it" },
     Unheeded {

@@ -237,6 +237,22 @@ fn a_capture_is_a_record_with_what_belongs_to_it_and_says_how_it_was_had() {
     assert!(capture.model == "zlac8030l" && !capture.parameters.is_empty() && !capture.is_cut_off);
     let drawn = done(&["plot", name, "-o", "-", "--json"]).json();
     assert!(!drawn["picture"].as_str().unwrap().contains("capture {"), "the description is not an event");
+    // What was on the wire meanwhile, in two forms: the least and the most of each object are those of its trace.
+    let (log, blf) = (place.join("wire.log"), place.join("wire.blf"));
+    let (log, blf) = (log.to_str().unwrap(), blf.to_str().unwrap());
+    done(&["capture", "4", "supply", "--for", "100ms", "--log", log, "--json"]);
+    done(&["convert", log, blf]);
+    let page = place.join("page.html");
+    let of = |log: &str| {
+        let words = ["report", "4", "--capture", log, "-o", page.to_str().unwrap(), "--force", "--json"];
+        done(&words).json()["captures"][0]["figures"].clone()
+    };
+    let (figures, of_blf) = (of(log), of(blf));
+    assert_eq!(figures, of_blf);
+    // Its source is set to 48 V.
+    assert!(figures.as_array().is_some_and(|all| all.len() == 1) && figures[0]["mean"] == 48.0, "{figures}");
+    let drawn = done(&["plot", blf, "--model", "4=zlac8030l", "-o", "-", "--json"]).json();
+    assert!(drawn["signals"].as_u64() > Some(0), "{drawn}");
     let refused = ferrodrive(&["capture", "1", "velocity"]);
     assert!(
         refused.status == Some(1) && refused.err.contains("is fixed") && refused.err.contains("--sdo"),

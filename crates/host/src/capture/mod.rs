@@ -4,12 +4,14 @@
 //! collects until a capture is whole. [`Restorer`] leads back, whatever ends it. [`merit`] has the figures of a response.
 
 pub mod merit;
+mod of_log;
 mod plan;
 mod quantity;
 mod restorer;
 mod rows;
 mod session;
 
+pub use of_log::record_of_log;
 pub use plan::{CapturePlan, Pace, Request, plan};
 pub use quantity::{Form, Quantity, short_names};
 pub use restorer::{Restorer, SeenBy};

@@ -8,7 +8,7 @@ use std::fmt;
 use canopen::Mux;
 use canopen::od::{DataType, Entry};
 use cia402::object::{POSITION_ACTUAL_VALUE, TARGET_POSITION};
-use devices::Units;
+use devices::{Description, Units};
 use master::Drive;
 use master::decode::{common_name, common_row};
 use recording::ending_of;
@@ -139,6 +139,11 @@ impl Quantity {
                 .at_object(mux)
                 .next(format!("ferrodrive objects {id} shows the types; ferrodrive read shows such an object once")));
         }
+        Ok(Self::of_row(drive.description(), mux, row))
+    }
+
+    /// A number of at most 32 bits by the row of its table.
+    pub(super) fn of_row(model: Option<&'static Description>, mux: Mux, row: Option<&'static Entry>) -> Self {
         let name = row.map(|row| row.name).or_else(|| common_name(mux));
         let mut name = name.map_or_else(|| format!("object_{:04X}", mux.index), str::to_owned);
         if mux.sub_index != 0 {
@@ -146,10 +151,10 @@ impl Quantity {
         }
         let (factor, unit) = row.map_or((1.0, ""), |row| factor_of(row.unit));
         let data_type = row.map_or(DataType::Unsigned32, |row| row.data_type);
-        let form = drive.description().and_then(|model| model.pdo.mapping.tpdo_form(mux));
+        let form = model.and_then(|model| model.pdo.mapping.tpdo_form(mux));
         let by_sdo = Form { data_type, factor };
         let by_pdo = form.map_or(by_sdo, |form| Form { data_type: form.data_type, factor: factor_of(form.unit).0 });
-        Ok(Self { name: name + ending_of(unit), unit: unit.to_owned(), object: mux, by_sdo, by_pdo })
+        Self { name: name + ending_of(unit), unit: unit.to_owned(), object: mux, by_sdo, by_pdo }
     }
 
     async fn of_short(drive: &Drive, Short { name, kind, place }: &Short) -> Result<Self, Failure> {

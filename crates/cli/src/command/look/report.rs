@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
-use host::network::report::{Capture, CaptureFigure, Made, NodeReport};
-use recording::{Recorded, Subject, picture};
+use host::network::report::{Capture, Made, NodeReport};
+use master::decode::Decoder;
 use serde::Serialize;
 use transport::WallClock;
 use words::counted;
@@ -16,7 +16,7 @@ use crate::command::record_and_replay::plot::read_record;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::frames::stamp::absolute;
-use plot::{Figure, Paint};
+use plot::Paint;
 
 /// Write a report about a node: identity, what differs from delivery, limits, guard, faults, PDOs, captures
 ///
@@ -35,7 +35,7 @@ pub(crate) struct Report {
     /// Who makes the report
     #[arg(long, value_name = "NAME")]
     by: Option<String>,
-    /// Record of --record or `record`, whose curves and figures of this node belong to the report; may be repeated
+    /// Record of --record, `record` or `capture`, or a log of frames (candump, BLF, ..), whose curves and figures of this node belong to the report; may be repeated
     #[arg(long, value_name = "FILE")]
     capture: Vec<PathBuf>,
     /// Overwrite an existing file
@@ -64,7 +64,11 @@ impl Report {
     pub(crate) async fn run(&self, context: &Context) -> Result<Written, Failure> {
         // Before minutes are spent on the bus.
         new_file(Some(&self.output), self.force)?;
-        let captures = self.capture.iter().map(|path| capture(path, self.node)).collect::<Result<Vec<_>, _>>()?;
+        let captures = self
+            .capture
+            .iter()
+            .map(|path| capture(path, self.node, context.decoder()))
+            .collect::<Result<Vec<_>, _>>()?;
         let clock = WallClock::start();
         let now = clock.unix_zero() + Duration::from_nanos(clock.now().as_nanos());
         // To the minute.
@@ -79,36 +83,14 @@ impl Report {
 }
 
 /// What a record has of a node.
-fn capture(path: &Path, node: NodeId) -> Result<Capture, Failure> {
-    let Recorded { mut series, marks, torn } = read_record(path)?;
-    series.retain(|series| matches!(series.column.subject, Subject::Axis(place) if place.node == node.raw()));
-    let recorded = Recorded { series, marks, torn };
+fn capture(path: &Path, node: NodeId, decoder: Decoder) -> Result<Capture, Failure> {
+    let recorded = read_record(path, decoder)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let poster = picture(&file, &recorded, &[], 0.0..=f64::INFINITY).map_err(|reason| {
+    Capture::of_record(file, recorded, node).map_err(|reason| {
         Failure::bad_file(format!("the record {} has nothing of node {node}", path.display()))
             .because(reason)
             .next("give a record of this node, or omit it")
-    })?;
-    let drawn: Vec<&Figure> = poster.rows.iter().flatten().collect();
-    // A node with several axes has a figure for each.
-    let axis = |figure: &Figure| if drawn.len() > 1 { format!("{}: ", figure.title) } else { String::new() };
-    let axis = &axis;
-    let figures = drawn.iter().flat_map(|figure| {
-        let traces = figure.panels.iter().flat_map(|panel| panel.traces.iter().map(move |trace| (panel, trace)));
-        traces.filter_map(move |(panel, trace)| {
-            let name = format!("{}{}, {}", axis(figure), panel.title, trace.label);
-            let (min, mean, max) = extent(&trace.points)?;
-            Some(CaptureFigure { name, unit: panel.unit.to_string(), min, mean, max })
-        })
-    });
-    Ok(Capture { figures: figures.collect(), file, is_cut_off: torn, picture: poster.to_svg() })
-}
-
-/// The least value, the mean of the samples and the most; `None` where no sample has a value.
-fn extent(points: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
-    let values = || points.iter().map(|(_, value)| *value).filter(|value| value.is_finite());
-    let (min, max) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
-    Some((min, values().sum::<f64>() / values().count() as f64, max))
+    })
 }
 
 impl crate::output::Report for Written {

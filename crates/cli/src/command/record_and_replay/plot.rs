@@ -3,13 +3,20 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use can::Instant;
+use canlog::{Content, Entry, Record};
+use host::capture::record_of_log;
+use master::decode::Decoder;
 use recording::{Kind, Recorded, picture, read};
 use serde::Serialize;
 use words::counted;
 use words::document::read_bytes;
 
 use crate::command::configure::dcf::is_stdout;
+use crate::command::look::dump::open_log;
 use crate::failure::Failure;
+use crate::frames::decoder;
+use crate::global::Global;
 use crate::output::Report;
 use plot::Paint;
 
@@ -20,9 +27,10 @@ use plot::Paint;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive plot run.mcap -o run.svg\n  \
+    ferrodrive plot trace.blf --machine base.toml\n  \
     ferrodrive plot run.csv --signals velocity --from 1.5s --to 3s -o run.html")]
 pub(crate) struct Plot {
-    /// Record, NAME.mcap or NAME.csv
+    /// Record, NAME.mcap or NAME.csv; or a log of frames (candump, BLF, ..), whose PDOs are decoded by --model or --machine
     file: PathBuf,
     /// Signals, e.g. velocity,4.current_a,5.* (default: positions, velocities, currents and supplies)
     #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',')]
@@ -80,8 +88,8 @@ pub(crate) struct Drawn {
 
 impl Plot {
     /// Draws it.
-    pub(crate) fn draw(&self) -> Result<Drawn, Failure> {
-        let recorded = read_record(&self.file)?;
+    pub(crate) fn draw(&self, global: &Global) -> Result<Drawn, Failure> {
+        let recorded = read_record(&self.file, decoder(global, &[]))?;
         let title = self.file.file_name().unwrap_or_default().to_string_lossy();
         let span = self.from..=self.to.unwrap_or(f64::INFINITY);
         if span.is_empty() {
@@ -113,20 +121,46 @@ impl Plot {
     }
 }
 
-/// What a file that --record has written holds.
-pub(in crate::command) fn read_record(path: &Path) -> Result<Recorded, Failure> {
-    let unreadable = |reason| {
+/// What a file that --record has written holds, or what the PDOs of a log carry, which this decoder puts into words.
+pub(in crate::command) fn read_record(path: &Path, decoder: Decoder) -> Result<Recorded, Failure> {
+    let unreadable = |reason: String| {
         Failure::bad_file(format!("cannot read the record {}", path.display()))
             .because(reason)
-            .next("give a file that --record of this program has written")
+            .next("give a file that --record of this program has written, or a log of frames")
     };
-    let kind = Kind::of_name(&path.to_string_lossy()).ok_or_else(|| {
-        Failure::usage(format!("{} is not a record", path.display()))
-            .because("a record is called NAME.mcap or NAME.csv")
-            .next("make one, e.g. ferrodrive sim --drive zlac8030l@4 --record run.mcap")
-    })?;
-    let bytes = read_bytes(path, LARGEST).map_err(unreadable)?;
-    read(kind, &bytes).map_err(|reason| unreadable(reason).of_kind("record"))
+    if let Some(kind) = Kind::of_name(&path.to_string_lossy()) {
+        let bytes = read_bytes(path, LARGEST).map_err(unreadable)?;
+        return read(kind, &bytes).map_err(|reason| unreadable(reason).of_kind("record"));
+    }
+    if canlog::Format::of_name(path).is_none() {
+        return Err(Failure::usage(format!("{} is not a record", path.display()))
+            .because("a record is called NAME.mcap or NAME.csv, a log of frames NAME.log, .blf, .asc, .trc, .pcap or .pcapng")
+            .next("make one, e.g. ferrodrive sim --drive zlac8030l@4 --record run.mcap"));
+    }
+    let mut log = open_log(path)?;
+    let mut torn = None;
+    let frames = std::iter::from_fn(|| {
+        loop {
+            match log.next_entry() {
+                Ok(Some(Entry::Record(Record { at: Some(at), content: Content::Frame(frame), .. }))) => {
+                    return Some((at, frame));
+                }
+                Ok(Some(_)) => {}
+                Ok(None) => return None,
+                Err(error) => {
+                    torn = Some(error);
+                    return None;
+                }
+            }
+        }
+    });
+    let mut first = None;
+    let since = frames.map(|(at, frame)| {
+        let first = *first.get_or_insert(at);
+        (Instant::from_nanos(at.nanos_since(first)), frame)
+    });
+    let recorded = record_of_log(decoder, since).map_err(|reason| unreadable(reason).of_kind("record"))?;
+    Ok(Recorded { torn: torn.is_some(), ..recorded })
 }
 
 /// Writes a picture where it is asked for; the text of it, if that is standard output.

@@ -28,7 +28,7 @@ impl Capture {
                 Some(CaptureFigure { name, unit: panel.unit.to_string(), min, mean, max })
             })
         });
-        Ok(Self { figures: figures.collect(), file, picture: poster.to_svg() })
+        Ok(Self { figures: figures.collect(), file, is_cut_off: torn, picture: poster.to_svg() })
     }
 }
 

@@ -31,6 +31,11 @@ pub struct Pdo {
 }
 
 impl Pdo {
+    /// The model of the node, as far as it is known.
+    pub fn model(&self) -> Option<&'static Description> {
+        self.model.map(|model| model.0)
+    }
+
     pub(super) fn unmapped(node: NodeId, pdo: PdoId, model: Option<Model>, frame: &Frame) -> Self {
         let bytes = frame.data().to_vec();
         Self { node, pdo, fields: Vec::new(), bytes, mapped_bytes: None, model }
