@@ -37,6 +37,7 @@
 //! | reach a bus: socketcand, slcan, a log | [`transport::BusSpec`], [`transport::run_station`] |
 //! | read and write log files | [`canlog::LogReader`], [`canlog::LogWriter`] |
 //! | serve a virtual bus to other programs | [`serve::world::ServedWorld`], [`transport::Hub`], [`transport::run_world`] |
+//! | show a run live to Foxglove, Lichtblick or PlotJuggler | [`foxglove::Server`] |
 //! | know what a device is: objects, units, faults | [`devices::Description`] |
 //! | read, check and write EDS and DCF files | [`eds::Eds`] |
 //! | test a device for conformance | [`conform::Suite`] |
@@ -53,6 +54,6 @@
 
 #[doc(inline)]
 pub use {
-    can, canlog, canopen, cia402, conform, devices, drives, eds, fmu, host, machine, master, motion, plant, plot,
-    recording, scenario, serve, showcase, sim, slcan, studio, transport, tune, words,
+    can, canlog, canopen, cia402, conform, devices, drives, eds, fmu, foxglove, host, machine, master, motion, plant,
+    plot, recording, scenario, serve, showcase, sim, slcan, studio, transport, tune, words,
 };

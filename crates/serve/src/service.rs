@@ -14,7 +14,7 @@ use super::control::ControlMessage;
 use super::input::next_line;
 use super::messages::Messages;
 use super::world::{Commanded, ServedWorld};
-use crate::writing::{FrameLog, RecordFile};
+use crate::writing::{FrameLog, RecordOutput};
 use recording::Batch;
 use words::failure::Failure;
 
@@ -95,8 +95,8 @@ pub struct Service {
     pub warnings: Messages,
     /// The log, if one is asked for.
     pub log: Option<FrameLog>,
-    /// The record, if one is asked for.
-    pub record: Option<RecordFile>,
+    /// Where the record goes, if one is asked for.
+    pub record: Option<RecordOutput>,
     /// Lines that came while a run was under way: each is answered in its turn.
     pub waiting: VecDeque<String>,
     /// RoundRobin of keeping after which a `quit` that waits ends the run.
@@ -300,7 +300,7 @@ mod tests {
     use crate::files::{create_log, create_record};
     use crate::pacer::{Clock, Pacer, Speed};
     use crate::scratch;
-    use crate::writing::Pace;
+    use crate::writing::{Pace, RecordFile};
 
     type Asked = Request<Failure>;
 
@@ -321,7 +321,7 @@ mod tests {
         let file = create_record(&path, kind).unwrap();
         let columns = [Column::of_axis(channel)];
         let record = recording::Record::begin(kind, Box::new(file), &columns).unwrap();
-        let file = RecordFile::start(record, Pace::Free, Messages::silent());
+        let file = Some(RecordFile::start(record, Pace::Free, Messages::silent()));
         let mut served =
             ServedWorld::new(world, Pacer::new(Clock::Manual, Speed::Times(1.0)), true, Messages::silent());
         let frames = BufWriter::new(create_log(&log, Format::Candump).unwrap());
@@ -330,7 +330,7 @@ mod tests {
             answers: Messages::silent(),
             warnings: Messages::silent(),
             log: Some(FrameLog::start(frames, Duration::ZERO, Pace::Free, Messages::silent())),
-            record: Some(file),
+            record: Some(RecordOutput { file, ..RecordOutput::default() }),
             waiting: VecDeque::new(),
             quit_in: None,
             by_hand: true,

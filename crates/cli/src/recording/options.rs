@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use devices::AxisId;
-use recording::{Column, Kind, Record, columns_of_drives, select};
+use recording::{Channels, Column, Kind, Record, columns_of_drives, select};
 use sim::coupling::BodyState;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Place, World};
@@ -13,10 +13,13 @@ use crate::failure::Failure;
 use master::units::parse_duration;
 use serve::files::create_record;
 use serve::messages::Messages;
-use serve::writing::{Pace, RecordFile};
+use serve::writing::{Pace, RecordFile, RecordOutput};
+
+use super::viewers::ViewerOptions;
 
 /// Sample rate and choice of signals of a record.
 #[derive(clap::Args, Clone, Debug, Default)]
+#[command(group = clap::ArgGroup::new("sampled").args(["record", "foxglove"]).multiple(true))]
 pub(crate) struct RecordOptions {
     /// Record motion, measured values and events to this file: .mcap (for Foxglove, PlotJuggler, Rerun) or .csv
     ///
@@ -25,11 +28,13 @@ pub(crate) struct RecordOptions {
     #[arg(long, value_name = "FILE", value_parser = record_path)]
     record: Option<PathBuf>,
     /// Time between two samples, at least 50us
-    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = record_period, hide_short_help = true, requires = "record")]
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = record_period, hide_short_help = true, requires = "sampled")]
     record_period: Option<Duration>,
     /// Signals, e.g. velocity,4.current_a,5.* (default: all)
-    #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',', hide_short_help = true, requires = "record")]
+    #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',', hide_short_help = true, requires = "sampled")]
     record_signals: Vec<String>,
+    #[command(flatten)]
+    viewers: ViewerOptions,
 }
 
 /// The shortest control period of a drive: nothing that is sampled changes faster.
@@ -57,14 +62,21 @@ impl RecordOptions {
         self.record.as_deref()
     }
 
+    /// Viewers are asked for.
+    pub(crate) fn is_live(&self) -> bool {
+        self.viewers.is_asked_for()
+    }
+
     /// Begins to record the drives of `world` as asked for; `None` if it is not.
     pub(crate) fn start(
         &self,
         world: &mut World,
         pace: Pace,
         messages: Messages,
-    ) -> Result<Option<RecordFile>, Failure> {
-        let Some(path) = self.path() else { return Ok(None) };
+    ) -> Result<Option<RecordOutput>, Failure> {
+        if self.path().is_none() && !self.is_live() {
+            return Ok(None);
+        }
         let mut places = Vec::new();
         let numbers: Vec<u8> = world.drive_numbers().collect();
         for node in numbers {
@@ -92,11 +104,15 @@ impl RecordOptions {
         let of_axes = channels.iter().map(|channel| Column::of_axis(*channel));
         let columns: Vec<Column> = of_axes.chain(bodies.iter().flat_map(Column::of_body)).collect();
         let period = self.record_period.unwrap_or(Duration::from_millis(1));
-        let record = create(path).and_then(|(kind, file)| Record::begin(kind, Box::new(file), &columns));
-        let file = RecordFile::start(record.map_err(|error| cannot_write(path, &error))?, pace, messages);
+        let viewers = self.viewers.start(Channels::of(&columns), |note| messages.say(&format!("note: {note}")))?;
+        let begin = |path: &Path| {
+            let record = create(path).and_then(|(kind, file)| Record::begin(kind, Box::new(file), &columns));
+            record.map_err(|error| cannot_write(path, &error))
+        };
+        let file = self.path().map(begin).transpose()?.map(|record| RecordFile::start(record, pace, messages));
         world.start_recording(Recorder::new(period, channels).with_bodies(&bodies));
         world.watch(true);
-        Ok(Some(file))
+        Ok(Some(RecordOutput { file, viewers }))
     }
 }
 

@@ -78,7 +78,7 @@ fn follow_in(name: &str, folder: &Path) -> usize {
 }
 
 /// The pages whose commands are run here, and how many they are.
-const FOLLOWED: [(&str, usize); 16] = [
+const FOLLOWED: [(&str, usize); 17] = [
     ("install.md", 2),
     ("first-steps.md", 18),
     ("simulate.md", 14),
@@ -95,6 +95,7 @@ const FOLLOWED: [(&str, usize); 16] = [
     ("why-it-does-not-move.md", 3),
     ("start-up.md", 2),
     ("several-axes.md", 4),
+    ("foxglove.md", 1),
 ];
 
 /// The pages whose commands are not run here, and why.
@@ -175,4 +176,5 @@ fn every_command_of_the_other_pages_ends_well() {
     follows("why-it-does-not-move.md", follow("why-it-does-not-move.md"));
     follows("start-up.md", follow("start-up.md"));
     follows("several-axes.md", follow("several-axes.md"));
+    follows("foxglove.md", follow("foxglove.md"));
 }

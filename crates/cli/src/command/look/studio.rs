@@ -12,6 +12,7 @@ use can::Bitrate;
 use canopen::NodeId;
 use host::{Host, Journals, Setting};
 use machine::parameters::journal::Journal;
+use recording::Channels;
 use serde::Serialize;
 use studio::{Access, AccessError, Password, Token};
 use transport::BusSpec;
@@ -24,7 +25,7 @@ use crate::control_client::ControlArgs;
 use crate::failure::Failure;
 use crate::far_world;
 use crate::output::{Format, Report, file_path};
-use crate::recording::interface_of;
+use crate::recording::{HostViewers, ViewerOptions, interface_of};
 use crate::served::{cannot_listen, listen};
 use plot::Paint;
 
@@ -71,6 +72,8 @@ pub(crate) struct Studio {
     open: bool,
     #[command(flatten)]
     control: ControlArgs,
+    #[command(flatten)]
+    viewers: ViewerOptions,
 }
 
 /// Where the studio is.
@@ -111,11 +114,14 @@ impl Studio {
             setting.world = Some(far_world::open(&self.control)?);
         }
         let (host, handle) = Host::new(context.network.clone(), setting);
+        let viewers = HostViewers::new(self.viewers.start(Channels::exact(&[]), |note| context.note(note))?);
+        let showing = viewers.serve(&handle);
         let app = studio::app(handle, Arc::new(access));
         tokio::select! {
             served = studio::serve(listener, app) => served.map_err(|error| cannot_listen(&self.listen, error)),
             // Not before the router is gone, which holds the handle.
-            () = host.run(|| context.traffic.take()) => Ok(()),
+            () = host.run(|| viewers.note(context.traffic.take())) => Ok(()),
+            never = showing => match never {},
             never = self.keep_open(context, &url) => match never {},
         }
     }

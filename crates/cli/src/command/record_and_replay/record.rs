@@ -13,7 +13,7 @@ use master::decode::{common_row, common_type};
 use master::pdo::TimerUnits;
 use master::units::parse_duration;
 use master::{Drive, Node};
-use recording::{Batch, Column, Kind, Mark, Severity, Subject};
+use recording::{Batch, Channels, Column, Kind, Mark, Severity, Subject};
 use serde::Serialize;
 use sim::Place;
 use words::counted;
@@ -25,10 +25,11 @@ use crate::command::configure::sdo::resolve;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
+use crate::recording::ViewerOptions;
 use plot::Paint;
 use serve::files::create_record;
 use serve::messages::Messages;
-use serve::writing::{Pace, RecordFile};
+use serve::writing::{Pace, RecordFile, RecordOutput};
 
 /// Record objects of a node over time
 ///
@@ -58,6 +59,8 @@ pub(crate) struct Record {
     /// End after this time (default on an embedded virtual bus: 1s)
     #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
     duration: Option<Duration>,
+    #[command(flatten)]
+    viewers: ViewerOptions,
 }
 
 fn record_file(text: &str) -> Result<(PathBuf, Kind), String> {
@@ -149,7 +152,9 @@ impl Record {
         let cannot = |error: std::io::Error| Failure::of_writing("the record", path, &error);
         let file = if is_stdout(path) { stdout_file() } else { create_record(path, *kind) };
         let record = file.and_then(|file| recording::Record::exact(*kind, Box::new(file), &columns)).map_err(cannot)?;
-        let mut file = RecordFile::start(record, Pace::RealTime, Messages::of_warnings());
+        let viewers = self.viewers.start(Channels::exact(&columns), |note| context.note(note))?;
+        let file = Some(RecordFile::start(record, Pace::RealTime, Messages::of_warnings()));
+        let mut output = RecordOutput { file, viewers };
         let mut report = RecordReport {
             file: path.display().to_string(),
             node: self.node.raw(),
@@ -160,8 +165,8 @@ impl Record {
             missing: 0,
             duration_s: 0.0,
         };
-        self.sample(context, &node, &sources, &mut file, &mut report).await;
-        file.finish(DISK_PATIENCE)?;
+        self.sample(context, &node, &sources, &mut output, &mut report).await;
+        output.finish(DISK_PATIENCE)?;
         if is_stdout(path) {
             context.progress.clear();
             context.note(&report.summary(Paint::OFF));
@@ -174,7 +179,7 @@ impl Record {
         context: &Context,
         node: &Node,
         sources: &[RecordedObject],
-        file: &mut RecordFile,
+        output: &mut RecordOutput,
         report: &mut RecordReport,
     ) {
         let network = &context.network;
@@ -205,14 +210,14 @@ impl Record {
             }
             if at - handed >= HANDED_ON {
                 handed = at;
-                file.write(std::mem::take(&mut batch));
+                output.write(std::mem::take(&mut batch));
                 context.progress.show(format!("{} samples", report.samples));
             }
             // What took longer than a period is not made up for.
             due = (due + self.every).max(network.now());
         }
         report.duration_s = (network.now() - begin).as_secs_f64();
-        file.write(batch);
+        output.write(batch);
     }
 }
 

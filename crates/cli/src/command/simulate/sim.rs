@@ -16,7 +16,7 @@ use serve::pacer::{Clock, Pacer, Speed};
 use serve::service::{PARTING_PATIENCE, REQUESTS_WAITING, Service, read_lines, tick};
 use serve::store_writer::{StoreWriter, file_name};
 use serve::world::ServedWorld;
-use serve::writing::{FrameLog, Pace, RecordFile};
+use serve::writing::{FrameLog, Pace, RecordOutput};
 use sim::Fidelity;
 use sim::machine::{Order, Realism, TimingMode};
 use sim::{VirtualDrive, World};
@@ -278,7 +278,7 @@ impl Sim {
         &self,
         mut world: ServedWorld,
         eeproms: Option<Eeproms>,
-        (log, record): (Option<NewLog>, Option<RecordFile>),
+        (log, record): (Option<NewLog>, Option<RecordOutput>),
         warnings: Messages,
         global: &Global,
         bridge: Option<&BusSpec>,

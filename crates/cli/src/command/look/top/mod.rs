@@ -22,6 +22,7 @@ use crossterm::{execute, terminal};
 use host::{Host, LocalClient, Shown};
 use master::drive::Stopped;
 use ratatui::DefaultTerminal;
+use recording::Channels;
 use serde_json::Value;
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
@@ -30,6 +31,7 @@ use super::studio::setting;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Format;
+use crate::recording::{HostViewers, ViewerOptions};
 use app::{Action, App};
 use screen::Look;
 
@@ -41,7 +43,10 @@ use screen::Look;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive top\n  ferrodrive --bus can0 --machine machine.toml top\n\n\
     Keys: ? shows them. SPACE and Esc stop every drive.")]
-pub(crate) struct Top {}
+pub(crate) struct Top {
+    #[command(flatten)]
+    viewers: ViewerOptions,
+}
 
 /// How often time is looked at: what is no longer held ends so much later at most.
 const TICK: Duration = Duration::from_millis(10);
@@ -66,13 +71,17 @@ impl Top {
                 .next("ferrodrive watch NODE OBJECT .. --json prints what changes, a line each")
                 .next("ferrodrive studio serves the same as a page and as /api/state"));
         }
+        let server = self.viewers.start(Channels::exact(&[]), |note| context.note(note))?;
         context.progress.clear();
         context.traffic.listen();
         let (host, app) = Host::new(context.network.clone(), setting(context));
-        let mut host = pin!(host.run(|| context.traffic.take()));
+        let viewers = HostViewers::new(server);
+        let showing = viewers.serve(&app);
+        let mut host = pin!(host.run(|| viewers.note(context.traffic.take())));
         tokio::select! {
             ended = show(context, app, format) => ended?,
             () = &mut host => {}
+            never = showing => match never {},
         }
         stop(context).await
     }

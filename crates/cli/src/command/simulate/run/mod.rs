@@ -103,6 +103,11 @@ impl Run {
     /// Runs it.
     pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
         self.serving.check()?;
+        if self.recording.is_live() && !self.serving.is_asked_for() {
+            return Err(Failure::usage("--foxglove has no meaning where virtual time does not follow the clock")
+                .because("this run is over before anyone could look")
+                .next("add --serve URL or --control HOST:PORT, or give --record NAME.mcap and open that"));
+        }
         let [file] = self.files.as_slice() else {
             self.refuse_for_several()?;
             return several::run(
@@ -125,9 +130,9 @@ impl Run {
         let Some(seeds) = &self.seeds else {
             return self.once(&scenario, file, format);
         };
-        if self.recording.path().is_some() {
-            return Err(Failure::usage("--record writes one run, and a sweep has many")
-                .next("the summary shows how to repeat one run: add --record to that"));
+        if self.recording.path().is_some() || self.recording.is_live() {
+            return Err(Failure::usage("--record and --foxglove are for one run, and a sweep has many")
+                .next("the summary shows how to repeat one run: add them to that"));
         }
         if self.serving.is_asked_for() {
             return Err(Failure::usage("--serve and --control serve one run, and a sweep has many")
@@ -160,6 +165,7 @@ impl Run {
         let given = [
             (self.seeds.is_some(), "--seeds"),
             (self.recording.path().is_some(), "--record"),
+            (self.recording.is_live(), "--foxglove"),
             (self.serving.is_asked_for(), "--serve and --control"),
             (self.threads.is_some(), "--threads"),
         ];
