@@ -1,7 +1,7 @@
 //! Who may connect: programs of a person, and pages that the person has opened for this.
 //!
 //! A browser lets any page connect to a port of its own machine, and says by `Origin` which page it is; a page cannot forge that.
-//! What is to be seen here moves nothing, but belongs to whoever started the server: pages of the Foxglove application, pages served by this
+//! What is to be seen here moves nothing, but belongs to the person who started the server: pages of the Foxglove application, pages served by this
 //! machine and those named at the start are let in, any other is refused. Programs that are not browsers send no origin, or one of
 //! their own scheme (`file:`, `app:`).
 

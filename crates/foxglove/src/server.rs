@@ -100,7 +100,7 @@ impl Server {
     }
 
     /// Shows what has happened. This never waits: where the server's thread is behind, the batch is left out, and a
-    /// status message says so.
+    /// status message reports it.
     pub fn show(&self, batch: Batch) {
         let samples = batch.samples() as u64;
         if self.is_watched() && !self.hand(Piece::Batch(Box::new(batch))) {
