@@ -19,6 +19,10 @@ function overSocket(heard, closed) {
 }
 
 let worker = null;
+/** Ends a worker that has left so many requests in turn without an answer. */
+let giveUp = (_why) => {};
+let silent = 0;
+const MOST_SILENT = 3;
 let asked = 0;
 const answers = new Map();
 /** The views make requests before the page connects. */
@@ -38,7 +42,9 @@ function inWorker(heard, closed) {
     answers.clear();
     closed();
   };
+  giveUp = lose;
   mine.onmessage = ({ data }) => {
+    silent = 0;
     if (data.text !== undefined) heard(data.text);
     else if (data.ended !== undefined) {
       // Not again and again: the next one is the first one.
@@ -76,13 +82,21 @@ function machine() {
  * @param {RequestInit} [options]
  * @returns {Promise<Response>}
  */
-async function requestWorker(path, { body = null } = {}) {
+async function requestWorker(path, { body = null, signal = null } = {}) {
   await beginning;
   if (!worker) throw new Error("the worker has ended");
   asked += 1;
   const answer = asked;
   worker.postMessage({ request: answer, path, body });
-  return new Promise((resolve, reject) => answers.set(answer, { resolve, reject }));
+  return new Promise((resolve, reject) => {
+    answers.set(answer, { resolve, reject });
+    signal?.addEventListener("abort", () => {
+      if (!answers.delete(answer)) return;
+      reject(signal.reason);
+      silent += 1;
+      if (silent === MOST_SILENT) giveUp("it does not answer");
+    });
+  });
 }
 
 /** Opens a connection: `{ isOpen, send, close }`. */
@@ -98,6 +112,7 @@ if (worker_at) {
     if (!link) return;
     event.preventDefault();
     const answer = await request(link.getAttribute("href"));
+    if (!answer.ok) return alert((await answer.json()).error.message);
     const url = URL.createObjectURL(await answer.blob());
     const save = document.createElement("a");
     [save.href, save.download] = [url, link.download];

@@ -15,7 +15,11 @@ let compiled = null;
 
 /** The module beside this file, compiled once. */
 function compile() {
-  compiled ??= compileFrom(new URL("./ferrodrive.wasm", import.meta.url));
+  compiled ??= compileFrom(new URL("./ferrodrive.wasm", import.meta.url)).catch((error) => {
+    // The next one tries again.
+    compiled = null;
+    throw error;
+  });
   return compiled;
 }
 
@@ -96,7 +100,10 @@ export class World {
   /** Has so many seconds pass. */
   run(seconds) {
     if (!(seconds >= 0 && seconds <= 1e6)) throw new RangeError(`expected seconds from 0 to 1e6, got ${seconds}`);
-    this.#runTo(this.#now_ns + Math.round(seconds * 1e9));
+    const end_ns = this.#now_ns + Math.round(seconds * 1e9);
+    // In pieces: all states of a piece are held until its end.
+    do this.#runTo(Math.min(end_ns, this.#now_ns + 1e9));
+    while (this.#now_ns < end_ns);
   }
 
   #runTo(to_ns) {

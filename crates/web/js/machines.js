@@ -39,7 +39,7 @@ function pick(value) {
 }
 
 /** Runs a scenario in a worker of its own, faster than the clock, and shows what it found. */
-function play({ title, text }) {
+function play({ title, text, files = {} }) {
   say(`${title} …`);
   const worker = new Worker("scenario.js", { type: "module" });
   worker.onmessage = ({ data }) => {
@@ -48,7 +48,7 @@ function play({ title, text }) {
     show(title, data);
   };
   worker.onerror = (event) => say(`${title}: ${event.message ?? "it cannot be run"}`);
-  worker.postMessage({ scenario: text });
+  worker.postMessage({ scenario: text, files });
 }
 
 function show(title, { outcome, error }) {
@@ -75,7 +75,8 @@ async function copyLink() {
     await navigator.clipboard.writeText(url.href);
     say("The link is copied: it holds the machine");
   } catch {
-    location.hash = url.hash;
+    // Without the event of a changed address, which shows another view.
+    history.replaceState(null, "", url);
     say("The address holds the machine now");
   }
 }
@@ -83,21 +84,24 @@ async function copyLink() {
 /** Machine files, scenarios and data sheets that are dropped or chosen. */
 async function take(files) {
   const sheets = {};
+  let file_of = null;
   for (const file of files) {
     if (file.size > LARGEST_FILE) return say(`${file.name} has ${file.size} bytes; at most ${LARGEST_FILE} are read`, "bad");
     if (/\.(eds|dcf)$/i.test(file.name)) sheets[file.name] = await file.text();
     else if (/\.toml$/i.test(file.name)) {
-      const text = await file.text();
-      if (/^\s*\[machine\]/m.test(text)) return play({ title: file.name, text });
-      return begin(text, { ...present().files, ...sheets });
+      if (file_of) return say(`${file.name}: expected one machine file or scenario, beside ${file_of.title}`, "bad");
+      file_of = { title: file.name, text: await file.text() };
     } else return say(`${file.name}: expected a machine file or scenario (.toml), or a data sheet (.eds, .dcf)`, "bad");
   }
+  if (file_of && /^\s*\[machine\]/m.test(file_of.text)) return play({ ...file_of, files: { ...present().files, ...sheets } });
+  if (file_of) return begin(file_of.text, { ...present().files, ...sheets });
   // A device joins the machine at the next free node-ID.
   const { machine, files: kept } = present();
   const taken = [...machine.matchAll(/^\s*node\s*=\s*(\d+)/gm)].map(([, node]) => Number(node));
   let text = machine;
   for (const name of Object.keys(sheets)) {
     const node = Array.from({ length: 127 }, (_, at) => at + 1).find((free) => !taken.includes(free));
+    if (node === undefined) return say(`${name}: all 127 node-IDs are taken`, "bad");
     taken.push(node);
     text += `\n[[drive]]\nmodel = ${JSON.stringify(name)}\nnode = ${node}\n`;
   }
