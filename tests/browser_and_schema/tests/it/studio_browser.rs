@@ -11,6 +11,7 @@ mod homing;
 mod pdo;
 mod safety;
 mod scope;
+mod sending;
 mod tour;
 mod watch;
 mod world;

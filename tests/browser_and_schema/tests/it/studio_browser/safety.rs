@@ -39,7 +39,7 @@ impl Stage {
         assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
     }
 
-    async fn script(&self, script: &str) -> Value {
+    pub(super) async fn script(&self, script: &str) -> Value {
         self.client.execute(script, Vec::new()).await.unwrap_or_else(|error| panic!("{script}: {error}"))
     }
 
