@@ -63,7 +63,25 @@ async fn captures_stay_over_a_reload(stage: &Stage) {
     stage.press_on(".captures li:nth-child(1) button", Key::Enter.into()).await;
     stage.press_on("#capture-subtract", Key::Enter.into()).await;
     stage.press_on("canvas", Key::Right.into()).await;
+    // One and the same data: the record was saved of what was kept.
+    stage.choose("#capture-align", "time").await;
     let read = stage.says(".readout", "Speed: difference").await;
+    let difference = async || {
+        let read = stage.says(".readout", "Speed: difference").await;
+        read.split_once("Speed: difference").and_then(|(_, rest)| Some(rest.split_once(" r/min")?.0.to_owned()))
+    };
+    // To the right, where what was shown as it was kept begins.
+    stage
+        .until("a cursor where both have values", async || {
+            let is_known = !difference().await.expect("a value").ends_with('\u{2013}');
+            if !is_known {
+                stage.press_on("canvas", Key::Right.into()).await;
+            }
+            is_known
+        })
+        .await;
+    let known = difference().await.expect("a value");
+    assert!(known.ends_with(" 0.0"), "{known}");
     assert!(read.starts_with("A at ") && read.contains("Position of node 4"), "{read}");
     // The scale by the keyboard: half the span after arrows up, and its own again.
     let span = async || {

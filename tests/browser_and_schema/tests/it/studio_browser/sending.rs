@@ -116,6 +116,7 @@ async fn a_cyclic_frame_ends_with_its_button_and_with_a_stop_from_anywhere() {
         // One that was on its way is counted; its period is 100 ms.
         tokio::time::sleep(Duration::from_millis(200)).await;
         let before = stage.sent().await;
+        // By the clock of the page, whose timers these are: five periods.
         tokio::time::sleep(Duration::from_millis(500)).await;
         assert_eq!(stage.sent().await, before, "nothing is sent any more: {end}");
     }
