@@ -153,8 +153,8 @@ impl Machine {
     pub fn from_table(file: &Table<'_>, folder: &Path) -> Result<Self, Vec<Problem>> {
         let mut problems = file.strangers(BUS_KEYS);
         let bitrate = noted(file.get("bitrate").map(|field| rate(&field)).transpose(), &mut problems);
-        let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on"));
-        let seed = noted(seed.transpose(), &mut problems);
+        let seed =
+            noted(file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose(), &mut problems);
         let realism = noted(optional_word(file, "realism", "\"ideal\" or \"full\""), &mut problems);
         let timing = noted(optional_word(file, "timing", "\"device\" or \"ideal\""), &mut problems);
         let fidelity = noted(optional_word(file, "fidelity", "\"full\" or \"mechanical\""), &mut problems);
@@ -453,19 +453,13 @@ mod tests {
         assert!(refusal(&format!("{DRIVE}supply_v = 300")).starts_with("line 4, column 12: supply of node 4"));
     }
 
-    /// CiA 301, 7.5.2.33: the record of the nth server is 1200h + n - 1; 7.5.2.22: a counter of 2 to 240.
     #[test]
     fn servers_and_the_counter_of_sync_are_for_a_master() {
         let machine = parsed(&format!("sync_counter = 240\n{DRIVE}sdo_server = 2"));
-        let servers: Vec<_> = machine.sdo_servers().map(|(node, record)| (node.raw(), record)).collect();
-        assert_eq!((machine.sync_counter, &servers[..]), (Some(240), &[(4, 0x1201)][..]));
-        assert_eq!(machine.unused_by_a_master(), None);
-        for number in [0, 129, -1] {
-            assert!(refusal(&format!("{DRIVE}sdo_server = {number}")).contains("expected the number of an SDO server"));
-        }
-        for counter in [1, 241] {
-            assert!(refusal(&format!("sync_counter = {counter}\n{DRIVE}")).contains("2 to 240"), "{counter}");
-        }
+        assert!(machine.sdo_servers().eq([(NodeId::new(4).unwrap(), 0x1201)]));
+        assert_eq!((machine.sync_counter, machine.unused_by_a_master()), (Some(240), None));
+        assert!([0, 129, -1].iter().all(|n| refusal(&format!("{DRIVE}sdo_server = {n}")).contains("number of an SDO")));
+        assert!(refusal(&format!("sync_counter = 241\n{DRIVE}")).contains("2 to 240"));
     }
 
     #[test]
