@@ -73,7 +73,7 @@ impl Crew {
                 });
             }
             drop(results);
-            // A panic of `take` ends the work too: what the others would go on to make would not be taken.
+            // A panic of `take` ends the work too: what the others would go on to make is not taken any more.
             let _ends = taken.on_panic(&self.stop);
             let mut early = BTreeMap::new();
             let mut first = 0;
