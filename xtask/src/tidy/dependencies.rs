@@ -83,6 +83,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "plant",
             "devices",
             "eds",
+            "foxglove",
             "drives",
             "sim",
             "fmu",

@@ -30,7 +30,7 @@ pub use configuration::{mapped, pdo_id, sdo_server_record, tpdo_id};
 pub use cycles::{BASE_PERIOD, CyclePlan, GROUP_PERIOD, TOLERANCE, TooFull, speed_mode, too_full, too_full_at};
 use fields::{noted, optional_word, rate};
 pub use motion::{AxisPlan, BasePlan, GroupPlan, WATCHDOG};
-pub use placed::Placed;
+pub use placed::{DRIVE_KEYS, Placed};
 use words::document::reader::{self, Parameters as Placeholders, Table};
 use words::document::{BadFile, Problem, read_text};
 use words::models::Description;
@@ -47,30 +47,6 @@ const MOST_DRIVES: usize = 127;
 /// What a machine file may say of its bus.
 pub const BUS_KEYS: &[&str] =
     &["bitrate", "seed", "realism", "timing", "fidelity", "sync_counter", "drive", "body", "group", "base"];
-
-/// What it may say of a drive.
-pub const DRIVE_KEYS: &[&str] = &[
-    "model",
-    "node",
-    "supply_v",
-    "supply",
-    "options",
-    "load",
-    "inputs",
-    "switches",
-    "rotor_locked",
-    "shaft",
-    "temperatures_c",
-    "faults",
-    "battery",
-    "units",
-    "pdos",
-    "limits",
-    "heartbeat",
-    "guarding",
-    "start_up",
-    "sdo_server",
-];
 
 /// A machine as its file describes it.
 #[derive(Clone, Debug, Default)]

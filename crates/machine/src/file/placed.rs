@@ -15,7 +15,31 @@ use words::node::node;
 
 use super::fields::noted;
 use super::seat::Seat;
-use super::{DRIVE_KEYS, configuration, surroundings, units};
+use super::{configuration, surroundings, units};
+
+/// What a machine file may say of a drive.
+pub const DRIVE_KEYS: &[&str] = &[
+    "model",
+    "node",
+    "supply_v",
+    "supply",
+    "options",
+    "load",
+    "inputs",
+    "switches",
+    "rotor_locked",
+    "shaft",
+    "temperatures_c",
+    "faults",
+    "battery",
+    "units",
+    "pdos",
+    "limits",
+    "heartbeat",
+    "guarding",
+    "start_up",
+    "sdo_server",
+];
 
 /// One drive of a machine and what is around it.
 #[derive(Clone, Debug)]
