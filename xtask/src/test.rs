@@ -145,7 +145,7 @@ mod tests {
         assert_eq!(names(&[]), ["fmt", "tidy", "tests", "doctests", "demo"]);
         assert_eq!(
             STEPS.iter().map(|step| step.name).filter(|name| !names(&["--all"]).contains(name)).collect::<Vec<_>>(),
-            ["web"]
+            ["web", "aarch64"]
         );
         assert_eq!(names(&["--only", "web"]), ["web"]);
     }

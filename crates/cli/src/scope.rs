@@ -28,8 +28,10 @@ const TIMEOUT: &str = "timeout";
 const VERBOSE: &str = "verbose";
 const REALTIME: &str = "realtime";
 const LOG: &str = "log";
+const SDO_SERVER: &str = "sdo_servers";
+const SYNC_COUNTER: &str = "sync_counter";
 
-const ALL: &[&str] = &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG];
+const ALL: &[&str] = &[BUS, MODEL, SDO_SERVER, SYNC_COUNTER, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG];
 
 const UNHEEDED: [Unheeded; 16] = [
     Unheeded {
@@ -58,8 +60,8 @@ const UNHEEDED: [Unheeded; 16] = [
     },
     Unheeded {
         command: "sim",
-        options: &[TIMEOUT],
-        why: "it sends no requests, and waits for no answer",
+        options: &[TIMEOUT, SDO_SERVER, SYNC_COUNTER],
+        why: "it sends no requests and no SYNC, and waits for no answer",
         next: "omit it",
     },
     Unheeded {
@@ -70,13 +72,13 @@ const UNHEEDED: [Unheeded; 16] = [
     },
     Unheeded {
         command: "dump",
-        options: &[TIMEOUT, VERBOSE],
+        options: &[TIMEOUT, VERBOSE, SDO_SERVER, SYNC_COUNTER],
         why: "it only listens, waits for no answer, and shows every frame that it hears",
         next: "omit it; --for TIME says how long it listens",
     },
     Unheeded {
         command: "decode",
-        options: &[BUS, TIMEOUT, VERBOSE, REALTIME],
+        options: &[BUS, TIMEOUT, VERBOSE, REALTIME, SDO_SERVER, SYNC_COUNTER],
         why: "it reads a log, and sends no requests",
         next: "omit it",
     },
@@ -88,7 +90,7 @@ const UNHEEDED: [Unheeded; 16] = [
     },
     Unheeded {
         command: "plot",
-        options: &[BUS, TIMEOUT, VERBOSE, REALTIME, LOG],
+        options: &[BUS, TIMEOUT, VERBOSE, REALTIME, LOG, SDO_SERVER, SYNC_COUNTER],
         why: "it draws a file; of a log, --model and --machine name the models",
         next: "omit it",
     },
@@ -124,7 +126,7 @@ const OBJECTS_OF_A_MODEL: Unheeded = Unheeded {
 
 const CHECK_OF_A_FILE: Unheeded = Unheeded {
     command: "check",
-    options: &[TIMEOUT, VERBOSE, REALTIME, LOG],
+    options: &[TIMEOUT, VERBOSE, REALTIME, LOG, SDO_SERVER, SYNC_COUNTER],
     why: "without a bus it reads files, and sends nothing",
     next: "omit it, or give --bus to ask the drives on it",
 };
@@ -194,7 +196,12 @@ pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgM
 
 /// The option as it is typed.
 fn spelled(option: &str) -> &str {
-    if option == MODEL { "model" } else { option }
+    match option {
+        MODEL => "model",
+        SDO_SERVER => "sdo-server",
+        SYNC_COUNTER => "sync-counter",
+        other => other,
+    }
 }
 
 fn refuse_two_models(global: &Global) -> Result<(), Failure> {
@@ -294,6 +301,8 @@ mod tests {
             VERBOSE => vec!["--verbose"],
             REALTIME => vec!["--realtime"],
             LOG => vec!["--log", "frames.log"],
+            SDO_SERVER => vec!["--sdo-server", "4=2"],
+            SYNC_COUNTER => vec!["--sync-counter", "10"],
             other => panic!("what is typed for {other}?"),
         }
     }

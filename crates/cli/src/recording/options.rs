@@ -21,7 +21,7 @@ use super::viewers::ViewerOptions;
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(group = clap::ArgGroup::new("sampled").args(["record", "foxglove"]).multiple(true))]
 pub(crate) struct RecordOptions {
-    /// Record motion, measured values and events to this file: .mcap (for Foxglove, PlotJuggler, Rerun) or .csv
+    /// Record motion, values and events to this file, .mcap or .csv
     ///
     /// The file is new, empty, or an earlier record, which is replaced. What is older than a second is on the disk,
     /// whatever happens to this program. `ferrodrive plot FILE` draws it.

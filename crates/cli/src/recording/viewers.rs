@@ -10,8 +10,10 @@ use crate::failure::Failure;
 /// Where viewers connect, and which.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct ViewerOptions {
-    /// Show signals, frames and events live to Foxglove, Lichtblick and PlotJuggler, e.g. at 127.0.0.1:8765; a port
-    /// alone is one of this machine, 0 a free one
+    /// Show the run live to viewers, e.g. Foxglove, at this address
+    ///
+    /// Signals, frames and events for Foxglove, Lichtblick and PlotJuggler, e.g. at 127.0.0.1:8765; a port alone is one
+    /// of this machine, 0 a free one.
     ///
     /// The channels are those of an MCAP record, over the Foxglove WebSocket protocol. Viewers only look; one that reads
     /// slowly loses points, and the bus never waits for it. There is no password: any program that reaches the address

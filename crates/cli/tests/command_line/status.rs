@@ -55,6 +55,7 @@ const LINES: &[&str] = &[
     "params backup 4",
     "pdo show 4",
     "plan",
+    "plot a.log",
     "program 4 a.bin",
     "quick-stop 4",
     "read 4 6064",

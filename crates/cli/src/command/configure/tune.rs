@@ -44,7 +44,7 @@ pub(crate) struct Tune {
     /// Which loops
     #[arg(long = "loop", value_enum, default_value = "speed")]
     which: WhichLoop,
-    /// Objective: where the gain of the speed loop is to fall to one, in Hz
+    /// Objective: where the gain of the speed loop falls to one, in Hz
     #[arg(long, value_name = "HZ", value_parser = hertz, conflicts_with = "phase_margin")]
     bandwidth: Option<f64>,
     /// Objective: degrees that are to be left there; as stiff as that allows

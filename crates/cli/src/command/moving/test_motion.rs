@@ -42,7 +42,7 @@ pub(crate) struct TestMotion {
     /// Shape of the motion
     #[arg(value_name = "SHAPE")]
     shape: ShapeName,
-    /// Distance of back-and-forth, amplitude of sine and chirp
+    /// Distance, or amplitude of sine and chirp
     #[arg(long, value_name = "ANGLE", value_parser = angle, default_value = "90deg")]
     by: Angle,
     /// Speed of steps, ramp and prbs
@@ -72,7 +72,7 @@ pub(crate) struct TestMotion {
     /// Limit of the acceleration; steps: the drive's own ramps without it
     #[arg(long, value_name = "RATE", value_parser = rate)]
     acceleration: Option<f64>,
-    /// Farthest that the shaft may turn from where it stands, in turns: farther points are refused, and steps are stopped there
+    /// Turns from its start, beyond which points are refused and steps stop
     #[arg(long, value_name = "TURNS", value_parser = turns)]
     travel: Option<f64>,
     /// Distance of the shaft from its set-point beyond which it is stopped

@@ -58,7 +58,7 @@ pub(crate) struct Run {
     /// faster (default: the machine's, or full; docs/fidelity.md)
     #[arg(long, value_name = "full|mechanical", hide_short_help = true)]
     fidelity: Option<Fidelity>,
-    /// Run with each of these seeds, and with each value of the scenario's [sweep]
+    /// Run with each of these seeds and each value of [sweep]
     #[arg(long, value_name = "FIRST..LAST", value_parser = seeds)]
     seeds: Option<RangeInclusive<u64>>,
     /// Make a part of the runs: the I-th of N. Each meets each value, and --merge puts them together
