@@ -50,7 +50,7 @@ pub struct LetGo {
     pub moving: Vec<String>,
 }
 
-/// See the [module](self).
+/// The host, its page, and the client of the adapter.
 pub struct SerialHost {
     network: Network,
     station: Tap<Network, Passed>,

@@ -274,7 +274,9 @@ class NodeReport(TypedDict):
     limits: list[dict[str, Any]]
     guard: dict[str, Any]
     fault: Optional[dict[str, Any]]
+    fault_not_known: Optional[str]
     remembered: Optional[list[dict[str, Any]]]
+    remembered_not_known: Optional[str]
     captures: list[dict[str, Any]]
 
 
