@@ -35,7 +35,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Currents that a drive shows, A.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Currents {
-    /// At the [`STEADY_SHARES`] of the highest speed.
+    /// At 40 % of the highest speed and at all of it, either way: +40, -40, +100, -100 %.
     pub steady_a: [f64; 4],
     /// While it speeds up, either way.
     pub rising_a: f64,
