@@ -71,7 +71,7 @@ enum Polling {
     Due(Instant),
 }
 
-/// See the [module](self).
+/// The side of the program that has the port.
 #[derive(Clone, Debug)]
 pub struct Client {
     /// The digit behind `S`.

@@ -1,7 +1,7 @@
 //! Machine files: drives and what is around them, described in TOML, for a virtual bus (`--bus sim:FILE.toml`, `sim --machine
 //! FILE.toml`, `run`), or which models are where on a real bus (`--machine FILE.toml` of every other command).
 //!
-//! Everything about a machine becomes a [`Stimulus`] of `ferrodrive sim` and is done by the same code, so that a file can do
+//! Everything about a machine becomes a [`Stimulus`](sim::Stimulus) of `ferrodrive sim` and is done by the same code, so that a file can do
 //! what a world command can, and no more. Each key is described in `docs/machine-file.md`.
 
 mod bodies;
