@@ -85,9 +85,11 @@ function machine() {
 async function requestWorker(path, { body = null, signal = null } = {}) {
   await beginning;
   if (!worker) throw new Error("the worker has ended");
+  // Here and not in the worker: a file that cannot be read fails this request alone, and nothing waits behind it.
+  const content = body instanceof Blob ? await body.arrayBuffer() : body;
   asked += 1;
   const answer = asked;
-  worker.postMessage({ request: answer, path, body });
+  worker.postMessage({ request: answer, path, body: content });
   return new Promise((resolve, reject) => {
     answers.set(answer, { resolve, reject });
     signal?.addEventListener("abort", () => {

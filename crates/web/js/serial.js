@@ -100,7 +100,7 @@ function attach() {
     const had_control = link.welcome !== null && link.state?.controller === link.welcome.session;
     const nodes = `node${moved.length > 1 ? "s" : ""} ${moved.join(", ")}`;
     if (moving.length) say(`${what}.`, moving);
-    else if (moved.length) say(`${what}: a quick stop was ordered for ${nodes}. Nothing moves until you take control again.`, []);
+    else if (moved.length) say(`${what}: a quick stop was ordered for ${nodes}. Whether it stands is shown at the drive; control has to be taken again.`, []);
     else if (had_control) say(`${what}: control has to be taken again.`, []);
   });
 

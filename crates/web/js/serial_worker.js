@@ -47,7 +47,7 @@ function run(event = null, input = "") {
 
 function take({ wire, line, lost, let_go, moved, body }) {
   if (wire > 0 && cable) {
-    cable.outbox.push(...body.subarray(0, wire));
+    cable.outbox.push(body.slice(0, wire));
     if (cable.writing_since === null) cable.flushing = flush(cable);
   }
   if (body.length > wire) for (const text of new TextDecoder().decode(body.subarray(wire)).split("\n")) postMessage({ text });
@@ -73,7 +73,7 @@ async function flush(mine) {
   try {
     while (mine.outbox.length) {
       mine.writing_since = performance.now();
-      await mine.writer.write(new Uint8Array(mine.outbox.splice(0)));
+      await mine.writer.write(mine.outbox.shift());
     }
     mine.writing_since = null;
   } catch (error) {
@@ -180,9 +180,9 @@ async function open({ serial }) {
 /** Requests that came before there was a host. */
 const waiting = [];
 
-async function answer({ request, path, body }) {
+function answer({ request, path, body }) {
   if (!hosts) return waiting.push({ request, path, body });
-  const { status, kind, body: content } = library.call({ call: "request", path }, body instanceof Blob ? await body.arrayBuffer() : (body ?? ""));
+  const { status, kind, body: content } = library.call({ call: "request", path }, body ?? "");
   postMessage({ answer: request, status, kind, body: content });
 }
 

@@ -148,15 +148,14 @@ impl SerialHost {
         let was_open = std::mem::replace(&mut self.is_open, false);
         (self.client, self.lost) = (None, Some(why.to_owned()));
         if was_open {
-            let moving = Account::of_lost_bus(&self.network, WHO).iter().map(Account::text).collect();
             self.wire.update(|health| health.state = Some("connection lost"));
-            self.end_session(format!("The adapter is lost: {why}"), moving);
+            self.end_session(format!("The adapter is lost: {why}"));
         }
     }
 
     /// Ends the session of the page, if there is one: what it moved is stopped, and control has to be taken anew.
     pub fn let_go(&mut self, why: &str) {
-        self.end_session(why.to_owned(), Vec::new());
+        self.end_session(why.to_owned());
     }
 
     /// Begins a session for the page; as soon as the adapter has opened its channel.
@@ -193,7 +192,7 @@ impl SerialHost {
         let pause = now - self.now;
         if pause > HELD_UP {
             let why = format!("The machine slept, or this page was held up, for {:.1} s", pause.as_secs_f64());
-            self.end_session(why, Vec::new());
+            self.end_session(why);
         }
         self.now = now;
         if let Some(client) = &mut self.client {
@@ -226,9 +225,12 @@ impl SerialHost {
         self.let_go.take()
     }
 
-    fn end_session(&mut self, why: String, moving: Vec<String>) {
+    fn end_session(&mut self, why: String) {
         self.is_page_waiting = false;
         let moved = self.moved();
+        // Without a channel no stop leaves, whatever has ended the session.
+        let lost = if self.is_open { Vec::new() } else { Account::of_lost_bus(&self.network, WHO) };
+        let moving: Vec<String> = lost.iter().map(Account::text).collect();
         let Some(hosted) = &mut self.hosted else { return };
         // Once for each session, however often the adapter refuses.
         if hosted.leave() || !moving.is_empty() {
@@ -298,7 +300,7 @@ impl SerialHost {
         if self.network.moved().is_empty() {
             self.wire.tell(why);
         } else {
-            self.end_session(why.to_owned(), Vec::new());
+            self.end_session(why.to_owned());
         }
     }
 
