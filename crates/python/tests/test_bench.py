@@ -69,6 +69,9 @@ def test_a_tuning_that_is_given_up_leaves_the_shaft_at_rest(world):
         tuning.cancel()
         with pytest.raises(asyncio.CancelledError):
             await tuning
+        # With the network left open: it is stopped by what gave it up.
+        await network.async_sleep(2)
+        assert abs(world[4].velocity_rpm) < 1
 
     with ferrodrive.virtual_time(world), ferrodrive.Network(world) as network:
         asyncio.run(main(network))

@@ -153,6 +153,7 @@ pub(crate) fn test_motion(
             drive.guard(master::drive::SwitchedOff::Leave).await.map_err(Failure::from)?;
         }
         let (restorer, mut runs) = (Restorer::of(&drive), Vec::new());
+        own.stop_first(drive.node().network().clone(), drive.node().id());
         [&own, &of_network].into_iter().for_each(|ways_back| ways_back.add(restorer.clone()));
         let how = (order.count, order.travel_turns);
         let moved = run((&drive, &motion), (&wanted, &restorer), how, &mut runs, |_| ()).await;

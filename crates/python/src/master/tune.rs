@@ -12,6 +12,7 @@ use super::value::Value;
 use super::whole::AskedDrive;
 use super::{Job, Network, duration};
 use crate::failure::bad_value;
+use crate::ways_back::WaysBack;
 
 /// Longest time for the transaction with the proposed values, as the default of the command line.
 const WITHIN: Duration = Duration::from_secs(60);
@@ -71,12 +72,16 @@ pub(crate) fn tune_drive(
         within: WITHIN,
     };
     request.check().map_err(|failure| bad_value(failure.what))?;
-    network.get().begin_said(py, async move {
+    let own = WaysBack::default();
+    let ways_back = own.clone();
+    let work = async move {
         let drive = asked.drive().await?;
+        own.stop_first(drive.node().network().clone(), drive.node().id());
         if order.speed_rpm.is_none() {
             request.bounds.speed_rpm = host::tune::loops_of(&drive)?.1.usual_rpm;
         }
         let report = host::tune::tune(&drive, &request, &(), std::future::ready(false)).await?;
         Ok(Value::report(&report))
-    })
+    };
+    network.get().begin_leading_back(py, work, Some(ways_back))
 }
