@@ -90,12 +90,15 @@ export function sequencePanel(isAccepted) {
     if (answers.some(({ ok, error }) => !ok && error.kind !== "replaced" && error.kind !== "stopped")) stopAll();
   }
 
-  on("halt", (here) => {
-    // The press follows at once. Of a stop from elsewhere a command may have been sent behind it.
+  /** A press of stop has ended the play. Behind one from elsewhere a command may have been sent: stops again. */
+  function stopped(here, why = "ended by Stop") {
     const again = playing && !here && inControl();
-    halt("ended by Stop", false);
+    halt(why, false);
     if (again) stopAll();
-  });
+  }
+
+  // `here`: the press follows at once.
+  on("halt", (here) => stopped(here));
   on("change", (connected) => connected || halt("ended: the connection to the studio was lost"));
   on("sight", ({ fresh }) => fresh || halt("ended: the state of the studio was stale"));
   // Timers of a hidden page are late.
@@ -117,7 +120,11 @@ export function sequencePanel(isAccepted) {
       mine.nodes.add(command.node);
       // Not awaited: the next command comes when it came, and replaces a motion that is not done.
       ask(command).then((answer) => {
-        if (playing === mine && !answer.ok && answer.error.kind !== "replaced") halt(`ended at ${at + 1}: ${answer.error.message}`);
+        if (playing !== mine || answer.ok || answer.error.kind === "replaced") return;
+        // The answer to a command may come before the news of the stop that ended it.
+        const why = `ended at ${at + 1}: ${answer.error.message}`;
+        if (answer.error.kind === "stopped") stopped(false, why);
+        else halt(why);
       });
     }
     if (playing === mine) halt(`all ${steps.length} commands were sent`, false);
