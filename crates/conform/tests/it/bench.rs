@@ -8,7 +8,7 @@ use conform::{Capture, CaseResult, Options, Outcome, Report, Subject, Suite};
 use devices::Description;
 use master::Network;
 use sim::machine::{Order, order};
-use sim::{VirtualDrive, World, block_on_for};
+use sim::{Fidelity, VirtualDrive, World, block_on_for};
 
 /// Longer than the whole suite takes.
 const LIMIT: Duration = Duration::from_secs(3600);
@@ -19,7 +19,12 @@ pub(crate) fn node() -> NodeId {
 
 /// A virtual device of this description, without power.
 pub(crate) fn drive(description: &'static Description) -> Box<dyn VirtualDrive> {
-    order(description, &Order::new(description, node(), Bitrate::K500)).unwrap()
+    drive_with(description, Fidelity::Full)
+}
+
+/// The same with as much computed.
+pub(crate) fn drive_with(description: &'static Description, fidelity: Fidelity) -> Box<dyn VirtualDrive> {
+    order(description, &Order { fidelity, ..Order::new(description, node(), Bitrate::K500) }).unwrap()
 }
 
 /// Runs the suite against a station that is node 5.

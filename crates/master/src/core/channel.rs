@@ -89,6 +89,11 @@ impl Channel {
         }
     }
 
+    /// No request is on the wire or waits.
+    pub(super) fn is_idle(&self) -> bool {
+        self.active.is_none() && self.queue.is_empty()
+    }
+
     /// It asks the default server.
     pub(super) fn is_default(&self) -> bool {
         self.server == self.default

@@ -274,11 +274,13 @@ impl Core {
     }
 
     fn cancel(&mut self, ticket: Ticket) {
-        self.timers.cancel(ticket);
+        if self.timers.cancel(ticket) {
+            return;
+        }
         let now = self.now;
         let blocks = self.may_use_blocks();
-        let owner = self.members.iter_mut().position(|member| member.channel.cancel(ticket, blocks, now));
-        if let Some(node) = owner.and_then(|position| NodeId::new(position as u8 + 1)) {
+        let owner = self.busy.iter().find(|node| self.member_mut(*node).channel.cancel(ticket, blocks, now));
+        if let Some(node) = owner {
             self.settle(node);
         }
     }
@@ -328,11 +330,10 @@ impl Core {
             self.member_mut(node).channel.start_next(blocks, now);
             self.forget_servers(node);
         }
-        let busy = self.member(node).channel.poll_timeout().is_some();
-        if busy {
-            self.busy.insert(node)
-        } else {
+        if self.member(node).channel.is_idle() {
             self.busy.remove(node)
+        } else {
+            self.busy.insert(node)
         }
         self.sending.insert(node);
     }

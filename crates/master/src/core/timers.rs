@@ -15,9 +15,11 @@ impl Timers {
         self.armed.insert((due, ticket));
     }
 
-    /// Scans: a cancelled sleep is rare and few are armed.
-    pub(super) fn cancel(&mut self, ticket: Ticket) {
+    /// Scans: few are armed. False if it is not here.
+    pub(super) fn cancel(&mut self, ticket: Ticket) -> bool {
+        let before = self.armed.len();
         self.armed.retain(|(_, armed)| *armed != ticket);
+        self.armed.len() < before
     }
 
     pub(super) fn next(&self) -> Option<Instant> {

@@ -82,12 +82,14 @@ impl NetworkState {
     }
 
     fn poll_slot(&mut self, ticket: Ticket, context: &mut Context<'_>) -> Poll<Outcome> {
+        if let Some(Slot::Waiting(waker)) = self.slots.get_mut(&ticket) {
+            // Mostly the same one again.
+            waker.clone_from(context.waker());
+            return Poll::Pending;
+        }
         match self.slots.remove(&ticket) {
             Some(Slot::Done(outcome)) => Poll::Ready(outcome),
-            _ => {
-                self.slots.insert(ticket, Slot::Waiting(context.waker().clone()));
-                Poll::Pending
-            }
+            _ => Poll::Pending,
         }
     }
 }

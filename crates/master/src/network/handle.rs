@@ -1,4 +1,4 @@
-use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
@@ -26,7 +26,7 @@ pub(super) struct NetworkState {
     pub(super) core: Core,
     /// Commands that wait for the runner's next time.
     inbox: VecDeque<Command>,
-    pub(super) slots: HashMap<Ticket, Slot>,
+    pub(super) slots: BTreeMap<Ticket, Slot>,
     pub(super) watchers: Vec<Watcher>,
     /// Woken by the next cycle, or when there will be none.
     pub(super) cycle_waiters: Vec<CycleWaiter>,
