@@ -11,8 +11,16 @@ use crate::status::Status;
 /// How long an adapter may take for an answer. Some firmwares never acknowledge; those cost this much at opening.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// How often the status flags are asked for: often enough for a person, and one frame's worth of the line.
-const STATUS_PERIOD: Duration = Duration::from_secs(1);
+/// How often the status flags are asked for: often enough for a person, and one frame's worth of the line. An adapter that has none is
+/// asked for its version instead.
+const ASKED_EVERY: Duration = Duration::from_secs(1);
+
+/// How long an open adapter that is asked may say nothing at all before it is asked again.
+const SILENCE: Duration = Duration::from_secs(1);
+
+/// How often in a row an adapter is asked that says nothing: one answer may be lost, and a caller that was held up asks again before it
+/// judges.
+const TRIES: u8 = 2;
 
 /// What an adapter brings.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,6 +37,8 @@ pub enum Event {
     FrameRefused,
     /// A line that is not slcan, by its number since the channel opened: noise, or an extension of the firmware.
     Malformed(u64, Malformed),
+    /// The adapter, which has answered before, says nothing any more; nothing comes behind this.
+    Silent,
 }
 
 /// Why a channel does not open.
@@ -55,20 +65,28 @@ enum Phase {
     /// The answer to O.
     Opening,
     Open(Polling),
+    /// It has not opened, or is silent.
     Failed,
 }
 
-/// Whether the adapter reports its status flags.
+/// What an open adapter is asked again and again, so that its silence is noticed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Polling {
-    /// It does not.
+    /// Nothing: it answers neither F nor V.
     Never,
-    /// Asked for the first time: answers come in the order of the commands, so a BEL that comes next says no.
-    Asked,
-    /// Asked, by one that answers.
-    AskedAgain,
-    /// It does, and is asked again then.
-    Due(Instant),
+    /// For its flags, the first time: answers come in the order of the commands, so a BEL that comes next says no.
+    First,
+    /// With this, so many times since it last said anything.
+    Asked(Question, u8),
+    /// It is asked at the deadline.
+    Due(Question),
+}
+
+/// What an adapter is known to answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Question {
+    Status,
+    Version,
 }
 
 /// The side of the program that has the port.
@@ -77,10 +95,12 @@ pub struct Client {
     /// The digit behind `S`.
     code: Option<u8>,
     phase: Phase,
-    /// When the present phase of opening ends without an answer.
+    /// When the present phase, or what is awaited in it, ends without an answer.
     deadline: Instant,
     /// The adapter has answered one of the commands.
     has_answered: bool,
+    /// What it has answered to V.
+    version: Option<String>,
     decoder: Decoder<Answer>,
     lines: u64,
     output: Vec<u8>,
@@ -99,6 +119,7 @@ impl Client {
             phase: Phase::Clearing,
             deadline: now + PATIENCE,
             has_answered: false,
+            version: None,
             decoder: Decoder::default(),
             lines: 0,
             output: Vec::new(),
@@ -128,7 +149,7 @@ impl Client {
             self.lines += 1;
             match self.phase {
                 Phase::Open(polling) => self.handle_line(line, polling, now),
-                _ => self.handle_opening(line.ok(), now),
+                _ => self.handle_opening(line, now),
             }
         }
     }
@@ -136,21 +157,24 @@ impl Client {
     /// Time has reached `now`.
     pub fn handle_timeout(&mut self, now: Instant) {
         match self.phase {
-            Phase::Clearing | Phase::Selecting | Phase::Opening if now >= self.deadline => self.next_phase(now),
-            Phase::Open(Polling::Due(at)) if now >= at => {
-                self.phase = Phase::Open(Polling::AskedAgain);
-                Command::Status.emit(&mut self.output);
+            Phase::Failed | Phase::Open(Polling::Never) => {}
+            _ if now < self.deadline => {}
+            Phase::Clearing | Phase::Selecting | Phase::Opening => self.next_phase(now),
+            Phase::Open(Polling::First) => self.has_no_flags(now),
+            Phase::Open(Polling::Due(question)) => self.ask(question, 0, now),
+            Phase::Open(Polling::Asked(question, tries)) if tries < TRIES => self.ask(question, tries, now),
+            Phase::Open(Polling::Asked(..)) => {
+                self.phase = Phase::Failed;
+                self.events.push_back(Event::Silent);
             }
-            _ => {}
         }
     }
 
     /// When [`handle_timeout`](Self::handle_timeout) is to be called next.
     pub const fn poll_timeout(&self) -> Option<Instant> {
         match self.phase {
-            Phase::Clearing | Phase::Selecting | Phase::Opening => Some(self.deadline),
-            Phase::Open(Polling::Due(at)) => Some(at),
-            Phase::Open(_) | Phase::Failed => None,
+            Phase::Failed | Phase::Open(Polling::Never) => None,
+            _ => Some(self.deadline),
         }
     }
 
@@ -174,14 +198,17 @@ impl Client {
         out.append(&mut self.output);
     }
 
-    fn handle_opening(&mut self, answer: Option<Answer>, now: Instant) {
-        let is_awaited = match (self.phase, &answer) {
-            (Phase::Clearing, Some(Answer::Version(_))) => true,
-            (Phase::Selecting | Phase::Opening, Some(Answer::Done)) => true,
-            (Phase::Selecting, Some(Answer::Refused)) => {
+    fn handle_opening(&mut self, line: Result<Answer, Malformed>, now: Instant) {
+        let is_awaited = match (self.phase, &line) {
+            (Phase::Clearing, line) => {
+                self.version = version_in(line);
+                self.version.is_some()
+            }
+            (Phase::Selecting | Phase::Opening, Ok(Answer::Done)) => true,
+            (Phase::Selecting, Ok(Answer::Refused)) => {
                 return self.fail(OpenError::BitrateRefused(self.code.unwrap_or_default()));
             }
-            (Phase::Opening, Some(Answer::Refused)) => return self.fail(OpenError::OpenRefused),
+            (Phase::Opening, Ok(Answer::Refused)) => return self.fail(OpenError::OpenRefused),
             _ => false,
         };
         if is_awaited {
@@ -203,7 +230,7 @@ impl Client {
                 Command::Open.emit(&mut self.output);
             }
             (Phase::Opening, _) if self.has_answered => {
-                self.phase = Phase::Open(Polling::Asked);
+                self.phase = Phase::Open(Polling::First);
                 self.lines = 0;
                 Command::Status.emit(&mut self.output);
                 self.events.push_back(Event::Opened);
@@ -217,22 +244,59 @@ impl Client {
         self.events.push_back(Event::Failed(error));
     }
 
+    /// Asks an open adapter, which has been asked so often since it last said anything.
+    fn ask(&mut self, question: Question, tries: u8, now: Instant) {
+        self.phase = Phase::Open(Polling::Asked(question, tries + 1));
+        self.deadline = now + SILENCE;
+        let command = match question {
+            Question::Status => Command::Status,
+            Question::Version => Command::Version,
+        };
+        command.emit(&mut self.output);
+    }
+
+    /// It answers with this: it is asked again in a while.
+    fn answers(&mut self, question: Question, now: Instant) {
+        self.phase = Phase::Open(Polling::Due(question));
+        self.deadline = now + ASKED_EVERY;
+    }
+
+    fn has_no_flags(&mut self, now: Instant) {
+        match self.version {
+            Some(_) => self.answers(Question::Version, now),
+            None => self.phase = Phase::Open(Polling::Never),
+        }
+    }
+
     fn handle_line(&mut self, line: Result<Answer, Malformed>, polling: Polling, now: Instant) {
+        if let Polling::Asked(question, _) = polling {
+            // Whatever it says, it is there.
+            self.phase = Phase::Open(Polling::Asked(question, 0));
+        }
+        if self.version.is_some() && version_in(&line) == self.version {
+            return self.answers(Question::Version, now);
+        }
         let event = match line {
             Ok(Answer::Frame { frame, .. }) => Event::Frame(frame),
             Ok(Answer::Status(flags)) => {
-                self.phase = Phase::Open(Polling::Due(now + STATUS_PERIOD));
+                self.answers(Question::Status, now);
                 Event::Status(Status(flags))
             }
-            Ok(Answer::Refused) if polling == Polling::Asked => {
-                self.phase = Phase::Open(Polling::Never);
-                return;
-            }
+            Ok(Answer::Refused) if polling == Polling::First => return self.has_no_flags(now),
             Ok(Answer::Refused) => Event::FrameRefused,
             Ok(_) => return,
             Err(malformed) => Event::Malformed(self.lines, malformed),
         };
         self.events.push_back(event);
+    }
+}
+
+/// What a line says as an answer to V: behind the letter, as the protocol has it, or as plain words, as CANable's firmwares do.
+fn version_in(line: &Result<Answer, Malformed>) -> Option<String> {
+    match line {
+        Ok(Answer::Version(text)) => Some(text.clone()),
+        Err(Malformed::Syntax { text, .. }) if text.is_ascii() && text.contains(' ') => Some(text.clone()),
+        _ => None,
     }
 }
 
@@ -282,14 +346,20 @@ mod tests {
 
     #[test]
     fn an_adapter_that_acknowledges_nothing_opens_by_its_version_and_a_silent_line_does_not() {
-        for (answers, expected) in [("V1013\r", Event::Opened), ("", Event::Failed(OpenError::Silent))] {
+        let words = "b158aa7-dirty https://example.org/firmware.git\r";
+        for (answers, expected) in [
+            ("V1013\r", &[Event::Opened, Event::Silent][..]),
+            (words, &[Event::Opened, Event::Silent]),
+            ("\u{fffd} \u{fffd}\rnoise\r", &[Event::Failed(OpenError::Silent)]),
+            ("", &[Event::Failed(OpenError::Silent)]),
+        ] {
             let mut client = Client::open(Some(Bitrate::M1), ms(0)).expect("S8");
             client.handle_input(answers.as_bytes(), ms(1));
             while let Some(at) = client.poll_timeout() {
                 client.handle_timeout(at);
             }
             assert!(client.take_output().starts_with(b"\r\rC\rV\rS8\rO\r"), "{answers:?}");
-            assert_eq!(events(&mut client), [expected], "{answers:?}");
+            assert_eq!(events(&mut client), expected, "{answers:?}");
         }
     }
 
@@ -301,7 +371,10 @@ mod tests {
             client.handle_input(&[*byte], ms(0));
         }
         assert_eq!(events(&mut client), [Event::Opened]);
-        assert_eq!(client.poll_timeout(), None, "the flags are not asked for again");
+        assert_eq!(client.poll_timeout(), Some(ms(1000)), "then its version shows that it is there");
+        client.handle_timeout(ms(1000));
+        assert!(client.take_output().ends_with(b"F\rV\r"), "the flags are not asked for again");
+        client.handle_input(b"V1\r", ms(1000));
         client.handle_input(b"t1001", ms(1));
         client.handle_input(b"A5\rnoise\r\x07t100", ms(1));
         client.handle_input(&[0xFF; 200], ms(1));
@@ -309,8 +382,8 @@ mod tests {
         let found = events(&mut client);
         let frame = |text: &str| Event::Frame(text.parse().expect("a frame"));
         assert_eq!((&found[0], &found[2], &found[4]), (&frame("100#A5"), &Event::FrameRefused, &frame("100#")));
-        assert!(matches!(found[1], Event::Malformed(3, Malformed::Syntax { .. })), "{found:?}");
-        assert!(matches!(found[3], Event::Malformed(5, Malformed::TooLong)), "{found:?}");
+        assert!(matches!(found[1], Event::Malformed(4, Malformed::Syntax { .. })), "{found:?}");
+        assert!(matches!(found[3], Event::Malformed(6, Malformed::TooLong)), "{found:?}");
         assert_eq!(found.len(), 5);
     }
 
@@ -345,6 +418,69 @@ mod tests {
         client.handle_timeout(ms(1009));
         assert!(!client.has_output());
         client.handle_timeout(ms(1010));
-        assert_eq!((client.take_output(), client.poll_timeout()), (b"F\r".to_vec(), None));
+        assert_eq!((client.take_output(), client.poll_timeout()), (b"F\r".to_vec(), Some(ms(2010))));
+    }
+
+    /// What is asked, what the adapter says to it, and when it is known to be gone.
+    #[test]
+    fn an_adapter_that_falls_silent_is_noticed_whatever_it_answered_before() {
+        let words = "b158aa7 https://example.org/firmware.git";
+        // It has flags; it refuses them, or passes over F, and has a version of either form; it acknowledges O alone.
+        for (answers, asked) in [
+            ("\r\r\rV1\r\rF24\r".to_owned(), Some("F\r")),
+            ("\r\r\rV1\r\r\x07".to_owned(), Some("V\r")),
+            (format!("{words}\r"), Some("V\r")),
+            ("\r".to_owned(), None),
+        ] {
+            let mut client = Client::open(None, ms(0)).expect("any adapter");
+            client.handle_input(answers.as_bytes(), ms(0));
+            let Some(asked) = asked else {
+                client.handle_timeout(ms(500));
+                client.handle_input(b"\r", ms(500));
+                client.handle_timeout(ms(1000));
+                assert_eq!((events(&mut client), client.poll_timeout()), (vec![Event::Opened], None));
+                continue;
+            };
+            // By its patience, where it acknowledges nothing.
+            let first = loop {
+                client.take_output();
+                let at = client.poll_timeout().expect("it is asked again");
+                client.handle_timeout(at);
+                if client.take_output() == asked.as_bytes() && at >= ms(1000) {
+                    break at;
+                }
+            };
+            assert_eq!(events(&mut client).first(), Some(&Event::Opened), "{answers:?}");
+            // A frame alone shows that it is there: it is asked again, as often as that.
+            let mut at = first;
+            for _ in 0..5 {
+                client.handle_input(b"t1000\r", at);
+                at += SILENCE;
+                client.handle_timeout(at);
+                assert_eq!((client.take_output(), events(&mut client).len()), (asked.as_bytes().to_vec(), 1));
+            }
+            // A caller that was held up asks once more, and hears what has come meanwhile.
+            at += Duration::from_secs(100);
+            client.handle_timeout(at);
+            assert_eq!((client.take_output(), events(&mut client)), (asked.as_bytes().to_vec(), vec![]));
+            let answer = if asked == "F\r" {
+                "F00"
+            } else if answers.contains(words) {
+                words
+            } else {
+                "V1"
+            };
+            client.handle_input(format!("{answer}\r").as_bytes(), at);
+            assert!(!matches!(events(&mut client)[..], [Event::Malformed(..)]), "{answers:?}");
+            at += ASKED_EVERY;
+            // Then nothing more.
+            for expected in [None, None, Some(Event::Silent)] {
+                assert_eq!(client.poll_timeout(), Some(at), "{answers:?}");
+                client.handle_timeout(at);
+                assert_eq!(client.poll_event(), expected, "{answers:?}");
+                at += SILENCE;
+            }
+            assert_eq!(client.poll_timeout(), None);
+        }
     }
 }

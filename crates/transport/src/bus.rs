@@ -128,6 +128,14 @@ pub enum BusError {
         /// `HOST:PORT` or the device.
         address: String,
     },
+    /// The peer, which has answered before, says nothing any more.
+    #[error(
+        "{address} says nothing any more: it was asked twice, and left each unanswered for 1 s; is the adapter still there?"
+    )]
+    FellSilent {
+        /// `HOST:PORT` or the device.
+        address: String,
+    },
     /// A bus that was joined to another, and is slower.
     #[error(
         "it takes frames more slowly than they come: more than 16384 wait for it; is its bit rate lower, is it disturbed?"
@@ -181,7 +189,7 @@ pub enum BusError {
 impl BusError {
     /// Whether the connection is gone, and a new one may come about.
     pub(crate) const fn is_loss_of_connection(&self) -> bool {
-        matches!(self, Self::Closed { .. } | Self::Lost { .. } | Self::Stuck { .. })
+        matches!(self, Self::Closed { .. } | Self::Lost { .. } | Self::Stuck { .. } | Self::FellSilent { .. })
     }
 }
 

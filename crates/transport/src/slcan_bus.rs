@@ -174,6 +174,7 @@ impl AsyncBus for SlcanBus {
                     self.notes.push_back(Note::SendQueueFull);
                 }
                 Some(Event::Malformed(line, malformed)) => self.handle_malformed(line, &malformed),
+                Some(Event::Silent) => return Err(BusError::FellSilent { address: self.link.address() }),
                 // Of the opening.
                 Some(Event::Opened | Event::Failed(_)) => {}
                 None => {
@@ -254,6 +255,21 @@ mod tests {
         });
         assert_eq!(received, "\r\rC\rV\rS6\rO\rF\rt601140\r");
         assert_eq!((bus.frames_refused(), bus.lines_malformed()), (1, 1));
+    }
+
+    #[tokio::test]
+    async fn an_adapter_that_falls_silent_ends_the_bus_as_a_lost_connection() {
+        let clock = WallClock::start();
+        let (host, line) = SerialStream::pair().unwrap();
+        let opening = SlcanBus::begin(Link::over_serial("tty", host, &clock), None, &clock);
+        let (_, bus) = tokio::join!(adapter(line, &["\r", "\r", "\r", "V1013\r", "\r"]), opening);
+        let mut bus = bus.unwrap();
+        // Its silence in the client's time, without waiting.
+        while let Some(at) = bus.client.poll_timeout() {
+            bus.client.handle_timeout(at);
+        }
+        let error = bus.recv().await.unwrap_err();
+        assert!(error.is_loss_of_connection() && error.to_string().starts_with("tty says nothing any more"), "{error}");
     }
 
     #[tokio::test]

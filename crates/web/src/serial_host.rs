@@ -257,6 +257,7 @@ impl SerialHost {
                         self.distrust(why);
                     }
                 }
+                Event::Silent => self.unplug("the adapter says nothing any more: is it still there?"),
                 Event::Malformed(_, malformed) => {
                     self.garbled += 1;
                     if self.garbled == GARBLED {

@@ -368,3 +368,15 @@ fn a_wrong_bit_rate_is_said_and_nothing_is_hosted() {
     let odd = SerialHost::new("CANable", Bitrate::new(40_000).expect("a rate"), Duration::ZERO, Instant::ZERO);
     assert!(odd.expect_err("slcan has it not").message.contains("800k"));
 }
+
+#[test]
+fn an_adapter_that_falls_silent_is_lost_with_all_that_moved() {
+    let mut cable = Cable::turning();
+    cable.is_plugged = false;
+    // Asked each second, and twice for a second each.
+    cable.run(3000 + 10);
+    let (why, moving) = cable.let_go();
+    assert!(why.contains("says nothing any more"), "{why}");
+    assert!(moving.len() == 1 && moving[0].starts_with("node 4 may still be moving"), "{moving:?}");
+    assert!(matches!(cable.host.line(), Line::Closed(Some(_))));
+}
