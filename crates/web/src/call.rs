@@ -80,6 +80,8 @@ enum PortEvent {
     Unplugged(String),
     /// The page can no longer be relied on: its session ends, and what it moved is stopped.
     LetGo(String),
+    /// The page takes leave of the adapter: what it moved is stopped, and the drives' watches over this host are given back.
+    Leave,
     /// The channel of the adapter is to be closed.
     Close,
 }
@@ -178,6 +180,7 @@ impl Library {
             Some(PortEvent::Plugged) => serial.plug(),
             Some(PortEvent::Unplugged(why)) => serial.unplug(&why),
             Some(PortEvent::LetGo(why)) => serial.let_go(&why),
+            Some(PortEvent::Leave) => serial.take_leave(),
             Some(PortEvent::Close) => serial.close(),
             None => {}
         }
@@ -190,8 +193,7 @@ impl Library {
             .take_let_go()
             .map(|let_go| json!({ "why": let_go.why, "moved": let_go.moved, "moving": let_go.moving }));
         let mut bytes = serial.take_output();
-        let head =
-            json!({ "wire": bytes.len(), "line": line, "lost": lost, "let_go": let_go, "moved": serial.moved() });
+        let head = json!({ "wire": bytes.len(), "line": line, "lost": lost, "let_go": let_go, "moved": serial.moved(), "left": serial.left() });
         bytes.extend_from_slice(serial.take_sent().join("\n").as_bytes());
         Ok(answer(head, &bytes))
     }

@@ -69,6 +69,11 @@ impl Hosted {
         self.conversation.take().is_some()
     }
 
+    /// The page is in control of the drives, by the newest state.
+    pub(crate) fn is_controlled(&self) -> bool {
+        self.conversation.is_some() && self.handle.states().borrow().snapshot().controller.is_some()
+    }
+
     /// Hands on a message of the page, as it would send it over the studio's socket. Without a conversation it is lost.
     pub(crate) fn say(&mut self, message: &str) {
         if let Some(page) = &self.conversation {

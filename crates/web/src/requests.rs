@@ -41,11 +41,18 @@ struct OfNode {
     node: Option<u8>,
 }
 
+/// The answer to a request that needs no host.
+pub(crate) fn respond_without_host(request: &Request) -> Option<Response> {
+    (request.path == "/api/power-states").then(|| of_text(JSON, host::page::power_states()))
+}
+
 pub(crate) fn respond(handle: &HostHandle, request: &Request, body: &[u8]) -> Response {
+    if let Some(response) = respond_without_host(request) {
+        return response;
+    }
     let (path, query) = request.path.split_once('?').unwrap_or((&request.path, ""));
     let answered = match path {
         "/api/state" => Ok(of_text(JSON, handle.states().borrow().json().to_string())),
-        "/api/power-states" => Ok(of_text(JSON, host::page::power_states())),
         "/api/faults" => parameters::<Since>(query).map(|Since { since }| of_json(&handle.timeline().since(since))),
         "/api/trace" => trace(handle, query),
         "/api/trace/identifiers" => parameters::<Asked>(query)

@@ -2,19 +2,23 @@
 //!
 //! The host begins when the adapter has opened its channel, and stays when the port is lost: what it had moved then gets its stop again
 //! as soon as there is a port. The page's session ends, and with it its control, whenever what it sees or sends can no longer be relied
-//! on: the page is hidden, this program was not run for a while, the port is lost, the adapter refuses frames or sends garbage.
+//! on: the page is hidden, this program was not run for a while, the port is lost, the adapter falls silent, refuses frames or sends
+//! garbage. A page that takes leave has the drives' watches over this host given back.
 
+use std::pin::Pin;
+use std::task::Poll;
 use std::time::Duration;
 
 use can::{Bitrate, Instant, Station, Tap};
-use host::stopping::Account;
+use host::stopping::{Account, still_moving, stop};
 use host::{Setting, Wire};
 use master::Network;
+use sim::task::Task;
 use slcan::{Client, Event, Status};
 
 use crate::hosted::{Hosted, Passed};
 use crate::hosted_world::Failed;
-use crate::requests::{Request, Response};
+use crate::requests::{Request, Response, respond_without_host};
 
 /// Longest wait for each answer of a node, as the command line has it at first.
 const TIMEOUT: Duration = Duration::from_millis(500);
@@ -50,6 +54,15 @@ pub struct LetGo {
     pub moving: Vec<String>,
 }
 
+/// How far the page's leave of the adapter is.
+enum Leave {
+    No,
+    /// What was moved is being stopped, and then the watches of the drives are given back.
+    Stopping(Task<Pin<Box<dyn Future<Output = Vec<Account>>>>>),
+    /// What may still be moving.
+    Done(Vec<String>),
+}
+
 /// The host, its page, and the client of the adapter.
 pub struct SerialHost {
     network: Network,
@@ -69,6 +82,7 @@ pub struct SerialHost {
     /// It has been said that the adapter refuses frames, since it opened its channel.
     is_refusal_said: bool,
     let_go: Option<LetGo>,
+    leave: Leave,
     now: Instant,
 }
 
@@ -119,6 +133,7 @@ impl SerialHost {
             garbled: 0,
             is_refusal_said: false,
             let_go: None,
+            leave: Leave::No,
             now,
         })
     }
@@ -151,6 +166,33 @@ impl SerialHost {
             self.wire.update(|health| health.state = Some("connection lost"));
             self.end_session(format!("The adapter is lost: {why}"));
         }
+        if matches!(self.leave, Leave::Stopping(_)) {
+            self.leave = Leave::Done(self.out_of_reach());
+        }
+    }
+
+    /// The page takes leave of the adapter: its session ends, what it moved is stopped, and the drives' watches over this host are given
+    /// back. There is no further session; [`left`](Self::left) says when that is done.
+    pub fn take_leave(&mut self) {
+        if !matches!(self.leave, Leave::No) {
+            return;
+        }
+        self.end_session("The page took leave of the adapter".to_owned());
+        self.leave = if self.is_open && self.hosted.is_some() {
+            let network = self.network.clone();
+            Leave::Stopping(Task::new(Box::pin(async move { stop(&network, WHO).await })))
+        } else {
+            Leave::Done(self.out_of_reach())
+        };
+        self.settle();
+    }
+
+    /// Once the page has taken leave, and all is done that can be: the drives that may still be moving, and what they do by themselves.
+    pub fn left(&self) -> Option<&[String]> {
+        match &self.leave {
+            Leave::Done(moving) => Some(moving),
+            Leave::No | Leave::Stopping(_) => None,
+        }
     }
 
     /// Ends the session of the page, if there is one: what it moved is stopped, and control has to be taken anew.
@@ -158,8 +200,11 @@ impl SerialHost {
         self.end_session(why.to_owned());
     }
 
-    /// Begins a session for the page; as soon as the adapter has opened its channel.
+    /// Begins a session for the page; as soon as the adapter has opened its channel. Not for a page that has taken leave.
     pub fn join(&mut self) {
+        if !matches!(self.leave, Leave::No) {
+            return;
+        }
         self.is_page_waiting = self.hosted.is_none();
         if let Some(hosted) = &mut self.hosted {
             hosted.join();
@@ -180,9 +225,11 @@ impl SerialHost {
     /// # Errors
     /// The adapter has not opened its channel yet.
     pub fn request(&self, request: &Request, body: &[u8]) -> Result<Response, Failed> {
-        let hosted =
-            self.hosted.as_ref().ok_or_else(|| Failed::new("no_bus", "the adapter has not opened its channel yet"))?;
-        Ok(hosted.request(request, body))
+        let response = match &self.hosted {
+            Some(hosted) => Some(hosted.request(request, body)),
+            None => respond_without_host(request),
+        };
+        response.ok_or_else(|| Failed::new("no_bus", "the adapter has not opened its channel yet"))
     }
 
     /// Takes what the port has brought, and brings everything to `now`. It is to be called every few milliseconds: a call after a longer
@@ -229,14 +276,17 @@ impl SerialHost {
         self.is_page_waiting = false;
         let moved = self.moved();
         // Without a channel no stop leaves, whatever has ended the session.
-        let lost = if self.is_open { Vec::new() } else { Account::of_lost_bus(&self.network, WHO) };
-        let moving: Vec<String> = lost.iter().map(Account::text).collect();
+        let moving = if self.is_open { Vec::new() } else { self.out_of_reach() };
         let Some(hosted) = &mut self.hosted else { return };
-        // Once for each session, however often the adapter refuses.
         if hosted.leave() || !moving.is_empty() {
             self.let_go = Some(LetGo { why, moved, moving });
         }
         self.settle();
+    }
+
+    /// The drives that were set in motion, as those of a bus that is lost.
+    fn out_of_reach(&self) -> Vec<String> {
+        still_moving(Account::of_lost_bus(&self.network, WHO))
     }
 
     fn handle_events(&mut self) {
@@ -253,15 +303,14 @@ impl SerialHost {
                 Event::FrameRefused => {
                     self.wire.update(|health| health.frames_lost += 1);
                     let why = "The adapter answered BEL: a frame is lost. Is another node on, is the bit rate right, is the bus terminated?";
-                    if !std::mem::replace(&mut self.is_refusal_said, true) || !self.network.moved().is_empty() {
-                        self.distrust(why);
-                    }
+                    let is_news = !std::mem::replace(&mut self.is_refusal_said, true);
+                    self.distrust(why, is_news);
                 }
                 Event::Silent => self.unplug("the adapter says nothing any more: is it still there?"),
                 Event::Malformed(_, malformed) => {
                     self.garbled += 1;
                     if self.garbled == GARBLED {
-                        self.distrust(&format!("The adapter sends what is not slcan: {malformed}"));
+                        self.distrust(&format!("The adapter sends what is not slcan: {malformed}"), true);
                     }
                 }
             }
@@ -296,12 +345,13 @@ impl SerialHost {
         });
     }
 
-    /// The line cannot be relied on: nothing is to move by it. Without a motion it is news.
-    fn distrust(&mut self, why: &str) {
-        if self.network.moved().is_empty() {
-            self.wire.tell(why);
-        } else {
+    /// The line cannot be relied on: a page in control moves nothing by it any more. Where nothing moves by this page, or what moved has
+    /// had its stop, it is news.
+    fn distrust(&mut self, why: &str, is_news: bool) {
+        if self.hosted.as_ref().is_some_and(Hosted::is_controlled) && !self.network.moved().is_empty() {
             self.end_session(why.to_owned());
+        } else if is_news {
+            self.wire.tell(why);
         }
     }
 
@@ -310,6 +360,14 @@ impl SerialHost {
         let Some(hosted) = &mut self.hosted else { return };
         loop {
             let mut has_run = hosted.poll();
+            if let Leave::Stopping(stopping) = &mut self.leave
+                && let Some(polled) = stopping.poll_if_woken()
+            {
+                has_run = true;
+                if let Poll::Ready(accounts) = polled {
+                    self.leave = Leave::Done(still_moving(accounts));
+                }
+            }
             if self.station.poll_timeout().is_some_and(|at| at <= self.now) || self.network.now() < self.now {
                 self.station.handle_timeout(self.now);
                 has_run = true;

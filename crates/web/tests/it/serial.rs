@@ -64,7 +64,11 @@ struct Cable {
 impl Cable {
     /// Drives that have booted, and an adapter whose channel has not been opened.
     fn at(bitrate: Bitrate) -> Self {
-        let machine = machine::file::Machine::parse_in(DRIVES, std::path::Path::new("")).expect("a machine");
+        Self::with(DRIVES, bitrate)
+    }
+
+    fn with(machine: &str, bitrate: Bitrate) -> Self {
+        let machine = machine::file::Machine::parse_in(machine, std::path::Path::new("")).expect("a machine");
         let mut world = machine.build().expect("a world");
         let plugged = Plugged {
             adapter: Adapter::new(Some(Bitrate::K500)),
@@ -93,11 +97,16 @@ impl Cable {
 
     /// The same with its drives found, and control taken.
     fn in_control() -> Self {
-        let mut cable = Self::at(Bitrate::K500);
-        cable.until("both drives", |state| {
+        Self::at(Bitrate::K500).take_control(2)
+    }
+
+    /// So many drives are found, and control is taken.
+    fn take_control(self, drives: usize) -> Self {
+        let mut cable = self;
+        cable.until("all drives", |state| {
             state["nodes"]
                 .as_array()
-                .is_some_and(|nodes| nodes.len() == 2 && nodes.iter().all(|node| !node["drive"].is_null()))
+                .is_some_and(|nodes| nodes.len() == drives && nodes.iter().all(|node| !node["drive"].is_null()))
         });
         cable.must(json!({ "do": "take_control" }));
         cable
@@ -199,11 +208,24 @@ impl Cable {
         assert_eq!(answer["ok"], true, "{answer}");
     }
 
-    /// The true speed of a shaft, in r/min.
-    fn speed(&mut self, node: u8) -> f64 {
+    /// What a drive truly does.
+    fn get(&mut self, node: u8) -> Value {
         let command = format!("{node} get").parse().expect("a command");
         let got = sim::command::perform(&mut self.world, &command, sim::command::Service::default()).expect("a drive");
-        serde_json::from_str::<Value>(&got).expect("JSON")["velocity_rpm"].as_f64().expect("a speed")
+        serde_json::from_str(&got).expect("JSON")
+    }
+
+    /// The true speed of a shaft, in r/min.
+    fn speed(&mut self, node: u8) -> f64 {
+        self.get(node)["velocity_rpm"].as_f64().expect("a speed")
+    }
+
+    /// The first frame that the host has sent is a quick stop of the wheel: CiA 301, 7.2.4.3.3: a download of two bytes to 6040h; CiA 402-2,
+    /// table 28: quick stop has of bits 7, 2 and 1 only the last.
+    fn has_said_stop_first(&self) -> bool {
+        let first = self.said.split('\r').find(|line| line.starts_with('t')).expect("a frame");
+        let (download, low) = first.split_at_checked(13).expect("eight bytes");
+        download == "t60482B406000" && u8::from_str_radix(&low[..2], 16).expect("a byte") & 0x86 == 0x02
     }
 
     /// The wheel turns.
@@ -293,11 +315,7 @@ fn a_machine_that_wakes_stops_what_moved_before_anything_else() {
         cable.sleep(slept);
         // What the page said before it slept comes late, and moves nothing.
         cable.exchange();
-        let first = cable.said.split('\r').find(|line| line.starts_with('t')).expect("a frame").to_owned();
-        // CiA 301, 7.2.4.3.3: a download of two bytes to 6040h; CiA 402-2, table 28: quick stop has of bits 7, 2 and 1 only the last.
-        let (download, low) = first.split_at_checked(13).expect("eight bytes");
-        let low = u8::from_str_radix(&low[..2], 16).expect("a byte");
-        assert!(download == "t60482B406000" && low & 0x86 == 0x02, "slept {slept} ms: {first}");
+        assert!(cable.has_said_stop_first(), "slept {slept} ms: {}", cable.said);
         let (why, _) = cable.let_go();
         assert!(why.contains("slept") && why.contains(&format!("{:.1} s", slept as f64 / 1000.0)), "{why}");
         cable.say(json!({ "do": "velocity", "node": 4, "rpm": 60 }));
@@ -339,9 +357,15 @@ fn an_adapter_that_is_unplugged_leaves_its_drives_to_their_watch_and_they_are_st
 fn an_adapter_that_refuses_frames_or_sends_garbage_ends_what_moves() {
     let mut cable = Cable::turning();
     cable.on_bus.lock().is_off = true;
-    cable.run(1100);
-    let (why, _) = cable.let_go();
+    // Until a frame of the host was refused: long before the watch of the drive, of 1 s.
+    let refused = (0..500).find_map(|_| {
+        cable.said.clear();
+        cable.run(1);
+        cable.host.take_let_go()
+    });
+    let why = refused.expect("the session has ended").why;
     assert!(why.contains("BEL") && why.contains("terminated"), "{why}");
+    assert!(cable.has_said_stop_first(), "{}", cable.said);
     cable.on_bus.lock().is_off = false;
     cable.run(2000);
     cable.rests_and_control_is_free();
@@ -354,6 +378,7 @@ fn an_adapter_that_refuses_frames_or_sends_garbage_ends_what_moves() {
     }
     let (why, _) = cable.let_go();
     assert!(why.contains("not slcan") && why.contains("'@@'"), "{why}");
+    assert!(cable.has_said_stop_first(), "{}", cable.said);
     cable.rests_and_control_is_free();
 }
 
@@ -365,8 +390,28 @@ fn a_wrong_bit_rate_is_said_and_nothing_is_hosted() {
     assert!(cable.host.take_let_go().is_none() && cable.state.is_null());
     let request = web::Request { path: "/api/state".into() };
     assert_eq!(cable.host.request(&request, &[]).expect_err("no host").kind, "no_bus");
+    // Asked for once, when the page is opened.
+    let request = web::Request { path: "/api/power-states".into() };
+    assert_eq!(cable.host.request(&request, &[]).expect("it is the same for all").status, 200);
     let odd = SerialHost::new("CANable", Bitrate::new(40_000).expect("a rate"), Duration::ZERO, Instant::ZERO);
     assert!(odd.expect_err("slcan has it not").message.contains("800k"));
+}
+
+/// What an earlier page was stopped for ends no session that is not in control: it sees what its drives do.
+#[test]
+fn a_page_that_only_looks_stays_while_the_adapter_refuses_frames() {
+    let mut cable = Cable::turning();
+    cable.on_bus.lock().is_off = true;
+    cable.run(50);
+    assert!(cable.let_go().0.contains("BEL"));
+    cable.host.join();
+    // The host looks at its drives, and repeats its stop.
+    for _ in 0..40 {
+        cable.run(50);
+        assert_eq!(cable.host.take_let_go(), None);
+        assert_eq!(cable.host.moved(), [4], "it was not seen to stand");
+    }
+    assert!(cable.state.is_object() && cable.state["controller"].is_null(), "{}", cable.state);
 }
 
 #[test]
@@ -379,4 +424,50 @@ fn an_adapter_that_falls_silent_is_lost_with_all_that_moved() {
     assert!(why.contains("says nothing any more"), "{why}");
     assert!(moving.len() == 1 && moving[0].starts_with("node 4 may still be moving"), "{moving:?}");
     assert!(matches!(cable.host.line(), Line::Closed(Some(_))));
+}
+
+/// The joint watches for the heartbeat of its host from the first one on: without its guard given back, it would raise an alarm 2 s after
+/// that has gone.
+#[test]
+fn a_page_that_takes_leave_gives_the_watches_back_once_its_drives_stand() {
+    let mut cable = Cable::with("[[drive]]\nmodel = \"m4230e17b50\"\nnode = 1\n", Bitrate::K500).take_control(1);
+    cable.must(json!({ "do": "velocity", "node": 1, "rpm": 10 }));
+    cable.run(1000);
+    assert!((cable.speed(1) - 10.0).abs() < 1.0, "{} r/min", cable.speed(1));
+    cable.host.take_leave();
+    assert_eq!(cable.host.left(), None);
+    cable.exchange();
+    cable.state = Value::Null;
+    while cable.host.left().is_none() {
+        cable.run(1);
+        // A page that connects again gets no session.
+        cable.host.join();
+        cable.say(json!({ "do": "take_control" }));
+        assert!(cable.state.is_null(), "{}", cable.state);
+    }
+    assert_eq!((cable.host.left(), cable.host.moved()), (Some(&[][..]), vec![]));
+    assert!(cable.speed(1).abs() < 1.0, "{} r/min", cable.speed(1));
+    cable.host.close();
+    cable.said.clear();
+    cable.exchange();
+    assert!(cable.said.ends_with("C\r"), "{}", cable.said);
+    cable.sleep(5000);
+    assert_eq!(cable.get(1)["error_code"], 0);
+}
+
+#[test]
+fn a_page_that_takes_leave_of_an_adapter_that_is_gone_says_what_may_be_moving() {
+    let mut cable = Cable::turning();
+    cable.host.take_leave();
+    cable.is_plugged = false;
+    cable.host.unplug("the cable was pulled");
+    let moving = cable.host.left().expect("no more can be done");
+    assert!(moving.len() == 1 && moving[0].starts_with("node 4 may still be moving"), "{moving:?}");
+    // One that answers nothing, though its line is there.
+    let mut cable = Cable::turning();
+    cable.host.take_leave();
+    cable.is_plugged = false;
+    cable.run(3000);
+    let moving = cable.host.left().expect("each wait has its end");
+    assert!(moving.len() == 1 && moving[0].starts_with("node 4 may still be moving"), "{moving:?}");
 }
