@@ -41,8 +41,6 @@ pub(super) struct Channel {
     given_up: Option<Mux>,
     /// What is read goes here, what is written comes from here.
     buffer: Vec<u8>,
-    /// It has answered block transfer with 0504 0001h, and has not booted since.
-    refuses_blocks: bool,
     /// It has just done so.
     has_refused: bool,
 }
@@ -84,7 +82,6 @@ impl Channel {
             ended: None,
             given_up: None,
             buffer: Vec::new(),
-            refuses_blocks: false,
             has_refused: false,
         }
     }
@@ -113,11 +110,6 @@ impl Channel {
     /// True once after the node has refused block transfer.
     pub(super) const fn take_refusal(&mut self) -> bool {
         core::mem::replace(&mut self.has_refused, false)
-    }
-
-    /// The node has booted: it may be another device, or another firmware.
-    pub(super) const fn handle_boot_up(&mut self) {
-        self.refuses_blocks = false;
     }
 
     /// Starts the request, or queues it. Where `blocks` are allowed, a long value is sent in them.
@@ -155,7 +147,6 @@ impl Channel {
         let Request { mux, transfer, timeout, .. } = request;
         self.client.set_timeout(timeout);
         self.buffer.clear();
-        let may_use_blocks = blocks && !self.refuses_blocks;
         let (uploads, in_blocks) = match transfer {
             Transfer::Upload => {
                 self.buffer.resize(FIRST_ROOM, 0);
@@ -164,7 +155,7 @@ impl Channel {
             }
             Transfer::Download(data) => {
                 self.buffer.extend_from_slice(data.as_bytes());
-                let in_blocks = may_use_blocks && self.buffer.len() >= DOWNLOAD_BLOCKS_FROM;
+                let in_blocks = blocks && self.buffer.len() >= DOWNLOAD_BLOCKS_FROM;
                 if in_blocks {
                     self.client.download_blocks(mux, &self.buffer, now);
                 } else {
@@ -173,13 +164,13 @@ impl Channel {
                 (false, in_blocks)
             }
         };
-        self.active = Some(Active { ticket, mux, timeout, uploads, may_use_blocks, in_blocks, sent: false });
+        self.active = Some(Active { ticket, mux, timeout, uploads, may_use_blocks: blocks, in_blocks, sent: false });
     }
 
     /// The node has no block transfer: the same again without.
     fn start_without_blocks(&mut self, now: Instant) {
         let Some(active) = &mut self.active else { return };
-        (self.refuses_blocks, self.has_refused) = (true, true);
+        self.has_refused = true;
         (active.may_use_blocks, active.in_blocks) = (false, false);
         if active.uploads {
             self.client.upload(active.mux, now);
@@ -378,7 +369,7 @@ mod tests {
     const TAKEN: &str = "584#6008100000000000";
 
     #[test]
-    fn a_long_download_goes_in_blocks_unless_the_node_has_refused_them_since_it_booted() {
+    fn a_long_download_goes_in_blocks_where_they_are_allowed_and_again_in_segments_where_they_are_refused() {
         let download = |bytes: usize| Transfer::Download(Payload::new(&vec![0; bytes]));
         let mut channel = Channel::new(NodeId::new(4).unwrap());
         let sent = conversation(&mut channel, download(63), true, &[]);
@@ -389,13 +380,6 @@ mod tests {
         let sent = conversation(&mut channel, download(64), true, &[REFUSED, TAKEN]);
         assert_eq!(sent, ["604#C608100040000000", "604#2108100040000000", "604#0000000000000000"]);
         assert!(channel.take_refusal() && !channel.take_refusal());
-        channel.cancel(Ticket(1), true, Instant::ZERO);
-        channel.poll_transmit().unwrap();
-        assert_eq!(conversation(&mut channel, download(64), true, &[]), ["604#2108100040000000"], "it has refused");
-        channel.cancel(Ticket(1), true, Instant::ZERO);
-        channel.poll_transmit().unwrap();
-        channel.handle_boot_up();
-        assert_eq!(conversation(&mut channel, download(64), true, &[]), ["604#C608100040000000"], "it has booted");
     }
 
     #[test]

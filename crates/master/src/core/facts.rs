@@ -35,6 +35,8 @@ pub struct NodeFacts {
     /// When it was last written to: an SDO download had ended, or an RPDO left. What it sent before does not reflect
     /// that.
     pub written_at: Option<Instant>,
+    /// It has answered SDO block transfer with 0504 0001h, and has not booted since: then it may be another device, or another firmware.
+    pub refuses_blocks: bool,
     /// SDO answers that no client had asked for.
     pub second_answers: u32,
     /// Two devices have this node-ID: what first spoke for it.
@@ -104,6 +106,7 @@ impl NodeFacts {
         if booted {
             self.boot_up = Some((now, self.boot_up.map_or(1, |(_, count)| count.saturating_add(1))));
             self.nmt_sent = None;
+            self.refuses_blocks = false;
         }
         let Some(watch) = &mut self.heartbeat_watch else { return false };
         // Boot-up does not arm the watch: the node may have lost its heartbeat time (CiA 301, 7.2.8.3.2.2). To be asked it needs none.

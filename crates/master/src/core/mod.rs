@@ -266,7 +266,7 @@ impl Core {
             let failure = Failure::NoAnswer { waited: Duration::ZERO, unsent: true };
             return self.finished.push_back(Finished { ticket, outcome: Err(failure) });
         }
-        let blocks = self.may_use_blocks();
+        let blocks = self.may_use_blocks(node);
         match self.member_mut(node).channel.push(ticket, request, blocks, now) {
             Ok(()) => self.settle(node),
             Err(failure) => self.finished.push_back(Finished { ticket, outcome: Err(failure) }),
@@ -278,8 +278,10 @@ impl Core {
             return;
         }
         let now = self.now;
-        let blocks = self.may_use_blocks();
-        let owner = self.busy.iter().find(|node| self.member_mut(*node).channel.cancel(ticket, blocks, now));
+        let owner = self.busy.iter().find(|node| {
+            let blocks = self.may_use_blocks(*node);
+            self.member_mut(*node).channel.cancel(ticket, blocks, now)
+        });
         if let Some(node) = owner {
             self.settle(node);
         }
@@ -307,15 +309,16 @@ impl Core {
     }
 
     /// Not while SYNC is produced: the segments of a block wait for no answer, and a hundred of them would stand before SYNC and RPDOs
-    /// in the queue of an adapter.
-    fn may_use_blocks(&self) -> bool {
-        self.sync.period().is_none()
+    /// in the queue of an adapter. Nor with a node that has refused them.
+    fn may_use_blocks(&self, node: NodeId) -> bool {
+        self.sync.period().is_none() && !self.member(node).facts.refuses_blocks
     }
 
     /// Collects what a node's channel has to say after it was called.
     fn settle(&mut self, node: NodeId) {
         let now = self.now;
         if self.member_mut(node).channel.take_refusal() {
+            self.member_mut(node).facts.refuses_blocks = true;
             self.events.push(Event::NoBlockTransfer(node), now);
         }
         while let Some(ended) = self.member_mut(node).channel.poll_finished() {
@@ -326,7 +329,7 @@ impl Core {
             if ended.ticket != FEED {
                 self.finished.push_back(Finished { ticket: ended.ticket, outcome: ended.outcome });
             }
-            let blocks = self.may_use_blocks();
+            let blocks = self.may_use_blocks(node);
             self.member_mut(node).channel.start_next(blocks, now);
             self.forget_servers(node);
         }

@@ -124,7 +124,7 @@ impl Core {
         // The stop by SDO does not wait behind what no caller waits for: words of earlier cycles, and questions to keep
         // a drive content.
         let now = self.now;
-        let blocks = self.may_use_blocks();
+        let blocks = self.may_use_blocks(node);
         while self.member_mut(node).channel.cancel(FEED, blocks, now) {}
         self.settle(node);
         self.find_due();

@@ -78,7 +78,6 @@ impl Core {
         let back = facts.note_heartbeat(state, now);
         let deadline = facts.heartbeat_watch.and_then(|watch| watch.deadline);
         if state == NmtState::Initialising {
-            self.member_mut(node).channel.handle_boot_up();
             self.events.push(Event::BootUp(node), now);
         } else if before != Some(state) {
             self.events.push(Event::NmtState(node, state), now);

@@ -57,6 +57,7 @@ impl Observed {
             pdos: Vec::new(),
             talked_to: facts.talked_to_at.map(|at| now - at),
             twins: facts.twins,
+            refuses_blocks: facts.refuses_blocks,
             heard: heard.clone(),
             values: BTreeMap::new(),
         };

@@ -3,13 +3,15 @@
 
 use crate::support::toy::Toy;
 use crate::support::{Bus, node};
+use can::Station;
+use canopen::Mux;
 use devices::servo::CIA402;
 use master::Drive;
-use master::explain::{Explained, Overheard};
+use master::explain::{Explained, Overheard, Weight};
 
 /// A servo that answers with this statusword, controlword and mode, and an error-free rest.
-fn explained(statusword: u16, controlword: u16, mode: u8) -> Explained {
-    let toy = Toy::new(4)
+fn servo(statusword: u16, controlword: u16, mode: u8) -> Toy {
+    Toy::new(4)
         .u32(0x1000, 0, 0x0002_0192)
         .u16(0x1017, 0, 0)
         .u16(0x603F, 0, 0)
@@ -20,11 +22,17 @@ fn explained(statusword: u16, controlword: u16, mode: u8) -> Explained {
         .u32(0x6064, 0, 0)
         .u32(0x606C, 0, 0)
         .u32(0x607A, 0, 0)
-        .u32(0x60FF, 0, 0);
-    let mut bus = Bus::new(vec![toy]);
+        .u32(0x60FF, 0, 0)
+}
+
+fn explained_on(bus: &mut Bus) -> Explained {
     let drive = Drive::new(bus.network.node(node(4)), &CIA402);
     let heard = Overheard::from(bus.now);
     bus.block_on(drive.explain(&heard))
+}
+
+fn explained(statusword: u16, controlword: u16, mode: u8) -> Explained {
+    explained_on(&mut Bus::new(vec![servo(statusword, controlword, mode)]))
 }
 
 fn has(explained: &Explained, rule: &str) -> bool {
@@ -89,4 +97,22 @@ fn a_following_error_is_named_in_the_modes_whose_bit_13_it_is() {
     assert!(has(&explained(ENABLED | FOLLOWING_ERROR, 0x0F, POSITION), "following_error"));
     assert!(!has(&explained(ENABLED, 0x0F, POSITION), "following_error"));
     assert!(!has(&explained(ENABLED | FOLLOWING_ERROR, 0x0F, VELOCITY), "following_error"));
+}
+
+/// The toy has no block transfer (CiA 301, 7.2.4.2.9, leaves it to the device) and refuses it with 0504 0001h.
+#[test]
+fn a_refused_block_transfer_is_named_once_a_long_value_was_transferred_until_the_node_boots() {
+    let mut bus = Bus::new(vec![servo(ENABLED, 0x0F, VELOCITY).with(0x1F50, 1, &[])]);
+    let program = Mux::new(0x1F50, 1);
+    let node = bus.network.node(node(4));
+    // 63 bytes go in segments by themselves.
+    bus.block_on(node.download(program, &[0; 63])).unwrap();
+    assert!(!has(&explained_on(&mut bus), "no_block_transfer"));
+    bus.block_on(node.download(program, &[0; 64])).unwrap();
+    let explained = explained_on(&mut bus);
+    assert!(has(&explained, "no_block_transfer"), "{explained:#?}");
+    let found = explained.findings.iter().find(|finding| finding.rule == "no_block_transfer").unwrap();
+    assert_eq!(found.weight, Weight::Warning);
+    bus.network.handle_frame(&"704#00".parse().unwrap(), bus.now);
+    assert!(!has(&explained_on(&mut bus), "no_block_transfer"));
 }

@@ -59,6 +59,10 @@ fn a_node_without_block_transfer_is_reported_once_and_gets_its_value_in_segments
     core.download(node(), NAME, &[7; 80], TIMEOUT, Instant::ZERO);
     assert_eq!(requests(&mut core), ["604#2108100050000000"], "it is not asked again");
     assert!(core.poll_event().is_none());
+    core.handle_frame(&reply("584#8008100000000008"), Instant::ZERO);
+    core.handle_frame(&reply("704#00"), Instant::ZERO);
+    core.download(node(), NAME, &[7; 80], TIMEOUT, Instant::ZERO);
+    assert_eq!(requests(&mut core), ["604#C608100050000000"], "it has booted: another device, or another firmware");
 }
 
 /// CiA 301, 7.2.4.3.9: the segments of a block wait for no answer. They take turns with what others are asked for.

@@ -18,6 +18,7 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
         findings.extend(two_devices(seen).or_else(|| heartbeat(seen)));
         findings.extend(other_master(seen));
         findings.extend(nmt_by_other(seen));
+        findings.extend(no_block_transfer(seen));
         findings.extend(host_watch(seen));
     }
 }
@@ -138,6 +139,28 @@ fn nmt_by_other(seen: &Observed) -> Option<Finding> {
                 format!("{} NMT commands of another program; the last one was {name} to {}", last.count, all_or(to)),
                 "PDOs end, or the node starts anew, in the middle of a motion".to_owned(),
                 "Find the other NMT master (ferrodrive dump --service nmt) and let one of the two do it".to_owned(),
+            ],
+        )
+    })
+}
+
+/// Block transfer is the device's choice (CiA 301, 7.2.4.2.9 and 7.2.4.2.13): it is reported where a long value was asked for in blocks.
+fn no_block_transfer(seen: &Observed) -> Option<Finding> {
+    let says = match seen.description {
+        Some(model) if !model.sdo_block_transfer => format!("; the {} has none", model.name),
+        _ => String::new(),
+    };
+    seen.refuses_blocks.then(|| {
+        warning(
+            TOPIC,
+            "no_block_transfer",
+            [
+                "Long values are transferred in blocks (CiA 301, 7.2.4.2.9)".to_owned(),
+                format!("It refused them with 0504 0001h{says}"),
+                "They go in segments, each with an answer: twice the frames and more, and the motion waits as long".to_owned(),
+                "Transfer programs and other long values while the machine stands; ask its maker for a firmware with block \
+                 transfer if that takes too long"
+                    .to_owned(),
             ],
         )
     })

@@ -89,6 +89,8 @@ pub struct Observed {
     pub talked_to: Option<Duration>,
     /// What speaks for two devices with its node-ID.
     pub twins: Option<Twins>,
+    /// It has refused SDO block transfer to this master since it has booted.
+    pub refuses_blocks: bool,
     /// What others sent.
     pub heard: Overheard,
     /// What the objects have.
