@@ -4,6 +4,7 @@
 
 pub(crate) mod axes;
 pub(crate) mod capture;
+mod chosen;
 mod from_file;
 mod job;
 mod order;
@@ -34,6 +35,7 @@ use pyo3::prelude::*;
 use transport::BusSpec;
 use words::models::{Description, with_files};
 
+use chosen::Chosen;
 pub(crate) use job::Job;
 use job::Trouble;
 use order::{Order, duration};
@@ -66,7 +68,14 @@ pub(crate) struct Network {
 impl Network {
     /// A master as one more station of a world; with the machine file that describes what is there, where the world was not made of one.
     #[staticmethod]
-    fn in_world(py: Python<'_>, world: &Bound<'_, World>, machine: Option<PathBuf>) -> PyResult<Self> {
+    fn in_world(
+        py: Python<'_>,
+        world: &Bound<'_, World>,
+        machine: Option<PathBuf>,
+        sdo_servers: BTreeMap<i64, i64>,
+        sync_counter: Option<i64>,
+    ) -> PyResult<Self> {
+        let chosen = Chosen::new(sdo_servers, sync_counter)?;
         let machine = read_machine_of(py, machine)?;
         let (core, traffic, shared) = (Core::new(), Traffic::default(), Arc::clone(world.get().shared()));
         let mut state = shared.lock(py)?;
@@ -74,19 +83,28 @@ impl Network {
         state.jobs.note_master();
         let machine = machine.or_else(|| state.machine());
         drop(state);
+        chosen.apply(&core, machine.as_deref());
         Ok(Self::new((core, traffic), Runner::World(shared), WaysBack::default(), machine))
     }
 
     /// A master on a real bus: `socketcand://HOST:PORT/can0`, `slcan:///dev/ttyACM0?bitrate=500k`; with the machine file that says what
     /// is there.
     #[staticmethod]
-    fn on_bus(py: Python<'_>, bus: &str, machine: Option<PathBuf>) -> PyResult<Self> {
+    fn on_bus(
+        py: Python<'_>,
+        bus: &str,
+        machine: Option<PathBuf>,
+        sdo_servers: BTreeMap<i64, i64>,
+        sync_counter: Option<i64>,
+    ) -> PyResult<Self> {
+        let chosen = Chosen::new(sdo_servers, sync_counter)?;
         let spec: BusSpec = bus.parse().map_err(bad_value)?;
         let machine = read_machine_of(py, machine)?;
         let (core, traffic) = (Core::new(), Traffic::default());
         let ways_back = WaysBack::default();
         let live = py.detach(|| Live::open(spec, core.clone(), traffic.clone(), ways_back.clone()));
         let live = live.map_err(|reason| wrong_use(format!("bus {bus}: {reason}")))?;
+        chosen.apply(&core, machine.as_deref());
         Ok(Self::new((core, traffic), Runner::Live(Mutex::new(Some(live))), ways_back, machine))
     }
 

@@ -411,3 +411,104 @@ def holds(kind, value, at):
         assert isinstance(value, (int, float)), f"{at}: {value!r}"
     elif isinstance(kind, type):
         assert isinstance(value, kind), f"{at}: {value!r} is not of {kind}"
+
+
+#: A box whose second SDO server is 680h and 690h from the start (CiA 301, 7.5.2.33).
+BOX = """
+[DeviceInfo]
+VendorName=None
+ProductName=Box
+[1000]
+ParameterName=Device type
+DataType=7
+AccessType=ro
+DefaultValue=0x191
+[1001]
+ParameterName=Error register
+DataType=5
+AccessType=ro
+[1201]
+ParameterName=Server
+ObjectType=9
+SubNumber=3
+[1201sub0]
+ParameterName=n
+DataType=5
+AccessType=const
+DefaultValue=2
+[1201sub1]
+ParameterName=Request
+DataType=7
+AccessType=rw
+DefaultValue=0x680
+[1201sub2]
+ParameterName=Reply
+DataType=7
+AccessType=rw
+DefaultValue=0x690
+"""
+
+
+@pytest.fixture
+def box(tmp_path):
+    (tmp_path / "box.eds").write_text(BOX, encoding="utf-8")
+    file = tmp_path / "box.toml"
+    file.write_text('sync_counter = 2\n[[drive]]\nmodel = "box.eds"\nnode = 4\nsdo_server = 2\n', encoding="utf-8")
+    return file
+
+
+def spoken(file, seconds, **chosen):
+    """What is on the bus while 1000h is read, and with SYNC for so long; the file is the network's alone."""
+    world = ferrodrive.World()
+    world.add(eds=file.with_name("box.eds"), node=4)
+    with ferrodrive.Network(world, **chosen) as network:
+        network.wait_for(4)
+        assert network.upload(4, 0x1000) == b"\x91\x01\x00\x00"
+        network.sync(0.01)
+        network.sleep(seconds)
+        network.sync(None)
+        return [line.split()[-1] for line in world.frames(100)]
+
+
+def test_a_node_is_asked_by_the_server_that_the_program_or_the_file_names(box):
+    by_default = spoken(box, 0.05)
+    assert "604#4000100000000000" in by_default and "680#4000100000000000" not in by_default
+    for chosen in [{"sdo_servers": {4: 2}}, {"machine": box}]:
+        by_second = spoken(box, 0.05, **chosen)
+        assert "680#4000100000000000" in by_second and "690#4300100091010000" in by_second, by_second
+        assert "604#4000100000000000" not in by_second
+    overruled = spoken(box, 0.05, machine=box, sdo_servers={4: 1})
+    assert "604#4000100000000000" in overruled and "680#4000100000000000" not in overruled
+    with pytest.raises(ferrodrive.MasterError, match="1202h"):
+        spoken(box, 0.05, sdo_servers={4: 3})
+
+
+def test_sync_has_the_counter_that_the_program_or_the_file_names(box):
+    """CiA 301, 7.2.5.1: from 1 to the value of 1019h."""
+
+    def counters(**chosen):
+        return [frame for frame in spoken(box, 0.045, **chosen) if frame.startswith("080#")]
+
+    assert counters()[:2] == ["080#", "080#"]
+    assert counters(sync_counter=3)[:4] == ["080#01", "080#02", "080#03", "080#01"]
+    assert counters(machine=box)[:3] == ["080#01", "080#02", "080#01"]
+    assert counters(machine=box, sync_counter=3)[:4] == ["080#01", "080#02", "080#03", "080#01"]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "expected"),
+    [
+        ({"sdo_servers": {4: 0}}, "1 to 128"),
+        ({"sdo_servers": {4: 129}}, "1 to 128"),
+        ({"sdo_servers": {128: 2}}, "1 to 127"),
+        ({"sdo_servers": {-1: 2}}, "1 to 127"),
+        ({"sync_counter": 1}, "2 to 240"),
+        ({"sync_counter": 241}, "2 to 240"),
+        ({"sync_counter": 1 << 40}, "2 to 240"),
+    ],
+)
+def test_a_server_or_counter_out_of_its_range_is_refused(chosen, expected):
+    with pytest.raises(ValueError, match=expected):
+        ferrodrive.Network(ferrodrive.World(), **chosen)
+    with pytest.raises(ValueError, match=expected):
+        ferrodrive.Network("socketcand://127.0.0.1:1/can0", **chosen)

@@ -1,6 +1,6 @@
 """The native half of the package: worlds that move without the interpreter's lock, and the master."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Optional
 
 from typing_extensions import Self
@@ -216,9 +216,13 @@ class Network:
     """A CANopen network as its master sees it."""
 
     @staticmethod
-    def in_world(world: World, machine: Optional[str]) -> Network: ...
+    def in_world(
+        world: World, machine: Optional[str], sdo_servers: Mapping[int, int], sync_counter: Optional[int]
+    ) -> Network: ...
     @staticmethod
-    def on_bus(bus: str, machine: Optional[str]) -> Network: ...
+    def on_bus(
+        bus: str, machine: Optional[str], sdo_servers: Mapping[int, int], sync_counter: Optional[int]
+    ) -> Network: ...
     def close(self) -> list[str]: ...
     def close_in_world(self) -> Job: ...
     def take_notes(self) -> list[str]: ...

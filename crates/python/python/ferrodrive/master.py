@@ -22,7 +22,7 @@ import atexit
 import os
 import warnings
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Optional, Union, cast
 
@@ -49,7 +49,12 @@ class Network(Whole):
     :param bus: a :class:`~ferrodrive.World`, ``socketcand://HOST:PORT/can0`` or ``slcan:///dev/ttyACM0?bitrate=500k``
     :param machine: the machine file that describes what is there: which models are where, what stands behind their shafts (``units``), how
         they are set up, groups and the base. A world of :meth:`World.machine` has one already; one that is given here counts instead
-    :raises ValueError: the bus is not one, or the file makes no sense (:class:`BadRequest`)
+    :param sdo_servers: the SDO server by which a node is asked, by its node-ID: ``{4: 2}`` for that of 1201h, up to 128, 127Fh. For a device
+        that another master asks too: neither takes the other's answers. The record is read at the default server, 1, with the first
+        request. Without it what ``sdo_server`` of the machine file says
+    :param sync_counter: the SYNC that this network sends has a counter, from 1 up to this, 2 to 240, equal to 1019h of the devices; without
+        it what the machine file says
+    :raises ValueError: the bus is not one, the file makes no sense (:class:`BadRequest`), or a number is out of its range
     :raises RuntimeError: the bus does not open
 
     >>> network = ferrodrive.Network(world)
@@ -60,15 +65,23 @@ class Network(Whole):
     >>> network.close()
     """
 
-    def __init__(self, bus: Union[World, str], *, machine: Optional[File] = None) -> None:
+    def __init__(
+        self,
+        bus: Union[World, str],
+        *,
+        machine: Optional[File] = None,
+        sdo_servers: Optional[Mapping[int, int]] = None,
+        sync_counter: Optional[int] = None,
+    ) -> None:
         self._world = bus if isinstance(bus, World) else None
         self._bus = "virtual world" if isinstance(bus, World) else bus
         path = None if machine is None else os.fspath(machine)
         self._machine = path if path is not None else getattr(bus, "machine_file", None)
+        servers = dict(sdo_servers or {})
         if isinstance(bus, World):
-            self._native = NativeNetwork.in_world(bus, path)
+            self._native = NativeNetwork.in_world(bus, path, servers, sync_counter)
         else:
-            self._native = NativeNetwork.on_bus(bus, path)
+            self._native = NativeNetwork.on_bus(bus, path, servers, sync_counter)
         _open.add(self)
 
     def __enter__(self) -> Network:
