@@ -11,6 +11,7 @@ use master::decode::Decoder;
 use master::drive::Drive;
 use master::identify::Knowledge;
 use master::{Error, Gear, Network, Node};
+use sim::recorder::LiveValues;
 use transport::BusSpec;
 
 use crate::failure::Failure;
@@ -41,6 +42,8 @@ pub(crate) struct Context {
     pub(crate) machine: Option<Machine>,
     /// The world around the drives, where they are virtual ones whose time passes with the clock.
     pub(crate) world: Option<WorldDoor>,
+    /// What is true of the drives, where they are virtual ones of this program.
+    pub(crate) true_values: Option<LiveValues>,
     /// What the bus says beside frames.
     pub(crate) wire: Wire,
     /// The highest counter of SYNC, where it has one.
@@ -109,6 +112,7 @@ impl Context {
             machine,
             sync_counter,
             world: None,
+            true_values: None,
             wire: Wire::default(),
             network,
             progress,

@@ -12,7 +12,7 @@ use crate::failure::Failure;
 /// Connects, and gives where to ask.
 pub(crate) fn open(control: &ControlArgs) -> Result<WorldDoor, Failure> {
     let mut far = FarWorld { client: control.connect()?, gone: false };
-    let (door, mut asks) = host::world_door();
+    let (door, mut asks) = host::world_door(None);
     std::thread::spawn(move || while !far.gone && asks.answer_next(&mut far) {});
     Ok(door)
 }

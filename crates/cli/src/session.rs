@@ -135,7 +135,10 @@ fn in_virtual_time<R>(
     let (log, writing) = CommandLog::start(log, interface_of(&global.bus), Duration::ZERO, Pace::Free);
     let progress = Progress::new(global.json);
     let traffic = Traffic::default();
-    let context = Context::new(global, network.clone(), drives.map(Vec::as_slice), progress.clone(), traffic.clone());
+    let mut context =
+        Context::new(global, network.clone(), drives.map(Vec::as_slice), progress.clone(), traffic.clone());
+    // A bus that goes on without the command stands for a real one, of which nothing is known but its frames.
+    context.true_values = drives.map(|_| world.live_values());
     let station = world.add_station(Tap::new(Tap::new(network, traffic), log));
     let ended = sim::block_on_for(world, VIRTUAL_LIMIT, command(&context));
     if drives.is_none() {
@@ -182,6 +185,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         traffic.show(decoder(global, &[]), Stamps::default(), progress.clone());
     }
     let mut context = Context::new(global, network.clone(), embedded.as_deref(), progress.clone(), traffic.clone());
+    context.true_values = world.as_ref().and_then(WorldDoor::values).cloned();
     (context.world, context.wire) = (world, health);
     if let Some(unused) = global.machine.as_ref().filter(|_| embedded.is_none()).and_then(Machine::unused_by_a_master) {
         let text = format!(

@@ -1,6 +1,7 @@
 """Test motions and tuning from Python: the parts of ``ferrodrive test-motion`` and ``ferrodrive tune``."""
 
 import asyncio
+from array import array
 
 import ferrodrive
 import pytest
@@ -28,6 +29,19 @@ def test_a_sine_is_followed_and_captured_in_each_run(world):
             assert max(speeds) == pytest.approx(60 * 6.2832 * 60 / 360, rel=0.1)
         network.sleep(0.1)
         assert abs(world[5].velocity_rpm) < 1
+
+
+def test_what_is_true_of_a_drive_is_captured_with_what_it_says(world):
+    with ferrodrive.Network(world) as network:
+        network.wait_for(4)
+        drive = network.drive(4, "zlac8030l")
+        capture = drive.capture("velocity", "true_velocity", "true_shaft_angle_rad", duration=0.05)
+        values, rows = capture["values"], len(capture["time_s"])
+        assert capture["by"]["true_velocity_rpm"] == "world" and values["true_velocity_rpm"] == array("d", [0.0] * rows)
+        assert rows > 45 and len(values["true_shaft_angle_rad"]) == rows
+        assert values["true_shaft_angle_rad"][-1] == pytest.approx(world[4].shaft_angle_rad, abs=1e-3)
+        with pytest.raises(ferrodrive.MasterError, match="no true value 'speeed'"):
+            drive.capture("true_speeed")
 
 
 def test_steps_that_come_too_far_are_stopped_and_their_run_is_kept(world):

@@ -8,6 +8,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use host::{Wire, WorldAsks, WorldDoor};
 use sim::pace::Pace;
+use sim::recorder::LiveValues;
 use sim::{StationId, World, WorldError};
 use transport::{AsyncBus, BusError, Received, WallClock};
 
@@ -25,15 +26,19 @@ pub(crate) struct WorldBus {
     pace: Pace,
     asks: WorldAsks,
     wire: Wire,
+    values: LiveValues,
 }
 
 impl WorldBus {
     /// A bus of this world, whose time begins now, and where the world can be asked.
     pub(crate) fn new(mut world: World, clock: &WallClock, wire: Wire) -> (Self, WorldDoor) {
         let probe = world.add_probe();
-        let pace = Pace::real_time(world.now()).rebased(elapsed(clock), world.now());
-        let (door, asks) = host::world_door();
-        (Self { world, probe, clock: clock.clone(), pace, asks, wire }, door)
+        let begun = elapsed(clock);
+        let pace = Pace::real_time(world.now()).rebased(begun, world.now());
+        let values = world.live_values();
+        values.set_host_time(Instant::ZERO + begun, world.now());
+        let (door, asks) = host::world_door(Some(values.clone()));
+        (Self { world, probe, clock: clock.clone(), pace, asks, wire, values }, door)
     }
 
     /// Moves the world to now.
@@ -41,6 +46,7 @@ impl WorldBus {
         let elapsed = elapsed(&self.clock);
         if self.pace.behind(elapsed, self.world.now()) > MOST_BEHIND {
             self.pace = self.pace.rebased(elapsed, self.world.now());
+            self.values.set_host_time(Instant::ZERO + elapsed, self.world.now());
         }
         let target = self.pace.target(elapsed);
         if target > self.world.now() {

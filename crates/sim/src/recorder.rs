@@ -12,8 +12,11 @@ use crate::Report;
 use crate::coupling::BodyState;
 use crate::stimulus::{Place, Stimulus};
 
+pub(crate) use self::live::LivePlace;
+pub use self::live::{LiveValues, Samples, Subscription};
 pub use self::signal::Signal;
 
+mod live;
 mod signal;
 
 /// A signal of one axis.

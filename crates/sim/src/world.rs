@@ -30,7 +30,7 @@ pub use stores::StoredImage;
 
 use crate::fault::{Corruption, NodeFaults};
 use crate::machine::TimingMode;
-use crate::recorder::Recorder;
+use crate::recorder::{LivePlace, Recorder};
 use crate::stimulus::Place;
 use crate::wire::{Bus, ControllerOptions};
 use crate::{Prng, VirtualDrive, seeds};
@@ -58,6 +58,7 @@ pub struct World {
     log: FrameLog,
     digest: Digest,
     recorder: Option<Recorder>,
+    live: LivePlace,
     /// By station, while stores are guarded.
     ledgers: Vec<Option<Ledger>>,
     watch: Option<Box<WorldWatch>>,
@@ -113,6 +114,7 @@ impl World {
             log: FrameLog::default(),
             digest: Digest::default(),
             recorder: None,
+            live: LivePlace::default(),
             ledgers: Vec::new(),
             watch: None,
             bodies: Vec::new(),

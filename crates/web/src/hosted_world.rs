@@ -75,7 +75,7 @@ impl HostedWorld {
         let passed = Passed::default();
         world.add_station(Tap::new(network.clone(), passed.clone()));
         world.run_for(BOOT);
-        let (door, asks) = world_door();
+        let (door, asks) = world_door(Some(world.live_values()));
         let setting = Setting {
             bus: "sim".into(),
             bitrate: Some(world.bitrate()),

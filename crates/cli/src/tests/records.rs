@@ -5,7 +5,7 @@ use std::path::Path;
 use processes::scratch;
 use recording::{Kind, Recorded, read};
 
-use super::virtual_bus::VirtualBus;
+use super::virtual_bus::{VirtualBus, without_bus};
 
 fn recorded(path: &Path) -> Recorded {
     let kind = Kind::of_name(path.to_str().unwrap()).unwrap();
@@ -54,6 +54,24 @@ fn the_master_records_objects_by_sdo_and_by_the_pdos_that_carry_them() {
         let positions = of(&recorded(&path), "4.position_actual_value_counts");
         assert!(positions.is_sorted() && positions.last() > positions.first(), "{name}: {positions:?}");
     }
+}
+
+#[test]
+fn what_is_true_of_a_virtual_drive_is_captured_beside_what_it_says_and_refused_on_another_bus() {
+    let place = scratch("true-capture");
+    let path = place.join("run.csv");
+    let words = ["capture", "4", "velocity", "true_velocity", "true_shaft_angle", "--for", "100ms"];
+    let out = ["-o", path.to_str().unwrap(), "--json"];
+    let ended = without_bus(&[&["--bus", "sim"], &words[..], &out].concat());
+    assert_eq!(ended.status, Some(0), "{}{}", ended.out, ended.err);
+    let report = ended.json();
+    let by = report["captures"][0]["traces"].as_array().unwrap().iter().map(|trace| trace["by"].as_str().unwrap());
+    assert_eq!(by.skip(1).collect::<Vec<_>>(), ["world", "world"]);
+    let found = recorded(&path);
+    let lengths: Vec<usize> = found.series.iter().map(|series| series.points.len()).collect();
+    assert!(lengths.len() == 3 && lengths.iter().all(|length| *length == lengths[0] && *length > 95), "{lengths:?}");
+    let bench = VirtualBus::of(&["zlac8030l@4"]);
+    bench.refused(&words, &["cannot be captured on this bus", "of a virtual drive alone", "--bus sim"]);
 }
 
 #[test]

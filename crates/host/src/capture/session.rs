@@ -1,6 +1,5 @@
 //! A capture on a bus: the drive is made to send, what comes is collected, and everything is put back.
 
-use std::fmt;
 use std::path::PathBuf;
 use std::pin::pin;
 use std::time::Duration;
@@ -14,10 +13,11 @@ use master::parameters::{Parameters, PlanOptions};
 use master::{Drive, FrameLog};
 use recording::{Capture, Trace, is_called};
 use sim::Place;
+use sim::recorder::{Samples, Subscription};
 use words::failure::Failure;
 
+use super::measurand::{Measurand, Way};
 use super::plan::{CapturePlan, Request, plan};
-use super::quantity::Quantity;
 use super::restorer::Restorer;
 use super::rows::{Armed, Rows, Trigger};
 use crate::network::params::journal::{Kept, default_path};
@@ -28,7 +28,7 @@ use machine::parameters::journal::Journal;
 #[derive(Clone, Debug)]
 pub struct Wanted {
     /// The quantities.
-    pub quantities: Vec<Quantity>,
+    pub quantities: Vec<Measurand>,
     /// Time between two readings.
     pub period: Duration,
     /// Of the bus.
@@ -54,25 +54,6 @@ pub struct Span {
     pub pre_trigger: Duration,
 }
 
-/// What was had of a quantity.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Way {
-    /// By this TPDO.
-    Tpdo(PdoId),
-    /// By SDO, one request after the other.
-    Sdo,
-}
-
-impl fmt::Display for Way {
-    /// `TPDO1`, `SDO`.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Tpdo(pdo) => pdo.fmt(f),
-            Self::Sdo => f.write_str("SDO"),
-        }
-    }
-}
-
 /// A TPDO that brings readings.
 #[derive(Debug)]
 struct Source {
@@ -83,16 +64,24 @@ struct Source {
     heard_at: Instant,
 }
 
+/// Where the readings come from that the drive does not send.
+#[derive(Debug)]
+struct Truth {
+    columns: Vec<usize>,
+    samples: Subscription,
+}
+
 /// A capture that runs: the drive sends.
 #[derive(Debug)]
 pub struct Running {
     drive: Drive,
-    quantities: Vec<Quantity>,
+    quantities: Vec<Measurand>,
     ways: Vec<Way>,
     plan: Option<CapturePlan>,
     period: Duration,
     log: Option<FrameLog>,
     sources: Vec<Source>,
+    truth: Option<Truth>,
     parameters: std::collections::BTreeMap<Mux, Vec<u8>>,
     rows: Rows,
     taken: Vec<LoggedFrame>,
@@ -155,12 +144,13 @@ impl Wanted {
     async fn begun(&self, drive: &Drive, restorer: &Restorer) -> Result<Running, Failure> {
         let node = drive.node();
         // What a drive does not have is refused before anything is written.
-        for quantity in &self.quantities {
+        for quantity in self.quantities.iter().filter_map(Measurand::quantity) {
             node.upload(quantity.object).await?;
         }
         let (planned, by_sdo) = self.planned(drive).await?;
         let parameters = drive.back_up(|_, _, _| ()).await?.parameters.values;
-        let ways = self.quantities.iter().map(|quantity| {
+        let ways = self.quantities.iter().map(|measurand| {
+            let Measurand::Object(quantity) = measurand else { return Way::World };
             let carries = |plan: &CapturePlan| {
                 let mut pdos = plan.pdos.iter();
                 pdos.find(|(config, _)| config.map.find(quantity.object).is_some()).map(|(config, _)| config.pdo)
@@ -176,6 +166,7 @@ impl Wanted {
             period: self.period,
             log: None,
             sources: Vec::new(),
+            truth: None,
             parameters,
             rows: Rows::new(self.quantities.len(), self.period),
             taken: Vec::new(),
@@ -186,6 +177,7 @@ impl Wanted {
             running.listen(&plan);
             running.wait_for_first(&plan, restorer).await?;
         }
+        running.look_into_world().await?;
         Ok(running)
     }
 
@@ -198,17 +190,20 @@ impl Wanted {
                 .at_node(node)
                 .next(words::models::name_its_model(node, &["MODEL"])));
         };
+        let mut objects: Vec<Mux> = Vec::new();
+        for quantity in self.quantities.iter().filter_map(Measurand::quantity) {
+            if !objects.contains(&quantity.object) {
+                objects.push(quantity.object);
+            }
+        }
+        if objects.is_empty() {
+            return Ok((None, Vec::new()));
+        }
         let now = drive.pdos().await?;
         let sync = match network.with_core(|core| core.sync_period()) {
             Some(period) => Some(period),
             None => heard_sync(drive).await,
         };
-        let mut objects: Vec<Mux> = Vec::new();
-        for quantity in &self.quantities {
-            if !objects.contains(&quantity.object) {
-                objects.push(quantity.object);
-            }
-        }
         let with = |objects: &[Mux]| {
             let Self { period, bitrate, take, .. } = self;
             plan(model, node, &now, &Request { objects, period: *period, bitrate: *bitrate, sync, take })
@@ -300,7 +295,8 @@ impl Running {
 
     fn listen(&mut self, plan: &CapturePlan) {
         for (config, id) in &plan.pdos {
-            let columns = self.quantities.iter().enumerate().filter_map(|(column, quantity)| {
+            let columns = self.quantities.iter().enumerate().filter_map(|(column, measurand)| {
+                let quantity = measurand.quantity()?;
                 let is_by_it = self.ways[column] == Way::Tpdo(config.pdo);
                 Some((column, config.map.find(quantity.object).filter(|_| is_by_it)?))
             });
@@ -339,6 +335,33 @@ impl Running {
         }
         let ids = self.sources.iter().map(|source| source.id).collect();
         restorer.lock().sending = Some((ids, plan.period));
+        Ok(())
+    }
+
+    /// Samples the world together with the last TPDOs that came, so that both are in one row: a period goes from one to the next.
+    async fn look_into_world(&mut self) -> Result<(), Failure> {
+        let columns: Vec<usize> = (0..self.quantities.len()).filter(|at| self.ways[*at] == Way::World).collect();
+        let of_world = self.quantities.iter().filter_map(|measurand| match measurand {
+            Measurand::World(value) => Some(value),
+            Measurand::Object(_) => None,
+        });
+        let Some(values) = of_world.clone().next().map(|value| value.values.clone()) else { return Ok(()) };
+        let (network, node) = (self.drive.node().network(), self.drive.node().id());
+        let first = self.sources.first().map(|source| source.id);
+        let heard_at = self.taken.iter().rev().find(|frame| Some(frame.id) == first).map(|frame| frame.at);
+        let first_at = heard_at.map_or_else(|| network.now(), |at| at + self.period);
+        let axis = (node.raw(), self.drive.axis_id());
+        let signals = of_world.map(|value| value.signal).collect();
+        let samples = values.subscribe(axis, signals, first_at, self.period);
+        network.sleep(self.period * 2 + COLLECT).await;
+        let first = samples.take();
+        if first.is_missing || first.times.is_empty() {
+            return Err(Failure::new(format!("node {node}: its true values cannot be captured"))
+                .of_kind("no_true_values")
+                .at_node(node)
+                .because("no virtual drive of this world has its node-ID"));
+        }
+        self.truth = Some(Truth { columns, samples });
         Ok(())
     }
 
@@ -429,6 +452,7 @@ impl Running {
         (self.rows, self.lost) = (Rows::new(self.quantities.len(), self.period), 0);
         self.has_come();
         self.taken.clear();
+        self.truth.iter().for_each(|truth| drop(truth.samples.take()));
         self.sources.iter_mut().for_each(|source| source.heard_at = now);
     }
 
@@ -441,10 +465,10 @@ impl Running {
 
     fn armed(&self, trigger: &Trigger) -> Result<(usize, Armed), Failure> {
         let asked = trigger.quantity.to_ascii_lowercase().replace('-', "_");
-        let whole = self.quantities.iter().position(|quantity| quantity.name == asked);
-        let begins = || self.quantities.iter().position(|quantity| is_called(&quantity.name, &asked));
+        let whole = self.quantities.iter().position(|quantity| quantity.name() == asked);
+        let begins = || self.quantities.iter().position(|quantity| is_called(quantity.name(), &asked));
         let column = whole.or_else(begins).ok_or_else(|| {
-            let names = self.quantities.iter().map(|quantity| quantity.name.as_str()).collect::<Vec<_>>().join(", ");
+            let names = self.quantities.iter().map(Measurand::name).collect::<Vec<_>>().join(", ");
             Failure::usage(format!("the trigger is of '{}', which is not captured", trigger.quantity))
                 .next(format!("name one of: {names}"))
         })?;
@@ -456,10 +480,10 @@ impl Running {
         let network = self.drive.node().network().clone();
         let began = network.now();
         for column in 0..self.quantities.len() {
-            if self.ways[column] != Way::Sdo {
+            let Some(quantity) = self.quantities[column].quantity().filter(|_| self.ways[column] == Way::Sdo) else {
                 continue;
-            }
-            let (object, by_sdo) = (self.quantities[column].object, self.quantities[column].by_sdo);
+            };
+            let (object, by_sdo) = (quantity.object, quantity.by_sdo);
             let raw = self.drive.node().upload(object).await?.raw();
             let (at, value) = (network.now(), by_sdo.value(raw));
             // What came by TPDO until then has earlier times.
@@ -476,21 +500,32 @@ impl Running {
         Ok(())
     }
 
+    /// What came by TPDO and what the world had meanwhile, in the order of their times.
     fn take_frames(&mut self) {
-        let Self { log, taken, sources, quantities, rows, lost, .. } = self;
-        let Some(log) = log else { return };
-        *lost += log.take(taken);
+        let Self { log, taken, sources, quantities, rows, lost, truth, .. } = self;
+        *lost += log.as_ref().map_or(0, |log| log.take(taken));
+        let (columns, Samples { times, values, lost: missed, .. }) =
+            truth.as_ref().map(|truth| (truth.columns.as_slice(), truth.samples.take())).unwrap_or_default();
+        *lost += missed;
+        let mut samples = times.iter().zip(values.chunks(columns.len().max(1))).peekable();
+        let true_values = |rows: &mut Rows, (at, values): (&Instant, &[f64])| {
+            rows.add(*at, columns.iter().copied().zip(values.iter().copied()));
+        };
         for frame in taken.drain(..) {
             let Some(source) = sources.iter_mut().find(|source| source.id == frame.id) else { continue };
+            while let Some(sample) = samples.next_if(|(at, _)| **at <= frame.at) {
+                true_values(rows, sample);
+            }
             source.heard_at = frame.at;
             let in_frame = source.fields.iter().filter(|(_, bits)| bits.end <= u32::from(frame.length) * 8);
-            let readings = in_frame.map(|(column, bits)| {
+            let readings = in_frame.filter_map(|(column, bits)| {
                 let mask = u64::MAX >> (u64::BITS - (bits.end - bits.start));
                 let raw = (frame.data >> bits.start & mask) as u32;
-                (*column, quantities[*column].by_pdo.value(raw))
+                Some((*column, quantities[*column].quantity()?.by_pdo.value(raw)))
             });
             rows.add(frame.at, readings);
         }
+        samples.for_each(|sample| true_values(rows, sample));
     }
 
     fn silent(&self, since: Duration) -> Failure {
@@ -513,7 +548,7 @@ impl Running {
         time_s.truncate(rows);
         let traces = self.quantities.iter().zip(columns).map(|(quantity, mut values)| {
             values.truncate(rows);
-            Trace::new(quantity.name.clone(), quantity.unit.clone(), values, &time_s)
+            Trace::new(quantity.name().to_owned(), quantity.unit().to_owned(), values, &time_s)
         });
         let traces = traces.collect();
         if self.lost > 0 && cut_off.is_none() {

@@ -17,7 +17,7 @@ fn play_around(scene: impl AsyncFnOnce(&Stage)) {
     world.run_for(Duration::from_secs(1));
     let models = [(WHEEL, "zlac8030l"), (ARM, "zlim42c")];
     let models = models.into_iter().map(|(node, name)| (node, devices::model(name).expect("a model"))).collect();
-    let (door, mut asks) = world_door();
+    let (door, mut asks) = world_door(None);
     let (host, handle) = Host::new(network.clone(), Setting { models, world: Some(door), ..setting() });
     let stage = Stage { network, handle };
     let whole = async {

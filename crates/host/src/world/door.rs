@@ -4,6 +4,7 @@
 
 use crate::around::{self, Around, Changed};
 use serde_json::Value;
+use sim::recorder::LiveValues;
 use tokio::sync::{mpsc, oneshot};
 
 /// Queued requests; they are answered every millisecond.
@@ -11,16 +12,19 @@ const MOST_WAITING: usize = 64;
 
 /// The host's end.
 #[derive(Clone, Debug)]
-pub struct WorldDoor(mpsc::Sender<Ask>);
+pub struct WorldDoor {
+    asks: mpsc::Sender<Ask>,
+    values: Option<LiveValues>,
+}
 
 /// The end of the world's run loop.
 #[derive(Debug)]
 pub struct WorldAsks(mpsc::Receiver<Ask>);
 
-/// Both ends of the channel to a world.
-pub fn world_door() -> (WorldDoor, WorldAsks) {
+/// Both ends of the channel to a world; with what can be sampled of it, where it is one of this program.
+pub fn world_door(values: Option<LiveValues>) -> (WorldDoor, WorldAsks) {
     let (asks, asked) = mpsc::channel(MOST_WAITING);
-    (WorldDoor(asks), WorldAsks(asked))
+    (WorldDoor { asks, values }, WorldAsks(asked))
 }
 
 /// A request, and the sender of its answer.
@@ -36,6 +40,11 @@ enum Ask {
 pub(crate) struct NoAnswer;
 
 impl WorldDoor {
+    /// What can be sampled of the world while it runs.
+    pub const fn values(&self) -> Option<&LiveValues> {
+        self.values.as_ref()
+    }
+
     /// The usage texts.
     pub(crate) fn forms(&self) -> impl Future<Output = Result<Vec<&'static str>, NoAnswer>> + use<> {
         self.ask(Ask::Forms)
@@ -59,7 +68,7 @@ impl WorldDoor {
         A: FnOnce(oneshot::Sender<T>) -> Ask,
     {
         let (answer, answered) = oneshot::channel();
-        let sent = self.0.try_send(ask(answer)).map_err(|_| NoAnswer);
+        let sent = self.asks.try_send(ask(answer)).map_err(|_| NoAnswer);
         async move {
             sent?;
             answered.await.map_err(|_| NoAnswer)

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::{Mux, NmtCommand, NodeId};
-use host::capture::{Pace, Quantity, Restorer, Running, SeenBy, Span, Wanted, Way};
+use host::capture::{Measurand, Pace, Quantity, Restorer, Running, SeenBy, Span, Wanted, Way};
 use host::network::params::journal::roll_back_by;
 use host::test_motion::{Shape, follow, points, steps};
 use master::cyclic::CyclicOptions;
@@ -90,11 +90,11 @@ impl Bench {
     }
 
     fn wanted(&mut self, quantities: &[&str], journal: Option<PathBuf>) -> Wanted {
-        let drive = self.drive.clone();
+        let (drive, world) = (self.drive.clone(), Some(self.world.live_values()));
         let quantities = self.run(async {
             let mut found = Vec::new();
             for name in quantities {
-                found.push(Quantity::named(&drive, name).await.expect("the model has it"));
+                found.push(Measurand::named(&drive, world.as_ref(), name).await.expect("the model has it"));
             }
             found
         });
@@ -175,6 +175,72 @@ fn a_motion_is_captured_at_the_rate_that_was_asked_for_with_demand_and_truth() {
         log.take(&mut came);
         assert!(came.is_empty(), "{name}: {came:?}");
     }
+}
+
+#[test]
+fn what_is_true_of_a_virtual_drive_stands_in_the_rows_of_what_it_sends() {
+    let mut bench = Bench::new("zlac8030l");
+    let wanted = bench.wanted(&["velocity", "true_velocity", "true_shaft_angle_rad"], None);
+    let (mut running, restorer) = bench.begin(&wanted).expect("it begins");
+    assert_eq!(running.ways().iter().map(ToString::to_string).collect::<Vec<_>>(), ["TPDO1", "world", "world"]);
+    let drive = bench.drive.clone();
+    let options = MotionOptions { wait: false, ..MotionOptions::default() };
+    bench.run(drive.velocity(Rpm(60.0), options)).expect("it turns");
+    let trigger = Some("true_velocity > 30".parse().expect("a trigger"));
+    let span = Span { duration: Duration::from_millis(700), trigger, pre_trigger: 20 * MS };
+    let (taken, seen) = bench.run_beside_truth(running.next(&span));
+    let (capture, seen_times) = (taken.expect("it is captured").capture, seen.0);
+    let of = |name: &str| &capture.trace(name).expect("it was captured").values;
+    let (said, speed, angle) = (of("velocity"), of("true_velocity"), of("true_shaft_angle"));
+    let trigger_s = capture.trigger_s.expect("it was triggered");
+    for (at, time_s) in capture.time_s.iter().enumerate() {
+        assert!([said[at], speed[at], angle[at]].iter().all(|value| value.is_finite()), "{time_s}: one row");
+        assert_eq!(speed[at] > 30.0, *time_s >= trigger_s - 1e-9, "{time_s}: {}", speed[at]);
+    }
+    assert_eq!((capture.traces[1].unit.as_str(), capture.traces[2].unit.as_str()), ("r/min", "rad"));
+    // The speed is the slope of the angle, over each 100 ms.
+    for from in (0..600).step_by(100) {
+        let span_s = capture.time_s[from + 100] - capture.time_s[from];
+        let slope = (angle[from + 100] - angle[from]) / span_s * 60.0 / std::f64::consts::TAU;
+        let mean = (speed[from] + speed[from + 100]) / 2.0 + speed[from + 1..from + 100].iter().sum::<f64>();
+        assert!((slope - mean / 100.0).abs() < 0.02, "{from}: {slope}, {mean}");
+    }
+    // The angle is that which the shaft has: degrees of every millisecond, looked at from outside.
+    let degrees: Vec<f64> = angle.iter().map(|angle| angle.to_degrees()).collect();
+    let outside = &seen.1[seen_times.len() - 700..];
+    let nearest = |value: f64| outside.iter().map(|seen| (seen - value).abs()).fold(f64::MAX, f64::min);
+    assert!(degrees[100..600].iter().all(|value| nearest(*value) < 0.4), "60 r/min are 0.36 degrees in 1 ms");
+    bench.run(drive.quick_stop()).expect("it stops");
+    drop(running);
+    assert_eq!(bench.run(restorer.restore()), Vec::<String>::new());
+}
+
+#[test]
+fn true_values_alone_change_nothing_on_the_bus_and_are_those_of_the_node_that_was_asked_for() {
+    let mut bench = Bench::new("zlac8030l");
+    let (before, mut copy) = (bench.tpdos(), bench.world.snapshot());
+    let wanted = bench.wanted(&["true_winding", "true_velocity_demand"], None);
+    let (mut running, _restorer) = bench.begin(&wanted).expect("it begins");
+    assert_eq!((running.plan(), bench.tpdos()), (None, before));
+    let capture = bench.run(running.next(&at_once(100))).expect("it is captured").capture;
+    let winding = capture.trace("true_winding_c").expect("a temperature");
+    assert_eq!((winding.values.len(), winding.gaps), (101, 0));
+    assert!((winding.period_s - 1e-3).abs() < 1e-9 && winding.jitter_s < 1e-9, "{}", winding.jitter_s);
+    let ambient = copy.report(4).expect("a drive").physics.expect("a motor").ambient_c;
+    assert!((winding.values[0] - ambient).abs() < 0.5, "it has not moved: {}, {ambient}", winding.values[0]);
+    // On a real bus nothing knows them.
+    let drive = bench.drive.clone();
+    let refused = bench.run(Measurand::named(&drive, None, "true_velocity")).expect_err("a real bus");
+    assert_eq!(refused.kind, "no_true_values");
+    assert!(refused.because[0].contains("of a virtual drive alone"), "{refused:?}");
+    let world = bench.world.live_values();
+    let refused = bench.run(Measurand::named(&drive, Some(&world), "true_windign")).expect_err("a slip of the keys");
+    assert!(refused.what.contains("did you mean") && refused.what.contains("winding"), "{refused:?}");
+    // A node that is not a drive of this world.
+    let stranger =
+        Drive::new(bench.network.node(NodeId::new(9).expect("a node-ID")), drive.description().expect("known"));
+    let named = bench.run(Measurand::named(&stranger, Some(&world), "true_velocity"));
+    assert!(named.is_ok(), "whether it is one is seen when it is sampled");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::time::Duration;
 use can::{Bitrate, Instant};
 use canopen::NodeId;
 use devices::HostWatch;
-use host::capture::{Quantity, Restorer, Wanted};
+use host::capture::{Measurand, Restorer, Wanted};
 use host::test_motion::{Motion, Run, Shape, points, run};
 use master::cyclic::CyclicOptions;
 use master::drive::SwitchedOff;
@@ -128,7 +128,7 @@ fn motion(steps: bool) -> Motion {
 
 async fn moved(drive: &Drive, motion: &Motion, travel: Option<f64>, runs: &mut Vec<Run>) -> Result<(), Failure> {
     drive.guard(SwitchedOff::SwitchOn).await?;
-    let quantities = vec![Quantity::named(drive, "velocity").await?];
+    let quantities = vec![Measurand::named(drive, None, "velocity").await?];
     let wanted = Wanted {
         quantities,
         period: PERIOD,

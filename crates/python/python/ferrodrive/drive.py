@@ -323,7 +323,8 @@ class Drive(_Orders):
         """Captures quantities while the drive does what it does: spare TPDOs are mapped to them, and put back as they were. What
         ``ferrodrive capture`` does.
 
-        :param quantities: ``velocity``, ``target_velocity``, ``current``, ``position`` and others, or objects by name or number
+        :param quantities: ``velocity``, ``target_velocity``, ``current``, ``position`` and others, or objects by name or number; in a ``World``
+            also what is true of the drive: ``true_velocity``, ``true_shaft_angle`` and the other signals of records
         :param duration: in s, from the begin or the trigger
         :param period: time between two readings in s
         :param trigger: begins when a quantity passes a value: ``"velocity > 10"`` rising, ``"velocity < 10"`` falling

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use can::Bitrate;
 use canopen::NodeId;
-use host::capture::{Quantity, Restorer, Span, Taken, Trigger, Wanted, Way, with_left};
+use host::capture::{Measurand, Restorer, Span, Taken, Trigger, Wanted, Way, with_left};
 use host::network::params::journal::default_path;
 use machine::file::tpdo_id;
 use pyo3::prelude::*;
@@ -116,13 +116,14 @@ pub(crate) fn capture(
         journal: (!asked.is_virtual).then_some(journal),
         on_kept: |_| (),
     };
+    let world = network.get().true_values(py)?;
     // Each job has ways back of its own, which the network's hold too: it may be closed meanwhile.
     let (own, of_network) = (WaysBack::default(), network.get().ways_back.clone());
     let ways_back = own.clone();
     let work = async move {
         let drive = asked.drive().await?;
         for name in &order.quantities {
-            wanted.quantities.push(Quantity::named(&drive, name).await?);
+            wanted.quantities.push(Measurand::named(&drive, world.as_ref(), name).await?);
         }
         wanted.check(&span)?;
         let restorer = Restorer::of(&drive);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use can::Bitrate;
-use host::capture::{Quantity, Restorer, Wanted, with_left};
+use host::capture::{Measurand, Restorer, Wanted, with_left};
 use host::network::params::journal::default_path;
 use host::test_motion::{Figures, Motion, Run, Shape, limits, points, run, usual_quantities};
 use master::cyclic::CyclicOptions;
@@ -139,13 +139,14 @@ pub(crate) fn test_motion(
         journal: (!asked.is_virtual).then_some(journal),
         on_kept: |_| (),
     };
+    let world = network.get().true_values(py)?;
     let (own, of_network) = (WaysBack::default(), network.get().ways_back.clone());
     let ways_back = own.clone();
     let work = async move {
         let drive = asked.drive().await?;
         let names = if order.quantities.is_empty() { usual_quantities(&drive).await? } else { order.quantities };
         for name in &names {
-            wanted.quantities.push(Quantity::named(&drive, name).await?);
+            wanted.quantities.push(Measurand::named(&drive, world.as_ref(), name).await?);
         }
         wanted.check(&motion.span())?;
         let guarded = matches!(motion, Motion::Steps { .. });

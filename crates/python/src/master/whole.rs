@@ -22,6 +22,7 @@ use master::explain::Overheard;
 use master::plan::{ErrorRate, HostQueue, NodeTraffic, Settings};
 use master::{Network as Core, boot as booting};
 use pyo3::prelude::*;
+use sim::recorder::LiveValues;
 use words::failure::Failure;
 use words::mode::mode;
 use words::models::Description;
@@ -56,6 +57,14 @@ impl Network {
 
     fn is_virtual(&self) -> bool {
         matches!(&*self.runner, Runner::World(_))
+    }
+
+    /// What is true of virtual drives; `None` on a real bus.
+    pub(super) fn true_values(&self, py: Python<'_>) -> PyResult<Option<LiveValues>> {
+        match &*self.runner {
+            Runner::World(shared) => Ok(Some(shared.lock(py)?.world.live_values())),
+            Runner::Live(_) => Ok(None),
+        }
     }
 
     /// The bit rate, where it is known without being said.

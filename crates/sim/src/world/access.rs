@@ -6,7 +6,7 @@ use super::member::Member;
 use super::{Digest, FrameLog, StationId, World, WorldError};
 use crate::fault::NodeFaults;
 use crate::machine::Realism;
-use crate::recorder::Recorder;
+use crate::recorder::{LiveValues, Recorder};
 use crate::stimulus::{Place, Stimulus, WireFault};
 use crate::wire::{ControllerOptions, ErrorCounters, Statistics};
 use crate::{Refused, Report, VirtualDrive};
@@ -202,6 +202,25 @@ impl World {
     /// Hands out what was recorded since the last call, while recording goes on.
     pub fn take_recorded(&mut self) -> Option<Recorder> {
         self.recorder.as_mut().map(Recorder::take)
+    }
+
+    /// What this world's host can sample while it runs.
+    pub fn live_values(&mut self) -> LiveValues {
+        self.live.handle()
+    }
+
+    /// The number of the drive that has this node-ID now.
+    pub(super) fn number_of(&mut self, node: u8) -> Option<u8> {
+        let has = |world: &mut Self, number: u8| {
+            let report = world.measure(Place::node(number));
+            report.is_some_and(|report| report.node == node)
+        };
+        // Mostly it is the one that it was added under.
+        if has(self, node) {
+            return Some(node);
+        }
+        let numbers: Vec<u8> = self.drive_numbers().collect();
+        numbers.into_iter().find(|number| has(self, *number))
     }
 
     /// Notes in the recording that something happened now.

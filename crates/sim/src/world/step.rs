@@ -49,15 +49,24 @@ impl World {
 
     /// Lets time pass up to `at`, and takes the samples due on the way as things stand just before `at`.
     pub(super) fn move_to(&mut self, at: Instant) {
-        if let Some(mut recorder) = self.recorder.take() {
-            while let Some(due) = recorder.due_by(at) {
-                self.now = self.now.max(due);
-                self.work_ahead(Job::Advance, |_, _| true);
+        while let Some(due) = self.sample_due_by(at) {
+            self.now = self.now.max(due);
+            self.work_ahead(Job::Advance, |_, _| true);
+            if let Some(mut recorder) = self.recorder.take_if(|recorder| recorder.due_by(due).is_some()) {
                 recorder.sample(due, self, Self::measure, Self::body);
+                self.recorder = Some(recorder);
             }
-            self.recorder = Some(recorder);
+            if let Some(values) = self.live.due_at(due) {
+                values.sample(self.now, self, Self::measure, Self::number_of);
+            }
         }
         self.now = self.now.max(at);
+    }
+
+    /// When the next sample is to be taken, if not after `end`.
+    fn sample_due_by(&self, end: Instant) -> Option<Instant> {
+        let recorder = self.recorder.as_ref().and_then(|recorder| recorder.due_by(end));
+        recorder.into_iter().chain(self.live.due_by(end)).min()
     }
 
     /// What can be measured at an axis of a drive, now; `None` without such a drive. Unlike [`report`](Self::report) it does not

@@ -6,7 +6,7 @@ use std::time::Duration;
 use can::Bitrate;
 use canopen::NodeId;
 use canopen::pdo::PdoId;
-use host::capture::{CapturePlan, Quantity, Running, SeenBy, Span, Taken, Trigger, Wanted, Way};
+use host::capture::{CapturePlan, Measurand, Running, SeenBy, Span, Taken, Trigger, Wanted, Way};
 use machine::file::tpdo_id;
 use master::Drive;
 use master::units::parse_duration;
@@ -31,7 +31,8 @@ use plot::{Paint, Table};
 /// everything back at the end: mapping, timers and NMT state, after a kill by `ferrodrive params rollback`. Nothing is
 /// moved. QUANTITY is position, velocity, current, their demands (target_position, position_demand, following_error,
 /// target_velocity, velocity_demand, target_current, current_demand), supply, motor_temperature, driver_temperature, or
-/// an object by its name or number.
+/// an object by its name or number; on --bus sim also what is true of the virtual drive, by the names of --record:
+/// true_velocity, true_shaft_angle, true_winding.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive capture 4 velocity current --for 2s --rate 1ms -o x.mcap\n  \
     ferrodrive --bus can0 capture 4 velocity --trigger 'velocity > 10' --pre 50ms")]
@@ -163,7 +164,7 @@ impl CaptureArgs {
     ) -> Result<Wanted, Failure> {
         let mut quantities = Vec::new();
         for name in names {
-            let quantity = Quantity::named(drive, name).await?;
+            let quantity = Measurand::named(drive, context.true_values.as_ref(), name).await?;
             if !quantities.contains(&quantity) {
                 quantities.push(quantity);
             }
