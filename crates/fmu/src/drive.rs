@@ -5,11 +5,12 @@ use std::path::Path;
 use can::{Bitrate, Frame, Instant};
 use sim::machine::{TimingMode, order};
 use sim::wire::{BUS_OFF_SEQUENCES, ErrorCounters, ErrorState};
-use sim::{Brake, Report, VirtualDrive, seeds};
+use sim::{Report, VirtualDrive, seeds};
 use words::drive::DriveSpec;
 
 use crate::config::{ConfigError, DriveConfig, bitrate};
 use crate::operation::{BusError, NodeStatus, Operation};
+use crate::surroundings::{OUTPUTS, Surroundings, measured};
 use crate::variable::{Causality, Reference, Terminal, Value, Variable};
 
 /// Transmit mailboxes of its controller: as many frames wait for a bus that confirms them.
@@ -22,49 +23,6 @@ const OVERDUE_RETRY_NS: u64 = 1_000;
 const TERMINAL: Reference = 1;
 /// The fifth of the terminal.
 const NOTIFICATIONS: Reference = 5;
-const SEED: Reference = 6;
-const LOAD_TORQUE: Reference = 10;
-const SUPPLY: Reference = 11;
-const SUPPLY_ON: Reference = 12;
-const INPUTS: Reference = 100;
-const OUTPUTS: Reference = 200;
-const LEVELS: Reference = 300;
-
-/// The row of an output: reference, name, unit, what it is, and where it is in a report. What a drive does not have reads 0.
-type OutputRow = (Reference, &'static str, &'static str, &'static str, fn(&Report) -> Value);
-
-/// What is read of every drive.
-const READ: [OutputRow; 15] = [
-    (OUTPUTS, "angle", "rad", "angle of the motor shaft, many turns", |it| Value::Float64(it.shaft_angle_rad)),
-    (OUTPUTS + 1, "velocity", "rad/s", "speed of the motor shaft", |it| {
-        Value::Float64(it.velocity_rpm * std::f64::consts::PI / 30.0)
-    }),
-    (OUTPUTS + 2, "torque", "N.m", "torque of the motor on its rotor", |it| {
-        Value::Float64(it.physics.as_ref().map_or(0.0, |physics| physics.motor_torque_nm))
-    }),
-    (OUTPUTS + 3, "load_angle", "rad", "angle of the load, behind a gear if there is one", |it| {
-        Value::Float64(it.physics.as_ref().map_or(0.0, |physics| physics.load_angle_rad))
-    }),
-    (OUTPUTS + 4, "current", "A", "signed motor current", |it| Value::Float64(it.current_a)),
-    (OUTPUTS + 5, "bus_voltage", "V", "voltage at the supply terminals", |it| Value::Float64(it.supply_v)),
-    (OUTPUTS + 6, "winding_temperature", "degC", "true temperature of the winding", |it| {
-        Value::Float64(it.physics.as_ref().map_or(0.0, |physics| physics.winding_c))
-    }),
-    (OUTPUTS + 7, "heat_sink_temperature", "degC", "true temperature of the power stage", |it| {
-        Value::Float64(it.physics.as_ref().map_or(0.0, |physics| physics.heat_sink_c))
-    }),
-    (OUTPUTS + 8, "statusword", "", "6041h; 0 without power", |it| Value::UInt16(it.statusword.unwrap_or(0))),
-    (OUTPUTS + 9, "error_code", "", "present fault in the drive's own numbering; 0 for none", |it| {
-        Value::UInt32(it.error_code)
-    }),
-    (OUTPUTS + 10, "position", "", "actual position in the drive's counts", |it| Value::Int64(it.position)),
-    (OUTPUTS + 11, "node_id", "", "node-ID in use", |it| Value::UInt8(it.node)),
-    (OUTPUTS + 12, "powered", "", "there is enough voltage for the firmware", |it| Value::Boolean(it.powered)),
-    (OUTPUTS + 13, "brake_engaged", "", "the holding brake holds the shaft", |it| {
-        Value::Boolean(it.brake == Some(Brake::Engaged))
-    }),
-    (OUTPUTS + 14, "damaged", "", "something was destroyed", |it| Value::Boolean(it.damage.is_some())),
-];
 
 /// A drive, its inputs and its controller.
 #[derive(Clone)]
@@ -78,11 +36,7 @@ pub struct DriveUnit {
     /// A deadline that stays in the past is not asked again before this.
     not_before: Instant,
     has_begun: bool,
-    seed: u64,
-    load_torque_nm: f64,
-    supply_v: Option<f64>,
-    supply_on: bool,
-    inputs: Vec<bool>,
+    surroundings: Surroundings,
     /// The bus tells what becomes of a frame (`BusNotifications`).
     notified: bool,
     bitrate: Option<Bitrate>,
@@ -104,8 +58,7 @@ impl DriveUnit {
         let spec = config.spec(resources)?;
         let ordered = order(spec.model, &spec.order(bitrate(config.bitrate)?));
         let drive = ordered.map_err(|error| ConfigError::Drive(error.to_string()))?;
-        let inputs = vec![false; drive.inputs().len()];
-        let report = drive.report();
+        let (surroundings, report) = (Surroundings::of(&*drive), drive.report());
         Ok(Self {
             spec,
             drive,
@@ -114,11 +67,7 @@ impl DriveUnit {
             now: Instant::ZERO,
             not_before: Instant::ZERO,
             has_begun: false,
-            seed: 1,
-            load_torque_nm: 0.0,
-            supply_v: None,
-            supply_on: true,
-            inputs,
+            surroundings,
             notified: false,
             bitrate: None,
             counters: ErrorCounters::default(),
@@ -136,63 +85,20 @@ impl DriveUnit {
 
     /// Its variables, but for those of the terminal.
     pub fn variables(&self) -> Vec<Variable> {
-        use Causality::{Input, Output, Parameter};
-        let supply_v = self.report.physics.as_ref().map_or(0.0, |physics| physics.source_v);
-        let mut rows = vec![
-            Variable::new(
-                NOTIFICATIONS,
-                "CAN.BusNotifications",
-                Parameter,
-                Value::Boolean(false),
-                "the bus confirms frames and tells of errors; false where nodes are joined directly",
-            ),
-            Variable::new(SEED, "seed", Parameter, Value::UInt64(1), "decides the jitter of the drive's own times"),
-            Variable::new(
-                LOAD_TORQUE,
-                "load_torque",
-                Input,
-                Value::Float64(0.0),
-                "torque of the load at the output shaft; positive opposes positive motion",
-            )
-            .in_unit("N.m"),
-            Variable::new(
-                SUPPLY,
-                "supply_voltage",
-                Input,
-                Value::Float64(supply_v),
-                "open-circuit voltage of the supply",
-            )
-            .in_unit("V"),
-            Variable::new(SUPPLY_ON, "supply_on", Input, Value::Boolean(true), "the switch between supply and drive"),
-        ];
-        for (place, name) in (INPUTS..).zip(self.drive.inputs()) {
-            rows.push(Variable::new(place, &format!("input.{name}"), Input, Value::Boolean(false), "digital input"));
-        }
-        for (reference, name, unit, what, read) in READ {
-            rows.push(Variable::new(reference, name, Output, read(&self.report), what).in_unit(unit));
-        }
-        for (place, name) in (LEVELS..).zip(self.report.outputs.names) {
-            rows.push(Variable::new(place, &format!("output.{name}"), Output, Value::Boolean(false), "digital output"));
-        }
+        let notified = "the bus confirms frames and tells of errors; false where nodes are joined directly";
+        let (name, value) = ("CAN.BusNotifications", Value::Boolean(false));
+        let mut rows = vec![Variable::new(NOTIFICATIONS, name, Causality::Parameter, value, notified)];
+        rows.extend(Surroundings::variables(&*self.drive, &self.report));
         rows
     }
 
     /// Reads a variable as of now.
     pub fn get(&mut self, reference: Reference) -> Option<Value> {
-        let place = |base: Reference| reference.checked_sub(base).map(|place| place as usize);
-        Some(match reference {
-            NOTIFICATIONS => Value::Boolean(self.notified),
-            SEED => Value::UInt64(self.seed),
-            LOAD_TORQUE => Value::Float64(self.load_torque_nm),
-            SUPPLY => {
-                Value::Float64(self.supply_v.or(self.report.physics.as_ref().map(|it| it.source_v)).unwrap_or(0.0))
-            }
-            SUPPLY_ON => Value::Boolean(self.supply_on),
-            LEVELS.. => Value::Boolean(self.seen().outputs.iter().nth(place(LEVELS)?)?.1),
-            OUTPUTS.. => READ.get(place(OUTPUTS)?)?.4(self.seen()),
-            INPUTS.. => Value::Boolean(*self.inputs.get(place(INPUTS)?)?),
-            _ => return None,
-        })
+        match reference {
+            NOTIFICATIONS => Some(Value::Boolean(self.notified)),
+            OUTPUTS.. => measured(reference, self.seen()),
+            _ => self.surroundings.get(reference, &self.report),
+        }
     }
 
     /// Writes a parameter or an input; an input acts from the present instant on.
@@ -201,34 +107,10 @@ impl DriveUnit {
     /// What the drive does not take.
     pub fn set(&mut self, reference: Reference, value: &Value) -> Result<(), String> {
         self.looked_at = None;
-        match (reference, value) {
-            (NOTIFICATIONS, Value::Boolean(notified)) => self.notified = *notified,
-            (SEED, Value::UInt64(seed)) => self.seed = *seed,
-            (LOAD_TORQUE, Value::Float64(torque_nm)) if *torque_nm != self.load_torque_nm => {
-                self.drive.set_load_torque(*torque_nm, self.now).map_err(|refused| refused.to_string())?;
-                self.load_torque_nm = *torque_nm;
-            }
-            (SUPPLY, Value::Float64(volt)) if Some(*volt) != self.supply_v => {
-                self.drive.set_supply(*volt, self.now).map_err(|refused| refused.to_string())?;
-                self.supply_v = Some(*volt);
-            }
-            (SUPPLY_ON, Value::Boolean(on)) if *on != self.supply_on => {
-                self.supply_on = *on;
-                if self.has_begun {
-                    self.drive.set_power(*on, self.now);
-                }
-            }
-            // What acts at once is seen at once.
-            (INPUTS..OUTPUTS, Value::Boolean(level)) => {
-                let input = (reference - INPUTS) as usize;
-                let before = *self.inputs.get(input).ok_or("the drive has no such input")?;
-                if before != *level {
-                    self.drive.set_input(input, *level, self.now).map_err(|refused| refused.to_string())?;
-                    self.inputs[input] = *level;
-                }
-            }
-            _ => {}
+        if let (NOTIFICATIONS, Value::Boolean(notified)) = (reference, value) {
+            self.notified = *notified;
         }
+        self.surroundings.set((reference, value), &mut *self.drive, self.has_begun, self.now)?;
         if self.has_begun {
             self.not_before = Instant::ZERO;
             self.after_call();
@@ -240,10 +122,10 @@ impl DriveUnit {
     pub fn begin(&mut self) {
         (self.has_begun, self.looked_at) = (true, None);
         if self.spec.timing.unwrap_or(TimingMode::Device) == TimingMode::Device {
-            let seed = seeds::timing_seed(self.seed, self.spec.node.raw());
+            let seed = seeds::timing_seed(self.surroundings.seed, self.spec.node.raw());
             self.drive.set_timing(TimingMode::Device, seed, self.now);
         }
-        if self.supply_on {
+        if self.surroundings.supply_on {
             self.drive.set_power(true, self.now);
         }
         // A controller without power takes no part.

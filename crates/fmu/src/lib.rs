@@ -29,6 +29,7 @@ pub mod instance;
 pub mod operation;
 pub mod package;
 pub mod state;
+mod surroundings;
 pub mod unit;
 pub mod variable;
 pub mod xml;
