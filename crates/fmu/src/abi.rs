@@ -1,4 +1,4 @@
-//! The C functions of FMI 3.0 (`fmi3Functions.h`), as an importer finds them in the library.
+//! The C functions of FMI 3.0 (`fmi3Functions.h`) and of FMI 2.0 (`fmi2Functions.h`), as an importer finds them in the library.
 //!
 //! An instance is a number to its importer, and a lock here: a pointer that was freed, or never was one, is an error and not a
 //! crash. A panic ends the call with `fmi3Fatal`. What is read or written through pointers is checked for null and size; that
@@ -7,8 +7,10 @@
 #![allow(unreachable_pub, reason = "the library's symbols, not the crate's items")]
 #![allow(clippy::missing_safety_doc, reason = "the standard's: pointers are valid for the counts beside them")]
 
+mod fmi2;
 mod held;
 mod life;
+mod states;
 mod status;
 mod unsupported;
 mod values;
@@ -29,7 +31,7 @@ const DEFECT: &str = "a defect of Ferrodrive; please report it with what was cal
 fn call(handle: *mut c_void, work: impl FnOnce(&mut Held) -> Called<()>) -> Status {
     carry_out(handle, |held| {
         if held.is_broken {
-            return Err((FATAL, "an earlier call ended with fmi3Fatal; fmi3Reset makes the instance anew".to_owned()));
+            return Err((FATAL, "an earlier call ended with Fatal; Reset makes the instance anew".to_owned()));
         }
         work(held).map_err(|error| (ERROR, error.to_string()))
     })
@@ -45,7 +47,7 @@ fn carry_out(handle: *mut c_void, work: impl FnOnce(&mut Held) -> Result<(), (St
             held.is_broken = true;
             Err((FATAL, DEFECT.to_owned()))
         });
-        (held.log, done)
+        (held.log.clone(), done)
     };
     // Without the lock: the importer may call in again.
     match done {
@@ -186,12 +188,12 @@ mod tests {
         let (mut of_first, mut of_second) = (null_mut(), null_mut());
         // SAFETY: a place for a pointer each.
         unsafe {
-            assert_eq!(life::fmi3GetFMUState(first, &raw mut of_first), OK);
-            assert_eq!(life::fmi3GetFMUState(second, &raw mut of_second), OK);
+            assert_eq!(states::fmi3GetFMUState(first, &raw mut of_first), OK);
+            assert_eq!(states::fmi3GetFMUState(second, &raw mut of_second), OK);
         }
-        assert_eq!(life::fmi3SetFMUState(first, of_second), ERROR);
-        assert_eq!(life::fmi3SetFMUState(second, of_first), ERROR);
-        assert_eq!(life::fmi3SetFMUState(first, of_first), OK);
+        assert_eq!(states::fmi3SetFMUState(first, of_second), ERROR);
+        assert_eq!(states::fmi3SetFMUState(second, of_first), ERROR);
+        assert_eq!(states::fmi3SetFMUState(first, of_first), OK);
         life::fmi3FreeInstance(first);
         life::fmi3FreeInstance(second);
     }

@@ -19,6 +19,8 @@ pub enum Config {
     Drive(DriveConfig),
     /// A CAN bus.
     Bus(BusConfig),
+    /// One drive with a master that leads it, for FMI 2.0.
+    Axis(AxisConfig),
 }
 
 /// A drive.
@@ -31,6 +33,43 @@ pub struct DriveConfig {
     pub bitrate: u32,
     /// How it announces what it has to send.
     pub clock: TxClock,
+}
+
+/// A drive and its master.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisConfig {
+    /// What the drive follows.
+    pub mode: TargetKind,
+    /// The drive; it announces nothing.
+    pub drive: DriveConfig,
+}
+
+/// What a drive follows that is led by a master.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TargetKind {
+    /// A speed.
+    #[default]
+    Velocity,
+    /// A path of positions.
+    Position,
+    /// A motor current.
+    Torque,
+}
+
+impl TargetKind {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Velocity, Self::Position, Self::Torque];
+
+    /// As people type it.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity",
+            Self::Position => "position",
+            Self::Torque => "torque",
+        }
+    }
 }
 
 /// A bus.
@@ -65,6 +104,9 @@ pub enum ConfigError {
     /// A drive that is not known.
     #[error("{0}")]
     Drive(String),
+    /// A model that cannot be led so.
+    #[error("a {0} has no mode in which it follows a new {1} in each cycle")]
+    NoMode(&'static str, &'static str),
     /// A bit rate that the bus cannot have.
     #[error("{0} bit/s is not a bit rate of CAN; expected 10000 to 1000000, e.g. 500000")]
     Bitrate(u32),
@@ -96,6 +138,15 @@ impl Config {
         match self {
             Self::Drive(drive) => drive.clock,
             Self::Bus(bus) => bus.clock,
+            Self::Axis(_) => TxClock::Triggered,
+        }
+    }
+
+    /// The drive that is in it.
+    pub const fn drive(&self) -> Option<&DriveConfig> {
+        match self {
+            Self::Drive(drive) | Self::Axis(AxisConfig { drive, .. }) => Some(drive),
+            Self::Bus(_) => None,
         }
     }
 }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::call::{CallError, Called, refused};
 use crate::config::{Config, ConfigError, TxClock};
+use crate::journal::Journal;
 use crate::unit::{Action, Unit};
 use crate::variable::{Causality, Reference, Terminal, Value, Variable};
 
@@ -75,13 +76,12 @@ pub struct Instance {
     resources: PathBuf,
     /// Of what FMU it is.
     pub(crate) token: String,
-    pub(crate) unit: Unit,
+    /// What it computes, with what was done to that.
+    pub(crate) journal: Journal,
     variables: Vec<Variable>,
     terminals: Vec<Terminal>,
     has_event_mode: bool,
     rest: Rest,
-    /// What was done to the unit since its begin, so that its state can become bytes.
-    pub(crate) actions: Vec<Action>,
 }
 
 impl Instance {
@@ -103,7 +103,8 @@ impl Instance {
         let ports = vec![Port::default(); terminals.len()];
         let rest = Rest { ports, mode: Mode::Instantiated, start_s: 0.0, now_ns: 0 };
         let (token, resources) = (crate::xml::token(&config, resources), resources.to_owned());
-        Ok(Self { config, resources, token, unit, variables, terminals, has_event_mode, rest, actions: Vec::new() })
+        let journal = Journal::new(unit);
+        Ok(Self { config, resources, token, journal, variables, terminals, has_event_mode, rest })
     }
 
     /// Its mode.
@@ -131,7 +132,7 @@ impl Instance {
     /// # Errors
     /// The wrong mode, a time that is not a number.
     pub fn enter_initialization(&mut self, start_s: f64) -> Called<()> {
-        self.expect(&[Mode::Instantiated], "fmi3EnterInitializationMode")?;
+        self.expect(&[Mode::Instantiated], "EnterInitializationMode")?;
         if !start_s.is_finite() {
             return refused(format!("the start time is {start_s}; expected a number of seconds"));
         }
@@ -145,7 +146,7 @@ impl Instance {
     /// # Errors
     /// The wrong mode.
     pub fn exit_initialization(&mut self) -> Called<()> {
-        self.expect(&[Mode::Initialization], "fmi3ExitInitializationMode")?;
+        self.expect(&[Mode::Initialization], "ExitInitializationMode")?;
         self.act(Action::Begin)?;
         self.rest.mode = if self.has_event_mode { Mode::Event } else { Mode::Step };
         self.tick_triggered()
@@ -156,7 +157,7 @@ impl Instance {
     /// # Errors
     /// The wrong mode, or event mode was not asked for.
     pub fn enter_event(&mut self) -> Called<()> {
-        self.expect(&[Mode::Step], "fmi3EnterEventMode")?;
+        self.expect(&[Mode::Step], "EnterEventMode")?;
         if !self.has_event_mode {
             return refused("event mode was not asked for: fmi3InstantiateCoSimulation had eventModeUsed = false");
         }
@@ -169,7 +170,7 @@ impl Instance {
     /// # Errors
     /// The wrong mode.
     pub fn enter_step(&mut self) -> Called<()> {
-        self.expect(&[Mode::Event], "fmi3EnterStepMode")?;
+        self.expect(&[Mode::Event], "EnterStepMode")?;
         self.hand_over()?;
         self.rest.mode = Mode::Step;
         Ok(())
@@ -180,9 +181,18 @@ impl Instance {
     /// # Errors
     /// The wrong mode.
     pub fn terminate(&mut self) -> Called<()> {
-        self.expect(&[Mode::Event, Mode::Step], "fmi3Terminate")?;
+        self.expect(&[Mode::Event, Mode::Step], "Terminate")?;
+        self.end()?;
         self.rest.mode = Mode::Terminated;
         Ok(())
+    }
+
+    /// What the unit moves is brought to rest: the instance is not used any more.
+    ///
+    /// # Errors
+    /// Never.
+    pub fn end(&mut self) -> Called<()> {
+        self.act(Action::End).map(drop)
     }
 
     /// One round of an event: takes in what was set, does what is due. True if clocks have ticked anew.
@@ -190,7 +200,7 @@ impl Instance {
     /// # Errors
     /// The wrong mode.
     pub fn update(&mut self) -> Called<bool> {
-        self.expect(&[Mode::Event], "fmi3UpdateDiscreteStates")?;
+        self.expect(&[Mode::Event], "UpdateDiscreteStates")?;
         self.clear_ticks();
         self.hand_over()?;
         self.act(Action::Serve)?;
@@ -203,7 +213,7 @@ impl Instance {
     /// # Errors
     /// The wrong mode, a step that does not begin where time stands, or is not forward.
     pub fn step(&mut self, from_s: f64, step_s: f64) -> Called<Stepped> {
-        self.expect(&[Mode::Step], "fmi3DoStep")?;
+        self.expect(&[Mode::Step], "DoStep")?;
         let to_s = from_s + step_s;
         // By the standard a step takes time; importers make one of none where a countdown ends at once.
         if !(step_s >= 0.0 && to_s.is_finite() && to_s - self.rest.start_s < LATEST_S) {
@@ -235,7 +245,9 @@ impl Instance {
         self.has_event_mode
             && match self.config.clock() {
                 TxClock::Triggered => self.rest.ports.iter().any(|port| port.ticked),
-                TxClock::Countdown => self.unit.next_event().is_some_and(|at| at.as_nanos() <= self.rest.now_ns),
+                TxClock::Countdown => {
+                    self.journal.unit.next_event().is_some_and(|at| at.as_nanos() <= self.rest.now_ns)
+                }
             }
     }
 
@@ -254,10 +266,8 @@ impl Instance {
                 port.visible.clone()
             }));
         }
-        if self.unit.look() {
-            self.actions.push(Action::Look);
-        }
-        self.unit.get(reference).ok_or_else(|| unknown(reference))
+        self.journal.look();
+        self.journal.unit.get(reference).ok_or_else(|| unknown(reference))
     }
 
     /// What a network sends, to be looked at without a copy; `None` for another variable.
@@ -308,7 +318,7 @@ impl Instance {
             return refused(format!("{name} cannot be set: the simulation is over"));
         }
         // What changes nothing is not written down, so that a state does not grow with each call.
-        if self.unit.get(reference).as_ref() == Some(&value) {
+        if self.journal.unit.get(reference).as_ref() == Some(&value) {
             return Ok(());
         }
         self.act(Action::Set(reference, value)).map_err(|error| CallError(format!("{name}: {error}")))?;
@@ -334,7 +344,7 @@ impl Instance {
     /// # Errors
     /// It is not a clock, or not one that the importer decides.
     pub fn set_clock(&mut self, reference: Reference, ticks: bool) -> Called<()> {
-        self.expect(&[Mode::Event, Mode::Initialization], "fmi3SetClock")?;
+        self.expect(&[Mode::Event, Mode::Initialization], "SetClock")?;
         self.clock(reference)?;
         let Some(place) = self.terminals.iter().position(|terminal| terminal.tx_clock == reference) else {
             // What is received says by itself when it came.
@@ -359,7 +369,7 @@ impl Instance {
             return refused(format!("clock {reference} has no interval: it is not a countdown"));
         }
         // Always what is left of it: importers that forget a countdown with each event need it, and others lose nothing.
-        let next = self.unit.next_event().map(|at| at.as_nanos());
+        let next = self.journal.unit.next_event().map(|at| at.as_nanos());
         Ok(next.map_or(Interval::NotKnown, |at| Interval::In(at.saturating_sub(self.rest.now_ns))))
     }
 
@@ -383,7 +393,8 @@ impl Instance {
         if modes.contains(&self.rest.mode) {
             return Ok(());
         }
-        refused(format!("{call} in the mode {:?}; expected {modes:?}", self.rest.mode))
+        let version = if matches!(self.config, Config::Axis(_)) { 2 } else { 3 };
+        refused(format!("fmi{version}{call} in the mode {:?}; expected {modes:?}", self.rest.mode))
     }
 
     /// Nanoseconds since the begin, to the nearest.
@@ -400,26 +411,7 @@ impl Instance {
 
     /// Does an action and writes it down.
     fn act(&mut self, action: Action) -> Called<Vec<u8>> {
-        let done = self.unit.act(&action).map_err(CallError)?;
-        match (&action, self.actions.last()) {
-            // Two of them are as good as one.
-            (Action::Serve, Some(Action::Serve)) => {}
-            (Action::Take(_), _) if done.is_empty() => {}
-            // Time that passes does all that was due on its way.
-            (Action::Advance(to_ns), _) => {
-                let kept = match self.actions.as_slice() {
-                    [.., Action::Advance(at)] | [.., Action::Advance(at), Action::Serve] if at == to_ns => {
-                        return Ok(done);
-                    }
-                    [kept @ .., Action::Advance(_)] | [kept @ .., Action::Advance(_), Action::Serve] => kept.len(),
-                    all => all.len(),
-                };
-                self.actions.truncate(kept);
-                self.actions.push(action);
-            }
-            _ => self.actions.push(action),
-        }
-        Ok(done)
+        self.journal.act(action).map_err(CallError)
     }
 
     /// Hands on what was set.

@@ -21,11 +21,14 @@
 //! ```
 
 mod abi;
+pub mod axis;
 pub mod bus;
 pub mod call;
 pub mod config;
 pub mod drive;
+pub mod fmi2;
 pub mod instance;
+mod journal;
 pub mod operation;
 pub mod package;
 pub mod state;

@@ -37,7 +37,7 @@ impl SavedState {
     pub fn bytes(&self) -> Vec<u8> {
         let instance = &self.0;
         let written =
-            Written { token: instance.token.clone(), actions: instance.actions.clone(), rest: instance.rest() };
+            Written { token: instance.token.clone(), actions: instance.journal.actions.clone(), rest: instance.rest() };
         // Numbers, texts and lists of them: they always have a form.
         let body = rmp_serde::to_vec(&written).unwrap_or_default();
         let mut bytes = crc32fast::hash(&body).to_le_bytes().to_vec();
@@ -69,9 +69,9 @@ impl SavedState {
                 }
                 latest_ns = *to_ns;
             }
-            instance.unit.act(action).map_err(error)?;
+            instance.journal.unit.act(action).map_err(error)?;
         }
-        instance.actions = written.actions;
+        instance.journal.actions = written.actions;
         instance.put(written.rest)?;
         Ok(Self(Box::new(instance)))
     }

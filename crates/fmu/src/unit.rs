@@ -8,6 +8,7 @@ use std::path::Path;
 use can::Instant;
 use serde::{Deserialize, Serialize};
 
+use crate::axis::AxisUnit;
 use crate::bus::BusUnit;
 use crate::config::{Config, ConfigError};
 use crate::drive::DriveUnit;
@@ -31,15 +32,18 @@ pub enum Action {
     Take(usize),
     /// Lets time pass up to so many nanoseconds after the begin.
     Advance(u64),
+    /// The simulation ends.
+    End,
 }
 
 /// A drive or a bus.
-#[derive(Clone)]
 pub enum Unit {
     /// A drive.
     Drive(Box<DriveUnit>),
     /// A bus.
     Bus(Box<BusUnit>),
+    /// A drive with its master.
+    Axis(Box<AxisUnit>),
 }
 
 impl Unit {
@@ -51,6 +55,7 @@ impl Unit {
         Ok(match config {
             Config::Drive(drive) => Self::Drive(Box::new(DriveUnit::new(drive, resources)?)),
             Config::Bus(bus) => Self::Bus(Box::new(BusUnit::new(bus)?)),
+            Config::Axis(axis) => Self::Axis(Box::new(AxisUnit::new(axis, resources)?)),
         })
     }
 
@@ -59,6 +64,7 @@ impl Unit {
         match self {
             Self::Drive(drive) => drive.variables(),
             Self::Bus(bus) => bus.variables(),
+            Self::Axis(axis) => axis.variables(),
         }
     }
 
@@ -67,6 +73,7 @@ impl Unit {
         match self {
             Self::Drive(_) => vec![DriveUnit::terminal()],
             Self::Bus(bus) => bus.terminals(),
+            Self::Axis(_) => Vec::new(),
         }
     }
 
@@ -75,6 +82,7 @@ impl Unit {
         match self {
             Self::Drive(drive) => drive.look(),
             Self::Bus(_) => false,
+            Self::Axis(axis) => axis.look(),
         }
     }
 
@@ -83,6 +91,7 @@ impl Unit {
         match self {
             Self::Drive(drive) => drive.get(reference),
             Self::Bus(bus) => bus.get(reference),
+            Self::Axis(axis) => axis.get(reference),
         }
     }
 
@@ -99,6 +108,15 @@ impl Unit {
         match (self, action) {
             (Self::Drive(drive), Action::Set(reference, value)) => drive.set(*reference, value)?,
             (Self::Bus(bus), Action::Set(reference, value)) => bus.set(*reference, value)?,
+            (Self::Axis(axis), Action::Set(reference, value)) => axis.set(*reference, value)?,
+            (Self::Axis(axis), Action::Begin) => axis.begin()?,
+            (Self::Axis(axis), Action::Advance(nanos)) => axis.advance(Instant::from_nanos(*nanos)),
+            (Self::Axis(axis), Action::Look) => {
+                axis.look();
+            }
+            (Self::Axis(axis), Action::End) => axis.end(),
+            // It has no network.
+            (Self::Axis(_), Action::Serve | Action::Receive(..) | Action::Take(_)) => {}
             (Self::Drive(drive), Action::Begin) => drive.begin(),
             (Self::Bus(bus), Action::Begin) => bus.begin(),
             (Self::Drive(drive), Action::Receive(_, bytes)) => {
@@ -117,6 +135,8 @@ impl Unit {
             }
             // A bus does all that is due when time passes.
             (Self::Bus(_), Action::Serve | Action::Look) => {}
+            // What they do is others' to end.
+            (Self::Drive(_) | Self::Bus(_), Action::End) => {}
         }
         Ok(Vec::new())
     }
@@ -126,6 +146,8 @@ impl Unit {
         match self {
             Self::Drive(drive) => drive.next_event(),
             Self::Bus(bus) => bus.next_event(),
+            // Nothing leaves it.
+            Self::Axis(_) => None,
         }
     }
 }

@@ -24,6 +24,8 @@ pub enum Value {
     Boolean(bool),
     /// Bytes.
     Binary(Vec<u8>),
+    /// A text; in FMI 2.0 alone.
+    String(String),
 }
 
 impl Value {
@@ -38,6 +40,7 @@ impl Value {
             Self::UInt64(_) => "UInt64",
             Self::Boolean(_) => "Boolean",
             Self::Binary(_) => "Binary",
+            Self::String(_) => "String",
         }
     }
 
@@ -51,6 +54,7 @@ impl Value {
             Self::UInt32(value) => value.to_string(),
             Self::UInt64(value) => value.to_string(),
             Self::Boolean(value) => value.to_string(),
+            Self::String(text) => text.clone(),
             Self::Binary(bytes) => bytes.iter().map(|byte| format!("{byte:02x}")).collect(),
         }
     }

@@ -1,11 +1,13 @@
 //! The descriptions that an FMU carries: of its variables (FMI 3.0, 2.4), of its networks and of the layered standard.
 
+mod fmi2;
+
 use std::fmt::Write as _;
 use std::path::Path;
 
 use words::escaped;
 
-use crate::config::{Config, TxClock};
+use crate::config::{Config, DriveConfig, TxClock};
 use crate::unit::Unit;
 use crate::variable::{Causality, Reference, Terminal, Variable};
 
@@ -17,14 +19,25 @@ pub const MODEL_IDENTIFIER: &str = "ferrodrive_fmu";
 const MIME_TYPE: &str = "application/org.fmi-standard.fmi-ls-bus.can; version=&quot;1.0.0&quot;";
 
 /// Units by the exponents of SI's base units (FMI 3.0, 2.4.3).
-const UNITS: [(&str, &str); 6] = [
+const UNITS: [(&str, &str); 7] = [
     ("rad", r#"rad="1""#),
     ("rad/s", r#"rad="1" s="-1""#),
+    ("s", r#"s="1""#),
     ("N.m", r#"kg="1" m="2" s="-2""#),
     ("A", r#"A="1""#),
     ("V", r#"kg="1" m="2" s="-3" A="-1""#),
     ("degC", r#"K="1" offset="273.15""#),
 ];
+
+/// What messages are about (FMI 2.0.5 and 3.0, 2.2.4).
+const LOG_CATEGORIES: &str = "  <LogCategories>\n    <Category name=\"logStatusError\"/>\n    <Category \
+    name=\"logStatusFatal\"/>\n  </LogCategories>\n";
+
+/// The definitions of [`UNITS`].
+fn units() -> String {
+    let unit = |(unit, exponents)| format!("    <Unit name=\"{unit}\"><BaseUnit {exponents}/></Unit>\n");
+    format!("  <UnitDefinitions>\n{}  </UnitDefinitions>\n", UNITS.map(unit).concat())
+}
 
 /// What an importer has to hand back at instantiation: another one is of another FMU.
 /// The file in `resources` that describes a drive counts.
@@ -32,9 +45,7 @@ pub fn token(config: &Config, resources: &Path) -> String {
     let version = env!("CARGO_PKG_VERSION");
     let mut sum = crc32fast::Hasher::new();
     sum.update(config.text().as_bytes());
-    if let Config::Drive(drive) = config
-        && let Some(name) = drive.file()
-    {
+    if let Some(name) = config.drive().and_then(DriveConfig::file) {
         sum.update(&std::fs::read(resources.join(name)).unwrap_or_default());
     }
     format!("ferrodrive-{version}-{:08x}", sum.finalize())
@@ -45,23 +56,20 @@ pub fn model_description(config: &Config, resources: &Path, unit: &Unit) -> Stri
     let name = match config {
         Config::Drive(drive) => drive.drive.clone(),
         Config::Bus(bus) => format!("CAN bus of {} nodes", bus.nodes),
+        Config::Axis(axis) => return fmi2::model_description(config, axis, resources, &unit.variables()),
     };
     let mut xml = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"3.0\" modelName=\"{}\" \
          instantiationToken=\"{}\" generationTool=\"Ferrodrive {}\" variableNamingConvention=\"flat\">\n  \
          <CoSimulation modelIdentifier=\"{MODEL_IDENTIFIER}\" canHandleVariableCommunicationStepSize=\"true\" \
-         hasEventMode=\"true\" canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\"/>\n  <UnitDefinitions>\n",
+         hasEventMode=\"true\" canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\"/>\n",
         escaped(&name),
         token(config, resources),
         env!("CARGO_PKG_VERSION"),
     );
-    for (unit, exponents) in UNITS {
-        let _ = writeln!(xml, "    <Unit name=\"{unit}\"><BaseUnit {exponents}/></Unit>");
-    }
-    xml.push_str(
-        "  </UnitDefinitions>\n  <LogCategories>\n    <Category name=\"logStatusError\"/>\n    <Category name=\"logStatusFatal\"/>\n  </LogCategories>\n  \
-         <DefaultExperiment startTime=\"0\" stopTime=\"10\" stepSize=\"0.001\"/>\n  <ModelVariables>\n",
-    );
+    xml.push_str(&units());
+    xml.push_str(LOG_CATEGORIES);
+    xml.push_str("  <DefaultExperiment startTime=\"0\" stopTime=\"10\" stepSize=\"0.001\"/>\n  <ModelVariables>\n");
     let _ = writeln!(
         xml,
         "    <Float64 name=\"time\" valueReference=\"{TIME}\" causality=\"independent\" variability=\"continuous\"/>"

@@ -28,7 +28,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("transport", &["can", "canlog", "slcan"]),
     ("showcase", &["can", "canopen", "cia402", "devices", "drives", "sim", "master", "plot"]),
     ("words", &["can", "canopen", "cia402", "devices", "eds", "master", "plot", "sim"]),
-    ("fmu", &["can", "sim", "words"]),
+    ("fmu", &["can", "cia402", "devices", "master", "sim", "words"]),
     ("machine", &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives", "sim", "master", "words"]),
     ("recording", &["can", "canopen", "plot", "sim", "words"]),
     ("foxglove", &["can", "recording"]),

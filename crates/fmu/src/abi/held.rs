@@ -1,13 +1,18 @@
 //! The instances that importers hold, by number.
 
 use std::collections::HashMap;
-use std::ffi::{CString, c_void};
+use std::ffi::{CStr, CString, c_void};
+use std::panic::UnwindSafe;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use super::status::{FATAL, LogMessage, Status};
+use super::DEFECT;
+use super::status::{ERROR, FATAL, LogMessage, Logger, Status};
+use crate::config::Config;
 use crate::instance::Instance;
 use crate::state::SavedState;
+use crate::xml;
 
 /// An instance with what belongs to its importer.
 pub(super) struct Held {
@@ -17,14 +22,26 @@ pub(super) struct Held {
     pub(super) is_broken: bool,
     /// States that were handed out, by number.
     pub(super) states: HashMap<usize, SavedState>,
+    /// From when to when the importer wants to simulate, s (FMI 2.0).
+    pub(super) span_s: (f64, Option<f64>),
+    /// Texts that the last call handed out (FMI 2.0).
+    pub(super) texts: Vec<CString>,
 }
 
 /// Where messages go.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Log {
     /// The importer's own pointer, as a number: it goes back as it came.
     environment: usize,
-    message: LogMessage,
+    message: Message,
+}
+
+/// The importer's function for messages, by the version of FMI.
+#[derive(Clone)]
+enum Message {
+    Fmi3(LogMessage),
+    /// With the name of the instance.
+    Fmi2(Logger, Arc<CStr>),
 }
 
 /// The instances, and the number of the next.
@@ -40,22 +57,63 @@ static INSTANCES: LazyLock<Mutex<Instances>> = LazyLock::new(Mutex::default);
 
 impl Log {
     pub(super) fn new(environment: *mut c_void, message: LogMessage) -> Self {
-        Self { environment: environment as usize, message }
+        Self { environment: environment as usize, message: Message::Fmi3(message) }
+    }
+
+    /// By FMI 2.0, of an instance of this name.
+    pub(super) fn fmi2(environment: *mut c_void, logger: Logger, name: &CStr) -> Self {
+        Self { environment: environment as usize, message: Message::Fmi2(logger, name.into()) }
     }
 
     /// A message of a call that ends with `status`.
     pub(super) fn say(&self, status: Status, what: &str) {
-        let Some(message) = self.message else { return };
-        let text = CString::new(what.replace('\0', " ")).unwrap_or_default();
+        let what = what.replace('\0', " ");
         let category = if status == FATAL { c"logStatusFatal" } else { c"logStatusError" };
-        // SAFETY: the importer's function with the importer's pointer and texts that live as long as the call.
-        unsafe { message(self.environment as *mut c_void, status, category.as_ptr(), text.as_ptr()) };
+        let environment = self.environment as *mut c_void;
+        match &self.message {
+            Message::Fmi3(Some(message)) => {
+                let text = CString::new(what).unwrap_or_default();
+                // SAFETY: the importer's function with the importer's pointer and texts that live as long as the call.
+                unsafe { message(environment, status, category.as_ptr(), text.as_ptr()) };
+            }
+            Message::Fmi2(Some(logger), name) => {
+                // It is a format of `printf`, to which nothing is handed.
+                let text = CString::new(what.replace('%', "%%")).unwrap_or_default();
+                // SAFETY: as above.
+                unsafe { logger(environment, name.as_ptr(), status, category.as_ptr(), text.as_ptr()) };
+            }
+            Message::Fmi3(None) | Message::Fmi2(None, _) => {}
+        }
     }
+}
+
+/// An instance of what is described in the resources, if the importer means that one.
+pub(super) fn checked(
+    config: Config,
+    resources: &Path,
+    token: Option<&str>,
+    has_event_mode: bool,
+) -> Result<Instance, String> {
+    let expected = xml::token(&config, resources);
+    if token != Some(expected.as_str()) {
+        return Err(format!("the instantiation token is {}; expected {expected}", token.unwrap_or("missing")));
+    }
+    Instance::of(config, resources, has_event_mode).map_err(|error| error.to_string())
+}
+
+/// Makes an instance and gives its handle; null if that fails, for which there is a message.
+pub(super) fn make(log: Log, work: impl FnOnce() -> Result<Instance, String> + UnwindSafe) -> *mut c_void {
+    match std::panic::catch_unwind(work) {
+        Ok(Ok(instance)) => return add(Held::new(instance, log)),
+        Ok(Err(error)) => log.say(ERROR, &error),
+        Err(_) => log.say(FATAL, DEFECT),
+    }
+    std::ptr::null_mut()
 }
 
 impl Held {
     pub(super) fn new(instance: Instance, log: Log) -> Self {
-        Self { instance, log, is_broken: false, states: HashMap::new() }
+        Self { instance, log, is_broken: false, states: HashMap::new(), span_s: (0.0, None), texts: Vec::new() }
     }
 
     /// Keeps a state, and gives its number.

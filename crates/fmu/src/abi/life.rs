@@ -3,13 +3,10 @@
 use std::ffi::{c_char, c_void};
 use std::path::Path;
 
-use super::held::{self, Held, Log};
-use super::status::{ERROR, FATAL, LogMessage, Status};
-use super::{DEFECT, call, carry_out, put, slice, slice_mut, text, wrong};
+use super::held::{self, Log};
+use super::status::{ERROR, LogMessage, Status};
+use super::{call, carry_out, put, text};
 use crate::config::Config;
-use crate::instance::Instance;
-use crate::state::SavedState;
-use crate::xml;
 
 /// `fmi3GetVersion`: `3.0`.
 #[unsafe(no_mangle)]
@@ -47,26 +44,14 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
     let log = Log::new(environment, log_message);
     // SAFETY: texts by the importer's word.
     let (token, resources) = unsafe { (text(token), text(resource_path)) };
-    let made = std::panic::catch_unwind(|| {
+    held::make(log, || {
         let resources = Path::new(resources.ok_or("the path of the resources is missing")?);
         let config = Config::read(resources).map_err(|error| error.to_string())?;
-        let expected = xml::token(&config, resources);
-        if token != Some(expected.as_str()) {
-            return Err(format!("the instantiation token is {}; expected {expected}", token.unwrap_or("missing")));
+        if matches!(config, Config::Axis(_)) {
+            return Err("this FMU is of FMI 2.0".to_owned());
         }
-        Instance::of(config, resources, event_mode_used != 0).map_err(|error| error.to_string())
-    });
-    match made {
-        Ok(Ok(instance)) => held::add(Held::new(instance, log)),
-        Ok(Err(error)) => {
-            log.say(ERROR, &error);
-            std::ptr::null_mut()
-        }
-        Err(_) => {
-            log.say(FATAL, DEFECT);
-            std::ptr::null_mut()
-        }
-    }
+        held::checked(config, resources, token, event_mode_used != 0)
+    })
 }
 
 /// `fmi3FreeInstance`.
@@ -175,98 +160,6 @@ pub unsafe extern "C" fn fmi3DoStep(
             put(early_return, 0);
             put(last_time, stepped.time_s);
         }
-        Ok(())
-    })
-}
-
-/// `fmi3GetFMUState`: a state that was handed out before is written anew.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetFMUState(handle: *mut c_void, state: *mut *mut c_void) -> Status {
-    call(handle, |held| {
-        // SAFETY: a place for a pointer by the importer's word.
-        let place = unsafe { slice_mut(state, 1)? };
-        held.states.remove(&(place[0] as usize));
-        let saved = SavedState::of(&held.instance);
-        place[0] = held.keep(saved) as *mut c_void;
-        Ok(())
-    })
-}
-
-/// `fmi3SetFMUState`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi3SetFMUState(handle: *mut c_void, state: *mut c_void) -> Status {
-    call(handle, |held| match held.states.get(&(state as usize)) {
-        Some(saved) => {
-            saved.restore(&mut held.instance);
-            Ok(())
-        }
-        None => wrong("no state of this instance"),
-    })
-}
-
-/// `fmi3FreeFMUState`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3FreeFMUState(handle: *mut c_void, state: *mut *mut c_void) -> Status {
-    call(handle, |held| {
-        if !state.is_null() {
-            // SAFETY: a place for a pointer by the importer's word.
-            let place = unsafe { slice_mut(state, 1)? };
-            held.states.remove(&(place[0] as usize));
-            place[0] = std::ptr::null_mut();
-        }
-        Ok(())
-    })
-}
-
-/// `fmi3SerializedFMUStateSize`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializedFMUStateSize(
-    handle: *mut c_void,
-    state: *mut c_void,
-    size: *mut usize,
-) -> Status {
-    call(handle, |held| {
-        let Some(saved) = held.states.get(&(state as usize)) else { return wrong("no state of this instance") };
-        // SAFETY: a place for a result by the importer's word.
-        unsafe { put(size, saved.bytes().len()) };
-        Ok(())
-    })
-}
-
-/// `fmi3SerializeFMUState`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializeFMUState(
-    handle: *mut c_void,
-    state: *mut c_void,
-    bytes: *mut u8,
-    size: usize,
-) -> Status {
-    call(handle, |held| {
-        let Some(saved) = held.states.get(&(state as usize)) else { return wrong("no state of this instance") };
-        let written = saved.bytes();
-        if written.len() > size {
-            return wrong(format!("the state has {} bytes, and there is room for {size}", written.len()));
-        }
-        // SAFETY: room for as many bytes by the importer's word.
-        let room = unsafe { slice_mut(bytes, size)? };
-        room[..written.len()].copy_from_slice(&written);
-        Ok(())
-    })
-}
-
-/// `fmi3DeserializeFMUState`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3DeserializeFMUState(
-    handle: *mut c_void,
-    bytes: *const u8,
-    size: usize,
-    state: *mut *mut c_void,
-) -> Status {
-    call(handle, |held| {
-        // SAFETY: as many bytes, and a place for a pointer, by the importer's word.
-        let (bytes, place) = unsafe { (slice(bytes, size)?, slice_mut(state, 1)?) };
-        let saved = SavedState::from_bytes(bytes, &held.instance)?;
-        place[0] = held.keep(saved) as *mut c_void;
         Ok(())
     })
 }

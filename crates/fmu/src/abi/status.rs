@@ -1,8 +1,8 @@
-//! What calls end with, and where messages go: types of `fmi3FunctionTypes.h`.
+//! What calls end with, and where messages go: types of `fmi3FunctionTypes.h` and `fmi2FunctionTypes.h`.
 
 use std::ffi::{c_char, c_void};
 
-/// `fmi3Status`.
+/// `fmi3Status`, and `fmi2Status`.
 pub(super) type Status = i32;
 pub(super) const OK: Status = 0;
 pub(super) const ERROR: Status = 3;
@@ -10,3 +10,7 @@ pub(super) const FATAL: Status = 4;
 
 /// `fmi3LogMessageCallback`.
 pub(super) type LogMessage = Option<unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char)>;
+
+/// `fmi2CallbackLogger`: component environment, name of the instance, status, category, message as of `printf`.
+pub(super) type Logger =
+    Option<unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...)>;

@@ -1,4 +1,4 @@
-//! Functions of FMI 3.0 for what these FMUs do not have. An importer finds all of them, and an error where it calls one.
+//! Functions of FMI for what these FMUs do not have. An importer finds all of them, and an error where it calls one.
 
 use std::ffi::c_void;
 
@@ -70,4 +70,17 @@ pub extern "C" fn fmi3InstantiateScheduledExecution(
     _: P,
 ) -> *mut c_void {
     std::ptr::null_mut()
+}
+
+// FMI 2.0: steps are never pending, and derivatives of inputs and outputs are not offered.
+unsupported! {
+    fmi2GetDirectionalDerivative: P, usize, P, usize, P, P;
+    fmi2SetRealInputDerivatives: P, usize, P, P;
+    fmi2GetRealOutputDerivatives: P, usize, P, P;
+    fmi2CancelStep: ;
+    fmi2GetStatus: i32, P;
+    fmi2GetRealStatus: i32, P;
+    fmi2GetIntegerStatus: i32, P;
+    fmi2GetBooleanStatus: i32, P;
+    fmi2GetStringStatus: i32, P;
 }

@@ -17,11 +17,12 @@ fn check_counts(references: usize, values: usize) -> Called<()> {
 }
 
 /// Reads variables of one type into `values`.
-unsafe fn read<T>(
+pub(super) unsafe fn read<T>(
     handle: *mut c_void,
     references: (*const u32, usize),
     values: (*mut T, usize),
     take: impl Fn(Value) -> Option<T>,
+    kind_of: fn(&Value) -> &'static str,
 ) -> Status {
     call(handle, |held| {
         check_counts(references.1, values.1)?;
@@ -29,7 +30,7 @@ unsafe fn read<T>(
         let (references, values) = unsafe { (slice(references.0, references.1)?, slice_mut(values.0, values.1)?) };
         for (reference, place) in references.iter().zip(values) {
             let value = held.instance.get(*reference)?;
-            let kind = value.type_name();
+            let kind = kind_of(&value);
             let Some(value) = take(value) else { return wrong(format!("variable {reference} is a {kind}")) };
             *place = value;
         }
@@ -38,17 +39,17 @@ unsafe fn read<T>(
 }
 
 /// Writes variables of one type.
-unsafe fn write<T: Copy>(
+pub(super) unsafe fn write<T: Copy>(
     handle: *mut c_void,
     references: (*const u32, usize),
     values: (*const T, usize),
-    give: impl Fn(T) -> Value,
+    give: impl Fn(T) -> Called<Value>,
 ) -> Status {
     call(handle, |held| {
         check_counts(references.1, values.1)?;
         // SAFETY: arrays of these counts by the importer's word.
         let (references, values) = unsafe { (slice(references.0, references.1)?, slice(values.0, values.1)?) };
-        references.iter().zip(values).try_for_each(|(reference, value)| held.instance.set(*reference, give(*value)))
+        references.iter().zip(values).try_for_each(|(reference, value)| held.instance.set(*reference, give(*value)?))
     })
 }
 
@@ -60,7 +61,13 @@ macro_rules! of_type {
         pub unsafe extern "C" fn $get(h: *mut c_void, vr: *const u32, nvr: usize, values: *mut $c, n: usize) -> Status {
             // SAFETY: handed on as it came.
             unsafe {
-                read(h, (vr, nvr), (values, n), |value| if let Value::$kind(it) = value { Some(it) } else { None })
+                read(
+                    h,
+                    (vr, nvr),
+                    (values, n),
+                    |value| if let Value::$kind(it) = value { Some(it) } else { None },
+                    Value::type_name,
+                )
             }
         }
 
@@ -74,7 +81,7 @@ macro_rules! of_type {
             n: usize,
         ) -> Status {
             // SAFETY: handed on as it came.
-            unsafe { write(h, (vr, nvr), (values, n), Value::$kind) }
+            unsafe { write(h, (vr, nvr), (values, n), |value| Ok(Value::$kind(value))) }
         }
     };
 }
@@ -93,7 +100,7 @@ macro_rules! of_no_variable {
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $get(h: *mut c_void, vr: *const u32, nvr: usize, values: *mut $c, n: usize) -> Status {
             // SAFETY: handed on as it came.
-            unsafe { read(h, (vr, nvr), (values, n), |_| None) }
+            unsafe { read(h, (vr, nvr), (values, n), |_| None, Value::type_name) }
         }
 
         #[doc = concat!("`", stringify!($set), "`: no variable has this type.")]
@@ -121,7 +128,7 @@ pub unsafe extern "C" fn fmi3GetBoolean(
 ) -> Status {
     let take = |value| if let Value::Boolean(it) = value { Some(u8::from(it)) } else { None };
     // SAFETY: handed on as it came.
-    unsafe { read(h, (vr, nvr), (values, n), take) }
+    unsafe { read(h, (vr, nvr), (values, n), take, Value::type_name) }
 }
 
 /// `fmi3SetBoolean`.
@@ -134,7 +141,7 @@ pub unsafe extern "C" fn fmi3SetBoolean(
     n: usize,
 ) -> Status {
     // SAFETY: handed on as it came.
-    unsafe { write(h, (vr, nvr), (values, n), |value| Value::Boolean(value != 0)) }
+    unsafe { write(h, (vr, nvr), (values, n), |value| Ok(Value::Boolean(value != 0))) }
 }
 
 /// `fmi3GetBinary`: what is handed out lives until the next call that changes the instance.

@@ -1,6 +1,7 @@
 //! The FMUs as an importer uses them, without a C interface: against a world of the same drives, by the rules of FMI, with wrong input.
 
 mod against_world;
+mod axis;
 mod importer;
 mod rules;
 mod states;
