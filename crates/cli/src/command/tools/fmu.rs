@@ -4,8 +4,8 @@ use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use can::Bitrate;
-use fmu::config::{BusConfig, Config, ConfigError, DriveConfig, MAX_NODES, TxClock};
-use fmu::package::{Entry, entries, platform};
+use fmu::config::{AxisConfig, BusConfig, Config, ConfigError, DriveConfig, MAX_NODES, TargetKind, TxClock};
+use fmu::package::{Entry, entries, platform, platform_of_fmi2};
 use plot::Paint;
 use serde::Serialize;
 use words::counted;
@@ -20,14 +20,16 @@ use crate::plain::plain;
 /// The library without what systems add to its name.
 const LIBRARY: &str = "ferrodrive_fmu";
 
-/// Pack a virtual drive, or a CAN bus, as an FMU for co-simulation (FMI 3.0)
+/// Pack a virtual drive, or a CAN bus, as an FMU for co-simulation (FMI 3.0 or 2.0)
 ///
 /// The drive has its firmware, motor, load and supply; it talks to other FMUs over a CAN terminal by the layered standard for buses
 /// (fmi-ls-bus), and takes the torque of its load and its supply voltage as inputs. `bus` is a CAN bus with arbitration, exact
-/// lengths of frames and errors. The library that an FMU carries is built by `cargo build --release -p ferrodrive-fmu`.
+/// lengths of frames and errors. With `--fmi 2` the drive has a master of its own in place of the terminal: enable and a target come in
+/// as numbers, actual values go out. The library that an FMU carries is built by `cargo build --release -p ferrodrive-fmu`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive fmu zlac8030l@4 -o wheel.fmu\n  \
     ferrodrive fmu vendor.eds@5 -o servo.fmu\n  \
+    ferrodrive fmu zlac8030l@4 --fmi 2 --mode torque -o wheel.fmu\n  \
     ferrodrive fmu bus --nodes 3 --bitrate 500k -o bus.fmu")]
 pub(crate) struct Fmu {
     /// The drive, as `sim --drive` takes it, or `bus`
@@ -36,15 +38,22 @@ pub(crate) struct Fmu {
     /// Write to this file
     #[arg(long, short, value_name = "FILE.fmu", value_parser = fmu_path)]
     output: PathBuf,
+    /// Version of FMI: 3 with a CAN terminal, or 2 with a master inside
+    #[arg(long, value_name = "VERSION", default_value = "3", value_parser = clap::value_parser!(u8).range(2..=3))]
+    fmi: u8,
+    /// With --fmi 2, what the drive follows: velocity, position or torque (its motor current) [default: velocity]
+    #[arg(long, value_name = "MODE", value_parser = mode)]
+    mode: Option<TargetKind>,
     /// How many nodes can be joined to the bus
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=i64::from(MAX_NODES)))]
     nodes: Option<u8>,
     /// Bit rate of the bus, or of the drive at its first start
     #[arg(long, value_name = "RATE", default_value = "500k")]
     bitrate: Bitrate,
-    /// How it announces what it sends: exact times, or at the end of each step for importers that know no countdown
-    #[arg(long, value_name = "KIND", default_value = "countdown", value_parser = clock)]
-    clock: TxClock,
+    /// How it announces what it sends: countdown for exact times, triggered at the end of each step for importers that know no
+    /// countdown [default: countdown]
+    #[arg(long, value_name = "KIND", value_parser = clock)]
+    clock: Option<TxClock>,
     /// The library that it carries (default: the one beside this program)
     #[arg(long, value_name = "FILE")]
     library: Option<PathBuf>,
@@ -65,11 +74,16 @@ fn clock(text: &str) -> Result<TxClock, String> {
     }
 }
 
+fn mode(text: &str) -> Result<TargetKind, String> {
+    let known = TargetKind::ALL.into_iter().find(|kind| kind.word() == text);
+    known.ok_or_else(|| "expected velocity, position or torque".to_owned())
+}
+
 /// What was packed.
 #[derive(Debug, Serialize)]
 pub(crate) struct FmuReport {
     file: String,
-    /// `drive` or `bus`.
+    /// `drive`, `bus`, or `axis` for a drive with its master.
     kind: &'static str,
     /// Variables beside those of the terminals.
     variables: usize,
@@ -80,8 +94,12 @@ pub(crate) struct FmuReport {
 
 impl Report for FmuReport {
     fn text(&self, _: Paint) -> String {
-        let (variables, terminals) = (counted(self.variables, "variable"), self.terminals.join(", "));
-        format!("{}: {variables}, CAN at {terminals}; {}", plain(&self.file), counted(self.bytes, "byte"))
+        let variables = counted(self.variables, "variable");
+        let terminals = match self.terminals.as_slice() {
+            [] => "with a master".to_owned(),
+            terminals => format!("CAN at {}", terminals.join(", ")),
+        };
+        format!("{}: {variables}, {terminals}; {}", plain(&self.file), counted(self.bytes, "byte"))
     }
 }
 
@@ -91,7 +109,8 @@ impl Fmu {
         let path = new_file(Some(&self.output), self.force)?.unwrap_or(&self.output);
         let (config, folder) = self.config()?;
         let library = self.library()?;
-        let (place, ending) = platform().ok_or_else(|| {
+        let named = if self.fmi == 2 { platform_of_fmi2() } else { platform() };
+        let (place, ending) = named.ok_or_else(|| {
             Failure::new("FMI has no name for this system")
                 .next("pack on Linux, macOS or Windows with a 64-bit processor")
         })?;
@@ -102,7 +121,11 @@ impl Fmu {
         keep(path, &archive, self.force)?;
         Ok(FmuReport {
             file: path.display().to_string(),
-            kind: if matches!(config, Config::Bus(_)) { "bus" } else { "drive" },
+            kind: match config {
+                Config::Bus(_) => "bus",
+                Config::Drive(_) => "drive",
+                Config::Axis(_) => "axis",
+            },
             variables: unit.variables().len(),
             terminals: unit.terminals().into_iter().map(|terminal| terminal.name).collect(),
             bytes: archive.len(),
@@ -111,7 +134,20 @@ impl Fmu {
 
     /// What is packed, and the folder of the files that it names.
     fn config(&self) -> Result<(Config, &Path), Failure> {
-        let (bitrate, clock) = (self.bitrate.bits_per_second(), self.clock);
+        if self.fmi == 2 && self.clock.is_some() {
+            return Err(Failure::usage("--clock is about a CAN terminal, which FMI 2.0 does not have").next("omit it"));
+        }
+        if self.fmi == 3 && self.mode.is_some() {
+            return Err(Failure::usage(
+                "--mode is what the master of a drive gives it, and with --fmi 3 there is none inside",
+            )
+            .next("add --fmi 2, or omit --mode"));
+        }
+        if self.fmi == 2 && self.what == "bus" {
+            return Err(Failure::usage("a bus needs FMI 3.0: FMI 2.0 has neither clocks nor binary variables")
+                .next("omit --fmi 2"));
+        }
+        let (bitrate, clock) = (self.bitrate.bits_per_second(), self.clock.unwrap_or_default());
         if self.what == "bus" {
             let nodes = self.nodes.ok_or_else(|| {
                 Failure::usage("a bus needs the number of its nodes").next("ferrodrive fmu bus --nodes 3 -o bus.fmu")
@@ -132,7 +168,11 @@ impl Fmu {
             }
             _ => (Path::new(""), self.what.clone()),
         };
-        Ok((Config::Drive(DriveConfig { drive, bitrate, clock }), folder))
+        let drive = DriveConfig { drive, bitrate, clock };
+        Ok(match self.fmi {
+            2 => (Config::Axis(AxisConfig { mode: self.mode.unwrap_or_default(), drive }), folder),
+            _ => (Config::Drive(drive), folder),
+        })
     }
 
     /// The library: what was named, or what stands beside this program or among what was built with it.
@@ -167,6 +207,7 @@ fn archived(files: &[Entry]) -> zip::result::ZipResult<Vec<u8>> {
 fn not_packed(error: ConfigError) -> Failure {
     let failure = Failure::new("cannot pack this FMU").because(&error);
     match error {
+        ConfigError::NoMode(..) => failure.next("choose another --mode: velocity, position or torque"),
         ConfigError::Drive(_) => failure.next("ferrodrive help sim describes --drive, which takes the same"),
         _ => failure,
     }
