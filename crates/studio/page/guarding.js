@@ -1,7 +1,8 @@
-// Shows in red, before the first motion of a drive, that nothing would stop it if the studio died, and asks once for confirmation.
+// Shows in red, before the first motion of a drive, that nothing would stop it if the host died, and asks once for confirmation.
 
 import { ask } from "./link.js";
 import { h, renew } from "./dom.js";
+import { host_name } from "./transport.js";
 
 /** `report` takes the answer. `update` takes the nodes that are about to be moved. */
 export function guarding(id, report) {
@@ -15,7 +16,7 @@ export function guarding(id, report) {
   }
 
   const line = ({ node, goes_on, without_us }) =>
-    without_us && h("p", { class: goes_on ? "bad" : "quiet" }, `Node ${node}: if the studio dies, ${without_us}.${goes_on ? " Keep an emergency stop within reach." : ""}`);
+    without_us && h("p", { class: goes_on ? "bad" : "quiet" }, `Node ${node}: if ${host_name} dies, ${without_us}.${goes_on ? " Keep an emergency stop within reach." : ""}`);
 
   function update(nodes, mine) {
     open = nodes.filter((node) => node.goes_on && !node.accepted).map(({ node }) => node);

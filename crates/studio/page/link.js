@@ -4,7 +4,7 @@
 // is stale: then only a stop is sent, since a command that waits in a connection would be executed much later. A
 // connection that is lost, or silent, is opened again; control has to be taken again then.
 
-import { open, request } from "./transport.js";
+import { host_name, open, request } from "./transport.js";
 
 const RETRY_MS = 1000;
 const ALIVE_MS = 500;
@@ -59,8 +59,8 @@ const refused = (kind, message) => Promise.resolve({ ok: false, error: { kind, m
 export function ask(command) {
   // After sleep a timer of another file may run before that of this one.
   look();
-  if (!link.welcome || !connection?.isOpen()) return refused("no_connection", "There is no connection to the studio.");
-  if (!link.fresh && command.do !== "stop_all") return refused("no_picture", "Nothing was sent: the state of the studio is stale.");
+  if (!link.welcome || !connection?.isOpen()) return refused("no_connection", `There is no connection to ${host_name}.`);
+  if (!link.fresh && command.do !== "stop_all") return refused("no_picture", `Nothing was sent: the state of ${host_name} is stale.`);
   seq += 1;
   const message = { seq, session: link.welcome.word, ...command };
   connection.send(JSON.stringify(message));
@@ -91,7 +91,8 @@ export function stopAll() {
   setTimeout(missed, CONFIRM_MS);
 }
 
-function take(message) {
+/** A message waits for a page that is frozen or hangs: a state is as old as that. */
+function take(message, age_ms) {
   switch (message.type) {
     case "welcome":
       link.welcome = message;
@@ -102,7 +103,7 @@ function take(message) {
     case "state": {
       const before = link.state;
       link.state = message;
-      seen_at = last_at = performance.now();
+      seen_at = last_at = performance.now() - age_ms;
       look();
       if (before && before.stops !== message.stops) emit("halt", false);
       emit("state", message);
@@ -127,7 +128,7 @@ export function connect() {
   opened_at = performance.now();
   // Messages of a connection that was given up no longer count.
   const mine = open(
-    (text) => mine === connection && take(JSON.parse(text)),
+    (text, sent_ms = Date.now()) => mine === connection && take(JSON.parse(text), Math.max(0, Date.now() - sent_ms)),
     () => mine === connection && lose(),
   );
   connection = mine;
@@ -136,7 +137,7 @@ export function connect() {
 function lose() {
   [connection, link.welcome, seen_at] = [null, null, -Infinity];
   for (const resolve of waiting.values()) {
-    resolve({ ok: false, error: { kind: "no_connection", message: "The connection to the studio was lost." } });
+    resolve({ ok: false, error: { kind: "no_connection", message: `The connection to ${host_name} was lost.` } });
   }
   waiting.clear();
   look();
@@ -149,7 +150,8 @@ function lose() {
 async function findRefusal() {
   try {
     const answer = await request("/api/state", { signal: AbortSignal.timeout(RETRY_MS) });
-    turned_away = answer.ok ? null : (await answer.json()).error.message;
+    // A host that has no bus yet (503) turns nobody away.
+    turned_away = [401, 403].includes(answer.status) ? (await answer.json()).error.message : null;
   } catch {
     turned_away = null;
   }

@@ -11,6 +11,7 @@ import { helpPanel } from "./help.js";
 import { meaningOf } from "./keys.js";
 import { lostSight, unseenStops } from "./sight.js";
 import { tourBar } from "./tour.js";
+import { host_name } from "./transport.js";
 
 /** @type {(id: string) => any} */
 const byId = (id) => document.getElementById(id);
@@ -174,7 +175,7 @@ function updateControl(state) {
   const asking = mine && state.asking !== null ? state.asking : null;
   const key = `${link.fresh} ${link.welcome?.session} ${state.controller} ${state.sessions} ${state.asking}`;
   renew(byId("control"), key, () => {
-    if (!link.fresh) return [h("span", { class: "bad" }, "The state of the studio is stale")];
+    if (!link.fresh) return [h("span", { class: "bad" }, `The state of ${host_name} is stale`)];
     const others = state.sessions > 1 ? ` · ${state.sessions} sessions open` : "";
     if (mine) {
       return [
@@ -234,7 +235,7 @@ on("sight", ({ fresh, connected, age_ms, refused }) => {
   const banner = byId("banner");
   banner.hidden = fresh || (!link.state && !refused && age_ms < OPENING_MS);
   if (fresh) return;
-  const lines = lostSight({ state: link.state, connected, age_ms, refused });
+  const lines = lostSight({ state: link.state, connected, age_ms, refused, host: host_name });
   renew(banner, JSON.stringify(lines), () => lines.map(({ text, urgent }) => h("p", { class: urgent ? "urgent" : "" }, text)));
   if (wasFresh && link.state) {
     for (const { view } of views) view.lose?.();

@@ -11,6 +11,7 @@ import { series } from "./kept.js";
 import { motionForm } from "./motion_form.js";
 import { sequencePanel } from "./sequence_panel.js";
 import { isSeenMoving } from "./sight.js";
+import { host_name } from "./transport.js";
 
 // Three within the 200 ms after which the studio stops what is not held.
 const HOLD_MS = 60;
@@ -197,7 +198,7 @@ export function motionView(shared, report) {
   /** A stale state is not shown, and nothing can be moved. */
   function lose() {
     hide();
-    setText(status, "Unknown: the state of the studio is stale");
+    setText(status, `Unknown: the state of ${host_name} is stale`);
     controls.disabled = true;
   }
 

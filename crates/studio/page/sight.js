@@ -22,20 +22,21 @@ export const unseenStops = ({ nodes }) =>
 
 /**
  * What is known while the state is stale, as `{ text, urgent }` each: from `state`, the last one received, from whether there is a
- * `connection`, and from the refusal of a studio that does not admit this page. Urgent texts are about drives that nothing stops.
+ * `connection`, and from the refusal of a studio that does not admit this page; `host` moves the drives. Urgent texts are about drives that
+ * nothing stops.
  */
-export function lostSight({ state, connected, age_ms, refused = null }) {
+export function lostSight({ state, connected, age_ms, refused = null, host = "the studio" }) {
   const since = `${(Math.floor(age_ms / 100) / 10).toFixed(1)} s`;
-  const lost = connected ? `Nothing received from the studio for ${since}.` : "No connection to the studio. Trying again …";
+  const lost = connected ? `Nothing received from ${host} for ${since}.` : `No connection to ${host}. Trying again …`;
   const lines = [{ text: refused ? `The studio was restarted and does not admit this page: ${refused}.` : lost, urgent: false }];
   if (!state) return lines;
   lines.push({ text: "This page no longer knows what moves; grey values are old.", urgent: false });
   const nodes = state.nodes.filter(mayMove);
   if (!nodes.length) lines.push({ text: "When last seen, no drive had power.", urgent: false });
   for (const { node, goes_on, without_us } of nodes) {
-    if (goes_on) lines.push({ text: `Nothing stops node ${node} if the studio is dead: use the emergency stop.`, urgent: true });
-    else if (without_us) lines.push({ text: `Node ${node}: if the studio is dead, ${without_us}.`, urgent: false });
-    else lines.push({ text: `Whether anything stops node ${node} if the studio is dead is unknown: use the emergency stop.`, urgent: true });
+    if (goes_on) lines.push({ text: `Nothing stops node ${node} if ${host} is dead: use the emergency stop.`, urgent: true });
+    else if (without_us) lines.push({ text: `Node ${node}: if ${host} is dead, ${without_us}.`, urgent: false });
+    else lines.push({ text: `Whether anything stops node ${node} if ${host} is dead is unknown: use the emergency stop.`, urgent: true });
   }
   return lines.sort((one, other) => Number(other.urgent) - Number(one.urgent));
 }

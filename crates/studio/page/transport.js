@@ -5,8 +5,10 @@
 const worker_at = globalThis.document?.documentElement.dataset.worker;
 /** The serial adapter that this tab has in place of virtual drives, in such a page. */
 const serial = worker_at ? JSON.parse(sessionStorage.getItem("serial")) : null;
+/** What moves the drives, in the words of the page. */
+export const host_name = worker_at ? "the host in this page" : "the studio";
 
-/** A host behind a socket: `heard` and `closed` are called with each message, and when the connection is lost. */
+/** A host behind a socket: `heard` and `closed` are called with each message (and when it was sent, by the wall clock, where that is known), and when the connection is lost. */
 function overSocket(heard, closed) {
   const socket = new WebSocket(`ws://${location.host}/ws`);
   socket.addEventListener("message", (event) => heard(event.data));
@@ -42,14 +44,14 @@ function inWorker(heard, closed) {
     answers.clear();
     closed();
   };
-  giveUp = lose;
+  giveUp = (why) => lose(serial ? `The host in this page was ended: ${why}` : why);
   mine.onmessage = ({ data }) => {
     silent = 0;
-    if (data.text !== undefined) heard(data.text);
+    if (data.text !== undefined) heard(data.text, data.sent_ms);
     else if (data.ended !== undefined) {
       // Not again and again: the next one is the first one.
       if (data.refused) sessionStorage.removeItem("machine");
-      if (serial) lose(`The host in this page has ended, and what it moved stops by its own watch alone: ${data.ended}`);
+      if (serial) lose(`The host in this page has ended: ${data.ended}`);
       else lose(data.refused ? `The machine was refused. ${data.ended}` : `The virtual machine has ended, and begins anew: ${data.ended}`);
     } else if (data.event !== undefined) {
       dispatchEvent(new CustomEvent(data.event, { detail: data.detail }));

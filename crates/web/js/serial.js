@@ -19,6 +19,9 @@ const refused = h("p", { class: "bad", role: "alert", id: "serial-refused" });
 async function begin() {
   setText(refused, "");
   try {
+    // A port that is forgotten is closed in every tab, whatever moves there.
+    const { held } = await navigator.locks.query();
+    if (held.some(({ name }) => name === "serial")) return setText(refused, "This page has an adapter already, in this tab or in another: choose Disconnect there first.");
     const port = await navigator.serial.requestPort();
     for (const other of await navigator.serial.getPorts()) if (other !== port) await other.forget();
     const { usbVendorId, usbProductId } = port.getInfo();
@@ -64,6 +67,11 @@ top.append(h("button", { type: "button", id: "serial-open", title: "Real drives,
 const alert = h("div", { id: "serial-alert", role: "alert", hidden: true });
 document.getElementById("alerts").prepend(alert);
 
+const LEFT = "serial-left";
+const left_moving = JSON.parse(sessionStorage.getItem(LEFT) ?? "[]");
+sessionStorage.removeItem(LEFT);
+if (left_moving.length) say("This page has taken leave of the adapter. Use the emergency stop:", left_moving);
+
 if (kept) attach();
 
 /** This tab has an adapter in place of virtual drives. */
@@ -72,19 +80,36 @@ function attach() {
   const detach = h("button", { type: "button", id: "serial-leave", title: "Stop what this page moved, close the adapter, and go back to virtual drives" }, "Disconnect");
   top.append(detach);
   let leaving = false;
+  /** The nodes that this page has set in motion, and that were not seen to stand since. */
+  let moved = [];
   detach.addEventListener("click", () => {
-    if (leaving) return left();
+    if (leaving) return left(moved.map((node) => may_move(node, "its quick stop was ordered, and that it stands was not awaited")));
     leaving = true;
     setText(detach, "Stopping … (again: at once)");
     tellWorker({ leave: true });
   });
-  function left() {
+  function left(moving) {
     sessionStorage.removeItem("serial");
+    // Shown beside the virtual drives.
+    if (moving.length) sessionStorage.setItem(LEFT, JSON.stringify(moving));
     location.reload();
   }
-  addEventListener("serial-left", left);
+  addEventListener("serial-left", ({ detail }) => left(detail.moving));
 
-  addEventListener("serial-line", ({ detail: { line, why, hosts } }) => {
+  /** With what it does by itself. */
+  function may_move(node, why) {
+    const without_us = link.state?.nodes.find((one) => one.node === node)?.without_us;
+    return `node ${node} may still be moving: ${why}${without_us ? `; without this page ${without_us}` : ""}`;
+  }
+  // Before the worker that has reached them is replaced by one that has moved nothing.
+  addEventListener("machine-ended", ({ detail }) => {
+    status.className = "bad";
+    setText(status, `${kept.name} at ${rate}: the host in this page has ended`);
+    say(detail, moved.map((node) => may_move(node, "this page cannot stop it any more")));
+  });
+
+  addEventListener("serial-line", ({ detail: { line, why, hosts, moved: nodes } }) => {
+    moved = nodes;
     const texts = { open: "connected", opening: "opening …", closed: why ?? "opening …" };
     status.className = line === "open" ? "good" : line === "opening" ? "quiet" : "bad";
     // An attempt each second: the reason of the last one stays until the channel opens.
@@ -113,7 +138,11 @@ function attach() {
 }
 
 function say(why, moving) {
+  // Which drives may be moving stays until it was seen.
+  if (!alert.hidden && alert.dataset.urgent && !moving.length) return;
   alert.hidden = false;
+  if (moving.length) alert.dataset.urgent = "1";
+  else delete alert.dataset.urgent;
   if (why.startsWith("No bus yet")) alert.dataset.early = "1";
   else delete alert.dataset.early;
   renew(alert, JSON.stringify([why, moving]), () => [

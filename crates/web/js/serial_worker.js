@@ -3,7 +3,7 @@
 // The port is opened in here, so that a page that hangs, is hidden or is gone is stopped by what still runs. Streams that a page hands to a
 // worker are pumped by the page.
 
-import { Library } from "./ferrodrive.js";
+import { FerrodriveError, Library } from "./ferrodrive.js";
 import { WakingClock } from "./waking_clock.js";
 
 /** How often time passes. */
@@ -20,8 +20,8 @@ let cable = null;
 /** The channel has been open once: there is a host. */
 let hosts = false;
 let shown = "";
-/** The page takes leave, as soon as what it moved was seen to stand. */
-let leaving = false;
+/** The page has taken leave, and nothing more can be done for its drives. */
+let gone = false;
 
 /** Why the port cannot be opened, by the last attempt. */
 let not_opened = null;
@@ -45,21 +45,18 @@ function run(event = null, input = "") {
   }
 }
 
-function take({ wire, line, lost, let_go, moved, body }) {
+function take({ wire, line, lost, let_go, moved, left, body }) {
   if (wire > 0 && cable) {
     cable.outbox.push(body.slice(0, wire));
     if (cable.writing_since === null) cable.flushing = flush(cable);
   }
-  if (body.length > wire) for (const text of new TextDecoder().decode(body.subarray(wire)).split("\n")) postMessage({ text });
+  if (body.length > wire) for (const text of new TextDecoder().decode(body.subarray(wire)).split("\n")) postMessage({ text, sent_ms: Date.now() });
   if (let_go) postMessage({ event: "serial-let-go", detail: let_go, closes: true });
-  if (line === "open" && !hosts) {
-    hosts = true;
-    for (const ask of waiting.splice(0)) answer(ask);
-  }
+  hosts ||= line === "open";
   show(line, not_opened ?? lost, moved);
   // The adapter has refused to open its channel.
   if (line === "closed" && cable) give_up();
-  if (leaving && moved.length === 0) leave();
+  if (left && !gone) leave(left);
 }
 
 function show(line, why, moved) {
@@ -142,9 +139,9 @@ async function release({ port, reader, writer }) {
   await port.close().catch(() => {});
 }
 
-/** The channel is closed as the last thing on the line. */
-async function leave() {
-  leaving = false;
+/** The channel is closed as the last thing on the line. `moving` are the drives that were not seen to stand. */
+async function leave(moving) {
+  gone = true;
   const mine = cable;
   if (mine) {
     run("close");
@@ -153,7 +150,7 @@ async function leave() {
     await Promise.race([mine.flushing, new Promise((resolve) => setTimeout(resolve, PAUSE_MS))]);
     await release(mine);
   }
-  postMessage({ event: "serial-left", detail: {} });
+  postMessage({ event: "serial-left", detail: { moving } });
   close();
 }
 
@@ -169,6 +166,8 @@ async function open({ serial }) {
     setting = serial;
     made.call({ call: "open_serial", name: serial.name, bitrate: serial.bitrate, unix_ms: Math.round(performance.timeOrigin), now_ns: now_ns() });
     library = made;
+    // As long as this worker lives: another tab lets no port be forgotten meanwhile.
+    navigator.locks.request("serial", () => new Promise(() => {}));
     navigator.serial.addEventListener("disconnect", () => cable && granted().catch(({ message }) => lose(cable, message)));
     setInterval(tick, TICK_MS);
     plug();
@@ -177,12 +176,19 @@ async function open({ serial }) {
   run();
 }
 
-/** Requests that came before there was a host. */
-const waiting = [];
+/** What is refused, as every request before there is a bus, is answered at once: a page takes a worker that does not answer for dead. */
+function answered(path, body) {
+  try {
+    return library.call({ call: "request", path }, body ?? "");
+  } catch (error) {
+    if (!(error instanceof FerrodriveError)) throw error;
+    const refusal = { ok: false, error: { kind: error.kind, message: error.message } };
+    return { status: 503, kind: "application/json", body: new TextEncoder().encode(JSON.stringify(refusal)) };
+  }
+}
 
 function answer({ request, path, body }) {
-  if (!hosts) return waiting.push({ request, path, body });
-  const { status, kind, body: content } = library.call({ call: "request", path }, body ?? "");
+  const { status, kind, body: content } = answered(path, body);
   postMessage({ answer: request, status, kind, body: content });
 }
 
@@ -193,10 +199,7 @@ function say({ say }) {
   run();
 }
 
-const take_leave = () => {
-  leaving = true;
-  run({ let_go: "The page took leave of the adapter" });
-};
+const take_leave = () => run("leave");
 
 // One after the other: a message that comes while the module loads waits for it. What stops does not wait.
 let queue = Promise.resolve();

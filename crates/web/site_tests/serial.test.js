@@ -79,9 +79,11 @@ async function turn() {
 /** A quick stop of the wheel by SDO: a download to 6040h (CiA 301, 7.2.4.3.3) with bits 7, 2 and 1 as 0, 0, 1 (CiA 402-2, table 28). */
 const is_stop = ([, low]) => (parseInt(low, 16) & 0x86) === 2;
 
+const is_stopped = () => [...adapter.heard.matchAll(/t60482B406000(..)/g)].some(is_stop);
+
 /** The page, or its worker, stops the wheel, and it stands. */
 async function stops() {
-  await eventually("a quick stop by the page", () => [...adapter.heard.matchAll(/t60482B406000(..)/g)].some(is_stop));
+  await eventually("a quick stop by the page", is_stopped);
   await stands(4);
 }
 
@@ -94,7 +96,7 @@ test("what stops and what cannot is said before an adapter is chosen; its drives
   await picture("serial_bus");
   await turn();
   await run("location.hash = 'motion'; return true");
-  await until("what a drive without a watch does", `return /Node 2: if the studio dies, nothing stops it/.test(document.getElementById("view").innerText)`);
+  await until("what a drive without a watch does", `return /Node 2: if the host in this page dies, nothing stops it/.test(document.getElementById("view").innerText)`);
   await picture("serial_motion");
   await run("document.getElementById('stop').dispatchEvent(new PointerEvent('pointerdown')); return true");
   await stands(4);
@@ -130,20 +132,33 @@ test("a tab that the browser freezes moves nothing, nor when it goes on", async 
   await stands(4);
 });
 
-test("a page that hangs is stopped by its worker", async () => {
+test("a page that hangs is stopped by its worker, and takes no state that has waited for it for a current one", async () => {
   await turn();
-  // A request that blocks the page, until the drive was seen to stand.
-  const hangs = run(`const request = new XMLHttpRequest(); request.open("GET", "/hang", false); request.send(); return request.responseText`);
+  // A request that blocks the page, until the drive was seen to stand. Of what has come meanwhile it is noted how it is taken.
+  const hangs = run(`const { link, on } = await import(new URL("page/link.js", location.href));
+    const request = new XMLHttpRequest();
+    request.open("GET", "/hang", false);
+    const taken = [];
+    on("state", ({ time_s }) => taken.push([link.fresh, time_s]));
+    request.send();
+    while (taken.length === 0) await new Promise((resolve) => setTimeout(resolve, 10));
+    await new Promise((resolve) => setTimeout(resolve, 100));
+    return { said: request.responseText, fresh: taken.filter(([fresh]) => fresh).map(([, time_s]) => time_s) }`);
   await eventually("a request that hangs", () => release !== null);
   await stops();
   release();
-  assert.equal(await hangs, "go on");
+  const { said, fresh } = await hangs;
+  assert.equal(said, "go on");
+  // The oldest is as old as the page's silence, of 3 s, and the way of the drive to a stop.
+  assert.ok(fresh.every((time_s) => fresh.at(-1) - time_s < 2), fresh.join(" "));
+  await found();
 });
 
 test("an adapter that answers BEL ends what moves", async () => {
   await turn();
   adapter.refuses = true;
-  await stands(4);
+  // Not by its own watch.
+  await eventually("a quick stop by the page", is_stopped);
   await until("the reason", `return /BEL/.test(document.getElementById("serial-alert").innerText)`);
   adapter.refuses = false;
 });
@@ -162,11 +177,36 @@ test("a cable that is pulled is said with what may still move, and what moved is
   await until("it was seen to stand", `${LINK} return link.state.nodes.every(({ stop_unseen }) => !stop_unseen)`);
 });
 
+test("a host that ends leaves a word of what may still move", async () => {
+  await turn();
+  // What it does not understand ends it, as a defect would.
+  await run(`const { tellWorker } = await import(new URL("page/transport.js", location.href)); tellWorker({ let_go: {} }); return true`);
+  await until("what may be moving", `return /The host in this page has ended.*node 4 may still be moving.*without this page/s.test(document.getElementById("serial-alert").innerText)`);
+  await picture("serial_ended");
+  await stands(4);
+  await found();
+  assert.match(await text("serial-alert"), /node 4 may still be moving/, "until a person has seen it");
+});
+
+test("another tab does not take the adapter away", async () => {
+  const [mine] = await command("GET", "/window/handles");
+  const { handle } = await command("POST", "/window/new", { type: "tab" });
+  await command("POST", "/window", { handle });
+  adapter.forgotten = false;
+  await go(`${address}?two`);
+  await attach();
+  await until("a refusal", `return /has an adapter already, in this tab or in another/.test(document.getElementById("serial-refused").innerText)`);
+  assert.equal(adapter.forgotten, false);
+  await command("DELETE", "/window");
+  await command("POST", "/window", { handle: mine });
+  await found();
+});
+
 test("a tab that is closed, and one that takes leave, stop what they moved", async () => {
   await found();
   await turn();
   await run("location.reload(); return true").catch(() => {});
-  await stands(4);
+  await stops();
   await found();
   await turn();
   await run("document.getElementById('serial-leave').click(); return true");
@@ -175,10 +215,27 @@ test("a tab that is closed, and one that takes leave, stop what they moved", asy
   assert.match(adapter.heard, /C\r$/, "the channel is closed as the last thing");
 });
 
+test("a page that takes leave names what was not seen to stand, beside its virtual drives", async () => {
+  await attach();
+  await found();
+  await turn();
+  adapter.refuses = true;
+  await run("document.getElementById('serial-leave').click(); return true");
+  await until("what may be moving", `${LINK} return link.state.bus.name === "sim" && /taken leave.*node 4 may still be moving.*without this page/s.test(document.getElementById("serial-alert").innerText)`);
+  await picture("serial_left");
+  adapter.refuses = false;
+  // By its own watch.
+  await stands(4);
+});
+
 test("a wrong bit rate is said", async () => {
   await attach("250k");
   await until("why", `return /the adapter refused 'O': is the bit rate right\\?/.test(document.getElementById("serial-status").innerText)`);
   assert.match(await text("serial-alert"), /No bus yet/);
+  // At once: a page takes a worker that does not answer for dead.
+  const state = await run(`const { request } = await import(new URL("page/transport.js", location.href)); const answer = await request("/api/state"); return [answer.status, (await answer.json()).error.kind]`);
+  assert.deepEqual(state, [503, "no_bus"]);
+  assert.ok(!/does not admit/.test(await run("return document.body.innerText")));
   await picture("serial_refused");
 });
 

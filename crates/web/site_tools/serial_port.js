@@ -31,12 +31,16 @@ const MOCK = `
     async close() {
       this.socket.close();
     }
-    async forget() {}
+    async forget() {
+      await fetch("/port/forget");
+    }
   }
   const port = new Port();
+  // That of another tab.
+  const others = location.search === "?two" ? [new Port()] : [];
   const serial = new EventTarget();
   serial.requestPort = async () => (await fetch("/port/choose"), port);
-  serial.getPorts = async () => ((await (await fetch("/port/is")).json()) ? [port] : []);
+  serial.getPorts = async () => ((await (await fetch("/port/is")).json()) ? [port, ...others] : []);
   if (location.search !== "?lacking") Object.defineProperty(navigator, "serial", { value: serial, configurable: true });
 }
 `;
@@ -47,6 +51,7 @@ export class Adapter {
     this.port = port;
     this.chosen = false;
     this.plugged = true;
+    this.forgotten = false;
     /** Answers BEL to every frame. */
     this.refuses = false;
     /** What it was sent since this was emptied. */
@@ -60,6 +65,7 @@ export class Adapter {
       answered: (path, answer) => {
         if (!path.startsWith("/port/")) return false;
         if (path === "/port/choose") this.chosen = true;
+        if (path === "/port/forget") this.forgotten = true;
         answer.writeHead(200, { "content-type": "application/json" }).end(String(this.chosen && this.plugged));
         return true;
       },
