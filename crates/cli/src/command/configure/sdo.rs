@@ -160,8 +160,14 @@ fn note(drive: &Drive, mux: Mux, number: Option<i64>, limits: Option<&Limits>) -
         let node = drive.node().id();
         return Some(format!("it takes effect at the next restart, if it is stored by then: ferrodrive save {node}"));
     }
-    let (magnitude, setting) = limits.zip(number).and_then(|(limits, number)| limits.changed(number))?;
-    Some(format!("the drive limits it to {magnitude}, by {setting}"))
+    in_effect(limits?, number?)
+}
+
+/// What a value effects in place of its own.
+fn in_effect(limits: &Limits, number: i64) -> Option<String> {
+    let (magnitude, setting) = limits.changed(number)?;
+    let does = if magnitude.unsigned_abs() > number.unsigned_abs() { "raises" } else { "limits" };
+    Some(format!("the drive {does} it to {magnitude}, by {setting}"))
 }
 
 /// A refusal of a value, with what the object takes now and where that comes from.
@@ -248,6 +254,8 @@ impl Report for ObjectReport {
 
 #[cfg(test)]
 mod tests {
+    use master::drive::Setting;
+
     use super::*;
 
     #[test]
@@ -261,5 +269,29 @@ mod tests {
         assert_eq!(bytes(0x6060, "i16:6"), Ok(vec![6, 0]), "a type that is given goes before");
         assert!(bytes(0x6060, "200").is_err() && bytes(0x60FF, "60rpm").is_err() && bytes(0x2000, "6").is_err());
         assert!(without_a_row(Mux::new(0x6060, 0), true, "6").is_err(), "a model that does not have it");
+    }
+
+    /// vl velocity min max amount, 6046h: a smaller target is raised, a greater one limited (CiA 402-2).
+    #[test]
+    fn a_value_that_is_raised_is_not_called_limited() {
+        let setting = |sub_index, value| {
+            let object = Mux::new(0x6046, sub_index);
+            Some((value, Setting { object, name: "amount", value, since_restart: false }))
+        };
+        let limits = Limits {
+            object: Mux::new(0x6042, 0),
+            name: "vl_target_velocity",
+            unit: "r/min",
+            low: -3000,
+            high: 3000,
+            listed: &[],
+            resolution: None,
+            held_to: setting(2, 1500),
+            raised_to: setting(1, 50),
+        };
+        let text = |number| in_effect(&limits, number);
+        assert_eq!(text(-20).unwrap(), "the drive raises it to 50, by 6046h:01 amount = 50");
+        assert_eq!(text(2000).unwrap(), "the drive limits it to 1500, by 6046h:02 amount = 1500");
+        assert_eq!([text(0), text(700)], [None, None]);
     }
 }

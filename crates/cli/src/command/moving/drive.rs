@@ -2,7 +2,7 @@
 //! intents, and what a drive says of itself.
 
 use canopen::{NmtState, NodeId};
-use cia402::ModeOfOperation;
+use cia402::{ModeOfOperation, PowerState};
 use master::Gear;
 use master::drive::{Drive, DriveState};
 use serde::Serialize;
@@ -140,6 +140,8 @@ pub(crate) struct StateReport {
     bits: Vec<&'static str>,
     /// Null where the drive refuses to show it.
     fault_code: Option<u16>,
+    #[serde(skip)]
+    is_faulted: bool,
     faults: Vec<FaultReport>,
     #[serde(flatten)]
     pub(crate) motion: ShaftMotion,
@@ -257,6 +259,7 @@ impl StateReport {
             statusword: state.statusword.0,
             bits,
             fault_code: state.fault_code,
+            is_faulted: matches!(state.power, Some(PowerState::Fault | PowerState::FaultReactionActive)),
             faults: faults.collect(),
             motion: ShaftMotion {
                 position: state.position.map(|counts| counts.0),
@@ -284,6 +287,10 @@ impl StateReport {
     pub(crate) fn fault_lines(&self, paint: Paint, gap: &str) -> Vec<String> {
         if let Some(code) = self.fault_code.filter(|code| *code != 0 && self.faults.is_empty()) {
             return vec![format!("  fault {gap}{}", paint.bad(&format!("{code:04X}h")))];
+        }
+        if self.is_faulted && self.fault_code == Some(0) {
+            let code = paint.bad("without a code");
+            return vec![format!("  fault {gap}{code}: the drive is in state {} and shows fault code 0", self.state)];
         }
         let lines = self.faults.iter().flat_map(|fault| {
             let name = paint.bad(&format!("{:04X}h {}", fault.code, fault.name));
@@ -327,7 +334,7 @@ impl Report for StateReport {
         lines.push(format!("  statusword  {:04X}h  {}", self.statusword, self.bits.join(", ")));
         lines.extend(self.fault_lines(paint, "      "));
         match self.fault_code {
-            Some(0) => lines.push("  fault       none".into()),
+            Some(0) if !self.is_faulted => lines.push("  fault       none".into()),
             Some(_) => {}
             None => lines.push("  fault       not known: the drive refuses to show its fault code".into()),
         }
@@ -340,5 +347,52 @@ impl Report for StateReport {
             lines.push(format!("  nmt         {nmt}"));
         }
         lines.join("\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_without_a_code_is_not_shown_as_none() {
+        let report = |power: PowerState| StateReport {
+            node: 4,
+            model: None,
+            guess: None,
+            state: power.name(),
+            mode: None,
+            mode_name: None,
+            statusword: 0x0008,
+            bits: Vec::new(),
+            fault_code: Some(0),
+            is_faulted: power == PowerState::Fault,
+            faults: Vec::new(),
+            motion: ShaftMotion {
+                position: None,
+                angle_deg: None,
+                velocity_rpm: None,
+                current_a: None,
+                position_mm: None,
+                velocity_mm_s: None,
+                is_geared: false,
+            },
+            supply_v: None,
+            motor_c: None,
+            driver_c: None,
+            nmt_state: None,
+            gear: None,
+        };
+        let faulted = report(PowerState::Fault);
+        let text = faulted.text(Paint::OFF);
+        assert!(
+            text.contains("  fault       without a code: the drive is in state Fault and shows fault code 0"),
+            "{text}"
+        );
+        assert!(!text.contains("none"), "{text}");
+        // What `fault reset` shows too.
+        assert_eq!(faulted.fault_lines(Paint::OFF, "  ").len(), 1);
+        let text = report(PowerState::SwitchOnDisabled).text(Paint::OFF);
+        assert!(text.contains("  fault       none"), "{text}");
     }
 }
