@@ -1,9 +1,14 @@
 //! What is reported of drives that the program which has moved them lets go of: by a signal, a failure, a client that has gone, a network that
 //! is closed. How they are stopped is the master's: [`Network::stop_and_release`] and [`Network::stop_moved`].
 
+use std::time::Duration;
+
 use canopen::NodeId;
-use master::Network;
+use master::cyclic::NotAtRest;
 use master::drive::{HostLoss, Stopped};
+use master::units::Rpm;
+use master::{Drive, Network};
+use words::failure::Failure;
 
 /// What is reported of one drive.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -14,6 +19,37 @@ pub struct Account {
     pub stands: bool,
     /// What was seen of it; of one that may still be moving also what it does by itself.
     pub because: Vec<String>,
+}
+
+/// How long a shaft may take to stand once its power was taken.
+const REST: Duration = Duration::from_secs(3);
+/// A shaft (not the output of a gear) that is slower, in r/min, stands where several looks in a row show that.
+const STANDSTILL_RPM: f64 = 1.0;
+const LOOKS: u32 = 3;
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Stops a drive, if this program has set it in motion, and takes its power: by SDO, whatever moved it. Ends when it was seen to stand
+/// without power: what a loop held may be turned by its load once it is let go, and a loop that is not stable swings until then.
+///
+/// # Errors
+/// That was not seen.
+pub async fn bring_to_rest(drive: &Drive) -> Result<(), Failure> {
+    let (network, node) = (drive.node().network(), drive.node().id());
+    let stopped = network.stop_moved([node].into_iter().collect()).await;
+    let swings = stopped.into_iter().find_map(|axis| axis.outcome.err());
+    drive.disable().await.map_err(|error| swings.unwrap_or(error))?;
+    let (began, mut looks) = (network.now(), 0);
+    while looks < LOOKS {
+        network.sleep(LOOK).await;
+        // One that shows no speed was seen to stand by its position, before.
+        let Rpm(rpm) = drive.state().await?.velocity.unwrap_or(Rpm(0.0));
+        looks = if rpm.abs() * drive.gear().ratio().abs() < STANDSTILL_RPM { looks + 1 } else { 0 };
+        if network.now() - began > REST {
+            let still = NotAtRest::StillTurns { node, rpm, limit: REST };
+            return Err(Failure::new(still.to_string()).of_kind("not_stopped").at_node(node));
+        }
+    }
+    Ok(())
 }
 
 /// Stops what `network` has set in motion and releases the guards of what stands; `who` lets go of the drives.

@@ -46,7 +46,7 @@ use value::Value;
 use crate::failure::{bad_value, raised, wrong_use};
 use crate::live::{Live, stop_what_moves};
 use crate::sheets::{model_of, node_id};
-use crate::ways_back::WaysBack;
+use crate::ways_back::{WayBack, WaysBack};
 use crate::world::World;
 
 /// A CANopen network as its master sees it; `ferrodrive.Network` is what users have.
@@ -336,18 +336,27 @@ impl Network {
         py: Python<'_>,
         work: impl Future<Output = Result<Value, Trouble>> + Send + 'static,
     ) -> PyResult<Job> {
-        self.begin_leading_back(py, work, None)
+        self.begin_job(py, work, None)
     }
 
-    /// As [`begin_said`](Self::begin_said), of work that has ways back: when it is given up it ends with them.
-    fn begin_leading_back(
+    /// As [`begin_said`](Self::begin_said), of work that has a way back: when it is given up it ends with that.
+    fn begin_leading_back<F: Future<Output = Result<Value, Trouble>> + Send + 'static>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(WayBack) -> F,
+    ) -> PyResult<Job> {
+        let way_back = WayBack::in_network(&self.ways_back);
+        self.begin_job(py, work(way_back.clone()), Some(way_back))
+    }
+
+    fn begin_job(
         &self,
         py: Python<'_>,
         work: impl Future<Output = Result<Value, Trouble>> + Send + 'static,
-        ways_back: Option<WaysBack>,
+        way_back: Option<WayBack>,
     ) -> PyResult<Job> {
         self.check_open()?;
-        let (job, future) = Job::new(work, ways_back, &self.runner);
+        let (job, future) = Job::new(work, way_back, &self.runner);
         match &*self.runner {
             Runner::World(shared) => job.set_number(shared.lock(py)?.jobs.begin(self.owner(), future)),
             Runner::Live(live) => {

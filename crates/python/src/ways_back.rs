@@ -1,47 +1,65 @@
-//! What is to be put back of the captures that go on in a network.
+//! What is to be put back of the captures, test motions and tunings that go on in a network.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use canopen::NodeId;
 use host::capture::Restorer;
-use master::Network;
+use master::Drive;
 
 /// The ways back of what is going on in a network, for what ends it.
 #[derive(Clone, Default)]
-pub(crate) struct WaysBack(Arc<Mutex<Vec<Restorer>>>, Arc<Mutex<Option<(Network, NodeId)>>>);
+pub(crate) struct WaysBack(Arc<Mutex<Vec<Restorer>>>);
+
+/// That of one job, which its network has too until the job has ended: it may be closed meanwhile.
+#[derive(Clone)]
+pub(crate) struct WayBack {
+    own: Arc<OnceLock<Restorer>>,
+    of_network: WaysBack,
+}
 
 impl WaysBack {
     fn lock(&self) -> MutexGuard<'_, Vec<Restorer>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// This node is going to be moved: what is given up stops it first.
-    pub(crate) fn stop_first(&self, network: Network, node: NodeId) {
-        *self.1.lock().unwrap_or_else(PoisonError::into_inner) = Some((network, node));
-    }
-
-    /// Something is going to be changed.
-    pub(crate) fn add(&self, restorer: Restorer) {
-        self.lock().push(restorer);
-    }
-
-    /// What it led back from is as it was.
-    pub(crate) fn remove(&self, restorer: &Restorer) {
-        self.lock().retain(|other| !other.is_same(restorer));
-    }
-
     /// Puts everything back; what could not be, in words.
     pub(crate) async fn restore(&self) -> Vec<String> {
-        let moved = self.1.lock().unwrap_or_else(PoisonError::into_inner).take();
-        if let Some((network, node)) = moved.filter(|(network, node)| network.moved().contains(*node)) {
-            network.stop_moved([node].into_iter().collect()).await;
-        }
         let restorers = std::mem::take(&mut *self.lock());
         let mut left = Vec::new();
         for restorer in restorers {
-            let node = restorer.node();
+            let node = restorer.id();
             left.extend(restorer.restore().await.iter().map(|left| format!("node {node}: not put back: {left}")));
         }
         left
+    }
+}
+
+impl WayBack {
+    /// Of a job in this network, which has changed nothing yet.
+    pub(crate) fn in_network(of_network: &WaysBack) -> Self {
+        Self { own: Arc::default(), of_network: of_network.clone() }
+    }
+
+    /// This drive is going to be changed. A job changes one.
+    pub(crate) fn of(&self, drive: &Drive) -> &Restorer {
+        self.own.get_or_init(|| {
+            let restorer = Restorer::of(drive);
+            self.of_network.lock().push(restorer.clone());
+            restorer
+        })
+    }
+
+    /// The job was given up: stops what it moves, and puts back what it has changed. What could not be put back stays with the network.
+    pub(crate) async fn restore(&self) {
+        let Some(own) = self.own.get() else { return };
+        own.restore().await;
+        if own.is_done() {
+            self.remove();
+        }
+    }
+
+    /// The job has ended by itself; what is left is in what it reports.
+    pub(crate) fn remove(&self) {
+        let Some(own) = self.own.get() else { return };
+        self.of_network.lock().retain(|other| !other.is_same(own));
     }
 }

@@ -1,6 +1,7 @@
 """Test motions and tuning from Python: the parts of ``ferrodrive test-motion`` and ``ferrodrive tune``."""
 
 import asyncio
+import math
 from array import array
 
 import ferrodrive
@@ -51,6 +52,9 @@ def test_steps_that_come_too_far_are_stopped_and_their_run_is_kept(world):
         with pytest.raises(ferrodrive.MasterError, match="turns from where it stood, more than 1") as stopped:
             drive.test_motion("steps", speed_rpm=60, time=10.0, acceleration_rpm_s=300.0, travel_turns=1.0, capture_period=0.01)
         assert stopped.value.kind == "travel_bound"
+        # In the form of runs that were made.
+        (run,) = stopped.value.report
+        assert max(run["capture"]["values"]["velocity_rpm"]) == pytest.approx(60, rel=0.1)
         assert abs(world[4].velocity_rpm) < 1 and 1.0 <= world[4].shaft_angle_rad / 6.2832 < 1.3
         with pytest.raises(ValueError, match="go 0.250 turns"):
             drive.test_motion("back-and-forth", by=90, travel_turns=0.2)
@@ -69,29 +73,98 @@ def test_a_wheel_is_tuned_and_has_afterwards_what_it_had(world):
         assert found["inertia_kg_m2"] == pytest.approx(0.014 + 0.05, rel=0.05)
         assert found["after"]["stable"] and found["after"]["phase_deg"] >= 40
         assert not found["applied"] and network.upload(4, 0x201D) == before
-        with pytest.raises(ValueError, match="a current above 0 A"):
+        with pytest.raises(ValueError, match="expected a current from"):
             drive.tune(current_a=0)
 
 
-def test_a_tuning_that_is_given_up_leaves_the_shaft_at_rest(world):
-    world.wait_until_booted()
+#: The TPDOs beside the first, which a test motion captures by. A group of axes leaves them switched off, at the end of any of its motions.
+SPARE = [(0x1A00 + pdo, sub) for pdo in (1, 2, 3) for sub in (0, 1, 2)] + [(0x1800 + pdo, 2) for pdo in (1, 2, 3)]
+#: A tuning writes the ramp, the first TPDO, the mode, and gains and filter of the speed loop too.
+OF_A_TUNING = [(0x6083, 0), (0x1A00, 1), (0x1800, 2), (0x6060, 0), (0x201D, 0), (0x201E, 0), (0x2018, 0)]
+
+
+def given_up(world, node, begin, after, objects):
+    """Cancels what ``begin`` makes of a network, after so many seconds: what it leaves is there as soon as the cancellation is seen."""
 
     async def main(network):
-        tuning = asyncio.ensure_future(network.async_drive(4, "zlac8030l").tune())
-        await network.async_sleep(3)
-        assert not tuning.done() and abs(world[4].velocity_rpm) > 5
-        tuning.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await tuning
-        # With the network left open: it is stopped by what gave it up.
-        await network.async_sleep(2)
-        assert abs(world[4].velocity_rpm) < 1
+        async def values():
+            return [await network.async_upload(node, *place) for place in objects]
 
+        before = await values()
+        job = asyncio.ensure_future(begin(network))
+        await network.async_sleep(after)
+        assert not job.done() and abs(world[node].velocity_rpm) > 5
+        assert await values() != before
+        job.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await job
+        # With the network left open, and nothing waited for.
+        assert abs(world[node].velocity_rpm) < 1
+        assert await values() == before
+        probe = world.add_probe()
+        await network.async_sleep(1)
+        assert abs(world[node].velocity_rpm) < 1
+        heard = iter(lambda: world.poll(probe), None)
+        # Neither SYNC nor set-points, and nothing that keeps the drive from its own watch.
+        assert not {message[0] for _, message in heard} & {0x80, 0x77F, 0x200 + node, 0x600 + node}
+
+    world.wait_until_booted()
     with ferrodrive.virtual_time(world), ferrodrive.Network(world) as network:
         asyncio.run(main(network))
-    assert abs(world[4].velocity_rpm) < 1
-    world.run_for(2.0)
-    assert abs(world[4].velocity_rpm) < 1
+
+
+def test_a_tuning_that_is_given_up_leaves_what_was_there(world):
+    given_up(world, 4, lambda network: network.async_drive(4, "zlac8030l").tune(), 3, SPARE + OF_A_TUNING)
+
+
+def test_a_tuning_that_is_given_up_with_its_new_gains_leaves_the_former_ones(world):
+    world[4].apply("load inertia 0.05")
+    # It measures for half a minute; from the 29th to the 33rd second it has the new gains.
+    given_up(world, 4, lambda network: network.async_drive(4, "zlac8030l").tune(apply=True), 31, SPARE + OF_A_TUNING)
+
+
+@pytest.mark.parametrize(
+    ("node", "model", "motion"),
+    [
+        (4, "zlac8030l", {"shape": "steps", "speed_rpm": 60, "time": 20.0, "acceleration_rpm_s": 300.0}),
+        (5, "cia402", {"shape": "ramp", "speed_rpm": 50, "time": 20.0}),
+    ],
+)
+def test_a_test_motion_that_is_given_up_leaves_what_was_there(world, node, model, motion):
+    given_up(world, node, lambda network: network.async_drive(node, model).test_motion(**motion), 3, SPARE)
+
+
+def test_what_no_tuning_can_be_made_with_is_refused_before_anything_moves(world):
+    with ferrodrive.Network(world) as network:
+        network.wait_for(4)
+        drive = network.drive(4, "zlac8030l")
+        for values in ({"bandwidth": -5.0}, {"phase_margin": 0.0}, {"torque_constant": 0.0}, {"speed_rpm": 0.0}, {"travel_turns": -1.0}):
+            (name,) = values
+            for value in (*values.values(), math.nan, math.inf):
+                with pytest.raises(ValueError, match="expected a .* from"):
+                    drive.tune(**{name: value})
+        assert world[4].shaft_angle_rad == 0.0
+        with pytest.raises(ValueError, match="50 us"):
+            drive.capture("velocity", period=1e-6)
+        with pytest.raises(ValueError, match="readings are more than are kept"):
+            drive.test_motion("steps", time=1e19)
+
+
+def test_a_tuning_is_given_up_with_its_network(world):
+    async def main():
+        network = ferrodrive.Network(world)
+        tuning = asyncio.ensure_future(network.async_drive(4, "zlac8030l").tune())
+        await network.async_sleep(3)
+        tuning.cancel()
+        await asyncio.sleep(0)
+        network.close()
+        with pytest.raises(asyncio.CancelledError):
+            await tuning
+        assert abs(world[4].velocity_rpm) < 1
+
+    world.wait_until_booted()
+    with ferrodrive.virtual_time(world):
+        asyncio.run(main())
 
 
 def test_a_joint_is_tuned_by_what_its_twin_shows():

@@ -1,31 +1,32 @@
-//! The way back of a capture: the drive's TPDOs, its NMT state and SYNC as they were, whatever ends it, with what was seen of it.
+//! The way back of a capture, a test motion or a tuning, whatever ends it: the shaft at rest, SYNC, the drive's NMT state and what was
+//! written to it as they were, with what was seen of it.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use can::Instant;
 use canopen::{Mux, NmtCommand, NmtState, NodeId};
-use devices::Description;
-use master::parameters::roll_back;
+use master::parameters::{Undone, roll_back};
 use master::{Drive, Node};
 
 use crate::network::params::journal::Kept;
+use crate::stopping::bring_to_rest;
+use words::failure::Failure;
 
-/// Puts back what a capture has changed. A clone outlives a capture that is given up, for the caller that ends it; without one,
-/// the journal stays on the disk, for `params rollback`.
+/// Puts back what a capture, a test motion or a tuning has changed. A clone outlives one that is given up, for the caller that ends it;
+/// without one, the journal stays on the disk, for `params rollback`.
 #[derive(Clone, Debug)]
 pub struct Restorer {
-    node: Node,
-    description: Option<&'static Description>,
+    drive: Drive,
     changed: Arc<Mutex<Changed>>,
 }
 
 #[derive(Debug, Default)]
 pub(super) struct Changed {
-    /// The writes that lead back, in their order.
-    pub(super) undo: Vec<(Mux, Vec<u8>)>,
-    /// Their copy on the disk.
-    pub(super) journal: Option<Kept>,
+    /// What is being moved.
+    motion: Option<Moving>,
+    /// What was written, the oldest first.
+    written: Vec<Written>,
     /// The node was not operational.
     pub(super) started: bool,
     /// Identifiers of the TPDOs that came, and the time between two of each.
@@ -34,6 +35,24 @@ pub(super) struct Changed {
     left_operational: Option<SeenBy>,
     /// SYNC is sent for the capture alone.
     pub(super) sync: bool,
+}
+
+/// A shaft that may be in motion.
+#[derive(Clone, Copy, Debug)]
+struct Moving {
+    /// SYNC is sent for it.
+    in_cycles: bool,
+    /// The program had its guard before.
+    was_guarded: bool,
+}
+
+/// Objects that were written together.
+#[derive(Debug)]
+struct Written {
+    /// The writes that lead back, in their order.
+    undo: Vec<(Mux, Vec<u8>)>,
+    /// Their copy on the disk.
+    journal: Option<Kept>,
 }
 
 /// By what a node was seen to be pre-operational again.
@@ -77,12 +96,16 @@ const FEW: usize = 8;
 impl Restorer {
     /// Of a drive of which nothing has been changed yet.
     pub fn of(drive: &Drive) -> Self {
-        Self { node: drive.node().clone(), description: drive.description(), changed: Arc::default() }
+        Self { drive: drive.clone(), changed: Arc::default() }
     }
 
-    /// The node that it is of.
-    pub const fn node(&self) -> NodeId {
-        self.node.id()
+    const fn node(&self) -> &Node {
+        self.drive.node()
+    }
+
+    /// The node-ID of its drive.
+    pub const fn id(&self) -> NodeId {
+        self.node().id()
     }
 
     /// True for a clone of this one.
@@ -90,15 +113,93 @@ impl Restorer {
         Arc::ptr_eq(&self.changed, &other.changed)
     }
 
+    /// True where nothing is to be put back.
+    pub fn is_done(&self) -> bool {
+        let Changed { motion, written, started, sync, .. } = &*self.lock();
+        motion.is_none() && written.is_empty() && !started && !sync
+    }
+
     pub(super) fn lock(&self) -> MutexGuard<'_, Changed> {
         self.changed.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts everything back, and says what could not be. What is done is not done again.
+    /// The drive is going to be moved, by set-points in cycles of an own SYNC or by its own ramps. Called before a guard of the motion's
+    /// own begins: the way back ends that.
+    pub fn begin_motion(&self, in_cycles: bool) {
+        let was_guarded = self.node().network().guarded(self.node().id()).is_some();
+        self.lock().motion.get_or_insert(Moving { in_cycles, was_guarded });
+    }
+
+    /// The motion was ended by its own means; of one that was not seen to stand the way back stays.
+    pub(crate) fn end_motion(&self) {
+        if !self.node().network().moved().contains(self.node().id()) {
+            self.lock().motion = None;
+        }
+    }
+
+    /// Objects are going to be written, and these writes lead back.
+    pub(crate) fn note_written(&self, undo: Vec<(Mux, Vec<u8>)>, journal: Option<Kept>) {
+        self.lock().written.push(Written { undo, journal });
+    }
+
+    /// What was written last stays.
+    ///
+    /// # Errors
+    /// Its journal cannot be deleted.
+    pub(crate) fn keep_newest(&self) -> Result<(), Failure> {
+        let newest = self.lock().written.pop();
+        newest.and_then(|newest| newest.journal).map_or(Ok(()), Kept::remove)
+    }
+
+    /// Puts back what was written last. Its journal stays where not all of it could be.
+    ///
+    /// # Errors
+    /// The journal cannot be deleted.
+    pub(crate) async fn put_back_newest(&self) -> Result<Undone, Failure> {
+        // It stays noted until it is done: this may be given up on the way.
+        let Some(undo) = self.lock().written.last().map(|newest| newest.undo.clone()) else {
+            return Ok(Undone::default());
+        };
+        let undone = roll_back(self.node(), &undo, |_| None).await;
+        if undone.not_put_back.is_empty() {
+            self.keep_newest()?;
+        }
+        Ok(undone)
+    }
+
+    /// Stops what is being moved, if it still is, and puts everything back; says what could not be. What is done is not done again.
     pub async fn restore(&self) -> Vec<String> {
-        let (undo, started, sync) = {
+        let motion = self.lock().motion;
+        let mut left = Vec::new();
+        if let Some(motion) = motion {
+            left.extend(self.come_to_rest(motion).await);
+        }
+        left.extend(self.restore_parameters().await);
+        left
+    }
+
+    /// The drive stands without power, and nothing is sent for its motion any more; why that was not seen.
+    async fn come_to_rest(&self, motion: Moving) -> Vec<String> {
+        let (network, id) = (self.node().network(), self.node().id());
+        if motion.in_cycles {
+            network.sync(None);
+        }
+        let stood = bring_to_rest(&self.drive).await;
+        let released = match motion.was_guarded {
+            true => Ok(()),
+            // One that was not seen to stand is left to its own watch.
+            false => network.release_guards([id].into_iter().collect()).await,
+        };
+        self.end_motion();
+        let stood = stood.err().map(|failure| failure.to_string());
+        stood.into_iter().chain(released.err().map(|error| error.to_string())).collect()
+    }
+
+    /// What was written and commanded, without the motion.
+    pub(super) async fn restore_parameters(&self) -> Vec<String> {
+        let (started, sync) = {
             let changed = self.lock();
-            (changed.undo.clone(), changed.started, changed.sync)
+            (changed.started, changed.sync)
         };
         let mut left = Vec::new();
         // Before SYNC ends and the TPDOs are changed: that they stop shows what the command did.
@@ -106,21 +207,18 @@ impl Restorer {
             left.extend(self.leave_operational().await.err());
         }
         if sync {
-            self.node.network().sync(None);
+            self.node().network().sync(None);
             self.lock().sync = false;
         }
-        if undo.is_empty() {
-            return left;
-        }
-        let undone = roll_back(&self.node, &undo, |_| None).await;
-        left.extend(undone.not_put_back.iter().map(|left| format!("{}: {}", left.object, left.why)));
-        if undone.not_put_back.is_empty() {
-            let journal = {
-                let mut changed = self.lock();
-                changed.undo.clear();
-                changed.journal.take()
-            };
-            left.extend(journal.and_then(|journal| journal.remove().err()).map(|failure| failure.to_string()));
+        while !self.lock().written.is_empty() {
+            match self.put_back_newest().await {
+                Ok(undone) if undone.not_put_back.is_empty() => {}
+                Ok(undone) => {
+                    left.extend(undone.not_put_back.iter().map(|left| format!("{}: {}", left.object, left.why)));
+                    break;
+                }
+                Err(failure) => left.push(failure.to_string()),
+            }
         }
         left
     }
@@ -132,15 +230,15 @@ impl Restorer {
 
     /// Commands the node to be pre-operational, as it was, and looks whether it is.
     async fn leave_operational(&self) -> Result<(), String> {
-        let network = self.node.network();
+        let network = self.node().network();
         let sending = self.lock().sending.clone();
         let log = sending.as_ref().map(|(ids, _)| network.log_frames(ids, FEW));
-        self.node.nmt(NmtCommand::EnterPreOperational);
+        self.node().nmt(NmtCommand::EnterPreOperational);
         let commanded = network.now();
         let (mut heard_at, mut frames) = (commanded, Vec::new());
         let seen = loop {
             network.sleep(LOOK).await;
-            let (now, facts) = (network.now(), self.node.facts());
+            let (now, facts) = (network.now(), self.node().facts());
             if let Some(log) = &log {
                 log.take(&mut frames);
                 heard_at = frames.drain(..).map(|frame| frame.at).fold(heard_at, Instant::max);
@@ -148,8 +246,8 @@ impl Restorer {
             let has_beaten = facts.heartbeat_at.is_some_and(|at| at > commanded);
             // The heartbeat of some models shows an alarm in place of the state.
             let shows_state =
-                self.description.zip(facts.nmt_state).is_none_or(|(model, said)| !model.tells_alarm(said));
-            let state = facts.probable_state(self.description);
+                self.drive.description().zip(facts.nmt_state).is_none_or(|(model, said)| !model.tells_alarm(said));
+            let state = facts.probable_state(self.drive.description());
             if has_beaten && shows_state && state == Some(NmtState::PreOperational) {
                 break Ok(SeenBy::Heartbeat);
             }

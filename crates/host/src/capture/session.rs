@@ -107,6 +107,8 @@ const COLLECT: Duration = Duration::from_millis(10);
 const LOG: usize = 20_000;
 /// How long a drive may take to send its first one, and how long none may come later on.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// Shortest time between two readings: more often a bus of 1 Mbit/s carries no frame, the shortest of which has 47 bits (CAN 2.0, 3.2).
+const SHORTEST: Duration = Duration::from_micros(50);
 /// Readings that are kept at most: eight bytes each.
 const MOST: u128 = 100_000_000;
 
@@ -114,13 +116,17 @@ impl Wanted {
     /// Checks what can be checked without the bus.
     ///
     /// # Errors
-    /// Nothing is asked for; it would be more than is kept.
+    /// Nothing is asked for, or more often than a bus carries frames; it would be more than is kept.
     pub fn check(&self, span: &Span) -> Result<(), Failure> {
         if self.quantities.is_empty() {
             let what = "expected at least one quantity to capture";
             return Err(Failure::usage(what).next(format!("name some of: {}", super::quantity::short_names())));
         }
-        let rows = (span.duration + span.pre_trigger).as_nanos() / self.period.as_nanos().max(1);
+        if self.period < SHORTEST {
+            let what = format!("expected a period of 50 us or more between two readings, got {:?}", self.period);
+            return Err(Failure::usage(what).next("1 ms is usual"));
+        }
+        let rows = span.duration.saturating_add(span.pre_trigger).as_nanos() / self.period.as_nanos();
         let readings = rows * self.quantities.len() as u128;
         if readings > MOST {
             return Err(Failure::usage(format!("{readings} readings are more than are kept, at most {MOST}"))
@@ -137,7 +143,7 @@ impl Wanted {
     pub async fn begin(&self, drive: &Drive, restorer: &Restorer) -> Result<Running, Failure> {
         match self.begun(drive, restorer).await {
             Ok(running) => Ok(running),
-            Err(failure) => Err(with_left(failure, &restorer.restore().await)),
+            Err(failure) => Err(with_left(failure, &restorer.restore_parameters().await)),
         }
     }
 
@@ -231,10 +237,7 @@ impl Wanted {
         if !steps.steps.is_empty() {
             let journal = Journal { node: node.id(), identity: steps.identity, undo: steps.undo() };
             let kept = self.journal.as_deref().map(|path| Kept::create(path, &journal, self.on_kept)).transpose()?;
-            {
-                let mut changed = restorer.lock();
-                (changed.undo, changed.journal) = (journal.undo, kept);
-            }
+            restorer.note_written(journal.undo, kept);
             match drive.apply_tpdos(&steps).await.map_err(source::refused)? {
                 Ok(_) => {}
                 Err(error) => {

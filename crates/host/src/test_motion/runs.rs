@@ -95,7 +95,7 @@ impl Motion {
                     Some(Ramp::RpmPerSecond(rate)) => Duration::try_from_secs_f64(rpm.abs() / rate).unwrap_or(OWN_RAMP),
                     _ => OWN_RAMP,
                 };
-                2 * (*hold + ramp)
+                hold.saturating_add(ramp).saturating_mul(2)
             }
             Self::Points { points, period, .. } => period.saturating_mul(points.len() as u32 + 2),
         };
@@ -252,6 +252,7 @@ pub async fn run(
         Some(most_turns) => Some(Travel::around(drive, most_turns).await?),
         None => None,
     };
+    restorer.begin_motion(matches!(motion, Motion::Points { .. }));
     let mut mover = match motion {
         Motion::Steps { speed, ramp, hold } => Mover::Steps(*speed, *ramp, *hold),
         Motion::Points { points, limits, period, cyclic } => {
@@ -287,6 +288,7 @@ pub async fn run(
             closed.map_err(|failure| reason.into_iter().fold(failure, Failure::because))
         }
     };
+    restorer.end_motion();
     both(moved, ended)
 }
 

@@ -13,6 +13,7 @@ use words::failure::{Failure, both};
 use super::bench::{ENOUGH_CURRENT, SWINGS};
 use super::setup::keep;
 use super::{Bench, Excursion, Proposed, Reader, Request, Setup, StepResponse, TuneReport, find, loops_of};
+use crate::capture::Restorer;
 use crate::network::Progress;
 use crate::network::params::Transaction;
 use crate::network::params::journal::Kept;
@@ -24,36 +25,41 @@ const MORE_THAN_TWIN: f64 = 1.3;
 const BACK: &str = "it was given its former gains back";
 
 /// Measures a drive, finds gains, and has it try them, if that was asked for. It keeps them where its current does not swing, its
-/// error is not larger, and `wants_back` is false, which is asked last. Else the drive has in the end what it had.
+/// error is not larger, and `wants_back` is false, which is asked last. Else the drive has in the end what it had. What leads back from
+/// where it is given up on the way is in `restorer`.
 ///
 /// # Errors
-/// What stopped it, what is not possible with this drive, and that not everything could be put back.
+/// What stopped it, what is not possible with this drive, that a journal of former gains is there already, and that not everything could
+/// be put back.
 pub async fn tune(
-    drive: &Drive,
+    (drive, restorer): (&Drive, &Restorer),
     request: &Request,
     progress: &impl Progress,
     wants_back: impl Future<Output = bool>,
 ) -> Result<TuneReport, Failure> {
     let id = drive.node().id();
+    let former = request.journal.as_deref().map(former_gains);
+    if request.apply {
+        // Before anything moves.
+        former.as_deref().map_or(Ok(()), |path| Kept::check_free(path, id))?;
+    }
     let mut excursion = Excursion::default();
     progress.show(format!("node {id}: measuring, about half a minute"));
-    let (mut report, proposed) = find(drive, request, &mut excursion).await?;
+    let (mut report, proposed) = find((drive, restorer), request, &mut excursion).await?;
     if !request.apply {
         return Ok(report);
     }
     progress.show(format!("node {id}: a step with the gains that it has"));
     // The first thing that a step does to the current is proportional to it.
     let most_rpm = ENOUGH_CURRENT * request.bounds.current_a / proposed.proportional_a_s_rad / RAD_S_PER_RPM;
-    let before = step(drive, request, most_rpm, &mut excursion).await?;
-    let undo: Vec<_> =
-        proposed.gains.iter().map(|gain| (gain.object, bytes(drive, gain.object, gain.before))).collect();
+    let before = step((drive, restorer), request, most_rpm, &mut excursion).await?;
+    let undo = proposed.gains.iter().map(|gain| (gain.object, bytes(drive, gain.object, gain.before))).collect();
     // Until the new gains are kept or gone: whatever ends the program meanwhile.
-    let path = request.journal.as_deref().map(former_gains);
-    let kept = keep(drive, path.as_deref(), &undo, request.on_kept).await?;
-    let after = match write(drive, request, &proposed, (true, progress)).await {
+    keep((drive, restorer), former.as_deref(), undo, request.on_kept).await?;
+    let after = match write(drive, request, &proposed, progress).await {
         Ok(()) => {
             progress.show(format!("node {id}: the same step with the new gains"));
-            step(drive, request, most_rpm, &mut excursion).await
+            step((drive, restorer), request, most_rpm, &mut excursion).await
         }
         Err(failure) => Err(failure),
     };
@@ -71,10 +77,13 @@ pub async fn tune(
     };
     if let Ok(None) = objection {
         report.applied = true;
-        kept.map_or(Ok(()), Kept::remove)?;
+        restorer.keep_newest()?;
         return Ok(report);
     }
-    let back = go_back(drive, request, &proposed, kept, progress).await;
+    let back = restorer.put_back_newest().await.and_then(|undone| match undone.not_put_back.is_empty() {
+        true => Ok(()),
+        false => Err(Failure::new("not every gain could be put back").of_kind("not_put_back").because(undone)),
+    });
     if let (Err(failure), Ok(())) = (&objection, &back) {
         return Err(failure.clone().because(BACK));
     }
@@ -113,13 +122,14 @@ fn objection(before: &StepResponse, after: &StepResponse, request: &Request, rep
 /// # Errors
 /// What stopped it, and that not everything could be put back.
 pub async fn step(
-    drive: &Drive,
+    (drive, restorer): (&Drive, &Restorer),
     request: &Request,
     most_rpm: f64,
     excursion: &mut Excursion,
 ) -> Result<StepResponse, Failure> {
     let (model, loops) = loops_of(drive)?;
-    let setup = Setup::begin(drive, (model, loops), false, request.journal.as_deref(), request.on_kept).await?;
+    let (journal, on_kept) = (request.journal.as_deref(), request.on_kept);
+    let setup = Setup::begin((drive, restorer), (model, loops), false, journal, on_kept).await?;
     let answer = async {
         setup.prepare(drive, 1.0).await?;
         if loops.demand.is_none() {
@@ -148,32 +158,13 @@ fn bytes(drive: &Drive, object: Mux, value: i64) -> Vec<u8> {
     value.to_le_bytes()[..width.min(8)].to_vec()
 }
 
-/// The former gains; their journal stays where that fails.
-async fn go_back(
-    drive: &Drive,
-    request: &Request,
-    proposed: &Proposed,
-    kept: Option<Kept>,
-    progress: &impl Progress,
-) -> Result<(), Failure> {
-    write(drive, request, proposed, (false, progress)).await?;
-    kept.map_or(Ok(()), Kept::remove)
-}
-
-/// The proposed values, or those of before, as a transaction. Its way back is the journal of the former gains.
-async fn write(
-    drive: &Drive,
-    request: &Request,
-    proposed: &Proposed,
-    (new, progress): (bool, &impl Progress),
-) -> Result<(), Failure> {
+/// The proposed values as a transaction. Its way back is that of the former gains.
+async fn write(drive: &Drive, request: &Request, proposed: &Proposed, progress: &impl Progress) -> Result<(), Failure> {
     let mut wanted = Parameters::default();
     for gain in &proposed.gains {
-        let value = if new { gain.after } else { gain.before };
-        wanted.values.insert(gain.object, bytes(drive, gain.object, value));
+        wanted.values.insert(gain.object, bytes(drive, gain.object, gain.after));
     }
     let (within, on_kept) = (request.within, request.on_kept);
     let transaction = Transaction { address: false, save: false, prove: None, within, journal: None, on_kept };
-    let what = if new { "proposed gains" } else { "former gains" };
-    transaction.apply(progress, drive, &wanted, what.to_owned()).await.map(drop)
+    transaction.apply(progress, drive, &wanted, "proposed gains".to_owned()).await.map(drop)
 }

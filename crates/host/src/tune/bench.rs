@@ -15,6 +15,8 @@ use master::{Drive, Network};
 use tune::{Excitation, Samples, SteadyRun};
 use words::failure::{Failure, both};
 
+use crate::stopping::bring_to_rest;
+
 /// What the motion of a measurement keeps to. Beyond one of them it is stopped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
@@ -161,6 +163,7 @@ const REST: Duration = Duration::from_secs(3);
 #[derive(Debug)]
 pub struct Bench {
     network: Network,
+    node: Drive,
     drive: CyclicDrive,
     position: Signal<i64>,
     current: Signal<i64>,
@@ -174,6 +177,8 @@ pub struct Bench {
     pub gain_share: f64,
     /// What was asked for last, r/min.
     asked_rpm: f64,
+    /// Its guard began with this measurement, and ends with it.
+    is_guarded: bool,
 }
 
 impl Bench {
@@ -211,6 +216,7 @@ impl Bench {
         let config = PdoConfig::new(PdoId { direction: Direction::Tpdo, number }, map)
             .transmission(TransmissionType::EVERY_SYNC);
         node.node().configure_pdo(&config, TimerUnits::of(model)).await.map_err(|error| failed(&error))?;
+        let is_guarded = options.guard.is_some() && node.node().network().guarded(node.node().id()).is_none();
         let drive = node.cyclic(mode, options).await.map_err(|error| failed(&error))?;
         let signal = |mux| node.node().signal_in(number, mux).map_err(|error| failed(&error));
         let network = node.node().network().clone();
@@ -219,6 +225,7 @@ impl Bench {
             current: signal(demand.object)?,
             counts_per_turn: node.counts_per_turn().await?,
             network,
+            node: node.clone(),
             drive,
             current_per_count,
             bounds,
@@ -226,6 +233,7 @@ impl Bench {
             excursion,
             gain_share: 1.0,
             asked_rpm: 0.0,
+            is_guarded,
         };
         it.network.sync(Some(period));
         let late = || failed(&"it was not enabled within 2 s").next(format!("ferrodrive explain {}", node.node().id()));
@@ -386,7 +394,7 @@ impl Bench {
         Ok(StepResponse { period_s: samples.period_s, step_rpm, speed_rpm, current_a: samples.current_a })
     }
 
-    /// No power, and no SYNC any more, once it stands.
+    /// No power, and no SYNC any more, once it stands; the guard that this measurement began ends.
     ///
     /// # Errors
     /// It was not seen to stand without power within 3 s.
@@ -400,10 +408,20 @@ impl Bench {
                 .at_node(node)
                 .next(format!("ferrodrive estop, and ferrodrive explain {node}"))
         };
-        match stood {
+        let stood = match stood {
             Ok(stood) => stood.map_err(moving),
             Err(failure) => Err(moving(NotAtRest::NotSeen { node }).after(failure)),
+        };
+        let stood = match stood {
+            // Without cycles its set-points do not reach it, and without its TPDO nothing is seen: both by SDO.
+            Err(failure) if bring_to_rest(&self.node).await.is_err() => Err(failure),
+            _ => Ok(()),
+        };
+        if !self.is_guarded {
+            return stood;
         }
+        // One that may still be moving gets no further sign of life, and is left to its own watch.
+        stood.and(self.network.release_guards([node].into_iter().collect()).await.map_err(Failure::from))
     }
 
     /// Whether it was seen to stand without power.

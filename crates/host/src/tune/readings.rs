@@ -88,8 +88,9 @@ impl Reader {
     /// It does not answer, or refuses.
     pub async fn guard(&mut self, guard: Option<SwitchedOff>) -> Result<(), Failure> {
         if let Some(switched_off) = guard {
+            let node = self.drive.node();
+            self.is_guarded = node.network().guarded(node.id()).is_none();
             self.drive.guard(switched_off).await?;
-            self.is_guarded = true;
         }
         Ok(())
     }
@@ -213,12 +214,14 @@ impl Reader {
             let unseen = Failure::new(NotAtRest::NotSeen { node }.to_string()).of_kind("not_stopped").at_node(node);
             unseen.next(format!("ferrodrive estop, and ferrodrive explain {node}")).after(error.into())
         });
-        let off = self.drive.disable().await;
-        both(off.map_err(Failure::from), stood)?;
-        if self.is_guarded {
-            self.drive.release_guard().await?;
+        let off = self.drive.disable().await.map_err(Failure::from);
+        let stood = both(off, stood);
+        if !self.is_guarded {
+            return stood;
         }
-        Ok(())
+        // One that may still be moving gets no further sign of life, and is left to its own watch.
+        let network = self.drive.node().network();
+        stood.and(network.release_guards([node].into_iter().collect()).await.map_err(Failure::from))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The whole of it: measured, found, proposed, tried on the twin; and then on the drive. As the rows that programs read.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -12,6 +13,8 @@ use serde::Serialize;
 use tune::{Margins, Objective, Unusable};
 use words::failure::{Failure, both};
 
+use crate::capture::Restorer;
+
 use super::{
     Bounds, Currents, Excursion, Found, Measurement, OutputLoad, Proposed, Reader, Setup, Shaft, StepResponse, Trial,
     Twin, Unreachable, loops_of, measure, motor_of,
@@ -23,7 +26,15 @@ const ALIKE: f64 = 3e-3;
 
 /// Shortest and longest time between two samples: 1 ms and 4096 counts a turn show what there is to see, and a tenth of the rate is to
 /// be beyond a loop's bandwidth.
-const PERIODS: std::ops::RangeInclusive<Duration> = Duration::from_micros(500)..=Duration::from_millis(10);
+const PERIODS: RangeInclusive<Duration> = Duration::from_micros(500)..=Duration::from_millis(10);
+
+/// The ranges of what is asked for, with their units. Beyond these is what nobody has meant, and what is not a number.
+const SPEED_RPM: RangeInclusive<f64> = 1.0..=100_000.0;
+const CURRENT_A: RangeInclusive<f64> = 0.01..=10_000.0;
+const TRAVEL_TURNS: RangeInclusive<f64> = 0.1..=10_000.0;
+const BANDWIDTH_HZ: RangeInclusive<f64> = 0.1..=500.0;
+const PHASE_MARGIN_DEG: RangeInclusive<f64> = 10.0..=80.0;
+const TORQUE_CONSTANT_NM_A: RangeInclusive<f64> = 1e-4..=1e3;
 
 /// What is asked for.
 #[derive(Clone, Debug)]
@@ -62,12 +73,22 @@ impl Request {
             return Err(Failure::usage(what).next("1 ms suits a bus of 1 Mbit/s, e.g. --period 1ms"));
         }
         let Bounds { speed_rpm, current_a, travel_turns } = self.bounds;
-        for (what, unit, value) in
-            [("speed", "r/min", speed_rpm), ("current", "A", current_a), ("travel", "turns", travel_turns)]
-        {
-            if value.is_nan() || value <= 0.0 {
-                return Err(Failure::usage(format!("expected a {what} above 0 {unit}, got {value} {unit}"))
-                    .next("it bounds the motion of the measurement; nothing was moved"));
+        let objective = match self.objective {
+            Objective::Bandwidth(hz) => ("bandwidth", "Hz", hz, BANDWIDTH_HZ),
+            Objective::PhaseMargin(degrees) => ("phase margin", "degrees", degrees, PHASE_MARGIN_DEG),
+        };
+        let constant = self.torque_constant_nm_a;
+        let constant = constant.map(|constant| ("torque constant", "N·m/A", constant, TORQUE_CONSTANT_NM_A));
+        let bounds = [
+            ("speed", "r/min", speed_rpm, SPEED_RPM),
+            ("current", "A", current_a, CURRENT_A),
+            ("travel", "turns", travel_turns, TRAVEL_TURNS),
+        ];
+        for (what, unit, value, range) in bounds.into_iter().chain([objective]).chain(constant) {
+            if !range.contains(&value) {
+                let (least, most) = (range.start(), range.end());
+                return Err(Failure::usage(format!("expected a {what} from {least} to {most} {unit}, got {value}"))
+                    .next("nothing was moved"));
             }
         }
         Ok(())
@@ -173,7 +194,7 @@ impl From<Margins> for MarginRow {
 /// # Errors
 /// What stopped it, what is not possible with this drive, and that not everything could be put back.
 pub async fn find(
-    drive: &Drive,
+    (drive, restorer): (&Drive, &Restorer),
     request: &Request,
     excursion: &mut Excursion,
 ) -> Result<(TuneReport, Proposed), Failure> {
@@ -188,17 +209,17 @@ pub async fn find(
         motor.windings.flux_linkage_wb *= constant / motor.windings.torque_constant_nm_a();
     }
     let how = (request.period, request.bounds);
-    let setup = Setup::begin(drive, (model, loops), true, request.journal.as_deref(), request.on_kept).await?;
-    let had = Setup::clone_values(&setup);
+    let (journal, on_kept) = (request.journal.as_deref(), request.on_kept);
+    let had = Setup::begin((drive, restorer), (model, loops), true, journal, on_kept).await?;
     let (found, twin, twin_off) = match (loops.demand, loops.stated, motor.gear) {
         (None, Some(stated), Some(gear)) => {
-            let currents = both(currents(drive, &setup, request, excursion).await, setup.put_back(drive).await)?;
+            let currents = both(currents(drive, &had, request, excursion).await, had.put_back(drive).await)?;
             let shaft = Shaft { motor: &motor, gear: &gear, stated: &stated };
             by_readings((model, loops), &shaft, &had, (&currents, how.1))?
         }
         _ => {
-            let measured = measure(drive, &setup, loops, (how.0, how.1, request.cyclic), excursion).await;
-            let measured = both(measured, setup.put_back(drive).await)?;
+            let measured = measure(drive, &had, loops, (how.0, how.1, request.cyclic), excursion).await;
+            let measured = both(measured, had.put_back(drive).await)?;
             let found = Found::of(&measured, &had, loops, &motor).map_err(|error| failed(&error))?;
             let twin = Twin::new((model, loops), &found, &motor, gains_of(&had, loops));
             let of_twin = twin.measure(&had.lowered(measured.gain_share), how)?;

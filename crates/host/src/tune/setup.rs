@@ -8,34 +8,34 @@ use canopen::pdo::PdoId;
 use cia402::ModeOfOperation;
 use cia402::object::MODES_OF_OPERATION;
 use devices::{Description, Integral, Loops};
-use master::parameters::{Parameters, PlanOptions, from_any_state, roll_back};
+use master::parameters::{Parameters, PlanOptions, from_any_state};
 use master::{Drive, Error};
 
 use super::bench::write;
+use crate::capture::Restorer;
 use crate::network::params::journal::Kept;
 use crate::network::params::source;
 use machine::parameters::journal::Journal;
 use words::failure::Failure;
 
-/// A drive whose parameters are going to be changed for a measurement.
-#[derive(Debug)]
+/// A drive that is going to be moved, and its parameters changed, for a measurement.
+#[derive(Clone, Debug)]
 pub struct Setup {
     model: &'static Description,
     loops: Loops,
     /// What it had: each object that is going to be written, and what sets its loops.
     before: BTreeMap<Mux, Vec<u8>>,
-    undo: Vec<(Mux, Vec<u8>)>,
-    kept: Option<Kept>,
+    restorer: Restorer,
 }
 
 impl Setup {
-    /// Reads what is going to be changed, and keeps the way back in a journal, if one is named. Writes nothing to the drive.
-    /// Gains are put back where they may be lowered.
+    /// Reads what is going to be changed, and keeps the way back in the restorer, and in a journal, if one is named. Writes nothing to
+    /// the drive. Gains are put back where they may be lowered.
     ///
     /// # Errors
     /// The drive is at work, or does not answer; a journal of an earlier transaction is there.
     pub async fn begin(
-        drive: &Drive,
+        (drive, restorer): (&Drive, &Restorer),
         (model, loops): (&'static Description, &Loops),
         lowers_gains: bool,
         journal: Option<&Path>,
@@ -69,13 +69,9 @@ impl Setup {
             }
         }
         let undo = from_any_state(Some(model), drive.node().id(), &written);
-        let kept = keep(drive, journal, &undo, on_kept).await?;
-        Ok(Self { model, loops: *loops, before, undo, kept })
-    }
-
-    /// The same values without a way back.
-    pub(super) fn clone_values(&self) -> Self {
-        Self { before: self.before.clone(), undo: Vec::new(), kept: None, ..*self }
+        keep((drive, restorer), journal, undo, on_kept).await?;
+        restorer.begin_motion(loops.demand.is_some());
+        Ok(Self { model, loops: *loops, before, restorer: restorer.clone() })
     }
 
     /// What an object had.
@@ -134,14 +130,15 @@ impl Setup {
         Ok(())
     }
 
-    /// Puts everything back, each value read back.
+    /// The motion has ended: puts everything back, each value read back.
     ///
     /// # Errors
-    /// What could not be put back; the journal stays then.
-    pub async fn put_back(self, drive: &Drive) -> Result<(), Failure> {
-        let undone = roll_back(drive.node(), &self.undo, |object| self.before.get(&object).cloned()).await;
+    /// What could not be put back; it stays in the restorer then, and its journal on the disk.
+    pub async fn put_back(&self, drive: &Drive) -> Result<(), Failure> {
+        self.restorer.end_motion();
+        let undone = self.restorer.put_back_newest().await?;
         if undone.not_put_back.is_empty() {
-            return self.kept.map_or(Ok(()), Kept::remove);
+            return Ok(());
         }
         Err(Failure::new(format!("node {}: not everything could be put back after the measurement", drive.node().id()))
             .of_kind("not_put_back")
@@ -151,16 +148,21 @@ impl Setup {
     }
 }
 
-/// A journal with these writes, if a place for it is named.
+/// These writes lead back from what is going to be written: also a journal has them, if a place for it is named.
 pub(super) async fn keep(
-    drive: &Drive,
+    (drive, restorer): (&Drive, &Restorer),
     path: Option<&Path>,
-    undo: &[(Mux, Vec<u8>)],
+    undo: Vec<(Mux, Vec<u8>)>,
     on_kept: fn(&str),
-) -> Result<Option<Kept>, Failure> {
-    let Some(path) = path else { return Ok(None) };
+) -> Result<(), Failure> {
+    let Some(path) = path else {
+        restorer.note_written(undo, None);
+        return Ok(());
+    };
     let nothing = Parameters::default();
     let identity = drive.plan_parameters(&nothing, PlanOptions::default()).await.map_err(source::refused)?.identity;
-    let journal = Journal { node: drive.node().id(), identity, undo: undo.to_vec() };
-    Kept::create(path, &journal, on_kept).map(Some)
+    let journal = Journal { node: drive.node().id(), identity, undo };
+    let kept = Kept::create(path, &journal, on_kept)?;
+    restorer.note_written(journal.undo, Some(kept));
+    Ok(())
 }

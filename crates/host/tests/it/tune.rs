@@ -1,16 +1,19 @@
 //! What is identified of a drive is held to what its plant has, over a bus as a program has it; and so are the gains proposed.
 
 use std::f64::consts::TAU;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use canopen::Mux;
 use devices::{Description, Loops};
+use host::capture::Restorer;
 use host::network::params::journal::roll_back_by;
 use host::tune::{
     Bounds, Excursion, Found, Proposed, Request, Setup, StepResponse, Twin, find, loops_of, measure, motor_of, tune,
 };
 use master::Drive;
 use master::cyclic::CyclicOptions;
+use master::drive::SwitchedOff;
 use sim::{MotorData, Prng, World};
 use tune::Objective;
 use words::failure::Failure;
@@ -87,7 +90,7 @@ struct Measured {
 fn identified(world: &mut World, drive: &Drive, motor: &MotorData) -> Result<Measured, tune::Unusable> {
     let (model, loops) = loops_of(drive).unwrap();
     let run = async {
-        let setup = Setup::begin(drive, (model, loops), true, None, |_| ()).await.unwrap();
+        let setup = Setup::begin((drive, &Restorer::of(drive)), (model, loops), true, None, |_| ()).await.unwrap();
         let how = (PERIOD, Bounds::default(), CyclicOptions::default());
         let measured = measure(drive, &setup, loops, how, &mut Excursion::default()).await;
         (setup, measured)
@@ -181,24 +184,14 @@ fn what_is_written_for_a_measurement_is_put_back_and_a_bound_that_is_reached_sto
     let loops = model.axes[0].loops.as_ref().unwrap();
     let plant = Twin::with_load((model, loops), vec!["load inertia 0.02".into()], &motor);
     let (mut world, drive) = plant.world().unwrap();
-    let objects =
-        [(0x6083, 0), (0x1A01, 1), (0x1801, 2), (0x201D, 0), (0x6060, 0)].map(|(index, sub)| Mux::new(index, sub));
-    let read = |world: &mut World| {
-        let all = async {
-            let mut values = Vec::new();
-            for object in objects {
-                values.push(drive.node().upload(object).await.unwrap().as_bytes().to_vec());
-            }
-            values
-        };
-        sim::block_on(world, all).unwrap()
-    };
-    let before = read(&mut world);
+    let before = values(&mut world, &drive, &WRITTEN);
     let bounds = Bounds { travel_turns: 0.5, ..Bounds::default() };
     let request = Request { bounds, ..request() };
-    let failure = sim::block_on(&mut world, find(&drive, &request, &mut Excursion::default())).unwrap().unwrap_err();
+    let failure = sim::block_on(&mut world, find((&drive, &Restorer::of(&drive)), &request, &mut Excursion::default()))
+        .unwrap()
+        .unwrap_err();
     assert!(failure.because[0].contains("turns from where it stood, more than 0.5"), "{failure:?}");
-    assert_eq!(read(&mut world), before);
+    assert_eq!(values(&mut world, &drive, &WRITTEN), before);
     assert!(world.report(1).unwrap().velocity_rpm.abs() < 1.0);
 }
 
@@ -212,7 +205,8 @@ fn a_drive_without_gains_is_refused_with_what_is_possible_instead() {
     assert!(failure.next[0].contains("ramps and currents"), "{failure:?}");
 }
 
-fn request() -> Request {
+/// Of a wheel, with nothing out of the ordinary.
+pub(crate) fn request() -> Request {
     Request {
         objective: Objective::PhaseMargin(40.0),
         with_position: false,
@@ -239,7 +233,8 @@ fn a_drive_that_is_lost_in_a_measurement_is_said_not_to_have_been_seen_to_stand_
     let (mut world, drive) = wheel(&["load inertia 0.02"]).world().unwrap();
     let request = request();
     let mut excursion = Excursion::default();
-    let mut run = Box::pin(find(&drive, &request, &mut excursion));
+    let restorer = Restorer::of(&drive);
+    let mut run = Box::pin(find((&drive, &restorer), &request, &mut excursion));
     let limit = Duration::from_secs(4);
     assert!(matches!(sim::block_on_for(&mut world, limit, &mut run), Err(sim::BlockOnError::OutOfTime { .. })));
     let station = world.drive_id(1).unwrap();
@@ -258,10 +253,11 @@ fn current_and_travel_are_those_of_the_whole_measurement() {
     let (model, loops) = loops_of(&drive).unwrap();
     let mut excursion = Excursion::default();
     let run = async {
-        let setup = Setup::begin(&drive, (model, loops), true, None, |_| ()).await.unwrap();
+        let restorer = Restorer::of(&drive);
+        let setup = Setup::begin((&drive, &restorer), (model, loops), true, None, |_| ()).await.unwrap();
         let bounds = Bounds { travel_turns: 5.0, ..Bounds::default() };
         let how = (PERIOD, bounds, CyclicOptions::default());
-        let first = host::tune::step(&drive, &Request { bounds, ..request() }, 30.0, &mut excursion).await;
+        let first = host::tune::step((&drive, &restorer), &Request { bounds, ..request() }, 30.0, &mut excursion).await;
         let gone = excursion.travel_turns;
         assert!(first.is_ok() && gone > 1.0, "{first:?} {gone}");
         let second = measure(&drive, &setup, loops, how, &mut excursion).await.unwrap_err();
@@ -277,41 +273,134 @@ fn current_and_travel_are_those_of_the_whole_measurement() {
     assert!(failure.because[0].contains("turns from where it stood, more than 5"), "{failure:?}");
 }
 
-fn gains(world: &mut World, drive: &Drive) -> Vec<Vec<u8>> {
-    let (_, loops) = loops_of(drive).unwrap();
-    let objects = [loops.speed_proportional, loops.speed_integral.object(), loops.speed_filter.unwrap().object];
+fn values(world: &mut World, drive: &Drive, objects: &[Mux]) -> Vec<Vec<u8>> {
     let all = async {
         let mut values = Vec::new();
         for object in objects {
-            values.push(drive.node().upload(object).await.unwrap().as_bytes().to_vec());
+            values.push(drive.node().upload(*object).await.unwrap().as_bytes().to_vec());
         }
         values
     };
     sim::block_on(world, all).unwrap()
 }
 
+fn gains(world: &mut World, drive: &Drive) -> Vec<Vec<u8>> {
+    let (_, loops) = loops_of(drive).unwrap();
+    let objects = [loops.speed_proportional, loops.speed_integral.object(), loops.speed_filter.unwrap().object];
+    values(world, drive, &objects)
+}
+
+/// A ramp, TPDO2 and the mode: what a measurement writes.
+const WRITTEN: [Mux; 5] =
+    [Mux::new(0x6083, 0), Mux::new(0x1A01, 1), Mux::new(0x1801, 2), Mux::new(0x201D, 0), Mux::new(0x6060, 0)];
+
+/// A folder of this test alone, with the place of a journal in it.
+fn folder(name: &str) -> (PathBuf, PathBuf) {
+    let folder = std::env::temp_dir().join(format!("ferrodrive-{name}-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir(&folder).unwrap();
+    let journal = folder.join("ferrodrive-node1.journal");
+    (folder, journal)
+}
+
+/// Given up while it measures: what its caller still holds stops the shaft and leads back, on a bus that goes on.
+#[test]
+fn a_tuning_that_is_given_up_is_led_back_by_its_restorer() {
+    let (mut world, drive) = wheel(&["load inertia 0.02"]).world().unwrap();
+    let before = values(&mut world, &drive, &WRITTEN);
+    let (folder, journal) = folder("tune-back");
+    let (request, restorer) = (Request { journal: Some(journal), ..request() }, Restorer::of(&drive));
+    let run = tune((&drive, &restorer), &request, &(), std::future::ready(false));
+    let ended = sim::block_on_for(&mut world, Duration::from_secs(4), &mut Box::pin(run));
+    assert!(matches!(ended, Err(sim::BlockOnError::OutOfTime { .. })), "{ended:?}");
+    assert!(world.report(1).unwrap().velocity_rpm.abs() > 5.0);
+    assert_ne!(values(&mut world, &drive, &WRITTEN), before);
+    assert_eq!(sim::block_on(&mut world, restorer.restore()).unwrap(), Vec::<String>::new());
+    assert!(restorer.is_done() && world.report(1).unwrap().velocity_rpm.abs() < 1.0);
+    assert_eq!(values(&mut world, &drive, &WRITTEN), before);
+    // The journal is gone, nothing keeps the drive content, and no SYNC is sent.
+    std::fs::remove_dir(&folder).unwrap();
+    let network = drive.node().network();
+    assert_eq!((network.guarded(drive.node().id()), network.moved().contains(drive.node().id())), (None, false));
+    assert_eq!(network.with_core(|core| core.sync_period()), None);
+}
+
+/// Another part of the program ends SYNC meanwhile: set-points reach the drive no more, and its guard would keep it going.
+#[test]
+fn a_measurement_whose_cycles_end_is_stopped_by_sdo_and_its_guard_ends() {
+    let (mut world, drive) = wheel(&["load inertia 0.02"]).world().unwrap();
+    let (network, id) = (drive.node().network(), drive.node().id());
+    let (request, restorer, mut excursion) = (request(), Restorer::of(&drive), Excursion::default());
+    let mut run = Box::pin(find((&drive, &restorer), &request, &mut excursion));
+    assert!(sim::block_on_for(&mut world, Duration::from_secs(4), &mut run).is_err());
+    assert!(network.guarded(id).is_some() && world.report(1).unwrap().velocity_rpm.abs() > 5.0);
+    network.sync(None);
+    let failure = sim::block_on(&mut world, run).unwrap().unwrap_err();
+    assert!(failure.because[0].contains("SYNC is neither produced nor followed"), "{failure:?}");
+    assert_eq!(failure.what, "node 1: the measurement was stopped");
+    assert!(world.report(1).unwrap().velocity_rpm.abs() < 1.0);
+    assert_eq!((network.guarded(id), network.moved().contains(id)), (None, false));
+}
+
+#[test]
+fn a_measurement_ends_its_own_guard_and_not_that_of_its_program() {
+    for guarded_before in [false, true] {
+        let (mut world, drive) = wheel(&["load inertia 0.02"]).world().unwrap();
+        let restorer = Restorer::of(&drive);
+        let run = async {
+            if guarded_before {
+                drive.guard(SwitchedOff::Leave).await.unwrap();
+            }
+            host::tune::step((&drive, &restorer), &request(), 30.0, &mut Excursion::default()).await.unwrap();
+        };
+        sim::block_on(&mut world, run).unwrap();
+        assert_eq!(drive.node().network().guarded(drive.node().id()).is_some(), guarded_before);
+    }
+}
+
+#[test]
+fn former_gains_of_an_earlier_tuning_are_found_before_anything_moves() {
+    let (mut world, drive) = wheel(&["load inertia 0.02"]).world().unwrap();
+    let (folder, journal) = folder("tune-former");
+    std::fs::write(journal.with_extension("gains.journal"), "").unwrap();
+    let (request, restorer) = (Request { apply: true, journal: Some(journal), ..request() }, Restorer::of(&drive));
+    let run = tune((&drive, &restorer), &request, &(), std::future::ready(false));
+    let failure = sim::block_on(&mut world, run).unwrap().unwrap_err();
+    assert_eq!(failure.kind, "journal_exists", "{failure:?}");
+    let position = values(&mut world, &drive, &[cia402::object::POSITION_ACTUAL_VALUE]);
+    assert_eq!(position, [0_i32.to_le_bytes().to_vec()]);
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
 #[test]
 fn a_program_that_ends_before_the_new_gains_are_kept_leaves_the_former_ones_in_a_journal() {
     let (mut world, drive) = wheel(&["load inertia 0.05"]).world().unwrap();
     let before = gains(&mut world, &drive);
-    let folder = std::env::temp_dir().join(format!("ferrodrive-tune-{}", std::process::id()));
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir(&folder).unwrap();
-    let journal = folder.join("ferrodrive-node1.journal");
+    let (folder, journal) = folder("tune");
     let request = Request { apply: true, journal: Some(journal.clone()), ..request() };
     // It ends while a person is asked.
-    let mut run = Box::pin(tune(&drive, &request, &(), std::future::pending()));
+    let restorer = Restorer::of(&drive);
+    let mut run = Box::pin(tune((&drive, &restorer), &request, &(), std::future::pending()));
     let limit = Duration::from_secs(60);
     let ended = sim::block_on_for(&mut world, limit, &mut run);
     assert!(matches!(ended, Err(sim::BlockOnError::OutOfTime { .. })), "{ended:?}");
     drop(run);
+    drop(restorer);
     assert_ne!(gains(&mut world, &drive), before);
     assert!(!journal.exists());
     let former = folder.join("ferrodrive-node1.gains.journal");
     let back = sim::block_on(&mut world, roll_back_by(&former, &drive)).unwrap().unwrap();
     assert_eq!((back.put_back, gains(&mut world, &drive)), (3, before.clone()));
+    // A program that goes on, and gives it up there, has what leads back.
+    let restorer = Restorer::of(&drive);
+    let mut run = Box::pin(tune((&drive, &restorer), &request, &(), std::future::pending()));
+    assert!(sim::block_on_for(&mut world, limit, &mut run).is_err());
+    drop(run);
+    assert_ne!(gains(&mut world, &drive), before);
+    assert_eq!(sim::block_on(&mut world, restorer.restore()).unwrap(), Vec::<String>::new());
+    assert_eq!(gains(&mut world, &drive), before);
     // And a person who wants them back has them, with nothing left over.
-    let run = tune(&drive, &request, &(), std::future::ready(true));
+    let run = tune((&drive, &restorer), &request, &(), std::future::ready(true));
     let report = sim::block_on(&mut world, run).unwrap().unwrap();
     assert!(!report.applied && report.drive_error.is_some(), "{report:?}");
     assert_eq!(report.notes.last().map(String::as_str), Some("it was given its former gains back"));
@@ -348,7 +437,29 @@ fn what_no_motion_can_be_measured_with_is_refused_before_anything_moves() {
     };
     let period = with(|request| request.period = Duration::from_micros(100));
     assert!(period.is_usage && period.what.contains("500\u{b5}s to 10ms"), "{period:?}");
-    assert!(with(|request| request.bounds.speed_rpm = 0.0).what.contains("a speed above 0 r/min"));
-    assert!(with(|request| request.bounds.current_a = f64::NAN).what.contains("a current above 0 A"));
-    assert!(with(|request| request.bounds.travel_turns = -1.0).what.contains("a travel above 0 turns"));
+    let refused = |what: &str, values: &[f64], set: fn(&mut Request, f64)| {
+        for value in values {
+            let mut request = request();
+            set(&mut request, *value);
+            let failure = request.check().unwrap_err();
+            assert!(
+                failure.is_usage && failure.what.contains(&format!("expected a {what} from")),
+                "{value}: {failure:?}"
+            );
+        }
+    };
+    let (nan, infinite) = (f64::NAN, f64::INFINITY);
+    refused("speed", &[0.0, -120.0, nan, infinite], |request, value| request.bounds.speed_rpm = value);
+    refused("current", &[0.0, -1.0, nan, infinite], |request, value| request.bounds.current_a = value);
+    refused("travel", &[-1.0, nan, infinite], |request, value| request.bounds.travel_turns = value);
+    refused("bandwidth", &[-5.0, 0.0, 501.0, nan, infinite], |request, value| {
+        request.objective = Objective::Bandwidth(value);
+    });
+    refused("phase margin", &[-5.0, 9.9, 81.0, nan], |request, value| {
+        request.objective = Objective::PhaseMargin(value)
+    });
+    refused("torque constant", &[0.0, -0.1, nan, infinite], |request, value| {
+        request.torque_constant_nm_a = Some(value);
+    });
+    assert!(Request { torque_constant_nm_a: Some(0.1), ..request() }.check().is_ok());
 }

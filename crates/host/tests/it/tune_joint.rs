@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use canopen::Mux;
 use devices::{Description, Loops};
-use host::tune::{Bounds, Excursion, Objective, OutputLoad, Request, TuneReport, Twin, find, motor_of, tune};
+use host::capture::Restorer;
+use host::tune::{Bounds, Excursion, OutputLoad, Request, TuneReport, Twin, find, motor_of, tune};
 use master::MotionOptions;
-use master::cyclic::CyclicOptions;
 use master::units::Rpm;
 use sim::machine::TimingMode;
 use sim::{MotorData, Place, Prng, Stimulus};
@@ -36,18 +36,8 @@ fn truth(load: &OutputLoad, motor: &MotorData) -> Truth {
 }
 
 fn request() -> Request {
-    Request {
-        objective: Objective::PhaseMargin(40.0),
-        with_position: true,
-        period: Duration::from_millis(1),
-        bounds: Bounds { speed_rpm: 600.0, ..Bounds::default() },
-        cyclic: CyclicOptions::default(),
-        torque_constant_nm_a: None,
-        journal: None,
-        on_kept: |_| (),
-        apply: false,
-        within: Duration::from_secs(60),
-    }
+    let bounds = Bounds { speed_rpm: 600.0, ..Bounds::default() };
+    Request { with_position: true, bounds, ..crate::tune::request() }
 }
 
 fn plant(name: &str, load: &OutputLoad) -> (Twin, MotorData, (&'static Description, &'static Loops)) {
@@ -60,7 +50,10 @@ fn plant(name: &str, load: &OutputLoad) -> (Twin, MotorData, (&'static Descripti
 fn found(plant: &Twin) -> TuneReport {
     let (mut world, drive) = plant.world().unwrap();
     world.set_timing(TimingMode::Device);
-    let (report, _) = sim::block_on(&mut world, find(&drive, &request(), &mut Excursion::default())).unwrap().unwrap();
+    let (report, _) =
+        sim::block_on(&mut world, find((&drive, &Restorer::of(&drive)), &request(), &mut Excursion::default()))
+            .unwrap()
+            .unwrap();
     assert!(world.report(1).unwrap().velocity_rpm.abs() < 1.0);
     report
 }
@@ -149,7 +142,10 @@ fn a_joint_that_tries_its_new_gains_has_them_or_its_former_ones() {
     let (plant, ..) = plant("m4230e17b50", &load);
     let (mut world, drive) = plant.world().unwrap();
     let request = Request { apply: true, ..request() };
-    let report = sim::block_on(&mut world, tune(&drive, &request, &(), std::future::ready(false))).unwrap().unwrap();
+    let report =
+        sim::block_on(&mut world, tune((&drive, &Restorer::of(&drive)), &request, &(), std::future::ready(false)))
+            .unwrap()
+            .unwrap();
     let read = async {
         (
             drive.node().read::<u16>(Mux::new(0x60F9, 1)).await.unwrap(),
@@ -177,7 +173,9 @@ fn a_joint_that_comes_too_far_is_stopped_and_one_that_is_lost_is_said_to_be() {
     let before = sim::block_on(&mut world, read).unwrap();
     let bounds = Bounds { travel_turns: 3.0, speed_rpm: 600.0, ..Bounds::default() };
     let request = Request { bounds, ..request() };
-    let failure = sim::block_on(&mut world, find(&drive, &request, &mut Excursion::default())).unwrap().unwrap_err();
+    let (restorer, mut excursion) = (Restorer::of(&drive), Excursion::default());
+    let run = find((&drive, &restorer), &request, &mut excursion);
+    let failure = sim::block_on(&mut world, run).unwrap().unwrap_err();
     assert_eq!(failure.kind, "travel_bound", "{failure:?}");
     assert!(world.report(1).unwrap().velocity_rpm.abs() < 1.0);
     let read = async {
@@ -187,9 +185,9 @@ fn a_joint_that_comes_too_far_is_stopped_and_one_that_is_lost_is_said_to_be() {
         )
     };
     assert_eq!(sim::block_on(&mut world, read).unwrap(), before);
-    let mut excursion = Excursion::default();
+    excursion = Excursion::default();
     let request = Request { bounds: Bounds { travel_turns: 40.0, ..bounds }, ..request };
-    let mut run = Box::pin(find(&drive, &request, &mut excursion));
+    let mut run = Box::pin(find((&drive, &restorer), &request, &mut excursion));
     let begun = sim::block_on_for(&mut world, Duration::from_secs(2), &mut run);
     assert!(begun.is_err(), "{begun:?}");
     let station = world.drive_id(1).unwrap();
@@ -211,8 +209,8 @@ fn a_joint_that_hears_no_program_any_more_in_a_measurement_stops_by_its_own_watc
     let load = OutputLoad { inertia_kg_m2: 0.1, dry_nm: 0.5, viscous_nm_s: 0.2 };
     let (plant, ..) = plant("m4230e17b50", &load);
     let (mut world, drive) = plant.world().unwrap();
-    let (request, mut excursion) = (request(), Excursion::default());
-    let mut run = Box::pin(find(&drive, &request, &mut excursion));
+    let (request, restorer, mut excursion) = (request(), Restorer::of(&drive), Excursion::default());
+    let mut run = Box::pin(find((&drive, &restorer), &request, &mut excursion));
     assert!(sim::block_on_for(&mut world, Duration::from_secs(2), &mut run).is_err());
     assert!(world.report(1).unwrap().velocity_rpm.abs() > 100.0);
     world.apply(Place::node(1), &Stimulus::CableCut(true)).unwrap().unwrap();

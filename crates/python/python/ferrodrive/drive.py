@@ -47,9 +47,17 @@ class _Orders:
     def _capture(
         self, quantities: tuple[str, ...], take: Sequence[str], journal: Optional[Union[str, "os.PathLike[str]"]], **order: Any
     ) -> Job:
-        kept = None if journal is None else os.fspath(journal)
-        whole = {**order, "quantities": list(quantities), "take": list(take), "journal": kept}
-        return _native.capture(self.network._native, self.node, self.model, whole)
+        return self._whole(_native.capture, journal, {**order, "quantities": list(quantities), "take": list(take)})
+
+    def _test_motion(
+        self, shape: str, quantities: tuple[str, ...], journal: Optional[Union[str, "os.PathLike[str]"]], **order: Any
+    ) -> Job:
+        usual = 0.001 if shape == "steps" else order["period"]
+        whole = {**order, "shape": shape, "quantities": list(quantities), "capture_period": order["capture_period"] or usual}
+        return self._whole(_native.test_motion, journal, whole)
+
+    def _tune(self, journal: Optional[Union[str, "os.PathLike[str]"]], **order: Any) -> Job:
+        return self._whole(_native.tune_drive, journal, order)
 
     def _whole(
         self,
@@ -85,13 +93,13 @@ def _captured(report: dict[str, Any]) -> Capture:
 
 
 @contextmanager
-def _reported_as_captured() -> Iterator[None]:
-    """What came of a capture that was cut off is the same as of a whole one."""
+def _reported_as(made: Callable[[dict[str, Any]], Any]) -> Iterator[None]:
+    """What came of something that was stopped or cut off has the same form as the whole of it."""
     try:
         yield
     except MasterError as error:
         if error.report is not None:
-            error.report = _captured(error.report)
+            error.report = made(error.report)
         raise
 
 
@@ -341,7 +349,7 @@ class Drive(_Orders):
         0.002
         """
         order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger, "sdo": sdo}
-        with _reported_as_captured():
+        with _reported_as(_captured):
             return _captured(self.network._finish(self._capture(quantities, take, journal, **order)))
 
     def test_motion(
@@ -394,26 +402,13 @@ class Drive(_Orders):
         >>> (runs[0]["followed"] or {})["most_deg"] < 10
         True
         """
-        order = {
-            "shape": shape,
-            "by_deg": by,
-            "speed_rpm": speed_rpm,
-            "frequency_hz": frequency,
-            "to_frequency_hz": to_frequency,
-            "periods": periods,
-            "time": time,
-            "path": list(path),
-            "count": count,
-            "velocity_rpm": velocity_rpm,
-            "acceleration_rpm_s": acceleration_rpm_s,
-            "travel_turns": travel_turns,
-            "following_error_deg": following_error,
-            "period": period,
-            "quantities": list(quantities),
-            "capture_period": capture_period or (0.001 if shape == "steps" else period),
-            "sdo": sdo,
-        }
-        return _runs(self.network._finish(self._whole(_native.test_motion, journal, order)))
+        motion = self._test_motion(
+            shape, quantities, journal, by_deg=by, speed_rpm=speed_rpm, frequency_hz=frequency, to_frequency_hz=to_frequency,
+            periods=periods, time=time, path=list(path), count=count, velocity_rpm=velocity_rpm, acceleration_rpm_s=acceleration_rpm_s,
+            travel_turns=travel_turns, following_error_deg=following_error, period=period, capture_period=capture_period, sdo=sdo,
+        )
+        with _reported_as(_runs):
+            return _runs(self.network._finish(motion))
 
     def tune(
         self,
@@ -450,18 +445,11 @@ class Drive(_Orders):
         ...     error.kind
         'no_gains'
         """
-        order = {
-            "bandwidth_hz": bandwidth,
-            "phase_margin_deg": phase_margin,
-            "position": position,
-            "speed_rpm": speed_rpm,
-            "current_a": current_a,
-            "travel_turns": travel_turns,
-            "period": period,
-            "torque_constant_nm_a": torque_constant,
-            "apply": apply,
-        }
-        report: Tuning = self.network._finish(self._whole(_native.tune_drive, journal, order))
+        tuning = self._tune(
+            journal, bandwidth_hz=bandwidth, phase_margin_deg=phase_margin, position=position, speed_rpm=speed_rpm, current_a=current_a,
+            travel_turns=travel_turns, period=period, torque_constant_nm_a=torque_constant, apply=apply,
+        )
+        report: Tuning = self.network._finish(tuning)
         return report
 
 
@@ -584,7 +572,7 @@ class AsyncDrive(_Orders):
     ) -> Capture:
         """As :meth:`Drive.capture`."""
         order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger, "sdo": sdo}
-        with _reported_as_captured():
+        with _reported_as(_captured):
             return _captured(await self.network._finish_soon(self._capture(quantities, take, journal, **order)))
 
     async def test_motion(
@@ -609,26 +597,13 @@ class AsyncDrive(_Orders):
         journal: Optional[Union[str, "os.PathLike[str]"]] = None,
     ) -> list[TestMotionRun]:
         """As :meth:`Drive.test_motion`."""
-        order = {
-            "shape": shape,
-            "by_deg": by,
-            "speed_rpm": speed_rpm,
-            "frequency_hz": frequency,
-            "to_frequency_hz": to_frequency,
-            "periods": periods,
-            "time": time,
-            "path": list(path),
-            "count": count,
-            "velocity_rpm": velocity_rpm,
-            "acceleration_rpm_s": acceleration_rpm_s,
-            "travel_turns": travel_turns,
-            "following_error_deg": following_error,
-            "period": period,
-            "quantities": list(quantities),
-            "capture_period": capture_period or (0.001 if shape == "steps" else period),
-            "sdo": sdo,
-        }
-        return _runs(await self.network._finish_soon(self._whole(_native.test_motion, journal, order)))
+        motion = self._test_motion(
+            shape, quantities, journal, by_deg=by, speed_rpm=speed_rpm, frequency_hz=frequency, to_frequency_hz=to_frequency,
+            periods=periods, time=time, path=list(path), count=count, velocity_rpm=velocity_rpm, acceleration_rpm_s=acceleration_rpm_s,
+            travel_turns=travel_turns, following_error_deg=following_error, period=period, capture_period=capture_period, sdo=sdo,
+        )
+        with _reported_as(_runs):
+            return _runs(await self.network._finish_soon(motion))
 
     async def tune(
         self,
@@ -645,16 +620,9 @@ class AsyncDrive(_Orders):
         journal: Optional[Union[str, "os.PathLike[str]"]] = None,
     ) -> Tuning:
         """As :meth:`Drive.tune`."""
-        order = {
-            "bandwidth_hz": bandwidth,
-            "phase_margin_deg": phase_margin,
-            "position": position,
-            "speed_rpm": speed_rpm,
-            "current_a": current_a,
-            "travel_turns": travel_turns,
-            "period": period,
-            "torque_constant_nm_a": torque_constant,
-            "apply": apply,
-        }
-        report: Tuning = await self.network._finish_soon(self._whole(_native.tune_drive, journal, order))
+        tuning = self._tune(
+            journal, bandwidth_hz=bandwidth, phase_margin_deg=phase_margin, position=position, speed_rpm=speed_rpm, current_a=current_a,
+            travel_turns=travel_turns, period=period, torque_constant_nm_a=torque_constant, apply=apply,
+        )
+        report: Tuning = await self.network._finish_soon(tuning)
         return report

@@ -82,6 +82,8 @@ class Network(Whole):
             self._native = NativeNetwork.in_world(bus, path, servers, sync_counter)
         else:
             self._native = NativeNetwork.on_bus(bus, path, servers, sync_counter)
+        #: What tells the coroutines that wait for jobs in a world that these have ended.
+        self._awaited: set[Callable[[], None]] = set()
         _open.add(self)
 
     def __enter__(self) -> Network:
@@ -115,6 +117,9 @@ class Network(Whole):
             moving: list[str] = self._native.close()
         else:
             moving = self._finish(self._native.close_in_world())
+            # Their jobs were given up, and nothing of them is heard in the world any more.
+            for report in list(self._awaited):
+                report()
         if moving:
             raise MasterError("; ".join(moving))
 
@@ -167,7 +172,8 @@ class Network(Whole):
                 raise Stalled("the master waits, and nothing is left to happen in the world")
 
     async def _finish_soon(self, job: Job, keep: bool = False) -> Any:
-        """The result of a job, awaited. One whose coroutine is cancelled is given up, unless it is to be kept."""
+        """The result of a job, awaited. One whose coroutine is cancelled is given up, unless it is to be kept; one that leads back is
+        awaited until it has: a second cancellation leaves it to go on by itself."""
         loop = asyncio.get_running_loop()
         ended: asyncio.Future[None] = loop.create_future()
 
@@ -176,21 +182,28 @@ class Network(Whole):
                 ended.set_result(None)
 
         def report() -> None:
-            loop.call_soon_threadsafe(end)
+            if not loop.is_closed():
+                loop.call_soon_threadsafe(end)
 
         if self._world is None:
             job.on_end(report)
         elif (time := taking_part(self._world)) is not None:
             time.on_done(job.number, report)
+            self._awaited.add(report)
         else:
             job.cancel()
             raise RuntimeError("time stands still in this world: run the loop inside `with ferrodrive.virtual_time(world)`")
         try:
-            await ended
+            # Which leaves the future as it is when it is cancelled.
+            await asyncio.wait([ended])
         except BaseException:
             if not keep:
                 job.cancel()
+                if job.leads_back:
+                    await asyncio.wait([ended])
             raise
+        finally:
+            self._awaited.discard(report)
         return self._result(job)
 
     @property

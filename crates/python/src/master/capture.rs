@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use can::Bitrate;
 use canopen::NodeId;
-use host::capture::{Measurand, Restorer, Span, Taken, Trigger, Wanted, Way, with_left};
-use host::network::params::journal::default_path;
+use host::capture::{Measurand, Span, Taken, Trigger, Wanted, Way, with_left};
 use machine::file::tpdo_id;
+use master::Drive;
 use pyo3::prelude::*;
 use recording::Capture;
 use serde::Serialize;
+use sim::recorder::LiveValues;
 use words::failure::Failure;
 
 use super::job::Trouble;
@@ -18,7 +19,6 @@ use super::value::Value;
 use super::whole::AskedDrive;
 use super::{Job, Network, duration};
 use crate::failure::bad_value;
-use crate::ways_back::WaysBack;
 
 /// What is to be captured, in plain values.
 #[derive(FromPyObject)]
@@ -81,6 +81,14 @@ impl Captured {
     }
 }
 
+impl AskedDrive {
+    /// What is captured of it: with this time between two readings, and nothing yet.
+    pub(super) fn capturing(&self, bitrate: Bitrate, period: Duration, journal: Option<PathBuf>) -> Wanted {
+        let journal = self.journal(journal);
+        Wanted { quantities: Vec::new(), period, bitrate, take: Vec::new(), by_sdo: false, journal, on_kept: |_| () }
+    }
+}
+
 /// What could not be put back.
 pub(super) fn not_put_back(node: NodeId, left: &[String]) -> Option<Failure> {
     let next = "when it answers again: network.params(node).rollback()";
@@ -101,46 +109,37 @@ pub(crate) fn capture(
     let trigger: Option<Trigger> = order.trigger.as_deref().map(str::parse).transpose().map_err(bad_value)?;
     let take = order.take.iter().map(|text| tpdo_id(text)).collect::<Result<_, _>>().map_err(bad_value)?;
     let span = Span { duration: duration(order.duration)?, trigger, pre_trigger: duration(order.pre_trigger)? };
-    let period = duration(order.period)?;
-    if period < Duration::from_micros(50) {
-        return Err(bad_value("expected a period of 50 us or more between two readings"));
-    }
-    let journal = order.journal.unwrap_or_else(|| default_path(asked.node));
-    let mut wanted = Wanted {
-        quantities: Vec::new(),
-        period,
-        bitrate,
-        take,
-        by_sdo: order.sdo,
-        // A virtual bus ends with the program, and nothing is left to go back to.
-        journal: (!asked.is_virtual).then_some(journal),
-        on_kept: |_| (),
-    };
+    let mut wanted = asked.capturing(bitrate, duration(order.period)?, order.journal);
+    (wanted.take, wanted.by_sdo) = (take, order.sdo);
     let world = network.get().true_values(py)?;
-    // Each job has ways back of its own, which the network's hold too: it may be closed meanwhile.
-    let (own, of_network) = (WaysBack::default(), network.get().ways_back.clone());
-    let ways_back = own.clone();
-    let work = async move {
+    network.get().begin_leading_back(py, |way_back| async move {
         let drive = asked.drive().await?;
-        for name in &order.quantities {
-            wanted.quantities.push(Measurand::named(&drive, world.as_ref(), name).await?);
-        }
+        wanted.quantities = quantities(&drive, world.as_ref(), &order.quantities).await?;
         wanted.check(&span)?;
-        let restorer = Restorer::of(&drive);
-        [&own, &of_network].into_iter().for_each(|ways_back| ways_back.add(restorer.clone()));
-        let mut running = wanted.begin(&drive, &restorer).await?;
+        let restorer = way_back.of(&drive);
+        let mut running = wanted.begin(&drive, restorer).await?;
         let taken = running.next(&span).await;
         let left = restorer.restore().await;
-        // What is left is in what this reports.
-        of_network.remove(&restorer);
         let Taken { capture, cut_off } = taken.map_err(|failure| with_left(failure, &left))?;
         let value = Value::report(&Captured::of(&capture, running.ways()));
         match cut_off.or(not_put_back(asked.node, &left)) {
             Some(failure) => Err(Trouble::Reported(with_left(failure, &left), Box::new(value))),
             None => Ok(value),
         }
-    };
-    network.get().begin_leading_back(py, work, Some(ways_back))
+    })
+}
+
+/// Quantities of a drive by their names; in a world its true values too.
+pub(super) async fn quantities(
+    drive: &Drive,
+    world: Option<&LiveValues>,
+    names: &[String],
+) -> Result<Vec<Measurand>, Failure> {
+    let mut quantities = Vec::new();
+    for name in names {
+        quantities.push(Measurand::named(drive, world, name).await?);
+    }
+    Ok(quantities)
 }
 
 fn known(value: f64) -> Option<f64> {

@@ -15,7 +15,7 @@ use super::runner::Runner;
 use super::value::Value;
 use crate::failure::{how_to_say, master_error, wrong_use};
 use crate::live::Live;
-use crate::ways_back::WaysBack;
+use crate::ways_back::WayBack;
 use crate::world;
 
 /// How long a waiting thread is deaf to signals (Ctrl-C).
@@ -27,8 +27,6 @@ pub(crate) struct Job {
     number: AtomicU64,
     runner: Arc<Runner>,
     outcome: Arc<Outcome>,
-    /// Given up, it goes on until what it has changed is put back.
-    leads_back: bool,
 }
 
 /// Why a job did not do what it should.
@@ -101,6 +99,8 @@ struct JobState {
     reported: bool,
     /// The result is not wanted any more, or will never come.
     given_up: bool,
+    /// Given up, it goes on until what it has changed is put back.
+    leads_back: bool,
     /// Has the work be polled again.
     waker: Option<Waker>,
     /// Called when it has ended.
@@ -109,7 +109,7 @@ struct JobState {
 
 impl JobState {
     const fn has_ended(&self) -> bool {
-        self.reported || self.given_up
+        self.reported || self.given_up && !self.leads_back
     }
 }
 
@@ -160,15 +160,15 @@ impl Drop for Reporter {
 
 impl Job {
     /// A job, and the future that does it.
-    /// One that is given up goes the ways back that it has, if any, before it ends.
+    /// One that is given up goes the way back that it has, if any, before it ends.
     pub(super) fn new(
         work: impl Future<Output = Result<Value, Trouble>> + Send + 'static,
-        ways_back: Option<WaysBack>,
+        way_back: Option<WayBack>,
         runner: &Arc<Runner>,
     ) -> (Self, world::Job) {
         let outcome = Arc::new(Outcome::default());
+        outcome.lock().leads_back = way_back.is_some();
         let reporter = Reporter(Arc::clone(&outcome));
-        let leads_back = ways_back.is_some();
         let future = async move {
             let result = {
                 let mut work = pin!(work);
@@ -179,13 +179,15 @@ impl Job {
                 });
                 result.await
             };
-            if let (None, Some(ways_back)) = (&result, ways_back) {
+            match (&result, way_back) {
                 // What could not be put back stays in the journal of a real bus; no caller waits for an answer any more.
-                ways_back.restore().await;
+                (None, Some(way_back)) => way_back.restore().await,
+                (Some(_), Some(way_back)) => way_back.remove(),
+                (_, None) => {}
             }
             reporter.report(result);
         };
-        (Self { number: AtomicU64::new(0), runner: Arc::clone(runner), outcome, leads_back }, Box::pin(future))
+        (Self { number: AtomicU64::new(0), runner: Arc::clone(runner), outcome }, Box::pin(future))
     }
 
     pub(super) fn set_number(&self, number: u64) {
@@ -204,14 +206,13 @@ impl Job {
     /// True when it has ended, one way or the other.
     #[getter]
     fn ended(&self) -> bool {
-        let state = self.outcome.lock();
-        if self.leads_back { state.reported } else { state.has_ended() }
+        self.outcome.lock().has_ended()
     }
 
     /// True for one that puts back what it has changed when it is given up, and ends after that.
     #[getter]
-    const fn leads_back(&self) -> bool {
-        self.leads_back
+    fn leads_back(&self) -> bool {
+        self.outcome.lock().leads_back
     }
 
     /// Waits for its end on a real bus.
@@ -219,7 +220,7 @@ impl Job {
         while !self.ended() {
             py.detach(|| {
                 let state = self.outcome.lock();
-                if !state.reported && (self.leads_back || !state.given_up) {
+                if !state.has_ended() {
                     drop(self.outcome.ended.wait_timeout(state, NAP));
                 }
             });
@@ -242,13 +243,13 @@ impl Job {
 
     /// Gives it up. What it asked for is taken back; what a drive has received already stays.
     fn cancel(&self, py: Python<'_>) -> PyResult<()> {
-        let waker = {
+        let (waker, leads_back) = {
             let mut state = self.outcome.lock();
             state.given_up = true;
-            state.waker.take()
+            (state.waker.take(), state.leads_back)
         };
         match &*self.runner {
-            Runner::World(shared) if !self.leads_back => shared.lock(py)?.jobs.cancel(self.number()),
+            Runner::World(shared) if !leads_back => shared.lock(py)?.jobs.cancel(self.number()),
             _ => waker.into_iter().for_each(Waker::wake),
         }
         Ok(())

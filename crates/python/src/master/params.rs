@@ -130,14 +130,12 @@ impl TransactionOrder {
                 return Err(bad_value(format!("expected prove=\"reset\" or \"power-cycle\", got {other:?}")));
             }
         };
-        let journal = self.journal.unwrap_or_else(|| default_path(asked.node));
         Ok(Transaction {
             address: self.address,
             save: self.save,
             prove,
             within: duration(self.within)?,
-            // A virtual bus ends with the program, and nothing is left to go back to.
-            journal: (!asked.is_virtual).then_some(journal),
+            journal: asked.journal(self.journal),
             on_kept: |_| (),
         })
     }

@@ -3,22 +3,21 @@
 use std::path::PathBuf;
 
 use can::Bitrate;
-use host::capture::{Measurand, Restorer, Wanted, with_left};
-use host::network::params::journal::default_path;
+use host::capture::with_left;
 use host::test_motion::{Figures, Motion, Run, Shape, limits, points, run, usual_quantities};
 use master::cyclic::CyclicOptions;
+use master::drive::SwitchedOff;
 use master::units::{Ramp, Rpm};
 use pyo3::prelude::*;
 use serde::Serialize;
 use words::failure::Failure;
 
-use super::capture::{Captured, not_put_back};
+use super::capture::{Captured, not_put_back, quantities};
 use super::job::Trouble;
 use super::value::Value;
 use super::whole::AskedDrive;
 use super::{Job, Network, duration};
 use crate::failure::bad_value;
-use crate::ways_back::WaysBack;
 
 /// What is to be moved, in plain values.
 #[derive(FromPyObject)]
@@ -128,40 +127,28 @@ pub(crate) fn test_motion(
     let bitrate = network.get().bitrate(py)?.unwrap_or(Bitrate::K500);
     let motion = order.motion().map_err(bad_value)?;
     order.travel_turns.map_or(Ok(()), |travel| motion.check_travel(order.count, travel)).map_err(bad_value)?;
-    let journal = order.journal.unwrap_or_else(|| default_path(asked.node));
-    let mut wanted = Wanted {
-        quantities: Vec::new(),
-        period: duration(order.capture_period)?,
-        bitrate,
-        take: Vec::new(),
-        by_sdo: order.sdo,
-        // A virtual bus ends with the program, and nothing is left to go back to.
-        journal: (!asked.is_virtual).then_some(journal),
-        on_kept: |_| (),
-    };
+    let mut wanted = asked.capturing(bitrate, duration(order.capture_period)?, order.journal);
+    wanted.by_sdo = order.sdo;
     let world = network.get().true_values(py)?;
-    let (own, of_network) = (WaysBack::default(), network.get().ways_back.clone());
-    let ways_back = own.clone();
-    let work = async move {
+    network.get().begin_leading_back(py, move |way_back| async move {
         let drive = asked.drive().await?;
         let names = if order.quantities.is_empty() { usual_quantities(&drive).await? } else { order.quantities };
-        for name in &names {
-            wanted.quantities.push(Measurand::named(&drive, world.as_ref(), name).await?);
-        }
+        wanted.quantities = quantities(&drive, world.as_ref(), &names).await?;
         wanted.check(&motion.span())?;
-        let guarded = matches!(motion, Motion::Steps { .. });
+        let (core, nodes) = (drive.node().network(), [asked.node].into_iter().collect());
+        let (restorer, mut runs) = (way_back.of(&drive), Vec::new());
+        let is_points = matches!(motion, Motion::Points { .. });
+        // Points have a guard of their own.
+        let guarded = !is_points && core.guarded(asked.node).is_none();
+        restorer.begin_motion(is_points);
         if guarded {
-            drive.guard(master::drive::SwitchedOff::Leave).await.map_err(Failure::from)?;
+            drive.guard(SwitchedOff::Leave).await.map_err(Failure::from)?;
         }
-        let (restorer, mut runs) = (Restorer::of(&drive), Vec::new());
-        own.stop_first(drive.node().network().clone(), drive.node().id());
-        [&own, &of_network].into_iter().for_each(|ways_back| ways_back.add(restorer.clone()));
         let how = (order.count, order.travel_turns);
-        let moved = run((&drive, &motion), (&wanted, &restorer), how, &mut runs, |_| ()).await;
+        let moved = run((&drive, &motion), (&wanted, restorer), how, &mut runs, |_| ()).await;
         let left = restorer.restore().await;
-        of_network.remove(&restorer);
-        // One that was not seen to stand keeps its watch.
-        let released = if guarded && moved.is_ok() { drive.release_guard().await } else { Ok(()) };
+        // One that was not seen to stand is left to its own watch.
+        let released = if guarded { core.release_guards(nodes).await } else { Ok(()) };
         let rows = runs.into_iter().map(|Run { number, figures, capture, ways }| RunReport {
             run: number,
             figures,
@@ -173,6 +160,5 @@ pub(crate) fn test_motion(
             Some(failure) => Err(Trouble::Reported(with_left(failure, &left), Box::new(value))),
             None => Ok(value),
         }
-    };
-    network.get().begin_leading_back(py, work, Some(ways_back))
+    })
 }

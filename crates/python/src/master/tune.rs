@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use host::network::params::journal::default_path;
-use host::tune::{Bounds, Objective, Request};
+use host::tune::{Bounds, Objective, Request, loops_of, tune};
 use master::cyclic::CyclicOptions;
 use pyo3::prelude::*;
 
@@ -12,7 +11,6 @@ use super::value::Value;
 use super::whole::AskedDrive;
 use super::{Job, Network, duration};
 use crate::failure::bad_value;
-use crate::ways_back::WaysBack;
 
 /// Longest time for the transaction with the proposed values, as the default of the command line.
 const WITHIN: Duration = Duration::from_secs(60);
@@ -53,7 +51,6 @@ pub(crate) fn tune_drive(
 ) -> PyResult<Job> {
     let asked = AskedDrive::of(network.get(), node, model)?;
     let objective = order.bandwidth_hz.map_or(Objective::PhaseMargin(order.phase_margin_deg), Objective::Bandwidth);
-    let journal = order.journal.unwrap_or_else(|| default_path(asked.node));
     let mut request = Request {
         objective,
         with_position: order.position,
@@ -65,23 +62,18 @@ pub(crate) fn tune_drive(
         },
         cyclic: CyclicOptions::default(),
         torque_constant_nm_a: order.torque_constant_nm_a,
-        // A virtual bus ends with the program, and nothing is left to go back to.
-        journal: (!asked.is_virtual).then_some(journal),
+        journal: asked.journal(order.journal),
         on_kept: |_| (),
         apply: order.apply,
         within: WITHIN,
     };
     request.check().map_err(|failure| bad_value(failure.what))?;
-    let own = WaysBack::default();
-    let ways_back = own.clone();
-    let work = async move {
+    network.get().begin_leading_back(py, |way_back| async move {
         let drive = asked.drive().await?;
-        own.stop_first(drive.node().network().clone(), drive.node().id());
         if order.speed_rpm.is_none() {
-            request.bounds.speed_rpm = host::tune::loops_of(&drive)?.1.usual_rpm;
+            request.bounds.speed_rpm = loops_of(&drive)?.1.usual_rpm;
         }
-        let report = host::tune::tune(&drive, &request, &(), std::future::ready(false)).await?;
+        let report = tune((&drive, way_back.of(&drive)), &request, &(), std::future::ready(false)).await?;
         Ok(Value::report(&report))
-    };
-    network.get().begin_leading_back(py, work, Some(ways_back))
+    })
 }

@@ -13,6 +13,7 @@ use host::network::boot::{BootReport, Planned};
 use host::network::check::CheckReport;
 use host::network::explain::ExplainReport;
 use host::network::heard::Counted;
+use host::network::params::journal::default_path;
 use host::network::plan::{CYCLE, PlanReport, SHORTEST_CYCLE, traffic};
 use host::network::scan::{ScanReport, ScannedNode, no_node};
 use machine::file::Machine;
@@ -312,8 +313,7 @@ pub(super) struct AskedDrive {
     pub(super) machine: Option<Arc<Machine>>,
     pub(super) node: NodeId,
     pub(super) model: Option<&'static Description>,
-    /// The bus ends with the program.
-    pub(super) is_virtual: bool,
+    is_virtual: bool,
 }
 
 impl AskedDrive {
@@ -325,6 +325,11 @@ impl AskedDrive {
             model: model.map(model_of).transpose()?,
             is_virtual: network.is_virtual(),
         })
+    }
+
+    /// Where the way back is kept: here, or at the place of its node. A virtual bus ends with the program, and nothing is left to go back to.
+    pub(super) fn journal(&self, asked: Option<PathBuf>) -> Option<PathBuf> {
+        (!self.is_virtual).then(|| asked.unwrap_or_else(|| default_path(self.node)))
     }
 
     /// The drive that is meant.

@@ -13,7 +13,7 @@ use words::node::node;
 use super::params::journal::note_kept;
 use crate::command::cycles::CycleArgs;
 use crate::command::repeat::period;
-use crate::context::Context;
+use crate::context::{Context, Restorer};
 use crate::failure::Failure;
 use crate::guard::{Guard, GuardArgs};
 use crate::output::Report;
@@ -45,10 +45,10 @@ pub(crate) struct Tune {
     #[arg(long = "loop", value_enum, default_value = "speed")]
     which: WhichLoop,
     /// Objective: where the gain of the speed loop falls to one, in Hz
-    #[arg(long, value_name = "HZ", value_parser = hertz, conflicts_with = "phase_margin")]
+    #[arg(long, value_name = "HZ", conflicts_with = "phase_margin")]
     bandwidth: Option<f64>,
     /// Objective: degrees that are to be left there; as stiff as that allows
-    #[arg(long, value_name = "DEGREES", default_value = "40", value_parser = degrees)]
+    #[arg(long, value_name = "DEGREES", default_value = "40")]
     phase_margin: f64,
     /// Highest speed of the measurement, of the motor's shaft (default: 120rpm, of a joint 600rpm)
     #[arg(long, value_name = "SPEED")]
@@ -57,13 +57,13 @@ pub(crate) struct Tune {
     #[arg(long, value_name = "CURRENT", default_value = "15A")]
     current: Amperes,
     /// Farthest that the shaft may turn from where it stands, in turns
-    #[arg(long, value_name = "TURNS", default_value = "40", value_parser = turns)]
+    #[arg(long, value_name = "TURNS", default_value = "40")]
     travel: f64,
     /// Time from one sample to the next
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = period)]
     period: Duration,
     /// Torque per ampere of another motor than the model's own, in N·m/A
-    #[arg(long, value_name = "NM_PER_A", value_parser = constant)]
+    #[arg(long, value_name = "NM_PER_A")]
     torque_constant: Option<f64>,
     /// Write the proposed values to the drive, and measure once more
     #[arg(long)]
@@ -78,29 +78,6 @@ pub(crate) struct Tune {
     cycles: CycleArgs,
     #[command(flatten)]
     guard: GuardArgs,
-}
-
-fn number(text: &str, what: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
-    match text.parse() {
-        Ok(value) if range.contains(&value) => Ok(value),
-        _ => Err(format!("expected {what} from {} to {}, got '{text}'", range.start(), range.end())),
-    }
-}
-
-fn hertz(text: &str) -> Result<f64, String> {
-    number(text, "a frequency in Hz", 0.1..=500.0)
-}
-
-fn degrees(text: &str) -> Result<f64, String> {
-    number(text, "degrees", 10.0..=80.0)
-}
-
-fn turns(text: &str) -> Result<f64, String> {
-    number(text, "turns", 0.1..=10_000.0)
-}
-
-fn constant(text: &str) -> Result<f64, String> {
-    number(text, "N·m/A", 1e-4..=1e3)
 }
 
 impl Tune {
@@ -132,7 +109,12 @@ impl Tune {
         let request = self.request(context, loops.usual_rpm);
         request.check()?;
         let guard = self.guard.begin(context, &drive).await?;
-        let done = host::tune::tune(&drive, &request, &context.progress, wants_back(context)).await;
+        let restorer = host::capture::Restorer::of(&drive);
+        context.restore_at_end(Restorer::Capture(restorer.clone()));
+        let done = host::tune::tune((&drive, &restorer), &request, &context.progress, wants_back(context)).await;
+        // What could not be put back is tried once more.
+        let left = context.restore().await.unwrap_or_default();
+        let done = done.map_err(|failure| host::capture::with_left(failure, &left));
         let released = Guard::end(guard, context, &drive, false).await;
         let report = done?;
         released?;

@@ -31,6 +31,15 @@ pub struct Kept {
 }
 
 impl Kept {
+    /// Whether a journal of this node can be kept there, for a caller that writes it later.
+    ///
+    /// # Errors
+    /// There is one already.
+    pub fn check_free(path: &Path, node: NodeId) -> Result<(), Failure> {
+        // A link that leads nowhere is there as well.
+        if path.symlink_metadata().is_ok() { Err(exists(path, node)) } else { Ok(()) }
+    }
+
     /// Writes it, whole and onto the disk itself, before anything is written to the node.
     ///
     /// # Errors
@@ -39,14 +48,7 @@ impl Kept {
         let file = OpenOptions::new().write(true).create_new(true).open(path);
         let mut file = match file {
             Ok(file) => file,
-            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-                return Err(Failure::new(format!("{} is there already; nothing was written", path.display()))
-                    .of_kind("journal_exists")
-                    .at_node(journal.node)
-                    .because("an earlier apply was not completed, or one is running now")
-                    .next(format!("undo it first: ferrodrive params rollback {} {}", journal.node, path.display()))
-                    .next("or delete that file to keep the node as it is"));
-            }
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => return Err(exists(path, journal.node)),
             Err(error) => return Err(Failure::of_writing("the journal", path, &error)),
         };
         let written = file.write_all(journal.print().as_bytes()).and_then(|()| file.sync_all());
@@ -75,6 +77,15 @@ impl Drop for Kept {
             ));
         }
     }
+}
+
+fn exists(path: &Path, node: NodeId) -> Failure {
+    Failure::new(format!("{} is there already; nothing was written", path.display()))
+        .of_kind("journal_exists")
+        .at_node(node)
+        .because("an earlier apply was not completed, or one is running now")
+        .next(format!("undo it first: ferrodrive params rollback {node} {}", path.display()))
+        .next("or delete that file to keep the node as it is")
 }
 
 fn remove(path: &Path) -> Result<(), Failure> {
