@@ -3,7 +3,7 @@
 //! Units are SI, positions are the drive's own counts, speeds are those of the motor shaft in r/min.
 
 use can::{Bitrate, Instant, Station};
-use canopen::NmtState;
+use canopen::{Mux, NmtState};
 use cia402::{ModeOfOperation, PowerState};
 use devices::{AxisId, Description};
 use drives::{Fidelity, RegisterError};
@@ -140,6 +140,11 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
 
     /// Names of the digital inputs, e.g. `X0`, `X1`; an input is addressed by its place in this list.
     fn inputs(&self) -> &'static [&'static str];
+
+    /// Values of analogue channels by the objects that show them, inputs before outputs (CiA 401: 6401h and 6411h), as converters have them.
+    fn analogue(&self) -> Vec<(Mux, i64)> {
+        Vec::new()
+    }
 
     /// The levels at the digital inputs now.
     fn input_levels(&self) -> Levels {

@@ -359,3 +359,30 @@ fn what_is_not_a_drive_is_not_moved_and_is_known_by_its_device_type() {
         assert_eq!(device_type & 0xFFFF, if name == "io401" { 0x0191 } else { 0x0196 });
     }
 }
+
+/// What `get` says, as a page or a program reads it: channels by the objects' words, in which `set` takes them.
+#[test]
+fn get_has_the_analogue_channels_and_the_position_of_an_encoder() {
+    let mut bench = Bench::new();
+    let get = |bench: &mut Bench, node: u8| -> serde_json::Value {
+        let answer = sim::command::answer(&mut bench.world, &format!("{node} get")).unwrap();
+        serde_json::from_str(&answer.json).unwrap()
+    };
+    bench.apply(MODULE, "set 6401:02 -1200");
+    bench.set(MODULE, 0x6411, 4, 2, 300);
+    let mut expected = serde_json::Map::new();
+    for (object, values) in [("6401", [0, -1200, 0, 0]), ("6411", [0, 0, 0, 300])] {
+        for (at, value) in values.into_iter().enumerate() {
+            expected.insert(format!("{object}:{:02X}", at + 1), value.into());
+        }
+    }
+    assert_eq!(get(&mut bench, MODULE)["analogue"], serde_json::Value::Object(expected));
+    turn(&mut bench, 150);
+    // 2.5 turns a second of 8192 steps; both are looked at in the same moment.
+    let steps = (shaft_turns(&mut bench) * 8192.0).floor().rem_euclid(8192.0 * 4096.0);
+    assert_eq!(get(&mut bench, ENCODER)["position"], steps as i64);
+    assert!(steps > 4096.0 && get(&mut bench, ENCODER).get("analogue").is_none());
+    bench.apply(MODULE, "power off");
+    bench.run_ms(10);
+    assert!(get(&mut bench, MODULE).get("analogue").is_none(), "without power nothing is converted");
+}

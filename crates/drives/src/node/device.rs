@@ -10,6 +10,7 @@ use devices::Description;
 use devices::variant::Variant;
 
 use super::described::{Described, DescribedDevice, Loss, described_station};
+use super::encoder;
 use super::profile::Profile;
 use super::{Memory, Overheard};
 use crate::engine::device::{Application, Device, ResetTimes};
@@ -59,6 +60,16 @@ impl<S: Storage> DescribedNode<S> {
             self.profile.set_input(self.base.device.values_mut(), line, level);
             self.notice(now);
         }
+    }
+
+    /// Values of the analogue channels by their objects (CiA 401): inputs, then outputs. None without power.
+    pub fn analogue(&self) -> impl Iterator<Item = (Mux, i64)> {
+        self.is_running().then(|| self.profile.analogue(self.values())).into_iter().flatten()
+    }
+
+    /// The position that an encoder shows, 6004h; `None` without power, and of what is not an encoder.
+    pub fn encoder_position(&self) -> Option<i64> {
+        (self.is_encoder() && self.is_running()).then(|| self.values().view().value(encoder::POSITION).ok()).flatten()
     }
 
     /// It is an encoder (CiA 406), which [sees](Self::see_shaft) a shaft.

@@ -107,6 +107,14 @@ impl Io {
         8 * count(values, DIGITAL_OUTPUT, MOST_LINES / 8)
     }
 
+    /// Values of the 16-bit channels by their objects: inputs (6401h), then outputs (6411h).
+    pub(super) fn analogue(values: &Dictionary<impl Storage>) -> impl Iterator<Item = (Mux, i64)> {
+        [ANALOGUE_INPUT, ANALOGUE_OUTPUT].into_iter().flat_map(move |index| {
+            (1..=u8::MAX - 1)
+                .map_while(move |sub_index| Some((Mux::new(index, sub_index), value(values, index, sub_index)?)))
+        })
+    }
+
     /// The firmware starts over: outputs are as their objects have them as delivered, the inputs as they are.
     pub(super) fn restart(&mut self, values: &mut Dictionary<impl Storage>) {
         for sub_index in 1..=MOST_LINES / 8 {

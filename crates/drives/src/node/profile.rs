@@ -91,6 +91,10 @@ impl Profile {
         }
     }
 
+    pub(super) fn analogue(&self, values: &Dictionary<impl Storage>) -> impl Iterator<Item = (Mux, i64)> {
+        matches!(self, Self::Io(_)).then(|| Io::analogue(values)).into_iter().flatten()
+    }
+
     pub(super) fn set_input(&mut self, values: &mut Dictionary<impl Storage>, line: u8, level: bool) {
         if let Self::Io(io) = self {
             io.set_input(values, line, level);

@@ -176,6 +176,9 @@ struct Got<'a> {
     supply_v: f64,
     inputs: BTreeMap<&'a str, u8>,
     outputs: BTreeMap<&'a str, u8>,
+    /// By the objects' words, as `set` has them: `6401:01`.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    analogue: BTreeMap<String, i64>,
     brake: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     output_shaft: Option<Output>,
@@ -226,9 +229,15 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
     let measured = world.with_drive(place.node, |drive, now| {
         drive.advance(now);
         drive.check_axis(place.axis)?;
-        Ok::<_, CommandError>((drive.model(), drive.bitrate(), drive.report_of(place.axis), drive.input_levels()))
+        Ok::<_, CommandError>((
+            drive.model(),
+            drive.bitrate(),
+            drive.report_of(place.axis),
+            drive.input_levels(),
+            drive.analogue(),
+        ))
     });
-    let (model, bitrate, report, inputs) = measured.map_err(|_| no_such_drive(world, place.node))??;
+    let (model, bitrate, report, inputs, analogue) = measured.map_err(|_| no_such_drive(world, place.node))??;
     let Report { node, powered, position, velocity_rpm, current_a, supply_v, .. } = report;
     let counters = world.counters(id);
     Ok(json::line(&Got {
@@ -246,6 +255,10 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
         supply_v,
         inputs: levels(inputs),
         outputs: levels(report.outputs),
+        analogue: analogue
+            .into_iter()
+            .map(|(mux, value)| (format!("{:04X}:{:02X}", mux.index, mux.sub_index), value))
+            .collect(),
         brake: brake_text(report.brake),
         output_shaft: report.output.map(Output::from),
         damage: report.damage,

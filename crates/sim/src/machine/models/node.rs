@@ -299,7 +299,8 @@ impl VirtualDrive for NodeMachine {
         let node = self.firmware.node_id().raw();
         let outputs =
             Levels { names: &OUTPUTS[..usize::from(self.firmware.lines()[1])], bits: self.firmware.levels()[1] };
-        Report { node, powered, power: self.phase(), nmt, supply_v, outputs, ..Report::default() }
+        let position = self.firmware.encoder_position().unwrap_or(0);
+        Report { node, powered, power: self.phase(), nmt, position, supply_v, outputs, ..Report::default() }
     }
 
     fn inputs(&self) -> &'static [&'static str] {
@@ -308,6 +309,10 @@ impl VirtualDrive for NodeMachine {
 
     fn input_levels(&self) -> Levels {
         Levels { names: self.inputs(), bits: self.firmware.levels()[0] }
+    }
+
+    fn analogue(&self) -> Vec<(Mux, i64)> {
+        self.firmware.analogue().collect()
     }
 
     fn reads_a_shaft(&self) -> bool {
