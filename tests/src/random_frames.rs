@@ -1,5 +1,5 @@
-//! Random frames against every kind of node: each virtual drive, the servo of CiA 402, and a device whose file has every service of
-//! CiA 301 that a described device acts on.
+//! Random frames against every kind of node: each virtual drive, the servo of CiA 402, inputs and outputs of CiA 401, an encoder of
+//! CiA 406, and a device whose file has every service of CiA 301 that a described device acts on.
 //!
 //! `cargo run -p ferrodrive-tests --example random_frames -- 10000000` does it for as many frames as are said; a short form
 //! is among the tests.
@@ -31,7 +31,7 @@ pub struct Seen {
     pub others: u64,
 }
 
-/// Every kind: the models that are built in, and the device of `everything`.
+/// Every kind: the models that are built in, drives and what stands beside them, and the device of `everything`.
 ///
 /// # Panics
 /// If the file makes no description.
@@ -39,7 +39,8 @@ pub struct Seen {
 pub fn kinds() -> Vec<&'static Description> {
     let read = eds::Eds::load(&everything()).expect("the file is read");
     let described = eds::keep(&read.eds).expect("the file makes a description");
-    models().chain([described]).collect()
+    let beside = ["io401", "encoder406"].map(|name| words::models::resolve(name).expect("it is built in"));
+    models().chain(beside).chain([described]).collect()
 }
 
 /// `frames` frames to a kind of node, all from one seed.
