@@ -21,10 +21,7 @@ use std::sync::PoisonError;
 
 use crate::call::{CallError, Called};
 use held::{Held, instance};
-use status::{ERROR, FATAL, OK, Status};
-
-/// What the importer reads of a panic.
-const DEFECT: &str = "a defect of Ferrodrive; please report it with what was called";
+use status::{DEFECT, ERROR, FATAL, OK, Status};
 
 /// Carries out a call on an instance; what goes wrong is reported to the importer's log. After a panic the instance is of no use
 /// until it is reset.

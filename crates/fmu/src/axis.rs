@@ -20,7 +20,7 @@ use words::drive::DriveSpec;
 use crate::config::{AxisConfig, ConfigError, TargetKind, bitrate};
 use crate::surroundings::{OUTPUTS, Surroundings, measured};
 use crate::variable::{Causality, Reference, Value, Variable};
-use lead::{Led, Wishes, lead, mode_of};
+use lead::{Led, Shared, lead, mode_of};
 
 const SYNC_PERIOD: Reference = 7;
 const ENABLE: Reference = 20;
@@ -66,13 +66,6 @@ pub struct AxisUnit {
     /// When the report was taken, to be taken again when it is asked for later.
     looked_at: Option<Instant>,
     now: Instant,
-}
-
-/// What importer and master say to each other.
-#[derive(Clone, Default)]
-struct Shared {
-    wishes: Wishes,
-    led: Led,
 }
 
 /// Drive and master on their bus.

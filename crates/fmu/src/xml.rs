@@ -1,55 +1,22 @@
 //! The descriptions that an FMU carries: of its variables (FMI 3.0, 2.4), of its networks and of the layered standard.
 
 mod fmi2;
+mod parts;
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use words::escaped;
 
-use crate::config::{Config, DriveConfig, TxClock};
+use crate::config::{Config, TxClock};
 use crate::unit::Unit;
 use crate::variable::{Causality, Reference, Terminal, Variable};
+use parts::{LOG_CATEGORIES, units};
+pub use parts::{MODEL_IDENTIFIER, token};
 
 /// The value reference of time.
 pub const TIME: Reference = 0;
-/// The name of the library in the FMU, without its ending.
-pub const MODEL_IDENTIFIER: &str = "ferrodrive_fmu";
-
 const MIME_TYPE: &str = "application/org.fmi-standard.fmi-ls-bus.can; version=&quot;1.0.0&quot;";
-
-/// Units by the exponents of SI's base units (FMI 3.0, 2.4.3).
-const UNITS: [(&str, &str); 7] = [
-    ("rad", r#"rad="1""#),
-    ("rad/s", r#"rad="1" s="-1""#),
-    ("s", r#"s="1""#),
-    ("N.m", r#"kg="1" m="2" s="-2""#),
-    ("A", r#"A="1""#),
-    ("V", r#"kg="1" m="2" s="-3" A="-1""#),
-    ("degC", r#"K="1" offset="273.15""#),
-];
-
-/// What messages are about (FMI 2.0.5 and 3.0, 2.2.4).
-const LOG_CATEGORIES: &str = "  <LogCategories>\n    <Category name=\"logStatusError\"/>\n    <Category \
-    name=\"logStatusFatal\"/>\n  </LogCategories>\n";
-
-/// The definitions of [`UNITS`].
-fn units() -> String {
-    let unit = |(unit, exponents)| format!("    <Unit name=\"{unit}\"><BaseUnit {exponents}/></Unit>\n");
-    format!("  <UnitDefinitions>\n{}  </UnitDefinitions>\n", UNITS.map(unit).concat())
-}
-
-/// What an importer has to hand back at instantiation: another one is of another FMU.
-/// The file in `resources` that describes a drive counts.
-pub fn token(config: &Config, resources: &Path) -> String {
-    let version = env!("CARGO_PKG_VERSION");
-    let mut sum = crc32fast::Hasher::new();
-    sum.update(config.text().as_bytes());
-    if let Some(name) = config.drive().and_then(DriveConfig::file) {
-        sum.update(&std::fs::read(resources.join(name)).unwrap_or_default());
-    }
-    format!("ferrodrive-{version}-{:08x}", sum.finalize())
-}
 
 /// `modelDescription.xml`.
 pub fn model_description(config: &Config, resources: &Path, unit: &Unit) -> String {

@@ -240,3 +240,130 @@ pub unsafe extern "C" fn fmi2GetString(
 pub extern "C" fn fmi2SetString(h: *mut c_void, _vr: *const u32, nvr: usize, _values: *const c_void) -> Status {
     call(h, |_| if nvr == 0 { Ok(()) } else { wrong("no variable for fmi2SetString") })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ptr::{null, null_mut};
+
+    use super::super::states;
+    use super::super::status::{FATAL, OK};
+    use super::*;
+    use crate::config::{AxisConfig, DriveConfig, FILE, TargetKind, TxClock};
+
+    /// A folder of resources that is removed at the end.
+    struct Resources(std::path::PathBuf);
+
+    impl Drop for Resources {
+        fn drop(&mut self) {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+
+    fn resources(name: &str) -> (Resources, CString, CString) {
+        let drive = "zlac8030l@4,timing=ideal,fidelity=mechanical".to_owned();
+        let drive = DriveConfig { drive, bitrate: 500_000, clock: TxClock::Triggered };
+        let config = Config::Axis(AxisConfig { mode: TargetKind::Velocity, drive });
+        let folder = std::env::temp_dir().join(format!("ferrodrive fmi2 {name} {}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join(FILE), config.text()).unwrap();
+        let uri = format!("file://{}", folder.display()).replace(' ', "%20");
+        let guid = crate::xml::token(&config, &folder);
+        (Resources(folder), CString::new(uri).unwrap(), CString::new(guid).unwrap())
+    }
+
+    fn instantiate(kind: c_int, guid: &CStr, uri: &CStr) -> *mut c_void {
+        // SAFETY: texts that live as long as the call; there are no callbacks.
+        unsafe { fmi2Instantiate(c"it".as_ptr(), kind, guid.as_ptr(), uri.as_ptr(), null(), 0, 0) }
+    }
+
+    #[test]
+    fn an_instance_is_made_for_co_simulation_of_this_fmu() {
+        let (_resources, uri, guid) = resources("made");
+        for (kind, guid, uri) in
+            [(0, &*guid, &*uri), (1, c"of another", &*uri), (1, &*guid, c"file:///nowhere"), (1, &*guid, c"http://x/y")]
+        {
+            assert!(instantiate(kind, guid, uri).is_null());
+        }
+        let handle = instantiate(CO_SIMULATION, &guid, &uri);
+        assert!(!handle.is_null());
+        assert_eq!(fmi2EnterInitializationMode(handle), OK);
+        assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, 0.0, 0, 0.0), ERROR);
+        fmi2FreeInstance(handle);
+        assert_eq!(fmi2ExitInitializationMode(handle), ERROR);
+        fmi2FreeInstance(handle);
+        fmi2FreeInstance(null_mut());
+    }
+
+    /// One call with arguments of no sense, but for memory, which is the importer's word.
+    fn any_call(handle: *mut c_void, state: &mut *mut c_void, mut random: impl FnMut(u32) -> u32) -> Status {
+        let references = [random(30), 200 + random(20), 400 + random(8), random(u32::MAX)].map(|it| it % 1_000);
+        let reals = [0.0, 1.0, -3.0, f64::NAN, f64::INFINITY, 1e300, 1e-3, -1e-3];
+        let real = reals[random(8) as usize];
+        let (mut read, mut whole, mut text) = ([real; 4], [random(u32::MAX) as c_int; 4], [null(); 4]);
+        let count = random(5) as usize;
+        let (vr, n) = (if random(10) == 0 { null() } else { references.as_ptr() }, count);
+        // SAFETY: arrays of four values, of which as many are meant or fewer, or null.
+        unsafe {
+            match random(20) {
+                0 => fmi2GetReal(handle, vr, n, read.as_mut_ptr()),
+                1 => fmi2SetReal(handle, vr, n, read.as_ptr()),
+                2 => fmi2GetInteger(handle, vr, n, whole.as_mut_ptr()),
+                3 => fmi2SetInteger(handle, vr, n, whole.as_ptr()),
+                4 => fmi2GetBoolean(handle, vr, n, whole.as_mut_ptr()),
+                5 => fmi2SetBoolean(handle, vr, n, whole.as_ptr()),
+                6 => fmi2GetString(handle, vr, n, text.as_mut_ptr()),
+                7 => fmi2SetString(handle, vr, n, null()),
+                8 => fmi2DoStep(handle, real, reals[random(8) as usize], 0),
+                9 => fmi2SetupExperiment(handle, 0, 0.0, real, 1, reals[random(8) as usize]),
+                10 if random(20) == 0 => fmi2Terminate(handle),
+                10 => fmi2EnterInitializationMode(handle),
+                11 => fmi2ExitInitializationMode(handle),
+                12 if random(20) == 0 => fmi2Reset(handle),
+                13 if random(20) == 0 => states::fmi2GetFMUstate(handle, state),
+                14 => states::fmi2SetFMUstate(handle, random(100) as *mut c_void),
+                15 => states::fmi2SerializeFMUstate(handle, *state, null_mut(), random(9) as usize),
+                16 => states::fmi2DeSerializeFMUstate(handle, whole.as_ptr().cast(), 16, state),
+                17 => fmi2GetReal(handle, vr, n, null_mut()),
+                18 => super::super::unsupported::fmi2CancelStep(handle),
+                // A step that makes sense where time stands.
+                _ => {
+                    let mut now = [0.0];
+                    match fmi2GetReal(handle, [0].as_ptr(), 1, now.as_mut_ptr()) {
+                        OK => fmi2DoStep(handle, now[0], 1e-4, 0),
+                        status => status,
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn ten_thousand_calls_of_no_sense_are_taken_or_end_with_an_error() {
+        let (_resources, uri, guid) = resources("calls");
+        let handle = instantiate(CO_SIMULATION, &guid, &uri);
+        let mut random = sim::Prng::new(1);
+        let (mut state, mut seen) = (null_mut(), [0; 5]);
+        for _ in 0..10_000 {
+            let status = any_call(handle, &mut state, |below| (random.next_u64() % u64::from(below)) as u32);
+            assert!(matches!(status, OK | ERROR), "{status}");
+            seen[status as usize] += 1;
+        }
+        assert!(seen[OK as usize] > 1_000 && seen[ERROR as usize] > 1_000 && seen[FATAL as usize] == 0, "{seen:?}");
+        // It is as good as new.
+        assert_eq!((fmi2Reset(handle), fmi2EnterInitializationMode(handle)), (OK, OK));
+        assert_eq!((fmi2ExitInitializationMode(handle), fmi2DoStep(handle, 0.0, 1e-3, 0)), (OK, OK));
+        fmi2FreeInstance(handle);
+    }
+
+    #[test]
+    fn a_step_ends_at_the_stop_time() {
+        let (_resources, uri, guid) = resources("stop");
+        let handle = instantiate(CO_SIMULATION, &guid, &uri);
+        assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, 5.0, 1, 4.0), ERROR);
+        assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, 5.0, 1, 5.002), OK);
+        assert_eq!((fmi2EnterInitializationMode(handle), fmi2ExitInitializationMode(handle)), (OK, OK));
+        let steps = [5.0, 5.001, 5.002].map(|from| fmi2DoStep(handle, from, 1e-3, 0));
+        assert_eq!(steps, [OK, OK, ERROR]);
+        fmi2FreeInstance(handle);
+    }
+}

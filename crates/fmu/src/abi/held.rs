@@ -7,8 +7,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use super::DEFECT;
-use super::status::{ERROR, FATAL, LogMessage, Logger, Status};
+use super::status::{DEFECT, ERROR, FATAL, LogMessage, Logger, Status};
 use crate::config::Config;
 use crate::instance::Instance;
 use crate::state::SavedState;

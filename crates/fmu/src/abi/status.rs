@@ -8,6 +8,9 @@ pub(super) const OK: Status = 0;
 pub(super) const ERROR: Status = 3;
 pub(super) const FATAL: Status = 4;
 
+/// What the importer reads of a panic.
+pub(super) const DEFECT: &str = "a defect of Ferrodrive; please report it with what was called";
+
 /// `fmi3LogMessageCallback`.
 pub(super) type LogMessage = Option<unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char)>;
 

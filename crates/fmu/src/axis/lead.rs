@@ -10,12 +10,18 @@ use master::cyclic::{CyclicDrive, CyclicError, CyclicOptions, CyclicState, Deman
 use master::units::{Amperes, Rpm, Turns};
 use master::{Drive, Network, NoCycle};
 
-use super::Shared;
 use crate::config::TargetKind;
 
 /// How long it is waited for a drive to boot, and after a set-up that failed.
 const BOOT_LIMIT: Duration = Duration::from_secs(60);
 const RETRY: Duration = Duration::from_millis(100);
+
+/// What importer and master say to each other.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Shared {
+    pub(super) wishes: Wishes,
+    pub(super) led: Led,
+}
 
 /// What the importer wants.
 #[derive(Clone, Copy, Debug, Default)]

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use words::escaped;
 
-use super::{LOG_CATEGORIES, MODEL_IDENTIFIER, token, units};
+use super::parts::{LOG_CATEGORIES, MODEL_IDENTIFIER, token, units};
 use crate::config::{AxisConfig, Config};
 use crate::fmi2::Kind;
 use crate::variable::{Causality, Variable};
