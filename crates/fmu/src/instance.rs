@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::call::{CallError, Called, refused};
 use crate::config::{Config, ConfigError, TxClock};
+use crate::fmi2::Kind;
 use crate::journal::Journal;
 use crate::unit::{Action, Unit};
 use crate::variable::{Causality, Reference, Terminal, Value, Variable};
@@ -298,7 +299,7 @@ impl Instance {
         let variable = variable.ok_or_else(|| unknown(reference))?;
         let name = variable.name.clone();
         if value.type_name() != variable.value.type_name() {
-            let (wanted, given) = (variable.value.type_name(), value.type_name());
+            let [wanted, given] = [&variable.value, &value].map(|value| self.type_name(value));
             return refused(format!("{name} is a {wanted}, not a {given}"));
         }
         let before = matches!(self.rest.mode, Mode::Instantiated | Mode::Initialization);
@@ -389,11 +390,20 @@ impl Instance {
         Ok(())
     }
 
+    const fn is_of_fmi2(&self) -> bool {
+        matches!(self.config, Config::Axis(_))
+    }
+
+    /// The type of a value in the instance's version of FMI.
+    const fn type_name(&self, value: &Value) -> &'static str {
+        if self.is_of_fmi2() { Kind::of(value).element() } else { value.type_name() }
+    }
+
     fn expect(&self, modes: &[Mode], call: &str) -> Called<()> {
         if modes.contains(&self.rest.mode) {
             return Ok(());
         }
-        let version = if matches!(self.config, Config::Axis(_)) { 2 } else { 3 };
+        let version = if self.is_of_fmi2() { 2 } else { 3 };
         refused(format!("fmi{version}{call} in the mode {:?}; expected {modes:?}", self.rest.mode))
     }
 

@@ -225,7 +225,7 @@ pub unsafe extern "C" fn fmi2GetString(
         for (reference, place) in references.iter().zip(values) {
             let text = match held.instance.get(*reference)? {
                 Value::String(text) => CString::new(text).unwrap_or_default(),
-                other => return wrong(format!("variable {reference} is a {}", kind_of(&other))),
+                other => return wrong(format!("variable {reference} is of type {}", kind_of(&other))),
             };
             // The text stays where it is when its owner moves.
             *place = text.as_ptr();

@@ -31,7 +31,7 @@ pub(super) unsafe fn read<T>(
         for (reference, place) in references.iter().zip(values) {
             let value = held.instance.get(*reference)?;
             let kind = kind_of(&value);
-            let Some(value) = take(value) else { return wrong(format!("variable {reference} is a {kind}")) };
+            let Some(value) = take(value) else { return wrong(format!("variable {reference} is of type {kind}")) };
             *place = value;
         }
         Ok(())

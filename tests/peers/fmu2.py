@@ -1,0 +1,167 @@
+"""Checks of `ferrodrive fmu --fmi 2`: FMPy validates and steps a drive with its master by FMI 2.0."""
+
+import ctypes
+import math
+import random
+import tempfile
+
+import fmpy
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
+from fmpy.validation import validate_fmu
+
+from checks import check, equal, near, true
+from drive import ZLAC8030L
+from fmu import pack
+
+FMI2 = ["--fmi", "2"]
+READY = ["zlac8030l@4,timing=ideal", *FMI2]
+
+
+class Instance:
+    """An instance by FMPy's own classes, its variables by their names, in steps of 1 ms."""
+
+    def __init__(self, path, folder, guid=None):
+        description = fmpy.read_model_description(path)
+        self.reference = {variable.name: variable.valueReference for variable in description.modelVariables}
+        self.fmu = FMU2Slave(
+            guid=guid or description.guid,
+            unzipDirectory=fmpy.extract(path, unzipdir=tempfile.mkdtemp(dir=folder)),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="100 %s",
+        )
+        self.fmu.instantiate()
+        self.time = 0.0
+
+    def begin(self):
+        self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+
+    def run(self, steps):
+        for _ in range(steps):
+            self.fmu.doStep(currentCommunicationPoint=self.time, communicationStepSize=1e-3)
+            self.time += 1e-3
+
+    def set(self, **values):
+        for name, value in values.items():
+            put = self.fmu.setBoolean if isinstance(value, bool) else self.fmu.setReal
+            put([self.reference[name]], [value])
+
+    def real(self, name):
+        return self.fmu.getReal([self.reference[name]])[0]
+
+    def true(self, name):
+        return bool(self.fmu.getBoolean([self.reference[name]])[0])
+
+    def text(self, name):
+        return self.fmu.getString([self.reference[name]])[0].decode()
+
+
+@check("FMPy finds nothing wrong with the FMUs of drives with a master (FMI 2.0)", ZLAC8030L)
+def valid(bench):
+    with tempfile.TemporaryDirectory() as folder:
+        for words in (READY, [*READY, "--mode", "torque"], ["m4230e17b50@5", *FMI2, "--mode", "position"]):
+            equal(validate_fmu(pack(bench, folder, *words)), [], f"problems of {words}")
+
+
+@check("FMPy turns, loads and stops a drive by numbers (FMI 2.0)", ZLAC8030L)
+def turned(bench):
+    with tempfile.TemporaryDirectory() as folder:
+        drive = Instance(pack(bench, folder, *READY), folder)
+        drive.begin()
+        drive.set(target_velocity=2 * math.pi)
+        drive.run(500)
+        equal((drive.real("velocity"), drive.true("follows")), (0.0, False), "speed without enable")
+        drive.set(enable=True)
+        drive.run(1500)
+        near(drive.real("velocity"), 2 * math.pi, 0.05, "60 r/min in rad/s")
+        before = drive.real("current")
+        drive.set(load_torque=2.0)
+        drive.run(500)
+        near(drive.real("velocity"), 2 * math.pi, 0.05, "60 r/min under load in rad/s")
+        true(drive.real("current") > before + 0.5, "2 N·m take more current")
+        drive.set(load_torque=0.0, stop=True)
+        drive.run(700)
+        near(drive.real("velocity"), 0.0, 0.01, "speed after a stop in rad/s")
+        true("enable has been false" in drive.text("refusal"), drive.text("refusal"))
+        equal(drive.fmu.getInteger([drive.reference["statusword"]])[0] & 0x6F, 0x07, "Quick stop active (CiA 402-2, table 29)")
+        drive.fmu.terminate()
+        drive.fmu.freeInstance()
+
+
+@check("a state that FMPy takes back, also from bytes, goes on alike (FMI 2.0)", ZLAC8030L)
+def states(bench):
+    with tempfile.TemporaryDirectory() as folder:
+        drive = Instance(pack(bench, folder, *READY), folder)
+        drive.begin()
+        drive.set(enable=True, target_velocity=3.0)
+        drive.run(900)
+        state = drive.fmu.getFMUstate()
+        data = drive.fmu.serializeFMUstate(state)
+        begin = drive.time
+
+        def onward():
+            drive.time = begin
+            drive.set(load_torque=1.0)
+            seen = []
+            for _ in range(200):
+                drive.run(1)
+                seen.append([drive.real(name) for name in ("angle", "velocity", "current", "actual_velocity")])
+            return seen
+
+        first = onward()
+        drive.fmu.setFMUstate(state)
+        equal(onward(), first, "from the state")
+        drive.fmu.setFMUstate(drive.fmu.deSerializeFMUstate(data))
+        equal(onward(), first, "from its bytes")
+        drive.fmu.freeFMUstate(state)
+        drive.fmu.freeInstance()
+
+
+@check("calls of no sense are answered with fmi2Error, and the process lives (FMI 2.0)", ZLAC8030L)
+def wrong(bench):
+    with tempfile.TemporaryDirectory() as folder:
+        path = pack(bench, folder, *READY)
+        refused(lambda: Instance(path, folder, guid="of another"), "a wrong GUID")
+        drive = Instance(path, folder)
+        refused(lambda: drive.run(1), "a step before initialization")
+        drive.begin()
+        drive.run(1)
+        refused(lambda: drive.fmu.doStep(0.0, 1e-3), "a step backwards")
+        refused(lambda: drive.fmu.doStep(1e-3, -1e-3), "a step that takes time away")
+        refused(lambda: drive.fmu.getReal([12345]), "a variable that is not there")
+        refused(lambda: drive.fmu.getInteger([drive.reference["angle"]]), "a variable of another type")
+        refused(lambda: drive.set(target_velocity=math.nan), "not a number")
+        refused(lambda: drive.set(sync_period=0.01), "a parameter while it runs")
+        refused(lambda: drive.fmu.setFMUstate(ctypes.c_void_p(99)), "a state that is not one")
+        chance = random.Random(1)
+        done = 0
+        for _ in range(3000):
+            reference, value = chance.choice([0, 7, 20, 23, 10, 11, 208, 402, chance.getrandbits(32)]), chance.uniform(-1e6, 1e6)
+            call, *arguments = chance.choice([
+                (drive.fmu.getReal, [reference]), (drive.fmu.getBoolean, [reference]), (drive.fmu.getString, [reference]),
+                (drive.fmu.getInteger, [reference]), (drive.fmu.setReal, [reference], [value]),
+                (drive.fmu.setInteger, [reference], [int(value)]), (drive.fmu.setBoolean, [reference], [value > 0]),
+                (drive.fmu.doStep, value, value),
+            ])  # fmt: skip
+            try:
+                call(*arguments)
+                done += 1
+            except FMICallException as error:
+                equal(error.status, 3, f"status of {call.__name__}{arguments}")
+        true(100 < done < 2900, f"{done} of 3000 were taken")
+        drive.run(10)
+        drive.fmu.freeInstance()
+
+
+def refused(call, what):
+    """fmi2Error, or an instance that was not made, for which FMPy has a plain exception."""
+    try:
+        call()
+    except FMICallException as error:
+        equal(error.status, 3, f"status of {what}")
+    except Exception as error:
+        true("instantiate" in str(error), f"{what}: {error!r}")
+    else:
+        raise AssertionError(f"{what} was taken")
