@@ -51,10 +51,11 @@ pub struct Options {
     pub origins: Vec<String>,
 }
 
-/// Serves those who watch, until it is dropped.
+/// Serves those who watch, until it is [finished](Self::finish) or dropped. A drop does not wait: its thread closes the connections as long
+/// as the process lives.
 pub struct Server {
     address: SocketAddr,
-    pieces: Option<mpsc::Sender<Piece>>,
+    pieces: mpsc::Sender<Piece>,
     shared: Arc<Shared>,
     /// Closed when the thread has ended.
     ended: std::sync::mpsc::Receiver<()>,
@@ -86,7 +87,7 @@ impl Server {
             let serving = serve(listener, options, Rc::clone(&clients), incoming, &of_thread);
             let _: io::Result<()> = LocalSet::new().block_on(&runtime, serving);
         })?;
-        Ok(Self { address, pieces: Some(pieces), shared, ended })
+        Ok(Self { address, pieces, shared, ended })
     }
 
     /// Where it listens, with the real port.
@@ -102,9 +103,17 @@ impl Server {
     /// Shows what has happened. This never waits: where the server's thread is behind, the batch is left out, and a
     /// status message reports it.
     pub fn show(&self, batch: Batch) {
-        let samples = batch.samples() as u64;
+        let entries = batch.samples() + batch.frames.len() + batch.marks.len();
         if self.is_watched() && !self.hand(Piece::Batch(Box::new(batch))) {
-            self.shared.lost.fetch_add(samples, Ordering::Relaxed);
+            self.leave_out(entries);
+        }
+    }
+
+    /// Notes that so many samples, frames or events did not find room before they could be shown: a status message reports them to those
+    /// who watch.
+    pub fn leave_out(&self, entries: usize) {
+        if self.is_watched() {
+            self.shared.lost.fetch_add(entries as u64, Ordering::Relaxed);
         }
     }
 
@@ -114,15 +123,15 @@ impl Server {
     }
 
     fn hand(&self, piece: Piece) -> bool {
-        self.pieces.as_ref().is_some_and(|pieces| pieces.try_send(piece).is_ok())
+        self.pieces.try_send(piece).is_ok()
     }
-}
 
-impl Drop for Server {
-    /// What was shown reaches those who read it in good time; then their connections are closed.
-    fn drop(&mut self) {
-        self.pieces = None;
-        let _ = self.ended.recv_timeout(PARTING_PATIENCE * 2);
+    /// Waits until what was shown has reached those who read it in good time, 1 s at most, and their connections are closed. Not for a
+    /// program that has something to stop first.
+    pub fn finish(self) {
+        let Self { pieces, ended, .. } = self;
+        drop(pieces);
+        let _ = ended.recv_timeout(PARTING_PATIENCE * 2);
     }
 }
 
@@ -150,7 +159,9 @@ async fn serve(
         }
         let lost = shared.lost.swap(0, Ordering::Relaxed);
         if lost > 0 {
-            clients.warn(&format!("{lost} samples were left out: this machine has no time to show them"));
+            clients.warn(&format!(
+                "{lost} samples, frames and events were left out: this machine has no time to show them"
+            ));
         }
         // Clients have their turn before the next batch, however fast those come.
         tokio::task::yield_now().await;

@@ -6,6 +6,6 @@ use std::sync::atomic::{AtomicU64, AtomicUsize};
 #[derive(Default)]
 pub(crate) struct Shared {
     pub(crate) subscriptions: AtomicUsize,
-    /// Samples that did not find room on their way to the thread.
+    /// Samples, frames and events that did not find room on their way to the thread.
     pub(crate) lost: AtomicU64,
 }

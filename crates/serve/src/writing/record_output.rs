@@ -38,7 +38,7 @@ impl RecordOutput {
     /// # Errors
     /// The file is not whole.
     pub fn finish(self, patience: Duration) -> Result<(), Failure> {
-        drop(self.viewers);
+        self.viewers.into_iter().for_each(Server::finish);
         self.file.map_or(Ok(()), |file| file.finish(patience))
     }
 }
