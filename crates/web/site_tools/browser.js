@@ -5,6 +5,7 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { extname, join, normalize } from "node:path";
+import { gzipSync } from "node:zlib";
 
 const { SITE, PICTURES } = process.env;
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm", ".tgz": "application/gzip" };
@@ -16,8 +17,25 @@ let driver, session, profile;
 export const asked = [];
 export let server, address;
 
+/** Sends a file compressed, as static hosts do, on a line of so many Mbit/s that all files share. */
+function slowly(mbit_s) {
+  const PIECE = 16_384;
+  let free_at = 0;
+  return async (answer, content) => {
+    const bytes = gzipSync(content, { level: 9 });
+    for (let at = 0; at < bytes.length; at += PIECE) {
+      const piece = bytes.subarray(at, at + PIECE);
+      free_at = Math.max(free_at, performance.now()) + (piece.length * 8) / (mbit_s * 1000);
+      await new Promise((resolve) => setTimeout(resolve, free_at - performance.now()));
+      answer.write(piece);
+    }
+    answer.end();
+  };
+}
+
 /** `answered` may answer a request in place of the folder, by returning true; `changed` may change the text of a file. */
-function serve({ answered = () => false, changed = (_, content) => content }) {
+function serve({ answered = () => false, changed = (_, content) => content, mbit_s = null }) {
+  const send = mbit_s && slowly(mbit_s);
   server = createServer((request, answer) => {
     const path = new URL(request.url, "http://host").pathname;
     asked.push(path);
@@ -25,7 +43,9 @@ function serve({ answered = () => false, changed = (_, content) => content }) {
     const name = normalize(path.replace(/^\/try\//, "")) || "index.html";
     try {
       const content = readFileSync(join(SITE, name === "." ? "index.html" : name));
-      answer.writeHead(200, { "content-type": TYPES[extname(name)] ?? "text/html" }).end(changed(name, content));
+      const type = { "content-type": TYPES[extname(name)] ?? "text/html" };
+      if (send) send(answer.writeHead(200, { ...type, "content-encoding": "gzip" }), content);
+      else answer.writeHead(200, type).end(changed(name, content));
     } catch {
       answer.writeHead(404).end();
     }
