@@ -62,6 +62,18 @@ pub(crate) enum Restorer {
     Conform(conform::Restorer),
     /// Of a capture.
     Capture(host::capture::Restorer),
+    /// Of the captures of a host.
+    Captures(host::capture::WaysBack),
+}
+
+impl Restorer {
+    /// Something may be left to put back.
+    fn has_written(&self) -> bool {
+        match self {
+            Self::Conform(_) | Self::Capture(_) => true,
+            Self::Captures(ways_back) => !ways_back.is_empty(),
+        }
+    }
 }
 
 /// A model that need not be found out.
@@ -205,15 +217,16 @@ impl Context {
 
     /// The command may have written what is to be put back.
     pub(crate) fn is_to_restore(&self) -> bool {
-        self.restorer.borrow().is_some()
+        self.restorer.borrow().as_ref().is_some_and(Restorer::has_written)
     }
 
     /// Puts back what the command has written, if it has; what could not be.
     pub(crate) async fn restore(&self) -> Option<Vec<String>> {
-        let restorer = self.restorer.take()?;
+        let restorer = self.restorer.take().filter(Restorer::has_written)?;
         Some(match restorer {
             Restorer::Conform(restorer) => restorer.restore().await,
             Restorer::Capture(restorer) => restorer.restore().await,
+            Restorer::Captures(ways_back) => ways_back.restore().await,
         })
     }
 

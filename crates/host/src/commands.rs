@@ -91,6 +91,7 @@ impl Host {
             NodeCommand::Read(reading) => self.read_parameters(node, reading, asked),
             NodeCommand::Change(change) => self.change_parameters(node, change, asked),
             NodeCommand::Pdos(command) => self.take_pdos(node, command, asked),
+            NodeCommand::Capture(command) => self.take_capture(node, command, asked),
             NodeCommand::Jog { rpm } => self.take_jog(node, rpm, asked),
             NodeCommand::Drive(command) => self.take_motion(node, command, asked),
         }
@@ -226,6 +227,7 @@ impl Host {
             }
             Done::Looked(asked, outcome) => self.conclude_looking(asked, outcome),
             Done::Written(asked, written) => self.conclude_writing(asked, *written),
+            Done::Captured(asked, ended) => self.conclude_capture(asked, *ended),
             Done::Learned(node, traffic) => self.conclude_learning(node, traffic),
             Done::PdosRead(asked, node, read) => self.conclude_reading_pdos(asked, node, *read),
             Done::PdosPlanned(asked, planned) => self.conclude_planning_pdos(asked, *planned),

@@ -11,7 +11,9 @@ use futures_util::stream::FuturesUnordered;
 use master::plan::NodeTraffic;
 use master::{Gear, Network};
 
+use crate::capture::{CaptureRun, WaysBack};
 use crate::motion::group_run::GroupRun;
+use crate::network::report;
 use crate::nodes::heard_ids::HeardIds;
 use crate::nodes::known_node::KnownNode;
 use crate::nodes::meter::Meter;
@@ -57,6 +59,8 @@ pub struct Setting {
     pub journals: Option<Arc<dyn Journals>>,
     /// The world around the drives, where they are virtual ones of this program.
     pub world: Option<WorldDoor>,
+    /// What is to be put back of captures, for whatever ends the program.
+    pub ways_back: WaysBack,
     /// Health and news of the bus.
     pub wire: Wire,
     /// Frames that a session sends as they are may set drives in motion.
@@ -93,6 +97,10 @@ pub struct Host {
     pub(crate) group: Option<GroupRun>,
     pub(crate) listening: Vec<Listening>,
     pub(crate) parameters: Transactions,
+    /// Captures under way.
+    pub(crate) captures: BTreeMap<NodeId, CaptureRun>,
+    /// What was captured of each node, newest first, for its report.
+    pub(crate) captured: BTreeMap<NodeId, Vec<report::Capture>>,
     /// The changes of the world.
     pub(crate) changes: Changes,
     /// Numbers the work that runs, so that the end of replaced work is not taken for the end of its replacement.
@@ -145,6 +153,8 @@ impl Host {
             group: None,
             listening: Vec::new(),
             parameters: Transactions::default(),
+            captures: BTreeMap::new(),
+            captured: BTreeMap::new(),
             changes: Changes::default(),
             learning: BTreeMap::new(),
             traffic: BTreeMap::new(),

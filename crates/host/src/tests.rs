@@ -1,5 +1,6 @@
 //! The host against virtual drives, in virtual time: permission to move, and stops.
 
+mod capture;
 mod faults;
 mod group;
 mod guarding;
@@ -28,6 +29,7 @@ use sim::machine::{TimingMode, zlac8030l, zlim42c};
 
 use super::{Host, JOG_SPAN, Journals, PRESENCE_SPAN, Setting};
 use crate::answer::Answer;
+use crate::capture::WaysBack;
 use crate::command::{Command, NodeCommand, SessionCommand};
 use crate::session::handle::{HostHandle, Session};
 use crate::state::TICK;
@@ -210,6 +212,7 @@ fn setting() -> Setting {
         unix_zero: Duration::from_secs(1_700_000_000),
         journals: None,
         world: None,
+        ways_back: WaysBack::default(),
         wire: Wire::default(),
         allow_motion: false,
     }

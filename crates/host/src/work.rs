@@ -15,6 +15,7 @@ use tokio::sync::oneshot;
 
 use crate::answer::Answer;
 use crate::around::Changed;
+use crate::capture::CaptureOutcome;
 use crate::motion::group_run::GroupOutcome;
 use crate::parameters::transactions::{Refusal, Written};
 use crate::pdo::load::PlannedPdos;
@@ -50,6 +51,8 @@ pub(crate) enum Done {
     Looked(Asked, Result<serde_json::Value, Refusal>),
     /// Parameters were written, or not.
     Written(Asked, Box<Written>),
+    /// A capture has ended.
+    Captured(Asked, Box<CaptureOutcome>),
     /// The world was read.
     LookedAround(Asked, Result<serde_json::Value, NoAnswer>),
     /// The world was changed, or not.

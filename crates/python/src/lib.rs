@@ -14,7 +14,6 @@ mod live;
 mod master;
 mod scenario;
 mod sheets;
-mod ways_back;
 mod world;
 
 use pyo3::prelude::*;

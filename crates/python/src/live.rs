@@ -4,6 +4,7 @@
 //! motion is quick-stopped, the guards of those that stand are released, and what captures have changed is put back.
 
 use can::Tap;
+use host::capture::WaysBack;
 use host::stopping::{still_moving, stop};
 use master::Network;
 use serve::live::{LiveBus, LostBus};
@@ -16,7 +17,6 @@ use transport::{BusNotes, BusSpec, Note};
 use words::failure::with_causes;
 
 use crate::master::tap::Traffic;
-use crate::ways_back::WaysBack;
 use crate::world::Job;
 
 /// What the bus says that may wait for a program: each kind comes once, only a connection may come and go for ever.

@@ -26,6 +26,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use can::Tap;
 use canopen::{Mux, NmtCommand, NodeId};
+use host::capture::{WayBack, WaysBack};
 use host::network::read_machine;
 use machine::file::Machine;
 use master::drive::Drive;
@@ -46,7 +47,6 @@ use value::Value;
 use crate::failure::{bad_value, raised, wrong_use};
 use crate::live::{Live, stop_what_moves};
 use crate::sheets::{model_of, node_id};
-use crate::ways_back::{WayBack, WaysBack};
 use crate::world::World;
 
 /// A CANopen network as its master sees it; `ferrodrive.Network` is what users have.

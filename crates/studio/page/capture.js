@@ -1,6 +1,7 @@
 // A capture: the values of some time, kept by themselves. Independent of the page.
 //
-// `{ id, name, taken, zero_s, from_s, shift_s, columns, marks }`: `taken` is the date and time of the day as text; `from_s` is where its
+// `{ id, name, notes, taken, zero_s, from_s, shift_s, columns, marks, model, parameters }`: `notes`, `model` and `parameters` (objects and their
+// bytes as hexadecimal digits) may be absent; `taken` is the date and time of the day as text; `from_s` is where its
 // picture begins, behind a first sample that only draws the line to the edge (absent: at the first sample); `zero_s` is the time that is laid
 // over that of other captures, of the trigger or of the begin; `shift_s` moves it by hand. A column is
 // `{ field, node, label, unit, decimals, steps, times, values }` with times in s, rising; a mark `{ time_s, node, text }`.
@@ -17,10 +18,10 @@ export const ALIGNMENTS = [
   { value: "time", text: "by time of the bus" },
 ];
 
-/** A column's samples as a series, later by `shift_s`. */
-export function seriesOf({ times, values }, shift_s = 0) {
+/** A column's samples as a series: the same arrays. */
+export function seriesOf({ times, values }) {
   const series = new Series(Infinity);
-  series.times = shift_s === 0 ? times : times.map((time_s) => time_s + shift_s);
+  series.times = times;
   series.values = values;
   series.end = times.length;
   return series;

@@ -8,6 +8,7 @@ import { powerMachine } from "./machine.js";
 import { request } from "./transport.js";
 import { buttonsOf } from "./remedy.js";
 import { remedyBar } from "./remedy_bar.js";
+import { reportBar } from "./report.js";
 
 /** Label, field, decimals, unit. */
 export const VALUES = [
@@ -77,6 +78,7 @@ export function driveView(shared, report) {
     remark,
     trouble,
     large.root,
+    reportBar(shared),
     h("div", { class: "columns" }, h("div", {}, h("h3", {}, "Power state"), picture, way), h("div", {}, h("h3", {}, "Fault"), faults, h("h3", {}, "Bits"), words, h("h3", {}, "Why"), why, findings)),
   );
 

@@ -18,8 +18,26 @@ export function placeOf(title) {
   return { node: Number(node), field: object ? `${node}:${object[1].toUpperCase()}:${object[2].toUpperCase()}` : name };
 }
 
-/** A capture as the text of a record: a column for each value, a line for each time, and what happened. */
-export function recordOf({ columns, marks }) {
+/** How the mark of a record begins that says what the capture is: the form of `ferrodrive capture` (crate recording). */
+const ABOUT = "capture {";
+
+/** That mark, of a capture of the scope. */
+function aboutOf({ name, notes = "", model = "", parameters = {}, zero_s, columns }) {
+  const first_s = Math.min(...columns.map(({ times }) => times[0]));
+  return `capture ${JSON.stringify({ name, notes, model, trigger_s: zero_s === first_s ? null : zero_s, parameters })}`;
+}
+
+/** What such a mark says; an empty object where it is none, or cannot be read. */
+function readAbout(text) {
+  try {
+    return text.startsWith(ABOUT) ? JSON.parse(text.slice(ABOUT.length - 1)) : {};
+  } catch {
+    return {};
+  }
+}
+
+/** A capture as the text of a record: a column for each value, a line for each time, and what happened; `about` is the kept capture that it is of. */
+export function recordOf({ columns, marks, about = null }) {
   const rows = new Map();
   columns.forEach(({ times, values }, column) => {
     times.forEach((time_s, at) => {
@@ -31,6 +49,7 @@ export function recordOf({ columns, marks }) {
   const quoted = (text) => `"${text.replaceAll('"', '""').replaceAll("\n", " ")}"`;
   const lines = [...[...rows].map(([time_s, row]) => [time_s, row, ""]), ...marks.map(({ time_s, text }) => [time_s, empty, quoted(text)])];
   lines.sort(([one], [other]) => one - other);
+  if (about && lines.length) lines.unshift([lines[0][0], empty, quoted(aboutOf(about))]);
   return [["t_s", ...columns.map(titleOf), "mark"].join(","), ...lines.map(([time_s, row, mark]) => [time_s, ...row, mark].join(",")), ""].join("\n");
 }
 
@@ -43,7 +62,10 @@ export function captureOf(name, { columns, marks }, now = new Date()) {
     return { field, node, label: known?.label ?? shown ?? title, unit: known?.unit ?? unit, decimals: known?.decimals ?? 3, steps: known?.steps, times, values };
   });
   const first_s = Math.min(...read.map(({ times }) => times[0]));
-  return { id: crypto.randomUUID(), name, taken: now.toISOString(), zero_s: first_s, shift_s: 0, columns: read, marks };
+  const about = marks.map(({ text }) => readAbout(text)).find(({ name: of }) => of !== undefined) ?? {};
+  const happened = marks.filter(({ text }) => !text.startsWith(ABOUT));
+  const more = { notes: about.notes ?? "", model: about.model ?? "", parameters: about.parameters ?? {} };
+  return { id: crypto.randomUUID(), name: about.name || name, ...more, taken: now.toISOString(), zero_s: about.trigger_s ?? first_s, shift_s: 0, columns: read, marks: happened };
 }
 
 async function posted(path, body) {

@@ -6,6 +6,7 @@ import { against, firstOf, lastOf, samplesOf, seriesOf } from "./capture.js";
 import { choice } from "./choice.js";
 import { h, number, setText, toggle } from "./dom.js";
 import { chooser } from "./drive.js";
+import { fastCapturePanel } from "./fast_capture_panel.js";
 import { heard, heardChooser } from "./heard.js";
 import { everything, markers, newest_s, series } from "./kept.js";
 import { linkTo, linked } from "./linked.js";
@@ -66,6 +67,10 @@ export function scopeView(shared) {
   const saved = h("p", { class: "bad", role: "status" });
   const computed = computedPanel();
   const captures = capturePanel({ take: shownCapture, open: openCapture });
+  const fast = fastCapturePanel(shared, { taken(capture) {
+    captures.keep(capture);
+    openCapture(capture);
+  } });
   const scales = new Scales(before.scales);
   const scale = scalePanel(scales, () => areas, store);
   const root = h(
@@ -79,12 +84,13 @@ export function scopeView(shared) {
     h("div", { class: "bar" }, other, button("scope-clear", "Clear cursors", () => (cursors = [null, null])), button("scope-zoom-in", "Time +", () => zoom(null, 1 / ZOOM), "Shorter time (plus on the picture)"), button("scope-zoom-out", "Time −", () => zoom(null, ZOOM), "Longer time (minus on the picture)"), steps, frequencies, across, below),
     readout,
     captures.root,
+    fast.root,
     computed.root,
     h("div", { class: "bar" }, h("span", { class: "quiet" }, "Save as"), button("scope-save", "CSV", saveCsv, "A record, for ferrodrive plot and spreadsheets"), button("scope-mcap", "MCAP", saveMcap, "For Foxglove, PlotJuggler, Rerun and ferrodrive plot"), button("scope-svg", "SVG", saveSvg)),
     saved,
     h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second, fewer with many drives; for an added object, each frame that carries it. A tap sets cursor A, with Shift cursor B; key p: pause. While paused a drag moves, the wheel or two fingers zoom; on the figures beside a pane they zoom and move its scale, and a double tap sets it free."),
   );
-  /** While paused: `{ columns, end_s, span_s, zero_s, marks, byTrigger, id }`; `id` is that of a capture that is shown by itself. */
+  /** While paused: `{ columns, end_s, span_s, zero_s, marks, byTrigger, id, about }`; `id` is that of a capture that is shown by itself, `about`. */
   let frozen = null;
   let cursors = [null, null];
   let followed = linked.changes;
@@ -134,7 +140,7 @@ export function scopeView(shared) {
     const columns = capture.columns.map((one) => ({ ...one, series: seriesOf(one) }));
     const [first_s, last_s] = [firstOf(capture), lastOf(capture)];
     cursors = [null, null];
-    hold({ columns, end_s: last_s, span_s: Math.max(SHORTEST_S, last_s - first_s), zero_s: capture.zero_s, marks: capture.marks, byTrigger: false, id: capture.id });
+    hold({ columns, end_s: last_s, span_s: Math.max(SHORTEST_S, last_s - first_s), zero_s: capture.zero_s, marks: capture.marks, byTrigger: false, id: capture.id, about: capture });
   }
 
   function goOn() {
@@ -382,7 +388,7 @@ export function scopeView(shared) {
     const { sources, marks } = content();
     const columns = sources[0].columns.map(({ series: of, ...column }) => ({ ...column, ...samplesOf(of) }));
     const first_s = Math.min(...columns.map(({ times }) => times[0]));
-    return recordOf({ columns, marks: marks.filter(({ time_s }) => time_s >= first_s) });
+    return recordOf({ columns, marks: marks.filter(({ time_s }) => time_s >= first_s), about: frozen?.about ?? null });
   }
 
   function saveCsv() {
@@ -413,6 +419,7 @@ export function scopeView(shared) {
 
   function update(state) {
     choose.update(state);
+    fast.update();
     drives = state.nodes.filter((node) => node.drive).map((node) => node.node);
     const more = drives.filter((node) => node !== shared.node);
     const key = more.join(" ");

@@ -7,6 +7,7 @@ import { count, h, setText, toggle } from "./dom.js";
 import { readRecording } from "./recordings.js";
 
 const LONGEST_NAME = 60;
+const LONGEST_NOTES = 2000;
 
 /** `take` gives a capture of what is shown, or null; `open` shows one by itself. */
 export function capturePanel({ take, open }) {
@@ -80,6 +81,11 @@ export function capturePanel({ take, open }) {
       capture.name = freeName(name.value.trim(), captures.filter((one) => one !== capture));
       trying(() => storeCapture(capture));
     });
+    const notes = h("input", { value: capture.notes ?? "", size: "28", maxlength: LONGEST_NOTES, placeholder: "notes", title: capture.notes ?? "", "aria-label": `Notes about ${capture.name}`, "data-notes": true });
+    notes.addEventListener("change", () => {
+      capture.notes = notes.value.trim();
+      trying(() => storeCapture(capture));
+    });
     const shift = h("input", { type: "number", step: "any", value: String(capture.shift_s), class: "short", "aria-label": `Move ${capture.name} by so many seconds` });
     shift.addEventListener("change", () => {
       if (shift.validity.badInput || shift.value === "") return (shift.value = String(capture.shift_s));
@@ -96,6 +102,7 @@ export function capturePanel({ take, open }) {
       { class: "bar", "data-capture": capture.name },
       pressed,
       name,
+      notes,
       h("label", {}, "by ", shift, " s"),
       h("button", { type: "button", "aria-label": `Show ${capture.name} by itself`, onclick: () => open(capture) }, "Show"),
       h("button", { type: "button", "aria-label": `Delete ${capture.name}`, onclick: remove }, "Delete"),

@@ -5,14 +5,22 @@
 
 import { computed, difference, seriesOf, shiftOf } from "./capture.js";
 
-/** A capture as a source over a picture, moved as `alignment` says. Moved samples are kept while they stay where they are. */
+/**
+ * A capture as a source over a picture, moved as `alignment` says. Over a running picture it moves with each frame: its times are moved
+ * in place then, in an array of their own that is made once.
+ */
 export function overlaid() {
   const moved = new WeakMap();
   return (capture, alignment, picture) => {
     const shift_s = shiftOf(capture, alignment, picture);
     const columns = capture.columns.map((column) => {
-      if (moved.get(column)?.shift_s !== shift_s) moved.set(column, { shift_s, series: seriesOf(column, shift_s) });
-      return { ...column, series: moved.get(column).series };
+      if (!moved.has(column)) moved.set(column, { shift_s: 0, series: Object.assign(seriesOf(column), { times: column.times.slice() }) });
+      const own = moved.get(column);
+      if (own.shift_s !== shift_s) {
+        for (let at = 0; at < column.times.length; at += 1) own.series.times[at] = column.times[at] + shift_s;
+        own.shift_s = shift_s;
+      }
+      return { ...column, series: own.series };
     });
     return { name: capture.name, columns };
   };

@@ -141,3 +141,34 @@ test("what the studio read of a file is a capture", () => {
   assert.deepEqual(found.columns.map(({ label, unit, node }) => [label, unit, node]), [["Speed", "r/min", 4], ["4:606C:00 velocity_actual_value", "[0.1 r/min]", 4]]);
   assert.deepEqual([...found.columns[0].values], [10, 11]);
 });
+
+test("a capture over a running picture moves with it in the array that it has, and what was kept stays", () => {
+  const own = capture([column([10, 11, 12], (time_s) => time_s)]);
+  const lay = overlaid();
+  const drawn = (from_s) => lay(own, "start", { from_s, zero_s: null }).columns[0].series;
+  const first = drawn(100);
+  assert.deepEqual([...first.times], [100, 101, 102]);
+  const arrays = new Set([first.times]);
+  for (let frame = 1; frame < 50; frame += 1) arrays.add(drawn(100 + frame / 64).times);
+  assert.equal(arrays.size, 1);
+  // From the kept times each time: nothing adds up.
+  assert.deepEqual([...drawn(7.5).times], [7.5, 8.5, 9.5]);
+  assert.equal(drawn(7.5).values, own.columns[0].values, "values are not copied at all");
+  assert.deepEqual([...own.columns[0].times], [10, 11, 12]);
+});
+
+test("name, notes, trigger and parameters of a capture go into a record and come back", () => {
+  const own = capture([column([10, 11, 12], () => 1)], { name: "cold start", notes: "belt \"tight\"\nsecond line", model: "zlac8030l", parameters: { "6083h:00": "E8030000" }, zero_s: 11 });
+  const text = recordOf({ columns: own.columns, marks: [{ time_s: 10.5, node: 4, text: "fault" }], about: own });
+  const mark = text.split("\n")[1];
+  // The form that crate recording reads: one mark, JSON in quotes that are doubled.
+  const about = JSON.parse(/"capture (.*)"$/.exec(mark)[1].replaceAll('""', '"'));
+  assert.deepEqual(about, { name: "cold start", notes: "belt \"tight\"\nsecond line", model: "zlac8030l", trigger_s: 11, parameters: { "6083h:00": "E8030000" } });
+  const read = { columns: [{ name: "4.velocity_rpm", title: "Speed", unit: "r/min", points: [[10, 1], [11, 1]] }], marks: [{ time_s: 10, node: null, text: `capture ${JSON.stringify(about)}` }, { time_s: 10.5, node: 4, text: "fault" }] };
+  const back = captureOf("x.csv", read);
+  assert.deepEqual([back.name, back.notes, back.zero_s, back.model, back.parameters], [own.name, own.notes, 11, own.model, own.parameters]);
+  assert.deepEqual(back.marks.map(({ text: of }) => of), ["fault"]);
+  // A mark that is broken is left out, and the file is read all the same.
+  const broken = captureOf("x.csv", { ...read, marks: [{ time_s: 0, node: null, text: "capture {" }] });
+  assert.deepEqual([broken.name, broken.notes, broken.marks], ["x.csv", "", []]);
+});

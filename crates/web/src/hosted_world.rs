@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use can::{Instant, Tap};
+use host::capture::WaysBack;
 use host::{Setting, Wire, WorldAsks, world_door};
 use machine::file::Machine;
 use master::Network;
@@ -86,6 +87,7 @@ impl HostedWorld {
             unix_zero,
             journals: None,
             world: Some(door),
+            ways_back: WaysBack::default(),
             wire: Wire::default(),
             // All drives are virtual.
             allow_motion: true,

@@ -10,6 +10,7 @@ use std::task::Poll;
 use std::time::Duration;
 
 use can::{Bitrate, Instant, Station, Tap};
+use host::capture::WaysBack;
 use host::stopping::{Account, still_moving, stop};
 use host::{Setting, Wire};
 use master::Network;
@@ -113,6 +114,7 @@ impl SerialHost {
             unix_zero,
             journals: None,
             world: None,
+            ways_back: WaysBack::default(),
             wire: wire.clone(),
             allow_motion: false,
         };

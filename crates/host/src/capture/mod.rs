@@ -3,19 +3,25 @@
 //! [`plan`] finds the TPDOs and what makes them come; [`Wanted::begin`] sets them up, with the way back on the disk, and [`Running`]
 //! collects until a capture is whole. [`Restorer`] leads back, whatever ends it. [`merit`] has the figures of a response.
 
+mod commanded;
 mod measurand;
 pub mod merit;
 mod of_log;
+mod plain;
 mod plan;
 mod quantity;
 mod restorer;
 mod rows;
 mod session;
+mod ways_back;
 
+pub(crate) use commanded::{CaptureOutcome, CaptureRun};
 pub use measurand::{Measurand, TRUE, TrueValue, Way};
 pub use of_log::record_of_log;
+pub use plain::Captured;
 pub use plan::{CapturePlan, Pace, Request, plan};
 pub use quantity::{Form, Quantity, short_names};
 pub use restorer::{Restorer, SeenBy};
 pub use rows::Trigger;
 pub use session::{Running, Span, Taken, Wanted, not_put_back, with_left};
+pub use ways_back::{WayBack, WaysBack};

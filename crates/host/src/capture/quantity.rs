@@ -217,7 +217,7 @@ impl fmt::Display for Quantity {
 }
 
 /// The short names that an axis has.
-fn had(model: &devices::Description, axis: &devices::AxisDescription) -> Vec<&'static str> {
+pub(super) fn had(model: &devices::Description, axis: &devices::AxisDescription) -> Vec<&'static str> {
     let has = |short: &&Short| match short.place {
         Place::Standard(mux) => model.row(axis.object(mux)).is_some(),
         Place::Model(of) => of(&axis.units).is_some(),

@@ -95,6 +95,8 @@ pub struct Taken {
     pub capture: Capture,
     /// Why it is shorter than asked for, if it is.
     pub cut_off: Option<Failure>,
+    /// When its first row was taken.
+    pub first_at: Instant,
 }
 
 /// How long SYNC of others is listened for.
@@ -379,6 +381,15 @@ impl Running {
     /// # Errors
     /// The trigger is of a quantity that is not captured. A drive that falls silent, or does not answer, cuts the capture off.
     pub async fn next(&mut self, span: &Span) -> Result<Taken, Failure> {
+        self.next_until(span, || false).await
+    }
+
+    /// As [`next`](Self::next), which ends earlier where `ended` says so: what came until then is the capture, nothing if its trigger has
+    /// not come.
+    ///
+    /// # Errors
+    /// Those of [`next`](Self::next).
+    pub async fn next_until(&mut self, span: &Span, ended: impl Fn() -> bool) -> Result<Taken, Failure> {
         let network = self.drive.node().network().clone();
         let mut watch = span.trigger.as_ref().map(|trigger| self.armed(trigger)).transpose()?;
         self.begin_anew();
@@ -402,7 +413,7 @@ impl Running {
                 }
                 looked_at += 1;
             }
-            if begun.is_some_and(|begun| now - begun >= span.duration + COLLECT) {
+            if ended() || begun.is_some_and(|begun| now - begun >= span.duration + COLLECT) {
                 break None;
             }
             if let Some(failure) = self.fallen_silent() {
@@ -571,7 +582,7 @@ impl Running {
             parameters: self.parameters.clone(),
             is_cut_off: cut_off.is_some(),
         };
-        Taken { capture, cut_off }
+        Taken { capture, cut_off, first_at: first }
     }
 }
 

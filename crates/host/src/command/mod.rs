@@ -4,6 +4,7 @@
 //! It is nested, so that the compiler knows what concerns one node, several drives, parameters, PDOs or the session. A command to a
 //! drive is the master's own ([`master::drive::Command`]).
 
+mod capture;
 pub(crate) mod fields;
 mod group;
 mod node;
@@ -11,6 +12,7 @@ mod parameters;
 mod pdo;
 mod session;
 
+pub use capture::{CaptureCommand, CaptureOrder};
 pub use group::{AxisSpeed, AxisTarget, BaseJog, GroupCommand, GroupMove};
 pub use node::NodeCommand;
 pub use parameters::{FileForm, NewValue, ParameterChange, ParameterReading};
@@ -149,5 +151,6 @@ mod tests {
         assert_eq!(variants::<ParameterReading>(), ParameterReading::WORDS);
         assert_eq!(variants::<ParameterChange>(), ParameterChange::WORDS);
         assert_eq!(variants::<PdoCommand>(), PdoCommand::WORDS);
+        assert_eq!(variants::<CaptureCommand>(), CaptureCommand::WORDS);
     }
 }

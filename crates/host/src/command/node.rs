@@ -1,5 +1,6 @@
 //! Commands to one node, as JSON.
 
+use super::capture::CaptureCommand;
 use super::fields::{Fields, taken, whole};
 use super::parameters::{ParameterChange, ParameterReading};
 use super::pdo::PdoCommand;
@@ -34,6 +35,8 @@ pub enum NodeCommand {
     Change(ParameterChange),
     /// Something with its PDOs.
     Pdos(PdoCommand),
+    /// A capture, or a report.
+    Capture(CaptureCommand),
 }
 
 impl NodeCommand {
@@ -57,7 +60,8 @@ impl NodeCommand {
     ];
 
     pub(super) fn words() -> impl Iterator<Item = &'static str> {
-        [Self::WORDS, ParameterReading::WORDS, ParameterChange::WORDS, PdoCommand::WORDS].into_iter().flatten().copied()
+        let of_kinds = [ParameterReading::WORDS, ParameterChange::WORDS, PdoCommand::WORDS, CaptureCommand::WORDS];
+        of_kinds.into_iter().chain([Self::WORDS]).flatten().copied()
     }
 
     /// Whether it needs control.
@@ -73,6 +77,7 @@ impl NodeCommand {
             | Self::AcceptUnguarded
             | Self::Change(_) => true,
             Self::Pdos(command) => command.needs_control(),
+            Self::Capture(command) => command.needs_control(),
         }
     }
 }
@@ -93,6 +98,9 @@ pub(super) fn read(word: &str, mut fields: Fields) -> Result<NodeCommand, String
     }
     if PdoCommand::WORDS.contains(&word) {
         return whole(fields).map(NodeCommand::Pdos);
+    }
+    if CaptureCommand::WORDS.contains(&word) {
+        return whole(fields).map(NodeCommand::Capture);
     }
     fields.remove("do");
     let command = match word {

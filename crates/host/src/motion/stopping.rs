@@ -31,9 +31,10 @@ impl Host {
         self.quick_stop(nodes, why);
     }
 
-    /// Quick-stops what this studio has set in motion.
+    /// Quick-stops what this studio has set in motion, and ends captures: whoever began them is not there any more.
     pub(crate) fn stop_moved(&mut self, why: &'static str) {
         self.stops += 1;
+        self.end_captures();
         let nodes = self.in_motion();
         self.quick_stop(nodes, why);
     }

@@ -117,7 +117,8 @@ impl Host {
         let is_busy = self.running.contains_key(&node)
             || self.jogs.contains_key(&node)
             || self.network.moved().contains(node)
-            || self.parameters.is_writing(node);
+            || self.parameters.is_writing(node)
+            || self.captures.contains_key(&node);
         if is_busy {
             return refuse(asked, busy("the drive is busy with another command"));
         }
@@ -142,6 +143,9 @@ impl Host {
         asked: Asked,
         writing: impl Future<Output = Result<(Value, Option<Parameters>), (Refusal, Option<Parameters>)>> + 'static,
     ) {
+        if self.captures.contains_key(&node) {
+            return refuse(asked, busy("it is being captured"));
+        }
         if self.running.contains_key(&node) || !self.parameters.writing.insert(node) {
             return refuse(asked, busy("the drive is busy with another command"));
         }

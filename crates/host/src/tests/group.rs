@@ -35,11 +35,11 @@ fn base() -> BaseJog {
     }
 }
 
-type Answered = tokio::sync::oneshot::Receiver<Answer>;
+pub(super) type Answered = tokio::sync::oneshot::Receiver<Answer>;
 
 impl Page {
     /// Sends a command without waiting for its answer.
-    fn begin(&mut self, command: Command) -> Answered {
+    pub(super) fn begin(&mut self, command: Command) -> Answered {
         self.seq += 1;
         self.session.ask(self.seq, command).expect("there is room")
     }

@@ -41,7 +41,7 @@ fn written(pdos: Vec<NewPdo>) -> Command {
 
 impl Stage {
     /// An object of the wheel, of whatever length.
-    async fn cell(&self, object: Mux) -> u32 {
+    pub(super) async fn cell(&self, object: Mux) -> u32 {
         self.network.node(WHEEL).upload(object).await.expect("it answers").raw()
     }
 }

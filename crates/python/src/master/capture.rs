@@ -5,12 +5,10 @@ use std::time::Duration;
 
 use can::Bitrate;
 use canopen::NodeId;
-use host::capture::{Measurand, Span, Taken, Trigger, Wanted, Way, with_left};
+use host::capture::{Captured, Measurand, Span, Taken, Trigger, Wanted, with_left};
 use machine::file::tpdo_id;
 use master::Drive;
 use pyo3::prelude::*;
-use recording::Capture;
-use serde::Serialize;
 use sim::recorder::LiveValues;
 use words::failure::Failure;
 
@@ -39,46 +37,6 @@ pub(crate) struct CaptureOrder {
     sdo: bool,
     #[pyo3(item)]
     journal: Option<PathBuf>,
-}
-
-/// What came of it.
-#[derive(Serialize)]
-pub(super) struct Captured {
-    model: String,
-    trigger_s: Option<f64>,
-    time_s: Vec<f64>,
-    traces: Vec<CapturedTrace>,
-    /// Objects as `6083h:00` and their bytes in the order of the wire.
-    objects: Vec<(String, Vec<u8>)>,
-}
-
-#[derive(Serialize)]
-struct CapturedTrace {
-    quantity: String,
-    unit: String,
-    by: String,
-    /// None where no reading belongs to the time.
-    values: Vec<Option<f64>>,
-    period_s: Option<f64>,
-    jitter_s: Option<f64>,
-    gaps: usize,
-}
-
-impl Captured {
-    pub(super) fn of(capture: &Capture, ways: &[Way]) -> Self {
-        let traces = capture.traces.iter().zip(ways).map(|(trace, way)| CapturedTrace {
-            quantity: trace.quantity.clone(),
-            unit: trace.unit.clone(),
-            by: way.to_string(),
-            values: trace.values.iter().map(|value| known(*value)).collect(),
-            period_s: known(trace.period_s),
-            jitter_s: known(trace.jitter_s),
-            gaps: trace.gaps,
-        });
-        let objects = capture.parameters.iter().map(|(object, bytes)| (object.to_string(), bytes.clone()));
-        let (model, trigger_s, time_s) = (capture.model.clone(), capture.trigger_s, capture.time_s.clone());
-        Self { model, trigger_s, time_s, traces: traces.collect(), objects: objects.collect() }
-    }
 }
 
 impl AskedDrive {
@@ -120,7 +78,7 @@ pub(crate) fn capture(
         let mut running = wanted.begin(&drive, restorer).await?;
         let taken = running.next(&span).await;
         let left = restorer.restore().await;
-        let Taken { capture, cut_off } = taken.map_err(|failure| with_left(failure, &left))?;
+        let Taken { capture, cut_off, .. } = taken.map_err(|failure| with_left(failure, &left))?;
         let value = Value::report(&Captured::of(&capture, running.ways()));
         match cut_off.or(not_put_back(asked.node, &left)) {
             Some(failure) => Err(Trouble::Reported(with_left(failure, &left), Box::new(value))),
@@ -140,8 +98,4 @@ pub(super) async fn quantities(
         quantities.push(Measurand::named(drive, world, name).await?);
     }
     Ok(quantities)
-}
-
-fn known(value: f64) -> Option<f64> {
-    value.is_finite().then_some(value)
 }

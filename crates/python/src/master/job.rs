@@ -7,6 +7,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Poll, Waker};
 use std::time::Duration;
 
+use host::capture::WayBack;
 use master::Error;
 use pyo3::prelude::*;
 use words::failure::Failure;
@@ -15,7 +16,6 @@ use super::runner::Runner;
 use super::value::Value;
 use crate::failure::{how_to_say, master_error, wrong_use};
 use crate::live::Live;
-use crate::ways_back::WayBack;
 use crate::world;
 
 /// How long a waiting thread is deaf to signals (Ctrl-C).

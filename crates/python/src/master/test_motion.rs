@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use can::Bitrate;
-use host::capture::with_left;
+use host::capture::{Captured, with_left};
 use host::test_motion::{Figures, Motion, Run, Shape, limits, points, run, usual_quantities};
 use master::cyclic::CyclicOptions;
 use master::drive::SwitchedOff;
@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use serde::Serialize;
 use words::failure::Failure;
 
-use super::capture::{Captured, not_put_back, quantities};
+use super::capture::{not_put_back, quantities};
 use super::job::Trouble;
 use super::value::Value;
 use super::whole::AskedDrive;

@@ -160,7 +160,7 @@ impl LiveValues {
             feed.is_missing = feed.number.is_none();
             // A host that asks for a time that has passed is not given all that would have been since.
             while feed.next_at <= at {
-                feed.next_at = feed.next_at + feed.period;
+                feed.next_at += feed.period;
             }
             if feed.times.len() >= MOST {
                 feed.lost += 1;

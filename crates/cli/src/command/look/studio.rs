@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use can::Bitrate;
 use canopen::NodeId;
+use host::capture::WaysBack;
 use host::{Host, Journals, Setting};
 use machine::parameters::journal::Journal;
 use recording::Channels;
@@ -20,7 +21,7 @@ use words::document::read_text;
 
 use crate::command::configure::params::journal::{Kept, default_path, note_kept};
 use crate::command::network::gateway::address;
-use crate::context::Context;
+use crate::context::{Context, Restorer};
 use crate::control_client::ControlArgs;
 use crate::failure::Failure;
 use crate::far_world;
@@ -150,7 +151,10 @@ fn elsewhere(mut address: SocketAddr) -> SocketAddr {
 
 /// What the host of a command gets at its start.
 pub(in crate::command) fn setting(context: &Context) -> Setting {
+    let ways_back = WaysBack::default();
+    context.restore_at_end(Restorer::Captures(ways_back.clone()));
     Setting {
+        ways_back,
         bus: context.bus().to_string(),
         bitrate: bitrate(context),
         timeout: context.timeout(),

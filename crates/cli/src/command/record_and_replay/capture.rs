@@ -219,7 +219,7 @@ impl Capture {
         for number in 1..=self.count {
             let waits = if span.trigger.is_some() { "armed" } else { "capturing" };
             context.progress.show(format!("node {}: {waits}, {number} of {}", self.node, self.count));
-            let Taken { mut capture, cut_off } = match running.next(span).await {
+            let Taken { mut capture, cut_off, .. } = match running.next(span).await {
                 Ok(taken) => taken,
                 Err(failure) => return (rows, Some(failure.into())),
             };

@@ -128,7 +128,7 @@ pub struct PresentFault {
 }
 
 /// A record of a run.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Capture {
     /// The file.
     pub file: String,
@@ -143,7 +143,7 @@ pub struct Capture {
 }
 
 /// A signal of a record in figures.
-#[derive(Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CaptureFigure {
     /// The signal: `Velocity, actual`.
     pub name: String,

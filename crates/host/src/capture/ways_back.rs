@@ -1,17 +1,18 @@
-//! What is to be put back of the captures, test motions and tunings that go on in a network.
+//! What is to be put back of the captures, test motions and tunings that go on in a program, whatever ends it.
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use host::capture::Restorer;
 use master::Drive;
 
-/// The ways back of what is going on in a network, for what ends it.
-#[derive(Clone, Default)]
-pub(crate) struct WaysBack(Arc<Mutex<Vec<Restorer>>>);
+use super::Restorer;
+
+/// The ways back of what is going on in a network, for what ends it. A clone is the same list.
+#[derive(Clone, Debug, Default)]
+pub struct WaysBack(Arc<Mutex<Vec<Restorer>>>);
 
 /// That of one job, which its network has too until the job has ended: it may be closed meanwhile.
-#[derive(Clone)]
-pub(crate) struct WayBack {
+#[derive(Clone, Debug)]
+pub struct WayBack {
     own: Arc<OnceLock<Restorer>>,
     of_network: WaysBack,
 }
@@ -21,8 +22,13 @@ impl WaysBack {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Nothing is to be put back.
+    pub fn is_empty(&self) -> bool {
+        self.lock().is_empty()
+    }
+
     /// Puts everything back; what could not be, in words.
-    pub(crate) async fn restore(&self) -> Vec<String> {
+    pub async fn restore(&self) -> Vec<String> {
         let restorers = std::mem::take(&mut *self.lock());
         let mut left = Vec::new();
         for restorer in restorers {
@@ -35,12 +41,12 @@ impl WaysBack {
 
 impl WayBack {
     /// Of a job in this network, which has changed nothing yet.
-    pub(crate) fn in_network(of_network: &WaysBack) -> Self {
+    pub fn in_network(of_network: &WaysBack) -> Self {
         Self { own: Arc::default(), of_network: of_network.clone() }
     }
 
     /// This drive is going to be changed. A job changes one.
-    pub(crate) fn of(&self, drive: &Drive) -> &Restorer {
+    pub fn of(&self, drive: &Drive) -> &Restorer {
         self.own.get_or_init(|| {
             let restorer = Restorer::of(drive);
             self.of_network.lock().push(restorer.clone());
@@ -49,7 +55,7 @@ impl WayBack {
     }
 
     /// The job was given up: stops what it moves, and puts back what it has changed. What could not be put back stays with the network.
-    pub(crate) async fn restore(&self) {
+    pub async fn restore(&self) {
         let Some(own) = self.own.get() else { return };
         own.restore().await;
         if own.is_done() {
@@ -58,7 +64,7 @@ impl WayBack {
     }
 
     /// The job has ended by itself; what is left is in what it reports.
-    pub(crate) fn remove(&self) {
+    pub fn remove(&self) {
         let Some(own) = self.own.get() else { return };
         self.of_network.lock().retain(|other| !other.is_same(own));
     }

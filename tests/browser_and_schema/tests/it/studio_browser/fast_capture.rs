@@ -1,0 +1,104 @@
+//! Fast capture and report in a real browser: a button each, with everything put back, also when the tab is closed meanwhile.
+
+use super::Stage;
+
+impl Stage {
+    /// Shows the form of a fast capture of the wheel.
+    async fn fast_capture(&self) {
+        self.click("#tabs [data-name=scope]").await;
+        self.find("#fast-capture").await;
+        self.client.execute("document.querySelector('#fast-capture').open = true", Vec::new()).await.expect("it opens");
+        self.find("[data-quantity=target_velocity]").await;
+    }
+
+    async fn fill(&self, css: &str, text: &str) {
+        let fill = "const of = document.querySelector(arguments[0]); of.value = arguments[1]; of.dispatchEvent(new Event('change'))";
+        self.client.execute(fill, vec![css.into(), text.into()]).await.expect("it is filled in");
+    }
+
+    /// What the first TPDO of the wheel carries, as the PDO view of a page that has just been loaded says.
+    async fn tpdo(&self) -> String {
+        self.load().await;
+        self.click("#tabs [data-name=pdo]").await;
+        self.click(".chooser button:nth-child(3)").await;
+        self.says("tr[data-pdo=TPDO1]", "184h").await
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_turning_wheel_is_captured_fast_and_reported() {
+    let stage = Stage::open("fast").await;
+    stage.take_the_wheel().await;
+    stage.click("#go-turn").await;
+    stage.turns();
+    stage.fast_capture().await;
+    stage.choose("#fast-period", "5").await;
+    stage.fill("#fast-time", "0.5").await;
+    // The studio's own world says what is true beside what the drive says.
+    stage.choose("#fast-true", "true_velocity_rpm").await;
+    stage.click("#fast-begin").await;
+    let said = stage.says("#fast-status", "The PDOs are as they were").await;
+    assert!(said.contains("rows in 0.") && said.contains("of the bus at most"), "{said}");
+    let had = stage.says("#fast-had", "true_velocity_rpm").await;
+    for part in ["velocity_rpm", "TPDO", "world", "5.000 ms", "Jitter"] {
+        assert!(had.contains(part), "{part}: {had}");
+    }
+    // It is kept, and shown by itself.
+    stage.says("#capture-status", "kept as ").await;
+    stage.find("#scope-pause[aria-pressed=true]").await;
+    stage.find(".captures li").await;
+    stage.shoot("fast_capture").await;
+    // Its notes are there after a reload.
+    stage.fill(".captures [data-notes]", "belt tight").await;
+    stage.fast_report().await;
+    assert!(stage.tpdo().await.contains("nothing is mapped into it"));
+    stage.click("#tabs [data-name=scope]").await;
+    let notes = "return document.querySelector('.captures [data-notes]')?.value ?? null";
+    stage
+        .until("notes over a reload", async || {
+            stage.client.execute(notes, Vec::new()).await.expect("it runs").as_str() == Some("belt tight")
+        })
+        .await;
+    stage.close().await;
+}
+
+impl Stage {
+    async fn fast_report(&self) {
+        self.click("#tabs [data-name=drive]").await;
+        self.find("#report-by").await.send_keys("A. Fitter").await.expect("typed");
+        self.click("#report").await;
+        self.says("#report-status", "saved as node4.html").await;
+        let page = std::fs::read_to_string(self.saved("node4.html").await).expect("text");
+        for part in ["A. Fitter", "zlac8030l", "capture of velocity_rpm", "true_velocity", "<svg"] {
+            assert!(page.contains(part), "{part} is in the report");
+        }
+        self.shoot("report_button").await;
+        self.client.goto(&format!("file://{}", self.saved("node4.html").await.display())).await.expect("it is shown");
+        self.shoot("report").await;
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_tab_that_is_closed_in_the_middle_of_a_capture_leaves_the_drive_as_it_was() {
+    let stage = Stage::open("fast_closed").await;
+    let first = stage.client.window().await.expect("a window");
+    let second = stage.client.new_window(true).await.expect("another one").handle;
+    stage.take_the_wheel().await;
+    stage.fast_capture().await;
+    // It waits for what does not come.
+    stage.fill("#fast-trigger", "velocity>500").await;
+    stage.click("#fast-begin").await;
+    stage.says("#fast-status", "armed, waits for velocity>500").await;
+    stage.shoot("fast_armed").await;
+    stage.client.switch_to_window(second.clone()).await.expect("it is there");
+    stage.until("a TPDO that is mapped", async || stage.tpdo().await.contains("606Ch")).await;
+    stage.client.switch_to_window(first).await.expect("it is there");
+    stage.says("#fast-status", "armed").await;
+    stage.client.close_window().await.expect("it closes");
+    stage.client.switch_to_window(second).await.expect("it is there");
+    stage.until("a TPDO as it was", async || stage.tpdo().await.contains("nothing is mapped into it")).await;
+    stage.studio.wait("no session in control", |state| state["controller"].is_null());
+    stage.close().await;
+}
