@@ -28,7 +28,7 @@ const ALIKE: f64 = 3e-3;
 /// be beyond a loop's bandwidth.
 const PERIODS: RangeInclusive<Duration> = Duration::from_micros(500)..=Duration::from_millis(10);
 
-/// The ranges of what is asked for, with their units. Beyond these is what nobody has meant, and what is not a number.
+/// The ranges of what is asked for, with their units. Beyond these is what is mistyped, or not a number.
 const SPEED_RPM: RangeInclusive<f64> = 1.0..=100_000.0;
 const CURRENT_A: RangeInclusive<f64> = 0.01..=10_000.0;
 const TRAVEL_TURNS: RangeInclusive<f64> = 0.1..=10_000.0;
