@@ -15,7 +15,7 @@ use super::conclude::Trigger;
 use super::explain::blinding;
 use super::handle::{Drive, POLL};
 use super::power::{STANDSTILL_LOOKS, STANDSTILL_RPM};
-use crate::core::{Command, Core, NodeSet, Payload, Request, SdoServer, Transfer};
+use crate::core::{Command, Core, NodeSet, Payload, Request, Transfer};
 use crate::error::Error;
 use crate::gear::Gear;
 use crate::host_loss::HostLoss;
@@ -110,7 +110,7 @@ impl Network {
         }
         // A further SDO server may be gone, since any client can make it invalid; the default one is always there.
         for node in unseen.iter() {
-            self.submit(Command::UseSdoServer(node, SdoServer::default_of(node)));
+            self.use_default_server(node);
         }
         let waited = self.now() - began;
         for again in self.stop_within(unseen, LAST_ANSWER, LAST_ANSWER).await {

@@ -9,7 +9,7 @@ use canopen::{Mux, NmtCommand, NodeId, sync};
 use devices::AxisId;
 
 use super::moved::{Moved, MovedAxis};
-use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, Ticket};
+use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, SdoServer, Ticket};
 use crate::host_loss::ArmedGuard;
 use crate::models::Models;
 
@@ -46,6 +46,8 @@ pub(super) struct NetworkState {
     guards: BTreeMap<NodeId, ArmedGuard>,
     /// SDO servers that nodes are to be asked by, whose records are still to be read.
     chosen_servers: BTreeMap<NodeId, u16>,
+    /// How often another server was chosen for a node: what was read for an earlier choice overrules no later one.
+    server_choices: BTreeMap<NodeId, u32>,
     /// Axes that belong to a group or a base, by the place of their controlword.
     pub(super) claims: BTreeSet<(NodeId, Mux)>,
 }
@@ -138,15 +140,42 @@ impl Network {
     /// [`Node::use_sdo_server`](super::Node::use_sdo_server) does where there is none. What stops an axis before that goes to the default
     /// server and waits for nothing.
     pub fn choose_sdo_servers(&self, servers: impl IntoIterator<Item = (NodeId, u16)>) {
-        self.lock().chosen_servers = servers.into_iter().collect();
+        let mut shared = self.lock();
+        shared.chosen_servers = servers.into_iter().collect();
+        NodeId::all().for_each(|node| *shared.server_choices.entry(node).or_default() += 1);
     }
 
-    pub(super) fn chosen_server(&self, node: NodeId) -> Option<u16> {
-        self.lock().chosen_servers.get(&node).copied()
+    /// The record of a server that is to be used and was not read yet, with the number of that choice.
+    pub(super) fn chosen_server(&self, node: NodeId) -> Option<(u16, u32)> {
+        let shared = self.lock();
+        let record = shared.chosen_servers.get(&node).copied()?;
+        Some((record, shared.server_choices.get(&node).copied().unwrap_or_default()))
     }
 
-    pub(super) fn forget_chosen_server(&self, node: NodeId) {
-        self.lock().chosen_servers.remove(&node);
+    /// Another server is chosen for a node; the number of that choice.
+    pub(super) fn begin_server_choice(&self, node: NodeId) -> u32 {
+        let mut shared = self.lock();
+        let choices = shared.server_choices.entry(node).or_default();
+        *choices += 1;
+        *choices
+    }
+
+    /// Has a node be asked by this server from now on, unless another was chosen since.
+    pub(super) fn use_chosen_server(&self, node: NodeId, server: SdoServer, choice: u32) {
+        {
+            let mut shared = self.lock();
+            if shared.server_choices.get(&node).copied().unwrap_or_default() != choice {
+                return;
+            }
+            shared.chosen_servers.remove(&node);
+        }
+        self.submit(Command::UseSdoServer(node, server));
+    }
+
+    /// Has a node be asked by its default server, whatever was chosen.
+    pub(crate) fn use_default_server(&self, node: NodeId) {
+        let choice = self.begin_server_choice(node);
+        self.use_chosen_server(node, SdoServer::default_of(node), choice);
     }
 
     /// What has been seen of a node.

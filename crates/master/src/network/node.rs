@@ -60,7 +60,8 @@ impl Node {
 
     /// Asks another of its SDO servers from the next request on, whatever handle makes it: two masters that each have one ask the same
     /// device at the same time, and neither takes the other's answers. Its record, 1201h to 127Fh, is read through the server in use;
-    /// 1200h is the default server, which nothing is read for.
+    /// 1200h is the default server, which nothing is read for. Of several that are chosen at the same time the one that was asked for last
+    /// is used.
     ///
     /// Where the server leaves a stop unanswered (another program may have made it invalid), the second try of the stop and what follows
     /// go to the default server.
@@ -68,10 +69,15 @@ impl Node {
     /// # Errors
     /// As [`read`](Self::read); [`Error::NoSdoServer`] where it does not exist.
     pub async fn use_sdo_server(&self, record: u16) -> Result<SdoServer, Error> {
+        let choice = self.network.begin_server_choice(self.id);
+        self.use_server_of(record, choice).await
+    }
+
+    /// The server that was chosen by this record, unless another is chosen while it is read.
+    async fn use_server_of(&self, record: u16, choice: u32) -> Result<SdoServer, Error> {
         let server =
             if record == 0x1200 { SdoServer::default_of(self.id) } else { self.further_server(record).await? };
-        self.network.forget_chosen_server(self.id);
-        self.network.submit(Command::UseSdoServer(self.id, server));
+        self.network.use_chosen_server(self.id, server, choice);
         Ok(server)
     }
 
@@ -199,8 +205,9 @@ impl Node {
     }
 
     async fn transfer(&self, mux: Mux, transfer: Transfer) -> Result<Payload, Error> {
-        if let Some(record) = self.network.chosen_server(self.id) {
-            self.use_sdo_server(record).await?;
+        // While its record is read, another one may be chosen.
+        while let Some((record, choice)) = self.network.chosen_server(self.id) {
+            self.use_server_of(record, choice).await?;
         }
         self.exchange(mux, transfer).await
     }

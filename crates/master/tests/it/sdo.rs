@@ -9,7 +9,7 @@ use crate::support::{Bus, mux, node};
 use can::Instant;
 use canopen::{AbortCode, NmtState};
 use master::core::{Event, Twins};
-use master::{Error, join_all};
+use master::{Error, Network, join_all};
 
 const DEVICE_TYPE: canopen::Mux = mux(0x1000, 0);
 const NAME: canopen::Mux = mux(0x1008, 0);
@@ -390,4 +390,52 @@ fn a_request_keeps_its_answer_while_its_server_is_changed_and_the_default_one_ne
         assert_eq!(node.use_sdo_server(0x1200).await.unwrap().request.raw(), 0x604);
         assert_eq!(node.read::<u32>(mux(0x1201, 1)).await.unwrap(), 0x680);
     });
+}
+
+/// The record of the first choice is read, and its answer is waited for, while another server is chosen: by its own handle, by all at once,
+/// and by the way in which the first was chosen.
+#[test]
+fn a_server_that_is_chosen_while_the_record_of_another_is_read_is_the_one_that_is_used() {
+    let toy = || Toy::new(4).u32(0x1201, 1, 0x680).u32(0x1201, 2, 0x690).u32(DEVICE_TYPE.index, 0, 0x0004_0192);
+    type Choice = fn(&Network);
+    let lazy: Choice = |network| network.choose_sdo_servers([(node(4), 0x1201)]);
+    let changes: [(&str, Option<Choice>, bool); 4] = [
+        ("read with a request, then the default one", Some(lazy), true),
+        ("read with a request, then none", Some(lazy), false),
+        ("asked for, then the default one", None, true),
+        ("asked for, then none", None, false),
+    ];
+    for (what, first, by_handle) in changes {
+        let mut bus = Bus::new(vec![toy()]);
+        let (network, handle) = (bus.network.clone(), bus.network.node(node(4)));
+        let asked = async {
+            if let Some(choose) = first {
+                choose(&network);
+                return handle.read::<u32>(DEVICE_TYPE).await.map(drop);
+            }
+            handle.use_sdo_server(0x1201).await.map(drop)
+        };
+        let other = async {
+            // The first half of the record has been asked for by now.
+            network.sleep(Duration::from_micros(1)).await;
+            match by_handle {
+                true => handle.use_sdo_server(0x1200).await.map(drop),
+                false => {
+                    network.choose_sdo_servers([]);
+                    Ok(())
+                }
+            }
+        };
+        bus.block_on(async {
+            type Asked<'a> = Pin<Box<dyn Future<Output = Result<(), Error>> + 'a>>;
+            let both: [Asked<'_>; 2] = [Box::pin(asked), Box::pin(other)];
+            for done in join_all(both).await {
+                done.unwrap_or_else(|error| panic!("{what}: {error}"));
+            }
+            // The toy answers at its default server only.
+            assert_eq!(handle.read::<u32>(DEVICE_TYPE).await.ok(), Some(0x0004_0192), "{what}");
+        });
+        assert!(bus.frames().iter().any(|frame| frame.starts_with("604#40011202")), "{what}: its record was read");
+        assert!(!bus.frames().iter().any(|frame| frame.starts_with("680#")), "{what}");
+    }
 }
