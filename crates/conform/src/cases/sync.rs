@@ -1,6 +1,7 @@
-//! SYNC 01 to 10: its identifier, its consumer, its producer and its counter.
+//! SYNC: its identifier, its consumer, its producer and its counter.
 
 use can::{BusFrame, CanId, Frame};
+use canopen::nmt::{NmtRequest, NmtTarget};
 use canopen::{AbortCode, Mux, NmtCommand};
 
 use crate::bench::{Bench, hex, ms, refused};
@@ -26,6 +27,8 @@ pub(crate) const CASES: &[Case] = &[
     case!("SYNC 09", "Refuse 1019h while 1006h is not 0", "CiA 301, 7.5.2.22", [Need::Index(0x1019), Need::Index(0x1006)], [], overflow_while_running),
     case!("SYNC 10", "1006h is kept by save and reset", "CiA 301, 7.5.2.13", [Need::Index(0x1006), Need::Index(0x1010), Need::Store], [], |bench| kept(bench, true)),
     case!("SYNC 51", "SYNC is taken from the identifier of 1005h, and from no other", "CiA 301, 7.5.2.5", [Need::Index(0x1005), Need::Tpdo], ["tpdo_answers_rpdo", "other_access"], moved),
+    case!("SYNC 52", "The counter of SYNC begins at 1 again when the node leaves stopped", "CiA 301, 7.2.5.1", [Need::Index(0x1019), Need::Index(0x1006)], [], counted_anew),
+    case!("SYNC 53", "2 and 240 are taken as 1019h", "CiA 301, 7.5.2.22", [Need::Index(0x1019)], [], overflow_at_its_limits),
 ];
 
 async fn identifier(bench: &mut Bench) -> Verdict {
@@ -57,6 +60,12 @@ async fn produce(bench: &mut Bench, overflow: Option<u8>) -> Result<(), Finding>
 async fn syncs(bench: &mut Bench, during: u64) -> Vec<BusFrame> {
     bench.absorb();
     bench.collect(ms(during), |frame| frame.id() == canopen::connection_set::SYNC).await
+}
+
+/// The counters of SYNC, of those that have one.
+async fn counters(bench: &mut Bench, during: u64) -> Vec<u8> {
+    let heard = syncs(bench, during).await;
+    heard.iter().filter_map(|passed| passed.frame.data().first().copied()).collect()
 }
 
 async fn produced(bench: &mut Bench) -> Verdict {
@@ -91,14 +100,50 @@ async fn without_counter(bench: &mut Bench) -> Verdict {
 async fn with_counter(bench: &mut Bench) -> Verdict {
     const HIGHEST: u8 = 4;
     produce(bench, Some(HIGHEST)).await?;
-    let heard = syncs(bench, PERIOD_MS * 10).await;
-    let counters: Vec<u8> = heard.iter().filter_map(|passed| passed.frame.data().first().copied()).collect();
+    let counters = counters(bench, PERIOD_MS * 10).await;
     let follows = |pair: &[u8]| pair[1] == pair[0] % HIGHEST + 1;
     if counters.len() < 5 || !counters.windows(2).all(follows) || !counters.iter().all(|at| (1..=HIGHEST).contains(at))
     {
         fail!("with 1019h = {HIGHEST} the counters were {counters:?}");
     }
     Ok(format!("{counters:?}"))
+}
+
+async fn counted_anew(bench: &mut Bench) -> Verdict {
+    // Not reached here: what goes on counting does not come to 1 by itself.
+    produce(bench, Some(100)).await?;
+    let before = counters(bench, PERIOD_MS * 10).await;
+    let Some(last) = before.last().filter(|last| **last > 1) else {
+        not_applicable!("no counter is there to begin anew: {before:?}");
+    };
+    bench.nmt(NmtCommand::Stop).await;
+    bench.absorb();
+    // All that comes from now on, not only what comes after the time that a command takes.
+    bench.send(NmtRequest::new(NmtCommand::EnterPreOperational, NmtTarget::Node(bench.node())).emit());
+    let heard = bench.collect(ms(PERIOD_MS * 10), |frame| frame.id() == canopen::connection_set::SYNC).await;
+    match heard.first().and_then(|passed| passed.frame.data().first()) {
+        Some(1) => Ok(format!("1 after {last}, with NMT stopped in between")),
+        Some(first) => fail!("the counter was {last}; after NMT stopped it went on with {first}"),
+        None => fail!("no SYNC with a counter came after the node left NMT stopped"),
+    }
+}
+
+async fn overflow_at_its_limits(bench: &mut Bench) -> Verdict {
+    // It may be written while SYNC is not produced only; a device without 1006h produces none.
+    let _ = bench.try_write(PERIOD, &[0; 4]).await?;
+    if let Err(code) = bench.try_write(OVERFLOW, &[10]).await? {
+        not_applicable!("the device takes no SYNC counter: {code}");
+    }
+    for value in [2, canopen::sync::MAX_COUNTER] {
+        if let Err(code) = bench.try_write(OVERFLOW, &[value]).await? {
+            fail!("{value} for 1019h was refused: {code}");
+        }
+        let read = bench.number(OVERFLOW).await?;
+        if read != i64::from(value) {
+            fail!("{value} was written to 1019h, and {read} is read");
+        }
+    }
+    Ok("2 and 240 are taken".into())
 }
 
 async fn consumed(bench: &mut Bench) -> Verdict {
