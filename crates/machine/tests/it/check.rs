@@ -448,6 +448,26 @@ fn each_trap_of_a_machine_file_is_at_its_line() {
     assert!(!placed(&of(&limited)).iter().any(|found| found.0 == "limits"), "{:#?}", of(&limited).findings);
 }
 
+/// The key `shaft` (docs/machine-file.md): the node whose motor shaft an encoder sits on.
+#[test]
+fn an_encoder_on_a_shaft_is_checked_and_one_on_no_shaft_is_refused_at_its_line() {
+    let servo = "[[drive]]\nmodel = 'cia402'\nnode = 5\n";
+    let of = |shaft: &str| {
+        let text = format!("{servo}[[drive]]\nmodel = 'encoder406'\nnode = 6\nshaft = {shaft}\n");
+        of_machine(&text, &PathBuf::new())
+    };
+    let checked = of("5").unwrap();
+    let nodes: Vec<_> = checked.nodes.iter().map(|node| node.node).collect();
+    assert_eq!(nodes, [Some(5), Some(6)]);
+    assert!(checked.findings.iter().all(|finding| finding.node != Some(6)), "{:#?}", checked.findings);
+    for (shaft, reason) in
+        [("9", "no drive 9"), ("6", "no shaft"), ("'5.2'", "axis"), ("0", "node whose shaft it sits on")]
+    {
+        let refused = of(shaft).map(|_| ()).unwrap_err().to_string();
+        assert!(refused.contains("line 7, column 9") && refused.contains(reason), "{shaft}: {refused}");
+    }
+}
+
 #[test]
 fn a_joint_that_interpolates_over_its_own_time_wants_that_cycle() {
     let group = |mode: &str, period: &str| {
