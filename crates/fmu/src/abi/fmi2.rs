@@ -115,7 +115,7 @@ pub extern "C" fn fmi2SetupExperiment(
                 held.instance.mode()
             ));
         }
-        if !start_time.is_finite() || stop.is_some_and(|stop| !(stop >= start_time)) {
+        if !start_time.is_finite() || stop.is_some_and(|stop| stop.is_nan() || stop < start_time) {
             return wrong(format!("an experiment from {start_time} s to {stop_time} s is not possible"));
         }
         held.span_s = (start_time, stop);

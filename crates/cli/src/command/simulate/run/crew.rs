@@ -3,12 +3,17 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
+use std::time::{Duration, Instant};
 
 use crate::session::runtime;
 use crate::signals::{Signal, asked_to_end};
 
 /// Pieces that may be begun before the first that is not done: one may take as long as thousands of others.
 const AHEAD: u64 = 1024;
+
+/// How long a thread keeps results. Of pieces of a few milliseconds each one would wake the thread that takes them, and find the lock of
+/// the queue taken by it.
+const KEPT: Duration = Duration::from_millis(20);
 
 /// Threads that do work, and whether a signal has asked them to end.
 pub(super) struct Crew {
@@ -60,16 +65,21 @@ impl Crew {
                 let (next, taken, work) = (&next, &taken, &work);
                 scope.spawn(move || {
                     let _ends = taken.on_panic(&self.stop);
+                    let mut batch = Batch { results, done: Vec::new(), since: Instant::now() };
                     while !self.stop.load(Ordering::Acquire) {
                         let number = next.fetch_add(1, Ordering::Relaxed);
                         if number >= count {
-                            return;
+                            break;
                         }
-                        taken.wait_for(number.saturating_sub(AHEAD - 1));
-                        if results.send((number, work(number))).is_err() {
-                            return;
+                        let wanted = number.saturating_sub(AHEAD - 1);
+                        if !taken.has(wanted) {
+                            // What it keeps may be what all others wait for.
+                            batch.hand_over();
+                            taken.wait_for(wanted);
                         }
+                        batch.make(number, work);
                     }
+                    batch.hand_over();
                 });
             }
             drop(results);
@@ -77,8 +87,8 @@ impl Crew {
             let _ends = taken.on_panic(&self.stop);
             let mut early = BTreeMap::new();
             let mut first = 0;
-            for (number, result) in incoming {
-                early.insert(number, result);
+            for batch in incoming {
+                early.extend(batch);
                 while let Some(result) = early.remove(&first) {
                     take(first, result);
                     first += 1;
@@ -86,6 +96,34 @@ impl Crew {
                 taken.show(first);
             }
         });
+    }
+}
+
+/// Results of one thread on their way to the one that takes them.
+struct Batch<T> {
+    results: mpsc::Sender<Vec<(u64, T)>>,
+    done: Vec<(u64, T)>,
+    /// When the first of them was begun.
+    since: Instant,
+}
+
+impl<T> Batch<T> {
+    /// Makes a piece, and hands over what has been kept long enough.
+    fn make(&mut self, number: u64, work: impl Fn(u64) -> T) {
+        if self.done.is_empty() {
+            self.since = Instant::now();
+        }
+        self.done.push((number, work(number)));
+        if self.since.elapsed() >= KEPT {
+            self.hand_over();
+        }
+    }
+
+    /// Who takes them stays until the last thread has ended, or panics: then nothing is taken any more.
+    fn hand_over(&mut self) {
+        if !self.done.is_empty() {
+            let _ = self.results.send(std::mem::take(&mut self.done));
+        }
     }
 }
 
@@ -100,11 +138,13 @@ struct Taken {
 }
 
 impl Taken {
+    /// Whether so many have been taken.
+    fn has(&self, wanted: u64) -> bool {
+        self.count.load(Ordering::SeqCst) >= wanted
+    }
+
     /// Returns when so many have been taken; the thread with the first piece that is not done never waits.
     fn wait_for(&self, wanted: u64) {
-        if self.count.load(Ordering::SeqCst) >= wanted {
-            return;
-        }
         self.waiting.fetch_add(1, Ordering::SeqCst);
         let lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
         drop(self.more.wait_while(lock, |()| self.count.load(Ordering::SeqCst) < wanted));
