@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::configure::{dcf, init, lss, params, program, sdo, store, tune};
-use crate::command::look::{dump, emcy, explain, objects, pdo, read, report, scan, studio, top, watch};
-use crate::command::moving::{drive, drive_base, estop, group, home, motion, test_motion};
+use crate::command::look::{dump, emcy, objects, pdo, read, report, scan, studio, top, watch};
+use crate::command::moving::{drive_base, group, test_motion};
 use crate::command::network::{boot, check, conform, gateway, latency, nmt, plan, send, supervise, sync, time};
 use crate::command::record_and_replay::{capture, convert, decode, plot, record, replay};
 use crate::command::simulate::{demo, events, run, sim, world};
@@ -51,20 +51,11 @@ pub(crate) enum Command {
     Sync(sync::SyncCommand),
     Time(time::Time),
     Send(send::Send),
-    State(drive::State),
-    Explain(explain::Explain),
     Report(report::Report),
     Conform(conform::Conform),
-    Enable(drive::Enable),
-    Disable(drive::Disable),
-    Estop(estop::Estop),
-    Stop(drive::Stop),
-    QuickStop(drive::QuickStop),
-    Reset(drive::Reset),
-    Velocity(motion::Velocity),
-    Move(motion::Move),
-    Torque(motion::Torque),
-    Home(home::Home),
+    /// Those that a page has too.
+    #[command(flatten)]
+    OfConsole(console::command::Command),
     Group(group::GroupCommand),
     TestMotion(test_motion::TestMotion),
     DriveBase(drive_base::DriveBase),

@@ -11,7 +11,7 @@ use host::control::{ControlAddress, ERROR_KINDS};
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
-use crate::status::Status;
+use console::status::Status;
 
 /// How long an answer is waited for.
 const PATIENCE: Duration = Duration::from_secs(10);

@@ -9,8 +9,8 @@ use sim::World;
 use transport::BusSpec;
 
 use crate::failure::Failure;
-use crate::numbers::whole;
 use crate::recording::{LogPath, log_path};
+use console::numbers::whole;
 use machine::file::Machine;
 use words::drive::node_model;
 use words::models::Description;

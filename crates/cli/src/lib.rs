@@ -54,6 +54,6 @@
 
 #[doc(inline)]
 pub use {
-    can, canlog, canopen, cia402, conform, devices, drives, eds, fmu, foxglove, host, machine, master, motion, plant,
-    plot, recording, scenario, serve, showcase, sim, slcan, studio, transport, tune, words,
+    can, canlog, canopen, cia402, conform, console, devices, drives, eds, fmu, foxglove, host, machine, master, motion,
+    plant, plot, recording, scenario, serve, showcase, sim, slcan, studio, transport, tune, words,
 };

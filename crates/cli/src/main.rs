@@ -13,10 +13,8 @@ mod failure;
 mod far_world;
 mod frames;
 mod global;
-mod guard;
 mod help;
 mod machine_option;
-mod numbers;
 mod output;
 mod plain;
 mod progress;
@@ -28,7 +26,6 @@ mod senses;
 mod served;
 mod session;
 mod signals;
-mod status;
 #[cfg(test)]
 mod tests;
 mod wire;
@@ -46,8 +43,6 @@ use clap_complete::env::CompleteEnv;
 use crate::args::{Cli, Command};
 use crate::command::look::departures::DepartureList;
 use crate::command::look::objects::{Objects, Whose};
-use crate::command::moving::drive::StopOutcome;
-use crate::command::moving::estop::Estop;
 use crate::command::network::check::Check;
 use crate::command::tools::completions::ASKED_BY;
 use crate::context::Context;
@@ -180,14 +175,14 @@ fn suggest_by_sense(error: &mut clap::Error, command: &clap::Command, words: &[S
 fn refuse_command_line(error: &clap::Error) -> ExitCode {
     let before_dashes = std::env::args_os().take_while(|argument| argument != "--");
     let json = before_dashes.into_iter().any(|argument| argument == "--json");
-    if let Some(failure) = Failure::of_named_file(error) {
+    if let Some(failure) = crate::failure::of_named_file(error) {
         complain(Format { json, paint: Paint::for_stream(&io::stdout()) }, &failure);
         return ExitCode::from(failure.status as u8);
     }
     if !json || !error.use_stderr() {
         return show_usage(error);
     }
-    let failure = Failure::of_command_line(error);
+    let failure = crate::failure::of_command_line(error);
     complain(Format { json, paint: Paint::for_stream(&io::stdout()) }, &failure);
     ExitCode::from(failure.status as u8)
 }
@@ -254,24 +249,13 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Write(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Lss(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Nmt(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::State(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Explain(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Report(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Conform(command) => command.run(global, format),
-        Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Disable(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Estop(command) => stops_all(global, format, command),
-        Command::Stop(command) => stops(global, format, async |context| command.run(context).await),
-        Command::QuickStop(command) => stops(global, format, async |context| command.run(context).await),
-        Command::Reset(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Velocity(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Move(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Torque(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::OfConsole(command) => of_console(global, format, command),
         Command::Save(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Restore(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Program(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Tune(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Home(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Objects(objects) => list_objects(global, format, objects),
         Command::Latency(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Boot(boot) => boot.run(global, format),
@@ -322,16 +306,8 @@ fn list_objects(global: &Global, format: Format, objects: &Objects) -> Result<()
     }
 }
 
-fn stops_all(global: &Global, format: Format, command: &Estop) -> Result<(), Failure> {
-    stops(global, format, async |context| command.run(context).await.map(StopOutcome::all))
-}
-
-fn stops(
-    global: &Global,
-    format: Format,
-    command: impl AsyncFnOnce(&Context) -> Result<StopOutcome, Failure>,
-) -> Result<(), Failure> {
-    let outcome = session::run(global, command)?;
+fn of_console(global: &Global, format: Format, command: &console::command::Command) -> Result<(), Failure> {
+    let outcome = session::run(global, async |context| command.run(context).await)?;
     format.print_judged(&outcome, outcome.failure())
 }
 

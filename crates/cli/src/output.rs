@@ -14,6 +14,12 @@ pub(crate) trait Report: Serialize {
     fn text(&self, paint: Paint) -> String;
 }
 
+impl Report for console::command::Outcome {
+    fn text(&self, paint: Paint) -> String {
+        self.text(paint)
+    }
+}
+
 /// How to print.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Format {

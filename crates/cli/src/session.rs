@@ -204,7 +204,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
                 Ok(done) => return Ok(done),
                 Err(failure) => (failure, false),
             },
-            signal = signals.next() => (Failure::ended_by(signal), true),
+            signal = signals.next() => (crate::failure::ended_by(signal), true),
         };
         let failure = stop_what_moves(&context, failure, asked_again(&context, signals, by_signal)).await;
         let notes = notes.borrow();

@@ -8,7 +8,7 @@ use std::future::poll_fn;
 #[cfg(unix)]
 use std::task::Poll;
 
-use crate::status::Status;
+use console::status::Status;
 
 /// A signal that asks this process to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -49,6 +49,11 @@ impl Answer {
         Self { kind: Self::KIND, seq, ok: false, notes: Vec::new(), result: None, error }
     }
 
+    /// Why it was refused or failed.
+    pub(crate) fn trouble(&self) -> Option<&Trouble> {
+        self.error.as_deref()
+    }
+
     /// Whether it succeeded.
     #[cfg(test)]
     pub const fn is_ok(&self) -> bool {

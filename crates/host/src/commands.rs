@@ -31,12 +31,7 @@ impl Host {
         command: Command,
         answer: oneshot::Sender<Answer>,
     ) {
-        if command.needs_control()
-            && let Err(refusal) = self.authority.may_move(session)
-        {
-            return send(answer, refused(seq, refusal));
-        }
-        if let Err((kind, text)) = self.within_speed_limit(session, &command) {
+        if let Err((kind, text)) = self.allow(session, &command) {
             return send(answer, Answer::failed(Some(seq), kind, text));
         }
         let asked = (seq, answer);
@@ -48,6 +43,14 @@ impl Host {
             Command::Group(command) => self.take_group(command, asked),
             Command::Node(node, command) => self.take_node(node, command, asked),
         }
+    }
+
+    /// Whether a session may command this: what needs control, and its speed limit.
+    pub(crate) fn allow(&self, session: SessionId, command: &Command) -> Result<(), (&'static str, String)> {
+        if command.needs_control() {
+            self.authority.may_move(session).map_err(|refusal| (refusal.kind(), refusal.to_string()))?;
+        }
+        self.within_speed_limit(session, command)
     }
 
     fn take_session(&mut self, session: SessionId, command: SessionCommand, asked: Asked) {
@@ -70,6 +73,7 @@ impl Host {
             SessionCommand::LimitSpeed { rpm } => self.limit_speed(session, rpm, asked),
             SessionCommand::Scan {} => self.begin_scan(Some(asked)),
             SessionCommand::SendFrame { frame } => self.send_frame(session, &frame, asked),
+            SessionCommand::Console { line } => self.take_line(session, &line, asked),
             SessionCommand::Help { node, topic, name } => {
                 self.help(node, topic, &name, asked);
             }
@@ -122,7 +126,7 @@ impl Host {
     }
 
     /// The drive of a node, if it may get a command now; else the refusal is sent.
-    fn drive_to_move(&self, id: NodeId, stops: bool, (seq, answer): Asked) -> Option<(Drive, Asked)> {
+    pub(crate) fn drive_to_move(&self, id: NodeId, stops: bool, (seq, answer): Asked) -> Option<(Drive, Asked)> {
         let refusal = match self.nodes.get(&id).and_then(|node| node.drive.clone()) {
             None => ("no_such_drive", "no drive is known at this node: scan the bus, and check its supply"),
             // Nothing moves with half a set of parameters.
@@ -234,6 +238,11 @@ impl Host {
             Done::LookedAround(asked, seen) => conclude_looking_around(asked, seen),
             Done::WorldChanged(asked, done) => self.conclude_change(asked, done),
             Done::Command(node, generation, outcome) => self.conclude(node, generation, outcome),
+            Done::Line((seq, answer), said) => {
+                self.lines = self.lines.saturating_sub(1);
+                send(answer, said.answer(seq));
+            }
+            Done::Nothing => {}
             Done::Group(generation, outcome) => self.conclude_group(generation, outcome),
             Done::Explained(seq, answer, explained) => {
                 let findings: Vec<_> = explained.findings.iter().map(shown).collect();
@@ -281,7 +290,7 @@ impl Host {
 }
 
 /// What a drive is doing during a command, for people, and whether it moves and so ends with the session.
-const fn doing(command: &drive::Command) -> (&'static str, bool) {
+pub(crate) const fn doing(command: &drive::Command) -> (&'static str, bool) {
     use drive::Command;
     match command {
         Command::Enable => ("enabling", true),

@@ -12,6 +12,7 @@ use master::plan::NodeTraffic;
 use master::{Gear, Network};
 
 use crate::capture::{CaptureRun, WaysBack};
+use crate::console::Reader;
 use crate::motion::group_run::GroupRun;
 use crate::network::report;
 use crate::nodes::heard_ids::HeardIds;
@@ -61,6 +62,8 @@ pub struct Setting {
     pub world: Option<WorldDoor>,
     /// What is to be put back of captures, for whatever ends the program.
     pub ways_back: WaysBack,
+    /// What understands the lines of a console, where there is one.
+    pub console: Option<Arc<dyn Reader>>,
     /// Health and news of the bus.
     pub wire: Wire,
     /// Frames that a session sends as they are may set drives in motion.
@@ -96,6 +99,8 @@ pub struct Host {
     /// Several drives as one motion.
     pub(crate) group: Option<GroupRun>,
     pub(crate) listening: Vec<Listening>,
+    /// Lines of consoles that are under way.
+    pub(crate) lines: usize,
     pub(crate) parameters: Transactions,
     /// Captures under way.
     pub(crate) captures: BTreeMap<NodeId, CaptureRun>,
@@ -152,6 +157,7 @@ impl Host {
             stops: 0,
             group: None,
             listening: Vec::new(),
+            lines: 0,
             parameters: Transactions::default(),
             captures: BTreeMap::new(),
             captured: BTreeMap::new(),

@@ -213,6 +213,7 @@ fn setting() -> Setting {
         journals: None,
         world: None,
         ways_back: WaysBack::default(),
+        console: None,
         wire: Wire::default(),
         allow_motion: false,
     }

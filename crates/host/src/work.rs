@@ -16,6 +16,7 @@ use tokio::sync::oneshot;
 use crate::answer::Answer;
 use crate::around::Changed;
 use crate::capture::CaptureOutcome;
+use crate::console::Said;
 use crate::motion::group_run::GroupOutcome;
 use crate::parameters::transactions::{Refusal, Written};
 use crate::pdo::load::PlannedPdos;
@@ -57,6 +58,10 @@ pub(crate) enum Done {
     LookedAround(Asked, Result<serde_json::Value, NoAnswer>),
     /// The world was changed, or not.
     WorldChanged(Asked, Result<Result<Changed, (&'static str, String)>, NoAnswer>),
+    /// A line of a console has ended.
+    Line(Asked, Said),
+    /// Something that others wait for has ended.
+    Nothing,
     /// A drive was examined for an explanation.
     Explained(u64, oneshot::Sender<Answer>, Box<Explained>),
 }

@@ -53,6 +53,9 @@ const emit = (what, value) => listeners[what].forEach((listener) => listener(val
 /** True if this page may move drives. */
 export const inControl = () => link.welcome !== null && performance.now() - seen_at <= OLD_MS && link.state?.controller === link.welcome.session;
 
+/** True if the bus is one of virtual drives in the studio itself: no real motor turns. */
+export const isVirtual = () => /^sim(:|$)/.test(link.state?.bus.name ?? "");
+
 const refused = (kind, message) => Promise.resolve({ ok: false, error: { kind, message } });
 
 /** Sends a command; resolves with the answer, and never rejects. */

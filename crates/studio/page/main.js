@@ -1,6 +1,6 @@
 // The frame of the page: views, keys, stop, control, news.
 
-import { ask, connect, inControl, link, on, stopAll } from "./link.js";
+import { ask, connect, inControl, isVirtual, link, on, stopAll } from "./link.js";
 import { closeChoice } from "./choice.js";
 import { h, number, renew, setText, toggle } from "./dom.js";
 import { busView } from "./bus.js";
@@ -46,6 +46,7 @@ const views = [
   { name: "trace", title: "Trace", view: fetching() },
   { name: "faults", title: "Faults", view: fetching() },
   { name: "world", title: "World", view: fetching() },
+  { name: "console", title: "Console", view: fetching() },
 ];
 let shown = null;
 
@@ -85,7 +86,7 @@ function show(name) {
 
 byId("tabs").append(
   ...views.map(({ name, title }, at) =>
-    h("button", { type: "button", "data-name": name, title: `${title} (key ${at + 1})`, onclick: () => show(name) }, title)),
+    h("button", { type: "button", "data-name": name, title: at < 9 ? `${title} (key ${at + 1})` : title, onclick: () => show(name) }, title)),
 );
 addEventListener("hashchange", () => show(location.hash.slice(1)));
 
@@ -97,13 +98,13 @@ byId("stop").addEventListener("click", (event) => {
 });
 
 /**
- * Space is a space in a text field while the studio moves nothing and its state is fresh, and in the commands to a virtual world,
- * where no real motor turns; everywhere else it is Stop.
+ * Space is a space in a text field while the studio moves nothing and its state is fresh, in the commands to a virtual world, and in
+ * the console of virtual drives, where no real motor turns; everywhere else it is Stop.
  */
 const isText = (target) =>
   target.matches("textarea, input:not([type]), input[type=text], input[type=search]") &&
   link.fresh &&
-  (target.closest(".world") !== null || !link.state.nodes.some((node) => node.moving || node.doing));
+  (target.closest(".world") !== null || (target.closest(".console") !== null && isVirtual()) || !link.state.nodes.some((node) => node.moving || node.doing));
 
 addEventListener(
   "keydown",

@@ -1,5 +1,6 @@
 // The views that are not needed for the first picture: fetched after it, so that a page on a slow line is there sooner.
 
+import { consoleView } from "./console.js";
 import { faultsView } from "./faults.js";
 import { parametersView } from "./parameters.js";
 import { pdoView } from "./pdo.js";
@@ -15,4 +16,5 @@ export const laterViews = (shared, report) => ({
   trace: traceView(),
   faults: faultsView(report),
   world: worldView(shared, report),
+  console: consoleView(),
 });

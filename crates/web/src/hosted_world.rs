@@ -1,9 +1,11 @@
 //! A virtual machine with a host and one page, in one thread: its caller has the clock, and moves it.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use can::{Instant, Tap};
+use console::line::Reader;
 use host::capture::WaysBack;
 use host::{Setting, Wire, WorldAsks, world_door};
 use machine::file::Machine;
@@ -88,6 +90,7 @@ impl HostedWorld {
             journals: None,
             world: Some(door),
             ways_back: WaysBack::default(),
+            console: Some(Arc::new(Reader)),
             wire: Wire::default(),
             // All drives are virtual.
             allow_motion: true,

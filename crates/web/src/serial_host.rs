@@ -6,10 +6,12 @@
 //! garbage. A page that takes leave has the drives' watches over this host given back.
 
 use std::pin::Pin;
+use std::sync::Arc;
 use std::task::Poll;
 use std::time::Duration;
 
 use can::{Bitrate, Instant, Station, Tap};
+use console::line::Reader;
 use host::capture::WaysBack;
 use host::stopping::{Account, still_moving, stop};
 use host::{Setting, Wire};
@@ -115,6 +117,7 @@ impl SerialHost {
             journals: None,
             world: None,
             ways_back: WaysBack::default(),
+            console: Some(Arc::new(Reader)),
             wire: wire.clone(),
             allow_motion: false,
         };

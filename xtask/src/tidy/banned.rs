@@ -29,7 +29,7 @@ const BANNED: &[Banned] = &[
     },
     Banned {
         word: "tokio",
-        allowed_in: &["transport", "host", "foxglove", "serve", "studio", "web", "cli", "python"],
+        allowed_in: &["transport", "host", "console", "foxglove", "serve", "studio", "web", "cli", "python"],
         why: "the core is sans-IO and runs under any runtime or none",
         remedy: "write a Station or a plain future; the run loops are in transport",
     },

@@ -50,9 +50,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "words",
         ],
     ),
+    ("console", &["canopen", "cia402", "devices", "host", "master", "plot", "words"]),
     ("serve", &["can", "canlog", "foxglove", "host", "master", "recording", "scenario", "sim", "transport", "words"]),
     ("studio", &["can", "canlog", "canopen", "host", "machine", "master", "recording", "words"]),
-    ("web", &["can", "canopen", "host", "machine", "master", "scenario", "sim", "slcan", "words"]),
+    ("web", &["can", "canopen", "console", "host", "machine", "master", "scenario", "sim", "slcan", "words"]),
     (
         "python",
         &[
@@ -89,6 +90,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "fmu",
             "master",
             "conform",
+            "console",
             "transport",
             "tune",
             "canlog",

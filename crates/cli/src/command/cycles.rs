@@ -10,7 +10,7 @@ use master::plan::NodeTraffic;
 use super::look::studio::bitrate;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::numbers::whole;
+use console::numbers::whole;
 
 /// The most cycles that `--tolerance` takes.
 const MOST_TOLERANCE: u32 = 100;

@@ -15,7 +15,6 @@ pub(crate) mod look {
     pub(crate) mod departures;
     pub(crate) mod dump;
     pub(crate) mod emcy;
-    pub(crate) mod explain;
     pub(crate) mod objects;
     pub(crate) mod pdo;
     pub(crate) mod read;
@@ -27,12 +26,8 @@ pub(crate) mod look {
 }
 
 pub(crate) mod moving {
-    pub(crate) mod drive;
     pub(crate) mod drive_base;
-    pub(crate) mod estop;
     pub(crate) mod group;
-    pub(crate) mod home;
-    pub(crate) mod motion;
     pub(crate) mod test_motion;
 }
 

@@ -8,7 +8,7 @@ use master::units::parse_duration;
 
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::numbers::whole;
+use console::numbers::whole;
 
 /// How often, and how many times.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]

@@ -84,7 +84,7 @@ pub(crate) fn listen_to_signals(requests: mpsc::Sender<Asked>) {
             drop(ready);
             let signal = signals.next().await;
             let asked = async {
-                let _ = requests.send(Asked::Ended(Failure::ended_by(signal))).await;
+                let _ = requests.send(Asked::Ended(crate::failure::ended_by(signal))).await;
                 std::future::pending::<()>().await;
             };
             tokio::select! {

@@ -1,6 +1,8 @@
 //! Commands on a bus that outlives them, in virtual time: what a simulator of another program would show, without a process and
 //! without a clock. What only processes show (signals, sockets, terminals) is in `tests/processes`.
 
+mod console;
+mod estop;
 mod guards;
 mod images;
 mod latency;

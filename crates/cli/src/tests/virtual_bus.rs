@@ -10,7 +10,6 @@ use serde_json::Value;
 use sim::{Place, Report, World};
 
 use crate::args::Cli;
-use crate::failure::Failure;
 use crate::output::{Format, kept};
 use crate::scope::{self, command_line};
 use crate::{Typed, complaint, run};
@@ -118,7 +117,7 @@ fn ended<'a>(words: impl Iterator<Item = &'a str>, shared: Option<Arc<Mutex<Worl
     let matches = match command_line().try_get_matches_from(std::iter::once("ferrodrive").chain(words)) {
         Ok(matches) => matches,
         Err(error) => {
-            let (status, err) = match Failure::of_named_file(&error) {
+            let (status, err) = match crate::failure::of_named_file(&error) {
                 Some(failure) => (failure.status as i32, failure.to_string()),
                 None => (error.exit_code(), error.render().to_string()),
             };

@@ -38,6 +38,11 @@ pub enum SessionCommand {
         /// In the form of candump: identifier, `#`, data.
         frame: String,
     },
+    /// Carries out a line of the command line, `move 4 90deg`: with what it says, and the status that it ends with.
+    Console {
+        /// The words of a command, without the program's name.
+        line: String,
+    },
     /// Explains a term that the state has.
     Help {
         /// The node that has it, for terms of its model.
@@ -61,6 +66,7 @@ impl SessionCommand {
         "stop_all",
         "scan",
         "send_frame",
+        "console",
         "help",
     ];
 

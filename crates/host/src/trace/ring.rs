@@ -104,6 +104,13 @@ impl Trace {
         decoder.decode(frame)
     }
 
+    /// Visits the frames of others since a time.
+    pub fn others_since(&self, at: Instant, each: impl FnMut(&BusFrame)) {
+        let held = self.held();
+        let frames = held.chunks.iter().flat_map(|chunk| chunk.frames.iter());
+        frames.filter(|passed| passed.at >= at && !passed.own).for_each(each);
+    }
+
     /// A snapshot of the kept frames, unaffected by further ones.
     pub fn held(&self) -> Held {
         let ring = self.lock();

@@ -87,6 +87,8 @@ const SOURCES: &[(&str, &str)] = files![
     "trace_identifiers.js",
     "trace_send.js",
     "trace_sum.js",
+    "console.js",
+    "console_lines.js",
     "views.js",
     "world.js",
     "world_form.js",

@@ -9,6 +9,8 @@ use master::drive::Limits;
 use master::{Drive, Error};
 use serde::Serialize;
 
+use console::command::drive::guessed;
+
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -228,11 +230,6 @@ impl ObjectReport {
             written,
         }
     }
-}
-
-/// The model that a drive is taken for on the evidence of its objects.
-pub(in crate::command) fn guessed(drive: &Drive) -> Option<&'static str> {
-    drive.guess().filter(|guess| guess.evidence().is_some()).map(|guess| guess.description().name)
 }
 
 impl Report for ObjectReport {

@@ -15,8 +15,8 @@ use crate::command::cycles::CycleArgs;
 use crate::command::repeat::period;
 use crate::context::{Context, Restorer};
 use crate::failure::Failure;
-use crate::guard::{Guard, GuardArgs};
 use crate::output::Report;
+use console::guard::{Guard, GuardArgs};
 use plot::{Paint, Table};
 
 /// Which loops gains are found for.

@@ -220,7 +220,7 @@ impl Dump {
         let over = async {
             tokio::select! {
                 () = clock.sleep_until_due(end) => Ok(()),
-                signal = asked_to_end() => Err(Failure::ended_by(signal)),
+                signal = asked_to_end() => Err(crate::failure::ended_by(signal)),
             }
         };
         tokio::select! {

@@ -6,10 +6,10 @@ use master::drive::{Limits, Setting};
 use serde::Serialize;
 
 use super::departures::DepartureList;
-use crate::command::configure::sdo::guessed;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
+use console::command::drive::guessed;
 use plot::Paint;
 use plot::Table;
 use words::models::{Description, resolve};

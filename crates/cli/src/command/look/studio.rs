@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use can::Bitrate;
 use canopen::NodeId;
+use console::line::Reader;
 use host::capture::WaysBack;
 use host::{Host, Journals, Setting};
 use machine::parameters::journal::Journal;
@@ -164,6 +165,7 @@ pub(in crate::command) fn setting(context: &Context) -> Setting {
         journals: journals(context),
         unix_zero: context.traffic.unix_zero(),
         world: context.world.clone(),
+        console: Some(Arc::new(Reader)),
         wire: context.wire.clone(),
         allow_motion: false,
     }

@@ -17,9 +17,9 @@ use crate::command::cycles::{CycleArgs, refuse_too_full};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
-use crate::guard::{GuardArgs, GuardReport};
 use crate::output::{Format, Report};
 use crate::session;
+use console::guard::{GuardArgs, GuardReport};
 use plot::Paint;
 use words::failure::SEE_DRIVES;
 

@@ -13,15 +13,15 @@ use serde::Serialize;
 use words::mode::mode;
 use words::node::node;
 
-use super::motion::speed;
 use crate::command::cycles::{CycleArgs, refuse_too_full};
 use crate::command::repeat::period;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::{Global, some_time};
-use crate::guard::{Guard, GuardArgs, GuardReport};
 use crate::output::{Format, Report};
 use crate::session;
+use console::command::motion::speed;
+use console::guard::{Guard, GuardArgs, GuardReport};
 use plot::Paint;
 use plot::Table;
 

@@ -22,9 +22,9 @@ use crate::command::record_and_replay::capture::{
 use crate::command::repeat::period;
 use crate::context::{Context, Restorer};
 use crate::failure::Failure;
-use crate::guard::{GuardArgs, GuardReport};
-use crate::numbers::whole;
 use crate::output::Report;
+use console::guard::{GuardArgs, GuardReport};
+use console::numbers::whole;
 use plot::{Paint, Table};
 
 /// Move a drive by a test motion, n times, with figures of each run

@@ -11,8 +11,8 @@ use transport::WallClock;
 use super::sync::identifier;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::numbers::whole;
 use crate::output::Report;
+use console::numbers::whole;
 use plot::Paint;
 
 /// Send the time of day to every device that consumes it (1012h)

@@ -20,9 +20,9 @@ use crate::command::configure::params::journal::{default_path, note_kept};
 use crate::command::repeat::period;
 use crate::context::{Context, Restorer};
 use crate::failure::Failure;
-use crate::numbers::whole;
 use crate::output::{Report, file_path};
 use crate::plain::plain;
+use console::numbers::whole;
 use plot::{Paint, Table};
 
 /// Capture quantities of a drive, fast

@@ -5,10 +5,10 @@ use serde_json::{Value, json};
 
 use crate::control_client::ControlArgs;
 use crate::failure::Failure;
-use crate::numbers::whole;
 use crate::output::{Format, print_line};
 use crate::plain::plain;
 use crate::session::exit_on_signal;
+use console::numbers::whole;
 
 /// Show the events of a running simulator
 ///

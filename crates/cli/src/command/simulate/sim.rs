@@ -28,12 +28,12 @@ use transport::{
 use crate::embedded;
 use crate::failure::Failure;
 use crate::global::Global;
-use crate::numbers::whole;
 use crate::output::file_path;
 use crate::plain::plain;
 use crate::recording::{LogPath, RecordOptions};
 use crate::served::{Asked, ClockArg, ControlOptions, at_the_end, is_typed, listen_to_signals, runtime_of_clients};
 use crate::session::{bus_failure, enter_real_time, not_served, start_clock};
+use console::numbers::whole;
 use described::notes;
 use machine::file::{Machine, Placed};
 use serve::writing::NewLog;

@@ -22,8 +22,8 @@ use crate::command::configure::params::{PlanReport, Transaction, plan_of};
 use crate::command::repeat::period;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::numbers::whole;
 use crate::output::Report;
+use console::numbers::whole;
 use plot::Paint;
 use plot::Table;
 

@@ -18,12 +18,12 @@ use scenario::{Kept, Outcome, Runner, Scenario};
 use sim::Fidelity;
 
 use crate::failure::Failure;
-use crate::numbers::whole;
 use crate::output::{Format, file_path};
 use crate::plain::plain;
 use crate::progress::Progress;
 use crate::recording::RecordOptions;
 use crate::session::exit_on_signal;
+use console::numbers::whole;
 use loaded::{Loaded, unbuildable, write};
 use report::RunReport;
 use serve::messages::Messages;

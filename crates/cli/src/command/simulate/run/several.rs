@@ -58,7 +58,7 @@ pub(super) fn run(
     );
     progress.clear();
     let mut report = SeveralReport { ok: true, files, results: &results };
-    let failure = crew.signal().map(Failure::ended_by).or_else(|| report.failure());
+    let failure = crew.signal().map(crate::failure::ended_by).or_else(|| report.failure());
     report.ok = failure.is_none();
     if let Some(path) = junit_file {
         write(path, &report.junit())?;

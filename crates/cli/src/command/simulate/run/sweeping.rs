@@ -52,7 +52,7 @@ pub(super) fn sweep(sweep: &Sweep, asked: &Asked<'_>, file: &Path, format: Forma
     }
     let crew = Crew::new(asked.jobs);
     make_runs(sweep, done, &crew, &mut summary, results.as_mut(), &Progress::new(format.json))?;
-    print(sweep, &summary, file, format, crew.signal().map(Failure::ended_by))
+    print(sweep, &summary, file, format, crew.signal().map(crate::failure::ended_by))
 }
 
 /// Makes the runs of this part from the `done`-th on.

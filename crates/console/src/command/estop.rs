@@ -12,9 +12,8 @@ use serde::Serialize;
 
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::Report;
-use crate::plain::plain;
 use plot::Paint;
+use words::plain;
 
 /// Stop every drive on the bus at once, whichever master moves it
 ///
@@ -28,7 +27,7 @@ use plot::Paint;
     after_help = "Examples:\n  ferrodrive --bus can0 estop\n  ferrodrive --bus can0 --machine machine.toml estop --json\n  \
     ferrodrive --bus can0 quick-stop all    # the same\n  ferrodrive --bus can0 stop all          # by the ramps; stays enabled"
 )]
-pub(crate) struct Estop {
+pub struct Estop {
     /// The word all, as behind `stop` and `quick-stop`: there is nothing else to choose
     #[arg(value_name = "all", value_parser = ["all"], hide = true)]
     everything: Option<String>,
@@ -36,7 +35,7 @@ pub(crate) struct Estop {
 
 /// What became of every drive on the bus.
 #[derive(Debug, Serialize)]
-pub(crate) struct StopReport {
+pub struct StopReport {
     ok: bool,
     nodes: Vec<AxisReport>,
     #[serde(skip)]
@@ -65,7 +64,7 @@ const PATIENCE: Duration = Duration::from_millis(150);
 
 impl Estop {
     /// Stops everything.
-    pub(crate) async fn run(&self, context: &Context) -> Result<StopReport, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<StopReport, Failure> {
         let models: BTreeMap<_, _> = context.stated_models();
         let stopped = context.network.stop_everything(&models).await;
         StopReport::new(
@@ -77,7 +76,7 @@ impl Estop {
 }
 
 /// `stop all`: each by its ramp; it stays enabled.
-pub(crate) async fn stop_all(context: &Context) -> Result<StopReport, Failure> {
+pub async fn stop_all(context: &Context) -> Result<StopReport, Failure> {
     // A stop waits for no record of a server.
     context.network.choose_sdo_servers([]);
     let asked = NodeId::all().map(|id| async move {
@@ -157,7 +156,7 @@ impl From<StoppedAxis> for AxisReport {
 
 impl StopReport {
     fn new(context: &Context, nodes: Vec<AxisReport>, surer: &str) -> Result<Self, Failure> {
-        let bus = context.bus();
+        let bus = &context.bus_name;
         if nodes.is_empty() {
             return Err(Failure::new(format!("no drive answers on {bus}: drives may still be moving"))
                 .of_kind("no_node")
@@ -186,13 +185,14 @@ impl StopReport {
     }
 
     /// Why not every drive was seen to stand.
-    pub(crate) fn failure(&self) -> Option<Failure> {
+    pub fn failure(&self) -> Option<Failure> {
         self.failure.clone()
     }
 }
 
-impl Report for StopReport {
-    fn text(&self, paint: Paint) -> String {
+impl StopReport {
+    /// As lines for people.
+    pub fn text(&self, paint: Paint) -> String {
         let line = |axis: &AxisReport| {
             let model = axis.model.map(|model| format!(" ({model})")).unwrap_or_default();
             let said = match (axis.after_ms, axis.way) {
@@ -215,105 +215,5 @@ fn in_words(way: &'static str) -> String {
         "a fault has removed power from its motor; a load may move it".to_owned()
     } else {
         "by its ramp; it stays enabled if it was".to_owned()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use cia402::object::{CONTROLWORD, MODES_OF_OPERATION, TARGET_VELOCITY};
-    use clap::Parser;
-    use processes::{Scratch, scratch};
-    use serde_json::{Value, json};
-
-    use super::*;
-    use crate::global::Global;
-    use crate::session;
-
-    #[derive(Parser)]
-    struct GlobalArguments {
-        #[command(flatten)]
-        global: Global,
-    }
-
-    /// A bus with these drives, and the models of all that should be there.
-    fn line(folder: &Scratch, there: &str, named: &[&str]) -> GlobalArguments {
-        let path = folder.join("bus.toml");
-        std::fs::write(&path, there).expect("written");
-        let bus = format!("sim:{}", path.display());
-        let models = named.iter().flat_map(|model| ["--model", model]);
-        GlobalArguments::parse_from(["ferrodrive", "--bus", &bus].into_iter().chain(models))
-    }
-
-    const SERVO: &str = "[[drive]]\nmodel = 'cia402'\nnode = 5\n";
-    const STEPPER: &str = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\n";
-
-    fn node(raw: u8) -> NodeId {
-        NodeId::new(raw).expect("a node-ID")
-    }
-
-    /// Sets a drive in motion as another program does: the master has no part in it.
-    async fn turn(context: &Context, id: NodeId) -> Drive {
-        let (node, drive) = (context.network.node(id), context.drive(id).await.expect("it is known"));
-        node.write(MODES_OF_OPERATION, 3_i8).await.expect("profile velocity");
-        // The servo counts encoder increments, the stepper r/min.
-        let counts = if id.raw() == 5 { 131_072 } else { 60 };
-        node.write(TARGET_VELOCITY, counts).await.expect("60 r/min");
-        for controlword in [0x06_u16, 0x07, 0x0F] {
-            node.write(CONTROLWORD, controlword).await.expect("it follows");
-            context.network.sleep(Duration::from_millis(100)).await;
-        }
-        context.network.sleep(Duration::from_secs(2)).await;
-        assert!(speed_rpm(&drive).await > 50.0, "node {id} turns at {} r/min", speed_rpm(&drive).await);
-        drive
-    }
-
-    async fn speed_rpm(drive: &Drive) -> f64 {
-        drive.state().await.expect("it answers").velocity.expect("it has one").0.abs()
-    }
-
-    fn json_of(report: &StopReport) -> Value {
-        serde_json::to_value(report).expect("JSON")
-    }
-
-    #[test]
-    fn everything_stops_and_each_drive_is_said_to_stand() {
-        let both = format!("{SERVO}{STEPPER}");
-        for by_ramp in [false, true] {
-            let folder = scratch("estop_all");
-            let line = line(&folder, &both, &[]);
-            session::run(&line.global, async |context| {
-                let drives = [turn(context, node(5)).await, turn(context, node(2)).await];
-                let report = if by_ramp { stop_all(context).await? } else { Estop::default().run(context).await? };
-                let said = json_of(&report);
-                let nodes = said["nodes"].as_array().expect("a list");
-                assert_eq!(nodes.iter().map(|row| &row["node"]).collect::<Vec<_>>(), [2, 5], "{said}");
-                assert!(said["ok"] == true && nodes.iter().all(|row| row["stands"] == true), "{said}");
-                for drive in &drives {
-                    assert!(speed_rpm(drive).await < 1.0, "{said}");
-                }
-                Ok(())
-            })
-            .unwrap_or_else(|failure| panic!("{failure}"));
-        }
-    }
-
-    #[test]
-    fn a_drive_that_was_not_seen_to_stand_may_still_be_moving() {
-        let folder = scratch("estop_silent");
-        let line = line(&folder, SERVO, &["2=zlim42c"]);
-        session::run(&line.global, async |context| {
-            turn(context, node(5)).await;
-            let report = Estop::default().run(context).await?;
-            let said = json_of(&report);
-            let stands = said["nodes"].as_array().expect("a list").iter().map(|row| (&row["node"], &row["stands"]));
-            assert_eq!(stands.collect::<Vec<_>>(), [(&json!(2), &json!(false)), (&json!(5), &json!(true))], "{said}");
-            let failure = report.failure().expect("it failed");
-            assert_eq!((&said["ok"], failure.kind), (&json!(false), "not_stopped"), "{said}");
-            assert!(failure.next.iter().any(|next| next.contains("emergency stop")), "{failure}");
-            let people = report.text(Paint::OFF);
-            assert!(people.contains("node 2 (zlim42c): may still be moving"), "{people}");
-            Ok(())
-        })
-        .unwrap_or_else(|failure| panic!("{failure}"));
     }
 }

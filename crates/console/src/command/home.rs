@@ -22,10 +22,10 @@ use words::node::node;
 /// inputs have to be configured as switches first; a drive that does not find the edge in time is stopped.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive home 2 --method 17\n  ferrodrive home 1 --method 18 --within 5s")]
-pub(crate) struct Home {
+pub struct Home {
     /// Node-ID
     #[arg(value_parser = node)]
-    node: NodeId,
+    pub(super) node: NodeId,
     /// Homing method of CiA 402, e.g. 17 (negative limit switch)
     #[arg(long, value_parser = |text: &str| whole(text, i8::MIN..=i8::MAX), allow_hyphen_values = true)]
     method: i8,
@@ -43,8 +43,14 @@ pub(crate) struct Home {
 }
 
 impl Home {
+    /// What the drive is to do.
+    pub(super) const fn motion(&self) -> Motion {
+        let (speed, within) = (self.profile_velocity, Some(self.within));
+        Motion::Home { method: self.method, speed, wait: !self.no_wait, within }
+    }
+
     /// Homes; refuses for drives without homing, with the reason.
-    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
         if let Some(model) = drive.description()
             && let Some(axis) = model.first_axis().filter(|axis| axis.homing.is_none())
@@ -52,9 +58,7 @@ impl Home {
             return Err(self.refusal(model, axis));
         }
         let doing = format!("node {}: searching for its reference", self.node);
-        let (speed, within) = (self.profile_velocity, Some(self.within));
-        let command = Motion::Home { method: self.method, speed, wait: !self.no_wait, within };
-        let (motion, guard) = perform(context, &drive, &doing, &self.guard, &command).await?;
+        let (motion, guard) = perform(context, &drive, &doing, &self.guard, &self.motion()).await?;
         let then = Then::goes_on_if(motion.reached_after.is_none());
         outcome(context, &drive, ("home with method", &self.method), motion, then, guard).await
     }

@@ -2,7 +2,7 @@
 
 /// How a command ended; the process ends with the same number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Status {
+pub enum Status {
     /// It was tried and did not come out, or a file that it was to be done by is bad or missing.
     Failed = 1,
     /// The command line itself makes no sense: no bus and no file is needed to see that.
@@ -19,7 +19,7 @@ pub(crate) enum Status {
 
 impl Status {
     /// True if a signal ended the command.
-    pub(crate) const fn is_signal(self) -> bool {
+    pub const fn is_signal(self) -> bool {
         self as u8 > 128
     }
 }

@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 ///
 /// # Errors
 /// `expected 2 to 240, got 0`.
-pub(crate) fn whole<T: Copy + Into<i128> + TryFrom<i128>>(text: &str, within: RangeInclusive<T>) -> Result<T, String> {
+pub fn whole<T: Copy + Into<i128> + TryFrom<i128>>(text: &str, within: RangeInclusive<T>) -> Result<T, String> {
     let (low, high): (i128, i128) = ((*within.start()).into(), (*within.end()).into());
     // Of more digits than any bound has, the value does not matter.
     let number = text.parse::<i128>().ok().filter(|number| (low..=high).contains(number));

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use devices::{Quantity, Ramps, Scale};
-use master::drive::{Commanded, Drive, Manner, MotionReport, Note};
+use master::drive::{Commanded, Drive, Manner, Motion, MotionReport, Note};
 use master::units::{Along, Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
 use serde::Serialize;
 
@@ -14,7 +14,6 @@ use super::drive::{ShaftMotion, StateReport};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::{Guard, GuardArgs, GuardReport};
-use crate::output::Report;
 use plot::Paint;
 use words::models::is_from_file;
 use words::node::node;
@@ -27,10 +26,10 @@ use words::node::node;
 #[command(
     after_help = "Examples:\n  ferrodrive velocity 4 60rpm --for 2s\n  ferrodrive velocity 4 -360deg/s --acceleration 120rpm/s"
 )]
-pub(crate) struct Velocity {
+pub struct Velocity {
     /// Node-ID
     #[arg(value_parser = node)]
-    node: NodeId,
+    pub(super) node: NodeId,
     /// Speed: 60 (r/min), 60rpm, 6.28rad/s, 360deg/s, 1r/s; 200mm/s where the machine file has a feed constant
     #[arg(allow_hyphen_values = true)]
     speed: Along<Rpm>,
@@ -45,10 +44,10 @@ pub(crate) struct Velocity {
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive move 4 90deg\n  ferrodrive move 4 32000 --profile-velocity 60rpm\n  \
     ferrodrive move 4 --relative -0.5turn --acceleration 300ms")]
-pub(crate) struct Move {
+pub struct Move {
     /// Node-ID
     #[arg(value_parser = node)]
-    node: NodeId,
+    pub(super) node: NodeId,
     /// Position: 32000 (counts), 90deg, 0.5turn, 1.57rad; 40mm where the machine file has a feed constant
     #[arg(allow_hyphen_values = true)]
     position: Along<Angle>,
@@ -67,10 +66,10 @@ pub(crate) struct Move {
 /// Returns at once: what the motor does depends on the load. With --for the torque is removed afterwards.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  ferrodrive torque 4 1.5A --for 2s")]
-pub(crate) struct Torque {
+pub struct Torque {
     /// Node-ID
     #[arg(value_parser = node)]
-    node: NodeId,
+    pub(super) node: NodeId,
     /// Motor current: 1.5A, -800mA
     #[arg(allow_hyphen_values = true)]
     current: Amperes,
@@ -105,7 +104,11 @@ struct RampArgs {
     guard: GuardArgs,
 }
 
-pub(in crate::command) fn speed(text: &str) -> Result<Along<Rpm>, String> {
+/// A speed that is to be kept to.
+///
+/// # Errors
+/// It is not one, or not above 0.
+pub fn speed(text: &str) -> Result<Along<Rpm>, String> {
     match text.parse() {
         Ok(speed @ (Along::Turning(Rpm(value)) | Along::Metres(value))) if value > 0.0 => Ok(speed),
         Ok(_) => Err("expected a profile velocity above 0, e.g. 60rpm; the target decides the direction".into()),
@@ -115,7 +118,7 @@ pub(in crate::command) fn speed(text: &str) -> Result<Along<Rpm>, String> {
 
 /// What was asked, within which limits, and what came of it.
 #[derive(Debug, Serialize)]
-pub(crate) struct MotionOutcome {
+pub struct MotionOutcome {
     asked: String,
     /// The same with what was sent, where that differs.
     #[serde(skip)]
@@ -170,38 +173,50 @@ struct ProfileLimits {
 }
 
 impl Velocity {
+    /// What the drive is to do.
+    pub(super) fn motion(&self) -> Motion {
+        Motion::Velocity(self.speed, self.ramps.manner())
+    }
+
     /// Turns.
-    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
         let doing = format!("node {}: to {}", self.node, self.speed);
-        let command = master::drive::Motion::Velocity(self.speed, self.ramps.manner());
-        let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &command).await?;
+        let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &self.motion()).await?;
         let then = self.duration.map_or(Then::goes_on_if(!stands_at(&self.speed)), Then::StopAfter);
         outcome(context, &drive, ("turn at", &self.speed), motion, then, guard).await
     }
 }
 
 impl Move {
+    /// What the drive is to do.
+    pub(super) fn motion(&self) -> Motion {
+        let (speed, manner) = (self.profile_velocity, self.ramps.manner());
+        Motion::Move { to: self.position, relative: self.relative, speed, manner }
+    }
+
     /// Moves.
-    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
         let verb = if self.relative { "move by" } else { "move to" };
         let doing = format!("node {}: {verb} {}", self.node, self.position);
-        let (speed, manner) = (self.profile_velocity, self.ramps.manner());
-        let command = master::drive::Motion::Move { to: self.position, relative: self.relative, speed, manner };
-        let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &command).await?;
+        let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &self.motion()).await?;
         let then = Then::goes_on_if(motion.reached_after.is_none());
         outcome(context, &drive, (verb, &self.position), motion, then, guard).await
     }
 }
 
 impl Torque {
+    /// What the drive is to do.
+    pub(super) const fn motion(&self) -> Motion {
+        Motion::Torque(self.current)
+    }
+
     /// Pushes.
-    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
         let doing = format!("node {}: applying {}", self.node, self.current);
-        let command = master::drive::Motion::Torque(self.current);
-        let (motion, guard) = perform(context, &drive, &doing, &self.guard, &command).await?;
+        let (motion, guard) = perform(context, &drive, &doing, &self.guard, &self.motion()).await?;
         let then = self.duration.map_or(Then::goes_on_if(self.current.0 != 0.0), Then::StopAfter);
         outcome(context, &drive, ("apply", &self.current), motion, then, guard).await
     }
@@ -224,15 +239,15 @@ fn stands_at(speed: &Along<Rpm>) -> bool {
 }
 
 /// Carries out a command that moves a drive, which is guarded first, and shows meanwhile what it is doing.
-pub(in crate::command) async fn perform(
+pub async fn perform(
     context: &Context,
     drive: &Drive,
     doing: &str,
     guard: &GuardArgs,
-    command: &master::drive::Motion,
+    command: &Motion,
 ) -> Result<(MotionReport, Guard), Failure> {
     drive.check_motion(command)?;
-    context.progress.show(doing);
+    context.show(doing);
     let guard = guard.begin(context, drive).await?;
     let report = shown_while(context, drive, doing, drive.make(command)).await?;
     Ok((report, guard))
@@ -242,13 +257,8 @@ pub(in crate::command) async fn perform(
 const PROGRESS_PERIOD: Duration = Duration::from_millis(500);
 
 /// Shows where the shaft is while `motion` goes on, to people at a terminal: the questions cost the bus some frames.
-pub(in crate::command) async fn shown_while<T>(
-    context: &Context,
-    drive: &Drive,
-    doing: &str,
-    motion: impl Future<Output = T>,
-) -> T {
-    if !context.progress.is_shown() {
+pub async fn shown_while<T>(context: &Context, drive: &Drive, doing: &str, motion: impl Future<Output = T>) -> T {
+    if !context.is_shown() {
         return motion.await;
     }
     let began = context.network.now();
@@ -266,13 +276,13 @@ pub(in crate::command) async fn shown_while<T>(
         // What keeps it from answering is reported by the motion.
         let Ok(state) = state else { continue };
         let seconds = (context.network.now() - began).as_secs_f64();
-        context.progress.show(format!("{doing}: at {} after {seconds:.1} s", state.motion.text()));
+        context.show(format!("{doing}: at {} after {seconds:.1} s", state.motion.text()));
     }
 }
 
 /// What follows a commanded motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::command) enum Then {
+pub enum Then {
     /// It is watched for this long, then the drive is stopped.
     StopAfter(Duration),
     /// The command ends, the motion does not.
@@ -283,13 +293,13 @@ pub(in crate::command) enum Then {
 
 impl Then {
     /// The motion goes on if so, and else is at its end.
-    pub(in crate::command) const fn goes_on_if(moving: bool) -> Self {
+    pub const fn goes_on_if(moving: bool) -> Self {
         if moving { Self::GoesOn } else { Self::Stands }
     }
 }
 
 /// Reads what came of a motion, and ends it if it is to be ended. `verb` and `value` say what was asked for.
-pub(in crate::command) async fn outcome(
+pub async fn outcome(
     context: &Context,
     drive: &Drive,
     (verb, value): (&str, &dyn fmt::Display),
@@ -306,7 +316,7 @@ pub(in crate::command) async fn outcome(
     let mut before_stop = None;
     if let Then::StopAfter(duration) = then {
         let doing = format!("node {}: {done} for {} s", drive.node().id(), duration.as_secs_f64());
-        context.progress.show(&doing);
+        context.show(&doing);
         shown_while(context, drive, &doing, drive.supervise(duration)).await?;
         before_stop = Some(StateReport::read(drive).await?.motion);
         drive.stop().await?;
@@ -369,8 +379,9 @@ impl ProfileLimits {
     }
 }
 
-impl Report for MotionOutcome {
-    fn text(&self, paint: Paint) -> String {
+impl MotionOutcome {
+    /// As lines for people.
+    pub fn text(&self, paint: Paint) -> String {
         let reached = match self.reached_after_s {
             Some(seconds) => paint.good(&format!("reached after {seconds:.2} s")),
             None => "commanded, not waited for".into(),

@@ -8,10 +8,8 @@ use master::drive::{Drive, DriveState};
 use serde::Serialize;
 
 use super::estop::{Estop, StopReport, stop_all};
-use crate::command::configure::sdo::guessed;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::Report;
 use plot::Paint;
 use words::node::{Nodes, node, nodes};
 
@@ -23,10 +21,10 @@ use words::node::{Nodes, node, nodes};
 #[command(
     after_help = "Examples:\n  ferrodrive state 4\n  ferrodrive --bus can0 --machine machine.toml state 4 --json"
 )]
-pub(crate) struct State {
+pub struct State {
     /// Node-ID
     #[arg(value_parser = node)]
-    node: NodeId,
+    pub(super) node: NodeId,
 }
 
 /// Enable a drive: power its motor, which holds still
@@ -37,10 +35,10 @@ pub(crate) struct State {
 #[command(
     after_help = "Examples:\n  ferrodrive --bus can0 enable 4\n  ferrodrive --bus can0 enable 4 -v      # each frame of it"
 )]
-pub(crate) struct Enable {
+pub struct Enable {
     /// Node-ID
     #[arg(value_parser = node)]
-    node: NodeId,
+    pub(super) node: NodeId,
 }
 
 /// Disable a drive: stop it, then remove power from its motor
@@ -48,10 +46,10 @@ pub(crate) struct Enable {
 /// A load that pulls (an arm, a slope) moves a motor without power, unless a brake holds it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  ferrodrive --bus can0 disable 4")]
-pub(crate) struct Disable {
+pub struct Disable {
     /// Node-ID
     #[arg(value_parser = node)]
-    node: NodeId,
+    pub(super) node: NodeId,
 }
 
 /// Stop a drive, or all, with the deceleration ramp; it stays enabled
@@ -60,10 +58,10 @@ pub(crate) struct Disable {
 /// 0 only when each one was seen to stand.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 stop 4\n  ferrodrive --bus can0 stop all")]
-pub(crate) struct Stop {
+pub struct Stop {
     /// Node-ID, or all
     #[arg(value_name = "NODE|all", value_parser = nodes)]
-    nodes: Nodes,
+    pub(super) nodes: Nodes,
 }
 
 /// Stop a drive, or all, with the quick stop as configured (605Ah)
@@ -72,16 +70,16 @@ pub(crate) struct Stop {
 /// `estop`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 quick-stop 4\n  ferrodrive --bus can0 quick-stop all")]
-pub(crate) struct QuickStop {
+pub struct QuickStop {
     /// Node-ID, or all
     #[arg(value_name = "NODE|all", value_parser = nodes)]
-    nodes: Nodes,
+    pub(super) nodes: Nodes,
 }
 
 /// What came of a stop.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
-pub(crate) enum StopOutcome {
+pub enum StopOutcome {
     /// Of one drive.
     One(Box<StateReport>),
     /// Of every drive on the bus.
@@ -89,12 +87,13 @@ pub(crate) enum StopOutcome {
 }
 
 impl StopOutcome {
-    pub(crate) fn all(report: StopReport) -> Self {
+    /// Of every drive.
+    pub fn all(report: StopReport) -> Self {
         Self::All(Box::new(report))
     }
 
     /// Why not every drive was seen to stand.
-    pub(crate) fn failure(&self) -> Option<Failure> {
+    pub fn failure(&self) -> Option<Failure> {
         match self {
             Self::One(_) => None,
             Self::All(report) => report.failure(),
@@ -102,8 +101,9 @@ impl StopOutcome {
     }
 }
 
-impl Report for StopOutcome {
-    fn text(&self, paint: Paint) -> String {
+impl StopOutcome {
+    /// As lines for people.
+    pub fn text(&self, paint: Paint) -> String {
         match self {
             Self::One(report) => report.text(paint),
             Self::All(report) => report.text(paint),
@@ -118,16 +118,17 @@ impl Report for StopOutcome {
 #[command(
     after_help = "Examples:\n  ferrodrive --bus can0 reset 4\n  ferrodrive --bus can0 state 4          # the fault, and what to do about it"
 )]
-pub(crate) struct Reset {
+pub struct Reset {
     /// Node-ID
     #[arg(value_parser = node)]
-    node: NodeId,
+    pub(super) node: NodeId,
 }
 
 /// What a drive says of itself.
 #[derive(Debug, Serialize)]
-pub(crate) struct StateReport {
-    pub(crate) node: u8,
+pub struct StateReport {
+    /// Its node-ID.
+    pub node: u8,
     /// The model, if it is known for sure.
     model: Option<&'static str>,
     /// The model that its objects speak for.
@@ -143,8 +144,9 @@ pub(crate) struct StateReport {
     #[serde(skip)]
     is_faulted: bool,
     faults: Vec<FaultReport>,
+    /// Where its shaft is and what it does.
     #[serde(flatten)]
-    pub(crate) motion: ShaftMotion,
+    pub motion: ShaftMotion,
     supply_v: Option<f64>,
     motor_c: Option<f64>,
     driver_c: Option<f64>,
@@ -165,7 +167,7 @@ struct GearReport {
 
 /// Where a shaft is and what it does; what is not known is left out of the text.
 #[derive(Debug, Serialize)]
-pub(crate) struct ShaftMotion {
+pub struct ShaftMotion {
     position: Option<i64>,
     angle_deg: Option<f64>,
     velocity_rpm: Option<f64>,
@@ -188,14 +190,14 @@ struct FaultReport {
 
 impl State {
     /// Reads everything.
-    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
         StateReport::read(&context.drive(self.node).await?).await
     }
 }
 
 impl Enable {
     /// Enables and shows the state.
-    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
         let drive = context.drive(self.node).await?;
         drive.enable().await?;
         StateReport::read(&drive).await
@@ -204,7 +206,7 @@ impl Enable {
 
 impl Disable {
     /// Disables and shows the state.
-    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
         let drive = context.drive_to_stop(self.node).await?;
         drive.disable().await?;
         StateReport::read(&drive).await
@@ -213,7 +215,7 @@ impl Disable {
 
 impl Stop {
     /// Stops and shows the state.
-    pub(crate) async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
         let Nodes::One(node) = self.nodes else { return stop_all(context).await.map(StopOutcome::all) };
         let drive = context.drive_to_stop(node).await?;
         drive.stop().await?;
@@ -223,7 +225,7 @@ impl Stop {
 
 impl QuickStop {
     /// Stops at once and shows the state. The stop goes out before the model is asked for.
-    pub(crate) async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
         let Nodes::One(node) = self.nodes else { return Estop::default().run(context).await.map(StopOutcome::all) };
         context.quick_stop(node).await?;
         let drive = context.drive_to_stop(node).await?;
@@ -234,7 +236,7 @@ impl QuickStop {
 
 impl Reset {
     /// Resets and shows the state.
-    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
         let drive = context.drive(self.node).await?;
         drive.reset_fault().await?;
         StateReport::read(&drive).await
@@ -243,7 +245,7 @@ impl Reset {
 
 impl StateReport {
     /// Reads everything that the drive says of itself.
-    pub(crate) async fn read(drive: &Drive) -> Result<Self, Failure> {
+    pub async fn read(drive: &Drive) -> Result<Self, Failure> {
         let state: DriveState = drive.state().await?;
         let bits = state.statusword_words();
         let gear = drive.gear();
@@ -284,7 +286,7 @@ impl StateReport {
     }
 
     /// Faults and what to do about them; nothing without one. `gap` lines the texts up with others.
-    pub(crate) fn fault_lines(&self, paint: Paint, gap: &str) -> Vec<String> {
+    pub fn fault_lines(&self, paint: Paint, gap: &str) -> Vec<String> {
         if let Some(code) = self.fault_code.filter(|code| *code != 0 && self.faults.is_empty()) {
             return vec![format!("  fault {gap}{}", paint.bad(&format!("{code:04X}h")))];
         }
@@ -311,7 +313,7 @@ impl StateReport {
 
 impl ShaftMotion {
     /// In one line.
-    pub(crate) fn text(&self) -> String {
+    pub fn text(&self) -> String {
         // A tenth of an r/min of the output may be many of a shaft behind a gear.
         let decimals = if self.is_geared { 3 } else { 1 };
         let parts = [
@@ -326,8 +328,9 @@ impl ShaftMotion {
     }
 }
 
-impl Report for StateReport {
-    fn text(&self, paint: Paint) -> String {
+impl StateReport {
+    /// As lines for people.
+    pub fn text(&self, paint: Paint) -> String {
         let mode = self.mode.map_or_else(|| "unknown mode".into(), |mode| ModeOfOperation(mode).to_string());
         let model = self.model.map(|model| format!(" ({model})")).unwrap_or_default();
         let mut lines = vec![format!("node {}{model}: {}, {mode}", self.node, paint.strong(self.state))];
@@ -348,6 +351,11 @@ impl Report for StateReport {
         }
         lines.join("\n")
     }
+}
+
+/// The model that a drive is taken for on the evidence of its objects.
+pub fn guessed(drive: &Drive) -> Option<&'static str> {
+    drive.guess().filter(|guess| guess.evidence().is_some()).map(|guess| guess.description().name)
 }
 
 #[cfg(test)]

@@ -9,12 +9,12 @@ use master::Drive;
 use master::drive::{HostLoss, SwitchedOff};
 use serde::Serialize;
 
-use crate::context::Context;
+use crate::context::{Context, Holding};
 use crate::failure::Failure;
 
 /// Whether a motion is guarded.
 #[derive(Debug, Default, clap::Args)]
-pub(crate) struct GuardArgs {
+pub struct GuardArgs {
     /// Have the drive stop by itself if this command dies, where it can monitor its host (on, unless off is given)
     ///
     /// The model decides how: it stops when it receives no frame for a time, or when the heartbeat of this command
@@ -37,14 +37,14 @@ enum OnOff {
 
 /// What a drive does without this command.
 #[derive(Debug)]
-pub(crate) struct Guard {
+pub struct Guard {
     loss: HostLoss,
     armed: bool,
 }
 
 /// The same for programs.
 #[derive(Debug, Serialize)]
-pub(crate) struct GuardReport {
+pub struct GuardReport {
     /// This command has seen to it that the drive stops by itself.
     armed: bool,
     /// After how long without this command it stops; `null` if it does not.
@@ -52,13 +52,18 @@ pub(crate) struct GuardReport {
     /// The object that sets it.
     object: Option<String>,
     /// In words.
-    pub(crate) text: String,
+    pub text: String,
 }
 
 impl GuardArgs {
     /// Guards the drive before it moves. What nothing would stop is reported on standard error.
-    pub(crate) async fn begin(&self, context: &Context, drive: &Drive) -> Result<Guard, Failure> {
+    pub async fn begin(&self, context: &Context, drive: &Drive) -> Result<Guard, Failure> {
         let armed = !self.no_guard && self.guard != Some(OnOff::Off);
+        if !armed && context.holding == Holding::Host {
+            let failure = Failure::usage("--guard off and --no-guard have no effect here");
+            let failure = failure.because("the host guards every drive that it moves");
+            return Err(failure.next("omit it; what nothing stops has to be accepted in the Motion view"));
+        }
         let switched_off = if self.guard.is_some() { SwitchedOff::SwitchOn } else { SwitchedOff::Leave };
         let loss = if armed { drive.guard(switched_off).await? } else { drive.host_loss().await? };
         if loss.stops_after().is_none() {
@@ -76,14 +81,18 @@ impl GuardArgs {
 impl Guard {
     /// Releases the drive; what there is to know of one that `goes_on` moving. A bus of this command's own ends with it, and
     /// its drives go nowhere.
-    pub(crate) async fn end(
+    pub async fn end(
         self,
         context: &Context,
         drive: &Drive,
         goes_on: bool,
     ) -> Result<(GuardReport, Option<String>), Failure> {
-        drive.release_guard().await?;
-        let note = (goes_on && !context.is_embedded()).then(|| self.farewell(drive));
+        let held = context.holding == Holding::Host;
+        // A host guards the drive as long as it may move.
+        if !held {
+            drive.release_guard().await?;
+        }
+        let note = (goes_on && context.holding == Holding::Unheld).then(|| self.farewell(drive));
         let report = GuardReport {
             armed: self.armed,
             stops_after_ms: self.loss.stops_after().map(|time| time.as_millis() as u64),

@@ -1,0 +1,226 @@
+//! The console of a page and the command line: one parser and one text. Each line is given to both, on fresh buses of the same machine in
+//! virtual time.
+
+use std::time::Duration;
+
+use processes::{Scratch, scratch};
+use serde_json::{Value, json};
+use web::HostedWorld;
+
+use super::virtual_bus::without_bus;
+
+const MACHINE: &str = "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n\n[[drive]]\nmodel = 'zlim42c'\nnode = 2\n\n[[drive]]\nmodel = 'm4230e17b50'\nnode = 1\n";
+
+/// A page that has control, with its own world of the machine.
+struct Page {
+    world: HostedWorld,
+    seq: u64,
+}
+
+impl Page {
+    fn new() -> Self {
+        let mut page = Self { world: HostedWorld::open(MACHINE, Duration::ZERO).expect("a machine"), seq: 0 };
+        page.must(json!({ "do": "take_control" }));
+        page
+    }
+
+    fn say(&mut self, mut command: Value) -> u64 {
+        self.seq += 1;
+        command["seq"] = self.seq.into();
+        command["session"] = "page".into();
+        self.world.say(&command.to_string());
+        self.seq
+    }
+
+    /// The answer, if it comes within the next 100 ms.
+    fn answer(&mut self, seq: u64) -> Option<Value> {
+        self.world.run_until(self.world.now() + Duration::from_millis(100));
+        let sent = self.world.take_sent().into_iter().map(|line| serde_json::from_str::<Value>(&line).expect("JSON"));
+        sent.into_iter().find(|message| message["type"] == "answer" && message["seq"] == seq)
+    }
+
+    /// Asks, and holds what moves until the answer has come.
+    fn ask(&mut self, command: Value) -> Value {
+        let seq = self.say(command);
+        for _ in 0..200 {
+            if let Some(answer) = self.answer(seq) {
+                return answer;
+            }
+            self.say(json!({ "do": "alive" }));
+        }
+        panic!("no answer within 20 s");
+    }
+
+    fn must(&mut self, command: Value) {
+        let answer = self.ask(command);
+        assert_eq!(answer["ok"], true, "{answer}");
+    }
+
+    /// What a line says, and its status.
+    fn line(&mut self, line: &str) -> (String, i64) {
+        let answer = self.ask(json!({ "do": "console", "line": line }));
+        let said = &answer["result"];
+        (said["text"].as_str().expect("a text").to_owned(), said["status"].as_i64().expect("a status"))
+    }
+
+    /// The true speed of a shaft, in r/min.
+    fn speed(&mut self, node: u8) -> f64 {
+        let got = self.world.command(&format!("{node} get")).expect("a drive");
+        serde_json::from_str::<Value>(&got).expect("JSON")["velocity_rpm"].as_f64().expect("a speed").abs()
+    }
+
+    /// Lets time pass without a sign of the page.
+    fn silent(&mut self, ms: u64) {
+        self.world.run_until(self.world.now() + Duration::from_millis(ms));
+    }
+}
+
+fn machine(name: &str) -> Scratch {
+    let folder = scratch(name);
+    std::fs::write(folder.join("machine.toml"), MACHINE).expect("written");
+    folder
+}
+
+/// Whether two texts are the same but for what is measured while a shaft moves: the host of a page reads its drives on the same bus
+/// meanwhile, so that what is read is read somewhat later.
+fn is_same(page: &str, shell: &str) -> bool {
+    let is_measured =
+        |line: &str| ["  at ", "  before "].iter().any(|start| line.starts_with(start)) || line.contains(" after ");
+    let number = |word: &str| word.trim_end_matches(|sign: char| !sign.is_ascii_digit()).parse::<f64>().ok();
+    let near = |least: f64, (page, shell): (&str, &str)| match (number(page), number(shell)) {
+        (Some(page), Some(shell)) => (page - shell).abs() <= (0.1 * shell.abs()).max(least),
+        _ => page == shell,
+    };
+    page.lines().count() == shell.lines().count()
+        && page.lines().zip(shell.lines()).all(|(page, shell)| {
+            let timed = shell.contains(" after ");
+            let same_words = || {
+                let (page, shell) = (page.split(' '), shell.split(' '));
+                // Seconds, or counts and degrees.
+                let least = if timed { 0.2 } else { 5.0 };
+                page.clone().count() == shell.clone().count() && page.zip(shell).all(|words| near(least, words))
+            };
+            page == shell || (is_measured(shell) && same_words())
+        })
+}
+
+#[test]
+fn a_line_says_in_a_page_what_it_says_in_a_shell() {
+    let folder = machine("console_same");
+    let bus = format!("sim:{}", folder.join("machine.toml").display());
+    for line in [
+        "state 4",
+        "state 2",
+        "state 1",
+        "enable 4",
+        "disable 4",
+        "reset 4",
+        "explain 4",
+        "stop 4",
+        "quick-stop 4",
+        "move 4 90deg",
+        "move 4 --relative -0.5turn --acceleration 300ms",
+        "velocity 4 60rpm --for 500ms",
+        "torque 4 1.5A --for 200ms",
+        "velocity 1 10rpm --for 500ms",
+        "home 4 --method 17",
+        "estop",
+        "state 9",
+        "velocity 4 60mm/s",
+    ] {
+        // As long as a page waits.
+        let words: Vec<_> = ["--bus", &bus, "--timeout", "200ms"].into_iter().chain(line.split(' ')).collect();
+        let shell = without_bus(&words);
+        let (text, status) = Page::new().line(line);
+        let said = format!("{}{}", shell.out, shell.err);
+        assert!(is_same(&text, said.trim_end()), "{line}\nin a page:\n{text}\nin a shell:\n{said}");
+        assert_eq!(Some(status), shell.status.map(i64::from), "{line}");
+    }
+}
+
+#[test]
+fn a_line_that_makes_no_sense_is_refused_in_the_words_of_the_command_line() {
+    let mut page = Page::new();
+    for line in ["fly 4", "move 4", "move 400 90deg", "velocity 4 60deg", "stop", "home 4", "move 4 90deg --speed 5"] {
+        let shell = without_bus(&line.split(' ').collect::<Vec<_>>());
+        let (text, status) = page.line(line);
+        assert_eq!((status, shell.status), (2, Some(2)), "{line}: {text}");
+        // What the parser says first; how a line is formed differs by the program's name and by what a page does not have.
+        let first = |text: &str| text.lines().next().map(str::to_owned);
+        assert_eq!(first(&text), first(&shell.err), "{line}");
+    }
+    let (help, status) = page.line("help move");
+    assert!(status == 0 && help.contains("Position: 32000 (counts), 90deg"), "{help}");
+    assert_eq!(page.line("move 4 90deg --no-guard").1, 2, "a host guards what it moves");
+    assert_eq!(page.line("ferrodrive state 4").1, 0, "as it stands in the manual");
+    assert!(page.speed(4) < 0.5);
+}
+
+#[test]
+fn a_line_moves_a_drive_for_the_session_in_control_alone_and_within_its_speed_limit() {
+    let mut page = Page::new();
+    page.must(json!({ "do": "release_control" }));
+    for line in ["move 4 90deg", "velocity 4 60rpm", "enable 4", "stop 4", "reset 4"] {
+        let (text, status) = page.line(line);
+        assert!(status == 1 && text.contains("take control first"), "{line}: {text}");
+    }
+    assert_eq!(page.line("state 4").1, 0, "looking is open to all");
+    assert_eq!(page.line("quick-stop 4").1, 0, "and so is a stop");
+    page.must(json!({ "do": "take_control" }));
+    page.must(json!({ "do": "limit_speed", "rpm": 30 }));
+    let (text, _) = page.line("velocity 4 60rpm");
+    assert!(text.contains("beyond the speed limit of this session, 30 r/min"), "{text}");
+    assert!(page.speed(4) < 0.5);
+    assert_eq!(page.line("velocity 4 20rpm").1, 0);
+    assert!((page.speed(4) - 20.0).abs() < 2.0);
+}
+
+#[test]
+fn what_a_line_moves_is_stopped_by_all_that_stops_a_page() {
+    for how in ["stop_all", "silent", "quick-stop 4", "joined anew"] {
+        let mut page = Page::new();
+        let (text, status) = page.line("velocity 4 60rpm");
+        assert!(status == 0 && !text.contains("this command ends here"), "the host holds it: {text}");
+        assert!((page.speed(4) - 60.0).abs() < 3.0, "{how}");
+        match how {
+            "stop_all" => page.must(json!({ "do": "stop_all" })),
+            "silent" => page.silent(3000),
+            "joined anew" => page.world.join(),
+            line => assert_eq!(page.line(line).1, 0, "{line}"),
+        }
+        page.silent(1000);
+        assert!(page.speed(4) < 2.0, "{how}: {} r/min", page.speed(4));
+    }
+}
+
+#[test]
+fn a_line_that_is_stopped_or_replaced_says_so() {
+    let mut page = Page::new();
+    for (by, says) in [
+        (json!({ "do": "stop_all" }), "stopped by a press of stop"),
+        (json!({ "do": "velocity", "node": 4, "rpm": 10 }), "replaced by another command to the drive"),
+        (json!({ "do": "console", "line": "quick-stop 4" }), "stopped by a quick stop"),
+    ] {
+        let seq = page.say(json!({ "do": "console", "line": "velocity 4 60rpm --for 60s" }));
+        for _ in 0..15 {
+            assert_eq!(page.answer(seq), None);
+            page.say(json!({ "do": "alive" }));
+        }
+        assert!((page.speed(4) - 60.0).abs() < 3.0);
+        page.say(by);
+        let answer = (0..20).find_map(|_| page.answer(seq)).expect("an answer");
+        let said = &answer["result"];
+        assert!(said["status"] == 1 && said["text"].as_str().is_some_and(|text| text.contains(says)), "{answer}");
+    }
+}
+
+/// Nothing stops the stepper when the program dies: a person has to accept that first, as for every motion.
+#[test]
+fn what_nothing_would_stop_is_moved_only_after_that_was_accepted() {
+    let mut page = Page::new();
+    let (text, status) = page.line("move 2 90deg");
+    assert!(status == 1 && text.contains("node 2 was not moved") && text.contains("Accept that first"), "{text}");
+    page.must(json!({ "do": "accept_unguarded", "node": 2 }));
+    let (text, status) = page.line("move 2 90deg");
+    assert!(status == 0 && text.contains("note: node 2: if this command dies, nothing stops it"), "{text}");
+}

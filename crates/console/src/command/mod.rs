@@ -1,0 +1,146 @@
+//! The commands: commands that share everything but a word share a file.
+
+pub mod drive;
+pub mod estop;
+pub mod explain;
+pub mod home;
+pub mod motion;
+
+use clap::Subcommand;
+use host::network::explain::ExplainReport;
+use master::drive::{self as master_drive, Motion};
+use plot::Paint;
+use serde::Serialize;
+use words::node::Nodes;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use drive::{StateReport, StopOutcome};
+use motion::MotionOutcome;
+
+/// Commands on a bus.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    #[allow(missing_docs, reason = "it would be the help in place of that of the command")]
+    State(drive::State),
+    #[allow(missing_docs, reason = "as above")]
+    Explain(explain::Explain),
+    #[allow(missing_docs, reason = "as above")]
+    Enable(drive::Enable),
+    #[allow(missing_docs, reason = "as above")]
+    Disable(drive::Disable),
+    #[allow(missing_docs, reason = "as above")]
+    Estop(estop::Estop),
+    #[allow(missing_docs, reason = "as above")]
+    Stop(drive::Stop),
+    #[allow(missing_docs, reason = "as above")]
+    QuickStop(drive::QuickStop),
+    #[allow(missing_docs, reason = "as above")]
+    Reset(drive::Reset),
+    #[allow(missing_docs, reason = "as above")]
+    Velocity(motion::Velocity),
+    #[allow(missing_docs, reason = "as above")]
+    Move(motion::Move),
+    #[allow(missing_docs, reason = "as above")]
+    Torque(motion::Torque),
+    #[allow(missing_docs, reason = "as above")]
+    Home(home::Home),
+}
+
+/// What came of one of them.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Outcome {
+    /// What a drive says of itself.
+    State(Box<StateReport>),
+    /// Why it does not move.
+    Explained(Box<ExplainReport>),
+    /// Of a stop.
+    Stopped(StopOutcome),
+    /// Of a motion.
+    Moved(Box<MotionOutcome>),
+}
+
+/// What a command does to drives, as far as a host has to know it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Effect {
+    /// It reads.
+    None,
+    /// It commands a drive.
+    OnDrive(canopen::NodeId, master_drive::Command),
+    /// It stops every drive at once.
+    StopAll,
+    /// It stops every drive by its ramp.
+    StopAllByRamp,
+}
+
+impl Command {
+    /// Does it.
+    ///
+    /// # Errors
+    /// Why it was not done.
+    pub async fn run(&self, context: &Context) -> Result<Outcome, Failure> {
+        Ok(match self {
+            Self::State(command) => Outcome::State(Box::new(command.run(context).await?)),
+            Self::Explain(command) => Outcome::Explained(Box::new(command.run(context).await?)),
+            Self::Enable(command) => Outcome::State(Box::new(command.run(context).await?)),
+            Self::Disable(command) => Outcome::State(Box::new(command.run(context).await?)),
+            Self::Estop(command) => Outcome::Stopped(StopOutcome::all(command.run(context).await?)),
+            Self::Stop(command) => Outcome::Stopped(command.run(context).await?),
+            Self::QuickStop(command) => Outcome::Stopped(command.run(context).await?),
+            Self::Reset(command) => Outcome::State(Box::new(command.run(context).await?)),
+            Self::Velocity(command) => Outcome::Moved(Box::new(command.run(context).await?)),
+            Self::Move(command) => Outcome::Moved(Box::new(command.run(context).await?)),
+            Self::Torque(command) => Outcome::Moved(Box::new(command.run(context).await?)),
+            Self::Home(command) => Outcome::Moved(Box::new(command.run(context).await?)),
+        })
+    }
+
+    /// What it does to drives.
+    pub fn effect(&self) -> Effect {
+        use master_drive::Command as Of;
+        let moves = |(node, motion): (_, Motion)| Effect::OnDrive(node, motion.into());
+        match self {
+            Self::State(_) | Self::Explain(_) => Effect::None,
+            Self::Enable(command) => Effect::OnDrive(command.node, Of::Enable),
+            Self::Disable(command) => Effect::OnDrive(command.node, Of::Disable),
+            Self::Reset(command) => Effect::OnDrive(command.node, Of::ResetFault),
+            Self::Estop(_) => Effect::StopAll,
+            Self::Stop(command) => stop_of(command.nodes, Of::Stop, Effect::StopAllByRamp),
+            Self::QuickStop(command) => stop_of(command.nodes, Of::QuickStop, Effect::StopAll),
+            Self::Velocity(command) => moves((command.node, command.motion())),
+            Self::Move(command) => moves((command.node, command.motion())),
+            Self::Torque(command) => moves((command.node, command.motion())),
+            Self::Home(command) => moves((command.node, command.motion())),
+        }
+    }
+}
+
+fn stop_of(nodes: Nodes, stop: master_drive::Command, all: Effect) -> Effect {
+    match nodes {
+        Nodes::One(node) => Effect::OnDrive(node, stop),
+        Nodes::All => all,
+    }
+}
+
+impl Outcome {
+    /// Why the command fails although it has something to report.
+    pub fn failure(&self) -> Option<Failure> {
+        match self {
+            Self::Stopped(outcome) => outcome.failure(),
+            Self::State(_) | Self::Explained(_) | Self::Moved(_) => None,
+        }
+    }
+}
+
+impl Outcome {
+    /// As lines for people.
+    pub fn text(&self, paint: Paint) -> String {
+        match self {
+            Self::State(report) => report.text(paint),
+            Self::Explained(report) => explain::text(report, paint),
+            Self::Stopped(report) => report.text(paint),
+            Self::Moved(report) => report.text(paint),
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Lines of the console of a page: read by the parser of the command line, carried out by a host, so that whatever stops a motion
+//! there stops these too.
+
+use std::cell::RefCell;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::time::Duration;
+
+use clap::Parser;
+use host::console::{Hands, Order, Said};
+use host::{Command as Asked, NodeCommand};
+use master::explain::Overheard;
+use plot::Paint;
+use words::plain;
+
+use crate::command::{Command, Effect};
+use crate::context::{Context, Holding, Shell, Stated};
+use crate::status::Status;
+
+/// CANopen motor drives: look into them, move them.
+#[derive(Debug, Parser)]
+#[command(
+    name = "ferrodrive",
+    no_binary_name = true,
+    disable_version_flag = true,
+    override_usage = "COMMAND [OPTIONS]; help COMMAND describes one"
+)]
+struct Line {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Reads lines for a host.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reader;
+
+impl host::console::Reader for Reader {
+    fn read(&self, line: &str) -> Result<Order, Said> {
+        let words = words_of(line).map_err(|why| Said::failed(Status::Usage as u8, why))?;
+        // As a line is copied from the manual.
+        let words = words.strip_prefix(&["ferrodrive".to_owned()][..]).unwrap_or(&words);
+        let Line { command } = Line::try_parse_from(words).map_err(|error| said(&error))?;
+        let asked = match command.effect() {
+            Effect::None => None,
+            Effect::OnDrive(node, command) => Some(NodeCommand::from(command).to(node)),
+            Effect::StopAll => Some(Asked::STOP_ALL),
+            Effect::StopAllByRamp => {
+                let text = "error: a page does not stop all drives by their ramps\n  next:    estop stops them at once; stop NODE one of them by its ramp";
+                return Err(Said::failed(Status::Usage as u8, text.to_owned()));
+            }
+        };
+        let work = |hands: Hands| {
+            Box::pin(async move { carry_out(&command, hands).await }) as Pin<Box<dyn Future<Output = Said>>>
+        };
+        Ok(Order { asked, work: Box::new(work) })
+    }
+}
+
+/// What the parser says: help, or what is wrong with the line.
+fn said(error: &clap::Error) -> Said {
+    let text = plain(&error.render().to_string());
+    let text = text.trim_end().to_owned();
+    if error.use_stderr() { Said { status: Status::Usage as u8, kind: Some("usage"), text } } else { Said::done(text) }
+}
+
+async fn carry_out(command: &Command, hands: Hands) -> Said {
+    let notes = Rc::new(RefCell::new(Vec::new()));
+    let context = Context {
+        network: hands.network.clone(),
+        bus_name: hands.bus.clone(),
+        timeout: hands.timeout,
+        models: hands.models.iter().map(|(node, model)| (*node, Stated::ByBus(model))).collect(),
+        gears: hands.gears.clone(),
+        json: false,
+        holding: Holding::Host,
+        shell: Rc::new(Page { hands, notes: Rc::clone(&notes) }),
+    };
+    let (printed, failure) = match command.run(&context).await {
+        Ok(outcome) => (Some(outcome.text(Paint::OFF)), outcome.failure()),
+        Err(failure) => (None, Some(failure)),
+    };
+    let (status, kind) = failure.as_ref().map_or((0, None), |failure| (failure.status as u8, Some(failure.kind)));
+    let complaint = failure.map(|failure| format!("error: {}", plain(&failure.to_string())));
+    let lines: Vec<String> = notes.take().into_iter().chain(printed).chain(complaint).collect();
+    Said { text: lines.join("\n"), status, kind }
+}
+
+/// The words of a line, as a shell would have them: quotes keep a word together.
+fn words_of(line: &str) -> Result<Vec<String>, String> {
+    let (mut words, mut word, mut quote) = (Vec::new(), None::<String>, None);
+    for sign in line.chars() {
+        match (quote, sign) {
+            (Some(open), sign) if sign == open => quote = None,
+            (None, '\'' | '"') => {
+                quote = Some(sign);
+                word.get_or_insert_default();
+            }
+            (None, sign) if sign.is_whitespace() => words.extend(word.take()),
+            (_, sign) => word.get_or_insert_default().push(sign),
+        }
+    }
+    if let Some(open) = quote {
+        return Err(format!("error: a quotation mark is left open: {open}\n  next:    close it"));
+    }
+    words.extend(word);
+    Ok(words)
+}
+
+/// A page: what is noted comes before what is reported, and what is going on meanwhile is not shown.
+struct Page {
+    hands: Hands,
+    notes: Rc<RefCell<Vec<String>>>,
+}
+
+impl Shell for Page {
+    fn show(&self, _: String) {}
+
+    fn is_shown(&self) -> bool {
+        false
+    }
+
+    fn note(&self, text: &str) {
+        self.notes.borrow_mut().push(format!("note: {}", plain(text)));
+    }
+
+    fn is_new(&self, _: &str) -> bool {
+        true
+    }
+
+    fn overhear(&self, time: Duration) -> Pin<Box<dyn Future<Output = Overheard> + '_>> {
+        Box::pin(async move {
+            let network = &self.hands.network;
+            let began = network.now();
+            let mut heard = Overheard::from(began);
+            network.sleep(time).await;
+            heard.until(network.now());
+            // The host reads the drives meanwhile.
+            self.hands.trace.others_since(began, |passed| heard.note(&passed.frame, passed.at));
+            heard
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::words_of;
+
+    #[test]
+    fn a_line_has_the_words_that_a_shell_would_make_of_it() {
+        let words = |line: &str| words_of(line).map(|words| words.join("|"));
+        assert_eq!(words("  move 4\t90deg "), Ok("move|4|90deg".into()));
+        assert_eq!(words("write 4 6060 'profile velocity'"), Ok("write|4|6060|profile velocity".into()));
+        assert_eq!(words("write 4 1008 \"a 'b'\"c ''"), Ok("write|4|1008|a 'b'c|".into()));
+        assert_eq!(words(""), Ok(String::new()));
+        assert!(words("write 4 1008 'left").is_err_and(|why| why.contains("left open: '")));
+    }
+}
