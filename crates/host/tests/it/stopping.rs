@@ -1,16 +1,18 @@
-//! The law of stopping for test motions: however one ends, its shaft stands. Every shape of sending x every model x every way to end,
-//! as `crates/master/tests/it/stopping` has it for what these are made of.
+//! The law of stopping for test motions and tuning: however one ends, its shaft stands. Every way of sending x every model x every way
+//! to end, as `crates/master/tests/it/stopping` has it for what these are made of. `docs/safety.md` has the times.
 //!
 //! What a stop may take is each drive's own ramp, as there.
 
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
+use ::tune::Objective;
 use can::{Bitrate, Instant};
 use canopen::NodeId;
 use devices::HostWatch;
 use host::capture::{Measurand, Restorer, Wanted};
 use host::test_motion::{Motion, Run, Shape, points, run};
+use host::tune::{Bounds, Request, loops_of, tune};
 use master::cyclic::CyclicOptions;
 use master::drive::SwitchedOff;
 use master::group::AxisLimits;
@@ -30,18 +32,17 @@ const FROZEN: Duration = Duration::from_secs(4);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum End {
-    /// What a command does at a signal.
+    /// What a command does at a signal, and Python with a call that is given up: the motion is no longer awaited, and what it moved is
+    /// stopped.
     StopAll,
     /// The guard of the library goes out of scope while the motion is still awaited.
     StopGuard,
-    /// The motion is no longer awaited, and its program stops what it has moved.
-    Dropped,
     Killed,
     Frozen,
     CableCut,
 }
 
-const ENDS: [End; 6] = [End::StopAll, End::StopGuard, End::Dropped, End::Killed, End::Frozen, End::CableCut];
+const ENDS: [End; 5] = [End::StopAll, End::StopGuard, End::Killed, End::Frozen, End::CableCut];
 
 struct Bench {
     world: World,
@@ -89,7 +90,7 @@ impl Bench {
 
     fn end(&mut self, end: End) {
         match end {
-            End::StopAll | End::Dropped => {
+            End::StopAll => {
                 let network = self.network.clone();
                 let stopped = self.run(network.stop_and_release());
                 assert!(stopped.iter().all(|stopped| stopped.outcome.is_ok()) && !stopped.is_empty(), "{stopped:?}");
@@ -147,46 +148,129 @@ fn poke(future: std::pin::Pin<&mut impl Future<Output = Result<(), Failure>>>) -
     future.poll(&mut Context::from_waker(Waker::noop()))
 }
 
-#[test]
-fn a_test_motion_stops_within_its_ramp_however_it_ends() {
-    for name in ["zlac8030l", "m4230e17b50", "zlim42c", "cia402"] {
-        let watch = devices::model(name).unwrap().host_watch;
-        for steps in [true, false] {
-            for end in ENDS {
-                let what = format!("{name} {} {end:?}", if steps { "steps" } else { "points" });
-                let mut bench = Bench::new(name);
-                let (drive, motion, mut runs) = (bench.drive.clone(), motion(steps), Vec::new());
-                let mut moving = Some(Box::pin(moved(&drive, &motion, None, &mut runs)));
-                let began = block_on_for(&mut bench.world, Duration::from_secs(3), moving.as_mut().unwrap());
-                assert!(began.is_err(), "{what}: {began:?}");
-                assert!(bench.fastest() > 5.0, "{what}: {} r/min before its end", bench.fastest());
-                // Beside it all others happen while the motion is still awaited.
-                if matches!(end, End::StopAll | End::Dropped) {
-                    moving = None;
-                }
-                bench.end(end);
-                if let Some(moving) = moving.as_mut() {
-                    let _ = poke(moving.as_mut());
-                }
-                let silent = matches!(end, End::Killed | End::CableCut) || end == End::Frozen && steps;
-                if silent && watch == HostWatch::None {
-                    assert_eq!(bench.time_to_standstill(Duration::from_secs(6)), None, "{what}: by nothing known");
-                    continue;
-                }
-                let longest = match end {
-                    End::StopAll | End::Dropped | End::StopGuard => Duration::from_secs(1),
-                    End::Frozen if watch == HostWatch::None => FROZEN + Duration::from_secs(1),
-                    _ => Duration::from_secs(3),
-                };
-                let stood = bench.time_to_standstill(Duration::from_secs(10));
-                assert!(stood.is_some_and(|time| time <= longest), "{what}: {stood:?}");
-                // And stays so, whatever is still sent.
-                bench.world.run_for(Duration::from_secs(5));
-                assert!(bench.fastest() < 1.0, "{what}: turns again at {} r/min", bench.fastest());
-            }
+/// What moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Moved {
+    Steps,
+    Points,
+    Tune,
+}
+
+impl Moved {
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Steps => "`test-motion` (steps)",
+            Self::Points => "`test-motion` (points)",
+            Self::Tune => "`tune`",
         }
     }
+
+    /// Whether set-points come in cycles: a program that was frozen finds that it is late.
+    fn is_in_cycles(self, name: &str) -> bool {
+        // A joint is turned by `velocity` while it is tuned.
+        self == Self::Points || self == Self::Tune && name != "m4230e17b50"
+    }
+
+    /// Set in motion, without an end of its own in the time that is looked at.
+    async fn go(self, drive: &Drive) -> Result<(), Failure> {
+        if self != Self::Tune {
+            return moved(drive, &motion(self == Self::Steps), None, &mut Vec::new()).await;
+        }
+        let request = Request {
+            objective: Objective::PhaseMargin(40.0),
+            with_position: false,
+            period: Duration::from_millis(1),
+            bounds: Bounds { speed_rpm: loops_of(drive)?.1.usual_rpm, ..Bounds::default() },
+            cyclic: CyclicOptions::default(),
+            torque_constant_nm_a: None,
+            journal: None,
+            on_kept: |_| (),
+            apply: false,
+            within: Duration::from_secs(60),
+        };
+        tune(drive, &request, &(), std::future::pending()).await.map(drop)
+    }
 }
+
+/// When its shaft stands after this end; `None` for never.
+fn stood_after(name: &str, what: Moved, end: End) -> Option<Duration> {
+    let said = format!("{name} {what:?} {end:?}");
+    let mut bench = Bench::new(name);
+    let drive = bench.drive.clone();
+    let mut moving = Some(Box::pin(what.go(&drive)));
+    let began = block_on_for(&mut bench.world, Duration::from_secs(3), moving.as_mut().unwrap());
+    assert!(began.is_err(), "{said}: {began:?}");
+    // A measurement goes both ways: until it turns.
+    for _ in 0..200 {
+        if bench.world.report(NODE).unwrap().velocity_rpm.abs() > 20.0 {
+            break;
+        }
+        let goes_on = block_on_for(&mut bench.world, PERIOD, moving.as_mut().unwrap());
+        assert!(goes_on.is_err(), "{said}: {goes_on:?}");
+    }
+    let before = bench.world.report(NODE).unwrap().velocity_rpm.abs();
+    assert!(before > 5.0, "{said}: {before} r/min before its end");
+    // Beside it all others happen while the motion is still awaited.
+    if end == End::StopAll {
+        moving = None;
+    }
+    let ended_at = bench.world.now();
+    bench.end(end);
+    if end == End::StopAll {
+        // It was seen to stand.
+        return Some(bench.world.now() - ended_at);
+    }
+    if let Some(moving) = moving.as_mut() {
+        let _ = poke(moving.as_mut());
+    }
+    let watch = devices::model(name).unwrap().host_watch;
+    let silent = matches!(end, End::Killed | End::CableCut) || end == End::Frozen && !what.is_in_cycles(name);
+    if silent && watch == HostWatch::None {
+        assert_eq!(bench.time_to_standstill(Duration::from_secs(6)), None, "{said}: by nothing known");
+        return None;
+    }
+    let longest = match end {
+        End::StopAll | End::StopGuard => Duration::from_secs(1),
+        End::Frozen if watch == HostWatch::None => FROZEN + Duration::from_secs(1),
+        _ => Duration::from_secs(3),
+    };
+    let stood = bench.time_to_standstill(Duration::from_secs(10));
+    assert!(stood.is_some_and(|time| time <= longest), "{said}: {stood:?}");
+    // And stays so, whatever is still sent.
+    bench.world.run_for(Duration::from_secs(5));
+    assert!(bench.fastest() < 1.0, "{said}: turns again at {} r/min", bench.fastest());
+    stood
+}
+
+#[test]
+fn a_test_motion_and_a_tuning_stop_within_their_ramp_however_they_end() {
+    let mut lines =
+        vec![format!("{TABLE_BEGINS} signal, failure, given up | `StopGuard` | killed | frozen 4 s | cable |")];
+    lines.push("|---|---|---|---|---|---|---|".to_owned());
+    for what in [Moved::Steps, Moved::Points, Moved::Tune] {
+        for name in ["zlac8030l", "m4230e17b50", "zlim42c", "cia402"] {
+            if what == Moved::Tune && devices::model(name).unwrap().axes[0].loops.is_none() {
+                continue;
+            }
+            let cell = |end| match stood_after(name, what, end) {
+                Some(time) => format!("{:.2} s", time.as_secs_f64()),
+                None => "**never**".to_owned(),
+            };
+            lines.push(format!("| {} | {name} | {} |", what.words(), ENDS.map(cell).join(" | ")));
+        }
+    }
+    let page = std::fs::read_to_string(PAGE).unwrap();
+    let (before, rest) = page.split_once(TABLE_BEGINS).expect("the page has the table");
+    let (_, after) = rest.split_once("\n\n").expect("something follows it");
+    let made = format!("{before}{}\n\n{after}", lines.join("\n"));
+    if std::env::var_os("FERRODRIVE_WRITE_PAGES").is_some() {
+        std::fs::write(PAGE, &made).unwrap();
+    }
+    assert_eq!(page, made, "docs/safety.md says how its tables are made");
+}
+
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/safety.md");
+const TABLE_BEGINS: &str = "| motion with captures | drive |";
 
 #[test]
 fn a_shaft_that_comes_too_far_is_stopped_and_points_that_would_are_refused() {
