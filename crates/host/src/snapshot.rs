@@ -102,6 +102,8 @@ pub struct NodeView {
     pub goes_on: bool,
     /// The session that has control has accepted that it keeps moving then.
     pub accepted: bool,
+    /// What moves along with a turn of its output, in m, as the machine file says.
+    pub feed_m: Option<f64>,
     /// Present if the node is a drive.
     pub drive: Option<Box<DriveView>>,
 }

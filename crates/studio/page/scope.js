@@ -25,6 +25,7 @@ import { overlaid, panesOf, partnerOf } from "./scope_source.js";
 import { kept, keep } from "./settings.js";
 import { SvgPen } from "./svg_pen.js";
 import { trigger } from "./scope_trigger.js";
+import { inUnit, unitsOf } from "./units.js";
 
 const SPANS_S = [1, 2, 5, 10, 30, 60];
 const SHORTEST_S = 1e-3;
@@ -72,6 +73,16 @@ export function scopeView(shared) {
     openCapture(capture);
   } });
   const scales = new Scales(before.scales);
+  /** The units that were chosen, by field; the panes as they are without; what a turn of each node moves. */
+  const units = before.units ?? {};
+  let offered = [];
+  const feeds = new Map();
+  const unit = choice("scope-unit", "Unit", [], { onchange: () => {
+    const field = unit.dataset.field;
+    if (field === undefined) return;
+    units[field] = unit.value;
+    store();
+  } });
   const scale = scalePanel(scales, () => areas, store);
   const root = h(
     "section",
@@ -80,7 +91,7 @@ export function scopeView(shared) {
     h("div", { class: "bar" }, seconds, pause, panes, together, heardChooser().root),
     h("div", { class: "bar" }, trip.root, keeps),
     canvas,
-    h("div", { class: "bar under" }, scale.root),
+    h("div", { class: "bar under" }, scale.root, unit),
     h("div", { class: "bar" }, other, button("scope-clear", "Clear cursors", () => (cursors = [null, null])), button("scope-zoom-in", "Time +", () => zoom(null, 1 / ZOOM), "Shorter time (plus on the picture)"), button("scope-zoom-out", "Time −", () => zoom(null, ZOOM), "Longer time (minus on the picture)"), steps, frequencies, across, below),
     readout,
     captures.root,
@@ -114,7 +125,7 @@ export function scopeView(shared) {
   }
 
   function store() {
-    keep(SETTINGS, { hidden: [...hidden], together: together.checked, span_s: Number(seconds.value), scales: scales.kept() });
+    keep(SETTINGS, { hidden: [...hidden], together: together.checked, span_s: Number(seconds.value), scales: scales.kept(), units });
   }
 
   /** The drawn drives, the chosen one first. */
@@ -172,7 +183,9 @@ export function scopeView(shared) {
   function drawn({ sources, from_s, to_s, marks }) {
     const all = panesOf(sources, { definitions: computed.definitions(), hidden, subtracts: captures.subtracts(), from_s });
     for (const one of all) if (trip.isOn() && trip.field() === one.key) one.level = trip.level();
-    return { panes: all, from_s, to_s, cursors, markers: marks.map(({ time_s, text }) => ({ time_s, text: cut(text) })) };
+    offered = all;
+    const feed_m = (node) => feeds.get(node) ?? null;
+    return { panes: all.map((one) => inUnit(one, units[one.field], feed_m)), from_s, to_s, cursors, markers: marks.map(({ time_s, text }) => ({ time_s, text: cut(text) })) };
   }
 
   /** What is shown now, as a capture. */
@@ -220,7 +233,7 @@ export function scopeView(shared) {
     const lines = sources.map(({ name, columns }) => [name, columns.map(({ node, field, series: one }) => `${node} ${field} ${one.first_s()} ${one.last_s()} ${one.length}`)]);
     const set = [frequencies, steps, across, together].map((one) => one.checked);
     const trigger = [trip.isOn(), trip.field(), trip.level()];
-    return JSON.stringify([size, colours(), set, trigger, below.value, scale.pane(), scales.kept(), captures.subtracts(), [...hidden], computed.definitions(), from_s, to_s, cursors, marks.length, marks.at(-1)?.time_s, lines]);
+    return JSON.stringify([size, colours(), set, trigger, below.value, scale.pane(), scales.kept(), captures.subtracts(), [...hidden], units, [...feeds], computed.definitions(), from_s, to_s, cursors, marks.length, marks.at(-1)?.time_s, lines]);
   }
 
   function draw() {
@@ -254,10 +267,24 @@ export function scopeView(shared) {
 
   function offerPanes(all) {
     scale.offer(areas.map(({ key }) => ({ key, label: all.find((one) => one.key === key)?.label ?? key })));
+    offerUnits(all.find(({ key }) => key === scale.pane()) ?? all[0]);
     const key = all.map((one) => one.key).join("\n");
     if (below.dataset.key === key) return;
     below.dataset.key = key;
     below.offer(all.map((one) => ({ value: one.key, text: `over ${one.label}` })));
+  }
+
+  /** The units of the pane whose scale is chosen. */
+  function offerUnits(pane) {
+    const own = offered.find(({ field }) => field === pane?.field);
+    unit.hidden = !own || unitsOf(own.unit).length < 2;
+    if (unit.hidden) return;
+    const of = unitsOf(own.unit, own.lines.map(({ node }) => feeds.get(node)));
+    const key = `${own.field} ${of.join()} ${pane.unit}`;
+    if (unit.dataset.key === key) return;
+    Object.assign(unit.dataset, { key, field: own.field });
+    unit.offer(of.map((text) => ({ value: text, text: `in ${text}` })));
+    unit.value = pane.unit;
   }
 
   /** Holds the picture once the trigger has fired, with the wanted part before it. */
@@ -420,6 +447,7 @@ export function scopeView(shared) {
   function update(state) {
     choose.update(state);
     fast.update();
+    for (const { node, feed_m } of state.nodes) feeds.set(node, feed_m);
     drives = state.nodes.filter((node) => node.drive).map((node) => node.node);
     const more = drives.filter((node) => node !== shared.node);
     const key = more.join(" ");

@@ -159,6 +159,7 @@ impl Host {
             without_us: loss.map(|loss| loss.to_string()),
             goes_on: loss.is_some_and(|loss| loss.stops_after().is_none()),
             accepted: self.accepted.contains(&id),
+            feed_m: self.setting.gears.get(&id).and_then(|gear| gear.feed_m()),
             drive: node.view.clone(),
         }
     }

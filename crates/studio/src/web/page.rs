@@ -89,6 +89,7 @@ const SOURCES: &[(&str, &str)] = files![
     "trace_sum.js",
     "console.js",
     "console_lines.js",
+    "units.js",
     "views.js",
     "world.js",
     "world_form.js",
