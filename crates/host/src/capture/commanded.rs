@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::NodeId;
-use futures_util::future::{AbortHandle, Aborted, abortable};
+use futures_util::future::{Aborted, abortable};
 use master::Drive;
 use recording::{Capture, Column, Recorded, Series, Subject};
 use serde_json::{Value, json};
@@ -17,6 +17,7 @@ use words::failure::Failure;
 
 use super::measurand::{Measurand, TRUE};
 use super::quantity::had;
+use super::run::{CaptureOutcome, CaptureRun};
 use super::session::not_put_back;
 use super::{Captured, Running, SeenBy, Span, Taken, Wanted, WayBack, with_left};
 use crate::command::{CaptureCommand, CaptureOrder};
@@ -35,19 +36,6 @@ const MOST_REPORTED: usize = 4;
 const MOST_QUANTITIES: usize = 32;
 /// The longest texts of a report's head.
 const LONGEST: usize = 100;
-
-/// A capture that is under way.
-pub(crate) struct CaptureRun {
-    /// What came until now is enough.
-    ended: Rc<Cell<bool>>,
-    abort: AbortHandle,
-}
-
-/// What came of a capture.
-pub(crate) struct CaptureOutcome {
-    node: NodeId,
-    outcome: Result<(Capture, Value), Refusal>,
-}
 
 impl Host {
     /// Executes a command about a capture or a report, or starts it.
@@ -162,7 +150,7 @@ impl Host {
         answer(asked, outcome);
     }
 
-    /// Whoever began the captures is not there any more: they end, and what they have changed is put back.
+    /// The session that began the captures has gone: they end, and what they have changed is put back.
     pub(crate) fn end_captures(&self) {
         self.captures.values().for_each(|run| run.abort.abort());
     }

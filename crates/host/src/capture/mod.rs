@@ -12,10 +12,10 @@ mod plan;
 mod quantity;
 mod restorer;
 mod rows;
+mod run;
 mod session;
 mod ways_back;
 
-pub(crate) use commanded::{CaptureOutcome, CaptureRun};
 pub use measurand::{Measurand, TRUE, TrueValue, Way};
 pub use of_log::record_of_log;
 pub use plain::Captured;
@@ -23,5 +23,6 @@ pub use plan::{CapturePlan, Pace, Request, plan};
 pub use quantity::{Form, Quantity, short_names};
 pub use restorer::{Restorer, SeenBy};
 pub use rows::Trigger;
+pub(crate) use run::{CaptureOutcome, CaptureRun};
 pub use session::{Running, Span, Taken, Wanted, not_put_back, with_left};
 pub use ways_back::{WayBack, WaysBack};

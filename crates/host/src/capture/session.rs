@@ -384,7 +384,7 @@ impl Running {
         self.next_until(span, || false).await
     }
 
-    /// As [`next`](Self::next), which ends earlier where `ended` says so: what came until then is the capture, nothing if its trigger has
+    /// As [`next`](Self::next), which ends earlier once `ended` is true: what came until then is the capture, nothing if its trigger has
     /// not come.
     ///
     /// # Errors

@@ -31,7 +31,7 @@ impl Host {
         self.quick_stop(nodes, why);
     }
 
-    /// Quick-stops what this studio has set in motion, and ends captures: whoever began them is not there any more.
+    /// Quick-stops what this studio has set in motion, and ends captures: the session that began them has gone.
     pub(crate) fn stop_moved(&mut self, why: &'static str) {
         self.stops += 1;
         self.end_captures();

@@ -1,4 +1,4 @@
-//! Captures and reports that a page commands: what comes is what was asked for, and whoever goes, everything is put back.
+//! Captures and reports that a page commands: what comes is what was asked for, and however its session ends, everything is put back.
 
 use std::time::Duration;
 

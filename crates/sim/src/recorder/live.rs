@@ -19,7 +19,7 @@ const MOST: usize = 100_000;
 /// `next_at` while nothing is subscribed.
 const NEVER: u64 = u64::MAX;
 
-/// A world's values for whoever hosts it. A clone is another handle to the same world.
+/// A world's values for its host. A clone is another handle to the same world.
 #[derive(Clone, Debug)]
 pub struct LiveValues(Arc<Shared>);
 

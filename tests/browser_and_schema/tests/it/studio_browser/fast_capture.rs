@@ -85,7 +85,6 @@ impl Stage {
 async fn a_tab_that_is_closed_in_the_middle_of_a_capture_leaves_the_drive_as_it_was() {
     let stage = Stage::open("fast_closed").await;
     let first = stage.client.window().await.expect("a window");
-    let second = stage.client.new_window(true).await.expect("another one").handle;
     stage.take_the_wheel().await;
     stage.fast_capture().await;
     // It waits for what does not come.
@@ -93,6 +92,7 @@ async fn a_tab_that_is_closed_in_the_middle_of_a_capture_leaves_the_drive_as_it_
     stage.click("#fast-begin").await;
     stage.says("#fast-status", "armed, waits for velocity>500").await;
     stage.shoot("fast_armed").await;
+    let second = stage.client.new_window(true).await.expect("another one").handle;
     stage.client.switch_to_window(second.clone()).await.expect("it is there");
     let is_mapped = async || !stage.tpdo().await.contains("nothing is mapped into it");
     stage.until("a TPDO that is mapped", is_mapped).await;
