@@ -153,7 +153,7 @@ function lose() {
 async function findRefusal() {
   try {
     const answer = await request("/api/state", { signal: AbortSignal.timeout(RETRY_MS) });
-    // A host that has no bus yet (503) turns nobody away.
+    // A host that has no bus yet (503) turns no page away.
     turned_away = [401, 403].includes(answer.status) ? (await answer.json()).error.message : null;
   } catch {
     turned_away = null;
