@@ -431,3 +431,12 @@ def every_form():
 def matches(words, line):
     """Whether a line says these words. A command without a node has the same verb."""
     return line.split()[0] == words[0] and all(word in line.split() for word in words)
+
+
+def test_analogue_channels_are_there_by_their_objects():
+    world = ferrodrive.World()
+    module = world.add("io401", node=10)
+    world.run_for(2)
+    module.apply("set 6401:02 -1200")
+    assert module.analogue == {f"{index}:{sub:02X}": 0 for index in ("6401", "6411") for sub in range(1, 5)} | {"6401:02": -1200}
+    assert world.add("cia402", node=5).analogue == {}

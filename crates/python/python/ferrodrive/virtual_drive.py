@@ -155,6 +155,11 @@ class VirtualDrive:
         return self.report()["outputs"]
 
     @property
+    def analogue(self) -> dict[str, int]:
+        """Values of the analogue channels of a device by CiA 401, by their objects: ``{"6401:01": 12000, "6411:01": 0}``."""
+        return self.report()["analogue"]
+
+    @property
     def brake(self) -> Optional[str]:
         """``released`` or ``engaged``; None where there is no holding brake."""
         return self.report()["brake"]

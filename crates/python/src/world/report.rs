@@ -12,10 +12,15 @@ use crate::failure::refused;
 pub(super) fn at<'py>(py: Python<'py>, world: &mut sim::World, place: Place) -> PyResult<Bound<'py, PyDict>> {
     let report = world.with_drive(place.node, |drive, now| {
         drive.advance(now);
-        drive.check_axis(place.axis).map(|()| drive.report_of(place.axis))
+        drive.check_axis(place.axis).map(|()| (drive.report_of(place.axis), drive.analogue()))
     });
-    let report = report.map_err(refused)?.map_err(refused)?;
+    let (report, channels) = report.map_err(refused)?.map_err(refused)?;
     let dict = values(py, &report)?;
+    let analogue = PyDict::new(py);
+    for (mux, value) in channels {
+        analogue.set_item(format!("{:04X}:{:02X}", mux.index, mux.sub_index), value)?;
+    }
+    dict.set_item("analogue", analogue)?;
     dict.set_item("bus", bus(world, place.node, report.powered))?;
     Ok(dict)
 }
