@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use can::Instant;
+use transport::WallClock;
 
 use crate::session::runtime;
 use crate::signals::{Signal, asked_to_end};
@@ -58,14 +61,15 @@ impl Crew {
         let jobs = self.jobs.unwrap_or(cores).min(usize::try_from(count).unwrap_or(usize::MAX));
         let next = AtomicU64::new(0);
         let taken = Taken::default();
+        let clock = WallClock::start();
         let (results, incoming) = mpsc::channel();
         std::thread::scope(|scope| {
             for _ in 0..jobs {
                 let results = results.clone();
-                let (next, taken, work) = (&next, &taken, &work);
+                let (next, taken, work, clock) = (&next, &taken, &work, &clock);
                 scope.spawn(move || {
                     let _ends = taken.on_panic(&self.stop);
-                    let mut batch = Batch { results, done: Vec::new(), since: Instant::now() };
+                    let mut batch = Batch { results, done: Vec::new(), since: Instant::ZERO };
                     while !self.stop.load(Ordering::Acquire) {
                         let number = next.fetch_add(1, Ordering::Relaxed);
                         if number >= count {
@@ -77,7 +81,7 @@ impl Crew {
                             batch.hand_over();
                             taken.wait_for(wanted);
                         }
-                        batch.make(number, work);
+                        batch.make(number, work, clock);
                     }
                     batch.hand_over();
                 });
@@ -109,12 +113,12 @@ struct Batch<T> {
 
 impl<T> Batch<T> {
     /// Makes a piece, and hands over what has been kept long enough.
-    fn make(&mut self, number: u64, work: impl Fn(u64) -> T) {
+    fn make(&mut self, number: u64, work: impl Fn(u64) -> T, clock: &WallClock) {
         if self.done.is_empty() {
-            self.since = Instant::now();
+            self.since = clock.now();
         }
         self.done.push((number, work(number)));
-        if self.since.elapsed() >= KEPT {
+        if clock.now() - self.since >= KEPT {
             self.hand_over();
         }
     }
