@@ -54,7 +54,7 @@ impl<'a> Loaded<'a> {
 fn unusable(file: &Path, reason: &str) -> Failure {
     Failure::bad_file(format!("cannot use the scenario {}", file.display()))
         .because(reason)
-        .next("docs/scenarios.md describes each key; examples/scenarios has ten of them")
+        .next("docs/scenarios.md describes each key; examples/scenarios has some")
 }
 
 /// The machine of a scenario cannot be built.
