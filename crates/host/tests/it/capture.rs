@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::{Mux, NmtCommand, NodeId};
-use host::capture::{Measurand, Pace, Quantity, Restorer, Running, SeenBy, Span, Wanted, Way};
+use host::capture::{Measurand, Pace, Restorer, Running, SeenBy, Span, Wanted, Way};
 use host::network::params::journal::roll_back_by;
 use host::test_motion::{Shape, follow, points, steps};
 use master::cyclic::CyclicOptions;
