@@ -71,7 +71,7 @@ impl Stage {
         self.click("#report").await;
         self.says("#report-status", "saved as node4.html").await;
         let page = std::fs::read_to_string(self.saved("node4.html").await).expect("text");
-        for part in ["A. Fitter", "zlac8030l", "capture of velocity_rpm", "true_velocity", "<svg"] {
+        for part in ["A. Fitter", "zlac8030l", "capture of target_velocity_rpm", "true_velocity", "<svg"] {
             assert!(page.contains(part), "{part} is in the report");
         }
         self.shoot("report_button").await;
