@@ -188,7 +188,7 @@ impl Moved {
             apply: false,
             within: Duration::from_secs(60),
         };
-        tune(drive, &request, &(), std::future::pending()).await.map(drop)
+        tune((drive, &Restorer::of(drive)), &request, &(), std::future::pending()).await.map(drop)
     }
 }
 
