@@ -7,7 +7,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use clap::Parser;
-use host::console::{Hands, Order, Said};
+use host::console::{Hands, Order, Said, Work};
 use host::{Command as Asked, NodeCommand};
 use master::explain::Overheard;
 use plot::Paint;
@@ -49,9 +49,7 @@ impl host::console::Reader for Reader {
                 return Err(Said::failed(Status::Usage as u8, text.to_owned()));
             }
         };
-        let work = |hands: Hands| {
-            Box::pin(async move { carry_out(&command, hands).await }) as Pin<Box<dyn Future<Output = Said>>>
-        };
+        let work = |hands: Hands| Box::pin(async move { carry_out(&command, hands).await }) as Work;
         Ok(Order { asked, work: Box::new(work) })
     }
 }

@@ -23,12 +23,15 @@ pub trait Reader: core::fmt::Debug + Send + Sync {
     fn read(&self, line: &str) -> Result<Order, Said>;
 }
 
+/// A line that is being carried out.
+pub type Work = Pin<Box<dyn Future<Output = Said>>>;
+
 /// What a line asks for.
 pub struct Order {
     /// What it does to drives: a command to one, or [`Command::STOP_ALL`]; `None` if it only looks.
     pub asked: Option<Command>,
     /// Does it, and words what came of it.
-    pub work: Box<dyn FnOnce(Hands) -> Pin<Box<dyn Future<Output = Said>>>>,
+    pub work: Box<dyn FnOnce(Hands) -> Work>,
 }
 
 impl core::fmt::Debug for Order {

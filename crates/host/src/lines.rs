@@ -1,7 +1,6 @@
 //! Lines of a console: what a [`Reader`](crate::console::Reader) understands is carried out as any other command of a session. Whatever
 //! stops a motion of the session stops one of a line too, what needs control needs it here, and the session's speed limit holds.
 
-use std::pin::Pin;
 use std::sync::Arc;
 
 use canopen::NodeId;
@@ -11,7 +10,7 @@ use tokio::sync::oneshot;
 use crate::answer::Answer;
 use crate::command::{Command, NodeCommand};
 use crate::commands::doing;
-use crate::console::{Hands, Order, Said};
+use crate::console::{Hands, Order, Said, Work};
 use crate::motion::guarding::guard;
 use crate::nodes::known_node::KnownNode;
 use crate::session::authority::SessionId;
@@ -75,7 +74,7 @@ impl Host {
         node: NodeId,
         command: drive::Command,
         (seq, said): (u64, oneshot::Sender<Said>),
-        line: Pin<Box<dyn Future<Output = Said>>>,
+        line: Work,
     ) {
         let (answer, answered) = oneshot::channel();
         let stops = matches!(command, drive::Command::Stop | drive::Command::Disable);

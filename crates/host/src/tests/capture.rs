@@ -5,7 +5,7 @@ use std::time::Duration;
 use canopen::{Mux, NmtState};
 use serde_json::{Value, json};
 
-use super::{ARM, Stage, WHEEL, play, velocity};
+use super::{Stage, WHEEL, play, velocity};
 use crate::command::{CaptureCommand, CaptureOrder, Command, NewValue, NodeCommand, ParameterChange, SessionCommand};
 
 const COUNT: Mux = Mux::new(0x1A00, 0);
@@ -182,9 +182,6 @@ fn an_order_that_cannot_be_carried_out_is_refused_with_what_is_possible_and_chan
             assert!(text.contains(says), "{text}");
         }
         assert_eq!(stage.tpdo().await, before);
-        let of_the_arm = NodeCommand::Capture(CaptureCommand::Capture(order(&["velocity"], 100.0, None))).to(ARM);
-        let (_, text) = page.refused(of_the_arm).await;
-        assert!(text.contains("node 2"), "{text}");
         let long = CaptureCommand::Report { at: "x".repeat(101), by: None };
         assert_eq!(page.refused(NodeCommand::Capture(long).to(WHEEL)).await.0, "malformed");
         stage.network.sleep(Duration::from_millis(10)).await;
