@@ -6,7 +6,7 @@ import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 
-import { address, asked, begin, end, go, picture, run, server, until } from "../site_tools/browser.js";
+import { address, asked, begin, command, end, go, picture, run, server, until } from "../site_tools/browser.js";
 
 const { FERRODRIVE, SCENARIOS } = process.env;
 
@@ -55,6 +55,30 @@ test("the views get what they request", async () => {
   await run("location.hash = 'world'; return true");
   await until("the world", "return /48\\.0 V/.test(document.querySelector('#view .world')?.innerText ?? '')");
   await picture("world");
+});
+
+test("the console takes lines by the keyboard alone, and shows what a device is called as text", async () => {
+  const key = (value) => ({ type: "key", actions: [...value].flatMap((one) => [{ type: "keyDown", value: one }, { type: "keyUp", value: one }]) });
+  const type = (keys) => command("POST", "/actions", { actions: [{ ...key(keys), id: "keys" }] });
+  const [ENTER, UP] = ["\ue007", "\ue013"];
+  await run("location.hash = 'console'; return true");
+  await until("its line", "const line = document.getElementById('console-line'); line?.focus(); return document.activeElement === line && line !== null");
+  const said = (text) => until(text, "return document.getElementById('console-log').innerText.includes(arguments[0])", text);
+  await type(`state 4${ENTER}`);
+  await said("statusword");
+  await type(`<b>fly</b> 4${ENTER}`);
+  await said("unrecognized subcommand '<b>fly</b>'");
+  await run("const { ask } = await import(new URL('page/link.js', location.href)); return await ask({ do: 'take_control' })");
+  await type(`move 1 10deg --relative${ENTER}`);
+  await said("reached after");
+  await type(`${UP}${UP}${UP}`);
+  await until("the oldest line", "return document.getElementById('console-line').value === 'state 4'");
+  await until("no markup", "return document.querySelector('#console-log b') === null && document.getElementById('console-log').getAttribute('role') === 'log'");
+  await picture("console");
+  await command("POST", "/window/rect", { width: 400, height: 800 });
+  await until("nothing wider than the window", "return document.documentElement.scrollWidth <= innerWidth");
+  await picture("console_narrow");
+  await command("POST", "/window/rect", { width: 1280, height: 900 });
 });
 
 test("a scenario in the browser is the same run as the native one", async () => {
