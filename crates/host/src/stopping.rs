@@ -32,24 +32,49 @@ const LOOK: Duration = Duration::from_millis(10);
 /// without power: what a loop held may be turned by its load once it is let go, and a loop that is not stable swings until then.
 ///
 /// # Errors
-/// That was not seen.
+/// That was not seen: it is among what this program has in motion then.
 pub async fn bring_to_rest(drive: &Drive) -> Result<(), Failure> {
+    let stood = see_at_rest(drive).await;
+    if stood.is_err() {
+        // To take its power counts as a stop, whatever the shaft does.
+        drive.note_moved();
+    }
+    stood
+}
+
+async fn see_at_rest(drive: &Drive) -> Result<(), Failure> {
     let (network, node) = (drive.node().network(), drive.node().id());
     let stopped = network.stop_moved([node].into_iter().collect()).await;
-    let swings = stopped.into_iter().find_map(|axis| axis.outcome.err());
-    drive.disable().await.map_err(|error| swings.unwrap_or(error))?;
-    let (began, mut looks) = (network.now(), 0);
+    let unseen = stopped.into_iter().find_map(|axis| axis.outcome.err());
+    if let Err(error) = drive.disable().await {
+        return Err(unseen.unwrap_or(error).into());
+    }
+    let (began, mut looks, mut before) = (network.now(), 0, None);
     while looks < LOOKS {
         network.sleep(LOOK).await;
-        // One that shows no speed was seen to stand by its position, before.
-        let Rpm(rpm) = drive.state().await?.velocity.unwrap_or(Rpm(0.0));
-        looks = if rpm.abs() * drive.gear().ratio().abs() < STANDSTILL_RPM { looks + 1 } else { 0 };
+        let state = drive.state().await?;
+        let before = std::mem::replace(&mut before, state.position);
+        let stands = match state.velocity {
+            Some(Rpm(rpm)) => rpm.abs() * drive.gear().ratio().abs() < STANDSTILL_RPM,
+            // One that shows no speed is looked at by its position: the encoder may swing between two counts.
+            None => before.zip(state.position).is_some_and(|(before, at)| before.0.abs_diff(at.0) <= 1),
+        };
+        looks = if stands { looks + 1 } else { 0 };
         if network.now() - began > REST {
-            let still = NotAtRest::StillTurns { node, rpm, limit: REST };
+            let still = match state.velocity {
+                Some(Rpm(rpm)) => NotAtRest::StillTurns { node, rpm, limit: REST },
+                None => NotAtRest::NotSeen { node },
+            };
             return Err(Failure::new(still.to_string()).of_kind("not_stopped").at_node(node));
         }
     }
-    Ok(())
+    if unseen.is_none() {
+        return Ok(());
+    }
+    // A sensor at fault shows a shaft that stands: that is looked at too, now that it shows it.
+    drive.note_moved();
+    let stopped = network.stop_moved([node].into_iter().collect()).await;
+    stopped.into_iter().find_map(|axis| axis.outcome.err()).map_or(Ok(()), |error| Err(error.into()))
 }
 
 /// Stops what `network` has set in motion and releases the guards of what stands; `who` lets go of the drives.

@@ -184,8 +184,8 @@ impl Drive {
         MovedAxis { node, controlword, axis: self.axis, description: self.description }
     }
 
-    /// Notes that this program has set this axis in motion.
-    pub(super) fn note_moved(&self) {
+    /// Notes that this program has set this axis in motion, or has not seen it stand after what counted as a stop.
+    pub fn note_moved(&self) {
         self.node.network().note_axis_moved(self.as_moved());
     }
 
