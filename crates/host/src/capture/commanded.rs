@@ -115,11 +115,12 @@ impl Host {
         Ok(async move {
             let captured: Result<Result<(Running, Taken), Failure>, Aborted> = capturing.await;
             let left = restorer.restore().await;
-            way_back.remove();
+            way_back.remove_if_done();
             let outcome = match captured {
                 Ok(captured) => outcome_of(node, captured, &left, restorer.left_operational()),
                 Err(Aborted) => {
-                    Err(("stopped", "the page that began it has gone, or control changed hands".to_owned()))
+                    let gone = Failure::new("the page that began it has gone, or control changed hands");
+                    Err(refusal(&with_left(gone.of_kind("stopped"), &left)))
                 }
             };
             CaptureOutcome { node, outcome }

@@ -50,7 +50,7 @@ struct Moving {
 #[derive(Debug)]
 struct Written {
     /// The writes that lead back, in their order.
-    undo: Vec<(Mux, Vec<u8>)>,
+    undo: Arc<[(Mux, Vec<u8>)]>,
     /// Their copy on the disk.
     journal: Option<Kept>,
 }
@@ -130,16 +130,16 @@ impl Restorer {
         self.lock().motion.get_or_insert(Moving { in_cycles, was_guarded });
     }
 
-    /// The motion was ended by its own means; of one that was not seen to stand the way back stays.
+    /// The motion was ended by its own means; of one that was not seen to stand, or whose guard is still armed, the way back stays.
     pub(crate) fn end_motion(&self) {
-        if !self.node().network().moved().contains(self.node().id()) {
-            self.lock().motion = None;
-        }
+        let (network, id) = (self.node().network(), self.node().id());
+        let (moves, is_guarded) = (network.moved().contains(id), network.guarded(id).is_some());
+        self.lock().motion.take_if(|motion| !moves && (motion.was_guarded || !is_guarded));
     }
 
     /// Objects are going to be written, and these writes lead back.
     pub(crate) fn note_written(&self, undo: Vec<(Mux, Vec<u8>)>, journal: Option<Kept>) {
-        self.lock().written.push(Written { undo, journal });
+        self.lock().written.push(Written { undo: undo.into(), journal });
     }
 
     /// What was written last stays.
@@ -156,15 +156,37 @@ impl Restorer {
     /// # Errors
     /// The journal cannot be deleted.
     pub(crate) async fn put_back_newest(&self) -> Result<Undone, Failure> {
+        let newest = self.lock().written.len().saturating_sub(1);
+        let (undone, deleted) = self.put_back(newest).await;
+        deleted.map(|()| undone)
+    }
+
+    /// Puts back what was written as the one with this index, and whether its journal could be deleted.
+    async fn put_back(&self, at: usize) -> (Undone, Result<(), Failure>) {
         // It stays noted until it is done: this may be given up on the way.
-        let Some(undo) = self.lock().written.last().map(|newest| newest.undo.clone()) else {
-            return Ok(Undone::default());
+        let Some(undo) = self.lock().written.get(at).map(|written| Arc::clone(&written.undo)) else {
+            return (Undone::default(), Ok(()));
         };
         let undone = roll_back(self.node(), &undo, |_| None).await;
-        if undone.not_put_back.is_empty() {
-            self.keep_newest()?;
+        if !undone.not_put_back.is_empty() {
+            return (undone, Ok(()));
         }
-        Ok(undone)
+        // A clone may have done the same meanwhile.
+        let done = self.lock().written.extract_if(.., |written| Arc::ptr_eq(&written.undo, &undo)).next();
+        (undone, done.and_then(|done| done.journal).map_or(Ok(()), Kept::remove))
+    }
+
+    /// Puts back all that was written, the newest first: what could not be, in words, and why journals of what was could not be deleted.
+    /// One that fails keeps none of the others from being tried.
+    pub(crate) async fn put_back_written(&self) -> (Vec<String>, Vec<Failure>) {
+        let (mut left, mut undeleted) = (Vec::new(), Vec::new());
+        let count = self.lock().written.len();
+        for at in (0..count).rev() {
+            let (undone, deleted) = self.put_back(at).await;
+            left.extend(undone.not_put_back.iter().map(|left| format!("{}: {}", left.object, left.why)));
+            undeleted.extend(deleted.err());
+        }
+        (left, undeleted)
     }
 
     /// Stops what is being moved, if it still is, and puts everything back; says what could not be. What is done is not done again.
@@ -187,39 +209,36 @@ impl Restorer {
         let stood = bring_to_rest(&self.drive).await;
         let released = match motion.was_guarded {
             true => Ok(()),
-            // One that was not seen to stand is left to its own watch.
+            // One that was not seen to stand is left to its own watch: it is among those in motion.
             false => network.release_guards([id].into_iter().collect()).await,
         };
-        self.end_motion();
+        if stood.is_ok() {
+            self.lock().motion = None;
+        }
         let stood = stood.err().map(|failure| failure.to_string());
         stood.into_iter().chain(released.err().map(|error| error.to_string())).collect()
     }
 
     /// What was written and commanded, without the motion.
     pub(super) async fn restore_parameters(&self) -> Vec<String> {
-        let (started, sync) = {
+        let (started, sync, is_moved) = {
             let changed = self.lock();
-            (changed.started, changed.sync)
+            (changed.started, changed.sync, changed.motion.is_some())
         };
         let mut left = Vec::new();
         // Before SYNC ends and the TPDOs are changed: that they stop shows what the command did.
-        if started {
+        if started && is_moved && self.node().network().moved().contains(self.node().id()) {
+            // What it does about the loss of its PDOs is not known. A motion of others may go on: the node was not operational before.
+            left.push("NMT state: it is moving, and was left operational".to_owned());
+        } else if started {
             left.extend(self.leave_operational().await.err());
         }
         if sync {
             self.node().network().sync(None);
             self.lock().sync = false;
         }
-        while !self.lock().written.is_empty() {
-            match self.put_back_newest().await {
-                Ok(undone) if undone.not_put_back.is_empty() => {}
-                Ok(undone) => {
-                    left.extend(undone.not_put_back.iter().map(|left| format!("{}: {}", left.object, left.why)));
-                    break;
-                }
-                Err(failure) => left.push(failure.to_string()),
-            }
-        }
+        let (written, undeleted) = self.put_back_written().await;
+        left.extend(written.into_iter().chain(undeleted.iter().map(Failure::to_string)));
         left
     }
 

@@ -31,7 +31,8 @@ impl WaysBack {
     pub async fn restore(&self) -> Vec<String> {
         let restorers = std::mem::take(&mut *self.lock());
         let mut left = Vec::new();
-        for restorer in restorers {
+        // The newest first: it may have been begun on what an older one changed.
+        for restorer in restorers.into_iter().rev() {
             let node = restorer.id();
             left.extend(restorer.restore().await.iter().map(|left| format!("node {node}: not put back: {left}")));
         }
@@ -58,14 +59,12 @@ impl WayBack {
     pub async fn restore(&self) {
         let Some(own) = self.own.get() else { return };
         own.restore().await;
-        if own.is_done() {
-            self.remove();
-        }
+        self.remove_if_done();
     }
 
-    /// The job has ended by itself; what is left is in what it reports.
-    pub fn remove(&self) {
-        let Some(own) = self.own.get() else { return };
+    /// The job has ended. What it could not put back stays with the network, which tries once more when it is closed.
+    pub fn remove_if_done(&self) {
+        let Some(own) = self.own.get().filter(|own| own.is_done()) else { return };
         self.of_network.lock().retain(|other| !other.is_same(own));
     }
 }

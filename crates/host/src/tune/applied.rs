@@ -13,7 +13,7 @@ use words::failure::{Failure, both};
 use super::bench::{ENOUGH_CURRENT, SWINGS};
 use super::setup::keep;
 use super::{Bench, Excursion, Proposed, Reader, Request, Setup, StepResponse, TuneReport, find, loops_of};
-use crate::capture::Restorer;
+use crate::capture::{Restorer, with_left};
 use crate::network::Progress;
 use crate::network::params::Transaction;
 use crate::network::params::journal::Kept;
@@ -77,19 +77,30 @@ pub async fn tune(
     };
     if let Ok(None) = objection {
         report.applied = true;
-        restorer.keep_newest()?;
+        let undeleted = restorer.keep_newest().err();
+        report.notes.extend(undeleted.map(|failure| noted("the new gains stay", failure)));
         return Ok(report);
     }
-    let back = restorer.put_back_newest().await.and_then(|undone| match undone.not_put_back.is_empty() {
+    // What a step has written may be there too, where its own way back was not whole.
+    let (left, undeleted) = restorer.put_back_written().await;
+    let undeleted = undeleted.into_iter().map(|failure| noted("what was written was put back", failure));
+    let back = match left.is_empty() {
         true => Ok(()),
-        false => Err(Failure::new("not every gain could be put back").of_kind("not_put_back").because(undone)),
-    });
+        false => {
+            let what = format!("node {id}: not everything that was written could be put back");
+            Err(with_left(Failure::new(what).of_kind("not_put_back").at_node(id), &left))
+        }
+    };
     if let (Err(failure), Ok(())) = (&objection, &back) {
-        return Err(failure.clone().because(BACK));
+        return Err(undeleted.fold(failure.clone().because(BACK), Failure::because));
     }
-    let still = |back| Failure::new(format!("node {id}: it still has the new gains")).at_node(id).after(back);
-    report.notes.extend(both(objection, back.map_err(still))?);
+    report.notes.extend(both(objection, back)?.into_iter().chain(undeleted));
     Ok(report)
+}
+
+/// A journal that could not be deleted, which says nothing against what the drive has.
+fn noted(what_is: &str, Failure { what, because, next, .. }: Failure) -> String {
+    [vec![format!("{what_is}, but {what}")], because, next].concat().join("; ")
 }
 
 /// Why the new gains do not stay.

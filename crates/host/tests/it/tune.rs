@@ -2,19 +2,25 @@
 
 use std::f64::consts::TAU;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use canopen::Mux;
+use can::{Bitrate, Frame, Instant, Station};
+use canopen::{Mux, NodeId};
 use devices::{Description, Loops};
 use host::capture::Restorer;
+use host::network::Progress;
 use host::network::params::journal::roll_back_by;
 use host::tune::{
     Bounds, Excursion, Found, Proposed, Request, Setup, StepResponse, Twin, find, loops_of, measure, motor_of, tune,
 };
-use master::Drive;
 use master::cyclic::CyclicOptions;
-use master::drive::SwitchedOff;
-use sim::{MotorData, Prng, World};
+use master::drive::{MotionOptions, SwitchedOff};
+use master::units::Rpm;
+use master::{Drive, Network};
+use sim::machine::{Order, order};
+use sim::{MotorData, Place, Prng, World};
 use tune::Objective;
 use words::failure::Failure;
 
@@ -462,4 +468,106 @@ fn what_no_motion_can_be_measured_with_is_refused_before_anything_moves() {
         request.torque_constant_nm_a = Some(value);
     });
     assert!(Request { torque_constant_nm_a: Some(0.1), ..request() }.check().is_ok());
+}
+
+/// A program some of whose frames say another value than it meant: so many of those to a ramp that are not 0.
+#[derive(Clone)]
+struct Garbled {
+    network: Network,
+    frames: Arc<AtomicUsize>,
+}
+
+/// From the step with the new gains on.
+struct FromNewGains(Arc<AtomicUsize>, usize);
+
+impl Progress for FromNewGains {
+    fn show(&self, text: String) {
+        if text.contains("with the new gains") {
+            self.0.store(self.1, Ordering::Relaxed);
+        }
+    }
+    fn count(&self, _: String) {}
+    fn note(&self, _: &str) {}
+}
+
+impl Station for Garbled {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.network.handle_frame(frame, now);
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.network.handle_timeout(now);
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        let frame = self.network.poll_transmit()?;
+        let mut data = *frame.padded();
+        // An expedited download (CiA 301, 7.2.4.3.3).
+        let is_of_ramp = frame.standard_data_id() == Some(0x601) && data[0] >> 5 == 1 && data[1..4] == [0x83, 0x60, 0];
+        let left = self.frames.load(Ordering::Relaxed);
+        if left == 0 || !is_of_ramp || data[4..] == [0; 4] {
+            return Some(frame);
+        }
+        self.frames.store(left - 1, Ordering::Relaxed);
+        data[4..].fill(0);
+        Some(Frame::full(frame.id(), data))
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.network.poll_timeout()
+    }
+}
+
+/// The step with the new gains leaves its ramp behind: that does not keep the gains from being put back, and of what is not put back none
+/// is said to be.
+#[test]
+fn former_gains_are_put_back_whatever_else_a_step_has_left() {
+    for frames in [1, usize::MAX] {
+        let model = devices::model("zlac8030l").unwrap();
+        let (mut world, network) = (World::new(Bitrate::M1, 1), Network::new());
+        let garbled = Arc::new(AtomicUsize::new(0));
+        world.add_station(Garbled { network: network.clone(), frames: Arc::clone(&garbled) });
+        world.add_drive(1, order(model, &Order::new(model, NodeId::MIN, Bitrate::M1)).unwrap()).unwrap();
+        world.apply(Place::node(1), &"load inertia 0.02".parse().unwrap()).unwrap().unwrap();
+        world.run_for(Duration::from_secs(1));
+        let drive = Drive::new(network.node(NodeId::MIN), model);
+        let (before, ramp) = (gains(&mut world, &drive), values(&mut world, &drive, &WRITTEN[..1]));
+        let (request, restorer) = (Request { apply: true, ..request() }, Restorer::of(&drive));
+        let progress = FromNewGains(Arc::clone(&garbled), frames);
+        let run = tune((&drive, &restorer), &request, &progress, std::future::ready(false));
+        let failure = sim::block_on(&mut world, run).unwrap().unwrap_err();
+        assert_ne!(garbled.load(Ordering::Relaxed), frames, "a ramp was written with the new gains");
+        assert_eq!(gains(&mut world, &drive), before, "{failure:?}");
+        let is_back = values(&mut world, &drive, &WRITTEN[..1]) == ramp;
+        assert_eq!((is_back, restorer.is_done()), (frames == 1, frames == 1), "{failure:?}");
+        assert_eq!(failure.to_string().contains("it was given its former gains back"), is_back, "{failure}");
+        assert_eq!(failure.kind, "not_put_back");
+        garbled.store(0, Ordering::Relaxed);
+        assert_eq!(sim::block_on(&mut world, restorer.restore()).unwrap(), Vec::<String>::new());
+        assert!(restorer.is_done() && values(&mut world, &drive, &WRITTEN[..1]) == ramp);
+    }
+}
+
+/// A load that pushes on turns the shaft once the power is off: to take the power is not to stand.
+#[test]
+fn a_shaft_that_turns_without_power_keeps_its_way_back_and_is_left_to_its_watch() {
+    let (mut world, drive) = wheel(&["load inertia 0.02"]).world().unwrap();
+    let (network, id, restorer) = (drive.node().network(), drive.node().id(), Restorer::of(&drive));
+    restorer.begin_motion(false);
+    let run = async {
+        drive.guard(SwitchedOff::Leave).await.unwrap();
+        let options = MotionOptions { wait: false, ..MotionOptions::default() };
+        drive.velocity(Rpm(60.0), options).await.unwrap();
+    };
+    sim::block_on(&mut world, run).unwrap();
+    world.apply(Place::node(1), &"load torque 3".parse().unwrap()).unwrap().unwrap();
+    let left = sim::block_on(&mut world, restorer.restore()).unwrap();
+    assert!(world.report(1).unwrap().velocity_rpm.abs() > 5.0, "{left:?}");
+    assert!(left.len() == 1 && left[0].contains("node 1"), "{left:?}");
+    assert_eq!((restorer.is_done(), network.moved().contains(id), network.guarded(id)), (false, true, None));
+    for words in ["load torque 0", "load friction 2 viscous 0.01"] {
+        world.apply(Place::node(1), &words.parse().unwrap()).unwrap().unwrap();
+    }
+    assert_eq!(sim::block_on(&mut world, restorer.restore()).unwrap(), Vec::<String>::new());
+    assert!(restorer.is_done() && !network.moved().contains(id) && world.report(1).unwrap().velocity_rpm.abs() < 1.0);
 }
