@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::{Mux, NmtCommand, NodeId};
-use host::capture::{Measurand, Pace, Restorer, Running, SeenBy, Span, Wanted, Way};
+use host::capture::{Measurand, Pace, Restorer, Running, SeenBy, Span, Taken, Wanted, Way};
 use host::network::params::journal::roll_back_by;
 use host::test_motion::{Shape, follow, points, steps};
 use master::cyclic::CyclicOptions;
@@ -189,7 +189,7 @@ fn what_is_true_of_a_virtual_drive_stands_in_the_rows_of_what_it_sends() {
     let trigger = Some("true_velocity > 30".parse().expect("a trigger"));
     let span = Span { duration: Duration::from_millis(700), trigger, pre_trigger: 20 * MS };
     let (taken, seen) = bench.run_beside_truth(running.next(&span));
-    let (capture, seen_times) = (taken.expect("it is captured").capture, seen.0);
+    let Taken { capture, first_at, .. } = taken.expect("it is captured");
     let of = |name: &str| &capture.trace(name).expect("it was captured").values;
     let (said, speed, angle) = (of("velocity"), of("true_velocity"), of("true_shaft_angle"));
     let trigger_s = capture.trigger_s.expect("it was triggered");
@@ -206,10 +206,14 @@ fn what_is_true_of_a_virtual_drive_stands_in_the_rows_of_what_it_sends() {
         assert!((slope - mean / 100.0).abs() < 0.02, "{from}: {slope}, {mean}");
     }
     // The angle is that which the shaft has: degrees of every millisecond, looked at from outside.
-    let degrees: Vec<f64> = angle.iter().map(|angle| angle.to_degrees()).collect();
-    let outside = &seen.1[seen_times.len() - 700..];
-    let nearest = |value: f64| outside.iter().map(|seen| (seen - value).abs()).fold(f64::MAX, f64::min);
-    assert!(degrees[100..600].iter().all(|value| nearest(*value) < 0.4), "60 r/min are 0.36 degrees in 1 ms");
+    let first_s = (first_at - Instant::ZERO).as_secs_f64();
+    for (time_s, angle) in capture.time_s.iter().map(|time| first_s + time).zip(angle) {
+        let after = seen.0.partition_point(|seen_s| *seen_s < time_s);
+        // 60 r/min are 0.36 degrees in the millisecond between two looks.
+        let (from, to) = (seen.1[after - 1], seen.1[after]);
+        let degrees = angle.to_degrees();
+        assert!((from - 0.01..=to + 0.01).contains(&degrees) && to - from < 0.4, "{time_s}: {from}, {degrees}, {to}");
+    }
     bench.run(drive.quick_stop()).expect("it stops");
     drop(running);
     assert_eq!(bench.run(restorer.restore()), Vec::<String>::new());
