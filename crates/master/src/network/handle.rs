@@ -155,6 +155,8 @@ impl Network {
     /// Another server is chosen for a node; the number of that choice.
     pub(super) fn begin_server_choice(&self, node: NodeId) -> u32 {
         let mut shared = self.lock();
+        // It would be read meanwhile as if it were the newer one.
+        shared.chosen_servers.remove(&node);
         let choices = shared.server_choices.entry(node).or_default();
         *choices += 1;
         *choices
