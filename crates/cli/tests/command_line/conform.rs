@@ -1,15 +1,6 @@
 //! `ferrodrive conform`: what it prints and writes, and what it ends with.
 
-use std::path::PathBuf;
-
-use processes::{done, ferrodrive, page};
-
-fn folder(name: &str) -> PathBuf {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("conform").join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("a folder for files");
-    folder
-}
+use processes::{done, ferrodrive, page, scratch};
 
 #[test]
 fn a_model_passes_and_its_departures_are_cited() {
@@ -29,7 +20,7 @@ fn a_model_passes_and_its_departures_are_cited() {
 
 #[test]
 fn a_sheet_that_is_not_the_devices_fails_with_status_1_in_every_form() {
-    let folder = folder("wrong");
+    let folder = scratch("conform-wrong");
     let sheet = done(&["eds", "zlac8030l"]).out.replace("DefaultValue=0x40192", "DefaultValue=0x20192");
     let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
     std::fs::write(path("wrong.eds"), &sheet).unwrap();
@@ -51,7 +42,7 @@ fn a_sheet_that_is_not_the_devices_fails_with_status_1_in_every_form() {
 
 #[test]
 fn a_sheet_of_another_device_is_warned_of() {
-    let folder = folder("another");
+    let folder = scratch("conform-another");
     let sheet = done(&["eds", "zlac8030l"]).out;
     let (before, after) = sheet.split_once("[1018sub2]").expect("a product code");
     let (row, after) = after.split_once("DefaultValue=").expect("its number");

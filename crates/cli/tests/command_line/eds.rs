@@ -1,16 +1,6 @@
 //! Data sheets on the command line: written, checked, shown, compared; and a device's values as a DCF.
 
-use std::path::PathBuf;
-
-use processes::{done, ferrodrive};
-
-/// A folder of its own for a test's files.
-fn folder(name: &str) -> PathBuf {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("eds").join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("a folder for files");
-    folder
-}
+use processes::{done, ferrodrive, scratch};
 
 fn file(folder: &std::path::Path, name: &str, text: impl AsRef<[u8]>) -> String {
     let path = folder.join(name);
@@ -25,7 +15,7 @@ const SMALL: &str = "[FileInfo]\nFileName=a.eds\n[MandatoryObjects]\nSupportedOb
 
 #[test]
 fn a_models_sheet_is_written_and_has_nothing_wrong_with_it() {
-    let folder = folder("written");
+    let folder = scratch("eds-written");
     let sheet = done(&["eds", "zlim42c"]).out;
     assert!(sheet.contains("[1014]\nParameterName=COB-ID EMCY\n") && sheet.ends_with('\n'));
     assert!(sheet.contains("DefaultValue=$NODEID+0x80\n"));
@@ -39,8 +29,8 @@ fn a_models_sheet_is_written_and_has_nothing_wrong_with_it() {
 fn lint_lists_the_rules_explains_one_and_names_it_in_its_findings() {
     let rules = done(&["eds", "lint", "--list", "--json"]).json()["rules"].clone();
     assert_eq!(rules.as_array().unwrap().len(), eds::Rule::ALL.len());
-    let path =
-        file(&folder("rules"), "a.eds", SMALL.replace("DataType=5\nAccessType=ro\n[1018]", "AccessType=ro\n[1018]"));
+    let folder = scratch("eds-rules");
+    let path = file(&folder, "a.eds", SMALL.replace("DataType=5\nAccessType=ro\n[1018]", "AccessType=ro\n[1018]"));
     let report = ferrodrive(&["eds", "lint", "--json", &path]).json();
     let found: Vec<_> = report["files"][0]["findings"].as_array().unwrap().iter().map(|found| &found["rule"]).collect();
     assert_eq!(found, ["EDS301"], "{report}");
@@ -72,7 +62,7 @@ fn a_sheet_is_for_one_node_with_choices_and_for_ros2_canopen() {
 
 #[test]
 fn a_file_is_called_as_the_user_calls_it_and_not_as_it_calls_itself() {
-    let folder = folder("called");
+    let folder = scratch("eds-called");
     let path = file(&folder, "wheel.eds", SMALL);
     let objects = done(&["objects", &path]).out;
     assert!(objects.contains(&format!("object dictionary of \"the file {path}\"")), "{objects}");
@@ -96,7 +86,7 @@ fn what_makes_no_sheet_is_a_usage_error() {
 
 #[test]
 fn lint_fails_for_errors_and_with_strict_for_warnings_too() {
-    let folder = folder("lint");
+    let folder = scratch("eds-lint");
     let clean = file(&folder, "clean.eds", SMALL);
     let warned = file(&folder, "warned.eds", SMALL.replace("SupportedObjects=3", "SupportedObjects=0x3"));
     let wrong = file(&folder, "wrong.eds", SMALL.replace("DataType=5", "DataType=0x99"));
@@ -127,7 +117,7 @@ fn lint_fails_for_errors_and_with_strict_for_warnings_too() {
 
 #[test]
 fn show_finds_objects_by_index_and_word_and_says_the_device() {
-    let folder = folder("show");
+    let folder = scratch("eds-show");
     let path = file(&folder, "small.eds", SMALL);
     let shown = done(&["eds", "show", &path, "1000"]).out;
     assert!(shown.contains("1000h:00  Device type  UNSIGNED32  ro      0x20192"), "{shown}");
@@ -144,7 +134,7 @@ fn show_finds_objects_by_index_and_word_and_says_the_device() {
 
 #[test]
 fn a_files_letters_do_not_steer_the_terminal() {
-    let folder = folder("letters");
+    let folder = scratch("eds-letters");
     let path = file(&folder, "escape.eds", SMALL.replace("Device type", "Device\u{1b}[31m"));
     let shown = done(&["eds", "show", &path]).out;
     assert!(!shown.contains('\u{1b}') && shown.contains("Device\\u{1b}[31m"), "{shown}");
@@ -152,7 +142,7 @@ fn a_files_letters_do_not_steer_the_terminal() {
 
 #[test]
 fn a_bomb_is_refused_at_its_line() {
-    let folder = folder("bomb");
+    let folder = scratch("eds-bomb");
     let path = file(&folder, "bomb.eds", "[1]\n".repeat(1_000_000));
     let ended = ferrodrive(&["eds", "show", &path]);
     assert_eq!(ended.status, Some(1));
@@ -165,7 +155,7 @@ fn a_bomb_is_refused_at_its_line() {
 
 #[test]
 fn a_devices_values_make_a_dcf_that_is_not_written_over_unasked() {
-    let folder = folder("dcf");
+    let folder = scratch("eds-dcf");
     let path = folder.join("wheel.dcf").to_str().expect("a name of letters").to_owned();
     let report = done(&["dcf", "4", "--output", &path, "--name", "left", "--json"]).json();
     assert_eq!(
@@ -195,7 +185,7 @@ fn a_devices_values_make_a_dcf_that_is_not_written_over_unasked() {
 
 #[test]
 fn values_that_differ_from_a_makers_sheet_are_in_the_dcf_and_what_the_device_refuses_is_reported() {
-    let folder = folder("dcf_eds");
+    let folder = scratch("eds-dcf_eds");
     let sheet = "; kept\n[FileInfo]\nFileName=v.eds\n\
         [2014]\nParameterName=Rated current\nDataType=6\nAccessType=rw\nDefaultValue=300\n\
         [2015]\nParameterName=Maximum current\nDataType=6\nAccessType=rw\nDefaultValue=300\n\
