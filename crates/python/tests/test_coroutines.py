@@ -197,6 +197,17 @@ def test_a_capture_that_is_cut_off_reports_what_came_as_a_whole_one_does():
     assert math.isclose(error.report["period_s"]["velocity_rpm"], 0.001, rel_tol=0.01)
 
 
+def test_a_capture_whose_coroutine_is_closed_is_given_up_without_being_awaited(world):
+    async def main(network):
+        capture = network.async_drive(4, "zlac8030l").capture("velocity", duration=60.0)
+        capture.send(None)
+        capture.close()
+
+    world.add("zlac8030l", node=4)
+    world.wait_until_booted()
+    run(world, main)
+
+
 def test_an_rpdo_is_not_taken_for_a_capture(world):
     with ferrodrive.Network(world) as network, pytest.raises(ValueError, match="'rpdo1' is not a TPDO"):
         network.drive(1, "cia402").capture("velocity", take=["rpdo1"])

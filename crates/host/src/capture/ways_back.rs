@@ -62,9 +62,16 @@ impl WayBack {
         self.remove_if_done();
     }
 
-    /// The job has ended. What it could not put back stays with the network, which tries once more when it is closed.
-    pub fn remove_if_done(&self) {
-        let Some(own) = self.own.get().filter(|own| own.is_done()) else { return };
+    /// The job was ended. What it could not put back stays with the network, which tries once more when it is closed.
+    pub(super) fn remove_if_done(&self) {
+        if self.own.get().is_some_and(Restorer::is_done) {
+            self.remove();
+        }
+    }
+
+    /// The job has ended by itself: it has tried to put everything back, and what is left is in what it reports.
+    pub fn remove(&self) {
+        let Some(own) = self.own.get() else { return };
         self.of_network.lock().retain(|other| !other.is_same(own));
     }
 }

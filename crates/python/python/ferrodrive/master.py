@@ -196,10 +196,11 @@ class Network(Whole):
         try:
             # Which leaves the future as it is when it is cancelled.
             await asyncio.wait([ended])
-        except BaseException:
+        except BaseException as stopped:
             if not keep:
                 job.cancel()
-                if job.leads_back:
+                # A coroutine that is closed may not await; nor can one without its loop.
+                if job.leads_back and not isinstance(stopped, GeneratorExit) and not loop.is_closed():
                     await asyncio.wait([ended])
             raise
         finally:

@@ -182,7 +182,7 @@ impl Job {
             match (&result, way_back) {
                 // What could not be put back stays in the journal of a real bus; no caller waits for an answer any more.
                 (None, Some(way_back)) => way_back.restore().await,
-                (Some(_), Some(way_back)) => way_back.remove_if_done(),
+                (Some(_), Some(way_back)) => way_back.remove(),
                 (_, None) => {}
             }
             reporter.report(result);

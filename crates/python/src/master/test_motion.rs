@@ -135,27 +135,26 @@ pub(crate) fn test_motion(
         let names = if order.quantities.is_empty() { usual_quantities(&drive).await? } else { order.quantities };
         wanted.quantities = quantities(&drive, world.as_ref(), &names).await?;
         wanted.check(&motion.span())?;
-        let (core, nodes) = (drive.node().network(), [asked.node].into_iter().collect());
         let (restorer, mut runs) = (way_back.of(&drive), Vec::new());
         let is_points = matches!(motion, Motion::Points { .. });
-        // Points have a guard of their own.
-        let guarded = !is_points && core.guarded(asked.node).is_none();
         restorer.begin_motion(is_points);
-        if guarded {
-            drive.guard(SwitchedOff::Leave).await.map_err(Failure::from)?;
-        }
-        let how = (order.count, order.travel_turns);
-        let moved = run((&drive, &motion), (&wanted, restorer), how, &mut runs, |_| ()).await;
+        let moved = async {
+            // Points have a guard of their own. That of steps ends with the way back.
+            if !is_points && drive.node().network().guarded(asked.node).is_none() {
+                drive.guard(SwitchedOff::Leave).await.map_err(Failure::from)?;
+            }
+            let how = (order.count, order.travel_turns);
+            run((&drive, &motion), (&wanted, restorer), how, &mut runs, |_| ()).await
+        };
+        let moved = moved.await;
         let left = restorer.restore().await;
-        // One that was not seen to stand is left to its own watch.
-        let released = if guarded { core.release_guards(nodes).await } else { Ok(()) };
         let rows = runs.into_iter().map(|Run { number, figures, capture, ways }| RunReport {
             run: number,
             figures,
             capture: Captured::of(&capture, &ways),
         });
         let value = Value::report(&TestMotionReport { runs: rows.collect() });
-        let failed = moved.err().or(not_put_back(asked.node, &left)).or(released.err().map(Failure::from));
+        let failed = moved.err().or(not_put_back(asked.node, &left));
         match failed {
             Some(failure) => Err(Trouble::Reported(with_left(failure, &left), Box::new(value))),
             None => Ok(value),

@@ -3,10 +3,13 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use host::capture::with_left;
 use host::tune::{Bounds, Objective, Request, loops_of, tune};
 use master::cyclic::CyclicOptions;
 use pyo3::prelude::*;
 
+use super::capture::not_put_back;
+use super::job::Trouble;
 use super::value::Value;
 use super::whole::AskedDrive;
 use super::{Job, Network, duration};
@@ -73,7 +76,13 @@ pub(crate) fn tune_drive(
         if order.speed_rpm.is_none() {
             request.bounds.speed_rpm = loops_of(&drive)?.1.usual_rpm;
         }
-        let report = tune((&drive, way_back.of(&drive)), &request, &(), std::future::ready(false)).await?;
-        Ok(Value::report(&report))
+        let restorer = way_back.of(&drive);
+        let tuned = tune((&drive, restorer), &request, &(), std::future::ready(false)).await;
+        let left = restorer.restore().await;
+        let report = Value::report(&tuned.map_err(|failure| with_left(failure, &left))?);
+        match not_put_back(asked.node, &left) {
+            Some(failure) => Err(Trouble::Reported(with_left(failure, &left), Box::new(report))),
+            None => Ok(report),
+        }
     })
 }
