@@ -15,6 +15,7 @@ use words::failure::{Failure, both};
 use super::{Followed, follow};
 use crate::capture::merit::{self, Heating, Step};
 use crate::capture::{Quantity, Restorer, Running, Span, Taken, Wanted, Way};
+use crate::stopping::bring_to_rest;
 
 /// How often it is looked where a shaft is that turns by its drive's own ramps.
 const LOOK: Duration = Duration::from_millis(10);
@@ -281,7 +282,7 @@ pub async fn run(
     };
     let moved = moved.await;
     let ended = match mover {
-        Mover::Steps(..) => drive.disable().await.map_err(Failure::from),
+        Mover::Steps(..) => bring_to_rest(drive).await,
         Mover::Points(mut group, _) => {
             let reason = if moved.is_err() { group.explain_stop().await } else { None };
             let closed = group.close().await.map_err(Failure::from);
