@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_folder_of_others_is_not_replaced() {
-        let folder = workspace::target().join("tmp/replaced");
+        let folder = workspace::target().join(format!("tmp/replaced-{}", std::process::id()));
         let _ = fs::remove_dir_all(&folder);
         assert!(may_be_replaced(&folder), "it is not there");
         fs::create_dir_all(&folder).expect("a folder");
@@ -268,5 +268,6 @@ mod tests {
         fs::write(folder.join("ferrodrive.wasm"), "").expect("a file");
         assert!(may_be_replaced(&folder), "one that was made here");
         assert!(!may_be_replaced(&folder.join("index.html")), "a file");
+        fs::remove_dir_all(&folder).expect("to remove it");
     }
 }
