@@ -241,8 +241,10 @@ impl Context {
     /// # Errors
     /// Those of SDO.
     pub async fn quick_stop(&self, id: NodeId) -> Result<(), Error> {
-        // Nor does it wait for the record of a server.
-        self.network.choose_sdo_servers([]);
+        // Nor does it wait for the record of a server. A host goes on with those that were chosen, and has sent a stop of its own.
+        if self.holding != Holding::Host {
+            self.network.choose_sdo_servers([]);
+        }
         let statusword = self.network.node(id).with_timeout(GLANCE).read::<u16>(STATUSWORD).await.map(Statusword);
         let enabled = |word: Statusword| word.state() == Some(PowerState::OperationEnabled);
         if statusword.is_ok_and(|word| !word.has(Statusword::VOLTAGE_ENABLED) && !enabled(word)) {

@@ -153,6 +153,9 @@ impl Host {
     ) {
         // A drive that continues alone leaves the others of its group without set-points.
         let others = self.leave_group(node);
+        if what != STOPPING {
+            self.leave_stopping_lines(node);
+        }
         self.generation += 1;
         let (running, future) = Running::new(node, self.generation, what, moves, asked, command);
         if let Some(before) = self.running.insert(node, running) {

@@ -1,9 +1,11 @@
 //! Lines of a console: what a [`Reader`](crate::console::Reader) understands is carried out as any other command of a session. Whatever
 //! stops a motion of the session stops one of a line too, what needs control needs it here, and the session's speed limit holds.
 
+use std::rc::Rc;
 use std::sync::Arc;
 
 use canopen::NodeId;
+use futures_util::future::{Aborted, abortable};
 use master::drive;
 use tokio::sync::oneshot;
 
@@ -15,9 +17,9 @@ use crate::motion::guarding::guard;
 use crate::nodes::known_node::KnownNode;
 use crate::session::authority::SessionId;
 use crate::state::Host;
-use crate::work::{Asked, Done, send};
+use crate::work::{Asked, Done, StoppingLine, send};
 
-/// Lines that may be under way.
+/// Lines that may be under way when one begins that only looks.
 const MOST_LINES: usize = 32;
 
 impl Host {
@@ -30,7 +32,8 @@ impl Host {
             Ok(order) => order,
             Err(said) => return send(answer, said.answer(seq)),
         };
-        if self.lines == MOST_LINES {
+        // A stop is never refused for what others look at.
+        if order.asked.is_none() && self.lines >= MOST_LINES {
             return send(answer, Answer::failed(Some(seq), "busy", "too many lines are under way: try again"));
         }
         let allowed = order.asked.as_ref().map_or(Ok(()), |asked| self.allow(session, asked));
@@ -48,6 +51,11 @@ impl Host {
 
     fn begin_line(&mut self, Order { asked, work }: Order, seq: u64, said: oneshot::Sender<Said>) {
         let hands = self.hands();
+        // One that stops everything is not given up for a command to one drive.
+        let stops = match &asked {
+            Some(Command::Node(node, _)) => Some(*node),
+            Some(_) | None => None,
+        };
         match asked {
             Some(Command::Node(node, NodeCommand::Drive(drive::Command::QuickStop))) => {
                 // The host's own goes out now; the line's says what came of it.
@@ -60,12 +68,28 @@ impl Host {
             Some(_) => self.stop_everything("stopped by a line of a console"),
             None => {}
         }
-        let line = work(hands);
+        let (line, abort) = abortable(work(hands));
+        let alive = Rc::new(());
+        if let Some(node) = stops {
+            self.stopping_lines.push(StoppingLine { node, abort, alive: Rc::downgrade(&alive) });
+        }
         self.work.push(Box::pin(async move {
+            let replaced = || Said::refused("replaced", "replaced by another command to the drive");
             // The session may have gone.
-            let _ = said.send(line.await);
+            let _ = said.send(line.await.unwrap_or_else(|Aborted| replaced()));
+            drop(alive);
             Done::Nothing
         }));
+    }
+
+    /// A newer command to this drive takes the place of the lines that stop it: their stop would meet that.
+    pub(crate) fn leave_stopping_lines(&mut self, node: NodeId) {
+        self.stopping_lines.retain(|line| {
+            if line.node == node {
+                line.abort.abort();
+            }
+            line.node != node && line.alive.strong_count() > 0
+        });
     }
 
     /// A line that commands a drive takes the place of the command under way there, and ends as one.

@@ -1,5 +1,6 @@
 //! Work under way, and the futures that do it.
 
+use std::rc::Weak;
 use std::time::Duration;
 
 use can::Instant;
@@ -31,6 +32,14 @@ pub(crate) type Asked = (u64, oneshot::Sender<Answer>);
 
 /// Shown while a drive is being quick-stopped.
 pub(crate) const STOPPING: &str = "stopping";
+
+/// A line of a console that stops a drive by itself, beside the host's own stop.
+pub(crate) struct StoppingLine {
+    pub(crate) node: NodeId,
+    pub(crate) abort: AbortHandle,
+    /// Dropped with the line.
+    pub(crate) alive: Weak<()>,
+}
 
 /// Work that has ended.
 pub(crate) enum Done {

@@ -214,6 +214,25 @@ fn a_line_that_is_stopped_or_replaced_says_so() {
     }
 }
 
+/// The stop of a line does not go on behind the command that has taken its place, and what that moves is stopped with the page.
+#[test]
+fn a_line_that_stops_gives_way_to_the_next_command() {
+    for after_ms in [5, 60, 180] {
+        let mut page = Page::new();
+        assert_eq!(page.line("velocity 4 60rpm").1, 0);
+        page.say(json!({ "do": "console", "line": "quick-stop 4" }));
+        page.silent(after_ms);
+        page.must(json!({ "do": "velocity", "node": 4, "rpm": 60 }));
+        for _ in 0..10 {
+            page.say(json!({ "do": "alive" }));
+            page.silent(100);
+        }
+        assert!((page.speed(4) - 60.0).abs() < 3.0, "{after_ms} ms: {} r/min", page.speed(4));
+        page.silent(4000);
+        assert!(page.speed(4) < 2.0, "{after_ms} ms: {} r/min", page.speed(4));
+    }
+}
+
 /// Nothing stops the stepper when the program dies: a person has to accept that first, as for every motion.
 #[test]
 fn what_nothing_would_stop_is_moved_only_after_that_was_accepted() {

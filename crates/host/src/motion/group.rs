@@ -100,6 +100,7 @@ impl Host {
         let (running, future) = Running::of_group(nodes, self.generation, what, (seq, answer), motion);
         for (node, running) in nodes.iter().zip(running) {
             self.jogs.remove(node);
+            self.leave_stopping_lines(*node);
             if let Some(before) = self.running.insert(*node, running) {
                 before.cut_short("replaced", "replaced by another command to the drive");
             }
