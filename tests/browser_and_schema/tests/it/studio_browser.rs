@@ -4,7 +4,6 @@
 //! `target/studio` to be looked at.
 
 mod axe;
-mod fast_capture;
 mod figures;
 mod group;
 mod help;
