@@ -240,9 +240,17 @@ impl PowerDrive {
         self.axis.feedback().standing && no_way_to_go && !homing
     }
 
+    // With each RPDO and in each period, while a mode is new next to never.
+    #[inline]
     fn adopt_mode(&mut self, change: ModeChange) {
-        let waits = || change == ModeChange::AtStandstill && self.engaged == Engaged::Yes && !self.is_at_rest();
-        if self.requested_mode == self.mode || waits() {
+        if self.requested_mode != self.mode {
+            self.change_mode(change);
+        }
+    }
+
+    #[inline(never)]
+    fn change_mode(&mut self, change: ModeChange) {
+        if change == ModeChange::AtStandstill && self.engaged == Engaged::Yes && !self.is_at_rest() {
             return;
         }
         self.mode = self.requested_mode;
