@@ -17,6 +17,7 @@ mod lss;
 mod program_download;
 mod random_frames;
 mod realism;
+mod sdo_figures;
 mod sdo_servers;
 mod tables_of_cia402;
 mod tables_of_the_drives;

@@ -106,7 +106,7 @@ int main(int count, char **arguments)
 {
     if (count != 3)
         return 2;
-    /* The bytes of benches/examples/sdo_figures.rs. */
+    /* The bytes of tests/tests/it/sdo_figures.rs. */
     for (uint32_t at = 0; at < LENGTH; at++)
         data[at] = (uint8_t)(at * 0x9E3779B1u >> 13);
     can_net_t *net = can_net_create();

@@ -51,3 +51,12 @@ fn control_effort_is_what_the_position_loop_asks_for() {
     bench.run_ms(20);
     assert_eq!((bench.read(0x6061, 0), bench.read(0x60FA, 0)), (3, 0), "no position is controlled");
 }
+
+/// CiA 402-2, 67FEh: the version of the profile, which a host can only read.
+#[test]
+fn the_version_of_the_profile_is_read_and_not_written() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(0x67FE, 0), 4 << 16, "4.0");
+    assert_eq!(bench.write(0x67FE, 0, 0), Err(AbortCode::READ_ONLY));
+    assert_eq!(bench.read(0x67FE, 0), 4 << 16);
+}
