@@ -49,6 +49,7 @@ pub(crate) struct Context {
 }
 
 /// What puts back what a command has written.
+#[derive(Clone)]
 pub(crate) enum Restorer {
     /// Of a case of the conformance suite.
     Conform(conform::Restorer),
@@ -62,7 +63,8 @@ impl Restorer {
     /// Something may be left to put back.
     fn has_written(&self) -> bool {
         match self {
-            Self::Conform(_) | Self::Capture(_) => true,
+            Self::Conform(_) => true,
+            Self::Capture(restorer) => !restorer.is_done(),
             Self::Captures(ways_back) => !ways_back.is_empty(),
         }
     }
@@ -225,12 +227,15 @@ impl Context {
 
     /// Puts back what the command has written, if it has; what could not be.
     pub(crate) async fn restore(&self) -> Option<Vec<String>> {
-        let restorer = self.restorer.take().filter(Restorer::has_written)?;
-        Some(match restorer {
+        let restorer = self.restorer.borrow().clone().filter(Restorer::has_written)?;
+        let left = match restorer {
             Restorer::Conform(restorer) => restorer.restore().await,
             Restorer::Capture(restorer) => restorer.restore().await,
             Restorer::Captures(ways_back) => ways_back.restore().await,
-        })
+        };
+        // Not before: what a signal interrupts is begun anew.
+        self.restorer.take();
+        Some(left)
     }
 
     /// What stands behind the shafts of all drives of the machine file.

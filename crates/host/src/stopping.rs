@@ -60,7 +60,7 @@ async fn see_at_rest(drive: &Drive) -> Result<(), Failure> {
             None => before.zip(state.position).is_some_and(|(before, at)| before.0.abs_diff(at.0) <= 1),
         };
         looks = if stands { looks + 1 } else { 0 };
-        if network.now() - began > REST {
+        if looks < LOOKS && network.now() - began > REST {
             let still = match state.velocity {
                 Some(Rpm(rpm)) => NotAtRest::StillTurns { node, rpm, limit: REST },
                 None => NotAtRest::NotSeen { node },

@@ -24,7 +24,7 @@ use crate::command::{CaptureCommand, CaptureOrder};
 use crate::network::params::journal::default_path;
 use crate::network::report::{self, Made, NodeReport};
 use crate::parameters::transactions::Refusal;
-use crate::parameters::{answer, busy, refuse};
+use crate::parameters::{STORING, answer, busy, refuse};
 use crate::state::Host;
 use crate::work::{Asked, Done};
 
@@ -82,6 +82,10 @@ impl Host {
         }
         if self.parameters.is_writing(node) {
             return Err(busy("its parameters are being written"));
+        }
+        // Some answer before they have stored, and would keep the TPDOs of the capture.
+        if self.running.get(&node).is_some_and(|running| running.what == STORING) {
+            return Err(busy("it is storing its parameters"));
         }
         let span = span_of(&order)?;
         let mut wanted = Wanted {
@@ -200,6 +204,14 @@ fn check_size(order: &CaptureOrder, wanted: &Wanted, span: &Span) -> Result<(), 
     let count = order.quantities.len();
     if count > MOST_QUANTITIES {
         return Err(("usage", format!("expected at most {MOST_QUANTITIES} quantities, got {count}")));
+    }
+    // Whether it is to end is looked for once a period.
+    if wanted.period > span.duration {
+        let text = format!(
+            "expected a time between two readings of at most the length, {:?}, got {:?}",
+            span.duration, wanted.period
+        );
+        return Err(("usage", text));
     }
     let rows = (span.duration + span.pre_trigger).as_nanos() / wanted.period.as_nanos();
     let readings = rows * count as u128;

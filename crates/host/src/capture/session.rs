@@ -425,6 +425,10 @@ impl Running {
                 looked_at -= before - self.rows.len();
             }
         };
+        if begun.is_none() {
+            // What was kept for a trigger that has not come belongs to no capture.
+            self.rows = Rows::new(self.quantities.len(), self.period);
+        }
         Ok(self.capture(span, begun, cut_off))
     }
 

@@ -29,13 +29,15 @@ impl WaysBack {
 
     /// Puts everything back; what could not be, in words.
     pub async fn restore(&self) -> Vec<String> {
-        let restorers = std::mem::take(&mut *self.lock());
+        // They are in the list until they are done: this may be given up on the way, and is begun anew then.
+        let restorers = self.lock().clone();
         let mut left = Vec::new();
         // The newest first: it may have been begun on what an older one changed.
         for restorer in restorers.into_iter().rev() {
             let node = restorer.id();
             left.extend(restorer.restore().await.iter().map(|left| format!("node {node}: not put back: {left}")));
         }
+        self.lock().retain(|restorer| !restorer.is_done());
         left
     }
 }

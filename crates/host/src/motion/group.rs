@@ -115,6 +115,12 @@ impl Host {
         if self.group.is_some() {
             return Err(("busy", "another group is moving, and there is one at a time: stop it first".into()));
         }
+        // It ends with SYNC, its TPDOs and the node's NMT state as they were: a group that began meanwhile would lose them on the way.
+        if let Some(node) = self.captures.keys().next() {
+            let text =
+                format!("node {node} is being captured: end the capture first, or begin it once the group moves");
+            return Err(("busy", text));
+        }
         if nodes.len() < 2 || nodes.len() > MOST_AXES {
             return Err(("malformed", format!("expected 2 to {MOST_AXES} drives, got {}", nodes.len())));
         }

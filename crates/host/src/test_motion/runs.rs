@@ -253,7 +253,13 @@ pub async fn run(
         Some(most_turns) => Some(Travel::around(drive, most_turns).await?),
         None => None,
     };
-    restorer.begin_motion(matches!(motion, Motion::Points { .. }));
+    // What is refused is refused before the way back has a motion to end: it would stop what others move.
+    drive.check_unclaimed("test motion")?;
+    let is_points = matches!(motion, Motion::Points { .. });
+    if is_points {
+        AxisSetup::best_mode(drive)?;
+    }
+    restorer.begin_motion(is_points);
     let mut mover = match motion {
         Motion::Steps { speed, ramp, hold } => Mover::Steps(*speed, *ramp, *hold),
         Motion::Points { points, limits, period, cyclic } => {

@@ -154,6 +154,45 @@ fn a_capture_is_ended_by_hand_and_nothing_else_writes_to_the_node_meanwhile() {
 }
 
 #[test]
+fn what_was_kept_for_a_trigger_that_did_not_come_is_no_capture() {
+    play(async |stage| {
+        let before = stage.tpdo().await;
+        let mut page = stage.page().await;
+        page.must(SessionCommand::TakeControl {}).await;
+        let mut wanted = order(&["velocity"], 300.0, Some("velocity > 500"));
+        wanted.pre_ms = 100.0;
+        let waiting = page.begin(captured(wanted));
+        stage.is_capturing().await;
+        stage.sleep(500).await;
+        page.must(NodeCommand::Capture(CaptureCommand::EndCapture {}).to(WHEEL)).await;
+        let answer = waiting.await.expect("it is answered").json();
+        assert!(answer.contains("ended before anything was captured"), "{answer}");
+        assert_eq!(stage.tpdo().await, before);
+    });
+}
+
+/// A capture ends with SYNC, TPDOs and the NMT state as they were before it, and a group needs its own.
+#[test]
+fn a_group_does_not_begin_beside_a_capture_nor_a_capture_while_the_drive_stores() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(SessionCommand::TakeControl {}).await;
+        let waiting = page.begin(captured(order(&["velocity"], 60_000.0, None)));
+        stage.is_capturing().await;
+        let (kind, text) = page.refused(super::group::move_to(90.0, 90.0)).await;
+        assert_eq!(kind, "busy");
+        assert!(text.contains("node 4 is being captured: end the capture first"), "{text}");
+        page.must(NodeCommand::Capture(CaptureCommand::EndCapture {}).to(WHEEL)).await;
+        waiting.await.expect("it is answered");
+        // What it says then is of the drives themselves.
+        assert_eq!(page.refused(super::group::move_to(90.0, 90.0)).await.0, "unguarded");
+        let stored = page.begin(NodeCommand::Change(ParameterChange::Store {}).to(WHEEL));
+        assert_eq!(page.refused(captured(order(&["velocity"], 100.0, None))).await.0, "busy");
+        stored.await.expect("it is answered");
+    });
+}
+
+#[test]
 fn an_order_that_cannot_be_carried_out_is_refused_with_what_is_possible_and_changes_nothing() {
     play(async |stage| {
         let before = stage.tpdo().await;
@@ -167,6 +206,7 @@ fn an_order_that_cannot_be_carried_out_is_refused_with_what_is_possible_and_chan
         for (wanted, kind, says) in [
             (of(|order| order.period_ms = f64::NAN), "usage", "expected a time between two readings from 50µs"),
             (of(|order| order.duration_ms = -1.0), "usage", "expected a length of the capture from 1ms"),
+            (of(|order| order.period_ms = 200.0), "usage", "at most the length, 100ms, got 200ms"),
             (of(|order| order.pre_ms = 1e300), "usage", "expected a time before the trigger"),
             (of(|order| order.trigger = Some("velocity".into())), "usage", "as in: velocity > 10"),
             (of(|order| order.trigger = Some("current > 1".into())), "usage", "name one of: velocity_rpm"),

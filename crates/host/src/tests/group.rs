@@ -12,7 +12,7 @@ use super::{ARM, Page, STOPPED_WITHIN, Stage, TICK, WHEEL, move_by, node, play, 
 use crate::answer::Answer;
 use crate::command::{AxisSpeed, AxisTarget, BaseJog, Command, GroupCommand, GroupMove, NodeCommand, SessionCommand};
 
-fn move_to(wheel: f64, arm: f64) -> Command {
+pub(super) fn move_to(wheel: f64, arm: f64) -> Command {
     let axes = vec![AxisTarget { node: WHEEL, degrees: wheel }, AxisTarget { node: ARM, degrees: arm }];
     GroupCommand::GroupMove(GroupMove { axes, relative: false, rpm: None, rpm_per_s: None, within_s: None }).into()
 }

@@ -20,6 +20,7 @@ use words::failure::{Failure, both};
 use super::bench::{Bounds, Excursion, StepResponse};
 use super::found::Found;
 use super::setup::Setup;
+use crate::stopping::bring_to_rest;
 
 /// Speeds at which friction is measured, as shares of the highest.
 const STEADY_SHARES: [f64; 4] = [0.4, -0.4, 1.0, -1.0];
@@ -214,7 +215,8 @@ impl Reader {
             let unseen = Failure::new(NotAtRest::NotSeen { node }.to_string()).of_kind("not_stopped").at_node(node);
             unseen.next(format!("ferrodrive estop, and ferrodrive explain {node}")).after(error.into())
         });
-        let off = self.drive.disable().await.map_err(Failure::from);
+        // A load may turn a shaft without power: it is looked at once more.
+        let off = bring_to_rest(&self.drive).await;
         let stood = both(off, stood);
         if !self.is_guarded {
             return stood;

@@ -9,13 +9,14 @@ use std::time::Duration;
 use ::tune::Objective;
 use can::{Bitrate, Instant};
 use canopen::NodeId;
+use cia402::PowerState;
 use devices::HostWatch;
 use host::capture::{Measurand, Restorer, Wanted};
 use host::test_motion::{Motion, Run, Shape, points, run};
 use host::tune::{Bounds, Request, loops_of, tune};
 use master::cyclic::CyclicOptions;
 use master::drive::SwitchedOff;
-use master::group::AxisLimits;
+use master::group::{AxisLimits, AxisSetup, Group};
 use master::units::{Ramp, Rpm};
 use master::{Drive, Network};
 use sim::machine::{Order, order};
@@ -110,18 +111,22 @@ impl Bench {
     }
 }
 
-fn motion(steps: bool) -> Motion {
-    if steps {
-        let ramp = Some(Ramp::Time(Duration::from_millis(300)));
-        return Motion::Steps { speed: Rpm(60.0), ramp, hold: Duration::from_secs(20) };
-    }
-    let limits = AxisLimits {
+fn limits() -> AxisLimits {
+    AxisLimits {
         range_turns: None,
         velocity_turns_s: 1.0,
         acceleration_turns_s2: 4.0,
         jerk_turns_s3: 40.0,
         following_error_turns: 0.5,
-    };
+    }
+}
+
+fn motion(steps: bool) -> Motion {
+    if steps {
+        let ramp = Some(Ramp::Time(Duration::from_millis(300)));
+        return Motion::Steps { speed: Rpm(60.0), ramp, hold: Duration::from_secs(20) };
+    }
+    let limits = limits();
     let shape = Shape::Ramp { velocity_turns_s: 0.9, hold_s: 20.0 };
     let points = points(&shape, &limits, PERIOD.as_secs_f64()).unwrap();
     Motion::Points { points, limits, period: PERIOD, cyclic: CyclicOptions::default() }
@@ -129,6 +134,15 @@ fn motion(steps: bool) -> Motion {
 
 async fn moved(drive: &Drive, motion: &Motion, travel: Option<f64>, runs: &mut Vec<Run>) -> Result<(), Failure> {
     drive.guard(SwitchedOff::SwitchOn).await?;
+    moved_with(&Restorer::of(drive), (drive, motion), travel, runs).await
+}
+
+async fn moved_with(
+    restorer: &Restorer,
+    (drive, motion): (&Drive, &Motion),
+    travel: Option<f64>,
+    runs: &mut Vec<Run>,
+) -> Result<(), Failure> {
     let quantities = vec![Measurand::named(drive, None, "velocity").await?];
     let wanted = Wanted {
         quantities,
@@ -140,7 +154,7 @@ async fn moved(drive: &Drive, motion: &Motion, travel: Option<f64>, runs: &mut V
         journal: None,
         on_kept: |_| (),
     };
-    run((drive, motion), (&wanted, &Restorer::of(drive)), (1, travel), runs, |_| ()).await
+    run((drive, motion), (&wanted, restorer), (1, travel), runs, |_| ()).await
 }
 
 /// Looks at what a future does beside the world: once.
@@ -240,6 +254,30 @@ fn stood_after(name: &str, what: Moved, end: End) -> Option<Duration> {
     bench.world.run_for(Duration::from_secs(5));
     assert!(bench.fastest() < 1.0, "{said}: turns again at {} r/min", bench.fastest());
     stood
+}
+
+#[test]
+fn a_test_motion_of_a_drive_that_a_group_moves_is_refused_and_stops_nothing() {
+    let mut bench = Bench::new("zlac8030l");
+    let drive = bench.drive.clone();
+    bench.run(async {
+        let mode = AxisSetup::best_mode(&drive).unwrap();
+        let axis = AxisSetup { drive: drive.clone(), mode, limits: limits() };
+        let mut group = Group::open(&[axis], PERIOD, CyclicOptions::default()).await.unwrap();
+        group.enable().await.unwrap();
+        for is_steps in [true, false] {
+            let restorer = Restorer::of(&drive);
+            let (motion, mut runs) = (motion(is_steps), Vec::new());
+            let refused = group.beside(moved_with(&restorer, (&drive, &motion), None, &mut runs)).await.unwrap_err();
+            assert_eq!(refused.kind, "in_cycles", "{refused}");
+            // What ends the program has nothing to stop for it.
+            assert!(restorer.is_done() && runs.is_empty());
+            assert_eq!(group.beside(restorer.restore()).await, Vec::<String>::new());
+        }
+        let state = group.beside(drive.state()).await.unwrap();
+        assert_eq!(state.power, Some(PowerState::OperationEnabled));
+        group.close().await.unwrap();
+    });
 }
 
 #[test]

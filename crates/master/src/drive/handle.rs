@@ -233,7 +233,10 @@ impl Drive {
     }
 
     /// An error if a group or a base of this program moves the axis: its next cycle would take back what is written here.
-    pub(super) fn check_unclaimed(&self, intent: &'static str) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// [`Error::InCycles`], with what was intended.
+    pub fn check_unclaimed(&self, intent: &'static str) -> Result<(), Error> {
         let node = self.node.id();
         match self.node.network().is_claimed(node, self.place(CONTROLWORD)) {
             true => Err(Error::InCycles { node, intent }),

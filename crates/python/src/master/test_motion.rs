@@ -137,7 +137,10 @@ pub(crate) fn test_motion(
         wanted.check(&motion.span())?;
         let (restorer, mut runs) = (way_back.of(&drive), Vec::new());
         let is_points = matches!(motion, Motion::Points { .. });
-        restorer.begin_motion(is_points);
+        drive.check_unclaimed("test motion").map_err(Failure::from)?;
+        if !is_points {
+            restorer.begin_motion(false);
+        }
         let moved = async {
             // Points have a guard of their own. That of steps ends with the way back.
             if !is_points && drive.node().network().guarded(asked.node).is_none() {
