@@ -43,7 +43,7 @@ type LedRow = (&'static str, &'static str, &'static str, fn(&Led) -> Value);
 const SAID: [LedRow; 3] = [
     ("ready", "", "the master has set the drive up and hears it", |it| Value::Boolean(it.ready)),
     ("follows", "", "the drive has power and follows its target", |it| Value::Boolean(it.follows)),
-    ("refusal", "", "why it does not; empty while it follows or is not to", |it| Value::String(it.refusal.clone())),
+    ("refusal", "", "why it does not; empty while it follows or is not to", |it| Value::String(it.refusal.to_string())),
 ];
 const POSITION: LedRow =
     ("actual_position", "rad", "position by the drive's TPDO, at its output", |it| Value::Float64(it.position_rad));

@@ -1,5 +1,6 @@
 //! The master of a drive: sets it up, and gives it its target in each cycle, while it may.
 
+use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -38,10 +39,35 @@ pub(super) struct Wishes {
 pub(super) struct Led {
     pub(super) ready: bool,
     pub(super) follows: bool,
-    pub(super) refusal: String,
+    pub(super) refusal: Why,
     pub(super) position_rad: f64,
     pub(super) velocity_rad_s: f64,
     pub(super) current_a: f64,
+}
+
+/// Why the drive does not follow. It becomes a text when the variable is read, not in each cycle.
+#[derive(Clone, Debug, Default)]
+pub(super) enum Why {
+    /// It follows, or is not to.
+    #[default]
+    Nothing,
+    /// It could not be set up, or lost its cycle.
+    Failed(String),
+    /// The demand of this cycle was refused.
+    Refused(Refusal),
+    /// It was stopped.
+    Locked,
+}
+
+impl fmt::Display for Why {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Nothing => Ok(()),
+            Self::Failed(what) => f.write_str(what),
+            Self::Refused(refusal) => refusal.fmt(f),
+            Self::Locked => f.write_str("it was stopped: it moves again when enable has been false"),
+        }
+    }
 }
 
 /// The mode in which a model follows such targets, a new one each cycle; `None` if it has none.
@@ -83,7 +109,7 @@ pub(super) async fn lead(drive: Drive, kind: TargetKind, period: Duration, share
             }
         };
         let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
-        shared.led = Led { refusal: failure.unwrap_or_default(), ..Led::default() };
+        shared.led = Led { refusal: failure.map_or(Why::Nothing, Why::Failed), ..Led::default() };
     }
 }
 
@@ -178,11 +204,9 @@ impl Led {
     fn take(&mut self, state: &CyclicState, gate: &Gate, wishes: &Wishes) {
         (self.ready, self.follows) = (state.statusword.is_some(), state.follows);
         self.refusal = match state.refused {
-            Some(refusal) => refusal.to_string(),
-            None if wishes.enable && gate.is_locked => {
-                "it was stopped: it moves again when enable has been false".to_owned()
-            }
-            None => String::new(),
+            Some(refusal) => Why::Refused(refusal),
+            None if wishes.enable && gate.is_locked => Why::Locked,
+            None => Why::Nothing,
         };
         if let Some(Turns(turns)) = state.position {
             self.position_rad = turns * std::f64::consts::TAU;
