@@ -101,7 +101,7 @@ unsafe fn text<'a>(pointer: *const c_char) -> Option<&'a str> {
 
 #[cfg(test)]
 mod tests {
-    use std::ptr::null_mut;
+    use std::ptr::{null, null_mut};
     use std::sync::Mutex;
 
     use super::*;
@@ -164,7 +164,34 @@ mod tests {
         let mut handle = null_mut();
         bus(&mut handle, Some(report));
         assert_eq!(call(handle, |_| panic!("a test's own")), FATAL);
+        // To free it does not fail.
+        life::fmi2FreeInstance(handle);
         assert_eq!(*REPORTED.lock().unwrap(), [(FATAL, DEFECT.to_owned())]);
+    }
+
+    /// FMI 3.0, 2.2.4: fmi3Error is of a call that was not carried out; not of one that was by half.
+    #[test]
+    fn of_several_values_all_are_taken_or_none() {
+        let mut handle = null_mut();
+        bus(&mut handle, None);
+        assert_eq!(life::fmi3EnterInitializationMode(handle, 0, 0.0, 0.0, 0, 0.0), OK);
+        assert_eq!(life::fmi3ExitInitializationMode(handle), OK);
+        let (data, sizes, mut size, mut read) = ([0x55; 4], [4, 4], [9], [null()]);
+        // Tx_Data is an output, and Rx_Data is not a clock.
+        let (references, values) = ([1001, 1003], [data.as_ptr(), data.as_ptr()]);
+        // SAFETY: two references, sizes and values; one of each to be read; one place for a clock.
+        unsafe {
+            assert_eq!(
+                values::fmi3SetBinary(handle, references.as_ptr(), 2, sizes.as_ptr(), values.as_ptr(), 2),
+                ERROR
+            );
+            assert_eq!(values::fmi3GetBinary(handle, &1001, 1, size.as_mut_ptr(), read.as_mut_ptr(), 1), OK);
+            assert_eq!(size, [0]);
+            let mut ticks = [9];
+            assert_eq!(values::fmi3SetClock(handle, [1002, 1001].as_ptr(), 2, [1, 1].as_ptr()), ERROR);
+            assert_eq!(values::fmi3GetClock(handle, &1002, 1, ticks.as_mut_ptr()), OK);
+            assert_eq!(ticks, [0]);
+        }
         life::fmi3FreeInstance(handle);
     }
 

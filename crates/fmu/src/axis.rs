@@ -31,10 +31,6 @@ const LED: Reference = 400;
 
 /// The shortest and the longest period of SYNC, s.
 const PERIODS_S: std::ops::RangeInclusive<f64> = 0.000_5..=1.0;
-/// How long a drive may take to come to rest after the end.
-const LAST_STOP: Duration = Duration::from_secs(3);
-/// How often it is asked then whether it stands.
-const LAST_LOOKS: Duration = Duration::from_millis(10);
 
 /// The row of what the master says: name, unit, what it is, and where it is.
 type LedRow = (&'static str, &'static str, &'static str, fn(&Led) -> Value);
@@ -71,7 +67,6 @@ pub struct AxisUnit {
 /// Drive and master on their bus.
 struct Live {
     world: World,
-    network: Network,
     task: Task<Pin<Box<dyn Future<Output = ()> + Send>>>,
 }
 
@@ -161,16 +156,29 @@ impl AxisUnit {
         })
     }
 
+    /// Whether [`set`](Self::set) would take it.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check(&self, reference: Reference, value: &Value) -> Result<(), String> {
+        match value {
+            Value::Float64(period_s) if reference == SYNC_PERIOD && !PERIODS_S.contains(period_s) => {
+                let (least, most) = (PERIODS_S.start(), PERIODS_S.end());
+                Err(format!("a period of SYNC is {least} s to {most} s, not {period_s} s"))
+            }
+            _ => self.surroundings.check((reference, value)),
+        }
+    }
+
     /// Writes a parameter or an input. Of the master's it acts from the next SYNC on, of the drive's surroundings from now on.
     ///
     /// # Errors
     /// What the drive does not take, a period that cannot be.
     pub fn set(&mut self, reference: Reference, value: &Value) -> Result<(), String> {
         match (reference, value) {
-            (SYNC_PERIOD, Value::Float64(period_s)) if PERIODS_S.contains(period_s) => self.period_s = *period_s,
             (SYNC_PERIOD, Value::Float64(period_s)) => {
-                let (least, most) = (PERIODS_S.start(), PERIODS_S.end());
-                return Err(format!("a period of SYNC is {least} s to {most} s, not {period_s} s"));
+                self.check(reference, value)?;
+                self.period_s = *period_s;
             }
             (ENABLE, Value::Boolean(enable)) => self.shared().wishes.enable = *enable,
             (STOP, Value::Boolean(stop)) => self.shared().wishes.stop = *stop,
@@ -213,7 +221,7 @@ impl AxisUnit {
         let drive = Drive::new(network.node(self.spec.node), self.spec.description());
         let period = Duration::from_secs_f64(self.period_s);
         let task = Task::new(Box::pin(lead(drive, self.kind, period, Arc::clone(&self.shared))) as Pin<Box<_>>);
-        self.live = Some(Live { world, network, task });
+        self.live = Some(Live { world, task });
         self.looked_at = None;
         Ok(())
     }
@@ -224,19 +232,6 @@ impl AxisUnit {
         if let Some(live) = &mut self.live {
             live.run_until(to);
         }
-    }
-
-    /// The end: a drive that moves is brought to rest as when `enable` becomes false, in time that the importer does not see. What can
-    /// be read stays as it was.
-    pub fn end(&mut self) {
-        self.seen();
-        self.shared().wishes.enable = false;
-        let Some(mut live) = self.live.take() else { return };
-        let limit = live.world.now() + LAST_STOP;
-        while !live.network.moved().is_empty() && live.world.now() < limit {
-            live.run_until(live.world.now() + LAST_LOOKS);
-        }
-        self.live = Some(live);
     }
 
     /// Looks at it now. True if that changed when something next happens.

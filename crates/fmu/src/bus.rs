@@ -114,17 +114,28 @@ impl BusUnit {
         })
     }
 
+    /// Whether [`set`](Self::set) would take it.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check(reference: Reference, value: &Value) -> Result<(), String> {
+        match (reference, value) {
+            (CORRUPTED, Value::Float64(share)) if !(0.0..=1.0).contains(share) => {
+                Err(format!("corrupted is a probability, from 0 to 1, not {share}"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Writes a parameter.
     ///
     /// # Errors
     /// A probability that is none.
     pub fn set(&mut self, reference: Reference, value: &Value) -> Result<(), String> {
+        Self::check(reference, value)?;
         match (reference, value) {
             (SEED, Value::UInt64(seed)) => self.seed = *seed,
-            (CORRUPTED, Value::Float64(share)) if (0.0..=1.0).contains(share) => self.corrupted = *share,
-            (CORRUPTED, Value::Float64(share)) => {
-                return Err(format!("corrupted is a probability, from 0 to 1, not {share}"));
-            }
+            (CORRUPTED, Value::Float64(share)) => self.corrupted = *share,
             _ => {}
         }
         Ok(())

@@ -101,6 +101,14 @@ impl DriveUnit {
         }
     }
 
+    /// Whether [`set`](Self::set) would take it.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check(&self, reference: Reference, value: &Value) -> Result<(), String> {
+        self.surroundings.check((reference, value))
+    }
+
     /// Writes a parameter or an input; an input acts from the present instant on.
     ///
     /// # Errors

@@ -15,6 +15,7 @@ use crate::variable::{Causality, Reference, Terminal, Value, Variable};
 const NANOS: f64 = 1e9;
 /// A century, in seconds: nanoseconds since the begin fit 64 bits far beyond it.
 const LATEST_S: f64 = 3.2e9;
+const LATEST_NS: u64 = (LATEST_S * NANOS) as u64;
 
 /// The state of an instance (FMI 3.0, 2.3 and 4.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -123,9 +124,17 @@ impl Instance {
     /// # Errors
     /// That a file of the resources has gone.
     pub fn reset(&mut self) -> Called<()> {
-        let anew = Self::of(self.config.clone(), &self.resources, self.has_event_mode);
-        *self = anew.map_err(|error| CallError(error.to_string()))?;
+        *self = self.anew()?;
         Ok(())
+    }
+
+    /// One like this before anything was done to it.
+    ///
+    /// # Errors
+    /// As of [`reset`](Self::reset).
+    pub(crate) fn anew(&self) -> Called<Self> {
+        let anew = Self::of(self.config.clone(), &self.resources, self.has_event_mode);
+        anew.map_err(|error| CallError(error.to_string()))
     }
 
     /// Initialization begins at `start_s`.
@@ -183,17 +192,8 @@ impl Instance {
     /// The wrong mode.
     pub fn terminate(&mut self) -> Called<()> {
         self.expect(&[Mode::Event, Mode::Step], "Terminate")?;
-        self.end()?;
         self.rest.mode = Mode::Terminated;
         Ok(())
-    }
-
-    /// What the unit moves is brought to rest: the instance is not used any more.
-    ///
-    /// # Errors
-    /// Never.
-    pub fn end(&mut self) -> Called<()> {
-        self.act(Action::End).map(drop)
     }
 
     /// One round of an event: takes in what was set, does what is due. True if clocks have ticked anew.
@@ -279,27 +279,51 @@ impl Instance {
         })
     }
 
+    /// Whether [`set`](Self::set) would take a value; nothing changes.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check(&self, reference: Reference, value: &Value) -> Called<()> {
+        self.may_set(reference, value)?;
+        self.journal.unit.check(reference, value).map_err(|error| self.named(reference, error))
+    }
+
     /// Writes a variable.
     ///
     /// # Errors
     /// No variable has this reference, it has another type, it cannot be set now, or the drive refuses the value.
     pub fn set(&mut self, reference: Reference, value: Value) -> Called<()> {
-        if let Some((place, _, is_rx)) = self.data(reference) {
-            let Value::Binary(bytes) = value else { return refused(format!("variable {reference} is a binary")) };
-            if !is_rx {
-                return refused(format!("variable {reference} is an output"));
+        self.may_set(reference, &value)?;
+        if let Some((place, ..)) = self.data(reference) {
+            if let Value::Binary(bytes) = value {
+                self.rest.ports[place].received = Some(bytes);
             }
-            if self.rest.mode == Mode::Terminated {
-                return refused(format!("variable {reference} cannot be set: the simulation is over"));
-            }
-            self.rest.ports[place].received = Some(bytes);
             return Ok(());
         }
-        let variable = self.variables.iter().find(|variable| variable.reference == reference);
-        let variable = variable.ok_or_else(|| unknown(reference))?;
-        let name = variable.name.clone();
+        // What changes nothing is not written down, so that a state does not grow with each call.
+        if self.journal.unit.get(reference).as_ref() == Some(&value) {
+            return Ok(());
+        }
+        let done = self.journal.act(Action::Set(reference, value));
+        done.map(drop).map_err(|error| self.named(reference, error))
+    }
+
+    /// The variable, if it may be set to such a value now; `None` for what comes in from a network.
+    fn may_set(&self, reference: Reference, value: &Value) -> Called<Option<&Variable>> {
+        if let Some((_, _, is_rx)) = self.data(reference) {
+            return match (value, is_rx) {
+                (Value::Binary(_), true) if self.rest.mode == Mode::Terminated => {
+                    refused(format!("variable {reference} cannot be set: the simulation is over"))
+                }
+                (Value::Binary(_), true) => Ok(None),
+                (Value::Binary(_), false) => refused(format!("variable {reference} is an output")),
+                _ => refused(format!("variable {reference} is a binary")),
+            };
+        }
+        let variable = self.variable(reference).ok_or_else(|| unknown(reference))?;
+        let name = &variable.name;
         if value.type_name() != variable.value.type_name() {
-            let [wanted, given] = [&variable.value, &value].map(|value| self.type_name(value));
+            let [wanted, given] = [&variable.value, value].map(|value| self.type_name(value));
             return refused(format!("{name} is a {wanted}, not a {given}"));
         }
         let before = matches!(self.rest.mode, Mode::Instantiated | Mode::Initialization);
@@ -318,12 +342,19 @@ impl Instance {
         if self.rest.mode == Mode::Terminated {
             return refused(format!("{name} cannot be set: the simulation is over"));
         }
-        // What changes nothing is not written down, so that a state does not grow with each call.
-        if self.journal.unit.get(reference).as_ref() == Some(&value) {
-            return Ok(());
-        }
-        self.act(Action::Set(reference, value)).map_err(|error| CallError(format!("{name}: {error}")))?;
-        Ok(())
+        Ok(Some(variable))
+    }
+
+    /// Why a unit does not take a value, with the name of the variable.
+    fn named(&self, reference: Reference, error: String) -> CallError {
+        CallError(match self.variable(reference) {
+            Some(variable) => format!("{}: {error}", variable.name),
+            None => error,
+        })
+    }
+
+    fn variable(&self, reference: Reference) -> Option<&Variable> {
+        self.variables.iter().find(|variable| variable.reference == reference)
     }
 
     /// Whether a clock has ticked.
@@ -345,19 +376,25 @@ impl Instance {
     /// # Errors
     /// It is not a clock, or not one that the importer decides.
     pub fn set_clock(&mut self, reference: Reference, ticks: bool) -> Called<()> {
+        match self.may_tick(reference)? {
+            Some(place) if ticks => self.tick(place),
+            // What is received says by itself when it came.
+            _ => Ok(()),
+        }
+    }
+
+    /// The network whose clock the importer may have tick; `None` for a clock of what it receives.
+    ///
+    /// # Errors
+    /// As of [`set_clock`](Self::set_clock).
+    pub(crate) fn may_tick(&self, reference: Reference) -> Called<Option<usize>> {
         self.expect(&[Mode::Event, Mode::Initialization], "SetClock")?;
         self.clock(reference)?;
-        let Some(place) = self.terminals.iter().position(|terminal| terminal.tx_clock == reference) else {
-            // What is received says by itself when it came.
-            return Ok(());
-        };
-        if self.config.clock() == TxClock::Triggered {
+        let place = self.terminals.iter().position(|terminal| terminal.tx_clock == reference);
+        if place.is_some() && self.config.clock() == TxClock::Triggered {
             return refused(format!("clock {reference} is an output: it ticks by itself"));
         }
-        if ticks {
-            self.tick(place)?;
-        }
-        Ok(())
+        Ok(place)
     }
 
     /// When the countdown of a clock ends.
@@ -378,16 +415,58 @@ impl Instance {
         self.rest.clone()
     }
 
-    /// Takes the rest of a state.
+    /// Does once more what was done to another instance, to one to which nothing was done, and takes the rest of its state. All of
+    /// it is looked at before the first is done.
     ///
     /// # Errors
-    /// It has other networks than this instance, or times that cannot be.
-    pub(crate) fn put(&mut self, rest: Rest) -> Called<()> {
+    /// What cannot have been done to it, or does not belong to what was.
+    pub(crate) fn replay(&mut self, actions: Vec<Action>, rest: Rest) -> Called<()> {
+        let now_ns = self.follow(&actions)?;
+        let has_begun = self.rest.mode == Mode::Step;
+        if has_begun == matches!(rest.mode, Mode::Instantiated | Mode::Initialization) {
+            let not = if has_begun { "" } else { "not " };
+            return refused(format!("it is in the mode {:?}, and its time has {not}begun", rest.mode));
+        }
+        if rest.now_ns != now_ns {
+            return refused(format!("it stands at {} ns; what was done ends at {now_ns} ns", rest.now_ns));
+        }
         if rest.ports.len() != self.terminals.len() || !rest.start_s.is_finite() {
             return refused("its networks or its start time are not possible");
         }
-        self.rest = rest;
+        for action in &actions {
+            self.journal.unit.act(action).map_err(|error| match action {
+                Action::Set(reference, _) => self.named(*reference, error),
+                _ => CallError(error),
+            })?;
+        }
+        (self.journal.actions, self.rest) = (actions, rest);
         Ok(())
+    }
+
+    /// Whether these actions can have been done to an instance, one after the other; the time at which they end, in ns.
+    fn follow(&mut self, actions: &[Action]) -> Called<u64> {
+        let mut now_ns = 0;
+        for action in actions {
+            let has_begun = self.rest.mode == Mode::Step;
+            match action {
+                Action::Set(reference, value) => {
+                    if self.may_set(*reference, value)?.is_none() {
+                        return refused(format!("variable {reference} is not set by itself"));
+                    }
+                }
+                Action::Begin if has_begun => return refused("its time begins twice"),
+                Action::Begin => self.rest.mode = Mode::Step,
+                Action::Receive(..) | Action::Serve | Action::Advance(_) if !has_begun => {
+                    return refused("time passes before it begins");
+                }
+                Action::Advance(to_ns) if !(now_ns..LATEST_NS).contains(to_ns) => {
+                    return refused(format!("its time goes from {now_ns} ns to {to_ns} ns"));
+                }
+                Action::Advance(to_ns) => now_ns = *to_ns,
+                Action::Receive(..) | Action::Serve | Action::Look | Action::Take(_) => {}
+            }
+        }
+        Ok(now_ns)
     }
 
     const fn is_of_fmi2(&self) -> bool {

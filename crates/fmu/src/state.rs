@@ -48,7 +48,7 @@ impl SavedState {
     /// A state from bytes, for an FMU like `of`.
     ///
     /// # Errors
-    /// The bytes are torn, or of another FMU.
+    /// The bytes are torn, of another FMU, or of what cannot have been.
     pub fn from_bytes(bytes: &[u8], of: &Instance) -> Called<Self> {
         let error = |what: String| CallError(format!("not a state of this FMU: {what}"));
         let (sum, body) = bytes.split_at_checked(CHECK_SUM).ok_or_else(|| error("too few bytes".to_owned()))?;
@@ -59,20 +59,8 @@ impl SavedState {
         if written.token != of.token {
             return Err(error(format!("it is of {}; expected {}", written.token, of.token)));
         }
-        let mut instance = of.clone();
-        instance.reset()?;
-        let mut latest_ns = 0;
-        for action in &written.actions {
-            if let Action::Advance(to_ns) = action {
-                if *to_ns < latest_ns {
-                    return Err(error("its time goes back".to_owned()));
-                }
-                latest_ns = *to_ns;
-            }
-            instance.journal.unit.act(action).map_err(error)?;
-        }
-        instance.journal.actions = written.actions;
-        instance.put(written.rest)?;
+        let mut instance = of.anew()?;
+        instance.replay(written.actions, written.rest).map_err(|refused| error(refused.to_string()))?;
         Ok(Self(Box::new(instance)))
     }
 }

@@ -1,5 +1,7 @@
 //! What surrounds a drive and what can be measured at it: the variables that each FMU of a drive has.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use can::Instant;
 use sim::{Brake, Report, VirtualDrive};
 
@@ -59,13 +61,16 @@ pub(crate) struct Surroundings {
     supply_v: Option<f64>,
     pub(crate) supply_on: bool,
     inputs: Vec<bool>,
+    /// A drive like it, which is never switched on: it is asked what such a drive takes.
+    asked: Arc<Mutex<Box<dyn VirtualDrive>>>,
 }
 
 impl Surroundings {
     /// Those of a drive that nothing was done to.
     pub(crate) fn of(drive: &dyn VirtualDrive) -> Self {
         let inputs = vec![false; drive.inputs().len()];
-        Self { seed: 1, load_torque_nm: 0.0, supply_v: None, supply_on: true, inputs }
+        let asked = Arc::new(Mutex::new(drive.clone_box()));
+        Self { seed: 1, load_torque_nm: 0.0, supply_v: None, supply_on: true, inputs, asked }
     }
 
     /// The variables of a drive that shows `report` now.
@@ -103,6 +108,20 @@ impl Surroundings {
             INPUTS..OUTPUTS => Value::Boolean(*self.inputs.get((reference - INPUTS) as usize)?),
             _ => return None,
         })
+    }
+
+    /// Whether [`set`](Self::set) would take it.
+    ///
+    /// # Errors
+    /// What the drive does not take.
+    pub(crate) fn check(&self, variable: (Reference, &Value)) -> Result<(), String> {
+        let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
+        let taken = match variable {
+            (LOAD_TORQUE, Value::Float64(torque_nm)) => asked.set_load_torque(*torque_nm, Instant::ZERO),
+            (SUPPLY, Value::Float64(volt)) => asked.set_supply(*volt, Instant::ZERO),
+            _ => Ok(()),
+        };
+        taken.map_err(|refused| refused.to_string())
     }
 
     /// Writes a parameter or an input, which acts from `now` on. `is_on` is whether the drive's power follows its switch.

@@ -32,8 +32,6 @@ pub enum Action {
     Take(usize),
     /// Lets time pass up to so many nanoseconds after the begin.
     Advance(u64),
-    /// The simulation ends.
-    End,
 }
 
 /// A drive or a bus.
@@ -95,6 +93,18 @@ impl Unit {
         }
     }
 
+    /// Whether [`Action::Set`] of this value would be taken now; nothing changes.
+    ///
+    /// # Errors
+    /// As of the action.
+    pub fn check(&self, reference: Reference, value: &Value) -> Result<(), String> {
+        match self {
+            Self::Drive(drive) => drive.check(reference, value),
+            Self::Bus(_) => BusUnit::check(reference, value),
+            Self::Axis(axis) => axis.check(reference, value),
+        }
+    }
+
     /// Does an action. Operations that are taken come back.
     ///
     /// # Errors
@@ -114,7 +124,6 @@ impl Unit {
             (Self::Axis(axis), Action::Look) => {
                 axis.look();
             }
-            (Self::Axis(axis), Action::End) => axis.end(),
             // It has no network.
             (Self::Axis(_), Action::Serve | Action::Receive(..) | Action::Take(_)) => {}
             (Self::Drive(drive), Action::Begin) => drive.begin(),
@@ -135,8 +144,6 @@ impl Unit {
             }
             // A bus does all that is due when time passes.
             (Self::Bus(_), Action::Serve | Action::Look) => {}
-            // What they do is others' to end.
-            (Self::Drive(_) | Self::Bus(_), Action::End) => {}
         }
         Ok(Vec::new())
     }

@@ -4,9 +4,9 @@ use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::Path;
 
 use super::held::{self, Log};
-use super::status::{ERROR, Logger, Status};
+use super::status::{Logger, Status};
 use super::values::{read, write};
-use super::{call, carry_out, slice, slice_mut, text, wrong};
+use super::{call, slice, slice_mut, text, wrong};
 use crate::config::Config;
 use crate::fmi2::{Kind, folder, from_integer, integer, real};
 use crate::instance::Mode;
@@ -14,8 +14,8 @@ use crate::variable::Value;
 
 /// `fmi2CoSimulation` of `fmi2Type`.
 const CO_SIMULATION: c_int = 1;
-/// By this much a sum of steps may be beyond the end, s.
-const ROUNDED_S: f64 = 1e-9;
+/// By this share of a step it may end beyond the stop time, which importers reach by adding up steps with their rounding.
+const ROUNDED: f64 = 0.01;
 
 /// `fmi2CallbackFunctions`: memory and the end of steps are this library's own.
 #[repr(C)]
@@ -87,16 +87,6 @@ pub unsafe extern "C" fn fmi2Instantiate(
     })
 }
 
-/// `fmi2FreeInstance`: what it moves is brought to rest before.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2FreeInstance(handle: *mut c_void) {
-    if !handle.is_null() {
-        // An instance that has panicked has nothing to bring to rest.
-        let _ = call(handle, |held| held.instance.end());
-        held::remove(handle);
-    }
-}
-
 /// `fmi2SetupExperiment`.
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi2SetupExperiment(
@@ -115,8 +105,11 @@ pub extern "C" fn fmi2SetupExperiment(
                 held.instance.mode()
             ));
         }
-        if !start_time.is_finite() || stop.is_some_and(|stop| stop.is_nan() || stop < start_time) {
-            return wrong(format!("an experiment from {start_time} s to {stop_time} s is not possible"));
+        if !start_time.is_finite() {
+            return wrong(format!("the start time is {start_time} s; expected a number of seconds"));
+        }
+        if let Some(stop) = stop.filter(|stop| stop.is_nan() || *stop < start_time) {
+            return wrong(format!("the stop time is {stop} s; expected the start time of {start_time} s or later"));
         }
         held.span_s = (start_time, stop);
         Ok(())
@@ -129,33 +122,11 @@ pub extern "C" fn fmi2EnterInitializationMode(handle: *mut c_void) -> Status {
     call(handle, |held| held.instance.enter_initialization(held.span_s.0))
 }
 
-/// `fmi2ExitInitializationMode`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2ExitInitializationMode(handle: *mut c_void) -> Status {
-    call(handle, |held| held.instance.exit_initialization())
-}
-
-/// `fmi2Terminate`: what the drive moves is brought to rest.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2Terminate(handle: *mut c_void) -> Status {
-    call(handle, |held| held.instance.terminate())
-}
-
-/// `fmi2Reset`: also after a panic.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2Reset(handle: *mut c_void) -> Status {
-    carry_out(handle, |held| {
-        held.instance.reset().map_err(|error| (ERROR, error.to_string()))?;
-        (held.is_broken, held.span_s) = (false, (0.0, None));
-        Ok(())
-    })
-}
-
 /// `fmi2DoStep`: always the whole step.
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi2DoStep(handle: *mut c_void, from: f64, step: f64, _no_set_state_prior: c_int) -> Status {
     call(handle, |held| {
-        if let Some(stop) = held.span_s.1.filter(|stop| from + step > stop + ROUNDED_S) {
+        if let Some(stop) = held.span_s.1.filter(|stop| from + step > stop + ROUNDED * step) {
             return wrong(format!("a step from {from} s by {step} s is beyond the stop time of {stop} s"));
         }
         held.instance.step(from, step).map(drop)
@@ -244,9 +215,11 @@ pub extern "C" fn fmi2SetString(h: *mut c_void, _vr: *const u32, nvr: usize, _va
 #[cfg(test)]
 mod tests {
     use std::ptr::{null, null_mut};
+    use std::sync::Mutex;
 
+    use super::super::life::{fmi2ExitInitializationMode, fmi2FreeInstance, fmi2Reset, fmi2Terminate};
     use super::super::states;
-    use super::super::status::{FATAL, OK};
+    use super::super::status::{ERROR, FATAL, OK};
     use super::*;
     use crate::config::{AxisConfig, DriveConfig, FILE, TargetKind, TxClock};
 
@@ -295,7 +268,7 @@ mod tests {
     }
 
     /// One call with arguments of no sense, but for memory, which is the importer's word.
-    fn any_call(handle: *mut c_void, state: &mut *mut c_void, mut random: impl FnMut(u32) -> u32) -> Status {
+    fn any_call(handle: *mut c_void, mut random: impl FnMut(u32) -> u32) -> Status {
         let references = [random(30), 200 + random(20), 400 + random(8), random(u32::MAX)].map(|it| it % 1_000);
         let reals = [0.0, 1.0, -3.0, f64::NAN, f64::INFINITY, 1e300, 1e-3, -1e-3];
         let real = reals[random(8) as usize];
@@ -304,7 +277,7 @@ mod tests {
         let (vr, n) = (if random(10) == 0 { null() } else { references.as_ptr() }, count);
         // SAFETY: arrays of four values, of which as many are meant or fewer, or null.
         unsafe {
-            match random(20) {
+            match random(18) {
                 0 => fmi2GetReal(handle, vr, n, read.as_mut_ptr()),
                 1 => fmi2SetReal(handle, vr, n, read.as_ptr()),
                 2 => fmi2GetInteger(handle, vr, n, whole.as_mut_ptr()),
@@ -319,12 +292,8 @@ mod tests {
                 10 => fmi2EnterInitializationMode(handle),
                 11 => fmi2ExitInitializationMode(handle),
                 12 if random(20) == 0 => fmi2Reset(handle),
-                13 if random(20) == 0 => states::fmi2GetFMUstate(handle, state),
-                14 => states::fmi2SetFMUstate(handle, random(100) as *mut c_void),
-                15 => states::fmi2SerializeFMUstate(handle, *state, null_mut(), random(9) as usize),
-                16 => states::fmi2DeSerializeFMUstate(handle, whole.as_ptr().cast(), 16, state),
-                17 => fmi2GetReal(handle, vr, n, null_mut()),
-                18 => super::super::unsupported::fmi2CancelStep(handle),
+                13 => fmi2GetReal(handle, vr, n, null_mut()),
+                14 => super::super::unsupported::fmi2CancelStep(handle),
                 // A step that makes sense where time stands.
                 _ => {
                     let mut now = [0.0];
@@ -337,18 +306,81 @@ mod tests {
         }
     }
 
+    /// What an importer has of states: two that it may hold, one that was freed, and bytes.
+    struct States {
+        held: [*mut c_void; 2],
+        freed: *mut c_void,
+        bytes: Vec<u8>,
+    }
+
+    /// One call of a function of states, which of them, and how it ends: a state that is held, was freed or never was, bytes as they
+    /// were written or with one changed, room for all of them or too little.
+    fn any_call_of_states(handle: *mut c_void, it: &mut States, mut random: impl FnMut(u32) -> u32) -> (usize, Status) {
+        let place = random(2) as usize;
+        let state = [it.held[place], it.held[place], it.freed, random(u32::MAX) as *mut c_void][random(4) as usize];
+        let call = random(6) as usize;
+        // SAFETY: places for a pointer and a size, and as much room as is meant.
+        let status = unsafe {
+            match call {
+                0 => states::fmi2GetFMUstate(handle, &raw mut it.held[place]),
+                1 => states::fmi2SetFMUstate(handle, state),
+                2 => {
+                    it.freed = it.held[place];
+                    states::fmi2FreeFMUstate(handle, &raw mut it.held[place])
+                }
+                3 => states::fmi2SerializedFMUstateSize(handle, state, &mut 0),
+                4 => {
+                    let mut size = 0;
+                    states::fmi2SerializedFMUstateSize(handle, state, &raw mut size);
+                    let mut room = vec![0; size.saturating_sub(random(2) as usize)];
+                    let status = states::fmi2SerializeFMUstate(handle, state, room.as_mut_ptr(), room.len());
+                    if status == OK {
+                        it.bytes = room;
+                    }
+                    status
+                }
+                _ => {
+                    let mut bytes = it.bytes.clone();
+                    if random(2) == 0 && bytes.len() > 4 {
+                        let changed = 4 + random(bytes.len() as u32 - 4) as usize;
+                        bytes[changed] ^= 1 << random(8);
+                        // As the writer of other bytes would: what they mean decides.
+                        let sum = crc32fast::hash(&bytes[4..]).to_le_bytes();
+                        bytes[..4].copy_from_slice(&sum);
+                    }
+                    states::fmi2FreeFMUstate(handle, &raw mut it.held[place]);
+                    states::fmi2DeSerializeFMUstate(handle, bytes.as_ptr(), bytes.len(), &raw mut it.held[place])
+                }
+            }
+        };
+        (call, status)
+    }
+
     #[test]
     fn ten_thousand_calls_of_no_sense_are_taken_or_end_with_an_error() {
         let (_resources, uri, guid) = resources("calls");
         let handle = instantiate(CO_SIMULATION, &guid, &uri);
         let mut random = sim::Prng::new(1);
-        let (mut state, mut seen) = (null_mut(), [0; 5]);
+        let mut states = States { held: [null_mut(); 2], freed: null_mut(), bytes: Vec::new() };
+        let (mut seen, mut seen_of_states) = ([0; 5], [[0; 5]; 6]);
+        let mut below = |below| (random.next_u64() % u64::from(below)) as u32;
         for _ in 0..10_000 {
-            let status = any_call(handle, &mut state, |below| (random.next_u64() % u64::from(below)) as u32);
+            let status = if below(20) == 0 {
+                let (call, status) = any_call_of_states(handle, &mut states, &mut below);
+                seen_of_states[call][status as usize] += 1;
+                status
+            } else {
+                any_call(handle, &mut below)
+            };
             assert!(matches!(status, OK | ERROR), "{status}");
             seen[status as usize] += 1;
         }
         assert!(seen[OK as usize] > 1_000 && seen[ERROR as usize] > 1_000 && seen[FATAL as usize] == 0, "{seen:?}");
+        // Each function of states has done its work; but to get and to free one, which ask for nothing, each has refused as well.
+        let all = seen_of_states.iter().enumerate();
+        let both =
+            |(call, it): (usize, &[u32; 5])| it[OK as usize] > 5 && (it[ERROR as usize] > 5 || matches!(call, 0 | 2));
+        assert!(all.into_iter().all(both), "{seen_of_states:?}");
         // It is as good as new.
         assert_eq!((fmi2Reset(handle), fmi2EnterInitializationMode(handle)), (OK, OK));
         assert_eq!((fmi2ExitInitializationMode(handle), fmi2DoStep(handle, 0.0, 1e-3, 0)), (OK, OK));
@@ -364,6 +396,72 @@ mod tests {
         assert_eq!((fmi2EnterInitializationMode(handle), fmi2ExitInitializationMode(handle)), (OK, OK));
         let steps = [5.0, 5.001, 5.002].map(|from| fmi2DoStep(handle, from, 1e-3, 0));
         assert_eq!(steps, [OK, OK, ERROR]);
+        fmi2FreeInstance(handle);
+    }
+
+    /// The importer adds up a million steps of 1 ms, and is 0.19 µs late; here the last two are taken.
+    #[test]
+    fn the_last_of_a_million_steps_is_taken() {
+        let (_resources, uri, guid) = resources("sum");
+        let handle = instantiate(CO_SIMULATION, &guid, &uri);
+        let before_last_s = (1..1_000_000).fold(2_000.0, |time_s, _| time_s + 1e-3);
+        assert!(before_last_s + 1e-3 > 3_000.0 + 1e-7);
+        assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, before_last_s - 1e-3, 1, 3_000.0), OK);
+        assert_eq!((fmi2EnterInitializationMode(handle), fmi2ExitInitializationMode(handle)), (OK, OK));
+        assert_eq!(fmi2DoStep(handle, before_last_s - 1e-3, 1e-3, 0), OK);
+        assert_eq!(fmi2DoStep(handle, before_last_s, 1e-3, 0), OK);
+        assert_eq!(fmi2DoStep(handle, before_last_s + 1e-3, 1e-3, 0), ERROR);
+        fmi2FreeInstance(handle);
+    }
+
+    /// FMI 2.0.5, 2.1.3: fmi2Error is of a call that was not carried out; not of one that was by half.
+    #[test]
+    fn of_several_values_all_are_taken_or_none() {
+        let (_resources, uri, guid) = resources("several");
+        let handle = instantiate(CO_SIMULATION, &guid, &uri);
+        assert_eq!((fmi2EnterInitializationMode(handle), fmi2ExitInitializationMode(handle)), (OK, OK));
+        let read = || {
+            let mut values = [f64::NAN; 3];
+            // SAFETY: three references, three places.
+            unsafe { assert_eq!(fmi2GetReal(handle, [10, 11, 23].as_ptr(), 3, values.as_mut_ptr()), OK) };
+            values
+        };
+        let before = read();
+        // Not a number, a torque and a voltage beyond what the model takes, an output, a Boolean, a parameter, none.
+        for (reference, value) in [(23, f64::NAN), (10, 1e9), (11, 1e9), (200, 1.0), (20, 1.0), (7, 0.01), (99, 0.0)] {
+            let (references, values) = ([10, 11, 23, reference], [1.0, 40.0, 2.0, value]);
+            // SAFETY: four references, four values.
+            let status = unsafe { fmi2SetReal(handle, references.as_ptr(), 4, values.as_ptr()) };
+            assert_eq!((status, read()), (ERROR, before), "{reference}");
+        }
+        // SAFETY: three references, three values.
+        unsafe { assert_eq!(fmi2SetReal(handle, [10, 11, 23].as_ptr(), 3, [1.0, 40.0, 2.0].as_ptr()), OK) };
+        assert_eq!(read(), [1.0, 40.0, 2.0]);
+        fmi2FreeInstance(handle);
+    }
+
+    #[test]
+    fn an_experiment_that_is_not_possible_says_what_is() {
+        static SAID: Mutex<Vec<String>> = Mutex::new(Vec::new());
+        unsafe extern "C" fn log(_: *mut c_void, _: Status, _: *const c_char, message: *const c_char) {
+            // SAFETY: a text of the caller's.
+            SAID.lock().unwrap().push(unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned());
+        }
+        let (_resources, uri, _) = resources("experiment");
+        let folder = folder(uri.to_str().unwrap()).unwrap();
+        let instance = crate::instance::Instance::new(folder.as_ref(), false).unwrap();
+        let handle = held::add(held::Held::new(instance, Log::new(null_mut(), Some(log))));
+        assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, f64::NAN, 0, 0.0), ERROR);
+        assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, 5.0, 1, 4.0), ERROR);
+        assert_eq!(fmi2EnterInitializationMode(handle), OK);
+        assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, 0.0, 0, 0.0), ERROR);
+        let said = std::mem::take(&mut *SAID.lock().unwrap());
+        let expected = [
+            "the start time is NaN s; expected a number of seconds",
+            "the stop time is 4 s; expected the start time of 5 s or later",
+            "fmi2SetupExperiment in the mode Initialization; expected [Instantiated]",
+        ];
+        assert_eq!(said, expected);
         fmi2FreeInstance(handle);
     }
 }

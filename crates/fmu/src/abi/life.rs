@@ -8,6 +8,42 @@ use super::status::{ERROR, LogMessage, Status};
 use super::{call, carry_out, put, text};
 use crate::config::Config;
 
+/// The functions that are the same in both versions, by their names there.
+macro_rules! life {
+    ($exit_initialization:ident, $terminate:ident, $reset:ident, $free:ident) => {
+        #[doc = concat!("`", stringify!($exit_initialization), "`.")]
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $exit_initialization(handle: *mut c_void) -> Status {
+            call(handle, |held| held.instance.exit_initialization())
+        }
+
+        #[doc = concat!("`", stringify!($terminate), "`.")]
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $terminate(handle: *mut c_void) -> Status {
+            call(handle, |held| held.instance.terminate())
+        }
+
+        #[doc = concat!("`", stringify!($reset), "`: also after a panic.")]
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $reset(handle: *mut c_void) -> Status {
+            carry_out(handle, |held| {
+                held.instance.reset().map_err(|error| (ERROR, error.to_string()))?;
+                (held.is_broken, held.span_s) = (false, (0.0, None));
+                Ok(())
+            })
+        }
+
+        #[doc = concat!("`", stringify!($free), "`.")]
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $free(handle: *mut c_void) {
+            held::remove(handle);
+        }
+    };
+}
+
+life!(fmi2ExitInitializationMode, fmi2Terminate, fmi2Reset, fmi2FreeInstance);
+life!(fmi3ExitInitializationMode, fmi3Terminate, fmi3Reset, fmi3FreeInstance);
+
 /// `fmi3GetVersion`: `3.0`.
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi3GetVersion() -> *const c_char {
@@ -54,12 +90,6 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
     })
 }
 
-/// `fmi3FreeInstance`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi3FreeInstance(handle: *mut c_void) {
-    held::remove(handle);
-}
-
 /// `fmi3EnterInitializationMode`.
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi3EnterInitializationMode(
@@ -73,12 +103,6 @@ pub extern "C" fn fmi3EnterInitializationMode(
     call(handle, |held| held.instance.enter_initialization(start_time))
 }
 
-/// `fmi3ExitInitializationMode`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi3ExitInitializationMode(handle: *mut c_void) -> Status {
-    call(handle, |held| held.instance.exit_initialization())
-}
-
 /// `fmi3EnterEventMode`.
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi3EnterEventMode(handle: *mut c_void) -> Status {
@@ -89,22 +113,6 @@ pub extern "C" fn fmi3EnterEventMode(handle: *mut c_void) -> Status {
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi3EnterStepMode(handle: *mut c_void) -> Status {
     call(handle, |held| held.instance.enter_step())
-}
-
-/// `fmi3Terminate`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi3Terminate(handle: *mut c_void) -> Status {
-    call(handle, |held| held.instance.terminate())
-}
-
-/// `fmi3Reset`: also after a panic.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi3Reset(handle: *mut c_void) -> Status {
-    carry_out(handle, |held| {
-        held.instance.reset().map_err(|error| (ERROR, error.to_string()))?;
-        held.is_broken = false;
-        Ok(())
-    })
 }
 
 /// `fmi3EvaluateDiscreteStates`: outputs change with `fmi3UpdateDiscreteStates` alone.

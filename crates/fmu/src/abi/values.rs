@@ -38,7 +38,7 @@ pub(super) unsafe fn read<T>(
     })
 }
 
-/// Writes variables of one type.
+/// Writes variables of one type: all of them or, if one is refused, none.
 pub(super) unsafe fn write<T: Copy>(
     handle: *mut c_void,
     references: (*const u32, usize),
@@ -49,7 +49,11 @@ pub(super) unsafe fn write<T: Copy>(
         check_counts(references.1, values.1)?;
         // SAFETY: arrays of these counts by the importer's word.
         let (references, values) = unsafe { (slice(references.0, references.1)?, slice(values.0, values.1)?) };
-        references.iter().zip(values).try_for_each(|(reference, value)| held.instance.set(*reference, give(*value)?))
+        let pairs = references.iter().zip(values);
+        if references.len() > 1 {
+            pairs.clone().try_for_each(|(reference, value)| held.instance.check(*reference, &give(*value)?))?;
+        }
+        pairs.clone().try_for_each(|(reference, value)| held.instance.set(*reference, give(*value)?))
     })
 }
 
@@ -186,12 +190,14 @@ pub unsafe extern "C" fn fmi3SetBinary(
         let references = unsafe { slice(references, count)? };
         // SAFETY: as above.
         let (sizes, values) = unsafe { (slice(sizes, value_count)?, slice(values, value_count)?) };
-        for ((reference, size), value) in references.iter().zip(sizes).zip(values) {
+        let given = references.iter().zip(sizes.iter().zip(values)).map(|(reference, (size, value))| {
             // SAFETY: as many bytes by the importer's word.
-            let bytes = unsafe { slice(*value, *size)? };
-            held.instance.set(*reference, Value::Binary(bytes.to_vec()))?;
-        }
-        Ok(())
+            let value = Value::Binary(unsafe { slice(*value, *size)? }.to_vec());
+            held.instance.check(*reference, &value)?;
+            Ok((*reference, value))
+        });
+        let given = given.collect::<Called<Vec<_>>>()?;
+        given.into_iter().try_for_each(|(reference, value)| held.instance.set(reference, value))
     })
 }
 
@@ -219,10 +225,9 @@ pub unsafe extern "C" fn fmi3SetClock(
     call(h, |held| {
         // SAFETY: arrays of this count by the importer's word.
         let (references, values) = unsafe { (slice(references, count)?, slice(values, count)?) };
-        references
-            .iter()
-            .zip(values)
-            .try_for_each(|(reference, ticks)| held.instance.set_clock(*reference, *ticks != 0))
+        references.iter().try_for_each(|reference| held.instance.may_tick(*reference).map(drop))?;
+        let mut pairs = references.iter().zip(values);
+        pairs.try_for_each(|(reference, ticks)| held.instance.set_clock(*reference, *ticks != 0))
     })
 }
 

@@ -264,21 +264,14 @@ fn a_drive_that_was_without_supply_waits_for_enable() {
     assert!((wheel.real("velocity") - 2.0 * PI).abs() < 0.1, "{}", wheel.real("velocity"));
 }
 
-/// The importer's time stands at the end, and what can be read; behind it the drive is at rest without a command that moves it.
+/// The importer's time stands at the end, and with it all that can be read: also of a drive that moves.
 #[test]
-fn the_end_brings_it_to_rest() {
+fn the_end_changes_nothing_that_can_be_read() {
     let mut wheel = turning(1_500);
     let before = wheel.all();
     wheel.instance.terminate().unwrap();
     assert_eq!(wheel.instance.mode(), Mode::Terminated);
-    let after: Vec<_> = wheel.all();
-    let variables = wheel.instance.variables().to_vec();
-    let measured = variables.iter().zip(before.iter().zip(&after)).filter(|(it, _)| it.causality == Causality::Output);
-    for (variable, (before, after)) in measured.filter(|(it, _)| it.reference < 400) {
-        assert_eq!(before, after, "{}", variable.name);
-    }
-    assert!(!wheel.is("follows"), "the master has switched it off");
-    assert!(wheel.real("actual_velocity").abs() < 0.3, "{}", wheel.real("actual_velocity"));
+    assert_eq!(wheel.all(), before);
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! A state that is taken back, as a value and as bytes, goes on as if nothing had happened.
 
 use ferrodrive_fmu::config::TxClock;
-use ferrodrive_fmu::instance::{Instance, Interval};
+use ferrodrive_fmu::instance::{Instance, Interval, Mode};
 use ferrodrive_fmu::operation::Operation;
 use ferrodrive_fmu::state::SavedState;
+use ferrodrive_fmu::unit::Action;
 use ferrodrive_fmu::variable::Value;
 
 use crate::importer::{binary, bus, drive, instance};
@@ -83,6 +84,57 @@ fn bytes_that_are_torn_or_of_another_fmu_are_refused() {
     let bus = instance(bus(2, TxClock::Triggered));
     let refusal = SavedState::from_bytes(&bytes, &bus).err().unwrap().to_string();
     assert!(refusal.contains("it is of ferrodrive-"), "{refusal}");
+}
+
+/// What is written of a state: token, actions, and ports, mode, start and time.
+type Written = (String, Vec<Action>, (Vec<(Option<Vec<u8>>, Vec<u8>, bool)>, Mode, f64, u64));
+
+/// What is changed of it.
+type Change<'a> = &'a dyn Fn(&mut Written);
+
+/// The bytes of a state in which something was changed, with the right check sum.
+fn forged(bytes: &[u8], change: impl FnOnce(&mut Written)) -> Vec<u8> {
+    let mut written: Written = rmp_serde::from_slice(&bytes[4..]).unwrap();
+    change(&mut written);
+    let body = rmp_serde::to_vec(&written).unwrap();
+    [crc32fast::hash(&body).to_le_bytes().as_slice(), &body].concat()
+}
+
+/// Also with the right check sum: what cannot have been done to an instance is refused, and says what.
+#[test]
+fn bytes_of_what_cannot_have_been_are_refused() {
+    let (drive, _) = turning();
+    let bytes = SavedState::of(&drive).bytes();
+    let refusal = |change: Change<'_>| {
+        let refused = SavedState::from_bytes(&forged(&bytes, change), &drive).err();
+        refused.map(|error| error.to_string()).unwrap_or_default()
+    };
+    assert_eq!(refusal(&|_| ()), "");
+    let set = |reference, value: Value| move |it: &mut Written| it.1.push(Action::Set(reference, value.clone()));
+    let nan = Value::Float64(f64::NAN);
+    let cases: [(Change<'_>, &str); 14] = [
+        (&|it| it.1.push(Action::Begin), "its time begins twice"),
+        (&|it| it.1.retain(|action| *action != Action::Begin), "time passes before it begins"),
+        (&|it| it.1.insert(0, Action::Serve), "time passes before it begins"),
+        (&|it| it.1.push(Action::Advance(1)), "its time goes from 625000000 ns to 1 ns"),
+        (&|it| it.1.push(Action::Advance(u64::MAX)), "its time goes from 625000000 ns to 18446744073709551615 ns"),
+        (&|it| it.2.3 += 1, "it stands at 625000001 ns; what was done ends at 625000000 ns"),
+        (&|it| it.2.1 = Mode::Initialization, "in the mode Initialization"),
+        (&|it| it.2.2 = f64::NAN, "start time"),
+        (&|it| it.2.0.clear(), "networks"),
+        (&set(10, nan), "load_torque cannot be NaN"),
+        (&set(10, Value::Float64(1e9)), "load_torque: "),
+        (&set(10, Value::UInt64(1)), "load_torque is a Float64, not a UInt64"),
+        (&set(6, Value::UInt64(4)), "seed is a parameter"),
+        (&set(2, Value::Binary(Vec::new())), "variable 2 is not set by itself"),
+    ];
+    for (change, expected) in cases {
+        let refusal = refusal(change);
+        assert!(
+            refusal.starts_with("not a state of this FMU: ") && refusal.contains(expected),
+            "{expected}: {refusal}"
+        );
+    }
 }
 
 #[test]
