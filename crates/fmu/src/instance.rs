@@ -72,7 +72,6 @@ pub(crate) struct Rest {
 }
 
 /// An instance.
-#[derive(Clone)]
 pub struct Instance {
     pub(crate) config: Config,
     resources: PathBuf,
@@ -135,6 +134,23 @@ impl Instance {
     pub(crate) fn anew(&self) -> Called<Self> {
         let anew = Self::of(self.config.clone(), &self.resources, self.has_event_mode);
         anew.map_err(|error| CallError(error.to_string()))
+    }
+
+    /// One that goes on as this one.
+    ///
+    /// # Errors
+    /// Of a drive with its master: more was done to it than is kept.
+    pub fn copy(&self) -> Called<Self> {
+        Ok(Self {
+            config: self.config.clone(),
+            resources: self.resources.clone(),
+            token: self.token.clone(),
+            journal: self.journal.copy()?,
+            variables: self.variables.clone(),
+            terminals: self.terminals.clone(),
+            has_event_mode: self.has_event_mode,
+            rest: self.rest.clone(),
+        })
     }
 
     /// Initialization begins at `start_s`.
@@ -433,13 +449,11 @@ impl Instance {
         if rest.ports.len() != self.terminals.len() || !rest.start_s.is_finite() {
             return refused("its networks or its start time are not possible");
         }
-        for action in &actions {
-            self.journal.unit.act(action).map_err(|error| match action {
-                Action::Set(reference, _) => self.named(*reference, error),
-                _ => CallError(error),
-            })?;
-        }
-        (self.journal.actions, self.rest) = (actions, rest);
+        self.journal.replay(actions).map_err(|(action, error)| match action {
+            Action::Set(reference, _) => self.named(reference, error),
+            _ => CallError(error),
+        })?;
+        self.rest = rest;
         Ok(())
     }
 

@@ -7,8 +7,7 @@ use crate::instance::Instance;
 use crate::unit::Action;
 
 /// A state, to be taken back by an instance of the same FMU.
-#[derive(Clone)]
-pub struct SavedState(pub(crate) Box<Instance>);
+pub struct SavedState(Box<Instance>);
 
 /// What a state is as bytes: of what FMU, and what was done to it since its begin. Taking it back does all that again, a few
 /// milliseconds for each simulated second.
@@ -24,25 +23,38 @@ const CHECK_SUM: usize = 4;
 
 impl SavedState {
     /// The whole state of an instance.
-    pub fn of(instance: &Instance) -> Self {
-        Self(Box::new(instance.clone()))
+    ///
+    /// # Errors
+    /// Of a drive with its master: more was done to it than is kept.
+    pub fn of(instance: &Instance) -> Called<Self> {
+        Ok(Self(Box::new(instance.copy()?)))
     }
 
     /// Has an instance go on from it.
-    pub fn restore(&self, instance: &mut Instance) {
-        instance.clone_from(&self.0);
+    ///
+    /// # Errors
+    /// As of [`of`](Self::of).
+    pub fn restore(&self, instance: &mut Instance) -> Called<()> {
+        *instance = self.0.copy()?;
+        Ok(())
     }
 
     /// The state as bytes.
-    pub fn bytes(&self) -> Vec<u8> {
+    ///
+    /// # Errors
+    /// More was done to it than is kept.
+    pub fn bytes(&self) -> Called<Vec<u8>> {
         let instance = &self.0;
-        let written =
-            Written { token: instance.token.clone(), actions: instance.journal.actions.clone(), rest: instance.rest() };
+        let written = Written {
+            token: instance.token.clone(),
+            actions: instance.journal.actions()?.to_vec(),
+            rest: instance.rest(),
+        };
         // Numbers, texts and lists of them: they always have a form.
         let body = rmp_serde::to_vec(&written).unwrap_or_default();
         let mut bytes = crc32fast::hash(&body).to_le_bytes().to_vec();
         bytes.extend(body);
-        bytes
+        Ok(bytes)
     }
 
     /// A state from bytes, for an FMU like `of`.

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::ffi::{CStr, CString, c_void};
-use std::panic::UnwindSafe;
+use std::panic::{AssertUnwindSafe, UnwindSafe};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
@@ -43,12 +43,14 @@ enum Message {
     Fmi2(Logger, Arc<CStr>),
 }
 
-/// The instances, and the number of the next.
+/// The instances, and the number of the last.
 #[derive(Default)]
 struct Instances {
     last: usize,
-    held: HashMap<usize, Arc<Mutex<Held>>>,
+    held: ByNumber<Held>,
 }
+
+type ByNumber<T> = HashMap<usize, Arc<Mutex<T>>>;
 
 /// The number of the last state, of whatever instance: a state of another one is not mistaken for one's own.
 static LAST_STATE: AtomicUsize = AtomicUsize::new(0);
@@ -139,5 +141,40 @@ pub(super) fn instance(handle: *mut c_void) -> Option<Arc<Mutex<Held>>> {
 
 /// Frees an instance.
 pub(super) fn remove(handle: *mut c_void) {
-    INSTANCES.lock().unwrap_or_else(PoisonError::into_inner).held.remove(&(handle as usize));
+    free(&INSTANCES, |all| all.held.remove(&(handle as usize)));
+}
+
+/// Takes something out of what is locked, and drops it when the lock is free. A panic there has no call to end with `Fatal`, and must
+/// not leave a C function: it is written to the process's error output by the panic itself.
+fn free<T, U>(all: &Mutex<T>, take: impl FnOnce(&mut T) -> Option<U>) {
+    let taken = take(&mut all.lock().unwrap_or_else(PoisonError::into_inner));
+    let _ = std::panic::catch_unwind(AssertUnwindSafe(|| drop(taken)));
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+
+    static ALL: Mutex<Vec<Last>> = Mutex::new(Vec::new());
+    static WAS_FREE: AtomicBool = AtomicBool::new(false);
+
+    /// What an instance may do when it ends.
+    struct Last;
+
+    impl Drop for Last {
+        fn drop(&mut self) {
+            WAS_FREE.store(ALL.try_lock().is_ok(), Ordering::Relaxed);
+            panic!("a test's own");
+        }
+    }
+
+    #[test]
+    fn the_end_of_an_instance_holds_up_no_other_and_its_panic_ends_there() {
+        ALL.lock().unwrap().push(Last);
+        free(&ALL, Vec::pop);
+        assert!(WAS_FREE.load(Ordering::Relaxed));
+        assert!(ALL.lock().unwrap().is_empty());
+    }
 }

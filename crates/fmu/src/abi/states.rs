@@ -16,7 +16,7 @@ macro_rules! states {
                 // SAFETY: a place for a pointer by the importer's word.
                 let place = unsafe { slice_mut(state, 1)? };
                 held.states.remove(&(place[0] as usize));
-                let saved = SavedState::of(&held.instance);
+                let saved = SavedState::of(&held.instance)?;
                 place[0] = held.keep(saved) as *mut c_void;
                 Ok(())
             })
@@ -26,10 +26,7 @@ macro_rules! states {
         #[unsafe(no_mangle)]
         pub extern "C" fn $set(handle: *mut c_void, state: *mut c_void) -> Status {
             call(handle, |held| match held.states.get(&(state as usize)) {
-                Some(saved) => {
-                    saved.restore(&mut held.instance);
-                    Ok(())
-                }
+                Some(saved) => saved.restore(&mut held.instance),
                 None => wrong("no state of this instance"),
             })
         }
@@ -54,7 +51,7 @@ macro_rules! states {
             call(handle, |held| {
                 let Some(saved) = held.states.get(&(state as usize)) else { return wrong("no state of this instance") };
                 // SAFETY: a place for a result by the importer's word.
-                unsafe { put(size, saved.bytes().len()) };
+                unsafe { put(size, saved.bytes()?.len()) };
                 Ok(())
             })
         }
@@ -69,7 +66,7 @@ macro_rules! states {
         ) -> Status {
             call(handle, |held| {
                 let Some(saved) = held.states.get(&(state as usize)) else { return wrong("no state of this instance") };
-                let written = saved.bytes();
+                let written = saved.bytes()?;
                 if written.len() > size {
                     return wrong(format!("the state has {} bytes, and there is room for {size}", written.len()));
                 }

@@ -282,8 +282,8 @@ fn an_axis_goes_on_from_its_state_and_from_its_bytes() {
         wheel.enable(true);
         wheel.set("target_velocity", Value::Float64(3.0));
         wheel.run_to(begin);
-        let state = SavedState::of(&wheel.instance);
-        let bytes = state.bytes();
+        let state = SavedState::of(&wheel.instance).unwrap();
+        let bytes = state.bytes().unwrap();
         let onward = |wheel: &mut Stepped| {
             wheel.ms = begin;
             wheel.set("load_torque", Value::Float64(1.0));
@@ -293,7 +293,7 @@ fn an_axis_goes_on_from_its_state_and_from_its_bytes() {
         let expected = onward(&mut wheel);
         let mut other = Stepped::new("zlac8030l@4,timing=ideal", TargetKind::Velocity);
         for taken in [&state, &SavedState::from_bytes(&bytes, &other.instance).unwrap()] {
-            taken.restore(&mut other.instance);
+            taken.restore(&mut other.instance).unwrap();
             assert_eq!(onward(&mut other), expected);
         }
         assert!((wheel.real("velocity") - 3.0).abs() < 0.1, "{}", wheel.real("velocity"));

@@ -46,8 +46,8 @@ fn seen(drive: &mut Instance) -> Vec<Value> {
 #[test]
 fn a_drive_goes_on_from_its_state_and_from_its_bytes() {
     let (mut drive, mut step) = turning();
-    let state = SavedState::of(&drive);
-    let bytes = state.bytes();
+    let state = SavedState::of(&drive).unwrap();
+    let bytes = state.bytes().unwrap();
     let begin = step;
     drive.set(10, Value::Float64(1.5)).unwrap();
     run(&mut drive, &mut step, 600);
@@ -58,13 +58,13 @@ fn a_drive_goes_on_from_its_state_and_from_its_bytes() {
     let mut other = Instance::of(drive_config(), ".".as_ref(), false).unwrap();
     let read = SavedState::from_bytes(&bytes, &other).unwrap();
     for taken in [&state, &read] {
-        taken.restore(&mut other);
+        taken.restore(&mut other).unwrap();
         let mut step = begin;
         other.set(10, Value::Float64(1.5)).unwrap();
         run(&mut other, &mut step, 600);
         assert_eq!(seen(&mut other), expected);
     }
-    assert_eq!(read.bytes(), bytes);
+    assert_eq!(read.bytes().unwrap(), bytes);
 }
 
 fn drive_config() -> ferrodrive_fmu::config::Config {
@@ -74,7 +74,7 @@ fn drive_config() -> ferrodrive_fmu::config::Config {
 #[test]
 fn bytes_that_are_torn_or_of_another_fmu_are_refused() {
     let drive = instance(drive_config());
-    let bytes = SavedState::of(&drive).bytes();
+    let bytes = SavedState::of(&drive).unwrap().bytes().unwrap();
     for place in 0..bytes.len() {
         let mut torn = bytes.clone();
         torn[place] ^= 1;
@@ -104,7 +104,7 @@ fn forged(bytes: &[u8], change: impl FnOnce(&mut Written)) -> Vec<u8> {
 #[test]
 fn bytes_of_what_cannot_have_been_are_refused() {
     let (drive, _) = turning();
-    let bytes = SavedState::of(&drive).bytes();
+    let bytes = SavedState::of(&drive).unwrap().bytes().unwrap();
     let refusal = |change: Change<'_>| {
         let refused = SavedState::from_bytes(&forged(&bytes, change), &drive).err();
         refused.map(|error| error.to_string()).unwrap_or_default()
@@ -148,12 +148,12 @@ fn a_bus_goes_on_from_its_bytes() {
     bus.enter_step().unwrap();
     // In the middle of the frame, which begins when 11 recessive bits have passed.
     bus.step(0.0, 1e-4).unwrap();
-    let saved = SavedState::from_bytes(&SavedState::of(&bus).bytes(), &bus).unwrap();
+    let saved = SavedState::from_bytes(&SavedState::of(&bus).unwrap().bytes().unwrap(), &bus).unwrap();
     // It has gone on, so that a state that is not taken back is seen: time would not stand at its begin.
     for _ in 0..2 {
         bus.step(1e-4, 9e-4).unwrap();
         assert_eq!(bus.get(10).unwrap(), Value::UInt64(1));
-        saved.restore(&mut bus);
+        saved.restore(&mut bus).unwrap();
         assert_eq!(bus.get(10).unwrap(), Value::UInt64(0));
         assert_eq!(bus.get(0).unwrap(), Value::Float64(1e-4));
     }
@@ -197,10 +197,13 @@ fn a_drive_that_is_read_while_it_boots_goes_on_from_its_bytes() {
     booting(&mut first, 0..booted - 1, true);
     for until in booted - 1..booted + 3 {
         let mut other = begun();
-        SavedState::from_bytes(&SavedState::of(&first).bytes(), &other).unwrap().restore(&mut other);
+        SavedState::from_bytes(&SavedState::of(&first).unwrap().bytes().unwrap(), &other)
+            .unwrap()
+            .restore(&mut other)
+            .unwrap();
         assert_eq!(other.interval(3), first.interval(3), "{until}");
         let end = booted + 100;
-        let mut going = first.clone();
+        let mut going = first.copy().unwrap();
         assert_eq!(booting(&mut other, until..end, false), booting(&mut going, until..end, false), "{until}");
         assert_eq!(seen(&mut other), seen(&mut going), "{until}");
         booting(&mut first, until..until + 1, true);
@@ -211,17 +214,17 @@ fn a_drive_that_is_read_while_it_boots_goes_on_from_its_bytes() {
 #[test]
 fn a_state_does_not_grow_with_steps_and_with_inputs_that_stay() {
     let (mut drive, mut step) = turning();
-    let size = SavedState::of(&drive).bytes().len();
+    let size = SavedState::of(&drive).unwrap().bytes().unwrap().len();
     for _ in 0..2_000 {
         drive.set(10, Value::Float64(0.0)).unwrap();
         drive.set(100, Value::Boolean(false)).unwrap();
         run(&mut drive, &mut step, 1);
         drive.get(208).unwrap();
     }
-    let grown = SavedState::of(&drive).bytes();
+    let grown = SavedState::of(&drive).unwrap().bytes().unwrap();
     assert!(grown.len() < size + 500, "{size} bytes have become {}", grown.len());
     let mut other = instance(drive_config());
-    SavedState::from_bytes(&grown, &other).unwrap().restore(&mut other);
+    SavedState::from_bytes(&grown, &other).unwrap().restore(&mut other).unwrap();
     assert_eq!(seen(&mut other), seen(&mut drive));
     let mut begin = step;
     run(&mut drive, &mut step, 300);
@@ -243,7 +246,7 @@ fn a_step_of_no_time_takes_nothing_away() {
     // From deadline to deadline, until one has it say that it has booted.
     loop {
         drive.update().unwrap();
-        let mut ahead = drive.clone();
+        let mut ahead = drive.copy().unwrap();
         let Interval::In(nanos) = drive.interval(3).unwrap() else { panic!() };
         if nanos == 0 && !take(&mut ahead).is_empty() {
             break;
@@ -256,8 +259,11 @@ fn a_step_of_no_time_takes_nothing_away() {
     drive.enter_step().unwrap();
     drive.step(now_ns as f64 / 1e9, 0.0).unwrap();
     drive.enter_event().unwrap();
-    let mut other = drive.clone();
-    SavedState::from_bytes(&SavedState::of(&drive).bytes(), &drive).unwrap().restore(&mut other);
+    let mut other = drive.copy().unwrap();
+    SavedState::from_bytes(&SavedState::of(&drive).unwrap().bytes().unwrap(), &drive)
+        .unwrap()
+        .restore(&mut other)
+        .unwrap();
     let sent = take(&mut drive);
     assert!(!sent.is_empty());
     assert_eq!(take(&mut other), sent);
