@@ -45,21 +45,33 @@ def pack(bench, folder, *words):
     return str(path)
 
 
-class Instance:
+class Slave:
     """An instance by FMPy's own classes, its variables by their names."""
 
-    def __init__(self, path, folder, events=False, token=None):
+    def __init__(self, kind, path, folder, name, guid=None, **options):
         description = fmpy.read_model_description(path)
         self.reference = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.messages = []
-        self.fmu = FMU3Slave(
-            guid=token or description.instantiationToken,
+        self.fmu = kind(
+            guid=guid or description.guid,
             unzipDirectory=fmpy.extract(path, unzipdir=tempfile.mkdtemp(dir=folder)),
             modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="it",
+            instanceName=name,
         )
-        self.fmu.instantiate(eventModeUsed=events)
+        self.fmu.instantiate(**options)
         self.time = 0.0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.fmu.freeInstance()
+
+
+class Instance(Slave):
+    """By FMI 3.0."""
+
+    def __init__(self, path, folder, events=False, guid=None):
+        super().__init__(FMU3Slave, path, folder, "it", guid, eventModeUsed=events)
 
     def begin(self):
         self.fmu.enterInitializationMode(startTime=0.0)
@@ -78,18 +90,6 @@ class Instance:
     def sent(self):
         return self.fmu.getBinary([self.reference["CAN.Tx_Data"]])[0] or b""
 
-    def close(self):
-        self.fmu.freeInstance()
-
-
-@contextlib.contextmanager
-def opened(path, folder, **options):
-    instance = Instance(path, folder, **options)
-    try:
-        yield instance
-    finally:
-        instance.close()
-
 
 @check("FMPy finds nothing wrong with the FMUs of drives and buses", ZLAC8030L)
 def valid(bench):
@@ -100,7 +100,7 @@ def valid(bench):
 
 @check("FMPy turns a drive by SDO over its bus terminal, and loads it", ZLAC8030L)
 def turned(bench):
-    with tempfile.TemporaryDirectory() as folder, opened(pack(bench, folder, "zlac8030l@4"), folder) as drive:
+    with tempfile.TemporaryDirectory() as folder, Instance(pack(bench, folder, "zlac8030l@4"), folder) as drive:
         drive.begin()
         said = drive.sent()
         for _ in range(1600):
@@ -132,7 +132,7 @@ def turn(drive, steps):
 
 @check("a state that FMPy takes back, also from bytes, goes on alike", ZLAC8030L)
 def states(bench):
-    with tempfile.TemporaryDirectory() as folder, opened(pack(bench, folder, "zlac8030l@4"), folder) as drive:
+    with tempfile.TemporaryDirectory() as folder, Instance(pack(bench, folder, "zlac8030l@4"), folder) as drive:
         drive.begin()
         for _ in range(200):
             drive.step(1e-3)
@@ -161,8 +161,8 @@ def states(bench):
 def wrong(bench):
     with tempfile.TemporaryDirectory() as folder:
         path = pack(bench, folder, "zlac8030l@4")
-        refused(lambda: Instance(path, folder, token="of another"), "a wrong token")
-        with opened(path, folder) as drive:
+        refused(lambda: Instance(path, folder, guid="of another"), "a wrong token")
+        with Instance(path, folder) as drive:
             refused(lambda: drive.step(1e-3), "a step before initialization")
             drive.begin()
             drive.step(1e-3)
@@ -175,13 +175,13 @@ def wrong(bench):
 
 
 def refused(call, what):
-    """fmi3Error, or an instance that was not made, for which FMPy has a plain exception of this text."""
+    """fmi2Error or fmi3Error, or an instance that was not made, for which FMPy has a plain exception of one of these texts."""
     try:
         call()
     except FMICallException as error:
         equal(error.status, 3, f"status of {what}")
     except Exception as error:
-        equal((type(error), str(error)), (Exception, "Failed to instantiate FMU"), what)
+        equal((type(error), str(error)[:22]), (Exception, "Failed to instantiate "), what)
     else:
         raise AssertionError(f"{what} was taken")
 
@@ -258,7 +258,7 @@ def joined(bench):
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
         words = (["bus", "--nodes", "2"], ["zlac8030l@4,timing=ideal"], ["m4230e17b50@5,timing=ideal"])
         paths = [pack(bench, folder, *each) for each in words]
-        bus, *drives = [stack.enter_context(opened(path, folder, events=True)) for path in paths]
+        bus, *drives = [stack.enter_context(Instance(path, folder, events=True)) for path in paths]
         network = Network(bus, drives)
         network.run(20_000_000)
         frames = {}
