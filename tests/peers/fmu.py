@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 
+import ferrodrive
 import fmpy
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
@@ -128,6 +129,49 @@ def turn(drive, steps):
         if step % 200 == 0:
             drive.send(download(4, 0x60FF, b"\x3c\0\0\0"))
         drive.step(1e-3)
+
+
+SCENARIO = """
+title = "a load turns a wheel whose supply sags"
+end = "2s"
+[machine]
+drive = [{ model = "zlac8030l", node = 4 }]
+[[step]]
+at = "1700ms"
+do = ["4 load torque 0.5", "4 supply 40"]
+[figures]
+velocity = "last 4 velocity"
+supply = "last 4 supply"
+"""
+
+
+@check("a load turns the same drive in an FMU, in a scenario and in a world of Python, to the last bit", ZLAC8030L)
+def alike(bench):
+    world = ferrodrive.World()
+    of_python = world.add("zlac8030l", node=4)
+    with tempfile.TemporaryDirectory() as folder, Instance(pack(bench, folder, "zlac8030l@4"), folder) as drive:
+        drive.begin()
+        for _ in range(1700):
+            drive.step(1e-3)
+        inputs = [drive.reference["load_torque"], drive.reference["supply_voltage"]]
+        drive.fmu.setFloat64(inputs, [0.5, 40.0])
+        for _ in range(299):
+            drive.step(1e-3)
+        # The last sample of the scenario is 1 ms before its end.
+        (path := pathlib.Path(folder) / "load.toml").write_text(SCENARIO)
+        figures = ferrodrive.run(path).figures
+        equal(drive.real("velocity"), figures["velocity"] * math.pi / 30, "speed in a scenario")
+        equal(drive.real("bus_voltage"), figures["supply"], "supply in a scenario")
+        drive.step(1e-3)
+        world.run_for(1.7)
+        world.apply("4 load torque 0.5")
+        world.apply("4 supply 40")
+        world.run_for(0.3)
+        names = ("angle", "current", "bus_voltage")
+        expected = [of_python.shaft_angle_rad, of_python.current_a, of_python.supply_v]
+        equal([drive.real(name) for name in names], expected, ", ".join(names))
+        equal(drive.fmu.getUInt16([drive.reference["statusword"]])[0], of_python.statusword, "statusword")
+        true(of_python.statusword & 0x4F == 0x40 and abs(of_python.velocity_rpm) > 10, "it has booted, and turns")
 
 
 @check("a state that FMPy takes back, also from bytes, goes on alike", ZLAC8030L)
