@@ -72,7 +72,11 @@ class Remote:
         return eventually(lambda: self.read(index), fits, f"{index:04X}h becomes {value} ± {tolerance}")
 
     def enable(self, mode):
-        """Selects a mode and enables operation: by canopen-python's profile where the drive has its power states."""
+        """Selects a mode and enables operation: by canopen-python's profile where the drive has its power states.
+
+        A host that a busy machine keeps waiting is not taken for lost.
+        """
+        self.write_all(self.drive.unwatched)
         self.write(0x6060, mode)
         if self.drive.modes is None:
             self.write(0x6040, 0x0F)
@@ -118,9 +122,9 @@ class Remote:
         what = f"an answer to {bytes(request).hex(' ')}"
         return bytes(self.bench.trace.wait(0x580 + self.node_id, mark, what).data)
 
-    def answers(self):
-        """Whether the drive answers 1000h as its model does."""
-        before, self.sdo.RESPONSE_TIMEOUT = self.sdo.RESPONSE_TIMEOUT, 0.5
+    def answers(self, patience_s=0.5):
+        """Whether the drive answers 1000h as its model does. Where it should, read 1000h: a busy machine is late."""
+        before, self.sdo.RESPONSE_TIMEOUT = self.sdo.RESPONSE_TIMEOUT, patience_s
         try:
             return self.read(0x1000) == self.drive.device_type
         except canopen.SdoCommunicationError:
@@ -133,7 +137,7 @@ class Remote:
         mark = self.bench.trace.mark()
         self.world("power cycle")
         self.bench.trace.wait(0x700 + self.node_id, mark, "boot-up after the power cycle", lambda frame: frame.data == b"\0")
-        time.sleep(0.05)
+        self.bench.sleep(0.05)
 
 
 class Bench(Remote):
@@ -191,7 +195,7 @@ class Bench(Remote):
             self.network.add_node(self.node)
             if not self.absent:
                 # The boot-up may have gone before we were on the bus, so ask until the node answers.
-                eventually(self.answers, bool, "the drive answers 1000h")
+                eventually(lambda: self.answers(10.0), bool, "the drive answers 1000h")
         except BaseException:
             self.simulator.__exit__(None, None, None)
             raise

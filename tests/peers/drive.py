@@ -12,7 +12,13 @@ from canopen import RemoteNode
 from canopen.objectdictionary import ODRecord, ODVariable, ObjectDictionary, datatypes
 from canopen.profiles.p402 import BaseNode402
 
+from checks import PATIENCE_S
+
 DATA = pathlib.Path(__file__).resolve().parent.parent / "data"
+# The library gives states and modes tenths of a second of the wall clock, which a busy machine takes.
+for _wait in ("SWITCH_OP_MODE", "SWITCH_STATE_FINAL", "SWITCH_STATE_SINGLE", "CHECK_TPDO", "HOMING_DEFAULT"):
+    setattr(BaseNode402, f"TIMEOUT_{_wait}", PATIENCE_S)
+
 TYPES = {
     "U8": datatypes.UNSIGNED8,
     "U16": datatypes.UNSIGNED16,

@@ -45,7 +45,6 @@ def turning(bench):
     node = bench.drive.node_id
     patient = {"open_timeout": PATIENCE_S, "ping_interval": None}
     with Bench(bench.program, bench.drive, extra=("--foxglove", "127.0.0.1:0")) as live:
-        live.write_all(live.drive.unwatched)
         live.turn(R_MIN)
         # 606Ch was near for a moment; the ramp ends some 50 ms later.
         live.sleep(0.5)

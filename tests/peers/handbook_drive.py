@@ -8,6 +8,14 @@ import time
 import canopen
 
 PROGRAM = "ferrodrive"
+PATIENCE_S = 60  # a busy machine takes its time
+
+
+def wait_until(is_so, what):
+    end = time.monotonic() + PATIENCE_S
+    while not is_so():
+        assert time.monotonic() < end, what
+        time.sleep(0.02)
 
 
 class Drive:
@@ -20,9 +28,9 @@ class Drive:
         self.network = canopen.Network()
         self.network.connect(interface="socketcand", host="127.0.0.1", port=port, channel="can0", tcp_tune=True)
         self.sdo = self.network.add_node(4, canopen.ObjectDictionary()).sdo
-        while self.machine("4 get")["power"] != "on":  # it boots, which takes a drive about a second
-            time.sleep(0.05)
-        time.sleep(0.1)  # it looks at its supply and sensors
+        self.sdo.RESPONSE_TIMEOUT = PATIENCE_S
+        wait_until(lambda: self.machine("4 get")["power"] == "on", "it boots")  # which takes a drive about a second
+        wait_until(lambda: self.statusword() & 0x4F == 0x40, "switch on disabled (CiA 402)")
         return self
 
     def __exit__(self, *_):
@@ -44,15 +52,14 @@ class Drive:
 
 def test_a_fault_is_seen():
     with Drive() as drive:
+        drive.write(0x2000, 0, 2)  # it does not take this host for lost, however long it is silent
         drive.write(0x6060, 3, 1)  # profile velocity
         for controlword in (6, 7, 15):
             drive.write(0x6040, controlword, 2)
         drive.write(0x60FF, 60, 4)
-        time.sleep(0.5)
-        assert abs(drive.machine("4 get")["velocity_rpm"] - 60) < 2
+        wait_until(lambda: abs(drive.machine("4 get")["velocity_rpm"] - 60) < 2, "60 r/min")
         drive.machine("4 fault hall on")
-        time.sleep(0.3)
-        assert drive.statusword() & 0x4F == 0x08, "fault (CiA 402)"
+        wait_until(lambda: drive.statusword() & 0x4F == 0x08, "fault (CiA 402)")
 
 
 if __name__ == "__main__":

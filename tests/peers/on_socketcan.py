@@ -24,7 +24,7 @@ NODE = 4
 #: Round trips for the figures: no check depends on them.
 ROUND_TRIPS = 300
 #: Longest wait for an answer: a guest without hardware support is slow.
-PATIENCE_S = 20
+PATIENCE_S = 120
 
 
 def device_type(node):

@@ -55,7 +55,7 @@ def profile_velocity(bench):
     node = ready(bench, "PROFILED VELOCITY")
     node.sdo[0x60FF].raw = 25 * TURN
     eventually(lambda: bench.world("get")["velocity_rpm"], lambda rpm: abs(rpm - 1500) < 15, "1500 r/min")
-    near(node.sdo[0x606C].raw, 25 * TURN, TURN // 4, "606Ch")
+    eventually(lambda: node.sdo[0x606C].raw, lambda speed: abs(speed - 25 * TURN) <= TURN // 4, "606Ch")
     node.state = "SWITCHED ON"
     eventually(lambda: abs(bench.world("get")["velocity_rpm"]), lambda rpm: rpm < 1, "it stands")
 
@@ -66,7 +66,7 @@ def homing(bench):
     bench.world(f"switch HOME {2 * TURN} {4 * TURN}")
     for method in (24, 8):
         node.sdo[0x6098].raw = method
-        true(node.homing(timeout=20), f"method {method}: homing attained")
+        true(node.homing(), f"method {method}: homing attained")
         equal(bench.statusword() & ATTAINED, ATTAINED, "bit 12")
         node.controlword = 0x0F
 
@@ -81,13 +81,13 @@ def cyclic_position(bench):
     rpdo.trans_type = 1
     rpdo.save()
     position = node.sdo[0x6064].raw
-    begin = time.monotonic()
     for step in range(1, 171):
         # The host ends at rest.
         position += TURN // 20 if step <= 150 else 0
         rpdo[0x6040].raw = 0x0F
         rpdo[0x607A].raw = position
         rpdo.transmit()
-        time.sleep(max(0, begin + 0.010 * step - time.monotonic()))
+        # A pause, not a schedule: what a busy machine has missed would come in a burst, which is a jump.
+        time.sleep(0.010)
     eventually(lambda: node.sdo[0x6064].raw, lambda at: abs(at - position) < TURN // 50, "it ends at the last set-point")
     true(not node.is_faulted(), "no fault")

@@ -119,6 +119,6 @@ def silence(bench):
         bench.world(away)
         true(not bench.answers(), f"no answer after {away}")
         bench.world(back)
-        eventually(bench.answers, bool, f"an answer after {back}")
+        eventually(lambda: bench.answers(10.0), bool, f"an answer after {back}")
         bench.sleep(0.5)  # frames that were not read meanwhile are answered now
         bench.turn(60)

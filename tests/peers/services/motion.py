@@ -16,7 +16,6 @@ def velocity(bench):
     for r_min in (60, -60, 200):
         bench.turn(r_min)
         bench.status_becomes(1 << 10, 1 << 10, "bit 10")
-    bench.write_all(bench.drive.unwatched)
     first = bench.world("get")
     bench.sleep(1.0)
     last = bench.world("get")
@@ -30,7 +29,6 @@ def velocity(bench):
 
 @check("profile position goes there, there again, back and on by relative ways, at the speed of 6081h", *ALL)
 def position(bench):
-    bench.write_all(bench.drive.unwatched)
     bench.enable(POSITION)
     bench.write(0x6081, 300)
     turn = TURN[bench.drive.name]
@@ -47,7 +45,6 @@ def position(bench):
 
 @check("halt and quick stop bring the motor to rest as their states say, and Fh lets a velocity go on", *ALL)
 def stops(bench):
-    bench.write_all(bench.drive.unwatched)
     bench.turn(100)
     for controlword, (mask, state) in ((0x010F, ENABLED[bench.drive.name]), (0x0002, QUICK_STOP[bench.drive.name])):
         if bench.drive is MJOINT and controlword == 0x0002:

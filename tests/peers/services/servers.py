@@ -82,6 +82,6 @@ WRONG = table("what words", ("an unknown model", ["nosuch@1"]), ("node 0", ["zli
 @check("{what} is a usage error before anything listens", ZLIM42C, rows=WRONG)
 def bad_drives(bench, row):
     words = [word for drive in row["words"] for word in ("--drive", drive)]
-    done = subprocess.run([bench.program, "sim", *words, "--serve", "socketcand://127.0.0.1:0"], capture_output=True, text=True, timeout=20, input="")
+    done = subprocess.run([bench.program, "sim", *words, "--serve", "socketcand://127.0.0.1:0"], capture_output=True, text=True, timeout=PATIENCE_S, input="")
     equal(done.returncode, 2, f"exit status of {words}")
     true(done.stderr.strip() and "ready" not in done.stdout, f"a reason for {words}: {done.stderr!r} {done.stdout!r}")
