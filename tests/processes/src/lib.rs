@@ -54,7 +54,7 @@ pub fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(program());
     let served = arguments.windows(2).any(|pair| pair[0] == "--bus" && pair[1].contains("://"));
     if served && !arguments.iter().any(|word| *word == "--timeout" || NOT_PATIENT.contains(word)) {
-        command.args(["--timeout", "10s"]);
+        command.args(["--timeout", "60s"]);
     }
     command.args(arguments).env_remove("FERRODRIVE_BUS").env_remove("FERRODRIVE_MACHINE").env("NO_COLOR", "1");
     command
