@@ -21,7 +21,7 @@ PAYLOADS = [bytes(range(1, 9)), bytes(8), b"\xff" * 8, b"\x80\x7f" * 4, b"\xfe\x
 def export(bench):
     bus = f"socketcand://127.0.0.1:{bench.simulator.port()}/can0"
     node = bench.node_id
-    words = [bench.program, "--bus", bus, "--model", f"{node}={bench.drive.model}", "export", "dbc", str(node)]
+    words = [bench.program, "--bus", bus, "--timeout", "60s", "--model", f"{node}={bench.drive.model}", "export", "dbc", str(node)]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     equal(done.returncode, 0, f"exit status of {words[1:]}: {done.stdout}{done.stderr}")
     return cantools.database.load_string(done.stdout, "dbc")

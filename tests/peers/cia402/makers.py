@@ -11,7 +11,7 @@ import canopen
 from canopen.profiles.p402 import BaseNode402
 from ferrodrive import Simulator
 
-from checks import Skip, check, eventually, true
+from checks import PATIENCE_S, Skip, check, eventually, true
 from cia402 import DRIVE
 
 #: Bits of 6502h.
@@ -43,7 +43,7 @@ def dictionary(path):
 def servo(program, path):
     """A servo made from a file as node 5, and canopen-python's node from the same file."""
     with Simulator([f"{path}@5"], path=program) as simulator:
-        simulator.wait_until_booted()
+        simulator.wait_until_booted(PATIENCE_S)
         network = canopen.Network()
         network.NOTIFIER_CYCLE = 0.05
         network.connect(interface="socketcand", host="127.0.0.1", port=simulator.port(), channel="can0")

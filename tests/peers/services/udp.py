@@ -57,7 +57,7 @@ def multicast_drive(bench):
     multicast(port).shutdown()
     place = f"udp_multicast://{GROUP}:{port}?hops=0"
     with Simulator(["zlac8030l@9"], extra=("--bus", place), path=bench.program) as simulator:
-        simulator.wait_until_booted()
+        simulator.wait_until_booted(PATIENCE_S)
         network = canopen.Network()
         network.NOTIFIER_CYCLE = 0.05
         network.connect(interface="udp_multicast", channel=GROUP, port=port, hop_limit=0)
@@ -170,7 +170,7 @@ def cannelloni_drive(bench):
     peer = Cannelloni(here)
     place = f"cannelloni://127.0.0.1:{peer.port}?local={here}"
     with Simulator(["zlac8030l@9"], extra=("--bus", place), path=bench.program) as simulator:
-        simulator.wait_until_booted()
+        simulator.wait_until_booted(PATIENCE_S)
         ask = lambda index: can.Message(arbitration_id=0x609, is_extended_id=False, data=struct.pack("<BHB4x", 0x40, index, 0))
         # A frame that the drive has no use for, two of the same node, one with an identifier of 29 bits.
         stranger = can.Message(arbitration_id=0x1ABCDEF0, data=b"\x01", is_extended_id=True)
