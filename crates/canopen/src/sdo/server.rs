@@ -183,7 +183,7 @@ impl Server {
         }
         match Request::parse(frame.padded()) {
             Request::InitiateUpload(mux) => self.initiate_upload(mux, values, now),
-            Request::InitiateDownload(mux, payload) => return self.initiate_download(mux, payload, values, now),
+            Request::InitiateDownload(mux, _) => return self.initiate_download(mux, frame.padded(), values, now),
             request => return self.go_on(request, frame, values, now),
         }
         None
@@ -359,12 +359,11 @@ impl Server {
         }
     }
 
-    // Inlined, the payload stays in registers.
     #[inline(always)]
     fn initiate_download<S: Storage>(
         &mut self,
         mux: Mux,
-        payload: Payload,
+        raw: &[u8; LENGTH],
         values: &mut Dictionary<S>,
         now: Instant,
     ) -> Option<Write> {
@@ -377,8 +376,8 @@ impl Server {
             }
         };
         let row = facts.summary;
-        // Made anew for the calls that need it whole: only the data of an expedited one is kept at hand.
-        let (length, bytes) = match payload {
+        // Read where it is used, and made anew for the calls that need it whole: only the data of an expedited one is kept at hand.
+        let (length, bytes) = match Payload::parse(raw) {
             Payload::Expedited { length, bytes } if row.is_writable_cell() => (length, bytes),
             Payload::Expedited { length, bytes } => {
                 let payload = Payload::Expedited { length, bytes };

@@ -88,7 +88,9 @@ impl Payload {
         Some(Self::Expedited { length: Some(data.len() as u8), bytes })
     }
 
-    fn parse(raw: &[u8; LENGTH]) -> Self {
+    /// Of the eight bytes that initiate a download or answer an upload.
+    #[inline(always)]
+    pub(super) fn parse(raw: &[u8; LENGTH]) -> Self {
         let [command, _, _, _, bytes @ ..] = *raw;
         let indicated = command & SIZE_INDICATED != 0;
         if command & EXPEDITED != 0 {
