@@ -184,21 +184,15 @@ impl Server {
         match Request::parse(frame.padded()) {
             Request::InitiateUpload(mux) => self.initiate_upload(mux, values, now),
             Request::InitiateDownload(mux, _) => return self.initiate_download(mux, frame.padded(), values, now),
-            request => return self.go_on(request, frame, values, now),
+            _ => return self.go_on(frame, values, now),
         }
         None
     }
 
-    /// Any request but those with which a transfer begins.
+    /// Any request but those with which a transfer begins. It reads the frame again, so that for those two comparisons do.
     #[inline(never)]
-    fn go_on<S: Storage>(
-        &mut self,
-        request: Request,
-        frame: &Frame,
-        values: &mut Dictionary<S>,
-        now: Instant,
-    ) -> Option<Write> {
-        match request {
+    fn go_on<S: Storage>(&mut self, frame: &Frame, values: &mut Dictionary<S>, now: Instant) -> Option<Write> {
+        match Request::parse(frame.padded()) {
             Request::Unknown { .. } if self.block_size > 0 => self.take_block_request(frame.padded(), values, now),
             Request::UploadSegment { toggle } => self.upload_segment(toggle, &values.view(), now),
             Request::DownloadSegment(segment) => {
