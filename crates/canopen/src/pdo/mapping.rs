@@ -113,7 +113,8 @@ impl MappingRecord {
 pub struct Mapping {
     objects: Objects,
     count: u8,
-    bits: u8,
+    /// In bytes.
+    length: u8,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -210,7 +211,7 @@ impl Mapping {
         }
         let objects =
             if plain { Objects::plain(values, &objects[..mapped]) } else { Objects::AtTheBit(objects, forms) };
-        Ok(Some(Self { objects, count: mapped as u8, bits: used }))
+        Ok(Some(Self { objects, count: mapped as u8, length: used.div_ceil(8) }))
     }
 
     /// The mapped objects, if each is a cell that stands in the PDO as it is.
@@ -233,7 +234,7 @@ impl Mapping {
     /// Length of the PDO in bytes, 1 to 8.
     #[inline]
     pub const fn length(&self) -> u8 {
-        self.bits.div_ceil(8)
+        self.length
     }
 
     /// The PDO's data, the first object in the lowest bits.
