@@ -403,8 +403,9 @@ impl<S: Storage> Station for Node<S> {
             return;
         }
         for position in 0..self.pdos.tpdo_ids.as_ref().len() {
-            if self.pdos.tpdo_ids.as_ref()[position] == frame.id().raw() {
-                self.pdos.tpdos.as_mut()[position].handle_transmitted(now);
+            if self.pdos.tpdo_ids.as_ref()[position] == frame.id().raw()
+                && self.pdos.tpdos.as_mut()[position].handle_transmitted(now)
+            {
                 self.offer_tpdo(position);
             }
         }

@@ -338,8 +338,13 @@ impl Tpdo {
         self.multiplexed.map(|_| Frame::of_bits(self.id, self.data, 8))
     }
 
-    /// The wire took the frame at `now`: the inhibit time counts from here.
-    pub const fn handle_transmitted(&mut self, now: Instant) {
-        self.inhibited_until = now.plus_nanos(self.inhibit_ns);
+    /// The wire took the frame at `now`: the inhibit time counts from here. False if there is none, which changes nothing.
+    #[inline]
+    pub fn handle_transmitted(&mut self, now: Instant) -> bool {
+        let is_held_back = self.inhibit_ns != 0 || now < self.inhibited_until;
+        if is_held_back {
+            self.inhibited_until = now.plus_nanos(self.inhibit_ns);
+        }
+        is_held_back
     }
 }
