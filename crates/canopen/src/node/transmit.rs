@@ -44,18 +44,18 @@ impl<S: Storage> Node<S> {
 
     #[inline(never)]
     pub(super) fn take_most_urgent(&mut self) -> Option<Frame> {
-        let source = match self.pending.take_only() {
-            Some(source) => source,
-            None => self.choose_source()?,
-        };
-        self.take(source)
+        match self.pending.take_only() {
+            Some(Source::SdoReply) => self.take_sdo_reply(),
+            Some(Source::Tpdo(position)) => self.take_tpdo(position),
+            _ => self.take_of_many(),
+        }
     }
 
     #[inline(never)]
-    fn choose_source(&mut self) -> Option<Source> {
+    fn take_of_many(&mut self) -> Option<Frame> {
         let source = self.pending.iter().min_by_key(|source| self.pending_id(*source))?;
         self.pending.remove(source);
-        Some(source)
+        self.take(source)
     }
 
     fn pending_id(&self, source: Source) -> u32 {
@@ -70,7 +70,6 @@ impl<S: Storage> Node<S> {
         }
     }
 
-    #[inline(always)]
     fn take(&mut self, source: Source) -> Option<Frame> {
         match source {
             Source::BootUp => Some(Heartbeat::boot_up(self.node_id).emit()),
@@ -79,23 +78,32 @@ impl<S: Storage> Node<S> {
                 let state = self.heartbeat_state.unwrap_or(self.state.heartbeat_byte());
                 Some(Heartbeat { node: self.node_id, state }.emit())
             }
-            Source::SdoReply => match self.sdo.take_reply() {
-                Some(bytes) => Some(Frame::full(connection_set::sdo_reply(self.node_id), bytes)),
-                None => self.take_segment(),
-            },
+            Source::SdoReply => self.take_sdo_reply(),
             Source::Channel => self.take_of_channel(),
-            Source::Tpdo(position) => {
-                let tpdo = &mut self.pdos.tpdos.as_mut()[position];
-                let frame = tpdo.take(&self.dictionary, self.now);
-                self.deadline = self.deadline.min(tpdo.deadline(self.now));
-                frame
-            }
+            Source::Tpdo(position) => self.take_tpdo(position),
             Source::Emcy => {
                 let emcy = self.emcy.take(self.now)?;
                 self.offer_emcy();
                 self.emcy_id.map(|id| emcy.emit(id))
             }
         }
+    }
+
+    #[inline(always)]
+    fn take_sdo_reply(&mut self) -> Option<Frame> {
+        match self.sdo.take_reply() {
+            Some(bytes) => Some(Frame::full(connection_set::sdo_reply(self.node_id), bytes)),
+            None => self.take_segment(),
+        }
+    }
+
+    // Apart, so that an SDO's reply saves no registers for it.
+    #[inline(never)]
+    fn take_tpdo(&mut self, position: usize) -> Option<Frame> {
+        let tpdo = &mut self.pdos.tpdos.as_mut()[position];
+        let frame = tpdo.take(&self.dictionary, self.now);
+        self.deadline = self.deadline.min(tpdo.deadline(self.now));
+        frame
     }
 
     /// Of an SDO block upload; the next one is offered at once.
