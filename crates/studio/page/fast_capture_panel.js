@@ -30,7 +30,7 @@ export function fastCapturePanel(shared, { taken }) {
   const had = h("div", { id: "fast-had" });
   const root = h(
     "details",
-    { class: "plain-details", id: "fast-capture" },
+    { class: "plain-details", id: "fast-capture", ontoggle: () => (offered = null) },
     h("summary", {}, "Fast capture"),
     h("div", { class: "bar" }, quantities),
     h("div", { class: "bar" }, more, truths),
@@ -42,7 +42,7 @@ export function fastCapturePanel(shared, { taken }) {
   );
   /** The node that is being captured; null for none. */
   let busy = null;
-  /** The node whose quantities are offered, or asked for. */
+  /** The node and model whose quantities are offered, asked for or refused: asked once, and again when the form is opened again. */
   let offered = null;
 
   function store() {
@@ -60,15 +60,21 @@ export function fastCapturePanel(shared, { taken }) {
     status.className = bad ? "bad" : "";
   };
 
-  async function offer(node) {
-    offered = node;
+  async function offer(node, key) {
+    offered = key;
+    renew(quantities, key, () => []);
+    truths.hidden = true;
     const answer = await ask({ do: "capture_quantities", node });
-    if (offered !== node) return;
-    if (!answer.ok) return (offered = null);
+    if (offered !== key) return;
+    if (!answer.ok) {
+      // Of these the studio has said nothing.
+      if (["no_connection", "no_picture"].includes(answer.error.kind)) offered = null;
+      return say(answer.error.message, true);
+    }
     const { quantities: names, true_values } = answer.result;
     truths.hidden = true_values.length === 0;
     truths.offer([{ value: "", text: "+ a true value" }, ...true_values.map((name) => ({ value: name, text: name }))]);
-    renew(quantities, `${node} ${names.join()}`, () => names.map((name) => toggle(null, name, chosen.has(name), () => {
+    renew(quantities, `${key} ${names.join()}`, () => names.map((name) => toggle(null, name, chosen.has(name), () => {
       if (!chosen.delete(name)) chosen.add(name);
       store();
     }, { "data-quantity": name })));
@@ -111,8 +117,11 @@ export function fastCapturePanel(shared, { taken }) {
 
   return {
     root,
-    update() {
-      if (root.open && shared.node !== null && offered !== shared.node) offer(shared.node);
+    update({ nodes }) {
+      const node = nodes.find((one) => one.node === shared.node);
+      if (!root.open || !node) return;
+      const key = `${node.node} ${node.model}`;
+      if (offered !== key) offer(node.node, key);
     },
   };
 }

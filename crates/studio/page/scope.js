@@ -446,7 +446,7 @@ export function scopeView(shared) {
 
   function update(state) {
     choose.update(state);
-    fast.update();
+    fast.update(state);
     for (const { node, feed_m } of state.nodes) feeds.set(node, feed_m);
     drives = state.nodes.filter((node) => node.drive).map((node) => node.node);
     const more = drives.filter((node) => node !== shared.node);
