@@ -67,10 +67,10 @@ top.append(h("button", { type: "button", id: "serial-open", title: "Real drives,
 const alert = h("div", { id: "serial-alert", role: "alert", hidden: true });
 document.getElementById("alerts").prepend(alert);
 
-const LEFT = "serial-left";
-const left_moving = JSON.parse(sessionStorage.getItem(LEFT) ?? "[]");
-sessionStorage.removeItem(LEFT);
-if (left_moving.length) say("This page has taken leave of the adapter. Use the emergency stop:", left_moving);
+/** What was said of drives that may be moving, as `[why, moving]`: over a reload too, until a person has seen it. */
+const UNSEEN = "serial-unseen";
+const unseen = JSON.parse(sessionStorage.getItem(UNSEEN));
+if (unseen) say(...unseen);
 
 if (kept) attach();
 
@@ -83,7 +83,7 @@ function attach() {
   /** The nodes that this page has set in motion, and that were not seen to stand since. */
   let moved = [];
   detach.addEventListener("click", () => {
-    if (leaving) return left(moved.map((node) => may_move(node, "its quick stop was ordered, and that it stands was not awaited")));
+    if (leaving) return left(moved.map((node) => may_move(node, "whether its quick stop was sent, and that it stands, was not awaited")));
     leaving = true;
     setText(detach, "Stopping … (again: at once)");
     tellWorker({ leave: true });
@@ -91,7 +91,7 @@ function attach() {
   function left(moving) {
     sessionStorage.removeItem("serial");
     // Shown beside the virtual drives.
-    if (moving.length) sessionStorage.setItem(LEFT, JSON.stringify(moving));
+    if (moving.length) say("This page has taken leave of the adapter. Use the emergency stop:", moving);
     location.reload();
   }
   addEventListener("serial-left", ({ detail }) => left(detail.moving));
@@ -103,6 +103,8 @@ function attach() {
   }
   // Before the worker that has reached them is replaced by one that has moved nothing.
   addEventListener("machine-ended", ({ detail }) => {
+    leaving = false;
+    setText(detach, "Disconnect");
     status.className = "bad";
     setText(status, `${kept.name} at ${rate}: the host in this page has ended`);
     say(detail, moved.map((node) => may_move(node, "this page cannot stop it any more")));
@@ -141,12 +143,19 @@ function say(why, moving) {
   // Which drives may be moving stays until it was seen.
   if (!alert.hidden && alert.dataset.urgent && !moving.length) return;
   alert.hidden = false;
-  if (moving.length) alert.dataset.urgent = "1";
-  else delete alert.dataset.urgent;
+  if (moving.length) {
+    alert.dataset.urgent = "1";
+    sessionStorage.setItem(UNSEEN, JSON.stringify([why, moving]));
+  } else delete alert.dataset.urgent;
   if (why.startsWith("No bus yet")) alert.dataset.early = "1";
   else delete alert.dataset.early;
   renew(alert, JSON.stringify([why, moving]), () => [
-    h("p", {}, why, " ", h("button", { type: "button", onclick: () => (alert.hidden = true) }, "Seen")),
+    h("p", {}, why, " ", h("button", { type: "button", onclick: seen }, "Seen")),
     ...moving.map((text) => h("p", { class: "urgent" }, text)),
   ]);
+}
+
+function seen() {
+  alert.hidden = true;
+  sessionStorage.removeItem(UNSEEN);
 }

@@ -20,6 +20,8 @@ let cable = null;
 /** The channel has been open once: there is a host. */
 let hosts = false;
 let shown = "";
+/** No other tab has an adapter. */
+let holds = false;
 /** The page has taken leave, and nothing more can be done for its drives. */
 let gone = false;
 
@@ -99,9 +101,22 @@ async function granted() {
   return ports[0];
 }
 
+/** Has the one adapter of this page to itself for as long as this worker lives: another tab opens none, and lets no port be forgotten. */
+const hold = () =>
+  new Promise((resolve, reject) => {
+    const until_end = (lock) => {
+      holds = lock !== null;
+      resolve();
+      return lock && new Promise(() => {});
+    };
+    navigator.locks.request("serial", { ifAvailable: true }, until_end).catch(reject);
+  });
+
 /** Opens the port, again and again. */
 async function plug() {
   try {
+    if (!holds) await hold();
+    if (!holds) throw new Error("another tab of this page has an adapter: choose Disconnect there first");
     const port = await granted();
     await port.open({ baudRate: setting.baud, bufferSize: 4096 });
     cable = { port, writer: port.writable.getWriter(), reader: port.readable.getReader(), outbox: [], writing_since: null, flushing: null };
@@ -162,12 +177,11 @@ function tick() {
 
 async function open({ serial }) {
   if (!library) {
+    await hold();
     const made = await Library.make();
     setting = serial;
     made.call({ call: "open_serial", name: serial.name, bitrate: serial.bitrate, unix_ms: Math.round(performance.timeOrigin), now_ns: now_ns() });
     library = made;
-    // As long as this worker lives: another tab lets no port be forgotten meanwhile.
-    navigator.locks.request("serial", () => new Promise(() => {}));
     navigator.serial.addEventListener("disconnect", () => cable && granted().catch(({ message }) => lose(cable, message)));
     setInterval(tick, TICK_MS);
     plug();

@@ -60,6 +60,9 @@ async function attach(bitrate = "500k") {
   await run("document.getElementById('serial-choose').click(); return true");
 }
 
+/** A person presses the button beside what may be moving. */
+const see = () => run("document.querySelector('#serial-alert button').click(); return true");
+
 const found = () => until("both drives", `${LINK} return link.state.nodes.length === 2 && link.state.nodes.every(({ drive }) => drive)`);
 
 /** Takes control and turns the wheel, also where the machine of the test is so loaded that the worker stops it once. */
@@ -186,6 +189,14 @@ test("a host that ends leaves a word of what may still move", async () => {
   await stands(4);
   await found();
   assert.match(await text("serial-alert"), /node 4 may still be moving/, "until a person has seen it");
+  // Over a reload too.
+  await command("POST", "/refresh", {});
+  await found();
+  assert.match(await text("serial-alert"), /The host in this page has ended.*node 4 may still be moving/s);
+  await see();
+  await command("POST", "/refresh", {});
+  await found();
+  assert.doesNotMatch(await text("serial-alert"), /may still be moving/);
 });
 
 test("another tab does not take the adapter away", async () => {
@@ -197,6 +208,10 @@ test("another tab does not take the adapter away", async () => {
   await attach();
   await until("a refusal", `return /has an adapter already, in this tab or in another/.test(document.getElementById("serial-refused").innerText)`);
   assert.equal(adapter.forgotten, false);
+  // One that is duplicated has the same settings.
+  await run(`sessionStorage.setItem("serial", JSON.stringify({ name: "USB 1d50:606f", bitrate: 500000, baud: 115200 })); return true`);
+  await command("POST", "/refresh", {});
+  await until("why it has no bus", `return /another tab of this page has an adapter/.test(document.getElementById("serial-status").innerText)`);
   await command("DELETE", "/window");
   await command("POST", "/window", { handle: mine });
   await found();
@@ -223,6 +238,7 @@ test("a page that takes leave names what was not seen to stand, beside its virtu
   await run("document.getElementById('serial-leave').click(); return true");
   await until("what may be moving", `${LINK} return link.state.bus.name === "sim" && /taken leave.*node 4 may still be moving.*without this page/s.test(document.getElementById("serial-alert").innerText)`);
   await picture("serial_left");
+  await see();
   adapter.refuses = false;
   // By its own watch.
   await stands(4);
