@@ -43,7 +43,8 @@ struct OfNode {
 
 /// The answer to a request that needs no host.
 pub(crate) fn respond_without_host(request: &Request) -> Option<Response> {
-    (request.path == "/api/power-states").then(|| of_text(JSON, host::page::power_states()))
+    let path = request.path.split('?').next();
+    (path == Some("/api/power-states")).then(|| of_text(JSON, host::page::power_states()))
 }
 
 pub(crate) fn respond(handle: &HostHandle, request: &Request, body: &[u8]) -> Response {

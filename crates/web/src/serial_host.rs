@@ -313,9 +313,10 @@ impl SerialHost {
                 }
                 Event::Silent => self.unplug("the adapter says nothing any more: is it still there?"),
                 Event::Malformed(_, malformed) => {
-                    self.garbled += 1;
-                    if self.garbled == GARBLED {
-                        self.distrust(&format!("The adapter sends what is not slcan: {malformed}"), true);
+                    self.garbled = self.garbled.saturating_add(1);
+                    if self.garbled >= GARBLED {
+                        let why = format!("The adapter sends what is not slcan: {malformed}");
+                        self.distrust(&why, self.garbled == GARBLED);
                     }
                 }
             }

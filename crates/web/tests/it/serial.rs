@@ -382,6 +382,25 @@ fn an_adapter_that_refuses_frames_or_sends_garbage_ends_what_moves() {
     cable.rests_and_control_is_free();
 }
 
+/// Also whoever takes control while it goes on has it no longer than until the next line, as long as something may move.
+#[test]
+fn an_adapter_that_goes_on_sending_garbage_lets_nobody_have_control() {
+    let mut cable = Cable::turning();
+    let garbage = |cable: &mut Cable| {
+        cable.world.run_for(Duration::from_millis(1));
+        cable.on_bus.lock().bytes = b"@@\r".to_vec();
+        cable.exchange();
+    };
+    (0..10).for_each(|_| garbage(&mut cable));
+    assert!(cable.let_go().0.contains("not slcan"));
+    cable.host.join();
+    garbage(&mut cable);
+    assert_eq!(cable.host.moved(), [4], "it was not seen to stand");
+    cable.say(json!({ "do": "take_control" }));
+    (0..3).for_each(|_| garbage(&mut cable));
+    assert!(cable.let_go().0.contains("not slcan"));
+}
+
 #[test]
 fn a_wrong_bit_rate_is_said_and_nothing_is_hosted() {
     let mut cable = Cable::at(Bitrate::K250);
@@ -391,8 +410,10 @@ fn a_wrong_bit_rate_is_said_and_nothing_is_hosted() {
     let request = web::Request { path: "/api/state".into() };
     assert_eq!(cable.host.request(&request, &[]).expect_err("no host").kind, "no_bus");
     // Asked for once, when the page is opened.
-    let request = web::Request { path: "/api/power-states".into() };
-    assert_eq!(cable.host.request(&request, &[]).expect("it is the same for all").status, 200);
+    for path in ["/api/power-states", "/api/power-states?of=all"] {
+        let request = web::Request { path: path.into() };
+        assert_eq!(cable.host.request(&request, &[]).expect("it is the same for all").status, 200);
+    }
     let odd = SerialHost::new("CANable", Bitrate::new(40_000).expect("a rate"), Duration::ZERO, Instant::ZERO);
     assert!(odd.expect_err("slcan has it not").message.contains("800k"));
 }
