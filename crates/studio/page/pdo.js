@@ -43,18 +43,19 @@ export function pdoView(shared, report) {
   let open = null;
   let seen = "";
   let asked_at = 0;
-  let reading = false;
+  /** The node that is being read. */
+  let reading = null;
   let shownKey = "";
 
   const now = (name) => seen_pdos?.pdos.find((pdo) => pdo.pdo === name);
   const changes = () => [...drafts.values()].filter((draft) => differs(draft, now(draft.pdo))).map((draft) => asked(draft, now(draft.pdo)));
 
   async function fetchPdos() {
-    if (reading) return;
-    [reading, asked_at] = [true, performance.now()];
+    if (reading === node) return;
     const of = node;
+    [reading, asked_at] = [of, performance.now()];
     const answer = await ask({ do: "pdos", node: of });
-    reading = false;
+    if (reading === of) reading = null;
     if (node !== of) return;
     if (!answer.ok) return setText(about, answer.error.message);
     const untouched = [...drafts].filter(([name, draft]) => now(name) && !differs(draft, now(name)));
@@ -74,6 +75,7 @@ export function pdoView(shared, report) {
 
   async function begin(of, name) {
     [node, model, seen_pdos, objects, drafts, open, shownKey] = [of, name, null, null, new Map(), null, ""];
+    asked_at = performance.now();
     rows.replaceChildren();
     place.replaceChildren();
     plan.clear();
@@ -182,9 +184,9 @@ export function pdoView(shared, report) {
     const found = state.nodes.find((known) => known.node === shared.node);
     const name = found?.model ?? null;
     if (shared.node !== node || name !== model) begin(shared.node, name);
-    // Another client wrote, or the node has changed its state.
+    // Another client wrote, or the node has changed its state; and once more where they could not be read.
     const key = `${node} ${found?.can_roll_back} ${found?.mapped} ${found?.nmt}`;
-    if (seen_pdos && (key !== seen || performance.now() - asked_at > REFRESH_MS)) fetchPdos();
+    if (node !== null && ((seen_pdos && key !== seen) || performance.now() - asked_at > REFRESH_MS)) fetchPdos();
     seen = key;
     const mine = inControl();
     const moves = Boolean(found?.moving || found?.doing);
