@@ -382,7 +382,7 @@ fn an_adapter_that_refuses_frames_or_sends_garbage_ends_what_moves() {
     cable.rests_and_control_is_free();
 }
 
-/// Also whoever takes control while it goes on has it no longer than until the next line, as long as something may move.
+/// A session that takes control while it goes on has it until the next line, as long as something may move.
 #[test]
 fn an_adapter_that_goes_on_sending_garbage_lets_nobody_have_control() {
     let mut cable = Cable::turning();
