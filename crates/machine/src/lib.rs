@@ -19,4 +19,5 @@
 pub mod check;
 pub mod dbc;
 pub mod file;
+pub mod group_move;
 pub mod parameters;

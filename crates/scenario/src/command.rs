@@ -8,6 +8,7 @@ use std::time::Duration;
 use can::Frame;
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{NmtCommand, NodeId};
+use machine::group_move::GroupMove;
 use master::drive::{self, ParseCommandError};
 use master::pdo::TransmissionType;
 use master::units::parse_duration;
@@ -36,7 +37,7 @@ const FORMS: &[&str] = &[
 /// Every form of a line of a host, for messages and the manual.
 pub fn forms() -> impl Iterator<Item = String> {
     let of_drive = drive::Command::FORMS.iter().map(|form| format!("NODE {form}"));
-    of_drive.chain(FORMS.iter().map(|form| (*form).to_owned()))
+    of_drive.chain([format!("group {}", GroupMove::FORM)]).chain(FORMS.iter().map(|form| (*form).to_owned()))
 }
 
 /// Those that begin so, as a list in a message.
@@ -52,6 +53,8 @@ const PATIENCE: Duration = Duration::from_secs(10);
 pub enum Command {
     /// A command to a drive.
     Drive(Place, drive::Command),
+    /// Several axes as one, to positions.
+    Group(GroupMove),
     /// Uploads an object.
     Read(NodeId, ObjectArg),
     /// Downloads an object.
@@ -109,6 +112,7 @@ impl FromStr for Command {
                 };
                 Ok(Self::WaitFor(condition.join(" ").parse()?, within))
             }
+            ["group", ref rest @ ..] => rest.join(" ").parse().map(Self::Group),
             ["wait", duration] => Ok(Self::Wait(time(duration)?)),
             ["all", "nmt", command] => Ok(Self::Nmt(None, nmt(command)?)),
             [place, ref rest @ ..] if place.parse::<Place>().is_ok() => of_node(place, rest),
@@ -204,6 +208,7 @@ mod tests {
             "2 velocity -5mm/s deceleration 100mm/s2",
             "4 move 32000",
             "2 home 17 at 60rpm within 5s",
+            "group move 1=90deg 2=-45deg within 3s",
             "4 write 6060 profile velocity",
             "4 read position_actual_value",
             "4 pdo map tpdo 1 6041 position_actual_value type 1",
@@ -224,6 +229,7 @@ mod tests {
             ("", "expected one of"),
             ("dance", "expected one of"),
             ("4 dance", "NODE enable"),
+            ("group dance", "group move [by] NODE=POSITION"),
             ("4 velocity", "NODE enable"),
             ("4 velocity fast", "does not begin with a number"),
             ("4 velocity 60rpm at 5rpm", "is not an option of velocity"),

@@ -8,7 +8,7 @@ use sim::Place;
 use super::command::Command;
 use super::condition::Condition;
 use super::entries::{MOST, Many, bounded, entries, expect, figures, host, kept, single, step};
-use super::plan::{Act, Base, Expect, Figure, Host, Measure, ScenarioStep};
+use super::plan::{Act, Base, Expect, Figure, Host, HostLine, Measure, ScenarioStep};
 use crate::sweep::file::{SweepAxis, axes};
 use machine::file::Machine;
 use sim::Fidelity;
@@ -215,10 +215,27 @@ impl Scenario {
             });
             problems.extend(strange.map(|reason| placed(&step.place, file.text(), reason)));
         }
+        problems.extend(self.check_groups(file));
         if problems.is_empty() {
             problems = self.check_bodies(file);
         }
         problems
+    }
+
+    /// Moves of axes that are not there, or not in one group.
+    fn check_groups(&self, file: &Table<'_>) -> Vec<Problem> {
+        let problem = |line: &HostLine| {
+            let Command::Group(asked) = &line.command else { return None };
+            let what = match asked.axes(Some(&self.machine)) {
+                Err(failure) => failure.one_line(),
+                Ok((nodes, _)) => {
+                    let node = nodes.into_iter().find(|node| !self.has_node(node.raw()))?;
+                    self.no_such(Place::node(node.raw()))
+                }
+            };
+            Some(placed(&line.place, file.text(), what))
+        };
+        self.hosts.iter().flat_map(|host| &host.lines).filter_map(problem).collect()
     }
 
     /// Bodies that are not there, and numbers that they do not have. Only a world knows which these are.

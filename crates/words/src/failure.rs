@@ -68,6 +68,12 @@ impl Failure {
         )
     }
 
+    /// What and what to do next, in one line.
+    pub fn one_line(&self) -> String {
+        let parts: Vec<_> = std::iter::once(&self.what).chain(&self.next).map(String::as_str).collect();
+        parts.join(": ")
+    }
+
     /// Names its kind.
     #[must_use]
     pub fn of_kind(self, kind: &'static str) -> Self {

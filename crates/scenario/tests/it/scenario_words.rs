@@ -123,3 +123,57 @@ fn a_step_that_tilts_the_ground_rolls_a_base_down_and_one_that_levels_it_lets_it
     let refused = Scenario::parse(&text.replace("slope 0", "slop 0"), Path::new("")).err().map(|bad| bad.to_string());
     assert!(refused.is_some_and(|said| said.contains("body NAME slope|grip|mass|payload VALUE")));
 }
+
+/// Two joints behind a gear, in cycles of 2 ms, and what their host does.
+fn arm(rest: &str) -> Result<Scenario, String> {
+    let joint = |node| format!("{{ model = 'm8025e25b50', node = {node}, units = {{ gear_ratio = 50 }} }}");
+    let axis = |node| {
+        format!(
+            "{{ node = {node}, velocity_deg_s = 60, acceleration_deg_s2 = 120, jerk_deg_s3 = 1200, following_error_deg = 5 }}"
+        )
+    };
+    let text = format!(
+        "[machine]\nbitrate = '1M'\ndrive = [{}, {}]\ngroup = [{{ name = 'arm', period = '2ms', axis = [{}, {}] }}]\n{rest}",
+        joint(1),
+        joint(2),
+        axis(1),
+        axis(2)
+    );
+    Scenario::parse(&text, Path::new("")).map_err(|bad| bad.to_string())
+}
+
+/// The output behind the gear: 262144 counts of a joint for one turn of its own shaft, 50 of these for one of the output.
+#[test]
+fn a_group_moves_as_one_and_a_line_sees_it_arrive() {
+    let scenario =
+        arm("[[host]]\nname = 'moved'\ndo = ['group move 1=9deg 2=-4.5deg within 2s', 'group move by 2=4.5deg']\n\
+                        [[expect]]\nafter = 'moved'\nthat = '1 velocity = 0 +- 0.5'\n")
+        .unwrap();
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+    let (verdict, seen) = row(&outcome, "group move 1=9deg");
+    assert!(verdict == Verdict::Passed && seen.starts_with("2 axes moved together in 2 s"), "{seen}");
+}
+
+#[test]
+fn a_cable_that_is_cut_in_a_move_stops_the_group() {
+    let scenario = arm("[[step]]\nat = '1.5s'\ndo = '2 cable cut'\n\
+                        [[host]]\ndo = [{ do = 'group move 1=30deg 2=30deg within 4s', fails = 'node 2' }]\n\
+                        [[expect]]\nfrom = '2.5s'\nuntil = '3s'\nalways = '1 velocity = 0 +- 0.5'\n")
+    .unwrap();
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+}
+
+#[test]
+fn a_group_that_is_not_there_is_refused_before_the_run() {
+    for (line, said) in [
+        ("group move 9=30deg", "the machine has no node 9; it has: 1, 2"),
+        ("group move 1=30deg of leg", "there is no group 'leg': the machine file has: arm"),
+        ("group move 1=30", "'30' has no unit"),
+        ("group fly", "expected: group move [by] NODE=POSITION.."),
+    ] {
+        let refused = arm(&format!("[[host]]\ndo = ['{line}']\n")).err().unwrap_or_default();
+        assert!(refused.contains(said), "{line}: {refused}");
+    }
+}

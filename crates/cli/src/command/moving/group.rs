@@ -5,13 +5,12 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use cia402::ModeOfOperation;
-use machine::file::{CyclePlan, GROUP_PERIOD, GroupPlan};
+use machine::group_move::{GroupMove, GroupRun, PlannedMove, angle, rate, target, turning};
 use master::Drive;
-use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase, StopCause};
-use master::units::{Along, Angle, Ramp, Rpm, Shown, Turns, parse_duration};
+use master::group::{AxisLimits, AxisSetup, Group, GroupError, StopCause};
+use master::units::{Angle, Rpm, Shown, parse_duration};
 use serde::Serialize;
 use words::mode::mode;
-use words::node::node;
 
 use crate::command::cycles::{CycleArgs, refuse_too_full};
 use crate::command::repeat::period;
@@ -20,13 +19,9 @@ use crate::failure::Failure;
 use crate::global::{Global, some_time};
 use crate::output::{Format, Report};
 use crate::session;
-use console::command::motion::speed;
 use console::guard::{Guard, GuardArgs, GuardReport};
 use plot::Paint;
 use plot::Table;
-
-/// How long the shafts may take to come to their last set-points before it is looked where they are.
-const SETTLING: Duration = Duration::from_millis(500);
 
 /// How often a person is shown how far the move has come.
 const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
@@ -103,42 +98,12 @@ enum Word {
 }
 
 fn word(text: &str) -> Result<Word, String> {
-    match text.split_once('=') {
-        Some((number, position)) => Ok(Word::Target(node(number)?, angle(position)?)),
-        None if Path::new(text).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) => {
+    match text.contains('=') {
+        true => target(text).map(|(node, angle)| Word::Target(node, angle)),
+        false if Path::new(text).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) => {
             Ok(Word::File(text.into()))
         }
-        None => Err("expected a machine file, FILE.toml, or NODE=POSITION, e.g. 1=90deg".into()),
-    }
-}
-
-/// An angle with its unit: a group is spoken of in degrees, and a number alone would be counts of the drive.
-pub(super) fn angle(text: &str) -> Result<Angle, String> {
-    let angle = text.parse().map_err(|error| format!("{error}"))?;
-    if text.ends_with(|c: char| c.is_ascii_digit() || c == '.') {
-        return Err(format!(
-            "'{text}' has no unit: expected an angle, e.g. {text}deg, 0.5turn or 1.57rad, or counts of the drive: {text}counts"
-        ));
-    }
-    Ok(angle)
-}
-
-/// A speed of the shaft: a group plans in turns.
-pub(super) fn turning(text: &str) -> Result<Rpm, String> {
-    match speed(text)? {
-        Along::Turning(rpm) => Ok(rpm),
-        Along::Metres(_) => {
-            Err("expected a speed of rotation, e.g. 60rpm: the axes of a group are moved in turns".into())
-        }
-    }
-}
-
-/// A rate in turns/s^2.
-pub(super) fn rate(text: &str) -> Result<f64, String> {
-    match text.parse::<Ramp>() {
-        Ok(Ramp::RpmPerSecond(rate)) if rate > 0.0 => Ok(rate / 60.0),
-        Ok(_) => Err("expected a rate above 0, e.g. 120rpm/s: a change of speed does not take a fixed time".into()),
-        Err(error) => Err(error.to_string()),
+        false => Err("expected a machine file, FILE.toml, or NODE=POSITION, e.g. 1=90deg".into()),
     }
 }
 
@@ -206,44 +171,15 @@ impl From<&AxisLimits> for AxisLimitValues {
     }
 }
 
-/// The axes, and where each is to go; `None` for one that stays.
-struct Planned {
-    axes: Vec<AxisSetup>,
-    targets: Vec<Option<Turns>>,
-    period: Duration,
-}
-
-impl Planned {
-    /// What the bus has to carry.
-    fn cycle(&self) -> CyclePlan {
-        CyclePlan {
-            what: "the group".to_owned(),
-            period: self.period,
-            nodes: self.axes.iter().map(|axis| (axis.drive.node().id(), Some(axis.mode))).collect(),
-            is_base: false,
+/// Says which axes will not move evenly, as `check` says it of a file.
+fn note_uneven(context: &Context, planned: &PlannedMove) {
+    let cycle = planned.cycle();
+    for AxisSetup { drive, mode, .. } in &planned.axes {
+        let uneven = drive.axis_description().and_then(|axis| cycle.uneven(axis, Some(*mode)));
+        if let Some((what, own)) = uneven {
+            context.note(&format!("node {}: {what}: give --period {own:?}", drive.node().id()));
         }
     }
-
-    /// Says which axes will not move evenly, as `check` says it of a file.
-    fn note_uneven(&self, context: &Context) {
-        let cycle = self.cycle();
-        for AxisSetup { drive, mode, .. } in &self.axes {
-            let uneven = drive.axis_description().and_then(|axis| cycle.uneven(axis, Some(*mode)));
-            if let Some((what, own)) = uneven {
-                context.note(&format!("node {}: {what}: give --period {own:?}", drive.node().id()));
-            }
-        }
-    }
-}
-
-/// What was seen on the way.
-struct GroupRun {
-    time: Duration,
-    from: Vec<f64>,
-    to: Vec<f64>,
-    at: Vec<f64>,
-    largest_turns: Vec<f64>,
-    missed_cycles: u64,
 }
 
 impl GroupCommand {
@@ -267,22 +203,38 @@ impl Move {
         global.on_machine(path, &session::read_machine(path)?)
     }
 
-    fn targets(&self) -> impl Iterator<Item = (NodeId, Angle)> {
-        self.words
-            .iter()
-            .filter_map(|word| if let Word::Target(node, angle) = word { Some((*node, *angle)) } else { None })
+    fn asked(&self) -> GroupMove {
+        let target = |word: &Word| if let Word::Target(node, angle) = word { Some((*node, *angle)) } else { None };
+        GroupMove {
+            targets: self.words.iter().filter_map(target).collect(),
+            relative: self.relative,
+            group: self.group.clone(),
+            within: self.within,
+            velocity: self.velocity,
+            acceleration: self.acceleration,
+            rounding: self.rounding,
+            following_error: self.following_error,
+            period: self.period,
+            mode: self.mode,
+        }
     }
 
     async fn run(&self, context: &Context) -> Result<GroupMoved, Failure> {
-        let planned = self.plan(context).await?;
+        let asked = self.asked();
+        let (nodes, plan) = asked.axes(context.machine.as_ref())?;
+        let mut drives = Vec::new();
+        for node in nodes {
+            drives.push(context.known_drive(node).await?);
+        }
+        let planned = asked.plan(plan, drives).await?;
         let drives: Vec<_> = planned.axes.iter().map(|axis| &axis.drive).collect();
         refuse_too_full(context, &planned.cycle(), &drives).await?;
-        planned.note_uneven(context);
+        note_uneven(context, &planned);
         let mut guards = Vec::new();
         for axis in &planned.axes {
             guards.push(self.guard.begin(context, &axis.drive).await?);
         }
-        let opened = Group::open(&planned.axes, planned.period, self.cycles.options()).await;
+        let opened = planned.open(self.cycles.options()).await;
         let moved = match opened {
             Ok(mut group) => {
                 let moved = self.carry_out(context, &mut group, &planned).await;
@@ -295,108 +247,23 @@ impl Move {
         Ok(GroupMoved::new(&planned, moved?, guards?))
     }
 
-    /// Which axes, how far each may go, and where to: all of it before anything moves.
-    async fn plan(&self, context: &Context) -> Result<Planned, Failure> {
-        let targets: Vec<_> = self.targets().collect();
-        if targets.is_empty() {
-            return Err(
-                Failure::usage("expected the axes to move").next("name each with its position: 1=90deg 4=0.5turn")
-            );
-        }
-        for (position, (node, _)) in targets.iter().enumerate() {
-            if targets[..position].iter().any(|(other, _)| other == node) {
-                return Err(Failure::usage(format!("two positions for node {node}"))
-                    .at_node(*node)
-                    .next("name each node once, with the position where it is to end"));
-            }
-        }
-        let plan = self.of_file(context, &targets)?;
-        let nodes: Vec<_> = match plan {
-            Some(plan) => plan.axes.iter().map(|axis| axis.node).collect(),
-            None => targets.iter().map(|(node, _)| *node).collect(),
-        };
-        let period = self.period.or(plan.and_then(|plan| plan.period)).unwrap_or(GROUP_PERIOD);
-        let mut planned = Planned { axes: Vec::new(), targets: Vec::new(), period };
-        for (index, node) in nodes.into_iter().enumerate() {
-            let drive = context.known_drive(node).await?;
-            let said = plan.map(|plan| &plan.axes[index]);
-            let mode = self.mode.or(said.and_then(|axis| axis.mode));
-            let mode = mode.map_or_else(|| AxisSetup::best_mode(&drive).map_err(Failure::from), Ok)?;
-            let limits = self.limits(&drive, said.map(|axis| &axis.limits)).await?;
-            let target = targets.iter().find(|(other, _)| *other == node);
-            planned.targets.push(match target {
-                Some((_, angle)) => Some(turns_of(&drive, *angle).await?),
-                None => None,
-            });
-            planned.axes.push(AxisSetup { drive, mode, limits });
-        }
-        Ok(planned)
-    }
-
-    /// The group of the machine file, if there is a file with groups.
-    fn of_file<'a>(&self, context: &'a Context, targets: &[(NodeId, Angle)]) -> Result<Option<&'a GroupPlan>, Failure> {
-        let groups = context.machine.as_ref().map_or(&[][..], |machine| &machine.groups);
-        let names = || groups.iter().map(|group| group.name.as_str()).collect::<Vec<_>>().join(", ");
-        let has = |group: &&GroupPlan, node: NodeId| group.axes.iter().any(|axis| axis.node == node);
-        let Some(name) = &self.group else {
-            let found = groups.iter().find(|group| targets.iter().all(|(node, _)| has(group, *node)));
-            // Limits that the file has for an axis are not passed over because of its neighbour.
-            let parted = groups.iter().any(|group| targets.iter().any(|(node, _)| has(&group, *node)));
-            if found.is_none() && parted {
-                return Err(Failure::bad_file("these nodes are not in one [[group]] of the machine file")
-                    .next(format!("move those of one group together; its groups: {}", names())));
-            }
-            return Ok(found);
-        };
-        let Some(group) = groups.iter().find(|group| group.name == *name) else {
-            let what = format!("there is no group '{name}'");
-            let advice = "a group is a [[group]] of a machine file (docs/machine-file.md); give that file";
-            return Err(match groups {
-                [] if context.machine.is_none() => Failure::usage(what).next(advice),
-                [] => Failure::bad_file(what).next(advice),
-                _ => Failure::bad_file(what).next(format!("the machine file has: {}", names())),
-            });
-        };
-        match targets.iter().find(|(node, _)| !has(&group, *node)) {
-            Some((node, _)) => {
-                let axes: Vec<_> = group.axes.iter().map(|axis| axis.node.to_string()).collect();
-                Err(Failure::bad_file(format!("node {node} is not an axis of the group '{name}'"))
-                    .at_node(*node)
-                    .next(format!("move its axes, nodes {}, or add the node to its [[group]]", axes.join(", "))))
-            }
-            None => Ok(Some(group)),
-        }
-    }
-
-    /// What an axis may do: as the command line says, else the file, else as a careful person would begin.
-    async fn limits(&self, drive: &Drive, said: Option<&AxisLimits>) -> Result<AxisLimits, Failure> {
-        let velocity_turns_s = self.velocity.map(|Rpm(rpm)| rpm / 60.0);
-        let following = match self.following_error {
-            Some(angle) => Some(turns_of(drive, angle).await?.0),
-            None => None,
-        };
-        let (is_said, careful) = (said.is_some(), AxisLimits::careful());
-        let said = said.unwrap_or(&careful);
-        let acceleration_turns_s2 = self.acceleration.unwrap_or(said.acceleration_turns_s2);
-        // Without a stated jerk it follows the acceleration.
-        let rounding_s = careful.acceleration_turns_s2 / careful.jerk_turns_s3;
-        let jerk = self.rounding.map(|time| acceleration_turns_s2 / time.as_secs_f64());
-        Ok(AxisLimits {
-            range_turns: said.range_turns.clone(),
-            velocity_turns_s: velocity_turns_s.unwrap_or(said.velocity_turns_s),
-            acceleration_turns_s2,
-            jerk_turns_s3: jerk.unwrap_or(if is_said {
-                said.jerk_turns_s3
-            } else {
-                acceleration_turns_s2 / rounding_s
-            }),
-            following_error_turns: following.unwrap_or(said.following_error_turns),
-        })
-    }
-
     /// Enables, moves and lets the shafts settle. What stops it is reported in the words of its drive.
-    async fn carry_out(&self, context: &Context, group: &mut Group, planned: &Planned) -> Result<GroupRun, Failure> {
-        match self.follow(context, group, planned).await {
+    async fn carry_out(
+        &self,
+        context: &Context,
+        group: &mut Group,
+        planned: &PlannedMove,
+    ) -> Result<GroupRun, Failure> {
+        context.progress.show(format!("enabling {} axes", planned.axes.len()));
+        let mut shown = Duration::ZERO;
+        let progress = |gone: Duration, whole: Duration| {
+            if gone >= shown + PROGRESS_PERIOD {
+                shown = gone;
+                let (gone, whole) = (gone.as_secs_f64(), whole.as_secs_f64());
+                context.progress.show(format!("moving {} axes: {gone:.1} of {whole:.1} s", planned.axes.len()));
+            }
+        };
+        match planned.carry_out(group, progress).await {
             Ok(seen) => Ok(seen),
             Err(error) => {
                 let cause = if let GroupError::Stopped(cause) = error { Some(cause) } else { None };
@@ -408,45 +275,6 @@ impl Move {
                 })
             }
         }
-    }
-
-    async fn follow(&self, context: &Context, group: &mut Group, planned: &Planned) -> Result<GroupRun, GroupError> {
-        context.progress.show(format!("enabling {} axes", planned.axes.len()));
-        group.enable().await?;
-        let from: Vec<_> = group.points().iter().map(|point| point.position_turns).collect();
-        let goal = |(from, target): (&f64, &Option<Turns>)| match target {
-            Some(Turns(by)) if self.relative => from + by,
-            Some(Turns(to)) => *to,
-            None => *from,
-        };
-        let to: Vec<_> = from.iter().zip(&planned.targets).map(goal).collect();
-        let goals: Vec<_> = to.iter().copied().map(Turns).collect();
-        let time = group.start_move(&goals, self.within)?;
-        let mut largest_turns = vec![0.0_f64; from.len()];
-        let began = context.network.now();
-        let mut shown = began;
-        loop {
-            let phase = group.cycle().await?.phase;
-            let errors = group.following_errors().map(Option::unwrap_or_default);
-            largest_turns.iter_mut().zip(errors).for_each(|(largest, error)| *largest = largest.max(error));
-            if phase != Phase::Moving {
-                break;
-            }
-            let now = context.network.now();
-            if now - shown >= PROGRESS_PERIOD {
-                shown = now;
-                let (gone, whole) = ((now - began).as_secs_f64(), time.as_secs_f64());
-                context.progress.show(format!("moving {} axes: {gone:.1} of {whole:.1} s", from.len()));
-            }
-        }
-        group.rest().await?;
-        let settled = context.network.now() + SETTLING;
-        while context.network.now() < settled {
-            group.cycle().await?;
-        }
-        group.rest().await?;
-        let at = group.axes().iter().zip(&to).map(|(state, to)| state.position.map_or(*to, |Turns(at)| at)).collect();
-        Ok(GroupRun { time, from, to, at, largest_turns, missed_cycles: group.state().missed_cycles })
     }
 }
 
@@ -463,15 +291,8 @@ pub(in crate::command) async fn end_guards<'a>(
     Ok(reports)
 }
 
-pub(super) async fn turns_of(drive: &Drive, angle: Angle) -> Result<Turns, Failure> {
-    match angle {
-        Angle::Turns(turns) => Ok(Turns(turns)),
-        Angle::Counts(counts) => Ok(Turns(counts as f64 / drive.counts_per_turn().await?)),
-    }
-}
-
 impl GroupMoved {
-    fn new(planned: &Planned, seen: GroupRun, guards: Vec<GuardReport>) -> Self {
+    fn new(planned: &PlannedMove, seen: GroupRun, guards: Vec<GuardReport>) -> Self {
         let axes = planned.axes.iter().zip(guards).enumerate().map(|(index, (axis, guard))| AxisMoved {
             node: axis.drive.node().id().raw(),
             mode: axis.mode.name().unwrap_or("manufacturer-specific").to_owned(),

@@ -7,6 +7,7 @@ use canopen::NodeId;
 use host::capture::Wanted;
 use host::capture::merit::{self, Heating};
 use host::test_motion::{Figures, Followed, Motion, Run, Shape, limits, points, run, usual_quantities};
+use machine::group_move::{angle, rate, turning, turns_of};
 use master::Drive;
 use master::group::AxisLimits;
 use master::units::{Angle, Ramp, Rpm, parse_duration};
@@ -14,7 +15,7 @@ use recording::{Capture, Kind};
 use serde::Serialize;
 use words::node::node;
 
-use super::group::{AxisLimitValues, angle, rate, turning, turns_of};
+use super::group::AxisLimitValues;
 use crate::command::cycles::CycleArgs;
 use crate::command::record_and_replay::capture::{
     CaptureArgs, CaptureRow, USUAL_RATE, capture_file, check_place, not_put_back, numbered, save,
