@@ -66,6 +66,32 @@ fn a_bus_that_is_too_full_ends_with_1_and_says_what_is_late() {
     assert!(ended.out.contains("late") && ended.out.contains("some frames are late"), "{}", ended.out);
 }
 
+/// Six drives at 1 Mbit/s and 2 ms: 6 RPDOs, 6 TPDOs and a SYNC fit in a cycle, which an SDO request and six EMCY do beside it not.
+#[test]
+fn late_frames_on_a_bus_that_is_not_full_are_explained() {
+    let directory = scratch("plan_late");
+    let file = directory.join("arm.toml");
+    let drives: String = (1..=6).map(|node| format!("[[drive]]\nmodel = 'm8025e25b50'\nnode = {node}\n")).collect();
+    std::fs::write(&file, format!("bitrate = '1M'\n{drives}")).unwrap();
+    let words = ["--json", "plan", file.to_str().unwrap(), "--cycle", "2ms", "--mode", "ip"];
+    let ended = ferrodrive(&words);
+    let report = ended.json();
+    assert_eq!((ended.status, &report["fits"]), (Some(1), &false.into()));
+    assert!(report["load"].as_f64().unwrap() < 0.8, "{report}");
+    let notes = report["notes"].to_string();
+    assert!(notes.contains("is an average") && notes.contains("without SDO and EMCY nothing is late"), "{notes}");
+    // What it names is enough, and half a millisecond less is not.
+    let named = notes.split("from a cycle of ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+    let shortest: f64 = named.parse().unwrap();
+    for (cycle_ms, status) in [(shortest, 0), (shortest - 0.5, 1)] {
+        let cycle = format!("{cycle_ms}ms");
+        let words = ["plan", file.to_str().unwrap(), "--cycle", &cycle, "--mode", "ip"];
+        assert_eq!(ferrodrive(&words).status, Some(status), "{cycle}");
+    }
+    let alone = ["plan", file.to_str().unwrap(), "--cycle", "2ms", "--mode", "ip", "--sdo", "0s", "--emcy", "0s"];
+    assert_eq!(ferrodrive(&alone).status, Some(0));
+}
+
 #[test]
 fn what_cannot_be_planned_is_refused_with_what_to_do() {
     let cases: [(&[&str], &str); 6] = [

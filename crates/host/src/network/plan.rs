@@ -7,7 +7,8 @@ use can::Bitrate;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
 use master::Drive;
-use master::plan::{NodeTraffic, Plan, PlannedFrame, Settings, most_nodes, plan};
+use master::plan::{NodeTraffic, Plan, PlannedFrame, Settings, most_nodes, plan, shortest_cycle};
+use master::units::Shown;
 use serde::Serialize;
 
 use machine::file::{CyclePlan, Machine, TOLERANCE, too_full};
@@ -92,8 +93,14 @@ impl PlanReport {
                  stop the motion: take a longer period, or ask nothing meanwhile (a plan without SDO requests shows what that gives)"
             ));
         }
-        if let Some(full) = too_full(nodes, settings, bitrate, &cycle) {
-            notes.extend([full.what, full.next]);
+        match too_full(nodes, settings, bitrate, &cycle) {
+            Some(full) => notes.extend([full.what, full.next]),
+            None => notes.extend(late_below_full(&all, &cycle, settings)),
+        }
+        if !fits {
+            notes.extend(shortest_cycle(nodes, settings, bitrate).filter(|shortest| *shortest > settings.cycle).map(
+                |shortest| format!("from a cycle of {} ms on nothing is late", Shown(shortest.as_secs_f64() * 1e3)),
+            ));
         }
         Self {
             ok,
@@ -110,6 +117,38 @@ impl PlanReport {
             notes,
         }
     }
+}
+
+/// Why frames are late on a bus that is not full: the load is an average, a bound is about the worst moment.
+fn late_below_full(all: &Plan, cycle: &Plan, settings: &Settings) -> Option<String> {
+    let lateness = |frame: &&PlannedFrame| frame.bound.worst.map(|worst| worst.saturating_sub(frame.deadline));
+    let late = all.frames.iter().filter(|frame| !frame.is_in_time());
+    // One without a bound is not later than all others: it has no last moment.
+    let (late, after) = late.filter_map(|frame| Some((frame, lateness(&frame)?))).max_by_key(|(_, late)| *late)?;
+    let ms = |time: Duration| Shown(time.as_secs_f64() * 1e3);
+    let whose = late.node.map_or_else(String::new, |node| format!(" of node {node}"));
+    let jitter = match settings.jitter {
+        Duration::ZERO => String::new(),
+        jitter => format!(", from a host that is up to {} ms late", ms(jitter)),
+    };
+    let beside = match (settings.sdo, settings.emcy) {
+        (None, None) => "",
+        (Some(_), None) => ", and an SDO request with its answer may come just then",
+        (None, Some(_)) => ", and an EMCY of each node may come just then",
+        (Some(_), Some(_)) => ", and an SDO request with its answer and an EMCY of each node may come just then",
+    };
+    let alone = match cycle.fits() {
+        true if beside.is_empty() => "",
+        true => "; without SDO and EMCY nothing is late",
+        false => "; it does not fit without SDO and EMCY either",
+    };
+    Some(format!(
+        "the load of {:.1} % is an average over time, and a frame is late by its worst moment: the PDOs of all drives are sent at SYNC at \
+         once{jitter}{beside}. Then {}{whose} is there up to {} ms after it was due{alone}",
+        100.0 * all.load,
+        late.purpose,
+        ms(after)
+    ))
 }
 
 /// What a drive sends: as it is set up, or as the machine file has it set up, and in the mode that is asked for or else in the cycles of

@@ -152,7 +152,7 @@ pub fn too_full(nodes: &[NodeTraffic], settings: &Settings, bitrate: Bitrate, al
     }
     let ms = |time: Duration| Shown(time.as_secs_f64() * 1e3);
     let rate = bitrate.bits_per_second() / 1000;
-    let shortest = match shortest_cycle(nodes, settings, bitrate) {
+    let shortest = match shortest_cycle(nodes, &settings.cycle_alone(), bitrate) {
         Some(period) => format!("take a period of {} ms, the shortest that fits at {rate} kbit/s", ms(period)),
         None => "no period up to 100 ms fits".to_owned(),
     };

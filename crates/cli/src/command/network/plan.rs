@@ -96,7 +96,11 @@ impl Plan {
         let report = session::run(&global, async |context| self.plan(context, bitrate).await)?;
         let failure = (!report.ok).then(|| {
             let failure = Failure::new("some frames are late").of_kind("bus_load");
-            failure.next("take a longer --cycle, a higher --bitrate or fewer drives")
+            let failure = failure
+                .next("take a longer --cycle, a higher --bitrate or fewer drives; the notes say why they are late");
+            failure.next(
+                "--sdo 0s and --emcy 0s plan the cycle alone, as it runs while nothing is asked and nothing fails",
+            )
         });
         format.print_judged(&report, failure)
     }

@@ -256,12 +256,12 @@ pub fn plan(nodes: &[NodeTraffic], settings: &Settings, bitrate: Bitrate) -> Pla
     Plan { frames: planned, load, remarks }
 }
 
-/// The shortest cycle, in steps of 0.5 ms to 10 ms and then longer ones, in which everything is there in time that is sent beside no SDO
-/// and no EMCY; `None`: there is none up to 100 ms.
+/// The shortest cycle, in steps of 0.5 ms to 10 ms and then longer ones, in which everything is there in time, with these settings
+/// but for their cycle; `None`: there is none up to 100 ms.
 pub fn shortest_cycle(nodes: &[NodeTraffic], settings: &Settings, bitrate: Bitrate) -> Option<Duration> {
     let half_ms = (1..=20).chain([40, 100, 200]);
     let mut cycles = half_ms.map(|half_ms| Duration::from_micros(500) * half_ms);
-    cycles.find(|cycle| plan(nodes, &Settings { cycle: *cycle, ..settings.cycle_alone() }, bitrate).fits())
+    cycles.find(|cycle| plan(nodes, &Settings { cycle: *cycle, ..*settings }, bitrate).fits())
 }
 
 /// How many nodes like these, over and over in their order, fit the bus at this cycle; at most 127. The PDOs of those that are
