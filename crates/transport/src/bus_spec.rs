@@ -155,7 +155,19 @@ fn path(text: &str) -> Result<PathBuf, String> {
     if text.is_empty() { Err("the file name is missing".to_owned()) } else { Ok(PathBuf::from(text)) }
 }
 
+/// Whether this is what Windows calls a serial port: `COM3`.
+fn is_com_port(name: &str) -> bool {
+    let is_com = name.get(..3).is_some_and(|start| start.eq_ignore_ascii_case("COM"));
+    is_com && name.len() > 3 && name[3..].bytes().all(|byte| byte.is_ascii_digit())
+}
+
 fn parse_interface(name: &str) -> Result<BusSpec, String> {
+    if is_com_port(name) {
+        return Err(format!(
+            "it is a serial port of Windows; an adapter there that speaks slcan is slcan://{name}?bitrate=500k; one of \
+             another kind is reached through a server, socketcand://HOST:PORT/can0"
+        ));
+    }
     let allowed = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'_' | b'-');
     match name.as_bytes() {
         [b'a'..=b'z' | b'A'..=b'Z', rest @ ..]
@@ -179,7 +191,9 @@ fn parse_socketcand(rest: &str) -> Result<BusSpec, String> {
 }
 
 fn parse_slcan(rest: &str) -> Result<BusSpec, String> {
-    let rest = rest.strip_prefix("//").ok_or("expected slcan:///dev/ttyACM0?bitrate=500k or slcan://HOST:PORT")?;
+    let rest = rest
+        .strip_prefix("//")
+        .ok_or("expected slcan:///dev/ttyACM0?bitrate=500k, slcan://COM3?bitrate=500k or slcan://HOST:PORT")?;
     let (place, options) = rest.split_once('?').unwrap_or((rest, ""));
     let mut bitrate = None;
     let mut baud = None;
@@ -193,11 +207,11 @@ fn parse_slcan(rest: &str) -> Result<BusSpec, String> {
             _ => return Err(format!("unknown option '{option}'; known are bitrate=500k and baud=115200")),
         }
     }
-    if place.starts_with('/') {
+    if place.starts_with('/') || is_com_port(place) {
         return Ok(BusSpec::SlcanSerial { path: place.to_owned(), bitrate, baud: baud.unwrap_or(DEFAULT_BAUD) });
     }
     if !place.contains(':') {
-        return Err("expected HOST:PORT, or a device with three slashes such as slcan:///dev/ttyACM0".to_owned());
+        return Err("expected HOST:PORT, a device with three slashes such as slcan:///dev/ttyACM0, or a port of Windows such as slcan://COM3".to_owned());
     }
     if baud.is_some() {
         return Err("baud is for serial devices, not for TCP".to_owned());
@@ -368,6 +382,10 @@ mod tests {
                 BusSpec::SlcanSerial { path: "/dev/ttyACM0".into(), bitrate: Some(Bitrate::K500), baud: 115_200 },
             ),
             (
+                "slcan://COM3?bitrate=500k",
+                BusSpec::SlcanSerial { path: "COM3".into(), bitrate: Some(Bitrate::K500), baud: 115_200 },
+            ),
+            (
                 "slcan:///dev/ttyS1?bitrate=1M&baud=57600",
                 BusSpec::SlcanSerial { path: "/dev/ttyS1".into(), bitrate: Some(Bitrate::M1), baud: 57_600 },
             ),
@@ -387,6 +405,8 @@ mod tests {
             ("0can", "expected sim,"),
             ("a-name-that-is-too-long", "expected sim,"),
             ("tcp://localhost:1", "expected sim,"),
+            ("COM3", "a serial port of Windows; an adapter there that speaks slcan is slcan://COM3?bitrate=500k"),
+            ("slcan:COM3", "slcan://COM3?bitrate=500k"),
             ("sim:", "file name is missing"),
             ("log:", "file name is missing"),
             ("socketcand:localhost", "expected socketcand://HOST:PORT/can0"),
