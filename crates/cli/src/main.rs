@@ -28,6 +28,7 @@ mod session;
 mod signals;
 #[cfg(test)]
 mod tests;
+mod tips;
 mod wire;
 mod word_order;
 
@@ -35,7 +36,7 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::builder::StyledStr;
-use clap::error::{ContextKind, ContextValue};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, FromArgMatches};
 use clap_complete::env::CompleteEnv;
@@ -119,7 +120,10 @@ fn matches() -> Result<ArgMatches, clap::Error> {
     let meant = meant.map(|text| format!("did you mean: {text}"));
     match meant.or_else(|| senses::stop_of_one(&command, &words)) {
         Some(tip) => suggest(&mut error, vec![tip]),
-        None => suggest_by_sense(&mut error, &command, &words),
+        None => match tips::further(&command, &words, error.kind()) {
+            Some(further) => return Err(further),
+            None => suggest_by_sense(&mut error, &command, &words),
+        },
     }
     Err(error)
 }
@@ -143,8 +147,16 @@ fn suggest(error: &mut clap::Error, tips: Vec<String>) {
     error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tips));
 }
 
-/// In place of commands that are spelt like an unknown one, those that do what it is the word for elsewhere.
+/// In place of commands that are spelt like an unknown one, those that do what it is the word for elsewhere. Where something is
+/// missing, how it is typed.
 fn suggest_by_sense(error: &mut clap::Error, command: &clap::Command, words: &[String]) {
+    if error.kind() == ErrorKind::MissingRequiredArgument {
+        let examples = tips::examples(command, words);
+        if !examples.is_empty() {
+            suggest(error, examples);
+        }
+        return;
+    }
     // A wrong command of `eds` is taken for a model.
     let model = words.iter().position(|word| word == "eds").and_then(|eds| words.get(eds + 1));
     let (word, is_model) = match (error.get(ContextKind::InvalidSubcommand), error.get(ContextKind::InvalidValue)) {
@@ -158,16 +170,20 @@ fn suggest_by_sense(error: &mut clap::Error, command: &clap::Command, words: &[S
         _ => Vec::new(),
     };
     let place = words.iter().position(|other| *other == word);
-    let tips = place.and_then(|place| senses::tips(command, words, place));
+    let by_sense = place.and_then(|place| senses::tips(command, words, place));
     // The spelling of a model has its own suggestion.
-    match tips {
+    match by_sense {
         Some(tips) => return suggest(error, tips),
         None if is_model => return,
         None => {}
     }
     let names: Vec<_> = by_spelling.into_iter().filter(|name| senses::may_be_meant(&word, name)).collect();
     if !names.is_empty() {
-        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(names));
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(tips::alike(&word, names)));
+    } else if let Some(place) = place
+        && let Some(tip) = tips::commands(command, &words[..place])
+    {
+        suggest(error, vec![tip]);
     }
 }
 

@@ -78,7 +78,7 @@ pub(crate) fn mend(command: &Command, words: &[String], error: ErrorKind) -> Opt
 }
 
 /// The words with that at `node` directly behind that at `at`.
-fn node_behind(words: &[String], at: usize, node: usize) -> Vec<String> {
+pub(crate) fn node_behind(words: &[String], at: usize, node: usize) -> Vec<String> {
     let mut order: Vec<String> = words.to_vec();
     let moved = order.remove(node);
     let at = if node < at { at - 1 } else { at };

@@ -74,6 +74,11 @@ fn by_name(table: &'static Table, name: &str) -> Result<&'static Entry, String> 
             second.mux()
         )),
         (None, _) => {
+            if name.len() > 4 && name.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+                return Err(format!(
+                    "'{name}' is longer than an index: expected 4 hexadecimal digits, and a sub-index of 2 behind a colon, e.g. 6064 or 2030:0E"
+                ));
+            }
             let names = near(name, table.rows().iter().map(|row| row.name));
             Err(format!("this model has no object named '{name}'{}", did_you_mean(&names)))
         }
@@ -114,6 +119,7 @@ mod tests {
         assert_eq!(find("position_actual_value"), Ok(Mux::new(0x6064, 0)));
         assert_eq!(find("Position-Actual-Value"), Ok(Mux::new(0x6064, 0)));
         assert!(find("position_actual_vale").unwrap_err().contains("did you mean position_actual_value?"));
+        assert!(find("FFFFF").unwrap_err().contains("longer than an index: expected 4 hexadecimal digits"));
         assert!(find("highest_sub_index").unwrap_err().contains("1401h:00"));
         assert!(object("velocity").unwrap().resolve(None).err().unwrap().contains("--model"));
     }

@@ -81,8 +81,8 @@ pub(super) fn advice(code: AbortCode, access: Access) -> &'static str {
             "This model has no such object: check index and \
              sub-index against its object dictionary"
         }
-        AbortCode::READ_ONLY => "The object can only be read",
-        AbortCode::WRITE_ONLY => "The object can only be written",
+        AbortCode::READ_ONLY => "The object can only be read: `ferrodrive objects NODE` shows which can be written",
+        AbortCode::WRITE_ONLY => "The object can only be written: `ferrodrive objects NODE` shows which can be read",
         AbortCode::INVALID_VALUE | AbortCode::VALUE_TOO_HIGH | AbortCode::VALUE_TOO_LOW => {
             "Give a value within the limits of its object dictionary"
         }
