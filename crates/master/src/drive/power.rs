@@ -74,7 +74,8 @@ impl Drive {
         result
     }
 
-    /// Stops by the drive's shutdown ramp and takes the power off the motor: Switch on disabled.
+    /// Stops by the drive's shutdown ramp and takes the power off the motor: Switch on disabled. What this program has set in motion
+    /// and does not stand then, since it coasts, stays among [`Network::moved`](crate::Network::moved).
     ///
     /// # Errors
     /// [`Error::NotReached`]; those of the SDO requests.
@@ -94,7 +95,10 @@ impl Drive {
             let command = PowerCommand::DisableVoltage;
             self.wait_for(INTENT, command, STEP_TIMEOUT, |state| state == PowerState::SwitchOnDisabled).await?;
         }
-        self.note_stopped();
+        // A motor without power may coast, or be turned by its load: it is still in motion until it was seen to stand.
+        if self.is_moved() && self.stands().await {
+            self.note_stopped();
+        }
         Ok(())
     }
 

@@ -194,6 +194,28 @@ impl Drive {
         self.node.network().note_stopped(self.node.id(), self.place(CONTROLWORD));
     }
 
+    /// Whether this program has set it in motion, and has not seen it stand since.
+    pub(super) fn is_moved(&self) -> bool {
+        let own = self.as_moved();
+        let axes = self.node.network().moved_axes();
+        axes.iter().any(|axis| (axis.node, axis.controlword) == (own.node, own.controlword))
+    }
+
+    /// Whether the shaft of an axis without power is seen to stand, now and for some looks.
+    pub(super) async fn stands(&self) -> bool {
+        let (mut stop_sent, mut rest) =
+            (Some(self.node.network().now()), Rest { looks: 0, position: None, at_fault: false });
+        // The first look at one that shows its position alone has nothing to compare it with.
+        for _ in 0..=STANDSTILL_LOOKS {
+            match self.look_at_rest(&mut stop_sent, &mut rest).await {
+                Ok(true) => return !rest.at_fault || self.check_sight("see it stand").await.is_ok(),
+                Ok(false) => self.node.network().sleep(POLL).await,
+                Err(_) => return false,
+            }
+        }
+        false
+    }
+
     /// Stops the drive and waits until it is seen to stand; how long that took. `silence` is how long it may be silent at first.
     pub(super) async fn come_to_rest(&self, silence: Duration) -> Result<Duration, Error> {
         const INTENT: &str = "bring it to rest";

@@ -14,7 +14,7 @@ use master::pdo::{PdoConfig, TimerUnits};
 use master::units::{Amperes, Counts, Degrees, Ramp, Rpm, Turns};
 use master::{Drive, Error, Network, join_all};
 use sim::machine::zlac8030l;
-use sim::{World, block_on};
+use sim::{Place, World, block_on};
 
 const TPDO1: PdoId = PdoId { direction: Direction::Tpdo, number: PdoNumber::FIRST };
 
@@ -52,6 +52,35 @@ fn it_enables_and_disables() {
     assert_eq!(block_on(&mut world, drives[0].state()).unwrap().unwrap().power, Some(PowerState::OperationEnabled));
     block_on(&mut world, drives[0].disable()).unwrap().unwrap();
     assert_eq!(block_on(&mut world, drives[0].state()).unwrap().unwrap().power, Some(PowerState::SwitchOnDisabled));
+}
+
+/// 605Bh = 0: the motor is let go at once (quick start guide V1.00, 6.3), and a wheel with a load coasts for seconds.
+#[test]
+fn a_motor_that_coasts_without_power_counts_as_moved_until_it_was_seen_to_stand() {
+    let (mut world, network, drives) = world(&[4]);
+    world.apply(Place::node(4), &"load inertia 0.1".parse().unwrap()).unwrap().unwrap();
+    let shaft_rpm = |world: &mut World| world.report(4).unwrap().velocity_rpm.abs();
+    block_on(&mut world, drives[0].node().write(mux(0x605B, 0), 0_i16)).unwrap().unwrap();
+    block_on(&mut world, drives[0].velocity(Rpm(100.0), slowly())).unwrap().unwrap();
+    block_on(&mut world, drives[0].disable()).unwrap().unwrap();
+    assert_eq!(block_on(&mut world, drives[0].state()).unwrap().unwrap().power, Some(PowerState::SwitchOnDisabled));
+    assert!(shaft_rpm(&mut world) > 10.0, "it coasts");
+    assert!(network.moved().contains(node(4)));
+    // 0.1 kg m2 at 10.5 rad/s against 0.1 N m of friction and more: some 10 s.
+    world.run_for(Duration::from_secs(20));
+    for stopped in block_on(&mut world, network.stop_all_moved()).unwrap() {
+        stopped.outcome.unwrap();
+    }
+    assert!(shaft_rpm(&mut world) < 1.0 && network.moved().is_empty());
+}
+
+/// One that its ramp has stopped is seen to stand at once.
+#[test]
+fn a_motor_that_is_stopped_by_its_shutdown_ramp_does_not_count_as_moved() {
+    let (mut world, network, drives) = world(&[4]);
+    block_on(&mut world, drives[0].velocity(Rpm(100.0), slowly())).unwrap().unwrap();
+    block_on(&mut world, drives[0].disable()).unwrap().unwrap();
+    assert!(world.report(4).unwrap().velocity_rpm.abs() < 1.0 && network.moved().is_empty());
 }
 
 #[test]
