@@ -37,7 +37,7 @@ pub(crate) struct Reading {
     pub(crate) manual: String,
     /// What the drive here does.
     pub(crate) here: String,
-    /// Why.
+    /// The reason for it.
     pub(crate) why: String,
     /// How sure that is; empty where nothing was to be decided.
     pub(crate) sure: String,

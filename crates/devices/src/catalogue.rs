@@ -39,7 +39,7 @@ impl<'a> Catalogue<'a> {
         Self(known)
     }
 
-    /// How many.
+    /// The number of models.
     pub const fn count(self) -> usize {
         self.0.len()
     }

@@ -246,9 +246,9 @@ impl ParameterStorage {
 /// A value to write to an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Write {
-    /// Where to.
+    /// The object that is written.
     pub object: Mux,
-    /// What.
+    /// The value, in as many bytes as the object has.
     pub value: u32,
 }
 

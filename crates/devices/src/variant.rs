@@ -89,7 +89,7 @@ impl Choice {
 /// A value of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Preset {
-    /// Where.
+    /// The object.
     pub object: Mux,
     /// What, in the object's own unit.
     pub value: i64,

@@ -104,7 +104,7 @@ impl<'a> IntoIterator for &'a Findings {
 pub struct Refusal {
     /// The line, from 1; 0 for the file as a whole.
     pub line: u32,
-    /// Why.
+    /// What keeps it from being read, as a sentence.
     pub reason: String,
     /// What to do.
     pub next: String,

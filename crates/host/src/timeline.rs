@@ -40,7 +40,7 @@ impl Kind {
 /// Something that happened.
 #[derive(Clone, Debug)]
 pub struct TimelineEvent {
-    /// When.
+    /// The time of the bus.
     pub at: Instant,
     /// Of which node.
     pub node: NodeId,

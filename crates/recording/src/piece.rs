@@ -45,7 +45,7 @@ pub enum Severity {
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mark {
-    /// When.
+    /// The time of the bus.
     pub at: Instant,
     /// To what: `node 4`; empty for the whole.
     pub of: Cow<'static, str>,
@@ -154,7 +154,7 @@ impl<T: Read + Write + Seek + Send> Target for T {}
 /// One signal over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// Which.
+    /// The signal, with its axis and unit.
     pub column: Column,
     /// Time in s and value, times ascending; not a number where there was none.
     pub points: Vec<(f64, f64)>,

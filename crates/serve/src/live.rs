@@ -36,7 +36,7 @@ enum OpenBus {
 /// The bus was lost, and with it the way to the drives.
 #[derive(Debug)]
 pub struct LostBus {
-    /// Why.
+    /// What the connection reported.
     pub error: BusError,
     /// The drives that had been set in motion: none of them was seen to stand.
     pub moving: Vec<Account>,

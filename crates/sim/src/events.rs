@@ -31,12 +31,12 @@ pub const MAX_WAITING: usize = 4096;
 /// One thing that happened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
-    /// When.
+    /// The time of the bus.
     pub at: Instant,
     /// At which drive, by the number under which it was added, and at which of its axes; of other stations on the bus the
     /// node-ID that their frame names. `None` for what is of no node.
     pub place: Option<Place>,
-    /// What.
+    /// What happened.
     pub kind: EventKind,
 }
 
@@ -101,7 +101,7 @@ pub enum EventKind {
     /// An attempt to send failed: an error frame. Of attempts in a row at one frame the first, second, fourth, eighth and so
     /// on are reported.
     BusError {
-        /// Why.
+        /// What the controllers took for an error.
         cause: ErrorCause,
         /// What was to be sent.
         frame: Frame,

@@ -73,7 +73,7 @@ pub enum WireEvent {
     },
     /// A controller changed its error state.
     State {
-        /// When.
+        /// The time of the bus.
         at: Instant,
         /// Number of the controller.
         controller: usize,

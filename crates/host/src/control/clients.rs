@@ -57,9 +57,9 @@ pub enum Outcome {
 /// A request to move the world that is not answered yet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pending {
-    /// Whose.
+    /// The client that is answered when it is done.
     pub client: ClientNumber,
-    /// How far.
+    /// How far the world is to be moved.
     pub run: Run,
     id: Option<Id>,
 }

@@ -14,9 +14,9 @@ use words::suggest::{did_you_mean, near};
 /// One signal of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Channel {
-    /// Where.
+    /// The axis.
     pub place: Place,
-    /// What.
+    /// The quantity.
     pub signal: Signal,
 }
 

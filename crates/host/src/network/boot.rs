@@ -52,7 +52,7 @@ pub struct BootedNode {
 /// One step of the boot-up of a node.
 #[derive(Debug, Serialize)]
 pub struct BootStep {
-    /// Which.
+    /// Its name, such as `identity`.
     pub step: &'static str,
     /// The object that it is about.
     pub object: Option<String>,

@@ -18,7 +18,7 @@ pub struct Heard {
     pub service: &'static str,
     /// Who sends it, or whom it is for.
     pub node: Option<u8>,
-    /// How often.
+    /// Number of its frames.
     pub count: u64,
     /// What it means for a scan.
     pub text: String,

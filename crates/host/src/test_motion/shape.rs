@@ -19,7 +19,7 @@ pub enum Shape {
     /// By an angle and back, each way as fast as velocity and acceleration allow, without a jump of the acceleration at its ends
     /// beyond that (a polynomial of the fifth degree).
     BackAndForth {
-        /// How far.
+        /// The angle, in turns.
         by_turns: f64,
     },
     /// Velocity up at the acceleration that is allowed, kept, down, and the same backwards.
@@ -35,7 +35,7 @@ pub enum Shape {
         amplitude_turns: f64,
         /// Periods in a second.
         hz: f64,
-        /// How many.
+        /// Number of periods.
         periods: u32,
     },
     /// As [`Sine`](Self::Sine), with a frequency that rises evenly; the time is lengthened to whole periods, so that it ends at rest.

@@ -37,9 +37,9 @@ pub struct Intended {
 /// What is moved in cycles, and where the file says its period.
 #[derive(Clone, Debug)]
 pub struct MovedAt {
-    /// What.
+    /// The cycle: its period, and the drives that are moved in it.
     pub cycle: CyclePlan,
-    /// Where.
+    /// The place of the period in the file.
     pub at: Place,
 }
 

@@ -45,7 +45,7 @@ pub struct LiveNode {
 /// An object that has not yet what the file wants.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LiveDeviation {
-    /// Which.
+    /// The object, such as `6083h:00`.
     pub object: String,
     /// What the file writes, hexadecimal.
     pub expected: String,

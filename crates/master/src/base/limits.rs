@@ -72,7 +72,7 @@ pub enum BaseError {
     /// Not a length.
     #[error("{what} is {value}: state a finite length above 0, in metres")]
     BadLength {
-        /// Which.
+        /// The name of the length.
         what: &'static str,
         /// What was given.
         value: f64,
@@ -80,7 +80,7 @@ pub enum BaseError {
     /// A limit that allows nothing or that bounds nothing.
     #[error("the limit {what} is {value}: state a finite number above 0")]
     BadLimit {
-        /// Which.
+        /// The name of the limit.
         what: &'static str,
         /// What was given.
         value: f64,

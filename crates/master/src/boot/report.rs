@@ -19,7 +19,7 @@ pub struct BootReport {
 /// The result of the boot-up of one node.
 #[derive(Clone, Debug)]
 pub struct NodeReport {
-    /// Which.
+    /// The node.
     pub node: NodeId,
     /// Without it the network does not start.
     pub mandatory: bool,

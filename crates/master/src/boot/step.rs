@@ -11,7 +11,7 @@ use crate::error::Hints;
 /// One step of the boot-up of a node.
 #[derive(Clone, Debug)]
 pub struct Step {
-    /// Which.
+    /// What the step does.
     pub kind: StepKind,
     /// The object that it was about, if it was about one.
     pub object: Option<Mux>,
@@ -105,7 +105,7 @@ pub enum Found {
     },
     /// Nothing of the kind that was waited for.
     Nothing {
-        /// How long.
+        /// For how long.
         waited: Duration,
         /// What was last heard of it.
         last: Option<Heard>,

@@ -17,7 +17,7 @@ use crate::parameters::{is_command, verify};
 /// A node that was left as it is, and does not have what was planned.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unconfigured {
-    /// Which.
+    /// The node.
     pub node: NodeId,
     /// The objects that have another value.
     pub objects: Vec<Mux>,

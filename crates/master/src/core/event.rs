@@ -46,7 +46,7 @@ pub enum Event {
 /// What has not come from a node that is watched, and for how long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Silence {
-    /// How long.
+    /// Time since it was last heard.
     pub time: Duration,
     /// It was asked for, by node guarding; else it is a heartbeat.
     pub asked: bool,

@@ -117,8 +117,8 @@ pub enum Failure {
 /// A request or timer that has ended.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// Which one.
+    /// Its ticket, as it was handed out when it began.
     pub ticket: Ticket,
-    /// How.
+    /// Its answer, its error or its end.
     pub outcome: Outcome,
 }

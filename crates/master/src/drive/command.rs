@@ -53,7 +53,7 @@ pub enum Motion {
         relative: bool,
         /// Largest speed on the way; as the drive has it with `None`.
         speed: Option<Along<Rpm>>,
-        /// How.
+        /// Its ramps, whether the target is waited for, and for how long.
         manner: Manner,
     },
     /// Applies a motor current.

@@ -100,7 +100,7 @@ pub enum Error {
     NoBootUp {
         /// The node waited for.
         node: NodeId,
-        /// How long.
+        /// For how long it was waited for.
         waited: Duration,
         /// What may explain it.
         hints: Hints,

@@ -68,7 +68,7 @@ pub enum GatewayCommand {
 pub struct Unreadable {
     /// The client's number for it, 0 where it has none.
     pub sequence: u32,
-    /// Why.
+    /// The error of CiA 309-3 that answers it.
     pub refusal: Refusal,
 }
 

@@ -102,7 +102,7 @@ pub enum GroupError {
          100 ms, and points that are waited for by the capacity"
     )]
     StreamOption {
-        /// Which.
+        /// The name of the option.
         option: &'static str,
         /// What was given.
         given: usize,

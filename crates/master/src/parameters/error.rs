@@ -55,7 +55,7 @@ pub enum Unfit {
     /// It cannot be read, so that it could not be put back.
     #[error("{object}: {cause}")]
     Unreadable {
-        /// Which.
+        /// The object.
         object: Mux,
         /// What the node says.
         cause: Error,
@@ -63,7 +63,7 @@ pub enum Unfit {
     /// It cannot be written, and has another value.
     #[error("{object} {name}: it can only be read, and has {}", hex(has))]
     ReadOnly {
-        /// Which.
+        /// The object.
         object: Mux,
         /// Its name.
         name: &'static str,
@@ -73,7 +73,7 @@ pub enum Unfit {
     /// The value has another length.
     #[error("{object}: {given} bytes are given, and it has {expected}")]
     Length {
-        /// Which.
+        /// The object.
         object: Mux,
         /// Bytes that it has.
         expected: usize,
@@ -129,7 +129,7 @@ pub struct ApplyError {
     pub step: usize,
     /// How many there were to be.
     pub of: usize,
-    /// Why.
+    /// What went wrong with it.
     pub why: Why,
     /// What the object takes now, where its model has that.
     pub limits: Option<Limits>,

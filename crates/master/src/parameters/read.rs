@@ -20,7 +20,7 @@ pub struct Backup {
 /// An object that has not the value that it should have.
 #[derive(Clone, Debug)]
 pub struct Deviation {
-    /// Which.
+    /// The object.
     pub object: Mux,
     /// What it should have.
     pub wanted: Vec<u8>,

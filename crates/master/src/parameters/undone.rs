@@ -20,7 +20,7 @@ pub struct Undone {
 /// An object that has not what it had.
 #[derive(Clone, Debug)]
 pub struct NotPutBack {
-    /// Which.
+    /// The object.
     pub object: Mux,
     /// What it had.
     pub had: Vec<u8>,

@@ -45,7 +45,7 @@ impl std::fmt::Display for Left {
 /// An object in which two lists differ.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
-    /// Which.
+    /// The object.
     pub object: Mux,
     /// Its value in the first list.
     pub first: Option<Vec<u8>>,

@@ -17,7 +17,7 @@ pub enum PdoUnfit {
     NoSuchPdo {
         /// The model.
         model: &'static str,
-        /// Which.
+        /// The PDO that was named.
         pdo: PdoId,
         /// Those that it has.
         has: String,
@@ -27,13 +27,13 @@ pub enum PdoUnfit {
     Fixed {
         /// The model.
         model: &'static str,
-        /// Which.
+        /// The PDO that was named.
         pdo: PdoId,
     },
     /// A frame has 64 bits.
     #[error("{pdo} would have {bits} bits: {objects}. A PDO has 64")]
     TooLong {
-        /// Which.
+        /// The PDO that would be too long.
         pdo: PdoId,
         /// Bits asked for.
         bits: u32,
@@ -45,7 +45,7 @@ pub enum PdoUnfit {
     TooMany {
         /// The model.
         model: &'static str,
-        /// Which.
+        /// The PDO that would have too many.
         pdo: PdoId,
         /// Objects asked for.
         objects: usize,
@@ -55,13 +55,13 @@ pub enum PdoUnfit {
     /// The object may not be mapped so.
     #[error("{object} {name} cannot be in {pdo}: {why}")]
     NotMappable {
-        /// Which.
+        /// The PDO that it was to be in.
         pdo: PdoId,
         /// The object.
         object: Mux,
         /// Its name.
         name: &'static str,
-        /// Why.
+        /// The reason.
         why: &'static str,
     },
     /// The model has no such object.
@@ -75,7 +75,7 @@ pub enum PdoUnfit {
     /// The value is not taken.
     #[error("{pdo}: {asked} is not taken for the {what}; it takes {takes}")]
     NotTaken {
-        /// Which.
+        /// The PDO.
         pdo: PdoId,
         /// What was asked for.
         asked: String,

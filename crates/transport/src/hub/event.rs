@@ -29,23 +29,23 @@ impl fmt::Display for ClientId {
 pub enum HubEvent {
     /// A client connected.
     Joined {
-        /// Who.
+        /// The client.
         client: ClientId,
         /// The protocol that it came by, and where from; `None` for a bus that was joined ([`Hub::join`](super::Hub::join)).
         peer: Option<(Protocol, SocketAddr)>,
     },
     /// A client sends a frame. Answer it with [`Hub::broadcast`](super::Hub::broadcast) or [`Hub::discard`](super::Hub::discard), now or later.
     Frame {
-        /// Who.
+        /// The client that sends it.
         client: ClientId,
-        /// What.
+        /// The frame.
         frame: Frame,
     },
     /// A client is gone. Its frames that came before still count.
     Left {
-        /// Who.
+        /// The client.
         client: ClientId,
-        /// Why.
+        /// Why its connection ended.
         reason: LeaveReason,
     },
 }

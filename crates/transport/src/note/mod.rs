@@ -69,12 +69,12 @@ pub enum Note {
     },
     /// Frames of others were lost, because they were not read fast enough.
     Overrun {
-        /// How many, where that is known.
+        /// Their number, where it is known.
         lost: Option<u32>,
     },
     /// Datagrams of a peer did not arrive: UDP says nothing of those, but they are numbered.
     DatagramsLost {
-        /// How many.
+        /// Their number.
         count: u8,
     },
     /// Frames of ours were lost: the queue of the controller or the adapter was full, or it refused them.

@@ -75,7 +75,7 @@ pub enum Heard {
     Carried {
         /// The frame.
         frame: Frame,
-        /// When.
+        /// The end of its last bit.
         at: Instant,
         /// Whose; `None` for the world's own stations.
         from: Option<ClientId>,
@@ -84,12 +84,12 @@ pub enum Heard {
     Error {
         /// What a controller reports of it.
         error: ErrorFrame,
-        /// When.
+        /// The time of the error frame.
         at: Instant,
     },
     /// The world gave up an injected frame.
     Lost {
-        /// Whose.
+        /// The client that injected it.
         from: ClientId,
     },
 }

@@ -66,7 +66,7 @@ pub enum Cyclic {
 /// A stop, which lies over a task: when it is taken away the task goes on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// How fast.
+    /// By which ramp it comes to rest, or whether it coasts.
     pub braking: Braking,
     /// The position stays on the planned way; or else it is given up, and the shaft held where it comes to rest.
     pub on_path: bool,

@@ -48,7 +48,7 @@ pub struct Refused {
     pub object: String,
     /// Its name, if the model has it.
     pub name: Option<&'static str>,
-    /// Why.
+    /// The reason that the drive or the model gives.
     pub why: String,
 }
 
@@ -139,7 +139,7 @@ pub struct LeftOut {
     pub object: String,
     /// Its name, if the model has it.
     pub name: Option<&'static str>,
-    /// Why.
+    /// Why no file of parameters has it.
     pub why: String,
 }
 

@@ -11,9 +11,9 @@ pub enum MergeError<E> {
     /// A part cannot be used.
     #[error("{error}")]
     Part {
-        /// Which, from 0 on in the order in which they were given.
+        /// Its place in the order in which the parts were given, from 0 on.
         part: usize,
-        /// Why.
+        /// Why it cannot be used.
         error: ResultsError,
     },
     /// There are not as many parts as the first of them says, or one is there twice.

@@ -92,7 +92,7 @@ pub enum OrderError {
     Preset {
         /// The value.
         preset: Preset,
-        /// Why.
+        /// Why the store cannot have it.
         error: PresetError,
     },
 }
