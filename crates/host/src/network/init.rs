@@ -237,7 +237,7 @@ fn alternatives(models: &[String]) -> String {
 /// The text of the file.
 fn machine_file(nodes: &[InitNode], bitrate: Option<Bitrate>) -> String {
     let mut text = "# A machine file, begun by `ferrodrive init`. docs/machine-file.md describes each key; `ferrodrive check FILE` checks it.\n\
-                    # Lines that begin with # and no blank are examples: remove the #, and put in what your machine has.\n\n"
+                    # Lines that begin with # and without a space after it are examples: remove the #, and put in the values of your machine.\n\n"
         .to_owned();
     let _ = match bitrate {
         Some(rate) => writeln!(text, "bitrate = \"{rate}\""),

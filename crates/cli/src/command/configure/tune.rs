@@ -28,7 +28,7 @@ enum WhichLoop {
     Position,
 }
 
-/// Find gains for the loops of a drive: measure it, try them on its twin, then on the drive
+/// Find gains for the loops of a drive: measured, tried on its twin, then on the drive
 ///
 /// The shaft turns to and fro at steady speeds, and then at one speed with an excitation on top that grows to a share of
 /// --current; that of a joint, whose loops are not seen from outside, is turned round by its own ramps instead. The motion stops where it reaches --current or --travel. Afterwards the drive has the parameters that it had,

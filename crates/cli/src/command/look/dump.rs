@@ -424,7 +424,7 @@ pub(crate) fn no_log(path: &Path, form: LogFormat) -> Failure {
 fn without_frames(what: String) -> Failure {
     Failure::new(what)
         .of_kind("no_log")
-        .next("a log is recognised by its first bytes, then by their extension: .log (candump), .asc, .blf, .trc, .pcap, .pcapng")
+        .next("a log is recognised by its first bytes, then by its extension: .log (candump), .asc, .blf, .trc, .pcap, .pcapng")
         .next("candump -L can0 writes one")
 }
 
