@@ -119,7 +119,7 @@ impl Note {
                 Some("is the bit rate right? `ip -details link show can0` shows that of an interface")
             }
             Self::NoAcknowledge => {
-                Some("is another node on, is the bus terminated at both ends, has everybody the same bit rate?")
+                Some("is another node on, is the bus terminated at both ends, do all nodes have the same bit rate?")
             }
             Self::State(ControllerState::BusOff) => Some(
                 "check bit rate, termination and wiring; then `ip link set can0 type can restart`, or `restart-ms 100` for \
