@@ -18,7 +18,7 @@ use crate::failure::Failure;
 use crate::frames::stamp::absolute;
 use plot::Paint;
 
-/// Write a report about a node: identity, differences from delivery, limits, faults, PDOs
+/// Write a report on a node: identity, differences from delivery, limits, faults, PDOs
 ///
 /// The report is one page of HTML that needs nothing else, and prints on A4. The node is only read: nothing is written to
 /// it, and it is not moved.
