@@ -11,8 +11,10 @@ fn real_time_is_entered_or_refused_with_what_to_do() {
     let drive = ["--realtime", "sim", "--drive", "zlac8030l@4"];
     let ended = ferrodrive(&[&drive[..], &["--speed", "10"]].concat());
     assert_eq!(ended.status, Some(2), "{}", ended.err);
-    let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+    let mut simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
+    // However late a busy machine looks, the speed is not reached.
+    assert_eq!(simulator.ask("4 rotor lock")["ok"], true);
     // A command with an answer, one without, and one that moves and is stopped when it fails.
     let commands: [(&[&str], i32); 3] = [
         (&["--timeout", "10s", "read", "4", "1000"], 0),
