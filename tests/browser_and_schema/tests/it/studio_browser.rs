@@ -13,6 +13,7 @@ mod safety;
 mod scope;
 mod sending;
 mod tour;
+mod turning;
 mod watch;
 mod world;
 
@@ -88,6 +89,9 @@ impl Stage {
         let mut capabilities = serde_json::Map::new();
         let keeping = json!({ "download.default_directory": &*profile, "download.prompt_for_download": false });
         capabilities.insert("goog:chromeOptions".into(), json!({ "args": arguments, "prefs": keeping }));
+        // The watchdog's, in ms: for the pages and scripts of a busy machine.
+        let patience = PATIENCE.as_millis() as u64;
+        capabilities.insert("timeouts".into(), json!({ "script": patience, "pageLoad": patience }));
         let driver_address = format!("127.0.0.1:{}", port.expect("it says its port"));
         let client = ClientBuilder::new(hyper_util::client::legacy::connect::HttpConnector::new())
             .capabilities(capabilities)
@@ -115,8 +119,14 @@ impl Stage {
             .unwrap_or_else(|error| panic!("{css}: {error}"))
     }
 
+    /// The state that the page shows is current: while it is stale, as on a busy machine, it sends nothing but a stop.
+    async fn sees(&self) {
+        self.find("body:not(.unseen)").await;
+    }
+
     /// Clicks. What the page draws anew between finding and clicking it is looked for again.
     async fn click(&self, css: &str) {
+        self.sees().await;
         // The watchdog's.
         let until = std::time::Instant::now() + PATIENCE;
         loop {
@@ -165,8 +175,14 @@ impl Stage {
         self.click("#take").await;
         self.find("#release").await;
         self.click("#tabs [data-name=motion]").await;
-        self.click(".motion .chooser button:nth-child(3)").await;
+        self.choose_drive("motion", 3).await;
         self.find(".motion fieldset:not([disabled])").await;
+    }
+
+    /// Chooses a drive in a view, by its place.
+    async fn choose_drive(&self, view: &str, place: usize) {
+        let button = format!(".{view} .chooser[aria-label=Drive] button:nth-child({place})");
+        self.click_for(&button, &format!("{button}[aria-pressed=true]")).await;
     }
 
     /// Chooses from a list of the page.
@@ -289,8 +305,7 @@ async fn a_drive_is_found_enabled_moved_and_stopped() {
     stage.click("#go-move").await;
     let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
     stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
-    stage.click("#go-turn").await;
-    stage.turns();
+    stage.turn().await;
     stage.shoot("motion").await;
     stage.client.perform_actions(press(' ')).await.expect("a key");
     stage.rests();
@@ -316,8 +331,7 @@ async fn a_sequence_is_played_and_runs_as_a_scenario(stage: &Stage) {
     let scenario = stage.saved("sequence.toml").await;
     let ran = processes::ferrodrive(&["run", &scenario.to_string_lossy(), "--json"]);
     assert_eq!(ran.status, Some(0), "{} {}", ran.out, ran.err);
-    stage.click("#sequence-play").await;
-    stage.turns();
+    stage.play().await;
     stage.client.perform_actions(press(Key::Escape.into())).await.expect("a press");
     stage.client.release_actions().await.expect("a release");
     stage.rests();
@@ -334,17 +348,14 @@ async fn a_jog_ends_with_the_button_the_key_and_the_tab() {
     let down = MouseActions::new("mouse".into())
         .then(PointerAction::MoveToElement { element: button, duration: None, x: 0.0, y: 0.0 })
         .then(PointerAction::Down { button: MOUSE_BUTTON_LEFT });
-    stage.client.perform_actions(down.clone()).await.expect("a press");
-    stage.turns();
+    stage.jog(async || stage.client.perform_actions(down.clone()).await.expect("a press")).await;
     stage.client.release_actions().await.expect("a release");
     stage.rests();
     stage.wheel("a ramp, not a quick stop", |wheel| wheel["drive"]["state"] == "Operation enabled");
-    stage.client.perform_actions(press(Key::Right.into())).await.expect("a press");
-    stage.turns();
+    stage.jog(async || stage.client.perform_actions(press(Key::Right.into())).await.expect("a press")).await;
     stage.client.release_actions().await.expect("a release");
     stage.rests();
-    stage.client.perform_actions(down).await.expect("a press");
-    stage.turns();
+    stage.jog(async || stage.client.perform_actions(down.clone()).await.expect("a press")).await;
     stage.client.close_window().await.expect("it closes");
     stage.rests();
     stage.wheel("a quick stop", |wheel| wheel["drive"]["state"] != "Operation enabled");

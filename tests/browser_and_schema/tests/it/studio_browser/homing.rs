@@ -9,7 +9,7 @@ use super::{Stage, press, speed};
 async fn homing_is_chosen_by_its_drawing_and_ends_with_a_stop() {
     let stage = Stage::open("homed").await;
     stage.take_the_wheel().await;
-    stage.click(".motion .chooser button:nth-child(2)").await;
+    stage.choose_drive("motion", 2).await;
     stage.click("#homing summary").await;
     stage.find("#homing .columns:not([hidden]) #home-method li[data-value='24']").await;
     stage.choose("#home-method", "24").await;

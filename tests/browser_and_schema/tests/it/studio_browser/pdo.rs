@@ -6,7 +6,7 @@ use fantoccini::actions::{InputSource, MOUSE_BUTTON_LEFT, MouseActions, PointerA
 use fantoccini::elements::Element;
 use fantoccini::key::Key;
 
-use super::Stage;
+use super::{Locator, RETRY, Stage};
 
 impl Stage {
     /// The header stays where it is: what lies below it cannot be clicked.
@@ -14,19 +14,23 @@ impl Stage {
         self.client.execute("scrollTo(0, 0)", Vec::new()).await.expect("it scrolls");
     }
 
-    /// Takes hold of the left part of one thing and lets it go over another.
-    async fn drag(&self, from: &str, to: &str) {
+    /// Takes hold of the left part of one thing and lets it go over another, until that has its effect: what the page moves meanwhile is
+    /// missed.
+    async fn drag(&self, from: &str, to: &str, wanted: &str) {
         const TIME: Option<Duration> = Some(Duration::from_millis(200));
         let over = |element: Element| PointerAction::MoveToElement { element, duration: TIME, x: -60.0, y: 0.0 };
-        let (from, to) = (self.find(from).await, self.find(to).await);
-        let pointer = MouseActions::new("mouse".into())
-            .then(over(from))
-            .then(PointerAction::Down { button: MOUSE_BUTTON_LEFT })
-            .then(PointerAction::MoveBy { duration: TIME, x: 4.0, y: 4.0 })
-            .then(over(to))
-            .then(PointerAction::Up { button: MOUSE_BUTTON_LEFT });
-        self.client.perform_actions(pointer).await.expect("a drag");
-        self.client.release_actions().await.expect("a release");
+        self.until(wanted, async || {
+            let pointer = MouseActions::new("mouse".into())
+                .then(over(self.find(from).await))
+                .then(PointerAction::Down { button: MOUSE_BUTTON_LEFT })
+                .then(PointerAction::MoveBy { duration: TIME, x: 4.0, y: 4.0 })
+                .then(over(self.find(to).await))
+                .then(PointerAction::Up { button: MOUSE_BUTTON_LEFT });
+            self.client.perform_actions(pointer).await.expect("a drag");
+            self.client.release_actions().await.expect("a release");
+            self.client.wait().at_most(RETRY).for_element(Locator::Css(wanted)).await.is_ok()
+        })
+        .await;
     }
 
     /// Nothing stands beyond the right edge of a window of this size.
@@ -49,7 +53,7 @@ async fn a_pdo_is_mapped_seen_in_the_trace_and_undone() {
     // ZLAC8030L quick start guide V1.00, chapter 9: it counts PDOs from 0, and its TPDOs carry nothing as delivered.
     let row = stage.says("tr[data-pdo=TPDO1]", "nothing is mapped into it").await;
     assert!(row.contains("manual: TPDO0") && row.contains("184h") && row.contains("on events"), "{row}");
-    stage.click("button[data-edit=TPDO1]").await;
+    stage.click_for("button[data-edit=TPDO1]", "#pdo-search").await;
     let search = stage.find("#pdo-search").await;
     search.send_keys("statusword").await.expect("typed");
     stage.click("button[data-add='6041h:00']").await;
@@ -70,10 +74,8 @@ async fn a_pdo_is_mapped_seen_in_the_trace_and_undone() {
     first.send_keys(&(Key::Alt + &char::from(Key::Up).to_string())).await.expect("a press");
     stage.find("li[data-mapped='6064h:00']:first-child").await;
     // And by the pointer: down, and up again.
-    stage.drag(".mapped li:first-child", ".mapped li:last-child").await;
-    stage.find("li[data-mapped='6041h:00']:first-child").await;
-    stage.drag(".mapped li:last-child", ".mapped li:first-child").await;
-    stage.find("li[data-mapped='6064h:00']:first-child").await;
+    stage.drag(".mapped li:first-child", ".mapped li:last-child", "li[data-mapped='6041h:00']:first-child").await;
+    stage.drag(".mapped li:last-child", ".mapped li:first-child", "li[data-mapped='6064h:00']:first-child").await;
     let timer = stage.find("#pdo-event_ms").await;
     timer.clear().await.expect("cleared");
     timer.send_keys("100").await.expect("typed");
@@ -100,8 +102,7 @@ async fn a_pdo_is_mapped_seen_in_the_trace_and_undone() {
     stage.click("#pdo-undo").await;
     stage.says("tr[data-pdo=TPDO1]", "nothing is mapped into it").await;
     // What a manual forbids is grey, with its section: M4230E17B50 and its siblings, 5.08.
-    stage.click(".pdo .chooser button:first-child").await;
-    stage.find(".pdo .chooser button:first-child[aria-pressed=true]").await;
+    stage.choose_drive("pdo", 1).await;
     stage.click_for("button[data-edit=TPDO1]", "#pdo-fixed").await;
     stage.says("#pdo-fixed", "Its mapping is fixed").await;
     stage.find(".mapped button[disabled]").await;

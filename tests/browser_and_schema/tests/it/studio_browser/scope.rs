@@ -101,7 +101,7 @@ async fn captures_stay_over_a_reload(stage: &Stage) {
 async fn the_scope_draws_any_object_that_passes() {
     let stage = Stage::open("scope_object").await;
     stage.click("#tabs [data-name=scope]").await;
-    stage.click(".scope .chooser button:nth-child(3)").await;
+    stage.choose_drive("scope", 3).await;
     // ZLAC8030L: 2029h is the bus voltage in 0.01 V, which the studio reads; 48 V is the supply as delivered.
     stage.choose("#scope-object", "4:2029:00").await;
     stage.find("[data-object='4:2029:00']").await;
@@ -160,8 +160,7 @@ async fn the_scope_waits_for_its_trigger_and_measures_the_step() {
     stage.choose("#trigger-mode", "once").await;
     stage.says("#trigger-status", "waiting").await;
     stage.click("#tabs [data-name=motion]").await;
-    stage.click("#go-turn").await;
-    stage.turns();
+    stage.turn().await;
     stage.click("#tabs [data-name=scope]").await;
     stage.says("#trigger-status", "fired at").await;
     // The part after it, 80 % of 10 s: while the wheel goes on turning.
@@ -212,8 +211,7 @@ async fn measures_what_comes_each_millisecond(stage: &Stage) {
     stage.says("#trigger-status", "waiting").await;
     stage.click("#tabs [data-name=motion]").await;
     stage.find("#velocity-ramp").await.send_keys("500").await.expect("typed");
-    stage.click("#go-turn").await;
-    stage.turns();
+    stage.turn().await;
     stage.click("#tabs [data-name=scope]").await;
     stage.find("#scope-pause[aria-pressed=true]").await;
     let reported = stage.says(".readout", "Step of 4:606C:00").await;

@@ -28,12 +28,12 @@ async fn the_tour_goes_on_when_the_drive_did_what_it_asks_for() {
     stage.click("#enable").await;
     stage.says("#tour", "2 of 10: Jog").await;
     stage.shoot("tour").await;
+    stage.sees().await;
     stage.client.perform_actions(press(Key::Right.into())).await.expect("a press");
     stage.says("#tour", "3 of 10: Scope").await;
     stage.client.release_actions().await.expect("a release");
     stage.rests();
-    stage.click("#go-turn").await;
-    stage.turns();
+    stage.turn().await;
     stage.go_on().await;
     stage.says("#tour", "4 of 10: Parameter").await;
     stage.go_on().await;
@@ -51,7 +51,7 @@ async fn the_tour_goes_on_when_the_drive_did_what_it_asks_for() {
     stage.click("#take").await;
     stage.find("#release").await;
     stage.click("#tabs [data-name=motion]").await;
-    stage.click(".motion .chooser button:nth-child(3)").await;
+    stage.choose_drive("motion", 3).await;
     stage.go_on().await;
     stage.find("#parameters-search").await.send_keys("2013").await.expect("typed");
     stage.click(".parameters tr[data-object='2013h:01']").await;

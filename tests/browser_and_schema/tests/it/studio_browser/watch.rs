@@ -7,8 +7,7 @@ use super::{Stage, press};
 async fn who_only_looks_can_stop() {
     let stage = Stage::open("watched").await;
     stage.take_the_wheel().await;
-    stage.click("#go-turn").await;
-    stage.turns();
+    stage.turn().await;
     let other = stage.client.new_window(false).await.expect("a second window");
     stage.client.switch_to_window(other.handle).await.expect("it is there");
     stage.load().await;
@@ -38,8 +37,7 @@ async fn a_space_in_a_text_field_stops_what_moves() {
     search.send_keys("maximum speed").await.expect("typed");
     assert_eq!(search.prop("value").await.expect("it has one").as_deref(), Some("maximum speed"));
     stage.click("#tabs [data-name=motion]").await;
-    stage.click("#go-turn").await;
-    stage.turns();
+    stage.turn().await;
     stage.click("#tabs [data-name=parameters]").await;
     stage.click("#parameters-search").await;
     stage.client.perform_actions(press(' ')).await.expect("a press");

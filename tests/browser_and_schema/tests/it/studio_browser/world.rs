@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{Locator, Stage};
+use super::{Locator, PATIENCE, Stage};
 
 impl Stage {
     /// Does something by its line in words.
@@ -25,8 +25,7 @@ async fn what_happens_to_the_world_is_drawn_and_the_drives_say_so() {
     let stage = Stage::open("world").await;
     stage.take_the_wheel().await;
     stage.click("#enable").await;
-    stage.click("#go-turn").await;
-    stage.turns();
+    stage.turn().await;
     stage.click("#tabs [data-name=world]").await;
     stage.find("[data-place='4'][aria-pressed=true]").await;
     // The wheel turns, the others rest: what is drawn is where the shafts are.
@@ -72,6 +71,7 @@ async fn what_happens_to_the_world_is_drawn_and_the_drives_say_so() {
     stage.click("#tabs [data-name=bus]").await;
     stage.says("#wire", "error-active, transmit error counter ").await;
     stage.click("#tabs [data-name=faults]").await;
-    stage.client.wait().for_element(Locator::XPath("//*[contains(., 'silent')]")).await.expect("it is reported");
+    let silent = stage.client.wait().at_most(PATIENCE).for_element(Locator::XPath("//*[contains(., 'silent')]"));
+    silent.await.expect("it is reported");
     stage.close().await;
 }
