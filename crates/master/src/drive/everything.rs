@@ -68,19 +68,26 @@ impl Network {
     /// can then be asked or seen. The nodes are left so: who goes on starts them again. Outputs of other devices stay
     /// as they are in pre-operational.
     ///
-    /// Then each node-ID has a quick stop by SDO, those first that were heard or are in `models`. A node without a controlword
+    /// Then it goes on as [`quick_stop_everything`](Self::quick_stop_everything).
+    pub async fn stop_everything(&self, models: &BTreeMap<NodeId, &'static Description>) -> Vec<StoppedAxis> {
+        self.nmt_all(NmtCommand::EnterPreOperational);
+        self.quick_stop_everything(models).await
+    }
+
+    /// The same, and the NMT state of each node stays as it is: for who may stop drives and may not do more to the bus. A drive that
+    /// another master keeps going by PDO is among the results as one that was not seen to stand, and a node in NMT state
+    /// stopped as one that does not answer.
+    ///
+    /// Each node-ID has a quick stop by SDO, those first that were heard or are in `models`. A node without a controlword
     /// (6040h) is not a drive and is left out. One that was heard, or is in `models`, and does not answer is among the
     /// results with that error. A node-ID that neither answers nor sends anything meanwhile is not: nothing shows it. Of an
     /// unknown model the second and further axes are commanded to stop and cannot be seen to stand.
     ///
     /// Takes a third of a second, and the time of the drives' own ramps. What else this program asks of these drives has to have
     /// ended.
-    pub async fn stop_everything(&self, models: &BTreeMap<NodeId, &'static Description>) -> Vec<StoppedAxis> {
+    pub async fn quick_stop_everything(&self, models: &BTreeMap<NodeId, &'static Description>) -> Vec<StoppedAxis> {
         let began = self.now();
-        self.nmt_all(NmtCommand::EnterPreOperational);
         self.quick_stop_moved();
-        // A stop waits for no record of a server.
-        self.choose_sdo_servers([]);
         let expected: NodeSet = self.seen().iter().chain(models.keys().copied()).collect();
         let (first, others): (Vec<_>, Vec<_>) = NodeId::all().partition(|node| expected.contains(*node));
         let turns = others.chunks(WINDOW).enumerate().flat_map(|(number, window)| {
@@ -90,7 +97,8 @@ impl Network {
             if !wait.is_zero() {
                 self.sleep(wait).await;
             }
-            let node = self.node(id).with_timeout(ANSWER);
+            // A stop waits for no record of a server.
+            let node = self.node(id).with_timeout(ANSWER).by_server_in_use();
             let stopped = stop_node(&node, models.get(&id).copied(), expected.contains(id)).await;
             let since = |axis: StoppedAxis| StoppedAxis {
                 outcome: axis.outcome.map(|(_, way)| (self.now() - began, way)),

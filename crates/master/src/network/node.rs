@@ -21,12 +21,13 @@ pub struct Node {
     network: Network,
     id: NodeId,
     timeout: Duration,
+    waits_for_server: bool,
 }
 
 impl Network {
     /// A handle on one node.
     pub fn node(&self, id: NodeId) -> Node {
-        Node { network: self.clone(), id, timeout: DEFAULT_TIMEOUT }
+        Node { network: self.clone(), id, timeout: DEFAULT_TIMEOUT, waits_for_server: true }
     }
 }
 
@@ -35,6 +36,14 @@ impl Node {
     #[must_use]
     pub const fn with_timeout(mut self, timeout: Duration) -> Self {
         self.timeout = timeout;
+        self
+    }
+
+    /// The same node by the SDO server that is in use: the record of one that was chosen
+    /// ([`Network::choose_sdo_servers`]) and not read yet is not read first. For what has to go out at once, as a stop.
+    #[must_use]
+    pub const fn by_server_in_use(mut self) -> Self {
+        self.waits_for_server = false;
         self
     }
 
@@ -206,7 +215,7 @@ impl Node {
 
     async fn transfer(&self, mux: Mux, transfer: Transfer) -> Result<Payload, Error> {
         // While its record is read, another one may be chosen.
-        while let Some((record, choice)) = self.network.chosen_server(self.id) {
+        while let Some((record, choice)) = self.network.chosen_server(self.id).filter(|_| self.waits_for_server) {
             self.use_server_of(record, choice).await?;
         }
         self.exchange(mux, transfer).await

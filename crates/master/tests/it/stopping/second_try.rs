@@ -60,11 +60,16 @@ fn a_chosen_server_is_used_from_the_first_request_on_and_delays_no_stop() {
     let network = bus.network.clone();
     let drive = master::Drive::new(network.node(node(4)), model("zlac8030l").unwrap());
     network.choose_sdo_servers([(node(4), 0x1201)]);
-    let axes = bus.block_on(async { network.stop_everything(&[(node(4), model("zlac8030l").unwrap())].into()).await });
-    assert!(matches!(&axes[..], [axis] if axis.outcome.is_ok()), "{axes:?}");
+    let models = [(node(4), model("zlac8030l").unwrap())].into();
+    // For who may stop drives and do no more; and with the NMT state of every node.
+    let mut axes = bus.block_on(network.quick_stop_everything(&models));
+    assert!(bus.frames().iter().all(|frame| !frame.starts_with("000#")), "no NMT command");
+    axes.extend(bus.block_on(network.stop_everything(&models)));
+    assert_eq!(bus.frames().iter().filter(|frame| frame.starts_with("000#")).collect::<Vec<_>>(), ["000#8000"]);
+    assert!(axes.len() == 2 && axes.iter().all(|axis| axis.outcome.is_ok()), "{axes:?}");
     assert!(bus.frames().iter().all(|frame| !frame.starts_with("604#400112") && !frame.starts_with("680#")));
 
-    network.choose_sdo_servers([(node(4), 0x1201)]);
+    // The choice lasts.
     let short = drive.node().clone().with_timeout(Duration::from_millis(20));
     // The toy answers at its default server only.
     bus.block_on(async { short.read::<u32>(canopen::Mux::new(0x1000, 0)).await }).unwrap_err();
