@@ -1,7 +1,7 @@
 // The Console view: lines of the command line, carried out by the host as any other command of this page, and what they say.
 
-import { ask, isVirtual } from "./link.js";
-import { history } from "./console_lines.js";
+import { ask, isVirtual, stopAll } from "./link.js";
+import { history, stops } from "./console_lines.js";
 import { h } from "./dom.js";
 import { keep, kept } from "./settings.js";
 
@@ -44,6 +44,8 @@ export function consoleView() {
     field.value = "";
     append(`> ${line}`, "typed");
     const said = append("…", "quiet");
+    // As the key does: also past a socket that is stuck, and a page with too many lines under way.
+    if (stops(line) === "all") stopAll();
     const answer = await ask({ do: "console", line });
     const { text, status } = answer.ok ? answer.result : { text: `error: ${answer.error.message}`, status: 1 };
     said.textContent = text === "" ? "done" : text;

@@ -1,7 +1,15 @@
-// The lines of the console that were given before. Independent of the page.
+// The lines of the console: which of them stop, and those that were given before. Independent of the page.
 
 /** Lines that are remembered. */
 const REMEMBERED = 100;
+
+/** What a line stops: "all" drives, "one" of them, or null. Such a line is sent however old the page's picture is. */
+export function stops(line) {
+  const [first, ...more] = line.replace(/^\s*ferrodrive\s/, "").trim().split(/\s+/);
+  if (first === "estop") return "all";
+  if (first !== "quick-stop") return null;
+  return more.includes("all") ? "all" : "one";
+}
 
 /** What was typed before: `older` and `newer` go through it from what stands in the field. */
 export function history(before) {

@@ -4,6 +4,7 @@
 // is stale: then only a stop is sent, since a command that waits in a connection would be executed much later. A
 // connection that is lost, or silent, is opened again; control has to be taken again then.
 
+import { stops } from "./console_lines.js";
 import { host_name, open, request } from "./transport.js";
 
 const RETRY_MS = 1000;
@@ -63,7 +64,8 @@ export function ask(command) {
   // After sleep a timer of another file may run before that of this one.
   look();
   if (!link.welcome || !connection?.isOpen()) return refused("no_connection", `There is no connection to ${host_name}.`);
-  if (!link.fresh && command.do !== "stop_all") return refused("no_picture", `Nothing was sent: the state of ${host_name} is stale.`);
+  const isStop = command.do === "stop_all" || (command.do === "console" && stops(command.line) !== null);
+  if (!link.fresh && !isStop) return refused("no_picture", `Nothing was sent: the state of ${host_name} is stale.`);
   seq += 1;
   const message = { seq, session: link.welcome.word, ...command };
   connection.send(JSON.stringify(message));

@@ -3,7 +3,13 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { history } from "../page/console_lines.js";
+import { history, stops } from "../page/console_lines.js";
+
+test("a line that stops is known, whatever stands around it", () => {
+  for (const line of ["estop", "  estop ", "estop all", "ferrodrive estop", "quick-stop all", "ferrodrive  quick-stop   all"]) assert.equal(stops(line), "all", line);
+  assert.equal(stops("quick-stop 4"), "one");
+  for (const line of ["", "stop 4", "help estop", "velocity 4 60rpm", "estopper", "state 4"]) assert.equal(stops(line), null, line);
+});
 
 test("up and down go through the lines and back to what was being typed", () => {
   const past = history(["state 4", "enable 4"]);
