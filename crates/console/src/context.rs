@@ -49,7 +49,10 @@ pub enum Holding {
     /// The bus is the command's own, and ends with it.
     OwnBus,
     /// A host: it guards each drive, and stops what its session does not hold.
-    Host,
+    Host {
+        /// The session may do more to the bus than stop its drives.
+        in_control: bool,
+    },
 }
 
 /// A model that need not be found out.
@@ -127,18 +130,26 @@ impl Context {
         self.models.get(&id).map(|stated| stated.description())
     }
 
+    /// Whether this is a line for a host: in control, or not.
+    pub const fn in_control(&self) -> Option<bool> {
+        match self.holding {
+            Holding::Host { in_control } => Some(in_control),
+            Holding::Unheld | Holding::OwnBus => None,
+        }
+    }
+
     /// What is known of a node's model: as stated, if the node does not contradict, else as its identity and objects
     /// say.
-    async fn knowledge_of(&self, id: NodeId) -> Result<Knowledge, Failure> {
-        match self.models.get(&id) {
+    async fn knowledge_of(&self, node: &Node) -> Result<Knowledge, Failure> {
+        match self.models.get(&node.id()) {
             Some(Stated::ByBus(model)) => return Ok((*model).into()),
             Some(Stated::ByUser(model)) => {
-                Drive::new(self.node(id), model).check_identity().await?;
+                Drive::new(node.clone(), model).check_identity().await?;
                 return Ok((*model).into());
             }
             None => {}
         }
-        Ok(master::identify::knowledge(&self.node(id)).await?)
+        Ok(master::identify::knowledge(node).await?)
     }
 
     /// All models that need not be found out.
@@ -177,9 +188,12 @@ impl Context {
     /// # Errors
     /// Those of the master.
     pub async fn drive(&self, id: NodeId) -> Result<Drive, Failure> {
-        let drive = self.drive_without_note(id).await?;
-        self.note_guess(&drive);
-        Ok(drive)
+        self.drive_at(self.node(id)).await.inspect(|drive| self.note_guess(drive))
+    }
+
+    async fn drive_at(&self, node: Node) -> Result<Drive, Failure> {
+        let (gear, knowledge) = (self.gear(node.id()), self.knowledge_of(&node).await?);
+        Ok(Drive::known_as(node, knowledge).behind(gear))
     }
 
     /// A drive, for commands that may refuse to work with a guess, which is then reported with the refusal.
@@ -187,7 +201,7 @@ impl Context {
     /// # Errors
     /// Those of the master.
     pub async fn drive_without_note(&self, id: NodeId) -> Result<Drive, Failure> {
-        Ok(Drive::known_as(self.node(id), self.knowledge_of(id).await?).behind(self.gear(id)))
+        self.drive_at(self.node(id)).await
     }
 
     /// Notes if what follows rests on a guess. Where all models that answer so have the same objects, it does not.
@@ -224,14 +238,16 @@ impl Context {
         }
     }
 
-    /// A drive that is to be stopped: as what the user takes it for, be that right or wrong.
+    /// A drive that is to be stopped: as what the user takes it for, be that right or wrong. It is not asked first for the record of
+    /// a server.
     ///
     /// # Errors
     /// Those of the master.
     pub async fn drive_to_stop(&self, id: NodeId) -> Result<Drive, Failure> {
+        let node = self.node(id).by_server_in_use();
         match self.stated_model(id) {
-            Some(model) => Ok(Drive::new(self.node(id), model).behind(self.gear(id))),
-            None => self.drive(id).await,
+            Some(model) => Ok(Drive::new(node, model).behind(self.gear(id))),
+            None => self.drive_at(node).await.inspect(|drive| self.note_guess(drive)),
         }
     }
 
@@ -241,16 +257,14 @@ impl Context {
     /// # Errors
     /// Those of SDO.
     pub async fn quick_stop(&self, id: NodeId) -> Result<(), Error> {
-        // Nor does it wait for the record of a server. A host goes on with those that were chosen, and has sent a stop of its own.
-        if self.holding != Holding::Host {
-            self.network.choose_sdo_servers([]);
-        }
-        let statusword = self.network.node(id).with_timeout(GLANCE).read::<u16>(STATUSWORD).await.map(Statusword);
+        // Nor does it wait for the record of a server.
+        let node = self.node(id).by_server_in_use();
+        let statusword = node.clone().with_timeout(GLANCE).read::<u16>(STATUSWORD).await.map(Statusword);
         let enabled = |word: Statusword| word.state() == Some(PowerState::OperationEnabled);
         if statusword.is_ok_and(|word| !word.has(Statusword::VOLTAGE_ENABLED) && !enabled(word)) {
             return Ok(());
         }
-        self.node(id).write(CONTROLWORD, PowerCommand::QuickStop.controlword().0).await
+        node.write(CONTROLWORD, PowerCommand::QuickStop.controlword().0).await
     }
 
     /// Waits until frames are sent that have no answer.

@@ -56,19 +56,30 @@ pub struct GuardReport {
 }
 
 impl GuardArgs {
+    /// Of a line for a host, before anything is done: it has guarded the drive by the time that these would count.
+    ///
+    /// # Errors
+    /// One was given.
+    pub fn check_for_host(&self) -> Result<(), words::failure::Failure> {
+        if self.guard.is_none() && !self.no_guard {
+            return Ok(());
+        }
+        let failure = words::failure::Failure::usage("--guard and --no-guard have no effect in a line of a page");
+        Err(failure
+            .because("the host guards every drive that it moves, and leaves a monitoring time that is set to 0")
+            .next("omit it: set that time with the parameters of the drive, or accept in the Motion view that nothing stops it"))
+    }
+
     /// Guards the drive before it moves. What nothing would stop is reported on standard error.
     pub async fn begin(&self, context: &Context, drive: &Drive) -> Result<Guard, Failure> {
         let armed = !self.no_guard && self.guard != Some(OnOff::Off);
-        if !armed && context.holding == Holding::Host {
-            let failure = Failure::usage("--guard off and --no-guard have no effect here");
-            let failure = failure.because("the host guards every drive that it moves");
-            return Err(failure.next("omit it; what nothing stops has to be accepted in the Motion view"));
-        }
         let switched_off = if self.guard.is_some() { SwitchedOff::SwitchOn } else { SwitchedOff::Leave };
         let loss = if armed { drive.guard(switched_off).await? } else { drive.host_loss().await? };
         if loss.stops_after().is_none() {
             let more = match loss {
-                HostLoss::SwitchedOff { .. } if armed => "; --guard gives it its factory value for this command",
+                HostLoss::SwitchedOff { .. } if armed && context.in_control().is_none() => {
+                    "; --guard gives it its factory value for this command"
+                }
                 HostLoss::NotArmed { .. } => "; without --no-guard they are",
                 _ => "; keep an emergency stop within reach",
             };
@@ -87,7 +98,7 @@ impl Guard {
         drive: &Drive,
         goes_on: bool,
     ) -> Result<(GuardReport, Option<String>), Failure> {
-        let held = context.holding == Holding::Host;
+        let held = context.in_control().is_some();
         // A host guards the drive as long as it may move.
         if !held {
             drive.release_guard().await?;

@@ -6,7 +6,7 @@ use std::pin::Pin;
 use std::rc::Rc;
 use std::time::Duration;
 
-use clap::Parser;
+use clap::{CommandFactory, FromArgMatches, Parser};
 use host::console::{Hands, Order, Said, Work};
 use host::{Command as Asked, NodeCommand};
 use master::explain::Overheard;
@@ -15,7 +15,10 @@ use words::plain;
 
 use crate::command::{Command, Effect};
 use crate::context::{Context, Holding, Shell, Stated};
-use crate::status::Status;
+use crate::guard::GuardArgs;
+
+/// How often a line that listens looks at the frames that have come: a full bus has some 10 000 in that time.
+const OVERHEARING: Duration = Duration::from_secs(1);
 
 /// CANopen motor drives: look into them, move them.
 #[derive(Debug, Parser)]
@@ -36,17 +39,19 @@ pub struct Reader;
 
 impl host::console::Reader for Reader {
     fn read(&self, line: &str) -> Result<Order, Said> {
-        let words = words_of(line).map_err(|why| Said::failed(Status::Usage as u8, why))?;
+        let words = words_of(line).map_err(Said::senseless)?;
         // As a line is copied from the manual.
         let words = words.strip_prefix(&["ferrodrive".to_owned()][..]).unwrap_or(&words);
-        let Line { command } = Line::try_parse_from(words).map_err(|error| said(&error))?;
+        let matches = parser().try_get_matches_from(words).map_err(|error| said(&error))?;
+        let Line { command } = Line::from_arg_matches(&matches).map_err(|error| said(&error))?;
+        command.guard().map_or(Ok(()), GuardArgs::check_for_host).map_err(|failure| Said::failed(&failure))?;
         let asked = match command.effect() {
             Effect::None => None,
             Effect::OnDrive(node, command) => Some(NodeCommand::from(command).to(node)),
             Effect::StopAll => Some(Asked::STOP_ALL),
             Effect::StopAllByRamp => {
                 let text = "error: a page does not stop all drives by their ramps\n  next:    estop stops them at once; stop NODE one of them by its ramp";
-                return Err(Said::failed(Status::Usage as u8, text.to_owned()));
+                return Err(Said::senseless(text.to_owned()));
             }
         };
         let work = |hands: Hands| Box::pin(async move { carry_out(&command, hands).await }) as Work;
@@ -54,11 +59,29 @@ impl host::console::Reader for Reader {
     }
 }
 
+/// The parser of the command line; its help names nothing that a line does not have.
+fn parser() -> clap::Command {
+    Line::command().mut_subcommands(|command| {
+        let examples = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+        let mut lines: Vec<String> = Vec::new();
+        for line in examples.lines().filter(|line| !line.contains(" -v ") && !line.contains("stop all")) {
+            let line = [" --bus can0", " --machine machine.toml", " --json"]
+                .iter()
+                .fold(line.to_owned(), |line, of| line.replace(of, ""));
+            if !lines.contains(&line) {
+                lines.push(line);
+            }
+        }
+        let guards = |arg: clap::Arg| if arg.get_id().as_str().ends_with("guard") { arg.hide(true) } else { arg };
+        command.after_help(lines.join("\n")).mut_args(guards)
+    })
+}
+
 /// What the parser says: help, or what is wrong with the line.
 fn said(error: &clap::Error) -> Said {
     let text = plain(&error.render().to_string());
     let text = text.trim_end().to_owned();
-    if error.use_stderr() { Said { status: Status::Usage as u8, kind: Some("usage"), text } } else { Said::done(text) }
+    if error.use_stderr() { Said::senseless(text) } else { Said::done(text) }
 }
 
 async fn carry_out(command: &Command, hands: Hands) -> Said {
@@ -70,17 +93,29 @@ async fn carry_out(command: &Command, hands: Hands) -> Said {
         models: hands.models.iter().map(|(node, model)| (*node, Stated::ByBus(model))).collect(),
         gears: hands.gears.clone(),
         json: false,
-        holding: Holding::Host,
+        holding: Holding::Host { in_control: hands.in_control },
         shell: Rc::new(Page { hands, notes: Rc::clone(&notes) }),
     };
     let (printed, failure) = match command.run(&context).await {
         Ok(outcome) => (Some(outcome.text(Paint::OFF)), outcome.failure()),
         Err(failure) => (None, Some(failure)),
     };
-    let (status, kind) = failure.as_ref().map_or((0, None), |failure| (failure.status as u8, Some(failure.kind)));
-    let complaint = failure.map(|failure| format!("error: {}", plain(&failure.to_string())));
+    let said = failure.map_or_else(|| Said::done(String::new()), |failure| Said::failed(&of_a_page(failure.reason)));
+    let complaint = said.trouble.is_some().then(|| said.text.clone());
     let lines: Vec<String> = notes.take().into_iter().chain(printed).chain(complaint).collect();
-    Said { text: lines.join("\n"), status, kind }
+    Said { text: lines.join("\n"), ..said }
+}
+
+/// A failure whose advice is for who types into a page.
+fn of_a_page(mut failure: words::failure::Failure) -> words::failure::Failure {
+    failure.next.iter_mut().for_each(|advice| *advice = advice_of_a_page(advice));
+    failure
+}
+
+/// A model is named where the host of the page is started, not in a line.
+fn advice_of_a_page(advice: &str) -> String {
+    let more = if advice.contains("--model ") { ", where the host of this page is started" } else { "" };
+    format!("{advice}{more}")
 }
 
 /// The words of a line, as a shell would have them: quotes keep a word together.
@@ -118,7 +153,7 @@ impl Shell for Page {
     }
 
     fn note(&self, text: &str) {
-        self.notes.borrow_mut().push(format!("note: {}", plain(text)));
+        self.notes.borrow_mut().push(format!("note: {}", plain(&advice_of_a_page(text))));
     }
 
     fn is_new(&self, _: &str) -> bool {
@@ -129,11 +164,17 @@ impl Shell for Page {
         Box::pin(async move {
             let network = &self.hands.network;
             let began = network.now();
-            let mut heard = Overheard::from(began);
-            network.sleep(time).await;
+            let (mut heard, mut number) = (Overheard::from(began), self.hands.trace.next());
+            // The trace keeps the newest frames alone; those of the host itself, which reads the drives meanwhile, tell nothing.
+            while network.now() - began < time {
+                network.sleep(OVERHEARING.min(time - (network.now() - began))).await;
+                number = self.hands.trace.others_from(number, |passed| {
+                    if passed.at >= began {
+                        heard.note(&passed.frame, passed.at);
+                    }
+                });
+            }
             heard.until(network.now());
-            // The host reads the drives meanwhile.
-            self.hands.trace.others_since(began, |passed| heard.note(&passed.frame, passed.at));
             heard
         })
     }

@@ -2,10 +2,10 @@
 
 use can::Instant;
 use canopen::NodeId;
-use master::Drive;
 use master::drive::{self, Manner, Motion, MotionReport, Note, Report};
 use master::explain::{Finding, Overheard, Weight};
 use master::units::Rpm;
+use master::{Drive, Error};
 use serde_json::json;
 use tokio::sync::oneshot;
 
@@ -16,7 +16,7 @@ use crate::parameters::STORING;
 use crate::session::DeadMan;
 use crate::session::authority::{Refusal, SessionId};
 use crate::state::{Host, JOG_SPAN, PRESENCE_SPAN};
-use crate::work::{Asked, Done, LISTENING_TIME, Listening, Outcome, Running, STOPPING, refusal_of, send};
+use crate::work::{Asked, Done, LISTENING_TIME, LineOf, Listening, Outcome, Running, STOPPING, refusal_of, send};
 use crate::world::conclude_looking_around;
 
 /// Explanations that may be under way.
@@ -116,6 +116,10 @@ impl Host {
         use drive::Command;
         let stops = matches!(command, Command::Stop | Command::Disable);
         let Some((drive, asked)) = self.drive_to_move(id, stops, asked) else { return };
+        if let Err(error) = check(&drive, &command) {
+            let (seq, answer) = asked;
+            return send(answer, Answer::failed(Some(seq), error.kind(), error.to_string()));
+        }
         // These do not change the motion: a jog continues, and so does its dead man.
         if !matches!(command, Command::Enable | Command::ResetFault) {
             self.jogs.remove(&id);
@@ -154,7 +158,7 @@ impl Host {
         // A drive that continues alone leaves the others of its group without set-points.
         let others = self.leave_group(node);
         if what != STOPPING {
-            self.leave_stopping_lines(node);
+            self.leave_lines(LineOf::Stop(node));
         }
         self.generation += 1;
         let (running, future) = Running::new(node, self.generation, what, moves, asked, command);
@@ -289,6 +293,15 @@ impl Host {
             }
             None => {}
         }
+    }
+}
+
+/// Whether a command can be, as far as that is known without asking the drive: what is refused does not take the place of the motion
+/// under way.
+pub(crate) fn check(drive: &Drive, command: &drive::Command) -> Result<(), Error> {
+    match command {
+        drive::Command::Motion(motion) => drive.check_motion(motion),
+        _ => Ok(()),
     }
 }
 

@@ -9,6 +9,8 @@ use canopen::NodeId;
 use devices::Description;
 use master::{Gear, Network};
 use serde_json::json;
+use words::failure::{Failure, FailureBody};
+use words::plain;
 
 use crate::answer::Answer;
 use crate::command::Command;
@@ -47,6 +49,8 @@ pub struct Hands {
     pub network: Network,
     /// The bus, as it was given.
     pub bus: String,
+    /// The session is in control: it may do more to the bus than stop its drives.
+    pub in_control: bool,
     /// Longest wait for each answer of a node.
     pub timeout: Duration,
     /// The models that are known for sure.
@@ -64,28 +68,38 @@ pub struct Said {
     pub text: String,
     /// The status that the command line ends with: 0 if it was done, 2 for a line that makes no sense.
     pub status: u8,
-    /// The kind of a failure.
-    pub kind: Option<&'static str>,
+    /// The kind of a failure, and in one line what failed and why.
+    pub trouble: Option<(&'static str, String)>,
 }
 
 impl Said {
     /// It was done.
     pub const fn done(text: String) -> Self {
-        Self { text, status: 0, kind: None }
+        Self { text, status: 0, trouble: None }
     }
 
-    /// It was not.
-    pub const fn failed(status: u8, text: String) -> Self {
-        let kind = if status == 2 { "usage" } else { "failed" };
-        Self { text, status, kind: Some(kind) }
+    /// It was not, for a reason that was found before anything was done.
+    pub fn failed(failure: &Failure) -> Self {
+        let FailureBody { kind, message, .. } = failure.into();
+        let status = if failure.is_usage { 2 } else { 1 };
+        Self { text: format!("error: {}", plain(&failure.to_string())), status, trouble: Some((kind, message)) }
+    }
+
+    /// The line makes no sense: `text` says why.
+    pub fn senseless(text: String) -> Self {
+        let message = text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+        Self { text, status: 2, trouble: Some(("usage", message)) }
     }
 
     pub(crate) fn refused(kind: &'static str, message: &str) -> Self {
-        Self { text: format!("error: {message}"), status: 1, kind: Some(kind) }
+        Self { text: format!("error: {message}"), status: 1, trouble: Some((kind, message.to_owned())) }
     }
 
     /// What a session is answered.
     pub(crate) fn answer(&self, seq: u64) -> Answer {
-        Answer::known(seq, json!({ "text": self.text, "status": self.status, "kind": self.kind }))
+        Answer::known(
+            seq,
+            json!({ "text": self.text, "status": self.status, "kind": self.trouble.as_ref().map(|(kind, _)| kind) }),
+        )
     }
 }

@@ -11,13 +11,13 @@ use tokio::sync::oneshot;
 
 use crate::answer::Answer;
 use crate::command::{Command, NodeCommand};
-use crate::commands::doing;
+use crate::commands::{check, doing};
 use crate::console::{Hands, Order, Said, Work};
 use crate::motion::guarding::guard;
 use crate::nodes::known_node::KnownNode;
 use crate::session::authority::SessionId;
 use crate::state::Host;
-use crate::work::{Asked, Done, StoppingLine, send};
+use crate::work::{Asked, Done, Line, LineOf, send};
 
 /// Lines that may be under way when one begins that only looks.
 const MOST_LINES: usize = 32;
@@ -42,19 +42,21 @@ impl Host {
         }
         self.lines += 1;
         let (said, words) = oneshot::channel();
-        self.begin_line(order, seq, said);
+        self.begin_line(session, order, seq, said);
         self.work.push(Box::pin(async move {
             let gone = Said::refused("over", "the host is ending");
             Done::Line((seq, answer), words.await.unwrap_or(gone))
         }));
     }
 
-    fn begin_line(&mut self, Order { asked, work }: Order, seq: u64, said: oneshot::Sender<Said>) {
-        let hands = self.hands();
-        // One that stops everything is not given up for a command to one drive.
-        let stops = match &asked {
-            Some(Command::Node(node, _)) => Some(*node),
-            Some(_) | None => None,
+    fn begin_line(&mut self, session: SessionId, order: Order, seq: u64, said: oneshot::Sender<Said>) {
+        let Order { asked, work } = order;
+        let hands = self.hands(session);
+        let of = match &asked {
+            Some(Command::Node(node, _)) => Some(LineOf::Stop(*node)),
+            // One that stops everything is not given up, neither for a command to one drive nor with its session.
+            Some(_) => None,
+            None => Some(LineOf::Session(session)),
         };
         match asked {
             Some(Command::Node(node, NodeCommand::Drive(drive::Command::QuickStop))) => {
@@ -70,8 +72,9 @@ impl Host {
         }
         let (line, abort) = abortable(work(hands));
         let alive = Rc::new(());
-        if let Some(node) = stops {
-            self.stopping_lines.push(StoppingLine { node, abort, alive: Rc::downgrade(&alive) });
+        if let Some(of) = of {
+            self.open_lines.retain(|line| line.alive.strong_count() > 0);
+            self.open_lines.push(Line { of, abort, alive: Rc::downgrade(&alive) });
         }
         self.work.push(Box::pin(async move {
             let replaced = || Said::refused("replaced", "replaced by another command to the drive");
@@ -82,14 +85,10 @@ impl Host {
         }));
     }
 
-    /// A newer command to this drive takes the place of the lines that stop it: their stop would meet that.
-    pub(crate) fn leave_stopping_lines(&mut self, node: NodeId) {
-        self.stopping_lines.retain(|line| {
-            if line.node == node {
-                line.abort.abort();
-            }
-            line.node != node && line.alive.strong_count() > 0
-        });
+    /// Ends lines: a newer command to a drive takes the place of those that stop it, since their stop would meet that; the
+    /// answers of a session that has left go nowhere.
+    pub(crate) fn leave_lines(&mut self, of: LineOf) {
+        self.open_lines.extract_if(.., |line| line.of == of).for_each(|line| line.abort.abort());
     }
 
     /// A line that commands a drive takes the place of the command under way there, and ends as one.
@@ -105,6 +104,10 @@ impl Host {
         let accepted = self.accepted.contains(&node);
         let (words, worded) = oneshot::channel();
         if let Some((drive, asked)) = self.drive_to_move(node, stops, (seq, answer)) {
+            if let Err(error) = check(&drive, &command) {
+                let _ = said.send(Said::failed(&error.into()));
+                return;
+            }
             if !matches!(command, drive::Command::Enable | drive::Command::ResetFault) {
                 self.jogs.remove(&node);
             }
@@ -114,7 +117,7 @@ impl Host {
                     guard(&drive, accepted).await?;
                 }
                 let said = line.await;
-                let failed = said.kind.map(|kind| (kind, said.text.trim_start_matches("error: ").to_owned()));
+                let failed = said.trouble.clone();
                 let _ = words.send(said);
                 failed.map_or_else(|| Ok(Vec::new()), Err)
             });
@@ -135,7 +138,7 @@ impl Host {
         }));
     }
 
-    fn hands(&self) -> Hands {
+    fn hands(&self, session: SessionId) -> Hands {
         let sure = |node: &KnownNode| {
             let drive = node.drive.as_ref().filter(|drive| drive.guess().is_none())?;
             drive.description()
@@ -144,6 +147,7 @@ impl Host {
         Hands {
             network: self.network.clone(),
             bus: self.setting.bus.clone(),
+            in_control: self.authority.controller() == Some(session),
             timeout: self.setting.timeout,
             models: found.collect(),
             gears: self.setting.gears.clone(),

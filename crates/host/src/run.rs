@@ -11,7 +11,7 @@ use crate::session::authority::SessionId;
 use crate::session::handle::{Request, StateUpdate};
 use crate::snapshot::{BusView, Snapshot};
 use crate::state::{Host, PRESENCE_SPAN, TICK};
-use crate::work::send;
+use crate::work::{LineOf, send};
 use can::BusFrame;
 
 /// Period of the state while a page is connected, and while none is.
@@ -101,6 +101,7 @@ impl Host {
 
     fn leave(&mut self, session: SessionId) {
         self.speed_limits.remove(&session);
+        self.leave_lines(LineOf::Session(session));
         if self.authority.leave(session) {
             (self.presence, self.held_by) = (None, None);
             self.accepted.clear();

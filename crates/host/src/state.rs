@@ -25,7 +25,7 @@ use crate::session::authority::{Authority, SessionId};
 use crate::session::handle::{HostHandle, Inbox, channel};
 use crate::trace::{Origin, Trace};
 use crate::wire::Wire;
-use crate::work::{Listening, Running, StoppingLine, Work};
+use crate::work::{Line, Listening, Running, Work};
 use crate::world::changes::Changes;
 use crate::world::door::WorldDoor;
 
@@ -101,8 +101,8 @@ pub struct Host {
     pub(crate) listening: Vec<Listening>,
     /// Lines of consoles that are under way.
     pub(crate) lines: usize,
-    /// Those of them that stop one drive.
-    pub(crate) stopping_lines: Vec<StoppingLine>,
+    /// Those of them that end before they are done with what they are of.
+    pub(crate) open_lines: Vec<Line>,
     pub(crate) parameters: Transactions,
     /// Captures under way.
     pub(crate) captures: BTreeMap<NodeId, CaptureRun>,
@@ -160,7 +160,7 @@ impl Host {
             group: None,
             listening: Vec::new(),
             lines: 0,
-            stopping_lines: Vec::new(),
+            open_lines: Vec::new(),
             parameters: Transactions::default(),
             captures: BTreeMap::new(),
             captured: BTreeMap::new(),

@@ -21,6 +21,7 @@ use crate::console::Said;
 use crate::motion::group_run::GroupOutcome;
 use crate::parameters::transactions::{Refusal, Written};
 use crate::pdo::load::PlannedPdos;
+use crate::session::authority::SessionId;
 use crate::snapshot::DriveView;
 use crate::world::door::NoAnswer;
 
@@ -33,12 +34,21 @@ pub(crate) type Asked = (u64, oneshot::Sender<Answer>);
 /// Shown while a drive is being quick-stopped.
 pub(crate) const STOPPING: &str = "stopping";
 
-/// A line of a console that stops a drive by itself, beside the host's own stop.
-pub(crate) struct StoppingLine {
-    pub(crate) node: NodeId,
+/// A line of a console that is under way beside the commands of drives.
+pub(crate) struct Line {
+    pub(crate) of: LineOf,
     pub(crate) abort: AbortHandle,
     /// Dropped with the line.
     pub(crate) alive: Weak<()>,
+}
+
+/// With what a line ends before it is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LineOf {
+    /// It stops this drive by itself, beside the host's own stop: with a newer command to that.
+    Stop(NodeId),
+    /// It looks, for this session: when that leaves.
+    Session(SessionId),
 }
 
 /// Work that has ended.

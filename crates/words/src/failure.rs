@@ -6,6 +6,7 @@ use std::error::Error;
 use std::fmt;
 
 use canopen::{AbortCode, Mux, NodeId};
+use cia402::ModeOfOperation;
 use master::base::BaseError;
 use master::group::GroupError;
 use serde::Serialize;
@@ -276,6 +277,9 @@ fn remedy(error: &master::Error) -> Option<&'static str> {
             "write them after each start: ferrodrive params apply NODE FILE, or boot by a machine file"
         }
         Error::NoFactorySettings { .. } => "write each object instead: ferrodrive params apply NODE FILE",
+        Error::NoSuchMode { mode: ModeOfOperation::HOMING, .. } => {
+            "move it to its reference, and set the position to zero there: ferrodrive objects NODE position"
+        }
         Error::NoSuchMode { .. } => "choose one of the modes that the model has",
         _ => return None,
     })

@@ -15,11 +15,18 @@ const MACHINE: &str = "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n\n[[drive]]\nmo
 struct Page {
     world: HostedWorld,
     seq: u64,
+    /// The texts of its news.
+    news: Vec<String>,
 }
 
 impl Page {
     fn new() -> Self {
-        let mut page = Self { world: HostedWorld::open(MACHINE, Duration::ZERO).expect("a machine"), seq: 0 };
+        Self::of(MACHINE)
+    }
+
+    fn of(machine: &str) -> Self {
+        let world = HostedWorld::open(machine, Duration::ZERO).expect("a machine");
+        let mut page = Self { world, seq: 0, news: Vec::new() };
         page.must(json!({ "do": "take_control" }));
         page
     }
@@ -36,6 +43,9 @@ impl Page {
     fn answer(&mut self, seq: u64) -> Option<Value> {
         self.world.run_until(self.world.now() + Duration::from_millis(100));
         let sent = self.world.take_sent().into_iter().map(|line| serde_json::from_str::<Value>(&line).expect("JSON"));
+        let sent: Vec<_> = sent.collect();
+        let news = sent.iter().filter(|message| message["type"] == "news");
+        self.news.extend(news.map(|news| news["text"].as_str().expect("a text").to_owned()));
         sent.into_iter().find(|message| message["type"] == "answer" && message["seq"] == seq)
     }
 
@@ -67,6 +77,14 @@ impl Page {
     fn speed(&mut self, node: u8) -> f64 {
         let got = self.world.command(&format!("{node} get")).expect("a drive");
         serde_json::from_str::<Value>(&got).expect("JSON")["velocity_rpm"].as_f64().expect("a speed").abs()
+    }
+
+    /// Lets time pass, and holds what moves.
+    fn held(&mut self, ms: u64) {
+        for _ in 0..ms / 100 {
+            self.say(json!({ "do": "alive" }));
+            self.silent(100);
+        }
     }
 
     /// Lets time pass without a sign of the page.
@@ -223,13 +241,120 @@ fn a_line_that_stops_gives_way_to_the_next_command() {
         page.say(json!({ "do": "console", "line": "quick-stop 4" }));
         page.silent(after_ms);
         page.must(json!({ "do": "velocity", "node": 4, "rpm": 60 }));
-        for _ in 0..10 {
-            page.say(json!({ "do": "alive" }));
-            page.silent(100);
-        }
+        page.held(1000);
         assert!((page.speed(4) - 60.0).abs() < 3.0, "{after_ms} ms: {} r/min", page.speed(4));
         page.silent(4000);
         assert!(page.speed(4) < 2.0, "{after_ms} ms: {} r/min", page.speed(4));
+    }
+}
+
+/// The wheels of a base of 40 kg swing through a target before they rest there.
+#[test]
+fn a_wheel_of_the_machine_that_a_page_begins_with_is_moved_to_its_target() {
+    let machine = concat!(env!("CARGO_MANIFEST_DIR"), "/../web/machine.toml");
+    let mut page = Page::of(&std::fs::read_to_string(machine).expect("a machine file"));
+    let (text, status) = page.line("move 4 90deg");
+    assert_eq!(status, 0, "{text}");
+    page.held(1000);
+    let got = page.world.command("4 get").expect("a drive");
+    let position = &serde_json::from_str::<Value>(&got).expect("JSON")["position"];
+    // 4096 counts a turn; a hundredth of it is near enough.
+    assert!(position.as_f64().is_some_and(|at| (at - 1024.0).abs() <= 41.0), "{got}");
+}
+
+/// What is refused has not begun: what moves goes on, whatever the reason.
+#[test]
+fn a_line_that_is_refused_does_not_disturb_the_motion_under_way() {
+    let mut page = Page::new();
+    assert_eq!(page.line("velocity 4 60rpm").1, 0);
+    page.held(1000);
+    for (line, status, says) in [
+        ("velocity 4 60mm/s", 1, "feed_constant"),
+        ("move 4 40mm", 1, "feed_constant"),
+        ("velocity 4 10rpm --acceleration 5mm/s2", 1, "feed_constant"),
+        ("velocity 4 10rpm --guard", 2, "the host guards every drive that it moves"),
+        ("move 4 90deg --guard off", 2, "the host guards every drive that it moves"),
+        ("torque 4 1A --no-guard", 2, "the host guards every drive that it moves"),
+        ("home 1 --method 17 --guard", 2, "the host guards every drive that it moves"),
+        ("home 4 --method 17", 1, "has no mode 6 (homing)"),
+    ] {
+        let said = page.line(line);
+        assert!(said.1 == status && said.0.contains(says), "{line}: {said:?}");
+        // Longer than a quick stop takes.
+        page.held(200);
+        assert!((page.speed(4) - 60.0).abs() < 3.0, "{line}: {} r/min", page.speed(4));
+    }
+}
+
+/// The session that gave the line has its whole text; the news of all are one line.
+#[test]
+fn the_news_of_a_line_that_failed_are_one_line() {
+    let mut page = Page::new();
+    let (text, status) = page.line("move 4 20turn --within 300ms");
+    assert!(status == 1 && text.lines().count() > 1, "{text}");
+    page.silent(100);
+    page.ask(json!({ "do": "alive" }));
+    let why = text.lines().find_map(|line| line.strip_prefix("error: ")).expect("an error");
+    assert!(page.news.iter().any(|news| news.starts_with(why)), "{why}: {:?}", page.news);
+    assert!(page.news.iter().all(|news| !news.contains('\n')), "{:?}", page.news);
+}
+
+#[test]
+fn lines_that_look_end_with_their_session() {
+    let mut page = Page::new();
+    // Together more than may be under way at once.
+    for _ in 0..4 {
+        for _ in 0..12 {
+            page.say(json!({ "do": "console", "line": "explain 4 --watch 600s" }));
+        }
+        page.silent(10);
+        page.world.join();
+    }
+    assert_eq!(page.line("state 4").1, 0);
+}
+
+/// A page that sees a danger stops what moves. More than that (the NMT state of every node) is for the session in control.
+#[test]
+fn an_estop_of_a_session_without_control_stops_and_does_no_more() {
+    let mut page = Page::new();
+    page.must(json!({ "do": "release_control" }));
+    let (text, status) = page.line("estop");
+    assert!(status == 0 && text.contains("node 4 (zlac8030l): stands"), "{text}");
+    assert!(text.contains("the NMT states of the nodes stay as they are"), "{text}");
+    let has =
+        |page: &mut Page, nmt: &str| page.line("state 1").0.lines().any(|line| line == format!("  nmt         {nmt}"));
+    assert!(has(&mut page, "operational"));
+    page.must(json!({ "do": "take_control" }));
+    let (text, status) = page.line("estop");
+    assert!(status == 0 && !text.contains("NMT") && has(&mut page, "pre-operational"), "{text}");
+}
+
+#[test]
+fn a_speed_along_a_way_is_held_to_the_limit_by_the_feed_of_the_machine_file() {
+    // 200 mm a turn of the output: 50 mm/s are 15 r/min.
+    let gear = "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nunits = { feed_constant = '200 mm' }\n\n[[drive]]\nmodel = 'zlac8030l'\nnode = 5\n";
+    let mut page = Page::of(gear);
+    page.must(json!({ "do": "limit_speed", "rpm": 30 }));
+    let (text, status) = page.line("velocity 4 150mm/s");
+    assert!(status == 1 && text.contains("45.0 r/min is beyond the speed limit"), "{text}");
+    let (text, status) = page.line("velocity 4 50mm/s");
+    assert_eq!(status, 0, "{text}");
+    page.held(1000);
+    assert!((page.speed(4) - 15.0).abs() < 1.0, "{} r/min", page.speed(4));
+    let (text, status) = page.line("velocity 5 50mm/s");
+    assert!(status == 1 && text.contains("no feed constant"), "{text}");
+}
+
+/// A line has no `--model` and no `--bus`: what its page has in their place is said.
+#[test]
+fn a_line_is_advised_of_nothing_that_it_does_not_have() {
+    let mut page = Page::new();
+    for command in ["state", "enable", "move", "explain", "torque", "home", "estop"] {
+        let (text, status) = page.line(&format!("help {command}"));
+        assert!(
+            status == 0 && !["--bus", "--machine", "--json", "-v ", "guard"].iter().any(|not| text.contains(not)),
+            "{text}"
+        );
     }
 }
 

@@ -185,7 +185,7 @@ fn homing_that_finds_nothing_in_time_is_reported_with_what_to_check() {
 fn homing_is_refused_with_the_reason() {
     let ended = ferrodrive(&["home", "4", "--method", "17"]);
     assert_eq!(ended.status, Some(1));
-    assert!(ended.err.contains("has no homing") && ended.err.contains("6060h takes 1"), "{}", ended.err);
+    assert!(ended.err.contains("has no mode 6 (homing)") && ended.err.contains("6060h takes 1"), "{}", ended.err);
 }
 
 #[test]

@@ -66,7 +66,17 @@ impl Estop {
     /// Stops everything.
     pub async fn run(&self, context: &Context) -> Result<StopReport, Failure> {
         let models: BTreeMap<_, _> = context.stated_models();
-        let stopped = context.network.stop_everything(&models).await;
+        let stopped = match context.in_control() {
+            // Who sees a danger stops what moves; the state of the bus is for who commands it.
+            Some(false) => {
+                context.note(
+                    "without control: each drive gets its quick stop, and the NMT states of the nodes stay as they are. Where another \
+                     master sets one going again, take control and give estop once more",
+                );
+                context.network.quick_stop_everything(&models).await
+            }
+            Some(true) | None => context.network.stop_everything(&models).await,
+        };
         StopReport::new(
             context,
             stopped.into_iter().map(AxisReport::from).collect(),
@@ -77,10 +87,9 @@ impl Estop {
 
 /// `stop all`: each by its ramp; it stays enabled.
 pub async fn stop_all(context: &Context) -> Result<StopReport, Failure> {
-    // A stop waits for no record of a server.
-    context.network.choose_sdo_servers([]);
     let asked = NodeId::all().map(|id| async move {
-        let answer = context.network.node(id).with_timeout(PATIENCE).read::<u16>(STATUSWORD).await;
+        let node = context.network.node(id).with_timeout(PATIENCE).by_server_in_use();
+        let answer = node.read::<u16>(STATUSWORD).await;
         let expected = context.stated_model(id).is_some() || context.network.facts(id).seen_at.is_some();
         match answer {
             Ok(_) => Some((id, None)),

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use canopen::NodeId;
-use cia402::ModeOfOperation;
 use master::drive::Motion;
 use master::units::{Along, Rpm, parse_duration};
 
@@ -12,8 +11,6 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::GuardArgs;
 use crate::numbers::whole;
-use devices::AxisDescription;
-use words::models::Description;
 use words::node::node;
 
 /// Find a drive's reference position
@@ -49,50 +46,16 @@ impl Home {
         Motion::Home { method: self.method, speed, wait: !self.no_wait, within }
     }
 
-    /// Homes; refuses for drives without homing, with the reason.
+    pub(super) const fn guard(&self) -> &GuardArgs {
+        &self.guard
+    }
+
+    /// Homes.
     pub async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
-        if let Some(model) = drive.description()
-            && let Some(axis) = model.first_axis().filter(|axis| axis.homing.is_none())
-        {
-            return Err(self.refusal(model, axis));
-        }
         let doing = format!("node {}: searching for its reference", self.node);
         let (motion, guard) = perform(context, &drive, &doing, &self.guard, &self.motion()).await?;
         let then = Then::goes_on_if(motion.reached_after.is_none());
         outcome(context, &drive, ("home with method", &self.method), motion, then, guard).await
-    }
-
-    fn refusal(&self, model: &Description, axis: &AxisDescription) -> Failure {
-        let modes = axis.modes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-        let mode = ModeOfOperation::HOMING;
-        Failure::new(format!("node {}: cannot home with method {}", self.node, self.method))
-            .of_kind("no_such_mode")
-            .at_node(self.node)
-            .because(format!("the {} has no homing: 6060h takes {modes} only, not {}", model.title, mode.0))
-            .next(format!(
-                "move it to its reference, then set the position to zero there: ferrodrive objects {} position",
-                model.name
-            ))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_refusal_names_the_modes_there_are() {
-        let home = Home {
-            node: NodeId::MAX,
-            method: 17,
-            profile_velocity: None,
-            within: Duration::from_secs(60),
-            no_wait: false,
-            guard: GuardArgs::default(),
-        };
-        let model = words::models::resolve("zlac8030l").unwrap();
-        let text = home.refusal(model, &model.axes[0]).to_string();
-        assert!(text.contains("6060h takes 1") && text.contains("objects zlac8030l position"), "{text}");
     }
 }

@@ -15,6 +15,7 @@ use words::node::Nodes;
 
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::guard::GuardArgs;
 use drive::{StateReport, StopOutcome};
 use motion::MotionOutcome;
 
@@ -94,6 +95,17 @@ impl Command {
             Self::Torque(command) => Outcome::Moved(Box::new(command.run(context).await?)),
             Self::Home(command) => Outcome::Moved(Box::new(command.run(context).await?)),
         })
+    }
+
+    /// How it guards what it moves.
+    pub const fn guard(&self) -> Option<&GuardArgs> {
+        match self {
+            Self::Velocity(command) => Some(command.guard()),
+            Self::Move(command) => Some(command.guard()),
+            Self::Torque(command) => Some(command.guard()),
+            Self::Home(command) => Some(command.guard()),
+            _ => None,
+        }
     }
 
     /// What it does to drives.

@@ -178,6 +178,10 @@ impl Velocity {
         Motion::Velocity(self.speed, self.ramps.manner())
     }
 
+    pub(super) const fn guard(&self) -> &GuardArgs {
+        &self.ramps.guard
+    }
+
     /// Turns.
     pub async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
@@ -195,6 +199,10 @@ impl Move {
         Motion::Move { to: self.position, relative: self.relative, speed, manner }
     }
 
+    pub(super) const fn guard(&self) -> &GuardArgs {
+        &self.ramps.guard
+    }
+
     /// Moves.
     pub async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
@@ -210,6 +218,10 @@ impl Torque {
     /// What the drive is to do.
     pub(super) const fn motion(&self) -> Motion {
         Motion::Torque(self.current)
+    }
+
+    pub(super) const fn guard(&self) -> &GuardArgs {
+        &self.guard
     }
 
     /// Pushes.

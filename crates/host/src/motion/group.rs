@@ -25,7 +25,7 @@ use crate::motion::guarding::{UNGUARDED, expect_guard};
 use crate::parameters::transactions::Refusal;
 use crate::session::DeadMan;
 use crate::state::{Host, JOG_SPAN};
-use crate::work::{Asked, Running, send};
+use crate::work::{Asked, LineOf, Running, send};
 
 /// SYNC period: at 500 kbit/s eight drives take half of it.
 const PERIOD: Duration = Duration::from_millis(10);
@@ -100,7 +100,7 @@ impl Host {
         let (running, future) = Running::of_group(nodes, self.generation, what, (seq, answer), motion);
         for (node, running) in nodes.iter().zip(running) {
             self.jogs.remove(node);
-            self.leave_stopping_lines(*node);
+            self.leave_lines(LineOf::Stop(*node));
             if let Some(before) = self.running.insert(*node, running) {
                 before.cut_short("replaced", "replaced by another command to the drive");
             }

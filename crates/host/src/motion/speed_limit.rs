@@ -1,8 +1,11 @@
 //! The speed limit of a session: faster motions are refused before anything is sent. Enforced here and not by the page,
 //! which may be an old one, or a program.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use canopen::NodeId;
+use master::Gear;
 use master::drive::{self, Motion};
 use master::group::AxisLimits;
 use master::units::{Along, Rpm};
@@ -40,11 +43,13 @@ impl Host {
 
     /// Whether a command of a session keeps to its limit.
     pub(crate) fn within_speed_limit(&self, session: SessionId, command: &Command) -> Result<(), Refusal> {
-        self.speed_limits.get(&session).map_or(Ok(()), |limit_rpm| keeps_to(command, *limit_rpm))
+        self.speed_limits.get(&session).map_or(Ok(()), |limit_rpm| keeps_to(command, *limit_rpm, &self.setting.gears))
     }
 }
 
-/// The speed of a shaft in a command.
+type Gears = BTreeMap<NodeId, Gear>;
+
+/// The speed of a shaft, behind its gear, in a command.
 enum Speed {
     /// At most this, in r/min.
     Rpm(f64),
@@ -52,13 +57,15 @@ enum Speed {
     AsSet,
     /// Any speed that its load allows.
     UpToTheLoad,
+    /// So much along a way, and not known how many turns those are.
+    OfAnUnknownFeed,
     /// The command does not move it.
     None,
 }
 
-fn keeps_to(command: &Command, limit_rpm: f64) -> Result<(), Refusal> {
+fn keeps_to(command: &Command, limit_rpm: f64, gears: &Gears) -> Result<(), Refusal> {
     let limit = format!("beyond the speed limit of this session, {limit_rpm} r/min");
-    match fastest(command) {
+    match fastest(command, gears) {
         // A speed that is not a number is not within the limit.
         Speed::Rpm(rpm) if rpm.abs() <= limit_rpm => Ok(()),
         Speed::Rpm(rpm) => {
@@ -69,25 +76,30 @@ fn keeps_to(command: &Command, limit_rpm: f64) -> Result<(), Refusal> {
             TOO_FAST,
             format!("with a current the speed depends on the load and may be {limit}: remove the limit first"),
         )),
+        Speed::OfAnUnknownFeed => {
+            Err((TOO_FAST, format!("the drive has no feed constant, and its speed may be {limit}: give it in r/min")))
+        }
         Speed::None => Ok(()),
     }
 }
 
-fn fastest(command: &Command) -> Speed {
+fn fastest(command: &Command, gears: &Gears) -> Speed {
     match command {
         Command::Session(_) | Command::World(_) => Speed::None,
         Command::Node(_, NodeCommand::Jog { rpm }) => Speed::Rpm(*rpm),
-        Command::Node(_, NodeCommand::Drive(drive::Command::Motion(motion))) => of_motion(motion),
+        Command::Node(node, NodeCommand::Drive(drive::Command::Motion(motion))) => {
+            of_motion(motion, gears.get(node).and_then(|gear| gear.feed_m()))
+        }
         Command::Node(..) => Speed::None,
         Command::Group(command) => of_group(command),
     }
 }
 
-fn of_motion(motion: &Motion) -> Speed {
+/// Of a drive whose output moves something by `feed_m` with each turn.
+fn of_motion(motion: &Motion, feed_m: Option<f64>) -> Speed {
     let of = |speed: &Along<Rpm>| match speed {
         Along::Turning(Rpm(rpm)) => Speed::Rpm(*rpm),
-        // The gear is not known here: it is not within the limit.
-        Along::Metres(_) => Speed::Rpm(f64::NAN),
+        Along::Metres(metres_s) => feed_m.map_or(Speed::OfAnUnknownFeed, |feed_m| Speed::Rpm(metres_s / feed_m * 60.0)),
     };
     match motion {
         Motion::Velocity(speed, _) => of(speed),

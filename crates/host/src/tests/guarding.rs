@@ -7,7 +7,7 @@ use master::drive;
 use serde_json::Value;
 
 use super::faults::change;
-use super::{ARM, Page, Stage, WHEEL, home, move_by, play, play_acts, to, torque, velocity};
+use super::{ARM, Page, Stage, WHEEL, home, move_by, play, play_acts, to, velocity};
 use crate::command::{AxisSpeed, AxisTarget, Command, GroupCommand, GroupMove, NodeCommand, SessionCommand};
 
 impl Stage {
@@ -24,7 +24,6 @@ fn motions() -> Vec<Command> {
         NodeCommand::Jog { rpm: 30.0 }.to(ARM),
         velocity(ARM, 30.0),
         move_by(ARM, 90.0, None),
-        torque(ARM, 0.1),
         home(ARM, 17, None),
         GroupCommand::GroupMove(GroupMove { axes, relative: true, rpm: None, rpm_per_s: None, within_s: None }).into(),
         GroupCommand::GroupJog { axes: both(30.0), rpm_per_s: None }.into(),

@@ -104,11 +104,18 @@ impl Trace {
         decoder.decode(frame)
     }
 
-    /// Visits the frames of others since a time.
-    pub fn others_since(&self, at: Instant, each: impl FnMut(&BusFrame)) {
+    /// The number of the next frame.
+    pub fn next(&self) -> u64 {
+        self.lock().next
+    }
+
+    /// Visits the kept frames of others from this number on; the number of the next one.
+    pub fn others_from(&self, number: u64, each: impl FnMut(&BusFrame)) -> u64 {
         let held = self.held();
-        let frames = held.chunks.iter().flat_map(|chunk| chunk.frames.iter());
-        frames.filter(|passed| passed.at >= at && !passed.own).for_each(each);
+        let new = |chunk: &Chunk| usize::try_from(number.saturating_sub(chunk.first)).unwrap_or(usize::MAX);
+        let frames = held.chunks.iter().flat_map(|chunk| chunk.frames.iter().skip(new(chunk)));
+        frames.filter(|passed| !passed.own).for_each(each);
+        held.next
     }
 
     /// A snapshot of the kept frames, unaffected by further ones.
@@ -254,6 +261,23 @@ mod tests {
         let mut numbers = Vec::new();
         held.decode(held.oldest(), held.next(), |number, _, _| numbers.push(number));
         assert!(numbers.len() == kept && numbers.is_sorted(), "each once, in order");
+    }
+
+    /// Longer than the trace is.
+    #[test]
+    fn who_looks_often_enough_misses_no_frame_of_others() {
+        let trace = Trace::new(Models::default(), Origin::default());
+        let (mut next, mut heard) = (trace.next(), Vec::new());
+        for number in 0..(KEPT + 2 * CHUNK) as u64 {
+            let at = Instant::from_nanos(number);
+            trace.append(BusFrame { at, frame: "181#".parse().expect("a frame"), own: number % 3 == 0 });
+            if number % 10_007 == 0 {
+                next = trace.others_from(next, |passed| heard.push(passed.at));
+            }
+        }
+        trace.others_from(next, |passed| heard.push(passed.at));
+        let others = (0..(KEPT + 2 * CHUNK) as u64).filter(|number| number % 3 != 0).map(Instant::from_nanos);
+        assert!(heard.iter().copied().eq(others), "each once, in order: {}", heard.len());
     }
 
     #[test]

@@ -7,6 +7,8 @@ use core::fmt;
 use core::str::FromStr;
 use std::time::Duration;
 
+use cia402::ModeOfOperation;
+
 use super::guard::SwitchedOff;
 use super::handle::Drive;
 use super::homing::HomingOptions;
@@ -155,8 +157,19 @@ impl Drive {
     /// Checks what can be known of a motion without asking the drive.
     ///
     /// # Errors
-    /// [`Error::NoFeed`] for a way, where the [gear](Self::gear) has no feed.
+    /// [`Error::NoFeed`] for a way, where the [gear](Self::gear) has no feed; [`Error::NoSuchMode`] where the model has no mode for it.
     pub fn check_motion(&self, motion: &Motion) -> Result<(), Error> {
+        if let Some(axis) = self.axis_description() {
+            let (mode, is_there) = match motion {
+                Motion::Velocity(..) => (axis.velocity_mode(), true),
+                Motion::Move { .. } => (ModeOfOperation::PROFILE_POSITION, true),
+                Motion::Torque(_) => (ModeOfOperation::PROFILE_TORQUE, axis.units.target_current.is_some()),
+                Motion::Home { .. } => (ModeOfOperation::HOMING, axis.homing.is_some()),
+            };
+            if !(is_there && axis.modes.contains(&mode)) {
+                return Err(self.no_such_mode(axis, mode));
+            }
+        }
         match motion {
             Motion::Velocity(speed, manner) => self.turning(*speed).and_then(|_| manner.options(self, None)).map(drop),
             Motion::Move { to, speed, manner, .. } => {
