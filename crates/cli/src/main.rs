@@ -271,7 +271,10 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Save(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Restore(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Program(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Tune(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Tune(command) => {
+            command.check()?;
+            on_bus(global, format, async |context| command.run(context).await)
+        }
         Command::Objects(objects) => list_objects(global, format, objects),
         Command::Latency(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Boot(boot) => boot.run(global, format),

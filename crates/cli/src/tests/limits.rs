@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use super::virtual_bus::VirtualBus;
+use super::virtual_bus::{VirtualBus, without_bus};
 
 #[test]
 fn limits_follow_what_is_written_to_the_objects_that_move_them() {
@@ -40,4 +40,11 @@ fn limits_follow_what_is_written_to_the_objects_that_move_them() {
     assert!(ended.err.contains("takes -10000 to 10000 in units of r/min / 10"), "{}", ended.err);
     let ended = on_bus(&["velocity", "4", "2.7rpm", "--for", "100ms"]);
     assert!(ended.out.starts_with("node 4: turn at 2.7 r/min: reached"), "{}{}", ended.out, ended.err);
+}
+
+#[test]
+fn what_a_tuning_is_asked_for_is_checked_before_a_bus_is_looked_for() {
+    let refused = without_bus(&["--bus", "bus_of_nobody", "tune", "4", "--travel", "0"]);
+    assert_eq!(refused.status, Some(2), "{}", refused.err);
+    assert!(refused.err.contains("expected a travel from 0.1 to 10000 turns, got 0"), "{}", refused.err);
 }
