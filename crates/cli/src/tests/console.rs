@@ -104,22 +104,36 @@ fn machine(name: &str) -> Scratch {
 fn is_same(page: &str, shell: &str) -> bool {
     let is_measured =
         |line: &str| ["  at ", "  before "].iter().any(|start| line.starts_with(start)) || line.contains(" after ");
-    let number = |word: &str| word.trim_end_matches(|sign: char| !sign.is_ascii_digit()).parse::<f64>().ok();
-    let near = |least: f64, (page, shell): (&str, &str)| match (number(page), number(shell)) {
-        (Some(page), Some(shell)) => (page - shell).abs() <= (0.1 * shell.abs()).max(least),
-        _ => page == shell,
+    let unsigned =
+        |word: &str| word.trim_start_matches(|sign: char| sign.is_ascii_digit() || "+-.".contains(sign)).to_owned();
+    let number = |word: &str| word[..word.len() - unsigned(word).len()].parse::<f64>().ok();
+    // By the unit, which stands at the number or behind it.
+    let near = |(page, shell): (&str, &str), next: &str| {
+        let unit = [unsigned(shell), next.to_owned()].into_iter().find(|unit| !unit.is_empty()).unwrap_or_default();
+        let least = match unit.trim_end_matches([',', ':']) {
+            "s" => 0.2,
+            "counts" => 41.0,
+            "°" => 3.6,
+            "r/min" => 3.0,
+            "A" => 0.5,
+            _ => 0.0,
+        };
+        match (number(page), number(shell)) {
+            (Some(page), Some(shell)) if least > 0.0 => (page - shell).abs() <= (0.1 * shell.abs()).max(least),
+            _ => page == shell,
+        }
+    };
+    let same_words = |page: &str, shell: &str| {
+        let (page, shell): (Vec<_>, Vec<_>) = (page.split(' ').collect(), shell.split(' ').collect());
+        let next = shell.iter().skip(1).copied().chain([""]);
+        page.len() == shell.len()
+            && page.iter().copied().zip(shell.iter().copied()).zip(next).all(|(words, next)| near(words, next))
     };
     page.lines().count() == shell.lines().count()
-        && page.lines().zip(shell.lines()).all(|(page, shell)| {
-            let timed = shell.contains(" after ");
-            let same_words = || {
-                let (page, shell) = (page.split(' '), shell.split(' '));
-                // Seconds, or counts and degrees.
-                let least = if timed { 0.2 } else { 5.0 };
-                page.clone().count() == shell.clone().count() && page.zip(shell).all(|words| near(least, words))
-            };
-            page == shell || (is_measured(shell) && same_words())
-        })
+        && page
+            .lines()
+            .zip(shell.lines())
+            .all(|(page, shell)| page == shell || (is_measured(shell) && same_words(page, shell)))
 }
 
 #[test]
