@@ -3,7 +3,7 @@ use core::time::Duration;
 use canopen::Mux;
 use cia402::{HomingMethod, HomingRow, HomingSequence, ModeOfOperation, PowerState, Statusword};
 
-use crate::loops::Loops;
+use crate::loops::{Loops, OpenLoop};
 use crate::placement::Placement;
 use crate::terminals::Terminals;
 use crate::units::{Quantity, Units};
@@ -37,6 +37,8 @@ pub struct AxisDescription {
     pub units: Units,
     /// How its loops are set, where it has gains.
     pub loops: Option<Loops>,
+    /// What keeps its rotor in step, where nothing measures it.
+    pub open_loop: Option<OpenLoop>,
 }
 
 impl AxisDescription {

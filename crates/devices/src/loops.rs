@@ -63,3 +63,23 @@ impl Integral {
         }
     }
 }
+
+/// How a stepper without an encoder is kept in step: by a current and ramps that leave torque. Its ramps are
+/// [`Units::ramps`](crate::Units), its microsteps [`Units::counts_per_turn`](crate::Units).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpenLoop {
+    /// Its number chooses the current while it runs.
+    pub current: Mux,
+    /// Amplitude of the phase current by that number, A.
+    pub currents_a: &'static [f32],
+    /// Where it is chosen how much of that current flows at standstill, and the shares by its value.
+    pub standstill: (Mux, &'static [f64]),
+    /// Most pulses in a second.
+    pub step_frequency_hz: f64,
+    /// Pulses in a turn from which its microsteps shake the rotor little.
+    pub smooth_pulses: u32,
+    /// Speed with which a motion begins, without a ramp.
+    pub start_speed: Quantity,
+    /// Speed from which it stops without one.
+    pub end_speed: Quantity,
+}

@@ -10,6 +10,7 @@ use crate::physics::Physics;
 use crate::pmsm::PmsmModel;
 use crate::rig::{Rig, RigModel};
 use crate::shaft::Motion;
+use crate::stepper::Stepping;
 
 /// A motor of any kind with its rig.
 pub trait Motor: Clone + PartialEq {
@@ -29,6 +30,11 @@ pub trait Motor: Clone + PartialEq {
 
     /// Its windings, of one with magnets.
     fn pmsm_model(&self) -> Option<&PmsmModel> {
+        None
+    }
+
+    /// Its windings, of a stepper.
+    fn stepping(&self) -> Option<Stepping> {
         None
     }
 

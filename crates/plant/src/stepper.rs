@@ -141,6 +141,28 @@ pub struct StepperOutput {
     pub arc_j: f64,
 }
 
+/// What a stepper's torque follows from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stepping {
+    /// Windings, magnets and teeth.
+    pub windings: StepperModel,
+    /// Relative change of the windings' resistance per kelvin above 20 °C.
+    pub resistance_per_k: f64,
+    /// Resistance of the switches in the path of a phase.
+    pub switch_resistance_ohm: f64,
+}
+
+impl Stepping {
+    /// The most torque that a current of this amplitude makes at a speed, from a supply of so many volts with the windings at this
+    /// temperature: `K I`, or what the voltage allows ([`StepperModel::pull_out_nm`]) where that is less.
+    pub fn pull_out_nm(&self, current_a: f64, supply_v: f64, winding_c: f64, velocity_rad_s: f64) -> f64 {
+        let winding_ohm = self.windings.resistance_ohm * (1.0 + self.resistance_per_k * (winding_c - 20.0));
+        let resistance_ohm = winding_ohm + self.switch_resistance_ohm;
+        let by_voltage = self.windings.pull_out_nm(supply_v, resistance_ohm, velocity_rad_s);
+        by_voltage.min(self.windings.torque_constant_nm_a() * current_a)
+    }
+}
+
 impl StepperModel {
     /// Torque per ampere of current across the magnets.
     pub fn torque_constant_nm_a(&self) -> f64 {

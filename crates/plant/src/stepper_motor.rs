@@ -21,7 +21,7 @@ use crate::motor::{self, Motor};
 use crate::physics::{Physics, load_velocity_rad_s};
 use crate::rig::{Rig, RigModel};
 use crate::shaft::{Motion, PendingStep, Turned};
-use crate::stepper::{Bridges, Phase, StepperData, StepperInput, StepperModel, Turn};
+use crate::stepper::{Bridges, Phase, StepperData, StepperInput, StepperModel, Stepping, Turn};
 use crate::thermal::reading_c;
 
 /// Assumed: two wires that touch have 1 ohm with their contact. It is enough to be noticed before the bus collapses.
@@ -274,6 +274,15 @@ impl Motor for StepperMotor {
     type Wear = bool;
 
     motor::parts!(StepperMotor);
+
+    fn stepping(&self) -> Option<Stepping> {
+        let rig = &self.model.rig;
+        Some(Stepping {
+            windings: self.model.stepper,
+            resistance_per_k: rig.resistance_per_k,
+            switch_resistance_ohm: rig.switch_resistance_ohm,
+        })
+    }
 
     fn physics(&self) -> Physics {
         let velocity_rad_s = load_velocity_rad_s(&self.rig, self.rotor.velocity_rad_s);

@@ -12,6 +12,7 @@ use plant::gear::GearModel;
 use plant::mechanics::RotorModel;
 use plant::physics::Physics;
 use plant::pmsm::PmsmModel;
+use plant::stepper::Stepping;
 
 use crate::machine::{Realism, TimingMode};
 use crate::mechanics::Mechanics;
@@ -27,6 +28,15 @@ pub struct MotorData {
     pub windings: PmsmModel,
     /// The reducer, where one is built in.
     pub gear: Option<GearModel>,
+}
+
+/// The same of a stepper.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepperData {
+    /// Rotor and bearings.
+    pub rotor: RotorModel,
+    /// Windings, magnets and switches.
+    pub stepping: Stepping,
 }
 
 /// A drive joined to its physics: firmware, motor, load, supply and sensors as one station.
@@ -113,6 +123,12 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
 
     /// What the motor of an axis is made of, of one with magnets.
     fn motor(&self, axis: AxisId) -> Option<MotorData> {
+        let _ = axis;
+        None
+    }
+
+    /// What the stepper of an axis is made of.
+    fn stepper(&self, axis: AxisId) -> Option<StepperData> {
         let _ = axis;
         None
     }

@@ -56,11 +56,14 @@ mod world;
 pub use block_on::{BlockOnError, block_on, block_on_for};
 pub use coupling::{BodyKind, BodyState, CoupledShaft, Coupling, CouplingError};
 pub use devices::AxisId;
-pub use drive::{Brake, Levels, MotorData, OutputShaft, PowerPhase, Report, VirtualDrive, VirtualDriveClone};
+pub use drive::{
+    Brake, Levels, MotorData, OutputShaft, PowerPhase, Report, StepperData, VirtualDrive, VirtualDriveClone,
+};
 pub use drives::{Fidelity, RegisterError};
 pub use mechanics::Mechanics;
 pub use plant::attachment::OUTPUT_WHEEL_SHARE;
 pub use plant::gear::GearModel;
+pub use plant::mechanics::RotorModel;
 pub use plant::physics::Physics;
 pub use prng::Prng;
 pub use refused::Refused;

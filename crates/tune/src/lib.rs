@@ -37,6 +37,7 @@ mod excitation;
 mod friction;
 mod least_squares;
 mod mechanics;
+mod open_loop;
 mod response;
 mod samples;
 
@@ -46,5 +47,6 @@ pub use design::{Margins, Objective, Proposal, margins, propose, propose_positio
 pub use excitation::Excitation;
 pub use friction::{Friction, SteadyRun, fit_friction};
 pub use mechanics::{Elastic, Mechanics, identify};
+pub use open_loop::{Ramp, Turned};
 pub use response::{BackEmf, Line, Response, distance, response};
 pub use samples::{Samples, Unusable};

@@ -116,6 +116,7 @@ const AXIS: AxisDescription = AxisDescription {
     homing: Some(HOMING),
     terminals: Terminals::NONE,
     loops: Some(LOOPS),
+    open_loop: None,
     units: UNITS,
 };
 

@@ -22,9 +22,6 @@ pub const SUPERVISION_PERIOD_S: f64 = 0.5e-3;
 /// Communication task: 0.5 ms, the unit of the sibling's PDO timers.
 pub const COMMUNICATION_PERIOD_NS: u64 = 500_000;
 
-/// Highest step frequency (2.1), pulses/s: it bounds every speed.
-pub const STEP_FREQUENCY_HZ: f64 = 200e3;
-
 /// Highest speed of 6081h and 60FFh, r/min.
 pub const MAX_SPEED_RPM: f64 = 3000.0;
 

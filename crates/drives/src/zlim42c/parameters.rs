@@ -5,7 +5,7 @@ use motion::pid::PiGains;
 
 use super::assumptions::*;
 use super::objects::*;
-use super::tables::{PEAK_CURRENTS_A, PULSES_PER_TURN, entry};
+use super::tables::{PEAK_CURRENTS_A, PULSES_PER_TURN, STEP_FREQUENCY_HZ, entry};
 use super::variations::{EMERGENCY_BRAKE, EMERGENCY_COAST};
 use super::{Values, homing};
 use crate::engine::actuator::stepper::{StepperCurrents, StepperGains, StepperModel};

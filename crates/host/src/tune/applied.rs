@@ -3,14 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use canopen::Mux;
 use cia402::RAD_S_PER_RPM;
 use master::Drive;
 use master::parameters::Parameters;
 use tune::Objective;
 use words::failure::{Failure, both};
 
-use super::bench::{ENOUGH_CURRENT, SWINGS};
+use super::bench::{ENOUGH_CURRENT, SWINGS, bytes};
 use super::setup::keep;
 use super::{Bench, Excursion, Proposed, Reader, Request, Setup, StepResponse, TuneReport, find, loops_of};
 use crate::capture::{Restorer, with_left};
@@ -162,11 +161,6 @@ pub async fn step(
 /// Where the former gains are kept, beside the journal of a transaction.
 fn former_gains(journal: &Path) -> PathBuf {
     journal.with_extension("gains.journal")
-}
-
-fn bytes(drive: &Drive, object: Mux, value: i64) -> Vec<u8> {
-    let width = drive.description().and_then(|model| model.row(object)).map_or(2, |row| row.data_type.size());
-    value.to_le_bytes()[..width.min(8)].to_vec()
 }
 
 /// The proposed values as a transaction. Its way back is that of the former gains.

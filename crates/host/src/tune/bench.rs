@@ -466,3 +466,9 @@ pub(super) async fn write(drive: &Drive, object: canopen::Mux, value: i64) -> Re
     let width = row.map_or(4, |row| row.data_type.size());
     Ok(drive.node().download(object, &value.to_le_bytes()[..width.min(8)]).await?)
 }
+
+/// A value as wide as its object.
+pub(super) fn bytes(drive: &Drive, object: canopen::Mux, value: i64) -> Vec<u8> {
+    let width = drive.description().and_then(|model| model.row(object)).map_or(2, |row| row.data_type.size());
+    value.to_le_bytes()[..width.min(8)].to_vec()
+}

@@ -9,14 +9,14 @@ use devices::{AxisId, Description, Loops};
 use master::cyclic::CyclicOptions;
 use master::{Drive, Network};
 use sim::machine::{Order, order};
-use sim::{Fidelity, MotorData, OUTPUT_WHEEL_SHARE, Place, World};
+use sim::{Fidelity, MotorData, OUTPUT_WHEEL_SHARE, Place, StepperData, World};
 use words::failure::Failure;
 
 use super::bench::{Bench, Bounds, Excursion, Measurement, StepResponse, excitation, write};
 use super::found::Found;
 use super::readings::{Currents, Reader};
 
-const NODE: NodeId = NodeId::MIN;
+pub(super) const NODE: NodeId = NodeId::MIN;
 /// How long the answer to a step and to a load is looked at.
 const ANSWER_S: f64 = 0.5;
 /// The load that comes on, by the current that holds it.
@@ -62,6 +62,42 @@ pub fn motor_of(model: &'static Description) -> Option<MotorData> {
     order(model, &order_of).ok()?.motor(AxisId(0))
 }
 
+/// The same of a stepper.
+pub(super) fn stepper_of(model: &'static Description) -> Option<StepperData> {
+    let order_of = Order::new(model, NODE, model.bitrate.unwrap_or(Bitrate::M1));
+    order(model, &order_of).ok()?.stepper(AxisId(0))
+}
+
+fn unmade(model: &Description, reason: impl std::fmt::Display) -> Failure {
+    Failure::new(format!("the twin of a {} cannot be made", model.title)).because(reason)
+}
+
+/// Present at the twin.
+pub(super) fn bring_about(world: &mut World, stimulus: &sim::Stimulus) -> Result<(), String> {
+    let applied = world.apply(Place::node(NODE.raw()), stimulus).map_err(|error| error.to_string())?;
+    // A refusal would leave it without a load, which the comparison would not show.
+    applied.map(drop).map_err(|refused| refused.to_string())
+}
+
+/// A world with one drive of a model, at whose shaft is what these words say.
+pub(super) fn world_of(
+    model: &'static Description,
+    fidelity: Fidelity,
+    load: &[String],
+) -> Result<(World, Drive), Failure> {
+    let mut world = World::new(Bitrate::M1, 1);
+    let network = Network::new();
+    world.add_station(network.clone());
+    let ordered = Order { fidelity, ..Order::new(model, NODE, Bitrate::M1) };
+    let machine = order(model, &ordered).map_err(|error| unmade(model, error))?;
+    world.add_drive(NODE.raw(), machine).map_err(|error| unmade(model, error))?;
+    for words in load {
+        let stimulus = words.parse().map_err(|error: sim::stimulus::StimulusError| unmade(model, error))?;
+        bring_about(&mut world, &stimulus).map_err(|reason| unmade(model, reason))?;
+    }
+    Ok((world, Drive::new(network.node(NODE), model)))
+}
+
 impl Twin {
     /// The twin of what was found; `values` are the drive's own settings that matter.
     pub fn new(
@@ -97,7 +133,7 @@ impl Twin {
     }
 
     fn failed(&self, reason: impl std::fmt::Display) -> Failure {
-        Failure::new(format!("the twin of a {} cannot be made", self.model.title)).because(reason)
+        unmade(self.model, reason)
     }
 
     /// What stopped a trial of the twin says nothing of the drive, which is at rest by then.
@@ -110,9 +146,7 @@ impl Twin {
 
     fn push(&self, world: &mut World, torque_nm: f64) -> Result<(), Failure> {
         let present = sim::Stimulus::LoadTorque(torque_nm);
-        let applied = world.apply(Place::node(NODE.raw()), &present).map_err(|error| self.failed(error))?;
-        // A refusal would leave it without a load, which the comparison would not show.
-        applied.map_err(|error| self.failed(error))
+        bring_about(world, &present).map_err(|reason| self.failed(reason))
     }
 
     /// A world with the twin alone, booted.
@@ -124,22 +158,12 @@ impl Twin {
     }
 
     fn world_at(&self, fidelity: Fidelity) -> Result<(World, Drive), Failure> {
-        let mut world = World::new(Bitrate::M1, 1);
-        let network = Network::new();
-        world.add_station(network.clone());
-        let ordered = Order { fidelity, ..Order::new(self.model, NODE, Bitrate::M1) };
-        let machine = order(self.model, &ordered).map_err(|error| self.failed(error))?;
-        world.add_drive(NODE.raw(), machine).map_err(|error| self.failed(error))?;
-        for words in &self.load {
-            let stimulus = words.parse().map_err(|error: sim::stimulus::StimulusError| self.failed(error))?;
-            let applied = world.apply(Place::node(NODE.raw()), &stimulus).map_err(|error| self.failed(error))?;
-            applied.map_err(|error| self.failed(error))?;
-        }
+        let (mut world, drive) = world_of(self.model, fidelity, &self.load)?;
         if self.load_nm != 0.0 {
             self.push(&mut world, self.load_nm)?;
         }
         world.run_for(Duration::from_secs(1));
-        Ok((world, Drive::new(network.node(NODE), self.model)))
+        Ok((world, drive))
     }
 
     async fn open(&self, drive: &Drive, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Bench, Failure> {

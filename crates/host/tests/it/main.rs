@@ -9,3 +9,4 @@ mod params;
 mod stopping;
 mod tune;
 mod tune_joint;
+mod tune_ramps;

@@ -92,6 +92,7 @@ const AXIS: AxisDescription = AxisDescription {
         driver_temperature: Some(Quantity::new(0x2026, 2, 0.1)),
     },
     loops: Some(LOOPS),
+    open_loop: None,
 };
 
 /// Chapter 9: 6074h is printed as "real-time target torque", 2018h to 2020h without units. Those

@@ -19,6 +19,7 @@ use cia402::{ModeOfOperation, Statusword, object};
 use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
 use crate::description::{Description, HostWatch, NmtRules, Section};
 use crate::faults::Faults;
+use crate::loops::OpenLoop;
 use crate::placement::Placement;
 use crate::stated::Stated;
 use crate::terminals::{Input, InputSignal, Terminals};
@@ -28,7 +29,7 @@ use crate::zltech;
 use faults::FAULTS;
 use objects::TABLE;
 use statusword::{BIT_4_OF_CONTROLWORD, ENERGISED, HOMING_ATTAINED, IN_POSITION, RUNNING};
-use tables::PULSES_PER_TURN;
+use tables::{PEAK_CURRENTS_A, PULSES_PER_TURN, STEP_FREQUENCY_HZ};
 use variations::VARIATIONS;
 
 /// The ZLIM42-C of 70 mm.
@@ -75,6 +76,7 @@ const AXIS: AxisDescription = AxisDescription {
     homing: Some(HOMING),
     terminals: TERMINALS,
     loops: None,
+    open_loop: Some(OPEN_LOOP),
     units: UNITS,
 };
 
@@ -122,6 +124,18 @@ const HOMING: HomingRules = HomingRules {
     own_methods: &homing::BY_LABEL,
     switches: TERMINALS,
     remark: "The manual's labels and its paragraphs (5.3.6) name opposite directions; this is by the labels.",
+};
+
+/// 2.1; 5.3.4 to 5.4. Of microsteps 1.2 says only that they are quiet: from an eighth of a full step on the drive shakes its
+/// rotor little (`docs/drives/zlim42c.md`, Smoothness).
+const OPEN_LOOP: OpenLoop = OpenLoop {
+    current: Mux::new(0x2005, 0),
+    currents_a: &PEAK_CURRENTS_A,
+    standstill: (Mux::new(0x2007, 0), &[0.5, 1.0]),
+    step_frequency_hz: STEP_FREQUENCY_HZ,
+    smooth_pulses: 1600,
+    start_speed: Quantity::speed(0x200E, 0, 1.0),
+    end_speed: Quantity::speed(0x6082, 0, 1.0),
 };
 
 const UNITS: Units = Units {

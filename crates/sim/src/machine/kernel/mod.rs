@@ -24,7 +24,7 @@ use plant::shaft::{Motion, Push};
 
 use crate::mechanics::Mechanics;
 use crate::stimulus::{Stimulus, SwitchRange};
-use crate::{Levels, MotorData, PowerPhase, Refused, Report, VirtualDrive, nmt_reset};
+use crate::{Levels, MotorData, PowerPhase, Refused, Report, StepperData, VirtualDrive, nmt_reset};
 use assembly::Assembly;
 use realism::{Noise, Realism};
 use rest::Rest;
@@ -446,6 +446,11 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         let motor = self.assembly.motor_at(axis);
         let (rotor, gear) = (*motor.rotor_model(), self.assembly.gear().copied());
         motor.pmsm_model().map(|windings| MotorData { rotor, windings: *windings, gear })
+    }
+
+    fn stepper(&self, axis: AxisId) -> Option<StepperData> {
+        let motor = self.assembly.motor_at(axis);
+        motor.stepping().map(|stepping| StepperData { rotor: *motor.rotor_model(), stepping })
     }
 
     fn check_couple(&self, axis: AxisId) -> Result<(), Refused> {
