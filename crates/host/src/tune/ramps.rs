@@ -80,6 +80,9 @@ impl RampRequest {
     }
 }
 
+/// Objects with the values that are proposed.
+type Values = Vec<(Mux, i64)>;
+
 /// What was computed and is proposed. Torques and inertia are those at the motor's shaft.
 #[derive(Debug, Serialize)]
 pub struct RampReport {
@@ -262,7 +265,7 @@ impl Known {
     }
 
     /// Values that leave this margin.
-    fn propose(&self, request: &RampRequest, margin: f64) -> Result<Vec<(Mux, i64)>, Failure> {
+    fn propose(&self, request: &RampRequest, margin: f64) -> Result<Values, Failure> {
         let failed = |reason: String| {
             Failure::new(format!("no ramp of a {} keeps a margin of {margin:.2}", self.model.title)).because(reason)
         };
@@ -344,7 +347,7 @@ impl Known {
     }
 
     /// Values with which the twin keeps in step under a load as many times as large as the margin, and what it lost.
-    fn proved(&self, request: &RampRequest) -> Result<(Vec<(Mux, i64)>, Vec<TwinRow>, i32), Failure> {
+    fn proved(&self, request: &RampRequest) -> Result<(Values, Vec<TwinRow>, i32), Failure> {
         let mut lost = Vec::new();
         for more in 0..CORRECTIONS {
             let values = self.propose(request, request.margin * CAREFUL.powi(more))?;

@@ -1,4 +1,4 @@
-//! `ferrodrive tune`: gains for a drive's loops, from a measurement.
+//! `ferrodrive tune`: gains for a drive's loops, from a measurement; ramps and currents of a stepper, from its load.
 
 use std::io::{IsTerminal, stdin};
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use host::network::params::journal::default_path;
-use host::tune::{Bounds, Request, TuneReport};
+use host::tune::{Bounds, RampReport, RampRequest, Request, TuneReport};
 use master::units::{Amperes, Rpm, parse_duration};
 use words::node::node;
 
@@ -19,6 +19,10 @@ use crate::output::Report;
 use console::guard::{Guard, GuardArgs};
 use plot::{Paint, Table};
 
+/// The speed of a stepper, where none is named, r/min.
+const STEPPER_RPM: f64 = 600.0;
+const UNCHANGED: &str = "nothing of the drive has changed; --apply writes the proposed values";
+
 /// Which loops gains are found for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum WhichLoop {
@@ -28,7 +32,11 @@ enum WhichLoop {
     Position,
 }
 
-/// Find gains for the loops of a drive: measured, tried on its twin, then on the drive
+/// Find gains for the loops of a drive, or ramps and currents of a stepper that lose no step
+///
+/// A stepper without an encoder has no loops, and shows no lost step: what it needs is computed from the load that --load-inertia,
+/// --load-friction and --load-torque name, with a margin, and tried on its twin. It is not turned. Any other drive is measured, and
+/// its gains are tried on its twin, then on the drive:
 ///
 /// The shaft turns to and fro at steady speeds, and then at one speed with an excitation on top that grows to a share of
 /// --current; that of a joint, whose loops are not seen from outside, is turned round by its own ramps instead. The motion stops where it reaches --current or --travel. Afterwards the drive has the parameters that it had,
@@ -36,7 +44,8 @@ enum WhichLoop {
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive tune 4\n  \
     ferrodrive tune 4 --bandwidth 20 --loop position --picture tune.svg\n  \
-    ferrodrive --bus can0 tune 4 --speed 60rpm --current 8A --apply")]
+    ferrodrive --bus can0 tune 4 --speed 60rpm --current 8A --apply\n  \
+    ferrodrive tune 2 --speed 600rpm --load-inertia 3e-5 --load-friction 0.05")]
 pub(crate) struct Tune {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -50,7 +59,8 @@ pub(crate) struct Tune {
     /// Objective: degrees that are to be left there; as stiff as that allows
     #[arg(long, value_name = "DEGREES", default_value = "40")]
     phase_margin: f64,
-    /// Highest speed of the measurement, of the motor's shaft (default: 120rpm, of a joint 600rpm)
+    /// Highest speed of the measurement, of the motor's shaft (default: 120rpm, of a joint 600rpm); of a stepper the speed that it is
+    /// to reach (default: 600rpm)
     #[arg(long, value_name = "SPEED")]
     speed: Option<Rpm>,
     /// Most current that the speed loop may ask for meanwhile
@@ -65,6 +75,21 @@ pub(crate) struct Tune {
     /// Torque per ampere of another motor than the model's own, in N·m/A
     #[arg(long, value_name = "NM_PER_A")]
     torque_constant: Option<f64>,
+    /// Of a stepper: inertia of what it turns, without its rotor, in kg·m²
+    #[arg(long, value_name = "KG_M2", default_value = "0")]
+    load_inertia: f64,
+    /// Of a stepper: dry friction of what it turns, in N·m
+    #[arg(long, value_name = "NM", default_value = "0")]
+    load_friction: f64,
+    /// Of a stepper: what pushes its shaft in one direction, such as a weight, in N·m
+    #[arg(long, value_name = "NM", default_value = "0", allow_negative_numbers = true)]
+    load_torque: f64,
+    /// Of a stepper: how many times the torque that is needed there is to be
+    #[arg(long, value_name = "TIMES", default_value = "1.5")]
+    margin: f64,
+    /// Of a stepper: time in which it is to reach the speed (default: the shortest that keeps the margin)
+    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    ramp: Option<Duration>,
     /// Write the proposed values to the drive, and measure once more
     #[arg(long)]
     apply: bool,
@@ -105,14 +130,37 @@ impl Tune {
     /// Whether what was typed is within its ranges: no bus is needed to see that.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         // The usual speed of a model is within them.
-        Ok(self.request(None, 120.0).check()?)
+        self.request(None, 120.0).check()?;
+        self.ramp_request(None).check()
     }
 
-    /// Measures and proposes; and writes, if that was asked for.
-    pub(crate) async fn run(&self, context: &Context) -> Result<TuneReport, Failure> {
+    fn ramp_request(&self, journal: Option<PathBuf>) -> RampRequest {
+        RampRequest {
+            load: tune::Turned {
+                inertia_kg_m2: self.load_inertia,
+                dry_nm: self.load_friction,
+                viscous_nm_s: 0.0,
+                load_nm: self.load_torque,
+            },
+            speed_rpm: self.speed.map_or(STEPPER_RPM, |Rpm(rpm)| rpm.abs()),
+            margin: self.margin,
+            ramp: self.ramp,
+            journal,
+            on_kept: note_kept,
+            apply: self.apply,
+            within: self.within,
+        }
+    }
+
+    /// Measures or computes, and proposes; and writes, if that was asked for.
+    pub(crate) async fn run(&self, context: &Context) -> Result<Tuned, Failure> {
         let drive = context.known_drive(self.node).await?;
-        let (_, loops) = host::tune::loops_of(&drive)?;
         let journal = (!context.is_embedded()).then(|| default_path(self.node));
+        if host::tune::open_loop_of(&drive).is_some() {
+            let request = self.ramp_request(journal);
+            return Ok(Tuned::Ramps(host::tune::tune_ramps(&drive, &request, &context.progress).await?));
+        }
+        let (_, loops) = host::tune::loops_of(&drive)?;
         let request = self.request(journal, loops.usual_rpm);
         let guard = self.guard.begin(context, &drive).await?;
         let restorer = host::capture::Restorer::of(&drive);
@@ -128,8 +176,73 @@ impl Tune {
             let written = std::fs::write(path, report.picture.to_svg());
             written.map_err(|error| Failure::of_writing("the picture", path, &error))?;
         }
-        Ok(report)
+        Ok(Tuned::Gains(Box::new(report)))
     }
+}
+
+/// What was proposed.
+#[derive(Debug, serde::Serialize)]
+#[serde(untagged)]
+pub(crate) enum Tuned {
+    /// Of a drive with loops.
+    Gains(Box<TuneReport>),
+    /// Of a stepper without an encoder.
+    Ramps(RampReport),
+}
+
+impl Report for Tuned {
+    fn text(&self, paint: Paint) -> String {
+        match self {
+            Self::Gains(report) => report.text(paint),
+            Self::Ramps(report) => report.text(paint),
+        }
+    }
+}
+
+impl Report for RampReport {
+    fn text(&self, paint: Paint) -> String {
+        let mut lines = vec![
+            format!(
+                "node {} ({}), {:.0} V: inertia {} kg·m² with its rotor",
+                self.node,
+                self.model,
+                self.supply_v,
+                three_digits(self.inertia_kg_m2)
+            ),
+            format!(
+                "at {:.0} r/min the motor gives {:.3} N·m at most, and the load takes {:.3} N·m",
+                self.speed_rpm, self.pull_out_nm, self.needed_nm
+            ),
+            format!(
+                "the load has the margin up to {:.0} r/min, and starts at {:.0} r/min at most",
+                self.highest_rpm, self.start_rpm
+            ),
+            String::new(),
+            rows(&self.values, paint),
+            String::new(),
+            format!(
+                "least margin of torque on the ramp: {:.2} as it is, {:.2} proposed; asked for {:.2}",
+                self.margin_before, self.margin_after, self.margin
+            ),
+        ];
+        lines.extend(self.twin.iter().map(|row| format!("its twin: {row}")));
+        lines.push(if self.applied {
+            "the drive has the proposed values; it was not turned".to_owned()
+        } else {
+            UNCHANGED.to_owned()
+        });
+        lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
+        lines.join("\n")
+    }
+}
+
+/// What each object has and is to get.
+fn rows(rows: &[host::tune::GainRow], paint: Paint) -> String {
+    let mut table = Table::new(&["object", "name", "has", "proposed"]);
+    for row in rows {
+        table.row([row.object.clone(), row.name.to_owned(), row.before.to_string(), row.after.to_string()]);
+    }
+    table.plain(paint)
 }
 
 /// One key of a person at a terminal: b and Enter. It is read beside what goes on: signs of life are sent, and Ctrl-C is heard.
@@ -193,12 +306,8 @@ impl Report for TuneReport {
             format!("the currents of its twin are {:.1} % off", 100.0 * self.twin_off)
         });
         lines.push(format!("it took {:.1} A at most, and {:.1} turns to one side", self.peak_a, self.travel_turns));
-        let mut table = Table::new(&["object", "name", "has", "proposed"]);
-        for row in &self.gains {
-            table.row([row.object.clone(), row.name.to_owned(), row.before.to_string(), row.after.to_string()]);
-        }
         lines.push(String::new());
-        lines.push(table.plain(paint));
+        lines.push(rows(&self.gains, paint));
         let margins = |name: &str, row: &host::tune::MarginRow| {
             let state = if row.stable { "stable" } else { "NOT stable" };
             format!(
@@ -220,7 +329,7 @@ impl Report for TuneReport {
                 format!("the drive has the proposed values; they are not stored: ferrodrive save {}", self.node)
             }
             (false, true) => "the drive has its former gains".to_owned(),
-            (false, false) => "nothing of the drive has changed; --apply writes the proposed values".to_owned(),
+            (false, false) => UNCHANGED.to_owned(),
         });
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
         lines.join("\n")
