@@ -287,3 +287,14 @@ impl Restorer {
         seen.map(drop)
     }
 }
+
+/// That not everything of a node was put back; `None` if nothing is left. How to do it later is for who reports it to say.
+pub fn not_put_back(node: NodeId, left: &[String]) -> Option<Failure> {
+    let failure = || Failure::new(format!("node {node}: not everything was put back"));
+    (!left.is_empty()).then(|| failure().of_kind("not_put_back").at_node(node))
+}
+
+/// A failure, with what could not be put back after it.
+pub fn with_left(failure: Failure, left: &[String]) -> Failure {
+    left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}")))
+}

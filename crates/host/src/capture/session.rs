@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::pdo::PdoId;
-use canopen::{Mux, NmtCommand, NmtState, NodeId, connection_set};
+use canopen::{Mux, NmtCommand, NmtState, connection_set};
 use futures_util::future::{Either, select};
 use master::core::LoggedFrame;
 use master::parameters::{Parameters, PlanOptions};
@@ -18,7 +18,7 @@ use words::failure::Failure;
 
 use super::measurand::{Measurand, Way};
 use super::plan::{CapturePlan, Request, plan};
-use super::restorer::Restorer;
+use super::restorer::{Restorer, with_left};
 use super::rows::{Armed, Rows, Trigger};
 use crate::network::params::journal::{Kept, default_path};
 use crate::network::params::{apply_refused, source};
@@ -254,17 +254,6 @@ impl Wanted {
         }
         Ok(())
     }
-}
-
-/// That not everything of a node was put back; `None` if nothing is left. How to do it later is for who reports it to say.
-pub fn not_put_back(node: NodeId, left: &[String]) -> Option<Failure> {
-    let failure = || Failure::new(format!("node {node}: not everything was put back"));
-    (!left.is_empty()).then(|| failure().of_kind("not_put_back").at_node(node))
-}
-
-/// A failure, with what could not be put back after it.
-pub fn with_left(failure: Failure, left: &[String]) -> Failure {
-    left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}")))
 }
 
 /// The period of a SYNC that another node sends: the median distance of those that were heard. Where only one was, the next is waited

@@ -131,7 +131,7 @@ impl Tune {
     pub(crate) fn check(&self) -> Result<(), Failure> {
         // The usual speed of a model is within them.
         self.request(None, 120.0).check()?;
-        self.ramp_request(None).check()
+        Ok(self.ramp_request(None).check()?)
     }
 
     fn ramp_request(&self, journal: Option<PathBuf>) -> RampRequest {
