@@ -146,7 +146,7 @@ fn texts_say_a_thing_once() {
     assert_eq!(done(&["write", "4", "60FF", "60rpm"]).out, "node 4 60FFh:00 target_velocity written: 60 r/min\n");
     let refused = ferrodrive(&["home", "4", "--method", "17"]).err;
     assert!(
-        refused.contains("6060h takes 1 (profile position), 3 (profile velocity), 4 (profile torque) only"),
+        refused.contains("its 6060h takes 1 (profile position), 3 (profile velocity), 4 (profile torque)\n"),
         "{refused}"
     );
 }

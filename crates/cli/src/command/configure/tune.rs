@@ -39,8 +39,8 @@ enum WhichLoop {
 /// its gains are tried on its twin, then on the drive:
 ///
 /// The shaft turns to and fro at steady speeds, and then at one speed with an excitation on top that grows to a share of
-/// --current; that of a joint, whose loops are not seen from outside, is turned round by its own ramps instead. The motion stops where it reaches --current or --travel. Afterwards the drive has the parameters that it had,
-/// unless --apply is given. Keep an emergency stop within reach, and the load free to turn.
+/// --current; that of a joint, whose loops are not seen from outside, is turned round by its own ramps instead. The motion stops where it
+/// reaches --current or --travel. Afterwards the drive has the parameters that it had, unless --apply is given. Keep an emergency stop within reach, and the load free to turn.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive tune 4\n  \
     ferrodrive tune 4 --bandwidth 20 --loop position --picture tune.svg\n  \
@@ -56,11 +56,10 @@ pub(crate) struct Tune {
     /// Objective: where the gain of the speed loop falls to one, in Hz
     #[arg(long, value_name = "HZ", conflicts_with = "phase_margin")]
     bandwidth: Option<f64>,
-    /// Objective: degrees that are to be left there; as stiff as that allows
+    /// Objective: degrees that are to be left there
     #[arg(long, value_name = "DEGREES", default_value = "40")]
     phase_margin: f64,
-    /// Highest speed of the measurement, of the motor's shaft (default: 120rpm, of a joint 600rpm); of a stepper the speed that it is
-    /// to reach (default: 600rpm)
+    /// Highest speed of the motor's shaft (default: 120rpm, of a joint and of a stepper 600rpm)
     #[arg(long, value_name = "SPEED")]
     speed: Option<Rpm>,
     /// Most current that the speed loop may ask for meanwhile
@@ -76,19 +75,19 @@ pub(crate) struct Tune {
     #[arg(long, value_name = "NM_PER_A")]
     torque_constant: Option<f64>,
     /// Of a stepper: inertia of what it turns, without its rotor, in kg·m²
-    #[arg(long, value_name = "KG_M2", default_value = "0")]
+    #[arg(long, value_name = "KG_M2", default_value = "0", hide_short_help = true)]
     load_inertia: f64,
     /// Of a stepper: dry friction of what it turns, in N·m
-    #[arg(long, value_name = "NM", default_value = "0")]
+    #[arg(long, value_name = "NM", default_value = "0", hide_short_help = true)]
     load_friction: f64,
     /// Of a stepper: what pushes its shaft in one direction, such as a weight, in N·m
-    #[arg(long, value_name = "NM", default_value = "0", allow_negative_numbers = true)]
+    #[arg(long, value_name = "NM", default_value = "0", allow_negative_numbers = true, hide_short_help = true)]
     load_torque: f64,
     /// Of a stepper: how many times the torque that is needed there is to be
-    #[arg(long, value_name = "TIMES", default_value = "1.5")]
+    #[arg(long, value_name = "TIMES", default_value = "1.5", hide_short_help = true)]
     margin: f64,
     /// Of a stepper: time in which it is to reach the speed (default: the shortest that keeps the margin)
-    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, hide_short_help = true)]
     ramp: Option<Duration>,
     /// Write the proposed values to the drive, and measure once more
     #[arg(long)]
