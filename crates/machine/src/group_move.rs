@@ -16,9 +16,6 @@ use words::failure::Failure;
 use words::mode::mode;
 use words::node::node;
 
-/// How long the shafts may take to come to their last set-points before it is looked where they are.
-const SETTLING: Duration = Duration::from_millis(500);
-
 /// A move as it is asked for; what is `None` is that of the machine file, or the default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GroupMove {
@@ -313,7 +310,7 @@ impl PlannedMove {
         Group::open(&self.axes, self.period, options).await
     }
 
-    /// Enables, moves, and lets the shafts settle; `progress` is called in each cycle with the time on the path and its whole time. The
+    /// Enables, moves, and waits until the shafts are seen where they were to go; `progress` is called in each cycle with the time on the path and its whole time. The
     /// group holds then, and is the caller's to close, also after an error.
     ///
     /// # Errors
@@ -344,12 +341,7 @@ impl PlannedMove {
             }
             progress(group.network().now() - began, time);
         }
-        group.rest().await?;
-        let settled = group.network().now() + SETTLING;
-        while group.network().now() < settled {
-            group.cycle().await?;
-        }
-        group.rest().await?;
+        group.settle().await?;
         let at = group.axes().iter().zip(&to).map(|(state, to)| state.position.map_or(*to, |Turns(at)| at)).collect();
         Ok(GroupRun { time, from, to, at, largest_turns, missed_cycles: group.state().missed_cycles })
     }

@@ -36,9 +36,6 @@ const TOLERANCE: u32 = 15;
 /// Most axes of a group: as many as a bus at 500 kbit/s carries in one period besides the readings of the studio.
 const MOST_AXES: usize = 8;
 
-/// How long shafts may take to reach their last set-points.
-const SETTLING: Duration = Duration::from_millis(300);
-
 /// Cycles for which a stream continues at its last speed: the maximum.
 const GRACE: u32 = 10;
 
@@ -284,11 +281,7 @@ async fn carry_out(
         let errors = group.following_errors().map(Option::unwrap_or_default);
         largest_turns.iter_mut().zip(errors).for_each(|(largest, error)| *largest = largest.max(error));
     }
-    group.rest().await?;
-    for _ in 0..SETTLING.as_millis() / PERIOD.as_millis() {
-        group.cycle().await?;
-    }
-    group.rest().await?;
+    group.settle().await?;
     let lags = axes.iter().zip(&largest_turns);
     let lags: Vec<_> = lags.map(|(axis, turns)| format!("node {} {:.1} deg", axis.node, turns * 360.0)).collect();
     let time = format!("{} drives moved together in {:.3} s", axes.len(), time.as_secs_f64());

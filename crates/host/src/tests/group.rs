@@ -234,12 +234,39 @@ fn a_drive_of_a_group_takes_no_other_command_meanwhile() {
     });
 }
 
+fn change(world: &mut World, words: &str) {
+    let stimulus = words.parse().expect("a stimulus");
+    world.apply(Place::node(WHEEL.raw()), &stimulus).expect("it is there").expect("it has that");
+}
+
+/// A wheel that is held back by less than its limit of the following error (0.2 turns) is not where it was to go.
+#[test]
+fn a_shaft_that_does_not_come_to_the_end_of_its_path_is_named() {
+    play_acts(
+        async |stage| stage.sleep(1).await,
+        |world| change(world, "rotor lock"),
+        async |stage| {
+            let mut page = stage.page().await;
+            page.take_control_of_all().await;
+            let mut moved = page.begin(move_to(20.0, 20.0));
+            let answer = loop {
+                tokio::select! {
+                    answer = &mut moved => break answer.expect("answered"),
+                    () = stage.network.sleep(Duration::from_millis(500)) => page.must(SessionCommand::Alive {}).await,
+                }
+            };
+            assert_eq!(answer.error_kind(), "group");
+            let text = answer.json();
+            assert!(text.contains("axis 1, node 4, is 2") && text.contains("deg from where it was led"), "{text}");
+            assert_ne!(stage.power_state(WHEEL).await, cia402::PowerState::OperationEnabled);
+        },
+        |_| {},
+        async |_| {},
+    );
+}
+
 #[test]
 fn a_fault_of_one_stops_the_others_and_names_it() {
-    fn change(world: &mut World, words: &str) {
-        let stimulus = words.parse().expect("a stimulus");
-        world.apply(Place::node(WHEEL.raw()), &stimulus).expect("it is there").expect("it has that");
-    }
     let begun = std::rc::Rc::new(std::cell::RefCell::new(None::<(Page, Answered)>));
     play_acts(
         async |stage| {

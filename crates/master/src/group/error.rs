@@ -126,6 +126,21 @@ pub enum GroupError {
         /// What it shows.
         shows: String,
     },
+    /// A shaft is not where its path has ended.
+    #[error(
+        "axis {axis}, node {node}, is {} deg from where it was led, {} s after its last set-point: it is held back, or its drive lost \
+         set-points", Shown(*error_turns * 360.0), waited.as_secs_f64()
+    )]
+    NotReached {
+        /// Which axis, from 1.
+        axis: usize,
+        /// Its node.
+        node: NodeId,
+        /// How far, in turns.
+        error_turns: f64,
+        /// How long it was waited for.
+        waited: Duration,
+    },
     /// An axis did not find its reference. Those that searched beside it were stopped.
     #[error("axis {axis} did not find its reference: {source}")]
     Homing {

@@ -21,6 +21,13 @@ use crate::units::Turns;
 /// Cycles after which a drive that is not heard is not waited for.
 const UNHEARD: u64 = 10;
 
+/// How far a shaft may be from the end of its path to be there, in turns.
+const REACHED_TURNS: f64 = 0.01;
+/// How long the shafts may take to come to their last set-points before it is looked where they are.
+const SETTLING: Duration = Duration::from_millis(500);
+/// How long one is waited for that is not there then.
+const LONGEST_SETTLING: Duration = Duration::from_secs(3);
+
 /// Several axes that move as one. See the [module](super).
 pub struct Group {
     pub(super) network: Network,
@@ -145,6 +152,30 @@ impl Group {
             self.cycle().await?;
         }
         self.check_going()
+    }
+
+    /// Cycles at rest until the shafts are where they were led: [`SETTLING`] at least, and for as long as one is not there yet.
+    ///
+    /// # Errors
+    /// As [`rest`](Self::rest); [`GroupError::NotReached`]: the group holds on.
+    pub async fn settle(&mut self) -> Result<(), GroupError> {
+        self.rest().await?;
+        let began = self.network.now();
+        loop {
+            self.cycle().await?;
+            self.rest().await?;
+            let waited = self.network.now() - began;
+            let mut errors = self.following_errors().map(Option::unwrap_or_default).enumerate();
+            match errors.find(|(_, turns)| *turns > REACHED_TURNS) {
+                _ if waited < SETTLING => {}
+                None => return Ok(()),
+                Some((axis, error_turns)) if waited >= LONGEST_SETTLING => {
+                    let node = self.runner.axes[axis].drive.node();
+                    return Err(GroupError::NotReached { axis: axis + 1, node, error_turns, waited });
+                }
+                Some(_) => {}
+            }
+        }
     }
 
     /// Whether the axes stand: `None` while they are on their way or it is not seen yet, `Ok` once all were seen to stand. What
