@@ -25,6 +25,8 @@ NODE = 4
 ROUND_TRIPS = 300
 #: Longest wait for an answer: a guest without hardware support is slow.
 PATIENCE_S = 120
+#: The same for `ferrodrive latency`, which listens so long for nodes whose motor is switched on before it sends SYNC.
+LISTEN_S = 20
 
 
 def device_type(node):
@@ -108,7 +110,7 @@ def on(program, sheet, of_drive, ours):
             print(f"canopen-python on {ours}: {round_trips.summary(node, ROUND_TRIPS)}", flush=True)
         finally:
             network.disconnect()
-        ask = [program, "--bus", ours, "--timeout", f"{PATIENCE_S}s", "latency", str(NODE), "--count", str(ROUND_TRIPS)]
+        ask = [program, "--bus", ours, "--timeout", f"{LISTEN_S}s", "latency", str(NODE), "--count", str(ROUND_TRIPS)]
         latency = subprocess.run(ask, capture_output=True, text=True)
         figures = (latency.stdout or latency.stderr).split("\n\n")[0]
         print(f"ferrodrive latency on {ours}:\n{figures}", flush=True)
