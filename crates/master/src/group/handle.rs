@@ -154,7 +154,7 @@ impl Group {
         self.check_going()
     }
 
-    /// Cycles at rest until the shafts are where they were led: [`SETTLING`] at least, and for as long as one is not there yet.
+    /// Cycles at rest until the shafts are where they were led: 0.5 s at least, and 3 s at most where one is not there yet.
     ///
     /// # Errors
     /// As [`rest`](Self::rest); [`GroupError::NotReached`]: the group holds on.
