@@ -51,14 +51,15 @@ fn a_journal_of_another_device_or_half_a_one_is_refused() {
 
 #[test]
 fn a_pdo_that_was_set_up_comes_and_before_it_was_said_why_not() {
-    let bench = VirtualBus::of(&["zlac8030l@4", "cia402@5"]);
+    let (bench, folder) = (VirtualBus::of(&["zlac8030l@4", "cia402@5"]), scratch("pdo_apply"));
     let shown = |part: &str| {
         let ended = bench.done(&["pdo", "show", "4"]);
         assert!(ended.out.contains(part), "{part}: {}", ended.out);
     };
     shown("node 4 TPDO1, TPDO2, TPDO3, TPDO4, RPDO2, RPDO3, RPDO4: nothing is mapped into it");
     shown("node 4 RPDO1: no node was heard sending it");
-    bench.done(&["pdo", "apply", "4", "tpdo1=statusword,position_actual_value", "tpdo2=off", "--type", "1"]);
+    let apply = ["pdo", "apply", "4", "tpdo1=statusword,position_actual_value", "tpdo2=off", "--type", "1"];
+    bench.done(&[&apply[..], &["--journal", &folder.path("node4.journal")]].concat());
     shown("TPDO2: off: bit 31 of its COB-ID is set");
     shown("TPDO1: it waits for SYNC, and none was heard");
     bench.done(&["nmt", "4", "start"]);

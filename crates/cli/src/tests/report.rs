@@ -22,7 +22,8 @@ fn what_was_changed_since_delivery_is_listed_and_nothing_else() {
     assert!(report["compared"].as_u64() > Some(20), "{report:#}");
 
     bench.done(&["write", "4", "maximum_speed_of_motor", "800"]);
-    bench.done(&["pdo", "apply", "4", "tpdo1=statusword", "--type", "1"]);
+    let journal = folder.path("node4.journal");
+    bench.done(&["pdo", "apply", "4", "tpdo1=statusword", "--type", "1", "--journal", &journal]);
     let report = bench.json(&["report", "4", "-o", &changed, "--by", "A. Fitter & <Co>"]);
     let differences = objects(&report["differences"]);
     assert_eq!(differences, ["1800h:02", "1A00h:00", "1A00h:01", "200Ah:00"], "{report:#}");
