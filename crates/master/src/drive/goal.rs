@@ -13,7 +13,7 @@ use super::power::STANDSTILL_RPM;
 use crate::error::Error;
 
 /// How near to the target bit 10 (target reached) is believed, in turns of the shaft.
-pub(super) const REACHED_TURNS: f64 = 0.01;
+pub(crate) const REACHED_TURNS: f64 = 0.01;
 
 /// What counts as reached.
 #[derive(Clone, Copy, Debug)]

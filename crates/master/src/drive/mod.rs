@@ -32,6 +32,7 @@ pub use command::{Command, Manner, Motion, ParseCommandError, Report};
 pub(crate) use conclude::Trigger;
 pub use everything::{StopWay, StoppedAxis};
 pub use explain::faults_in;
+pub(crate) use goal::REACHED_TURNS;
 pub use guard::SwitchedOff;
 pub use handle::Drive;
 pub use homing::HomingOptions;

@@ -13,7 +13,7 @@ use super::stream::{Stream, StreamOptions};
 use super::trajectory::Trajectory;
 use crate::core::NodeSet;
 use crate::cyclic::{CyclicState, NotAtRest, at_rest};
-use crate::drive::Drive;
+use crate::drive::{Drive, REACHED_TURNS};
 use crate::error::Error;
 use crate::network::{Exchange, Network};
 use crate::units::Turns;
@@ -21,8 +21,6 @@ use crate::units::Turns;
 /// Cycles after which a drive that is not heard is not waited for.
 const UNHEARD: u64 = 10;
 
-/// How far a shaft may be from the end of its path to be there, in turns.
-const REACHED_TURNS: f64 = 0.01;
 /// How long the shafts may take to come to their last set-points before it is looked where they are.
 const SETTLING: Duration = Duration::from_millis(500);
 /// How long one is waited for that is not there then.
@@ -157,7 +155,7 @@ impl Group {
     /// Cycles at rest until the shafts are where they were led: 0.5 s at least, and 3 s at most where one is not there yet.
     ///
     /// # Errors
-    /// As [`rest`](Self::rest); [`GroupError::NotReached`]: the group holds on.
+    /// As [`rest`](Self::rest); [`GroupError::NotReached`], or [`NotAtRest::NotSeen`] of one whose position does not come: the group holds on.
     pub async fn settle(&mut self) -> Result<(), GroupError> {
         self.rest().await?;
         let began = self.network.now();
@@ -165,13 +163,17 @@ impl Group {
             self.cycle().await?;
             self.rest().await?;
             let waited = self.network.now() - began;
-            let mut errors = self.following_errors().map(Option::unwrap_or_default).enumerate();
-            match errors.find(|(_, turns)| *turns > REACHED_TURNS) {
+            // One whose position did not come was not seen there.
+            let mut errors = self.following_errors().enumerate();
+            match errors.find(|(_, error)| error.is_none_or(|turns| turns > REACHED_TURNS)) {
                 _ if waited < SETTLING => {}
                 None => return Ok(()),
-                Some((axis, error_turns)) if waited >= LONGEST_SETTLING => {
+                Some((axis, error)) if waited >= LONGEST_SETTLING => {
                     let node = self.runner.axes[axis].drive.node();
-                    return Err(GroupError::NotReached { axis: axis + 1, node, error_turns, waited });
+                    return Err(error.map_or_else(
+                        || NotAtRest::NotSeen { node }.into(),
+                        |error_turns| GroupError::NotReached { axis: axis + 1, node, error_turns, waited },
+                    ));
                 }
                 Some(_) => {}
             }
