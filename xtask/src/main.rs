@@ -35,6 +35,7 @@ mod test_programs;
 mod tidy;
 mod times;
 mod vcan;
+mod wasm_order;
 mod web;
 mod wheel;
 mod workspace;

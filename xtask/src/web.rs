@@ -14,7 +14,7 @@ use crate::process::{self, quietly};
 use crate::say::say;
 use crate::sysroot::{Rust, Target};
 use crate::tally::Tally;
-use crate::{debian, page, program, workspace};
+use crate::{debian, page, program, wasm_order, workspace};
 
 /// A page, and node.
 const TARGET: Target = Target {
@@ -125,13 +125,23 @@ fn make(module: &Path, folder: &Path) -> Result<(), String> {
     for path in files(&own.join("js"))? {
         copy(&path, &folder.join(name(&path)))?;
     }
-    copy(module, &folder.join("ferrodrive.wasm"))?;
+    write_ordered(module, &folder.join("ferrodrive.wasm"))?;
     write(&folder.join("index.html"), &index(&read(&page.join("index.html"))?, &own)?)?;
     keep_offline(folder)?;
     pack(folder)?;
     let bytes: u64 = all_files(folder)?.iter().filter_map(|path| fs::metadata(path).ok()).map(|file| file.len()).sum();
     say(format_args!("{bytes} bytes in all"));
     Ok(())
+}
+
+/// Writes the module with its functions in an order that compresses well; as it is, if it has what is not known there.
+fn write_ordered(module: &Path, to: &Path) -> Result<(), String> {
+    let built = fs::read(module).map_err(|error| format!("{}: {error}", module.display()))?;
+    let ordered = wasm_order::ordered(&built).unwrap_or_else(|why| {
+        say(format_args!("the module's functions are left in their order: {why}"));
+        built
+    });
+    fs::write(to, ordered).map_err(|error| format!("{}: {error}", to.display()))
 }
 
 /// The studio's page that has its host in a worker.
