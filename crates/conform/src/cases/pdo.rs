@@ -7,6 +7,7 @@ use canopen::{AbortCode, CobId, Mux, NmtCommand};
 
 use crate::bench::{Bench, SILENCE, Tpdo, another, entry, hex, ms, refused, silent};
 use crate::case::{Case, Need, case};
+use crate::cases::pdo_mapping::end_if_constant;
 use crate::finding::{Finding, Verdict, fail, not_applicable};
 use crate::subject::{bytes_of, number_of};
 
@@ -335,6 +336,7 @@ async fn set_up_rpdo(bench: &mut Bench, transmission: u8) -> Result<Receiving, F
         not_applicable!("the device does not take transmission type {transmission}: {code}");
     }
     if let Err(code) = bench.map(index, &[entry(row)]).await? {
+        end_if_constant(bench, index, code)?;
         fail!("{} cannot be mapped into {index:04X}h: {code}", row.mux());
     }
     bench.switch_on(index, id).await?;

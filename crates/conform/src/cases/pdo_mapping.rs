@@ -61,13 +61,24 @@ async fn emptied(bench: &mut Bench, base: u16) -> Result<u16, Finding> {
     bench.nmt(NmtCommand::EnterPreOperational).await;
     let Some(index) = bench.subject.pdos(base).next() else { not_applicable!("the device has no such PDO") };
     bench.switch_off(index).await?;
-    match bench.try_write(Mux::new(index + 0x200, 0), &[0]).await? {
-        Ok(()) => Ok(index),
-        Err(code) if CONSTANT.contains(&code) && !is_writable(bench, index) => {
-            fail!("the mapping cannot be changed: {code}")
-        }
-        Err(code) => fail!("{:04X}h:00 does not take 0 while the PDO is off: {code}", index + 0x200),
+    if let Err(code) = bench.try_write(Mux::new(index + 0x200, 0), &[0]).await? {
+        end_if_constant(bench, index, code)?;
+        fail!("{:04X}h:00 does not take 0 while the PDO is off: {code}", index + 0x200);
     }
+    Ok(index)
+}
+
+/// Ends a case if the device has refused what its description lets nobody write: whether mappings can be changed is up to the device
+/// (CiA 301, 7.5.2.36 and 7.5.2.38).
+pub(super) fn end_if_constant(bench: &Bench, index: u16, code: AbortCode) -> Result<(), Finding> {
+    if !CONSTANT.contains(&code) || is_writable(bench, index) {
+        return Ok(());
+    }
+    if bench.subject.departures().any(|departure| departure.key() == "fixed_mapping") {
+        fail!("the mapping cannot be changed: {code}");
+    }
+    let source = if bench.subject.by_manual { "the manual" } else { "the file" };
+    not_applicable!("{source} has {:04X}h:00 as read only: its mapping is fixed", index + 0x200)
 }
 
 fn is_writable(bench: &Bench, index: u16) -> bool {

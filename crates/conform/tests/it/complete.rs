@@ -46,7 +46,14 @@ const ROWS: &[Row] = &[
 
 /// The description of that sheet.
 pub(crate) fn complete() -> &'static Description {
-    keep(&Eds::load(sheet(&[]).as_bytes()).unwrap().eds).unwrap()
+    described(ROWS.to_vec())
+}
+
+/// The same with mappings that cannot be changed.
+pub(crate) fn with_fixed_mappings() -> &'static Description {
+    let mut rows = ROWS.to_vec();
+    rows.iter_mut().filter(|row| matches!(row.0, 0x1600 | 0x1A00)).for_each(|row| row.3 = "ro");
+    described(rows)
 }
 
 /// The same with a SYNC start value, the date of the configuration, and a second SDO server, off as delivered.
@@ -60,11 +67,14 @@ pub(crate) fn extended() -> &'static Description {
         (0x1201, 2, U32, "rw", "0x80000000", NO, &[]),
         (0x1800, 6, U8, "rw", "0", NO, &[]),
     ];
-    keep(&Eds::load(sheet(FURTHER).as_bytes()).unwrap().eds).unwrap()
+    described(ROWS.iter().chain(FURTHER).copied().collect())
 }
 
-fn sheet(further: &[Row]) -> String {
-    let mut all: Vec<Row> = ROWS.iter().chain(further).copied().collect();
+fn described(rows: Vec<Row>) -> &'static Description {
+    keep(&Eds::load(sheet(rows).as_bytes()).unwrap().eds).unwrap()
+}
+
+fn sheet(mut all: Vec<Row>) -> String {
     all.sort_by_key(|row| (row.0, row.1));
     let mut out = String::from(
         "[FileInfo]\nFileName=complete.eds\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0\nDescription=\nCreatedBy=\n\

@@ -14,7 +14,7 @@ use devices::Description;
 use sim::Fidelity;
 
 use crate::bench::{drive_with, node, run, shown};
-use crate::complete::{complete, extended};
+use crate::complete::{complete, extended, with_fixed_mappings};
 use causes::Cause;
 use station::{Kind, Wrong};
 
@@ -94,6 +94,20 @@ fn the_complete_device_passes() {
 fn the_extended_device_passes() {
     let report = report_of(extended(), Kind::Right, without_drives());
     assert!(report.ok, "{:?}\n{}", report.not_restored, shown(&report, crate::bench::failed));
+}
+
+#[test]
+fn a_device_whose_file_has_its_mappings_as_read_only_passes() {
+    let description = with_fixed_mappings();
+    let station = Wrong::new(drive_with(description, Fidelity::Full), Kind::Right);
+    let options = Options { only: vec!["PDO".into()], ..without_drives() };
+    let report = run(station, Subject::of_file(node(), description), options);
+    assert!(report.ok, "{:?}\n{}", report.not_restored, shown(&report, crate::bench::failed));
+    for (id, mapping) in [("PDO 22", "1A00h"), ("PDO 25", "1A00h"), ("PDO 27", "1600h"), ("PDO 60", "1600h")] {
+        let case = report.cases.iter().find(|case| case.id == id).unwrap();
+        let fixed = format!("the file has {mapping}:00 as read only: its mapping is fixed");
+        assert_eq!((case.result, &*case.why), (Outcome::NotApplicable, &*fixed), "{id}");
+    }
 }
 
 /// Cases about objects that the complete device of today does not have.
