@@ -114,6 +114,15 @@ fn time_is_consumed_with_bit_31_of_1012h_and_goes_on() {
 }
 
 #[test]
+fn a_time_producer_by_its_file_takes_1012h_back_and_produces_nothing() {
+    let mut bench = Bench::new(&[(0x1000, 0, U32, "ro", 0, false), (0x1012, 0, U32, "rw", 0x4000_0100, false)]);
+    assert_eq!(bench.write(0x1012, 0, 4, 0x4000_0100), None);
+    assert_eq!(bench.write(0x1012, 0, 4, 0xC000_0100), Some(0x0609_0030));
+    assert_eq!(bench.run(2000), Vec::<String>::new());
+    assert_eq!((bench.write(0x1012, 0, 4, 0x100), bench.write(0x1012, 0, 4, 0x4000_0100)), (None, Some(0x0609_0030)));
+}
+
+#[test]
 fn the_emcy_messages_of_1028h_are_heard() {
     let consumers = [0x8000_0000, 0x82, 0x8000_0083].into_iter().zip(1..);
     let mut rows = vec![(0x1000, 0, U32, "ro", 0, false), (0x1028, 0, U8, "ro", 3, false)];

@@ -315,6 +315,26 @@ fn an_encoder_sends_in_its_cycle_and_refuses_what_its_disc_does_not_have() {
 }
 
 #[test]
+fn an_encoder_takes_back_the_units_that_its_file_leaves_open() {
+    let sheet = "[FileInfo]\nFileName=x.eds\n[DeviceInfo]\nProductName=other\n\
+        [1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\nDefaultValue=0x00020196\n\
+        [1001]\nParameterName=Error register\nDataType=5\nAccessType=ro\n\
+        [6001]\nParameterName=Units per revolution\nDataType=7\nAccessType=rw\nDefaultValue=0\n\
+        [6002]\nParameterName=Total range\nDataType=7\nAccessType=rw\nDefaultValue=0\n\
+        [6004]\nParameterName=Position\nDataType=7\nAccessType=ro\n";
+    let description = eds::keep(&eds::Eds::load(sheet.as_bytes()).unwrap().eds).unwrap();
+    let mut bench = Bench::new();
+    let node = NodeId::new(20).unwrap();
+    bench.world.add_drive(20, order(description, &Order::new(description, node, Bitrate::M1)).unwrap()).unwrap();
+    bench.run_ms(300);
+    for object in [0x6001, 0x6002] {
+        assert_eq!(bench.write(20, object, 0, 4, 0), Ok(()), "{object:04X}h as delivered");
+        assert_eq!(bench.write(20, object, 0, 4, 100), Ok(()));
+        assert_eq!(bench.write(20, object, 0, 4, 0), Err(AbortCode::VALUE_TOO_LOW), "{object:04X}h");
+    }
+}
+
+#[test]
 fn objects_of_the_profile_that_nothing_acts_on_take_no_writes() {
     let sheet = "[FileInfo]\nFileName=x.eds\n[DeviceInfo]\nProductName=other\n\
         [1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\nDefaultValue=0x00030191\n\
@@ -334,6 +354,8 @@ fn objects_of_the_profile_that_nothing_acts_on_take_no_writes() {
         bench.run_ms(300);
         let refused = bench.write(20, 0x6003, 1, 1, 5) == Err(AbortCode::READ_ONLY);
         assert_eq!(refused, acts, "{device_type}");
+        let there = i64::from(bench.read(20, 0x6003, 1) & 0xFF);
+        assert_eq!(bench.write(20, 0x6003, 1, 1, there), Ok(()), "what is there changes nothing");
         assert_eq!(bench.write(20, 0x6200, 1, 1, 5), Ok(()));
         assert_eq!(bench.write(20, 0x2000, 0, 1, 5), Ok(()), "the maker's own are stored and answered");
         assert_eq!(bench.world.report(20).unwrap().outputs.bits, if acts { 5 } else { 0 }, "{device_type}");

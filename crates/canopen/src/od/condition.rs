@@ -13,6 +13,8 @@ pub type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
 pub enum Condition {
     /// This function must agree.
     Check(Check),
+    /// The value that is there is taken; to any other this function must agree.
+    Change(Check),
     /// The application is asked, and may take its time: [`NodeEvent::Asked`](crate::NodeEvent::Asked). SDO only; what an RPDO
     /// brings is not asked about.
     Ask,
@@ -84,18 +86,15 @@ impl Conditions {
         self.numbers
     }
 
-    /// The condition of a number.
+    /// The condition of a number, and whose it is.
     #[inline(always)]
-    pub(super) fn numbered(&self, number: u16) -> Option<Condition> {
-        self.list.get(usize::from(number).wrapping_sub(1)).map(|(_, condition)| *condition)
+    pub(super) fn numbered(&self, number: u16) -> Option<(Slot, Condition)> {
+        self.list.get(usize::from(number).wrapping_sub(1)).copied()
     }
 
-    /// The function that must agree to writes to a row, if there is one.
-    pub(super) fn check_of(&self, slot: Slot) -> Option<Check> {
-        match self.numbered(*self.numbers.get(slot.position())?)? {
-            Condition::Check(check) => Some(check),
-            Condition::Ask => None,
-        }
+    /// The condition on writes to a row, if there is one.
+    pub(super) fn of(&self, slot: Slot) -> Option<Condition> {
+        self.numbered(*self.numbers.get(slot.position())?).map(|(_, condition)| condition)
     }
 }
 

@@ -196,7 +196,13 @@ impl<S: Storage> Dictionary<S> {
 
     /// What a write to a row has to pass, resolved: for a row that is written often.
     pub(crate) fn resolve(&self, slot: Slot) -> ResolvedWrite {
-        ResolvedWrite { gate: *self.table.gate(slot), slot, check: self.conditions.check_of(slot) }
+        let gate = *self.table.gate(slot);
+        match self.conditions.of(slot) {
+            Some(Condition::Check(check)) => ResolvedWrite { gate, slot, check: Some(check) },
+            // Rare: asked like a row whose limits are not in its gate.
+            Some(Condition::Change(_)) => ResolvedWrite { gate: gate.closed(), slot, check: None },
+            Some(Condition::Ask) | None => ResolvedWrite { gate, slot, check: None },
+        }
     }
 
     /// [`write`](Self::write) of a row that was [resolved](Self::resolve) for this dictionary.
@@ -278,6 +284,9 @@ impl<S: Storage> Dictionary<S> {
             Value::Real64(value) => check_real(value, row.limits)?,
             Value::Real32(_) | Value::Time { .. } | Value::Bytes(_) => {}
         }
+        if matches!(self.conditions.of(slot), Some(Condition::Change(_))) && self.view().long_bytes(slot) == bytes {
+            return Ok(());
+        }
         self.check_condition(slot, bytes.len() as u32)
     }
 
@@ -341,8 +350,13 @@ impl<S: Storage> Dictionary<S> {
     fn ask_condition(&self, number: u16, raw: u32) -> Result<(), Refusal> {
         match self.conditions.numbered(number) {
             None => Ok(()),
-            Some(Condition::Check(check)) => check(&self.view(), raw).map_err(Refusal::Abort),
-            Some(Condition::Ask) => Err(Refusal::Ask),
+            Some((_, Condition::Check(check))) => check(&self.view(), raw).map_err(Refusal::Abort),
+            Some((slot, Condition::Change(check))) => {
+                // Of a longer value the cell is its length: whether it is the same was looked at with its bytes.
+                let is_there = self.raw(slot) == raw && !self.table.summary(slot).is_long();
+                if is_there { Ok(()) } else { check(&self.view(), raw).map_err(Refusal::Abort) }
+            }
+            Some((_, Condition::Ask)) => Err(Refusal::Ask),
         }
     }
 }

@@ -18,6 +18,11 @@ impl Gate {
     /// Of no row: nothing passes.
     pub(super) const CLOSED: Self = Self { mask: u32::MAX, low: 0, span: 0, listed: 0 };
 
+    /// The same, but nothing passes: the row itself has to be asked.
+    pub(super) const fn closed(self) -> Self {
+        Self { mask: self.mask, ..Self::CLOSED }
+    }
+
     /// Closed, and the row itself has to be asked, where nothing may be written, of reals, and where a list's values lie too
     /// far apart for the bits. Limits that move with a resolution are those at 1, which are the narrowest: beyond them the row is
     /// asked.

@@ -38,13 +38,15 @@ pub(super) const fn acts_on(mux: Mux) -> bool {
     matches!(mux.index, 0x6000..=0x6004 | 0x6030 | 0x6200 | 0x6500..=0x6502 | 0x6509)
 }
 
-type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
-
-/// What is refused beyond the rows: units and ranges that the disc does not have, a preset beyond the range.
+/// What is refused beyond the rows: units and ranges that the disc does not have (what a file delivers apart), a preset beyond the
+/// range.
 pub(super) fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
-    let checks: [(Mux, Check); 3] =
-        [(UNITS_PER_REVOLUTION, units_are_had), (TOTAL_RANGE, range_is_had), (PRESET, preset_is_in_range)];
-    checks.into_iter().filter_map(move |(mux, check)| Some((table.find(mux).ok()?, Condition::Check(check))))
+    let conditions = [
+        (UNITS_PER_REVOLUTION, Condition::Change(units_are_had)),
+        (TOTAL_RANGE, Condition::Change(range_is_had)),
+        (PRESET, Condition::Check(preset_is_in_range)),
+    ];
+    conditions.into_iter().filter_map(move |(mux, condition)| Some((table.find(mux).ok()?, condition)))
 }
 
 fn between(raw: u32, most: i64) -> Result<(), AbortCode> {

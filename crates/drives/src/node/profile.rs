@@ -41,11 +41,11 @@ pub fn profile_conditions(description: &'static Description) -> impl Iterator<It
         has_profile && of_profile && row.access.is_writable() && !acts_on(description, row.mux())
     });
     let own = Profile::of(description).is_encoder().then(|| encoder::conditions(table)).into_iter().flatten();
-    rows.map(|(slot, _)| (slot, Condition::Check(refused))).chain(own)
+    rows.map(|(slot, _)| (slot, Condition::Change(refused))).chain(own)
 }
 
 /// Nothing would come of it.
-fn refused(_: &View<'_>, _: u32) -> Result<(), AbortCode> {
+pub(crate) fn refused(_: &View<'_>, _: u32) -> Result<(), AbortCode> {
     Err(AbortCode::READ_ONLY)
 }
 

@@ -270,16 +270,16 @@ impl<S: Storage> Services<S> {
 /// What a device with these objects refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).
 pub(super) fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
     table.iter().filter_map(|(slot, row)| {
-        let check: fn(&View<'_>, u32) -> Result<(), AbortCode> = match (row.index, row.sub_index) {
-            (HISTORY, 0) => only_zero,
-            (STORE, 1..) => only_save,
-            (RESTORE, 1..) => only_load,
-            (WATCH, FIRST_UNWATCHED..) => only_nobody,
-            (TIME_COB_ID, 0) => no_time_producer,
-            (TPDO_MAPPING..=LAST_TPDO_MAPPING, 0) => no_destinations,
+        let condition = match (row.index, row.sub_index) {
+            (HISTORY, 0) => Condition::Check(only_zero),
+            (STORE, 1..) => Condition::Check(only_save),
+            (RESTORE, 1..) => Condition::Check(only_load),
+            (WATCH, FIRST_UNWATCHED..) => Condition::Check(only_nobody),
+            (TIME_COB_ID, 0) => Condition::Change(no_time_producer),
+            (TPDO_MAPPING..=LAST_TPDO_MAPPING, 0) => Condition::Check(no_destinations),
             _ => return None,
         };
-        Some((slot, Condition::Check(check)))
+        Some((slot, condition))
     })
 }
 
@@ -296,7 +296,7 @@ fn only_zero(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if raw == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
 }
 
-/// 1012h: these devices have no clock of their own, to produce TIME (bit 30; CiA 301, 7.5.2.15).
+/// 1012h: these devices have no clock of their own, to produce TIME (bit 30; CiA 301, 7.5.2.15). A file may deliver it set.
 fn no_time_producer(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if CobId(raw).generates() { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
 }

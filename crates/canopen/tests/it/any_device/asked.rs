@@ -12,6 +12,11 @@ use crate::any_device::device::{Boxed, answer, drain, node_of, rw, table, talk, 
 
 /// 2000h, UNSIGNED16 up to 1000, and 2001h, a text, are asked about; RPDO 1 maps 2000h.
 fn device() -> Node<Boxed> {
+    under(Condition::Ask)
+}
+
+/// The same device with another condition on both.
+fn under(condition: Condition) -> Node<Boxed> {
     let table = table(vec![
         rw(0x1400, 1, DataType::Unsigned32).default(0x204),
         rw(0x1400, 2, DataType::Unsigned8).default(255),
@@ -22,7 +27,7 @@ fn device() -> Node<Boxed> {
         rw(0x2002, 0, DataType::Unsigned8),
     ]);
     let asked: Vec<(Slot, Condition)> =
-        [0x2000, 0x2001].map(|index| (table.find(Mux::new(index, 0)).unwrap(), Condition::Ask)).into();
+        [0x2000, 0x2001].map(|index| (table.find(Mux::new(index, 0)).unwrap(), condition)).into();
     let mut numbers = vec![0; table.rows().len()];
     asked.iter().zip(1..).for_each(|((slot, _), number)| numbers[slot.position()] = number);
     let conditions = Box::leak(Box::new(Conditions::new(asked.leak(), numbers.leak())));
@@ -132,6 +137,33 @@ fn rpdos_do_not_ask() {
     let via = Via::Rpdo(PdoNumber::FIRST);
     assert_eq!(written(&mut node), [NodeEvent::Written { slot, raw: 100, via }]);
     assert_eq!(value(&node), 100);
+}
+
+#[test]
+fn what_is_there_is_taken_and_another_value_has_to_pass_the_check() {
+    let mut node = under(Condition::Change(|_, _| Err(AbortCode::READ_ONLY)));
+    talk(
+        &mut node,
+        &[
+            ("604#2B00200007000000", "584#6000200000000000"),
+            ("604#2B00200008000000", "584#8000200002000106"),
+            // Beyond the row's range, which comes first.
+            ("604#2B002000E9030000", "584#8000200031000906"),
+            // "old", and "new", which is as long.
+            ("604#2101200003000000", "584#6001200000000000"),
+            ("604#096F6C6400000000", "584#2000000000000000"),
+            ("604#2101200003000000", "584#6001200000000000"),
+            ("604#096E657700000000", "584#8001200002000106"),
+        ],
+    );
+    let text = node.table().find(Mux::new(0x2001, 0)).unwrap();
+    assert_eq!(node.dictionary().view().long_bytes(text), b"old");
+    answer(&mut node, "000#0104");
+    written(&mut node);
+    for (frame, events) in [("204#6400", 0), ("204#0700", 1)] {
+        node.handle_frame(&frame.parse().unwrap(), Instant::ZERO);
+        assert_eq!((written(&mut node).len(), value(&node)), (events, 7), "{frame}");
+    }
 }
 
 #[test]
