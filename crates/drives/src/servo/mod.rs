@@ -24,10 +24,13 @@ pub use hardware::{Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Po
 pub use motor::{CONTROL_PERIOD_NS, Motor};
 
 use canopen::object::COMMUNICATION_CYCLE_PERIOD;
-use canopen::od::{Condition, Dictionary, Slot, Storage, Table, View};
+use canopen::od::{Condition, Dictionary, Entry, Slot, Storage, Table, View};
 use canopen::{AbortCode, Mux};
 use cia402::object::{HOMING_METHOD, INTERPOLATION_DATA_RECORD_1ST_SET_POINT, MODES_OF_OPERATION};
-use cia402::{HomingMethod, ModeOfOperation, SupportedModes};
+use cia402::{
+    DisableOperationOption, FaultReactionOption, HaltOption, HomingMethod, ModeOfOperation, QuickStopOption,
+    ShutdownOption, StopRamp, SupportedModes,
+};
 use devices::{Description, Placement};
 
 use crate::node;
@@ -63,23 +66,48 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
         .filter_map(move |axis| of_axis(axis.placement, INTERPOLATION_DATA_RECORD_1ST_SET_POINT, SET_POINT_CHECKS));
     let factors = table.iter().filter(|(_, row)| {
         let is_factor = |factor: u16| row.index % 0x800 == factor % 0x800;
-        (0x6000..=0x9FFF).contains(&row.index) && FACTORS.into_iter().any(is_factor) && matches!(row.sub_index, 1 | 2)
+        is_of_profile(row) && FACTORS.into_iter().any(is_factor) && matches!(row.sub_index, 1 | 2)
     });
-    let factors = factors.map(|(slot, _)| (slot, Condition::Check(is_not_zero)));
+    let factors = factors.filter(move |(_, row)| acts_on(description, row.mux()));
+    let factors = factors.map(|(slot, _)| (slot, Condition::Change(is_not_zero)));
     let methods = description.axes.iter().filter_map(move |axis| of_axis(axis.placement, HOMING_METHOD, METHOD_CHECKS));
     let types =
         description.axes.iter().filter_map(move |axis| of_axis(axis.placement, MOTION_PROFILE_TYPE, TYPE_CHECKS));
-    modes.chain(set_points).chain(methods).chain(types).chain(factors).chain(node::conditions(table))
+    let stops = description.axes.iter().flat_map(move |axis| {
+        let of_object = |(mux, check)| Some((table.find(axis.placement.place(mux)).ok()?, Condition::Change(check)));
+        STOP_CODES.into_iter().filter_map(of_object)
+    });
+    let others = stops.chain(factors).chain(node::conditions(table));
+    modes.chain(set_points).chain(methods).chain(types).chain(others)
 }
 
 type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
 
+/// Of the blocks of the axes (CiA 402-1).
+fn is_of_profile(row: &Entry) -> bool {
+    (0x6000..=0x9FFF).contains(&row.index)
+}
+
 /// How ramps look.
 const MOTION_PROFILE_TYPE: Mux = Mux::new(0x6086, 0);
 
-/// Factors of a numerator at sub-index 1 and a divisor at 2: velocity factor 1, and of velocity mode the set-point factor and the
-/// dimension factor.
-const FACTORS: [u16; 3] = [0x6095, 0x604B, 0x604C];
+/// Fractions of a numerator at sub-index 1 and a divisor at 2: encoder resolution, gear ratio, feed, the factors of the profile's
+/// first edition, and of velocity mode the set-point factor and the dimension factor.
+const FACTORS: [u16; 10] = [0x608F, 0x6091, 0x6092, 0x6093, 0x6094, 0x6095, 0x6096, 0x6097, 0x604B, 0x604C];
+
+/// Option codes that say how the shaft is brought to rest: what the standard reserves or leaves to makers is refused (CiA 402-2,
+/// tables 33 to 44), but for what a file delivers.
+const STOP_CODES: [(Mux, Check); 5] = [
+    (Mux::new(0x605A, 0), |_, raw| is_ramp(QuickStopOption(raw as i16).ramp())),
+    (Mux::new(0x605B, 0), |_, raw| is_ramp(ShutdownOption(raw as i16).ramp())),
+    (Mux::new(0x605C, 0), |_, raw| is_ramp(DisableOperationOption(raw as i16).ramp())),
+    (Mux::new(0x605D, 0), |_, raw| is_ramp(HaltOption(raw as i16).ramp())),
+    (Mux::new(0x605E, 0), |_, raw| is_ramp(FaultReactionOption(raw as i16).ramp())),
+];
+
+fn is_ramp(ramp: Option<StopRamp>) -> Result<(), AbortCode> {
+    ramp.map(|_| ()).ok_or(AbortCode::INVALID_VALUE)
+}
 
 /// By the index of the object: an axis' block of the profile area begins at each 800h (CiA 402-1).
 macro_rules! by_axis {

@@ -1,6 +1,7 @@
 //! Objects of CiA 402-2 that say what a drive can do, and what its loops do.
 
 use canopen::AbortCode;
+use canopen::od::{Access, Entry};
 use sim::VirtualDrive;
 
 use crate::virtual_cia402::bench::{Bench, changed};
@@ -21,7 +22,7 @@ fn a_method_that_a_file_does_not_list_or_that_does_not_run_is_refused() {
         (0x60E3, 0) => row.default(2),
         (0x60E3, 1) => row.default(17),
         (0x60E3, 2) => row.default(-3),
-        (0x6098, 0) => canopen::od::Entry { limits: None, ..row },
+        (0x6098, 0) => Entry { limits: None, ..row },
         _ => row,
     });
     let mut bench = Bench::of(few);
@@ -59,4 +60,47 @@ fn the_version_of_the_profile_is_read_and_not_written() {
     assert_eq!(bench.read(0x67FE, 0), 4 << 16, "4.0");
     assert_eq!(bench.write(0x67FE, 0, 0), Err(AbortCode::READ_ONLY));
     assert_eq!(bench.read(0x67FE, 0), 4 << 16);
+}
+
+/// CiA 402-2, tables 33 to 44: negative codes are makers', the others that are not listed reserved.
+#[test]
+fn reserved_option_codes_are_refused_and_the_one_that_a_file_delivers_is_taken() {
+    // As a file has them: without lists of values, one with a code of its maker.
+    let file = changed(|row| match row.index {
+        0x605A => Entry { values: &[], ..row.default(-1) },
+        0x605B..=0x605E => Entry { values: &[], ..row },
+        _ => row,
+    });
+    let mut bench = Bench::of(file);
+    assert_eq!(bench.write(0x605A, 0, -1), Ok(()));
+    for (index, codes) in [(0x605A, 0..=8), (0x605B, 0..=1), (0x605C, 0..=1), (0x605D, 1..=4), (0x605E, 0..=4)] {
+        let last = *codes.end();
+        for code in codes.clone() {
+            assert_eq!((bench.write(index, 0, code), bench.read(index, 0)), (Ok(()), code), "{index:04X}h");
+        }
+        for code in (-3..=12).chain([-0x8000, 0x7FFF]).filter(|code| !codes.contains(code)) {
+            assert_eq!(bench.write(index, 0, code), Err(AbortCode::INVALID_VALUE), "{index:04X}h = {code}");
+        }
+        assert_eq!(bench.read(index, 0), last, "nothing of it was stored in {index:04X}h");
+    }
+}
+
+#[test]
+fn a_fraction_takes_no_0_but_the_one_that_a_file_delivers() {
+    let file = changed(|row| match row.index {
+        0x608F | 0x6091 | 0x6092 if row.sub_index > 0 => {
+            Entry { limits: None, access: Access::ReadWrite, ..row.default(i64::from(row.index != 0x608F)) }
+        }
+        _ => row,
+    });
+    let mut bench = Bench::of(file);
+    for index in [0x608F, 0x6091, 0x6092] {
+        for sub in [1, 2] {
+            let as_delivered = if index == 0x608F { Ok(()) } else { Err(AbortCode::VALUE_TOO_LOW) };
+            assert_eq!(bench.write(index, sub, 0), as_delivered, "{index:04X}h:{sub:02X}");
+            assert_eq!(bench.write(index, sub, 3), Ok(()));
+            assert_eq!(bench.write(index, sub, 0), Err(AbortCode::VALUE_TOO_LOW), "{index:04X}h:{sub:02X}");
+            assert_eq!(bench.read(index, sub), 3);
+        }
+    }
 }
