@@ -1,9 +1,9 @@
 //! A CiA 402 servo of any vendor: the firmware is built from a [`Description`], of the standard's own
 //! drive ([`devices::servo`]) or of a file.
 //!
-//! Objects are looked up once, when the firmware starts: what the table lacks is not there, and what it has beyond
-//! [`acts_on`] is stored and answered, and has no effect. Values as delivered, limits and modes are the table's. The motor
-//! comes with the hardware.
+//! Objects are looked up once, when the firmware starts: what the table lacks is not there. What it has beyond [`acts_on`] has no
+//! effect: of the profile it is answered and keeps its value, of the maker it is stored and answered. Values as delivered, limits
+//! and modes are the table's. The motor comes with the hardware.
 
 mod drive;
 mod faults;
@@ -77,11 +77,20 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
         let of_object = |(mux, check)| Some((table.find(axis.placement.place(mux)).ok()?, Condition::Change(check)));
         STOP_CODES.into_iter().filter_map(of_object)
     });
-    let others = stops.chain(factors).chain(node::conditions(table));
+    let without_effect = table.iter().filter(move |(_, row)| {
+        let is_taken = row.access.is_writable() && !acts_on(description, row.mux());
+        is_of_profile(row) && is_taken && (row.index % 0x800, row.sub_index) != SIZE_OF_DATA_RECORD
+    });
+    let without_effect = without_effect.map(|(slot, _)| (slot, Condition::Change(node::refused)));
+    let others = stops.chain(factors).chain(without_effect).chain(node::conditions(table));
     modes.chain(set_points).chain(methods).chain(types).chain(others)
 }
 
 type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
+
+/// Index within the block of an axis, and sub-index, of what hosts write as they set the buffer of interpolated position up and
+/// cannot read (60C4h:05): a set-point has the bytes of 60C1h whatever they say.
+const SIZE_OF_DATA_RECORD: (u16, u8) = (0x60C4 % 0x800, 5);
 
 /// Of the blocks of the axes (CiA 402-1).
 fn is_of_profile(row: &Entry) -> bool {

@@ -19,7 +19,13 @@ const STEP_NS: u64 = 500_000;
 
 /// The standard's servo with some rows changed, for the life of the test.
 pub fn changed(change: impl Fn(Entry) -> Entry) -> &'static Description {
-    let rows: &'static [Entry] = CIA402.dictionary.rows().iter().map(|row| change(*row)).collect::<Vec<_>>().leak();
+    of_rows(CIA402.dictionary.rows().iter().map(|row| change(*row)).collect())
+}
+
+/// The standard's servo with these rows, for the life of the test.
+pub fn of_rows(mut rows: Vec<Entry>) -> &'static Description {
+    rows.sort_by_key(|row| row.mux().key());
+    let rows: &'static [Entry] = rows.leak();
     let (facts, places) = (vec![RowFacts::NONE; rows.len()].leak(), vec![FREE_PLACES; rows.len()].leak());
     let table = Table::at_run_time(rows, facts, places).expect("no object twice");
     Box::leak(Box::new(Description { dictionary: Box::leak(Box::new(table)), ..CIA402 }))

@@ -1,10 +1,12 @@
 //! Objects of CiA 402-2 that say what a drive can do, and what its loops do.
 
-use canopen::AbortCode;
-use canopen::od::{Access, Entry};
+use canopen::od::{Access, DataType, Entry};
+use canopen::{AbortCode, Mux};
+use devices::servo::CIA402;
+use drives::servo::acts_on;
 use sim::VirtualDrive;
 
-use crate::virtual_cia402::bench::{Bench, changed};
+use crate::virtual_cia402::bench::{Bench, changed, of_rows};
 
 #[test]
 fn supported_homing_methods_are_those_that_are_taken() {
@@ -102,5 +104,53 @@ fn a_fraction_takes_no_0_but_the_one_that_a_file_delivers() {
             assert_eq!(bench.write(index, sub, 0), Err(AbortCode::VALUE_TOO_LOW), "{index:04X}h:{sub:02X}");
             assert_eq!(bench.read(index, sub), 3);
         }
+    }
+}
+
+/// A maker's gains and motor data among them, which no loop of this firmware uses.
+#[test]
+fn a_servo_by_its_file_takes_no_change_of_what_it_does_not_act_on() {
+    let entry = |index, sub, data_type| Entry::new(index, sub, data_type, Access::ReadWrite, "", "");
+    let further = [
+        entry(0x2100, 0, DataType::Unsigned16).default(1),
+        entry(0x606A, 0, DataType::Integer16).default(-1),
+        entry(0x60F9, 1, DataType::Unsigned16).default(500),
+        entry(0x6410, 1, DataType::Unsigned16).default(2000),
+    ];
+    let are_further = |row: &Entry| further.iter().any(|other| other.mux() == row.mux());
+    let own = CIA402.dictionary.rows().iter().copied().filter(|row| !are_further(row));
+    let mut bench = Bench::of(of_rows(own.chain(further).collect()));
+    for (index, sub, own) in [(0x606A, 0, -1), (0x60F9, 1, 500), (0x6410, 1, 2000)] {
+        assert_eq!(bench.write(index, sub, own), Ok(()), "{index:04X}h:{sub:02X} has it");
+        assert_eq!(bench.write(index, sub, 77), Err(AbortCode::READ_ONLY), "{index:04X}h:{sub:02X}");
+        assert_eq!(bench.read(index, sub), own);
+    }
+    assert_eq!((bench.write(0x2100, 0, 77), bench.read(0x2100, 0)), (Ok(()), 77), "the maker's own are stored");
+}
+
+/// Objects that masters write as they set a drive up, whatever its maker (Lely, ros2_canopen, makers' start-up lists).
+#[test]
+fn what_start_ups_write_is_acted_on() {
+    let by_sub_index = [
+        (0x607B, 1..=2),
+        (0x607D, 1..=2),
+        (0x608F, 1..=2),
+        (0x6091, 1..=2),
+        (0x6092, 1..=2),
+        (0x6099, 1..=2),
+        (0x60A4, 1..=4),
+        (0x60C1, 1..=1),
+        (0x60C2, 1..=2),
+        (0x60FE, 1..=2),
+    ];
+    let plain = [
+        0x6007, 0x6040, 0x6042, 0x605A, 0x605B, 0x605C, 0x605D, 0x605E, 0x6060, 0x6065, 0x6066, 0x6067, 0x6068, 0x606D,
+        0x606E, 0x606F, 0x6070, 0x6071, 0x6072, 0x6073, 0x6075, 0x6076, 0x607A, 0x607C, 0x607E, 0x607F, 0x6080, 0x6081,
+        0x6082, 0x6083, 0x6084, 0x6085, 0x6086, 0x6087, 0x6098, 0x609A, 0x60B0, 0x60B1, 0x60B2, 0x60B8, 0x60C0, 0x60C5,
+        0x60C6, 0x60E0, 0x60E1, 0x60FF,
+    ];
+    let records = by_sub_index.into_iter().flat_map(|(index, subs)| subs.map(move |sub| Mux::new(index, sub)));
+    for mux in records.chain(plain.map(|index| Mux::new(index, 0))) {
+        assert!(acts_on(&CIA402, mux), "{mux}");
     }
 }

@@ -67,7 +67,7 @@ pub(super) fn ordered(model: &'static Description, order: &Order) -> Result<Box<
     Ok(Box::new(servo(model, order)?))
 }
 
-/// The objects that a description has and the firmware does not act on: they are stored and answered, and have no effect.
+/// The objects that a description has and the firmware does not act on: they are answered, and have no effect.
 pub fn without_effect(model: &Description) -> impl Iterator<Item = Mux> {
     let rows = model.dictionary.rows().iter().map(canopen::od::Entry::mux);
     let acts = if model.axes.is_empty() { device_acts_on } else { acts_on };

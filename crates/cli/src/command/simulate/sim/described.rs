@@ -18,7 +18,7 @@ pub(super) fn notes(node: NodeId, model: &'static Description, verbose: bool) ->
     let mut notes = vec![format!("note: {node} is {} of {}: {}", model.title, model.manual, run_as(model))];
     let quiet: Vec<_> = without_effect(model).map(|mux| named(model, mux)).collect();
     let all = model.dictionary.rows().len();
-    let of_all = format!("of its {all} objects are stored and answered, and have no effect");
+    let of_all = format!("of its {all} objects are answered, and have no effect");
     notes.extend(list(node, &quiet, &of_all, verbose));
     let odd: Vec<_> = model.dictionary.rows().iter().filter_map(beyond_limits).collect();
     notes.extend(list(node, &odd, "of its values as delivered are outside of their own limits", verbose));
@@ -122,7 +122,7 @@ mod tests {
     fn of_a_file_what_makes_no_sense_and_what_has_no_effect_is_counted_and_with_v_named() {
         let counted = said(false);
         assert!(counted.contains("claims to be a drive (1000h), but has no 6040h"), "{counted}");
-        assert!(counted.contains("1 of its 4 objects are stored and answered, and have no effect; -v"), "{counted}");
+        assert!(counted.contains("1 of its 4 objects are answered, and have no effect; -v"), "{counted}");
         assert!(
             counted.contains("1 of its PDOs cannot be mapped as delivered") && counted.contains("TPDO1 (object"),
             "{counted}"
