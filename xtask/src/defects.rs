@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use crate::test_programs::{self, Program};
 use crate::{libtest, process, workspace};
-use list::{DEFECTS, Defect, Tests};
+use list::{Defect, Tests, defects};
 
 /// What became of a defect.
 #[derive(Debug, PartialEq, Eq)]
@@ -43,18 +43,19 @@ pub(crate) fn command(words: &[&str]) -> ExitCode {
 /// The numbers that are asked for, from 1; without any, all.
 fn chosen(words: &[&str]) -> Result<Vec<usize>, String> {
     let mut numbers = Vec::new();
+    let all = 1..=defects().len();
     for pair in words.chunks(2) {
         let number = match pair {
-            ["--only", number] => number.parse().ok().filter(|number| (1..=DEFECTS.len()).contains(number)),
+            ["--only", number] => number.parse().ok().filter(|number| all.contains(number)),
             _ => None,
         };
         numbers.push(number.ok_or(format!(
             "expected --only NUMBER, 1 to {}, and not {}",
-            DEFECTS.len(),
+            all.end(),
             pair.join(" ")
         ))?);
     }
-    Ok(if numbers.is_empty() { (1..=DEFECTS.len()).collect() } else { numbers })
+    Ok(if numbers.is_empty() { all.collect() } else { numbers })
 }
 
 /// True if each is noticed.
@@ -62,16 +63,16 @@ fn check(numbers: &[usize]) -> Result<bool, String> {
     let place = workspace::target().join("defects");
     let copy = copy_of_the_tree(&place)?;
     let mut sound = BTreeSet::new();
-    let mut missed = 0;
+    let (list, mut missed) = (defects(), 0);
     for number in numbers {
-        let defect = &DEFECTS[number - 1];
+        let defect = list[number - 1];
         if sound.insert(defect.noticed_by) && run(&copy, defect.noticed_by)? != Verdict::Missed {
             return Err(format!("{:?} fails without a defect", defect.noticed_by));
         }
         let verdict = with(&copy, defect, || run(&copy, defect.noticed_by))?;
         missed += usize::from(verdict == Verdict::Missed);
         let Tests { package, target, .. } = defect.noticed_by;
-        println!("{number:2}  {}: {} | {package} {target}: {verdict}", defect.file, defect.instead.trim());
+        println!("{number:3}  {}: {} | {package} {target}: {verdict}", defect.file, defect.instead.trim());
     }
     println!("{} noticed, {missed} not", numbers.len() - missed);
     Ok(missed == 0)
@@ -178,7 +179,7 @@ mod tests {
     #[test]
     fn each_defect_can_be_put_in_where_it_says() {
         let packages = workspace::packages().unwrap();
-        for (place, defect) in DEFECTS.iter().enumerate() {
+        for (place, defect) in defects().into_iter().enumerate() {
             let text = fs::read_to_string(workspace::root().join(defect.file)).unwrap_or_default();
             let written = defect.written_into(&text).unwrap_or_else(|error| panic!("defect {}: {error}", place + 1));
             assert_ne!(written, text, "defect {}", place + 1);
@@ -204,7 +205,7 @@ mod tests {
 
     #[test]
     fn numbers_are_those_of_the_list() {
-        assert_eq!(chosen(&[]).unwrap().len(), DEFECTS.len());
+        assert_eq!(chosen(&[]).unwrap().len(), defects().len());
         assert_eq!(chosen(&["--only", "3", "--only", "1"]), Ok(vec![3, 1]));
         for words in [&["--only"][..], &["--only", "0"], &["--only", "999"], &["3"]] {
             assert!(chosen(words).unwrap_err().contains("--only NUMBER, 1 to "), "{words:?}");

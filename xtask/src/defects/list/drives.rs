@@ -1,0 +1,217 @@
+//! Motion, physics, firmware and the world around them.
+
+use super::Defect;
+use super::programs::{DRIVES, DRIVES_IT, MOTION_IT, PLANT, PLANT_IT, SIM, SIM_IT, WHEEL};
+
+pub(super) const DEFECTS: &[Defect] = &[
+    Defect {
+        file: "crates/motion/src/pid.rs",
+        text: "share * (gains.proportional * error + rest);",
+        instead: "share * (gains.proportional * error);",
+        noticed_by: MOTION_IT,
+    },
+    Defect {
+        file: "crates/motion/src/profile.rs",
+        text: "0.5 - y + 2.0 / 3.0 * y * y * y",
+        instead: "0.5 - y + 1.0 / 3.0 * y * y * y",
+        noticed_by: MOTION_IT,
+    },
+    Defect {
+        file: "crates/motion/src/foc.rs",
+        text: "let centre = 0.5 - (highest(phases)",
+        instead: "let centre = 0.5 + (highest(phases)",
+        noticed_by: MOTION_IT,
+    },
+    Defect {
+        file: "crates/motion/src/profile.rs",
+        text: "0.5 * (start * start - end * end) * down",
+        instead: "0.5 * (start * start + end * end) * down",
+        noticed_by: MOTION_IT,
+    },
+    Defect {
+        file: "crates/motion/src/jerk.rs",
+        text: "if to.abs() > relaxed.velocity.abs() { up }",
+        instead: "if to.abs() < relaxed.velocity.abs() { up }",
+        noticed_by: MOTION_IT,
+    },
+    Defect {
+        file: "crates/motion/src/field_weakening.rs",
+        text: "        -gains.most_a * self.depth",
+        instead: "        gains.most_a * self.depth",
+        noticed_by: MOTION_IT,
+    },
+    Defect {
+        file: "crates/motion/src/foc.rs",
+        text: "current_a.d + self.flux_linkage_wb)",
+        instead: "current_a.d - self.flux_linkage_wb)",
+        noticed_by: MOTION_IT,
+    },
+    Defect {
+        file: "crates/plant/src/thermal.rs",
+        text: "let flow_w_by_resistance = heat_w * self.resistance_k_w -",
+        instead: "let flow_w_by_resistance = heat_w -",
+        noticed_by: PLANT,
+    },
+    Defect {
+        file: "crates/plant/src/hall.rs",
+        text: "[u8; 6] = [5, 1, 3, 2, 6, 4];",
+        instead: "[u8; 6] = [5, 4, 6, 2, 3, 1];",
+        noticed_by: PLANT,
+    },
+    Defect {
+        file: "crates/plant/src/encoder.rs",
+        text: "        4 * self.lines",
+        instead: "        2 * self.lines",
+        noticed_by: PLANT,
+    },
+    Defect {
+        file: "crates/plant/src/supply.rs",
+        text: "if data.connected { self.capacitance_f + self.source_capacitance_f }",
+        instead: "if data.connected { self.capacitance_f }",
+        noticed_by: PLANT,
+    },
+    Defect {
+        file: "crates/plant/src/cogging.rs",
+        text: "        -self.amplitude_nm * self.phase",
+        instead: "        self.amplitude_nm * self.phase",
+        noticed_by: PLANT,
+    },
+    Defect {
+        file: "crates/plant/src/pmsm.rs",
+        text: "alpha_v: u * (2.0 * third_v) -",
+        instead: "alpha_v: u * third_v -",
+        noticed_by: PLANT_IT,
+    },
+    Defect {
+        file: "crates/plant/src/current_loop.rs",
+        text: "- omega * inductance_q_h * current_a.q,",
+        instead: "+ omega * inductance_q_h * current_a.q,",
+        noticed_by: PLANT_IT,
+    },
+    Defect {
+        file: "crates/plant/src/gear.rs",
+        text: "known_nm + 0.5 * coupling * rate_after;",
+        instead: "known_nm - 0.5 * coupling * rate_after;",
+        noticed_by: PLANT_IT,
+    },
+    Defect {
+        file: "crates/drives/src/engine/host_watchdog.rs",
+        text: "now.nanos_since(last) >= timeout_ns",
+        instead: "now.nanos_since(last) > timeout_ns",
+        noticed_by: DRIVES,
+    },
+    Defect {
+        file: "crates/drives/src/engine/inputs.rs",
+        text: "if *differs_for >= periods {",
+        instead: "if *differs_for > periods {",
+        noticed_by: DRIVES,
+    },
+    Defect {
+        file: "crates/drives/src/engine/actuator/overload.rs",
+        text: "(high_y - low_y) * (x - low)",
+        instead: "(high_y - low_y) * (high - x)",
+        noticed_by: DRIVES,
+    },
+    Defect {
+        file: "crates/drives/src/engine/storage.rs",
+        text: "(b.sequence.wrapping_sub(a.sequence) as i32) > 0",
+        instead: "(b.sequence.wrapping_sub(a.sequence) as i32) < 0",
+        noticed_by: DRIVES,
+    },
+    Defect {
+        file: "crates/drives/src/engine/axis/trajectory.rs",
+        text: "f64::from(target.wrapping_sub(from.position)) - from.fraction;",
+        instead: "f64::from(target.wrapping_sub(from.position)) + from.fraction;",
+        noticed_by: DRIVES,
+    },
+    Defect {
+        file: "crates/drives/src/zlim42c/protection.rs",
+        text: "lost |= *empty_for >= PHASE_LOSS_DEBOUNCE_PERIODS;",
+        instead: "lost |= *empty_for > PHASE_LOSS_DEBOUNCE_PERIODS;",
+        noticed_by: DRIVES,
+    },
+    Defect {
+        file: "crates/drives/src/mjoint/encoder.rs",
+        text: "if difference >= COUNTS_PER_TURN as u16 / 2",
+        instead: "if difference >= COUNTS_PER_TURN as u16 / 4",
+        noticed_by: DRIVES,
+    },
+    Defect {
+        file: "crates/drives/src/zlac8030l/protection.rs",
+        text: "[u, v, u + v].iter()",
+        instead: "[u, v, u - v].iter()",
+        noticed_by: DRIVES_IT,
+    },
+    Defect {
+        file: "crates/drives/src/zlac8030l/protection.rs",
+        text: "matches!(sensors.hall & 7, 0 | 7)",
+        instead: "matches!(sensors.hall & 7, 7)",
+        noticed_by: DRIVES_IT,
+    },
+    Defect {
+        file: "crates/drives/src/engine/cia402/status.rs",
+        text: "deviation.unsigned_abs() <= tolerances.position",
+        instead: "deviation.unsigned_abs() < tolerances.position",
+        noticed_by: DRIVES_IT,
+    },
+    Defect {
+        file: "crates/drives/src/node/io.rs",
+        text: "bit(1, now < of(LOWER_LIMIT))",
+        instead: "bit(1, now <= of(LOWER_LIMIT))",
+        noticed_by: DRIVES_IT,
+    },
+    Defect {
+        file: "crates/drives/src/engine/cia402/set_points.rs",
+        text: "if !new_set_point && self.waiting.is_none()",
+        instead: "if !new_set_point",
+        noticed_by: DRIVES_IT,
+    },
+    Defect {
+        file: "crates/sim/src/wire/confinement.rs",
+        text: "const BUS_OFF_ABOVE: u16 = 255;",
+        instead: "const BUS_OFF_ABOVE: u16 = 247;",
+        noticed_by: SIM,
+    },
+    Defect {
+        file: "crates/sim/src/wire/confinement.rs",
+        text: "self.rec = (self.rec + 9)",
+        instead: "self.rec = (self.rec + 8)",
+        noticed_by: SIM,
+    },
+    Defect {
+        file: "crates/sim/src/wire/collision.rs",
+        text: "Some(stuffing.count + 1)",
+        instead: "Some(stuffing.count)",
+        noticed_by: SIM,
+    },
+    Defect {
+        file: "crates/sim/src/pace.rs",
+        text: "(nanos as f64 / self.speed).ceil()",
+        instead: "(nanos as f64 * self.speed).ceil()",
+        noticed_by: SIM,
+    },
+    Defect {
+        file: "crates/sim/src/stimulus/range.rs",
+        text: "self.high.is_none_or(|high| position <= high)",
+        instead: "self.high.is_none_or(|high| position < high)",
+        noticed_by: SIM,
+    },
+    Defect {
+        file: "crates/sim/src/machine/models/zlim42c.rs",
+        text: "if node <= 15 { node } else { 0 }",
+        instead: "if node <= 16 { node } else { 0 }",
+        noticed_by: SIM_IT,
+    },
+    Defect {
+        file: "crates/sim/src/world/watch.rs",
+        text: "if first && before.generation != after.generation",
+        instead: "if before.generation != after.generation",
+        noticed_by: SIM_IT,
+    },
+    Defect {
+        file: "crates/drives/src/engine/cia402/stopping.rs",
+        text: "StopRamp::QuickStop => Braking::Ramp(parameters.quick_stop_ramp),",
+        instead: "StopRamp::QuickStop => Braking::Ramp(parameters.moves.deceleration),",
+        noticed_by: WHEEL,
+    },
+];
