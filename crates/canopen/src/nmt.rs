@@ -1,7 +1,8 @@
 //! Network management: node control (CiA 301, 7.2.8).
 //!
 //! The master's frames on identifier 0 and the slave's states. Boot-up and heartbeat are in [`crate::heartbeat`].
-//! What a reset does to a device is its owner's business; see [`crate::node`]. Node guarding is not offered.
+//! What a reset does to a device is its owner's business; see [`crate::node`]. Node guarding is in
+//! [`crate::guarding`].
 
 use core::fmt;
 

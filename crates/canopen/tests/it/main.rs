@@ -2,3 +2,4 @@
 
 mod any_device;
 mod node;
+mod wire_types;
