@@ -1,6 +1,7 @@
 use core::fmt;
 
-/// Multiplexor: which entry of an object dictionary. Prints as `6041h:00`. Source: CiA 301, 7.2.4.3.
+/// Multiplexor: which entry of an object dictionary. Prints as `6041h:00`, with `{:X}` as it is typed: `6041:00`. Source: CiA 301,
+/// 7.2.4.3.
 #[doc(alias = "address")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Mux {
@@ -30,5 +31,11 @@ impl Mux {
 impl fmt::Display for Mux {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:04X}h:{:02X}", self.index, self.sub_index)
+    }
+}
+
+impl fmt::UpperHex for Mux {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:04X}:{:02X}", self.index, self.sub_index)
     }
 }

@@ -167,11 +167,10 @@ fn objects(line: &TypedLine, current: &str) -> Vec<CompletionCandidate> {
     let by_number = current.starts_with(|first: char| first.is_ascii_digit());
     let one = |row: &Entry| {
         let mux = row.mux();
-        let (index, sub_index) = (mux.index, mux.sub_index);
         match by_number {
-            true if sub_index == 0 => candidate(format!("{index:04X}"), row.name),
-            true => candidate(format!("{index:04X}:{sub_index:02X}"), row.name),
-            false => candidate(row.name, format!("{index:04X}h:{sub_index:02X}")),
+            true if mux.sub_index == 0 => candidate(format!("{:04X}", mux.index), row.name),
+            true => candidate(format!("{mux:X}"), row.name),
+            false => candidate(row.name, mux.to_string()),
         }
     };
     model.dictionary.rows().iter().map(one).collect()

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::pin::Pin;
 
+use canopen::Mux;
 use canopen::sdo::parameter::is_further_server;
 use cia402::ModeOfOperation;
 use devices::PowerStyle;
@@ -169,7 +170,7 @@ impl fmt::Display for Need {
         match self {
             Self::Index(index) => write!(f, "the device has no object {index:04X}h"),
             Self::Writable(index) => write!(f, "the device has no object {index:04X}h that can be written"),
-            Self::Sub(index, sub_index) => write!(f, "the device has no object {index:04X}h:{sub_index:02X}"),
+            Self::Sub(index, sub_index) => write!(f, "the device has no object {}", Mux::new(*index, *sub_index)),
             Self::FurtherServer => f.write_str("the device has no SDO server beside the first one: 1201h to 127Fh"),
             Self::Rpdo => f.write_str("the device has no receive PDO"),
             Self::Tpdo => f.write_str("the device has no transmit PDO"),

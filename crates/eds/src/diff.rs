@@ -1,5 +1,7 @@
 //! Two files compared, object by object.
 
+use canopen::Mux;
+
 use crate::{DeviceInfo, Eds, Object, Value, Variable};
 
 /// One thing in which two files differ.
@@ -125,7 +127,7 @@ fn mapped(index: u16, value: &Value) -> Option<String> {
     }
     let Value::Number(number) = value else { return None };
     let record = u32::try_from(number.base).ok().filter(|record| *record > 0xFF)?;
-    Some(format!("{:04X}h:{:02X}, {} bits", record >> 16, record >> 8 & 0xFF, record & 0xFF))
+    Some(format!("{}, {} bits", Mux::from_key(record >> 8), record & 0xFF))
 }
 
 #[cfg(test)]

@@ -311,7 +311,7 @@ impl Bench {
     /// Reads an object and adds an expectation of it to the row.
     pub(super) fn expect_object(&mut self, index: u16, sub_index: u8, expect: Expect, unit: &str) {
         let seen = self.read_f64(index, sub_index);
-        let what = if sub_index == 0 { format!("{index:04X}h") } else { format!("{index:04X}h:{sub_index:02X}") };
+        let what = if sub_index == 0 { format!("{index:04X}h") } else { Mux::new(index, sub_index).to_string() };
         self.expect(&what, expect, unit, seen);
     }
 

@@ -77,7 +77,7 @@ fn what_is_reported_of_a_short_rpdo_stands_in_the_profile_that_masters_read() {
 /// Name and object of each departure, sorted.
 fn described(name: &str) -> Vec<(String, String)> {
     let departures = model(name).expect("a model").departures(all());
-    let object = |mux: Mux| format!("{:04X}:{:02X}", mux.index, mux.sub_index);
+    let object = |mux: Mux| format!("{mux:X}");
     let mut found: Vec<_> = departures
         .map(|departure| (departure.key().to_owned(), departure.object().map(object).unwrap_or_default()))
         .collect();

@@ -245,12 +245,12 @@ async fn one_answer_each(bench: &mut Bench) -> Verdict {
 
 async fn missing_sub_index_of_record(bench: &mut Bench) -> Verdict {
     let records = [0x1018, 0x1400, 0x1800, 0x1600];
-    let Some((index, sub_index)) = records.into_iter().find_map(|index| {
+    let Some(mux) = records.into_iter().find_map(|index| {
         let rows: Vec<_> = bench.subject.rows().filter(|row| row.index == index).map(|row| row.sub_index).collect();
-        rows.last().copied().filter(|last| *last > 0).map(|_| (index, 0xFE))
+        rows.last().copied().filter(|last| *last > 0).map(|_| Mux::new(index, 0xFE))
     }) else {
         not_applicable!("the device has no record to ask");
     };
-    let answer = bench.upload(Mux::new(index, sub_index)).await?;
-    refused(&format!("read of {index:04X}h:{sub_index:02X}"), &answer, &[AbortCode::NO_SUCH_SUB_INDEX])
+    let answer = bench.upload(mux).await?;
+    refused(&format!("read of {mux}"), &answer, &[AbortCode::NO_SUCH_SUB_INDEX])
 }

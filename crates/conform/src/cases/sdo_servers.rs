@@ -72,7 +72,7 @@ async fn own_identifiers(bench: &mut Bench) -> Verdict {
     let mut servers = 0;
     for index in records(bench) {
         for (sub_index, cob) in (1..).zip(cob_ids(bench, index).await?) {
-            let at = format!("{index:04X}h:{sub_index:02X} is {:08X}h", cob.0);
+            let at = format!("{} is {:08X}h", Mux::new(index, sub_index), cob.0);
             match cob {
                 _ if !cob.is_valid() => continue,
                 _ if cob.is_restricted() => fail!("{at}, an identifier that no further server may have"),

@@ -1,5 +1,7 @@
 //! PDOs as delivered: what is mapped, and under which identifiers. Source: CiA 301, 7.5.2.33 to 7.5.2.38.
 
+use canopen::Mux;
+
 use super::at::finding;
 use crate::value::Number;
 use crate::{Eds, Findings, Rule, TypeCode, Value};
@@ -54,8 +56,8 @@ pub(super) fn mappings(eds: &Eds, findings: &mut Findings) {
 
 /// What is wrong with a mapping record.
 fn wrong(eds: &Eds, mapped: u32, is_rpdo: bool) -> Option<String> {
-    let (index, sub_index, bits) = ((mapped >> 16) as u16, (mapped >> 8) as u8, mapped as u8);
-    let name = format!("{index:04X}h:{sub_index:02X}");
+    let (name, bits) = (Mux::from_key(mapped >> 8), mapped as u8);
+    let Mux { index, sub_index } = name;
     if mapped == 0 {
         return Some("counted, but nothing is mapped".into());
     }

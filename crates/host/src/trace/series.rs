@@ -124,7 +124,7 @@ impl Collected {
                 continue;
             }
             let one = self.0.entry((node, mux.index, mux.sub_index)).or_insert_with(|| Series {
-                object: format!("{node}:{:04X}:{:02X}", mux.index, mux.sub_index),
+                object: format!("{node}:{mux:X}"),
                 node: node.raw(),
                 name,
                 unit,

@@ -327,14 +327,14 @@ fn pdo_number(case: &Case<'_>, report: &mut Reporter<'_>) {
             );
         }
         for (index, sub_index) in pdo.mapping.iter().flatten() {
+            let mux = Mux::new(*index, *sub_index);
             match device.eds.variable(*index, *sub_index) {
                 None if *index >= 0x1000 => {
-                    let what =
-                        format!("its data sheet has no {index:04X}h:{sub_index:02X}, which {} is to carry", name(pdo));
+                    let what = format!("its data sheet has no {mux}, which {} is to carry", name(pdo));
                     report.say(Severity::Error, pdo.at, what, "map an object that it has");
                 }
                 Some(variable) if !variable.pdo_mapping => {
-                    let what = format!("{index:04X}h:{sub_index:02X} may not be mapped, by its data sheet");
+                    let what = format!("{mux} may not be mapped, by its data sheet");
                     report.say(Severity::Error, pdo.at, what, "map another object, or read it by SDO");
                 }
                 _ => {}

@@ -44,7 +44,7 @@ impl Journal {
         text += "undo = [\n";
         for (object, bytes) in &self.undo {
             let digits: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
-            let _ = writeln!(text, "  [\"{:04X}:{:02X}\", \"{digits}\"],", object.index, object.sub_index);
+            let _ = writeln!(text, "  [\"{object:X}\", \"{digits}\"],");
         }
         text + "]\nwhole = true\n"
     }

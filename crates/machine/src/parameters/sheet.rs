@@ -213,14 +213,7 @@ pub fn print(parameters: &Parameters, model: Option<&'static Description>) -> St
     for (object, bytes) in &parameters.values {
         let row = model.and_then(|model| model.row(*object));
         // Writing into a String cannot fail.
-        let _ = writeln!(
-            text,
-            "\"{:04X}:{:02X}\" = {}{}",
-            object.index,
-            object.sub_index,
-            shown(row, bytes),
-            remark(row, bytes)
-        );
+        let _ = writeln!(text, "\"{object:X}\" = {}{}", shown(row, bytes), remark(row, bytes));
     }
     text
 }

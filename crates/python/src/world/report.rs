@@ -18,7 +18,7 @@ pub(super) fn at<'py>(py: Python<'py>, world: &mut sim::World, place: Place) -> 
     let dict = values(py, &report)?;
     let analogue = PyDict::new(py);
     for (mux, value) in channels {
-        analogue.set_item(format!("{:04X}:{:02X}", mux.index, mux.sub_index), value)?;
+        analogue.set_item(format!("{mux:X}"), value)?;
     }
     dict.set_item("analogue", analogue)?;
     dict.set_item("bus", bus(world, place.node, report.powered))?;

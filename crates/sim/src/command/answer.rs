@@ -255,10 +255,7 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
         supply_v,
         inputs: levels(inputs),
         outputs: levels(report.outputs),
-        analogue: analogue
-            .into_iter()
-            .map(|(mux, value)| (format!("{:04X}:{:02X}", mux.index, mux.sub_index), value))
-            .collect(),
+        analogue: analogue.into_iter().map(|(mux, value)| (format!("{mux:X}"), value)).collect(),
         brake: brake_text(report.brake),
         output_shaft: report.output.map(Output::from),
         damage: report.damage,

@@ -30,7 +30,7 @@ impl fmt::Display for Stimulus {
             Self::Pulses(PulseTrain::Clock(hz)) => write!(f, "clock {hz}"),
             Self::CableCut(cut) => write!(f, "cable {}", if *cut { "cut" } else { "join" }),
             Self::Bus(fault) => fault.fmt(f),
-            Self::Object { mux, value } => write!(f, "set {:04X}:{:02X} {value}", mux.index, mux.sub_index),
+            Self::Object { mux, value } => write!(f, "set {mux:X} {value}"),
         }
     }
 }

@@ -80,11 +80,7 @@ impl Write {
                 format!("ferrodrive objects {} {:04X} shows its type, range, unit and words", self.node, mux.index)
             }
             None => {
-                let Mux { index, sub_index } = mux;
-                format!(
-                    "give its type with the value, e.g. ferrodrive write {} {index:04X}:{sub_index:02X} u16:15",
-                    self.node
-                )
+                format!("give its type with the value, e.g. ferrodrive write {} {mux:X} u16:15", self.node)
             }
         };
         let wrong = |reason| Failure::usage(reason).at_node(self.node).at_object(mux).next(&advice);
