@@ -23,8 +23,7 @@ pub struct Account {
 
 /// How long a shaft may take to stand once its power was taken.
 const REST: Duration = Duration::from_secs(3);
-/// A shaft (not the output of a gear) that is slower, in r/min, stands where several looks in a row show that.
-const STANDSTILL_RPM: f64 = 1.0;
+/// A shaft stands where so many looks in a row show that.
 const LOOKS: u32 = 3;
 const LOOK: Duration = Duration::from_millis(10);
 
@@ -55,7 +54,7 @@ async fn see_at_rest(drive: &Drive) -> Result<(), Failure> {
         let state = drive.state().await?;
         let before = std::mem::replace(&mut before, state.position);
         let stands = match state.velocity {
-            Some(Rpm(rpm)) => rpm.abs() * drive.gear().ratio().abs() < STANDSTILL_RPM,
+            Some(speed) => drive.stands_at(speed),
             // One that shows no speed is looked at by its position: the encoder may swing between two counts.
             None => before.zip(state.position).is_some_and(|(before, at)| before.0.abs_diff(at.0) <= 1),
         };

@@ -9,6 +9,7 @@ use cia402::object::{
 };
 use cia402::{Direction, HomingMethod, HomingSequence, HomingSwitch, ModeOfOperation, Statusword, SwitchEdge};
 use devices::{AxisDescription, Description, HomingRules, InputSignal, Meaning, Terminals};
+use master::units::Rpm;
 use master::{Drive, Error};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -21,9 +22,6 @@ use crate::work::{Asked, Done, refusal_of, send};
 /// Homing settings (CiA 402-2, 11.2): speed to the switch, speed to the edge, acceleration, and home offset.
 const SETTINGS: [Mux; 4] =
     [SPEED_DURING_SEARCH_FOR_SWITCH, SPEED_DURING_SEARCH_FOR_ZERO, HOMING_ACCELERATION, HOME_OFFSET];
-
-/// Below this speed in r/min a shaft counts as at rest: the actual velocity of a shaft at rest may be as high.
-const STANDS_RPM: f64 = 1.0;
 
 impl Host {
     /// Reads the data of the wizard from a drive.
@@ -62,7 +60,8 @@ struct Seen {
     inputs: Vec<(&'static str, Option<InputSignal>, Option<bool>)>,
     /// For a drive in mode 6.
     statusword: Option<Statusword>,
-    velocity_rpm: Option<f64>,
+    /// Which way the shaft turns; `None` of one at rest.
+    heading: Option<Direction>,
 }
 
 /// A method as the page draws it.
@@ -119,8 +118,10 @@ impl Seen {
             Some(quantity) => drive.read_quantity(quantity).await.ok(),
             None => None,
         };
+        let turning = velocity_rpm.filter(|rpm| !drive.stands_at(Rpm(*rpm)));
+        let heading = turning.map(|rpm| if rpm < 0.0 { Direction::Negative } else { Direction::Positive });
         let statusword = statusword.map(|word| Statusword(word as u16));
-        Ok(Self { model, rules, method, settings, inputs, statusword, velocity_rpm })
+        Ok(Self { model, rules, method, settings, inputs, statusword, heading })
     }
 
     fn to_json(&self, node: NodeId, running: bool) -> Value {
@@ -208,12 +209,7 @@ impl Seen {
 
     /// The phase of a run, by its switch and the direction in which the shaft turns.
     fn phase(&self, sequence: HomingSequence) -> String {
-        let velocity = self.velocity_rpm.unwrap_or_default();
-        let heading = match velocity {
-            _ if velocity.abs() < STANDS_RPM => None,
-            _ if velocity < 0.0 => Some(Direction::Negative),
-            _ => Some(Direction::Positive),
-        };
+        let heading = self.heading;
         let moving = heading.map_or_else(|| "at rest".to_owned(), |heading| format!("moving {}ly", direction(heading)));
         let Some(row) = sequence.switch else { return format!("{moving}, searching for the index pulse") };
         let switch = signal_of(row.switch);

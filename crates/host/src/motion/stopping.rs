@@ -7,6 +7,8 @@ use can::Instant;
 use canopen::NodeId;
 use cia402::PowerCommand;
 use cia402::object::CONTROLWORD;
+use master::Drive;
+use master::units::Rpm;
 
 use crate::nodes::known_node::has_power;
 use crate::snapshot::DriveView;
@@ -15,9 +17,6 @@ use crate::work::{Asked, STOPPING, quietly};
 
 /// Presses of stop within this time are reported as one.
 const SAME_PRESS: Duration = Duration::from_secs(1);
-
-/// A shaft that turns more slowly is taken to be at rest, in r/min.
-const RESTING_RPM: f64 = 1.0;
 
 /// Consecutive readings at rest that are needed: a single one may catch a shaft that reverses.
 const RESTING_LOOKS: u32 = 2;
@@ -113,7 +112,8 @@ impl Host {
     /// A drive whose stop was not seen was read.
     pub(crate) fn look_for_rest(&mut self, id: NodeId, look: Option<&DriveView>) {
         let Some(looks) = self.unseen_stops.get_mut(&id) else { return };
-        *looks = if look.is_some_and(rests) { *looks + 1 } else { 0 };
+        let drive = self.nodes.get(&id).and_then(|node| node.drive.as_ref());
+        *looks = if drive.zip(look).is_some_and(|(drive, look)| rests(drive, look)) { *looks + 1 } else { 0 };
         if *looks == RESTING_LOOKS {
             self.unseen_stops.remove(&id);
             self.send_news(Some(id), "it was seen at rest");
@@ -131,6 +131,6 @@ impl Host {
 }
 
 /// By its speed, or by its power stage if the drive does not report a speed.
-fn rests(look: &DriveView) -> bool {
-    look.velocity_rpm.map_or_else(|| !has_power(look.state), |rpm| rpm.abs() < RESTING_RPM)
+fn rests(drive: &Drive, look: &DriveView) -> bool {
+    look.velocity_rpm.map_or_else(|| !has_power(look.state), |rpm| drive.stands_at(Rpm(rpm)))
 }

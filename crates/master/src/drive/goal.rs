@@ -9,8 +9,8 @@ use devices::{HomingRules, Quantity};
 
 use super::conclude::{Interference, Trigger};
 use super::handle::{Drive, POLL};
-use super::power::STANDSTILL_RPM;
 use crate::error::Error;
+use crate::units::Rpm;
 
 /// How near to the target bit 10 (target reached) is believed, in turns of the shaft.
 pub(crate) const REACHED_TURNS: f64 = 0.01;
@@ -88,7 +88,7 @@ impl Goal {
             Self::Speed(held) => {
                 let at = drive.read_quantity(held.quantity).await?;
                 let reached = (at - held.target_rpm).abs() <= held.band_rpm;
-                Ok(SpeedLook { reached, at, rests: !reached && at.abs() < drive.gear.at_output(STANDSTILL_RPM) })
+                Ok(SpeedLook { reached, at, rests: !reached && drive.stands_at(Rpm(at)) })
             }
             Self::Position { target, band, .. } => {
                 let position = drive.read_number(drive.place(POSITION_ACTUAL_VALUE)).await?;
@@ -192,7 +192,7 @@ impl Drive {
         while waited < SETTLE_TIME {
             self.still_enabled(intent).await?;
             let speed = self.answered(intent, self.read_quantity(velocity).await).await?;
-            if speed.abs() < self.gear.at_output(STANDSTILL_RPM) {
+            if self.stands_at(Rpm(speed)) {
                 break;
             }
             self.wait_poll(&mut waited).await;

@@ -9,8 +9,8 @@ use devices::AxisDescription;
 use super::conclude::Trigger;
 use super::handle::{Drive, POLL, STEP_TIMEOUT};
 use super::motion::Note;
-use super::power::STANDSTILL_RPM;
 use crate::error::Error;
+use crate::units::Rpm;
 
 impl Drive {
     /// Sets 6060h and waits until the drive shows it. A shaft that turns in another mode is stopped first: drives change
@@ -39,7 +39,7 @@ impl Drive {
 
     async fn stop_if_turning(&self, axis: &AxisDescription) -> Result<bool, Error> {
         let Some(velocity) = axis.units.actual_velocity else { return Ok(false) };
-        let turning = self.read_quantity(velocity).await?.abs() >= self.gear.at_output(STANDSTILL_RPM);
+        let turning = !self.stands_at(Rpm(self.read_quantity(velocity).await?));
         let follows = self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled);
         if turning && follows {
             self.stop().await?;

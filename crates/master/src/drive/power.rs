@@ -7,6 +7,7 @@ use devices::{HomingStart, PowerStyle, Quantity};
 use super::conclude::Trigger;
 use super::handle::{Drive, POLL, STEP_TIMEOUT};
 use crate::error::Error;
+use crate::units::Rpm;
 
 /// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
 pub(crate) const STANDSTILL_RPM: f64 = 1.0;
@@ -158,6 +159,12 @@ impl Drive {
         self.write_controlword(rest).await
     }
 
+    /// Whether a shaft that shows this speed, as [`read_quantity`](Self::read_quantity) and [`state`](Self::state) have it behind a
+    /// [`gear`](Self::gear), counts as standing. One look: a shaft that reverses passes zero.
+    pub fn stands_at(&self, Rpm(speed): Rpm) -> bool {
+        speed.abs() < self.gear.at_output(STANDSTILL_RPM)
+    }
+
     /// Waits until the shaft stands still and goes on doing so, as long as the drive's ramps may take.
     pub(super) async fn wait_standstill(&self, intent: &'static str) -> Result<(), Error> {
         let velocity = self.has(self.motion(intent)?.units.actual_velocity, "the actual velocity")?;
@@ -165,7 +172,7 @@ impl Drive {
         let (mut waited, mut looks) = (Duration::ZERO, 0);
         loop {
             let speed = self.answered(intent, self.read_quantity(velocity).await).await?;
-            looks = if speed.abs() < self.gear.at_output(STANDSTILL_RPM) { looks + 1 } else { 0 };
+            looks = if self.stands_at(Rpm(speed)) { looks + 1 } else { 0 };
             if looks == STANDSTILL_LOOKS {
                 return Ok(());
             }

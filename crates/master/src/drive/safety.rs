@@ -14,12 +14,13 @@ use devices::PowerStyle;
 use super::conclude::Trigger;
 use super::explain::blinding;
 use super::handle::{Drive, POLL};
-use super::power::{STANDSTILL_LOOKS, STANDSTILL_RPM};
+use super::power::STANDSTILL_LOOKS;
 use crate::core::{Command, Core, NodeSet, Payload, Request, Transfer};
 use crate::error::Error;
 use crate::gear::Gear;
 use crate::host_loss::HostLoss;
 use crate::network::{DEFAULT_TIMEOUT, MovedAxis, Network, join_all};
+use crate::units::Rpm;
 
 /// Quick stop, with the halt bit for drives that look for their reference whatever the quick stop bit says; where there is
 /// a state machine, halt means nothing in Quick stop active (CiA 402-2, 8.4.1).
@@ -283,7 +284,7 @@ impl Drive {
             return Ok(false);
         }
         let stands = match self.axis_description().and_then(|axis| axis.units.actual_velocity) {
-            Some(velocity) => self.read_quantity(velocity).await?.abs() < STANDSTILL_RPM,
+            Some(velocity) => self.stands_at(Rpm(self.read_quantity(velocity).await?)),
             None => {
                 let at = i64::from(self.node.read::<i32>(self.place(POSITION_ACTUAL_VALUE)).await?);
                 let before = rest.position.replace(at);

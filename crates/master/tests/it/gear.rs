@@ -14,7 +14,7 @@ use master::drive::MotionOptions;
 use master::units::{Along, Angle, Degrees, Ramp, Rpm};
 use master::{Drive, Error, Gear, Network};
 use sim::machine::{mjoint, zlac8030l, zlim42c};
-use sim::{World, block_on};
+use sim::{Place, Stimulus, World, block_on};
 
 const JOINT: u8 = 1;
 const STEPPER: u8 = 2;
@@ -106,6 +106,19 @@ fn a_shaft_that_turns_behind_a_great_ratio_does_not_stand_still() {
     let report = block_on(&mut world, fast.velocity(Rpm(600.0), options)).unwrap().unwrap();
     assert_eq!(report.commanded.iter().map(|sent| sent.raw).collect::<Vec<_>>(), [60, 250]);
     block_on(&mut world, fast.stop()).unwrap().unwrap();
+}
+
+/// What is less than an r/min of the output is hundreds of the shaft.
+#[test]
+fn a_shaft_that_its_load_turns_behind_a_great_ratio_is_not_noted_as_one_that_stands() {
+    let (mut world, [_, _, servo]) = bench();
+    let slow = servo.behind(Gear::new(1000.0).unwrap());
+    block_on(&mut world, slow.velocity(Rpm(0.05), MotionOptions::default())).unwrap().unwrap();
+    world.apply(Place::node(SERVO), &Stimulus::LoadTorque(-2.0)).unwrap().unwrap();
+    block_on(&mut world, slow.disable()).unwrap().unwrap();
+    let turning = world.report(SERVO).unwrap().velocity_rpm;
+    assert!((5.0..1000.0).contains(&turning), "{turning} r/min");
+    assert!(slow.node().network().moved().contains(node(SERVO)), "noted as standing at {turning} r/min");
 }
 
 /// By speeds and by positions, what passes each cycle is in the units of the output too.
