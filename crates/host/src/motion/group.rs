@@ -11,15 +11,16 @@ use std::time::Duration;
 
 use can::Instant;
 use canopen::NodeId;
-use cia402::ModeOfOperation;
+use machine::file::speed_mode;
+use machine::group_move;
 use master::Drive;
 use master::base::{Base, BaseError, BaseLimits, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
-use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase, StreamOptions};
-use master::units::Turns;
+use master::group::{AxisLimits, AxisSetup, Group, GroupError, StreamOptions};
+use master::units::{Angle, Rpm, Turns};
 
 use crate::answer::Answer;
-use crate::command::{AxisSpeed, AxisTarget, BaseJog, GroupCommand, GroupMove};
+use crate::command::{AxisSpeed, BaseJog, GroupCommand, GroupMove};
 use crate::motion::group_run::{GroupOutcome, GroupRun, Wanted};
 use crate::motion::guarding::{UNGUARDED, expect_guard};
 use crate::parameters::transactions::Refusal;
@@ -209,15 +210,8 @@ impl Host {
     }
 }
 
-/// A group of these drives, each with these limits.
-async fn open(drives: &[Drive], limits: impl Fn(usize) -> AxisLimits) -> Result<Group, GroupError> {
-    let mut axes = Vec::new();
-    for (at, drive) in drives.iter().enumerate() {
-        let mode = AxisSetup::best_mode(drive)?;
-        axes.push(AxisSetup { drive: drive.clone(), mode, limits: limits(at) });
-    }
-    let options = CyclicOptions { tolerance: TOLERANCE, ..CyclicOptions::default() };
-    Group::open(&axes, PERIOD, options).await
+fn options() -> CyclicOptions {
+    CyclicOptions { tolerance: TOLERANCE, ..CyclicOptions::default() }
 }
 
 /// Closes a group, and returns the outcome of its motion, with the reason of the drive that stopped it.
@@ -242,13 +236,13 @@ fn refusal(error: GroupError) -> Refusal {
     }
 }
 
-/// The limits of an axis: the conservative defaults, except those that were given.
-fn limits(rpm: Option<f64>, rpm_per_s: Option<f64>) -> AxisLimits {
+/// The limits of an axis at this speed: else the conservative defaults, except a rate that was given.
+fn limits(rpm: f64, rpm_per_s: Option<f64>) -> AxisLimits {
     let careful = AxisLimits::careful();
     let acceleration_turns_s2 = rpm_per_s.map_or(careful.acceleration_turns_s2, |rate| rate / 60.0);
     let rounding_s = careful.acceleration_turns_s2 / careful.jerk_turns_s3;
     AxisLimits {
-        velocity_turns_s: rpm.map_or(careful.velocity_turns_s, |rpm| rpm / 60.0),
+        velocity_turns_s: rpm / 60.0,
         acceleration_turns_s2,
         jerk_turns_s3: acceleration_turns_s2 / rounding_s,
         ..careful
@@ -261,31 +255,24 @@ async fn move_together(drives: Vec<Drive>, asked: GroupMove) -> GroupOutcome {
         Ok(within) => within,
         Err(_) => return Err(("malformed", "expected a time above 0 in seconds".into())),
     };
-    let mut group = open(&drives, |_| limits(rpm, rpm_per_s)).await.map_err(refusal)?;
-    let moved = carry_out(&mut group, &axes, relative, within).await;
+    let asked = group_move::GroupMove {
+        targets: axes.iter().map(|axis| (axis.node, Angle::Turns(axis.degrees / 360.0))).collect(),
+        relative,
+        within,
+        velocity: rpm.map(Rpm),
+        acceleration: rpm_per_s.map(|rate| rate / 60.0),
+        period: Some(PERIOD),
+        ..group_move::GroupMove::default()
+    };
+    let planned = asked.plan(None, drives).await.map_err(refusal)?;
+    let mut group = planned.open(options()).await.map_err(refusal)?;
+    let moved = planned.carry_out(&mut group, |_, _| {}).await.map(|run| {
+        let lags = axes.iter().zip(&run.largest_turns);
+        let lags: Vec<_> = lags.map(|(axis, turns)| format!("node {} {:.1} deg", axis.node, turns * 360.0)).collect();
+        let time = format!("{} drives moved together in {:.3} s", axes.len(), run.time.as_secs_f64());
+        vec![format!("{time}; largest lag: {}. They are disabled now", lags.join(", "))]
+    });
     close(group, moved).await
-}
-
-async fn carry_out(
-    group: &mut Group,
-    axes: &[AxisTarget],
-    relative: bool,
-    within: Option<Duration>,
-) -> Result<Vec<String>, GroupError> {
-    group.enable().await?;
-    let from = group.points().iter().map(|point| if relative { point.position_turns } else { 0.0 });
-    let to: Vec<_> = from.zip(axes).map(|(from, axis)| Turns(from + axis.degrees / 360.0)).collect();
-    let time = group.start_move(&to, within)?;
-    let mut largest_turns = vec![0.0_f64; axes.len()];
-    while group.cycle().await?.phase == Phase::Moving {
-        let errors = group.following_errors().map(Option::unwrap_or_default);
-        largest_turns.iter_mut().zip(errors).for_each(|(largest, error)| *largest = largest.max(error));
-    }
-    group.settle().await?;
-    let lags = axes.iter().zip(&largest_turns);
-    let lags: Vec<_> = lags.map(|(axis, turns)| format!("node {} {:.1} deg", axis.node, turns * 360.0)).collect();
-    let time = format!("{} drives moved together in {:.3} s", axes.len(), time.as_secs_f64());
-    Ok(vec![format!("{time}; largest lag: {}. They are disabled now", lags.join(", "))])
 }
 
 async fn turn_together(
@@ -299,9 +286,14 @@ async fn turn_together(
     }
     // A drive that stays at rest has limits too.
     let least_rpm = AxisLimits::careful().velocity_turns_s * 60.0;
-    let of_axis = |at: usize| limits(Some(axes[at].rpm.abs().max(least_rpm) * ROOM), rpm_per_s);
-    let mut group = open(&drives, of_axis).await.map_err(refusal)?;
-    let turned = stream_speeds(&mut group, &axes, of_axis(0).acceleration_turns_s2, &wanted).await;
+    let of_axis = |axis: &AxisSpeed| limits(axis.rpm.abs().max(least_rpm) * ROOM, rpm_per_s);
+    let mut setups = Vec::new();
+    for (drive, axis) in drives.into_iter().zip(&axes) {
+        let mode = AxisSetup::best_mode(&drive).map_err(refusal)?;
+        setups.push(AxisSetup { drive, mode, limits: of_axis(axis) });
+    }
+    let mut group = Group::open(&setups, PERIOD, options()).await.map_err(refusal)?;
+    let turned = stream_speeds(&mut group, &axes, of_axis(&axes[0]).acceleration_turns_s2, &wanted).await;
     close(group, turned).await
 }
 
@@ -359,8 +351,7 @@ async fn drive_base(drives: Vec<Drive>, asked: BaseJog, wanted: Rc<Cell<Wanted>>
         watchdog: JOG_SPAN,
         lag_m: BaseLimits::lag_for(asked.most_m_s),
     };
-    let options = CyclicOptions { tolerance: TOLERANCE, ..CyclicOptions::default() };
-    let base = Base::open([&wheel(0), &wheel(1)], geometry, limits, PERIOD, options).await;
+    let base = Base::open([&wheel(0), &wheel(1)], geometry, limits, PERIOD, options()).await;
     let mut base = base.map_err(refused)?;
     let driven = follow_twists(&mut base, &wanted).await;
     let reason = match &driven {
@@ -389,11 +380,4 @@ async fn follow_twists(base: &mut Base, wanted: &Cell<Wanted>) -> Result<(), Bas
         }
     }
     base.stop().await
-}
-
-/// Cyclic synchronous velocity if the model has it.
-fn speed_mode(drive: &Drive) -> ModeOfOperation {
-    let csv = ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY;
-    let has = drive.axis_description().is_some_and(|axis| axis.modes.contains(&csv));
-    if has { csv } else { ModeOfOperation::PROFILE_VELOCITY }
 }
