@@ -30,7 +30,7 @@ export function fastCapturePanel(shared, { taken }) {
   const had = h("div", { id: "fast-had" });
   const root = h(
     "details",
-    { class: "plain-details", id: "fast-capture", ontoggle: () => (offered = null) },
+    { class: "plain-details", id: "fast-capture", ontoggle: () => (offered = root.open ? offered : null) },
     h("summary", {}, "Fast capture"),
     h("div", { class: "bar" }, quantities),
     h("div", { class: "bar" }, more, truths),

@@ -4,6 +4,7 @@
 //! `target/studio` to be looked at.
 
 mod axe;
+mod fast_capture;
 mod figures;
 mod group;
 mod help;

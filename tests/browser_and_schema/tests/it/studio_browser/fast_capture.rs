@@ -1,0 +1,96 @@
+//! Fast capture and report in a real browser: a button each, with everything put back.
+
+use super::Stage;
+
+impl Stage {
+    /// Shows the form of a fast capture of the wheel.
+    async fn fast_capture(&self) {
+        self.click("#tabs [data-name=scope]").await;
+        self.find("#fast-capture").await;
+        self.client.execute("document.querySelector('#fast-capture').open = true", Vec::new()).await.expect("it opens");
+        self.find("[data-quantity=target_velocity]").await;
+    }
+
+    async fn fill(&self, css: &str, text: &str) {
+        let fill = "const of = document.querySelector(arguments[0]); of.value = arguments[1]; of.dispatchEvent(new Event('change'))";
+        self.client.execute(fill, vec![css.into(), text.into()]).await.expect("it is filled in");
+    }
+
+    /// Clicks until this is said; again where the page of a busy machine has sent nothing, its state stale, or was silent for too long.
+    async fn has_done(&self, css: &str, status: &str, part: &str) -> String {
+        loop {
+            self.click(css).await;
+            let is_late =
+                |said: &str| said.contains("Nothing was sent") || said.contains("the page that began it has gone");
+            self.until(part, async || {
+                let said = self.says(status, "").await;
+                said.contains(part) || is_late(&said)
+            })
+            .await;
+            let said = self.says(status, "").await;
+            if said.contains(part) {
+                return said;
+            }
+        }
+    }
+
+    /// What the first TPDO of the wheel carries, as the PDO view of a page that has just been loaded says.
+    async fn tpdo(&self) -> String {
+        self.load().await;
+        self.click("#tabs [data-name=pdo]").await;
+        self.choose_drive("pdo", 3).await;
+        self.says("tr[data-pdo=TPDO1]", "184h").await
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_turning_wheel_is_captured_fast_and_reported() {
+    let stage = Stage::open("fast").await;
+    stage.take_the_wheel().await;
+    stage.turn().await;
+    stage.fast_capture().await;
+    stage.choose("#fast-period", "5").await;
+    stage.fill("#fast-time", "0.5").await;
+    // The studio's own world says what is true beside what the drive says.
+    stage.choose("#fast-true", "true_velocity_rpm").await;
+    let said = stage.has_done("#fast-begin", "#fast-status", "The PDOs are as they were").await;
+    assert!(said.contains(" rows in ") && said.contains("of the bus at most"), "{said}");
+    let had = stage.says("#fast-had", "true_velocity_rpm").await;
+    for part in ["velocity_rpm", "TPDO", "world", " ms", "Jitter"] {
+        assert!(had.contains(part), "{part}: {had}");
+    }
+    // It is kept, and shown by itself.
+    stage.says("#capture-status", "kept as ").await;
+    stage.find("#scope-pause[aria-pressed=true]").await;
+    stage.find(".captures li").await;
+    stage.shoot("fast_capture").await;
+    // Its notes are there after a reload.
+    stage.fill(".captures [data-notes]", "belt tight").await;
+    stage.fast_report().await;
+    assert!(stage.tpdo().await.contains("nothing is mapped into it"));
+    stage.click("#tabs [data-name=scope]").await;
+    let notes = "return document.querySelector('.captures [data-notes]')?.value ?? null";
+    stage
+        .until("notes over a reload", async || {
+            stage.client.execute(notes, Vec::new()).await.expect("it runs").as_str() == Some("belt tight")
+        })
+        .await;
+    stage.close().await;
+}
+
+impl Stage {
+    async fn fast_report(&self) {
+        self.click("#tabs [data-name=drive]").await;
+        // Not typed: while the wheel turns, Space is Stop.
+        self.fill("#report-by", "A. Fitter").await;
+        self.has_done("#report", "#report-status", "saved as node4.html").await;
+        let page = std::fs::read_to_string(self.saved("node4.html").await).expect("text");
+        for part in ["A. Fitter", "zlac8030l", "capture of target_velocity_rpm", "true_velocity", "<svg"] {
+            assert!(page.contains(part), "{part} is in the report");
+        }
+        self.shoot("report_button").await;
+        self.client.goto(&format!("file://{}", self.saved("node4.html").await.display())).await.expect("it is shown");
+        self.shoot("report").await;
+    }
+}
