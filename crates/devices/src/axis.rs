@@ -105,6 +105,17 @@ impl PowerStyle {
         }
     }
 
+    /// True if the statusword shows that the power stage is on (CiA 402-2, figure 5).
+    pub const fn is_live(self, statusword: Statusword) -> bool {
+        use PowerState::{FaultReactionActive, OperationEnabled, QuickStopActive};
+        match self {
+            Self::Cia402 => {
+                matches!(statusword.state(), Some(OperationEnabled | QuickStopActive | FaultReactionActive))
+            }
+            Self::EchoesControlword { live, .. } => statusword.has(live),
+        }
+    }
+
     /// The power state that a statusword shows, or the one of CiA 402 that comes closest: an alarm is a fault only when
     /// it has taken the power off the motor, and a live motor that does not follow a host is switched on.
     pub const fn state(self, statusword: Statusword) -> Option<PowerState> {

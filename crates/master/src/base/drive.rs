@@ -424,7 +424,7 @@ impl Base {
         Ok(released?)
     }
 
-    /// Cycles until both drives show that they have no power, or the limit has passed.
+    /// Cycles until both drives show that they have no power.
     async fn switch_off(&mut self) -> Result<(), BaseError> {
         self.power = Power::Off;
         for cycle in 0..self.cycles(POWER_LIMIT) {
@@ -436,7 +436,9 @@ impl Base {
                 break;
             }
         }
-        Ok(())
+        let powered = self.wheels.iter().find(|wheel| wheel.shows.is_some_and(|shown| shown.is_live));
+        let node = powered.map(|wheel| wheel.drive.node());
+        node.map_or(Ok(()), |node| Err(NotAtRest::StillPowered { node, limit: POWER_LIMIT }.into()))
     }
 
     fn cycles(&self, time: Duration) -> u64 {

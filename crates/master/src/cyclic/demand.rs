@@ -145,6 +145,8 @@ pub struct CyclicState {
     pub statusword: Option<Statusword>,
     /// The power state that it shows; of a drive without the state machine, the one that comes closest.
     pub power: Option<PowerState>,
+    /// Its statusword shows that the power stage is on (CiA 402-2, figure 5).
+    pub is_live: bool,
     /// The drive has power and follows its set-points.
     pub follows: bool,
     /// Where the shaft is, if that is mapped.
@@ -160,15 +162,9 @@ pub struct CyclicState {
 }
 
 impl CyclicState {
-    /// True in the states in which the power stage is on (CiA 402-2, figure 5).
-    pub const fn has_power(&self) -> bool {
-        use PowerState::{FaultReactionActive, OperationEnabled, QuickStopActive};
-        matches!(self.power, Some(OperationEnabled | QuickStopActive | FaultReactionActive))
-    }
-
     /// True if the drive is heard, and shows that its power stage is off.
     pub const fn is_without_power(&self) -> bool {
-        self.statusword.is_some() && !self.has_power()
+        self.statusword.is_some() && !self.is_live
     }
 }
 

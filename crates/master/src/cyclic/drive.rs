@@ -264,6 +264,7 @@ impl CyclicDrive {
         CyclicState {
             statusword,
             power: statusword.and_then(|statusword| self.style.state(statusword)),
+            is_live: statusword.is_some_and(|statusword| self.style.is_live(statusword)),
             follows: false,
             position: self.position.and_then(|signal| io.read_fresh(signal, cycles)),
             velocity: self.velocity.and_then(|signal| io.read_fresh(signal, cycles)),

@@ -35,13 +35,24 @@ pub enum NotAtRest {
         /// The node.
         node: NodeId,
     },
+    /// Its power stage is on.
+    #[error(
+        "node {node} still has power, {limit:?} after it was to lose it: it holds its shaft, or another master commands it. `estop` stops it \
+         whatever commands it"
+    )]
+    StillPowered {
+        /// The node.
+        node: NodeId,
+        /// How long it was waited for.
+        limit: Duration,
+    },
 }
 
 impl NotAtRest {
     /// Which node it is about.
     pub const fn node(&self) -> NodeId {
         match self {
-            Self::StillTurns { node, .. } | Self::NotSeen { node } => *node,
+            Self::StillTurns { node, .. } | Self::NotSeen { node } | Self::StillPowered { node, .. } => *node,
         }
     }
 }

@@ -17,8 +17,8 @@ use crate::identify;
 use crate::network::{Network, Node, join_all};
 
 /// How many nodes are asked at once, and how long after them the next ones: 32 requests take 40 ms at 100 kbit/s.
-const WINDOW: usize = 32;
-const WINDOW_TIME: Duration = Duration::from_millis(40);
+pub(super) const WINDOW: usize = 32;
+pub(super) const WINDOW_TIME: Duration = Duration::from_millis(40);
 
 /// How far apart the axes of a device have their objects, and how many there may be (CiA 402-1: eight blocks of 800h).
 const AXIS_OFFSET: u16 = 0x800;

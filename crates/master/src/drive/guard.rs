@@ -9,12 +9,15 @@ use std::time::Duration;
 use canopen::heartbeat::Consumer;
 use canopen::od::DefaultValue;
 use canopen::{Mux, NodeId};
-use devices::HostWatch;
+use devices::{AxisId, HostWatch};
 
+use super::everything::{WINDOW, WINDOW_TIME};
 use super::handle::Drive;
 use crate::core::NodeSet;
 use crate::error::Error;
+use crate::gear::Gear;
 use crate::host_loss::{ArmedGuard, HostLoss};
+use crate::identify;
 use crate::network::{Network, Node, join_all};
 
 /// How often a drive that watches for silence or for a heartbeat is content within its time: two may get lost.
@@ -82,7 +85,7 @@ impl Drive {
     /// From here on the runner keeps the drive content: a drive that watches for silence is asked for its statusword when
     /// no other request is sent to it (whether process data count for it is not known of every drive), and for one that consumes a heartbeat this master produces it, under the node-ID that the
     /// drive watches. A drive that had lost its host, and would go on with an old motion at the first heartbeat, is stopped
-    /// before. Ends with [`release_guard`](Self::release_guard); a program that ends otherwise leaves it to the drive
+    /// before: this one, and any other on the bus that watches the same node-ID, whoever had set it in motion. Ends with [`release_guard`](Self::release_guard); a program that ends otherwise leaves it to the drive
     /// to stop.
     ///
     /// One request whose answer is waited for longer than the drive's time leaves it without a frame: timeouts should be
@@ -115,6 +118,11 @@ impl Drive {
         }
         let loss = self.loss(armed);
         let Some(time) = loss.stops_after() else { return Ok(loss) };
+        if let HostLoss::StopsWithoutHeartbeat { host, .. } = loss
+            && !network.sends_heartbeat(host)
+        {
+            network.stop_what_would_go_on(id, host).await?;
+        }
         let guard = ArmedGuard { loss, period: (time / SIGNS_IN_TIME).max(SHORTEST_PERIOD), before, armed };
         // Noted before anything changes on the drive: whatever fails from here on, a release puts it back.
         network.with_guards(|guards| guards.insert(id, guard));
@@ -217,6 +225,39 @@ impl Network {
         released.into_iter().collect()
     }
 
+    /// Stops, on all nodes but `own`, what the first heartbeat of `host` would set going again: a drive that has stopped for want of it
+    /// goes on with its last command then, and the program that gave it may be dead. A node that does not answer is passed over: most
+    /// node-IDs are of none.
+    async fn stop_what_would_go_on(&self, own: NodeId, host: NodeId) -> Result<(), Error> {
+        let others = NodeId::all().filter(|node| *node != own).collect::<Vec<_>>();
+        let windows = others.chunks(WINDOW).enumerate();
+        let looks = windows.flat_map(|(number, window)| window.iter().map(move |node| (*node, number as u32)));
+        let looks = looks.map(|(id, number)| async move {
+            if number > 0 {
+                self.sleep(WINDOW_TIME * number).await;
+            }
+            self.stop_if_it_would_go_on(&self.node(id).with_timeout(BYSTANDER_TIMEOUT), host).await
+        });
+        join_all(looks.collect::<Vec<_>>()).await.into_iter().collect()
+    }
+
+    async fn stop_if_it_would_go_on(&self, node: &Node, host: NodeId) -> Result<(), Error> {
+        let consumer = node.read::<u32>(Mux::new(HEARTBEAT_CONSUMERS, 1)).await.ok().and_then(Consumer::from_raw);
+        if consumer.is_none_or(|consumer| consumer.node() != host) {
+            return Ok(());
+        }
+        let node = self.node(node.id());
+        let Some(description) = identify::knowledge(&node).await?.description() else { return Ok(()) };
+        for axis in (0..).zip(description.axes).map(|(number, _)| AxisId(number)) {
+            let description = Some(description);
+            let drive = Drive { node: node.clone(), axis, description, guess: None, gear: Gear::DIRECT };
+            if drive.has_lost_its_host().await? {
+                drive.stop().await?;
+            }
+        }
+        Ok(())
+    }
+
     /// Leaves a guarded drive to its watch: it gets no more signs of life.
     fn forsake(&self, node: NodeId) {
         match self.with_guards(|guards| guards.remove(&node)).map(|guard| guard.loss) {
@@ -306,6 +347,13 @@ impl Network {
             HostLoss::StopsWithoutHeartbeat { host, .. } => drop(self.send_heartbeat(host)),
             _ => {}
         }
+    }
+
+    /// Whether guarded drives have this program send the heartbeat of `host`.
+    fn sends_heartbeat(&self, host: NodeId) -> bool {
+        let is_of_host =
+            |guard: &ArmedGuard| matches!(guard.loss, HostLoss::StopsWithoutHeartbeat { host: own, .. } if own == host);
+        self.with_guards(|guards| guards.values().any(is_of_host))
     }
 
     /// Sends the heartbeat that guarded drives watch as often as they need it, or no longer; true if there are such drives.

@@ -282,7 +282,7 @@ impl Group {
         }
     }
 
-    /// Cycles until every drive shows that it has no power, or the limit has passed.
+    /// Cycles until every drive shows that it has no power.
     async fn switch_off(&mut self) -> Result<(), GroupError> {
         self.runner.activity = Activity::Off;
         for cycle in 0..self.cycles(POWER_LIMIT) {
@@ -294,7 +294,9 @@ impl Group {
                 break;
             }
         }
-        Ok(())
+        let mut states = self.runner.axes.iter().zip(&self.runner.states);
+        let powered = states.find(|(_, state)| state.is_live).map(|(axis, _)| axis.drive.node());
+        powered.map_or(Ok(()), |node| Err(NotAtRest::StillPowered { node, limit: POWER_LIMIT }.into()))
     }
 
     /// [`disable`](Self::disable), and ends what the group began: SYNC, and the guards of the drives that were seen to stand

@@ -60,6 +60,7 @@ pub(super) struct GroupRunner {
 const UNSEEN: CyclicState = CyclicState {
     statusword: None,
     power: None,
+    is_live: false,
     follows: false,
     position: None,
     velocity: None,
@@ -275,12 +276,13 @@ impl GroupRunner {
     }
 
     /// True once the quick stop has ended at all drives: they have no power, or are held where they came to rest
-    /// (605Ah of 5 to 8: target reached, CiA 402-2, 8.4.2).
+    /// (605Ah of 5 to 8: target reached, CiA 402-2, 8.4.2; one without the state machine has power and no longer follows).
     pub(super) fn has_quick_stopped(&self) -> bool {
         self.states.iter().all(|state| {
             let held = state.power == Some(PowerState::QuickStopActive)
                 && state.statusword.is_some_and(|word| word.has(Statusword::TARGET_REACHED));
-            held || state.is_without_power()
+            let holds = state.is_live && state.power == Some(PowerState::SwitchedOn);
+            held || holds || state.is_without_power()
         })
     }
 

@@ -89,6 +89,27 @@ fn turns(values: &[f64]) -> Vec<Turns> {
     values.iter().map(|value| Turns(*value)).collect()
 }
 
+/// The M joint has no power state machine: its statusword shows by bit 4 whether its motor has power (M joint manual, 5.04).
+#[test]
+fn joints_have_lost_their_power_once_their_group_is_closed() {
+    let joint = devices::model("m4230e17b50").unwrap();
+    let mut bench = Bench::new(&[(joint, IP); 6]);
+    for setup in &mut bench.setups {
+        setup.limits.following_error_turns = 0.2;
+    }
+    let open = Group::open(&bench.setups, 2 * MS, CyclicOptions::default());
+    let mut group = block_on(&mut bench.world, open).unwrap().unwrap();
+    block_on(&mut bench.world, group.enable()).unwrap().unwrap();
+    let live = |bench: &mut Bench, id| bench.world.report(id).unwrap().statusword.unwrap() & 1 << 4 != 0;
+    assert!((1..=6).all(|id| live(&mut bench, id)));
+    let to: Vec<_> = places(&group).iter().map(|from| from + 0.2).collect();
+    block_on(&mut bench.world, group.move_to(&turns(&to), None)).unwrap().unwrap();
+    block_on(&mut bench.world, group.close()).unwrap().unwrap();
+    for id in 1..=6 {
+        assert!(!live(&mut bench, id), "node {id}");
+    }
+}
+
 /// Where the drives say that they are.
 fn places(group: &Group) -> Vec<f64> {
     group.axes().iter().map(|state| state.position.unwrap().0).collect()

@@ -121,6 +121,11 @@ impl Bench {
         speed > 30.0
     }
 
+    /// Whether it shows an alarm, where no program is there to ask it.
+    fn alarm_shown(&mut self, id: u8) -> bool {
+        self.world.report(id).unwrap().error_code != 0
+    }
+
     fn alarm(&mut self, id: u8) -> i64 {
         let drive = self.network.node(node(id));
         i64::from(self.run(drive.read::<u16>(mux(0x260E, 0))).unwrap())
@@ -307,6 +312,24 @@ fn the_motion_of_a_dead_program_does_not_come_back_with_the_next_one() {
     assert_eq!((bench.alarm(JOINT), bench.turns(JOINT)), (0, false));
     bench.turn(JOINT);
     assert!(bench.turns(JOINT));
+}
+
+/// The other joint watches the same node-ID as the one that is moved next, and is not heard before the first heartbeat.
+#[test]
+fn the_motion_of_a_dead_program_does_not_come_back_when_another_drive_is_moved() {
+    let mut bench = Bench::new();
+    bench.guard(JOINT);
+    bench.turn(JOINT);
+    bench.kill();
+    bench.wait(3000);
+    assert_eq!((bench.turns(JOINT), bench.alarm_shown(JOINT)), (false, true));
+    bench.start_another();
+    bench.guard(OTHER_JOINT);
+    bench.turn(OTHER_JOINT);
+    for _ in 0..30 {
+        bench.wait(100);
+        assert!(!bench.turns(JOINT) && bench.turns(OTHER_JOINT));
+    }
 }
 
 #[test]
