@@ -221,7 +221,8 @@ test("a tab that is closed, and one that takes leave, stop what they moved", asy
   await found();
   await turn();
   await run("location.reload(); return true").catch(() => {});
-  await stops();
+  // By the page; where the browser ends its worker before that has sent the stop, by its own watch.
+  await stands(4);
   await found();
   await turn();
   await run("document.getElementById('serial-leave').click(); return true");
