@@ -10,6 +10,7 @@ use transport::BusSpec;
 
 use crate::failure::Failure;
 use crate::recording::{LogPath, log_path};
+use crate::signals::Signal;
 use console::numbers::whole;
 use machine::file::Machine;
 use words::drive::node_model;
@@ -95,11 +96,19 @@ pub(crate) struct Global {
 
     /// A bus in virtual time that outlives the command, whatever `--bus` says: that of a program which gives several.
     #[arg(skip)]
-    pub(crate) shared: Option<Arc<Mutex<World>>>,
+    pub(crate) shared: Option<SharedBus>,
 
     /// Where the machine file is, and whether the command line names it.
     #[arg(skip)]
     pub(crate) machine_file: Option<MachineFile>,
+}
+
+/// A bus in virtual time on which several commands are given, one after the other.
+#[derive(Clone)]
+pub(crate) struct SharedBus {
+    pub(crate) world: Arc<Mutex<World>>,
+    /// What asks the command to end, each so long after it began.
+    pub(crate) signals: Vec<(Duration, Signal)>,
 }
 
 /// Where the machine file of `--machine` or of the environment is.

@@ -21,10 +21,10 @@ use crate::failure::Failure;
 use crate::frames::decoder;
 use crate::frames::stamp::Stamps;
 use crate::frames::tap::Traffic;
-use crate::global::Global;
+use crate::global::{Global, SharedBus};
 use crate::progress::Progress;
 use crate::recording::{LogPath, interface_of};
-use crate::signals::{Signals, asked_to_end};
+use crate::signals::{EndSignals, Signals, SignalsAt, asked_to_end};
 use crate::wire;
 use machine::file::Machine;
 use serve::live::{LiveBus, LostBus};
@@ -39,8 +39,8 @@ const PARTING: Duration = Duration::from_millis(10);
 
 /// Runs `command` on the bus of the command line.
 pub(crate) fn run<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
-    if let Some(world) = &global.shared {
-        return shared_bus(global, &mut world.lock().unwrap_or_else(PoisonError::into_inner), command);
+    if let Some(shared) = &global.shared {
+        return shared_bus(global, shared, command);
     }
     match &global.bus {
         BusSpec::Sim { file } => virtual_bus(global, file.as_deref(), command),
@@ -105,20 +105,19 @@ fn virtual_bus<R>(
 }
 
 /// On a bus that goes on without the command, as on a real one: its drives are not known, and what moves is stopped where the
-/// command fails.
+/// command fails or is asked to end.
 fn shared_bus<R>(
     global: &Global,
-    world: &mut World,
+    shared: &SharedBus,
     command: impl AsyncFnOnce(&Context) -> Result<R, Failure>,
 ) -> Result<R, Failure> {
-    in_virtual_time(global, world, None, async |context| {
+    let mut world = shared.world.lock().unwrap_or_else(PoisonError::into_inner);
+    in_virtual_time(global, &mut world, None, async |context| {
         if global.verbose {
             context.traffic.show(decoder(global, &[]), Stamps::default(), context.progress.clone());
         }
-        let ended = match command(context).await {
-            Ok(done) => Ok(done),
-            Err(failure) => Err(stop_what_moves(context, failure, std::future::pending()).await),
-        };
+        let signals = SignalsAt::from_now(context.network.clone(), &shared.signals);
+        let ended = until_asked_to_end(context, command(context), signals).await;
         context.note_twins();
         ended
     })
@@ -195,22 +194,16 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     }
     let notes = RefCell::new(BusNotes::of(&global.bus));
     let until = async {
-        let mut signals = Signals::listen();
-        let (failure, by_signal) = tokio::select! {
-            result = async {
-                embedded::wait_until_booted(&context.network, embedded.as_deref().unwrap_or_default()).await?;
-                command(&context).await
-            } => match result {
-                Ok(done) => return Ok(done),
-                Err(failure) => (failure, false),
-            },
-            signal = signals.next() => (crate::failure::ended_by(signal), true),
+        let booted_first = async {
+            embedded::wait_until_booted(&context.network, embedded.as_deref().unwrap_or_default()).await?;
+            command(&context).await
         };
-        let failure = stop_what_moves(&context, failure, asked_again(&context, signals, by_signal)).await;
-        let notes = notes.borrow();
-        // People have read them when they came; programs have only the final report.
-        let failure = notes.troubles().filter(|_| global.json).fold(failure, Failure::because);
-        Err(notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost))))
+        until_asked_to_end(&context, booted_first, Signals::listen()).await.map_err(|failure| {
+            let notes = notes.borrow();
+            // People have read them when they came; programs have only the final report.
+            let failure = notes.troubles().filter(|_| global.json).fold(failure, Failure::because);
+            notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost)))
+        })
     };
     let station = Tap::new(Tap::new(network.clone(), traffic), log);
     let report = |_, note: &Note| {
@@ -272,13 +265,29 @@ pub(crate) fn exit_on_signal() {
     });
 }
 
+/// Carries out a command to its end, or until a signal comes; what it then has in motion is stopped.
+async fn until_asked_to_end<R>(
+    context: &Context,
+    command: impl Future<Output = Result<R, Failure>>,
+    mut signals: impl EndSignals,
+) -> Result<R, Failure> {
+    let (failure, by_signal) = tokio::select! {
+        result = command => match result {
+            Ok(done) => return Ok(done),
+            Err(failure) => (failure, false),
+        },
+        signal = signals.next() => (crate::failure::ended_by(signal), true),
+    };
+    Err(stop_what_moves(context, failure, asked_again(context, signals, by_signal)).await)
+}
+
 /// What a terminal and the programs about this one send within this time is one wish to end: a shell, `make` and the like pass
 /// Ctrl-C on to a process that has had it already. By then the quick stops are out.
 const ONE_WISH: Duration = Duration::from_millis(250);
 
 /// Until a second signal comes that is a wish of its own. Where the command has failed by itself, the first one asks for no more than
 /// what is being done: its sender may not have seen the failure.
-async fn asked_again(context: &Context, mut signals: Signals, has_one: bool) {
+async fn asked_again(context: &Context, mut signals: impl EndSignals, has_one: bool) {
     if !has_one {
         signals.next().await;
     }

@@ -3,10 +3,15 @@
 //! One function waits for all of them, so that no command forgets one. Each ends the process with the status that shells
 //! give it: 128 and its number. SIGKILL cannot be handled; the drives then act by themselves (`--guard`).
 
+use std::collections::VecDeque;
 #[cfg(unix)]
 use std::future::poll_fn;
 #[cfg(unix)]
 use std::task::Poll;
+use std::time::Duration;
+
+use can::Instant;
+use master::Network;
 
 use console::status::Status;
 
@@ -50,6 +55,35 @@ pub(crate) async fn asked_to_end() -> Signal {
     Signals::listen().next().await
 }
 
+/// Where signals that ask a command to end come from.
+pub(crate) trait EndSignals {
+    /// Completes with the next one. Nothing is lost if it is dropped before.
+    async fn next(&mut self) -> Signal;
+}
+
+/// Signals at times of a bus in virtual time.
+pub(crate) struct SignalsAt {
+    network: Network,
+    coming: VecDeque<(Instant, Signal)>,
+}
+
+impl SignalsAt {
+    /// Each so long after now; in this order.
+    pub(crate) fn from_now(network: Network, signals: &[(Duration, Signal)]) -> Self {
+        let now = network.now();
+        Self { network, coming: signals.iter().map(|(after, signal)| (now + *after, *signal)).collect() }
+    }
+}
+
+impl EndSignals for SignalsAt {
+    async fn next(&mut self) -> Signal {
+        let Some((at, signal)) = self.coming.front().copied() else { return std::future::pending().await };
+        self.network.sleep(at - self.network.now()).await;
+        self.coming.pop_front();
+        signal
+    }
+}
+
 /// The signals that ask this process to end. From [`listen`](Self::listen) on none of them ends it by itself, which is the
 /// system's default until then. Needs a runtime about it.
 #[cfg(unix)]
@@ -71,9 +105,11 @@ impl Signals {
         let wanted = all.into_iter().filter(|(asked, _)| *asked != Signal::HangUp || !hang_up_is_ignored());
         Self { streams: wanted.filter_map(|(asked, kind)| Some((asked, signal(kind).ok()?))).collect() }
     }
+}
 
-    /// Completes with the next one. Nothing is lost if it is dropped before.
-    pub(crate) async fn next(&mut self) -> Signal {
+#[cfg(unix)]
+impl EndSignals for Signals {
+    async fn next(&mut self) -> Signal {
         poll_fn(|context| {
             let mut streams = self.streams.iter_mut();
             let heard = streams.find_map(|(signal, stream)| stream.poll_recv(context).is_ready().then_some(*signal));
@@ -104,9 +140,11 @@ impl Signals {
     pub(crate) fn listen() -> Self {
         Self
     }
+}
 
-    /// Completes with the next one.
-    pub(crate) async fn next(&mut self) -> Signal {
+#[cfg(not(unix))]
+impl EndSignals for Signals {
+    async fn next(&mut self) -> Signal {
         if tokio::signal::ctrl_c().await.is_err() {
             std::future::pending::<()>().await;
         }

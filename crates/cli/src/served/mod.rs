@@ -15,7 +15,7 @@ pub(crate) use control_options::ControlOptions;
 
 use crate::failure::Failure;
 use crate::session::{no_runtime, runtime};
-use crate::signals::Signals;
+use crate::signals::{EndSignals, Signals};
 
 /// What is asked of a served world, and why it ends.
 pub(crate) type Asked = Request<Failure>;

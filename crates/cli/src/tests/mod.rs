@@ -5,6 +5,7 @@ mod console;
 mod estop;
 mod guards;
 mod images;
+mod interrupted;
 mod latency;
 mod limits;
 mod looks;

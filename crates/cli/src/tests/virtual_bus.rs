@@ -10,8 +10,10 @@ use serde_json::Value;
 use sim::{Place, Report, World};
 
 use crate::args::Cli;
+use crate::global::SharedBus;
 use crate::output::{Format, kept};
 use crate::scope::{self, command_line};
+use crate::signals::Signal;
 use crate::{Typed, complaint, run};
 use machine::file::{Machine, Placed};
 use plot::Paint;
@@ -78,8 +80,15 @@ impl VirtualBus {
     /// Gives a command line, and waits for its end.
     #[track_caller]
     pub(super) fn run(&self, words: &[&str]) -> Ended {
+        self.run_until(words, &[])
+    }
+
+    /// Gives a command line that these signals ask to end, each so long after it began.
+    #[track_caller]
+    pub(super) fn run_until(&self, words: &[&str], signals: &[(Duration, Signal)]) -> Ended {
         let before = ["--bus", BUS].into_iter().chain(self.options.iter().map(String::as_str));
-        ended(before.chain(words.iter().copied()), Some(Arc::clone(&self.world)))
+        let shared = SharedBus { world: Arc::clone(&self.world), signals: signals.to_vec() };
+        ended(before.chain(words.iter().copied()), Some(shared))
     }
 
     /// Gives a command line that has to succeed.
@@ -113,7 +122,7 @@ pub(super) fn without_bus(words: &[&str]) -> Ended {
 }
 
 /// What `main` does with the words of a command line.
-fn ended<'a>(words: impl Iterator<Item = &'a str>, shared: Option<Arc<Mutex<World>>>) -> Ended {
+fn ended<'a>(words: impl Iterator<Item = &'a str>, shared: Option<SharedBus>) -> Ended {
     let matches = match command_line().try_get_matches_from(std::iter::once("ferrodrive").chain(words)) {
         Ok(matches) => matches,
         Err(error) => {

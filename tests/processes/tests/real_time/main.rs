@@ -6,7 +6,6 @@ mod group;
 mod handbook;
 mod interrupted;
 mod killed;
-mod logs;
 mod modbus;
 mod params;
 mod realtime;

@@ -1,9 +1,10 @@
-//! `--record` and `plot`: what is written while drives are served, and what is left of it when the simulator dies.
+//! `--log`, `--record` and `plot`: what is written while drives are served, and what is left of it when the simulator dies.
 
 use std::path::Path;
 
-use processes::{Simulator, done, scratch, wait_for};
+use processes::{Simulator, done, ferrodrive, scratch, wait_for, wait_until};
 use recording::{Kind, Recorded, read};
+use serde_json::Value;
 
 fn recorded(path: &Path) -> Recorded {
     let kind = Kind::of_name(path.to_str().unwrap()).unwrap();
@@ -21,20 +22,39 @@ fn simulator(record: &Path, more: &[&str]) -> Simulator {
     Simulator::start_heard(&[&drives[..], more].concat())
 }
 
+/// The frames of a log as `decode` prints them.
+fn frames(log: &str) -> Vec<String> {
+    let ended = done(&["--json", "decode", log]);
+    let lines = ended.out.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+    lines.map(|line| line["frame"].as_str().expect("a frame").to_owned()).collect()
+}
+
+/// In every form of each.
 #[test]
-fn what_is_on_the_disk_of_a_killed_simulator_is_a_record() {
+fn what_is_on_the_disk_of_a_killed_simulator_is_a_log_and_a_record() {
     let place = scratch("killed-record");
-    for name in ["run.mcap", "run.csv"] {
-        let path = place.join(name);
-        let mut simulator = simulator(&path, &["--record-period", "5ms", "--record-signals", "supply,4.position*"]);
+    for (log, record) in [("log", "mcap"), ("asc", "csv"), ("blf", "mcap"), ("pcapng", "csv")] {
+        let (log, path) = (place.path(&format!("sim.{log}")), place.join(format!("of_{log}.{record}")));
+        let signals = ["--record-period", "5ms", "--record-signals", "supply,4.position*"];
+        let mut simulator = simulator(&path, &[&signals[..], &["--log", &log]].concat());
+        done(&["--bus", &simulator.bus("socketcand"), "--model", "4=zlac8030l", "read", "4", "1018:01"]);
         let before = wait_for("half a second of a record", || {
-            let found = std::fs::read(&path).ok().and_then(|bytes| read(Kind::of_name(name)?, &bytes).ok());
+            let found = std::fs::read(&path).ok().and_then(|bytes| read(Kind::of_name(path.to_str()?)?, &bytes).ok());
             let at = found.map(|recorded| last(&recorded));
-            at.filter(|at| *at > 0.5).ok_or_else(|| format!("{name}: {at:?}"))
+            at.filter(|at| *at > 0.5).ok_or_else(|| format!("{record}: {at:?}"))
+        });
+        // It need not be whole yet.
+        wait_until("the answer is on the disk", || {
+            ferrodrive(&["--json", "decode", &log]).out.contains("584#43181001")
         });
         simulator.kill();
+        // Boot-up, request and answer.
+        let frames = frames(&log);
+        for part in ["704#00", "604#4018100100000000", "584#43181001"] {
+            assert!(frames.iter().any(|frame| frame.starts_with(part)), "{log}: {part} in {frames:?}");
+        }
         let left = recorded(&path);
-        assert!(last(&left) >= before && left.series.len() == 3, "{name}: {} of {before}", last(&left));
+        assert!(last(&left) >= before && left.series.len() == 3, "{record}: {} of {before}", last(&left));
         // And it can be drawn.
         let svg = place.join("run.svg");
         let drawn = done(&["plot", path.to_str().unwrap(), "--signals", "supply", "--svg", svg.to_str().unwrap()]);
