@@ -221,74 +221,9 @@ mod tests {
     use clap::FromArgMatches;
 
     use super::*;
+    use crate::tests::lines::{OF_A_MACHINE, OTHERS};
 
     const REAL_BUS: &str = "socketcand://127.0.0.1:1/can0";
-
-    /// A line of each command that the parser takes, on a bus where every option may have an effect.
-    const LINES: &[&str] = &[
-        "boot m.toml",
-        "capture 4 velocity",
-        "check m.toml",
-        "completions bash",
-        "conform 4",
-        "convert a.log b.asc",
-        "dcf 4",
-        "decode a.log",
-        "demo",
-        "disable 4",
-        "drive-base m.toml",
-        "dump",
-        "eds zlac8030l",
-        "emcy watch",
-        "enable 4",
-        "estop",
-        "events --control 127.0.0.1:1",
-        "explain 4",
-        "export dbc",
-        "fmu zlac8030l@4 -o wheel.fmu",
-        "gateway",
-        "group move 4=90deg",
-        "home 4 --method 17",
-        "init",
-        "latency",
-        "lss scan",
-        "man-pages pages",
-        "move 4 90deg",
-        "nmt 4 start",
-        "objects 4",
-        "params backup 4",
-        "pdo show 4",
-        "plan",
-        "plot a.csv",
-        "quick-stop 4",
-        "read 4 6064",
-        "readings zlac8030l",
-        "record 4 6064 -o a.csv",
-        "replay a.log",
-        "reset 4",
-        "report 4 -o a.html",
-        "restore 4",
-        "program 4 firmware.bin",
-        "run a.toml",
-        "save 4",
-        "scan",
-        "send 000#0104",
-        "sim --drive zlac8030l@4",
-        "state 4",
-        "stop 4",
-        "studio",
-        "supervise m.toml",
-        "sync",
-        "test-motion 4 steps",
-        "time",
-        "top",
-        "torque 4 1A",
-        "tune 4",
-        "velocity 4 60rpm",
-        "watch 4 6064",
-        "world --control 127.0.0.1:1 now",
-        "write 4 6060 3",
-    ];
 
     /// What is typed for each option that every command has, but for `--json`, which all heed.
     fn typed(option: &str) -> Vec<&'static str> {
@@ -333,7 +268,7 @@ mod tests {
         let mut parser = command_line();
         for its in built.get_subcommands().filter(|its| !["help", help::OPTIONS].contains(&its.get_name())) {
             let name = its.get_name();
-            let line = LINES.iter().find(|line| line.split(' ').next() == Some(name));
+            let line = OF_A_MACHINE.iter().chain(OTHERS).find(|line| line.split(' ').next() == Some(name));
             let line = line.unwrap_or_else(|| panic!("a line of {name} is missing here"));
             let words: Vec<_> = line.split(' ').collect();
             let shows = |option: &str| {

@@ -8,6 +8,7 @@ mod images;
 mod interrupted;
 mod latency;
 mod limits;
+pub(crate) mod lines;
 mod looks;
 mod lss;
 mod machines;

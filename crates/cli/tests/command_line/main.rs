@@ -14,6 +14,8 @@ mod init;
 mod json;
 mod latency;
 mod limits;
+#[path = "../../src/tests/lines.rs"]
+mod lines;
 mod logs;
 mod machine;
 mod on_sim;

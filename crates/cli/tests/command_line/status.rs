@@ -4,6 +4,8 @@
 use processes::{done, ferrodrive, scratch};
 use serde_json::Value;
 
+use super::lines::OF_A_MACHINE;
+
 /// Ends with `status` and one line of JSON that says why and what to do; its error.
 #[track_caller]
 fn failed(arguments: &[&str], status: i32) -> Value {
@@ -27,62 +29,6 @@ fn commands() -> Vec<String> {
     names.filter(|name| *name != "help").map(ToOwned::to_owned).collect()
 }
 
-/// A line of each command that takes a machine file.
-const LINES: &[&str] = &[
-    "boot",
-    "capture 4 velocity -o a.mcap",
-    "check",
-    "conform 4",
-    "dcf 4",
-    "decode a.log",
-    "disable 4",
-    "drive-base",
-    "dump",
-    "emcy watch",
-    "enable 4",
-    "estop",
-    "explain 4",
-    "export dbc",
-    "gateway",
-    "group move 4=90deg",
-    "home 4 --method 17",
-    "init",
-    "latency",
-    "lss scan",
-    "move 4 90deg",
-    "nmt 4 start",
-    "objects 4",
-    "params backup 4",
-    "pdo show 4",
-    "plan",
-    "plot a.log",
-    "program 4 a.bin",
-    "quick-stop 4",
-    "read 4 6064",
-    "record 4 6064 -o a.csv",
-    "replay a.log",
-    "report 4 -o a.html",
-    "reset 4",
-    "restore 4",
-    "save 4",
-    "scan",
-    "send 000#0104",
-    "sim",
-    "state 4",
-    "stop 4",
-    "studio",
-    "supervise",
-    "sync",
-    "test-motion 4 steps",
-    "time",
-    "top",
-    "torque 4 1A",
-    "tune 4",
-    "velocity 4 60rpm",
-    "watch 4 6064",
-    "write 4 6060 3",
-];
-
 #[test]
 fn an_option_that_is_not_there_is_a_2_of_every_command() {
     let commands = commands();
@@ -99,7 +45,7 @@ fn a_machine_file_that_is_missing_or_bad_is_a_1_of_every_command_that_takes_one(
     std::fs::write(&bad, "[[drive]]\nmodel = 'toaster'\nnode = 4\n").unwrap();
     for name in commands() {
         let takes_one = done(&[&name, "-h"]).out.contains(" --machine");
-        let line = LINES.iter().find(|line| line.split(' ').next() == Some(&name));
+        let line = OF_A_MACHINE.iter().find(|line| line.split(' ').next() == Some(&name));
         assert_eq!(takes_one, line.is_some(), "{name}");
         let Some(line) = line else { continue };
         for file in ["/no/such/machine.toml", bad.to_str().unwrap()] {
