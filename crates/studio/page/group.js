@@ -5,10 +5,7 @@ import { ask, inControl, link } from "./link.js";
 import { choice } from "./choice.js";
 import { h, number, renew, setText, toggle } from "./dom.js";
 import { guarding } from "./guarding.js";
-import { motionForm } from "./motion_form.js";
-
-// Three within the 200 ms after which the studio stops what is not held.
-const HOLD_MS = 60;
+import { HOLD_MS, heldButtons, motionForm } from "./motion_form.js";
 
 /** Hold to run, for a group: begins with `make`, goes on with `hold`, ends with `group_end`. */
 function holder(report) {
@@ -43,21 +40,7 @@ function holder(report) {
     if (drop()) ask({ do: "group_end" });
   }
 
-  function button(id, text, title, begun) {
-    const element = h("button", { type: "button", class: "jog", id, title }, text);
-    element.addEventListener("pointerdown", (event) => {
-      element.setPointerCapture(event.pointerId);
-      begun();
-    });
-    for (const gone of ["pointerup", "pointercancel", "lostpointercapture"]) element.addEventListener(gone, end);
-    element.addEventListener("contextmenu", (event) => event.preventDefault());
-    return element;
-  }
-
-  addEventListener("blur", end);
-  addEventListener("pagehide", end);
-  document.addEventListener("visibilitychange", () => document.hidden && end());
-  return { begin, end, button };
+  return { begin, end, button: heldButtons(end) };
 }
 
 const input = (id, value, extra = {}) => h("input", { id, type: "number", step: "any", value, inputmode: "decimal", ...extra });
@@ -118,7 +101,7 @@ export function groupMotion(report) {
     return at && isAccepted(at.map(({ node }) => node)) && { do: "group_jog", axes: at.map(({ node, rpm }) => ({ node, rpm: sign * rpm })), rpm_per_s: read(ramp) };
   };
   const hold = () => ({ do: "group_hold" });
-  const spin = (id, text, sign, title) => held.button(id, text, title, () => held.begin("Group", turn(sign), hold));
+  const spin = (id, text, sign, title) => held.button({ id, title }, text, () => held.begin("Group", turn(sign), hold));
 
   // The base: which drives are its wheels, how it is built, and how fast.
   const [left, right] = [choice("base-left", "Left wheel"), choice("base-right", "Right wheel")];
@@ -138,7 +121,7 @@ export function groupMotion(report) {
     const begin = () => ({ do: "base_jog", wheels, turns: [read(turns_left) ?? 1, read(turns_right) ?? -1], wheel_base_m: read(base_m) ?? 0, wheel_radius_m: read(radius_m) ?? 0, most_m_s: read(most) ?? 0, m_per_s2: read(ramp_m) ?? 0, ...wanted });
     held.begin("Base", begin, () => ({ do: "base_twist", ...wanted }));
   };
-  const go = (id, text, title, forward, round) => held.button(id, text, title, drive(forward, round));
+  const go = (id, text, title, forward, round) => held.button({ id, title }, text, drive(forward, round));
 
   const fields = h(
     "div",

@@ -8,13 +8,10 @@ import { guarding } from "./guarding.js";
 import { speedLimit } from "./limit.js";
 import { homingWizard } from "./homing.js";
 import { series } from "./kept.js";
-import { motionForm } from "./motion_form.js";
+import { HOLD_MS, heldButtons, motionForm } from "./motion_form.js";
 import { sequencePanel } from "./sequence_panel.js";
 import { isSeenMoving } from "./sight.js";
 import { host_name } from "./transport.js";
-
-// Three within the 200 ms after which the studio stops what is not held.
-const HOLD_MS = 60;
 
 /** Hold to run: turns while held, stops when released in any way. */
 function jogger(shared, speed, report, isAccepted) {
@@ -48,20 +45,8 @@ function jogger(shared, speed, report, isAccepted) {
     ask({ do: "jog_end", node });
   }
 
-  function button(text, direction, title) {
-    const element = h("button", { type: "button", class: "jog", title }, text);
-    element.addEventListener("pointerdown", (event) => {
-      element.setPointerCapture(event.pointerId);
-      begin(direction);
-    });
-    for (const gone of ["pointerup", "pointercancel", "lostpointercapture"]) element.addEventListener(gone, end);
-    element.addEventListener("contextmenu", (event) => event.preventDefault());
-    return element;
-  }
-
-  addEventListener("blur", end);
-  addEventListener("pagehide", end);
-  document.addEventListener("visibilitychange", () => document.hidden && end());
+  const heldButton = heldButtons(end);
+  const button = (text, direction, title) => heldButton({ title }, text, () => begin(direction));
   addEventListener("keyup", (event) => (event.key === "ArrowLeft" || event.key === "ArrowRight") && end());
   return { begin, end, button, isHeld: () => held !== null };
 }
