@@ -25,6 +25,7 @@ impl Bench {
     /// a write changes, where there is one.
     pub(crate) async fn set_up_tpdo(&mut self, transmission: u8, timer_ms: u16) -> Result<Tpdo, Finding> {
         let Some(index) = self.subject.pdos(0x1800).next() else { not_applicable!("the device has no transmit PDO") };
+        self.hush_sync().await?;
         let id = self.switch_off(index).await?;
         for (sub_index, value) in [(3, 0), (5, timer_ms)] {
             if self.subject.row(index, sub_index).is_some() {
@@ -51,6 +52,17 @@ impl Bench {
         self.switch_on(index, id).await?;
         self.watch(id);
         Ok(Tpdo { index, id, mapped })
+    }
+
+    /// The node produces no SYNC of its own (bit 30 of 1005h) until the case ends: those of the case are meant.
+    pub(crate) async fn hush_sync(&mut self) -> Result<(), Finding> {
+        let Some(row) = self.subject.row(0x1005, 0).filter(|row| row.access.is_writable()) else { return Ok(()) };
+        let cob = self.number(row.mux()).await? as u32;
+        if CobId(cob).generates() {
+            // A device that refuses goes on, and what it sends shows.
+            let _ = self.try_write(row.mux(), &(cob & !CobId::GENERATES).to_le_bytes()).await?;
+        }
+        Ok(())
     }
 
     /// Bit 31 of a PDO's COB-ID is set. The identifier that it had, or that it has by the predefined connection set.

@@ -56,6 +56,24 @@ pub(crate) fn with_fixed_mappings() -> &'static Description {
     described(rows)
 }
 
+/// The same, producing SYNC as delivered, each 10 ms.
+pub(crate) fn producing_sync() -> &'static Description {
+    let mut rows = ROWS.to_vec();
+    for row in &mut rows {
+        row.4 = match row.0 {
+            0x1005 => "0x40000080",
+            0x1006 => "10000",
+            _ => row.4,
+        };
+    }
+    described(rows)
+}
+
+/// The same without SYNC.
+pub(crate) fn without_sync() -> &'static Description {
+    described(ROWS.iter().filter(|row| !matches!(row.0, 0x1005 | 0x1006 | 0x1019)).copied().collect())
+}
+
 /// The same with a SYNC start value, the date of the configuration, and a second SDO server, off as delivered.
 pub(crate) fn extended() -> &'static Description {
     const FURTHER: &[Row] = &[

@@ -14,7 +14,7 @@ use devices::Description;
 use sim::Fidelity;
 
 use crate::bench::{drive_with, node, run, shown};
-use crate::complete::{complete, extended, with_fixed_mappings};
+use crate::complete::{complete, extended, producing_sync, with_fixed_mappings, without_sync};
 use causes::Cause;
 use station::{Kind, Wrong};
 
@@ -107,6 +107,27 @@ fn a_device_whose_file_has_its_mappings_as_read_only_passes() {
         let case = report.cases.iter().find(|case| case.id == id).unwrap();
         let fixed = format!("the file has {mapping}:00 as read only: its mapping is fixed");
         assert_eq!((case.result, &*case.why), (Outcome::NotApplicable, &*fixed), "{id}");
+    }
+}
+
+#[test]
+fn the_sync_of_a_node_that_produces_it_is_not_taken_for_that_of_a_case() {
+    let synchronous = ["PDO 06", "PDO 07", "PDO 12", "PDO 18", "PDO 55", "PDO 56", "PDO 58", "SYNC 03", "SYNC 51"];
+    let options = Options { only: synchronous.map(Into::into).to_vec(), ..without_drives() };
+    let report = report_of(producing_sync(), Kind::Right, options);
+    assert!(report.ok, "{:?}\n{}", report.not_restored, shown(&report, crate::bench::failed));
+    let passed: Vec<_> = report.cases.iter().filter(|case| case.result == Outcome::Pass).map(|case| case.id).collect();
+    assert_eq!(passed, synchronous);
+}
+
+#[test]
+fn nothing_synchronous_is_asked_of_a_device_without_1005h() {
+    let synchronous = ["PDO 06", "PDO 07", "PDO 55", "PDO 58"];
+    let options = Options { only: synchronous.map(Into::into).to_vec(), ..without_drives() };
+    let report = report_of(without_sync(), Kind::Right, options);
+    for case in report.cases.iter().filter(|case| synchronous.contains(&case.id)) {
+        let why = "the device has no object 1005h, and takes no SYNC";
+        assert_eq!((case.result, &*case.why), (Outcome::NotApplicable, why), "{}", case.id);
     }
 }
 
