@@ -141,6 +141,9 @@ async fn supported_modes(bench: &mut Bench) -> Verdict {
 async fn option_code(bench: &mut Bench, index: u16, reserved: i16) -> Verdict {
     let mux = bench.place(index);
     let Some(row) = bench.subject.description.row(mux) else { not_applicable!("the drive has no {mux}") };
+    if !row.access.is_writable() {
+        not_applicable!("the description has {mux} as read only");
+    }
     let mut taken = Vec::new();
     for (value, _) in row.values {
         let data = bytes_of(row.data_type, *value);
