@@ -115,6 +115,10 @@ impl Host {
     fn take_motion(&mut self, id: NodeId, command: drive::Command, asked: Asked) {
         use drive::Command;
         let stops = matches!(command, Command::Stop | Command::Disable);
+        // A test motion ends without power, whatever stops it.
+        if stops && self.is_tested(id) {
+            return self.quick_stop_one(id, "stopped", Some(asked));
+        }
         let Some((drive, asked)) = self.drive_to_move(id, stops, asked) else { return };
         if let Err(error) = check(&drive, &command) {
             let (seq, answer) = asked;
@@ -139,6 +143,9 @@ impl Host {
             }
             Some(_) if !stops && self.is_in_group(id) => {
                 ("busy", "it belongs to a group that is moving: stop the group first")
+            }
+            Some(_) if !stops && self.is_tested(id) => {
+                ("busy", "it makes a test motion: wait for its end, or stop it first")
             }
             Some(drive) => return Some((drive, (seq, answer))),
         };

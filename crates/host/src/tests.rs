@@ -9,6 +9,7 @@ mod parameters;
 mod pdo;
 mod series;
 mod speed_limit;
+mod test_motion;
 mod trace;
 mod world;
 

@@ -148,6 +148,11 @@ impl Running {
         (nodes.iter().map(one).collect(), future)
     }
 
+    /// A test motion: its own future answers, at the end of the way back.
+    pub(crate) const fn of_test_motion(generation: u64, what: &'static str, abort: AbortHandle) -> Self {
+        Self { generation, what, moves: true, abort, answer: None }
+    }
+
     /// Cancels it: it sends nothing further to the drive.
     pub(crate) fn cut_short(self, kind: &'static str, why: &str) {
         self.abort.abort();

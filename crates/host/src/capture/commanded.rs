@@ -15,11 +15,12 @@ use sim::recorder::{LiveValues, Signal};
 use words::counted;
 use words::failure::Failure;
 
-use super::measurand::{Measurand, TRUE};
+use super::measurand::{Measurand, TRUE, Way};
 use super::quantity::had;
 use super::run::{CaptureOutcome, CaptureRun};
 use super::{Captured, Running, SeenBy, Span, Taken, Wanted, WayBack, not_put_back, with_left};
 use crate::command::{CaptureCommand, CaptureOrder};
+use crate::motion::guarding::UNGUARDED;
 use crate::network::params::journal::default_path;
 use crate::network::report::{self, Made, NodeReport};
 use crate::parameters::transactions::Refusal;
@@ -45,9 +46,10 @@ impl Host {
                 Ok(work) => self.work.push(Box::pin(async move { Done::Captured(asked, Box::new(work.await)) })),
                 Err(refusal) => refuse(asked, refusal),
             },
-            CaptureCommand::EndCapture {} => match self.captures.get(&node) {
-                Some(run) => {
-                    run.ended.set(true);
+            CaptureCommand::TestMotion(order) => self.take_test_motion(node, order, asked),
+            CaptureCommand::EndCapture {} => match self.captures.get(&node).and_then(|run| run.ended.as_ref()) {
+                Some(ended) => {
+                    ended.set(true);
                     answer(asked, Ok(json!({ "node": node.raw() })));
                 }
                 None => refuse(asked, ("no_capture", format!("nothing is being captured of node {node}"))),
@@ -65,7 +67,7 @@ impl Host {
         Ok(json!({ "node": node.raw(), "quantities": names, "true_values": true_values }))
     }
 
-    fn true_values(&self) -> Option<&LiveValues> {
+    pub(crate) fn true_values(&self) -> Option<&LiveValues> {
         self.setting.world.as_ref()?.values()
     }
 
@@ -79,6 +81,7 @@ impl Host {
         if self.captures.contains_key(&node) {
             return Err(busy("it is being captured already"));
         }
+        self.check_no_test_motion()?;
         if self.parameters.is_writing(node) {
             return Err(busy("its parameters are being written"));
         }
@@ -87,34 +90,20 @@ impl Host {
             return Err(busy("it is storing its parameters"));
         }
         let span = span_of(&order)?;
-        let mut wanted = Wanted {
-            quantities: Vec::new(),
-            period: time("a time between two readings", order.period_ms, Duration::from_micros(50))?,
-            bitrate: self.setting.bitrate.unwrap_or(Bitrate::K500),
-            take: Vec::new(),
-            by_sdo: order.sdo,
-            // A virtual bus ends with the program, and nothing is left to go back to.
-            journal: self.setting.journals.is_some().then(|| default_path(node)),
-            on_kept: |_| (),
-        };
-        check_size(&order, &wanted, &span)?;
+        let mut wanted = self.wanted(node, order.period_ms, order.sdo)?;
+        check_size(order.quantities.len(), 1, &wanted, &span)?;
         let way_back = WayBack::in_network(&self.setting.ways_back);
         let restorer = way_back.of(&drive).clone();
         let (world, ended) = (self.true_values().cloned(), Rc::new(Cell::new(false)));
         let (flag, changes) = (Rc::clone(&ended), restorer.clone());
         let (capturing, abort) = abortable(async move {
-            for name in &order.quantities {
-                let measurand = Measurand::named(&drive, world.as_ref(), name).await?;
-                if !wanted.quantities.contains(&measurand) {
-                    wanted.quantities.push(measurand);
-                }
-            }
+            wanted.quantities = measurands(&drive, world.as_ref(), &order.quantities).await?;
             wanted.check(&span)?;
             let mut running = wanted.begin(&drive, &changes).await?;
             let taken = running.next_until(&span, || flag.get()).await?;
             Ok((running, taken))
         });
-        self.captures.insert(node, CaptureRun { ended, abort });
+        self.captures.insert(node, CaptureRun { ended: Some(ended), abort });
         Ok(async move {
             let captured: Result<Result<(Running, Taken), Failure>, Aborted> = capturing.await;
             let left = restorer.restore().await;
@@ -126,28 +115,46 @@ impl Host {
                     Err(refusal(&with_left(gone.of_kind("stopped"), &left)))
                 }
             };
-            CaptureOutcome { node, outcome }
+            CaptureOutcome { node, generation: None, outcome }
+        })
+    }
+
+    /// What is to be captured of a node, without its quantities.
+    pub(crate) fn wanted(&self, node: NodeId, period_ms: f64, by_sdo: bool) -> Result<Wanted, Refusal> {
+        Ok(Wanted {
+            quantities: Vec::new(),
+            period: time("a time between two readings", period_ms, Duration::from_micros(50))?,
+            bitrate: self.setting.bitrate.unwrap_or(Bitrate::K500),
+            take: Vec::new(),
+            by_sdo,
+            // A virtual bus ends with the program, and nothing is left to go back to.
+            journal: self.setting.journals.is_some().then(|| default_path(node)),
+            on_kept: |_| (),
         })
     }
 
     /// A capture has ended, and everything was put back, or could not be.
     pub(crate) fn conclude_capture(&mut self, asked: Asked, ended: CaptureOutcome) {
-        let CaptureOutcome { node, outcome } = ended;
+        let CaptureOutcome { node, generation, outcome } = ended;
         self.captures.remove(&node);
+        if let Some(generation) = generation {
+            self.conclude_test_motion(node, generation);
+        }
         // Pages that show its PDOs read them again.
         self.parameters.note_mapped(node);
         self.learn_pdos(node);
-        let outcome = outcome.map(|(capture, value)| {
+        let outcome = outcome.map(|(captures, value)| {
             let kept = self.captured.entry(node).or_default();
-            let name = format!("capture of {}", names_of(&capture));
-            if let Ok(row) = report::Capture::of_record(name, recorded(capture), node) {
-                kept.truncate(MOST_REPORTED - 1);
-                kept.insert(0, row);
+            for (name, capture) in captures {
+                if let Ok(row) = report::Capture::of_record(name, recorded(capture), node) {
+                    kept.truncate(MOST_REPORTED - 1);
+                    kept.insert(0, row);
+                }
             }
             value
         });
         if let Err((kind, text)) = &outcome
-            && *kind != "usage"
+            && !matches!(*kind, "usage" | UNGUARDED)
         {
             self.send_news(Some(node), text);
         }
@@ -193,14 +200,14 @@ fn span_of(order: &CaptureOrder) -> Result<Span, Refusal> {
 }
 
 /// Times as the page has them: in ms.
-fn time(what: &str, ms: f64, least: Duration) -> Result<Duration, Refusal> {
+pub(crate) fn time(what: &str, ms: f64, least: Duration) -> Result<Duration, Refusal> {
     let time =
         Duration::try_from_secs_f64(ms / 1e3).ok().filter(|time| (least..=Duration::from_secs(3600)).contains(time));
     time.ok_or_else(|| ("usage", format!("expected {what} from {least:?} to 1 h, got {ms} ms")))
 }
 
-fn check_size(order: &CaptureOrder, wanted: &Wanted, span: &Span) -> Result<(), Refusal> {
-    let count = order.quantities.len();
+/// Whether a page can be sent so many quantities of so many runs.
+pub(crate) fn check_size(count: usize, runs: u32, wanted: &Wanted, span: &Span) -> Result<(), Refusal> {
     if count > MOST_QUANTITIES {
         return Err(("usage", format!("expected at most {MOST_QUANTITIES} quantities, got {count}")));
     }
@@ -213,7 +220,7 @@ fn check_size(order: &CaptureOrder, wanted: &Wanted, span: &Span) -> Result<(), 
         return Err(("usage", text));
     }
     let rows = (span.duration + span.pre_trigger).as_nanos() / wanted.period.as_nanos();
-    let readings = rows * count as u128;
+    let readings = rows * count as u128 * u128::from(runs);
     if readings > MOST_READINGS {
         let text = format!(
             "{readings} readings are more than a page is sent, at most {MOST_READINGS}: capture for a shorter time, at a lower rate, or by `ferrodrive capture`"
@@ -223,12 +230,36 @@ fn check_size(order: &CaptureOrder, wanted: &Wanted, span: &Span) -> Result<(), 
     Ok(())
 }
 
+/// The quantities of these names, each once.
+pub(crate) async fn measurands(
+    drive: &Drive,
+    world: Option<&LiveValues>,
+    names: &[String],
+) -> Result<Vec<Measurand>, Failure> {
+    let mut quantities = Vec::new();
+    for name in names {
+        let measurand = Measurand::named(drive, world, name).await?;
+        if !quantities.contains(&measurand) {
+            quantities.push(measurand);
+        }
+    }
+    Ok(quantities)
+}
+
+/// A capture of a node as the page has it, which began then.
+pub(crate) fn shown(node: NodeId, capture: &Capture, ways: &[Way], first_at: Instant) -> Value {
+    let mut value = serde_json::to_value(Captured::of(capture, ways)).unwrap_or_default();
+    value["node"] = node.raw().into();
+    value["begun_s"] = (first_at - Instant::ZERO).as_secs_f64().into();
+    value
+}
+
 fn outcome_of(
     node: NodeId,
     captured: Result<(Running, Taken), Failure>,
     left: &[String],
     nmt_back: Option<SeenBy>,
-) -> Result<(Capture, Value), Refusal> {
+) -> Result<(Vec<(String, Capture)>, Value), Refusal> {
     let (running, taken) = captured.map_err(|failure| refusal(&with_left(failure, left)))?;
     let Taken { capture, cut_off, first_at } = taken;
     if capture.time_s.is_empty() {
@@ -236,19 +267,18 @@ fn outcome_of(
             cut_off.unwrap_or_else(|| Failure::new(format!("node {node}: ended before anything was captured")));
         return Err(refusal(&with_left(failure, left)));
     }
-    let mut value = serde_json::to_value(Captured::of(&capture, running.ways())).unwrap_or_default();
-    value["node"] = node.raw().into();
-    value["begun_s"] = (first_at - Instant::ZERO).as_secs_f64().into();
+    let mut value = shown(node, &capture, running.ways(), first_at);
     value["pace"] = running.plan().map(|plan| plan.pace.words()).into();
     value["load"] = running.plan().map(|plan| plan.load).into();
     value["nmt_back"] = nmt_back.map(SeenBy::words).into();
     let lacks = cut_off.into_iter().chain(not_put_back(node, left).map(|failure| with_left(failure, left)));
     value["lacks"] = lacks.map(|failure| refusal(&failure).1).collect();
-    Ok((capture, value))
+    let name = format!("capture of {}", names_of(&capture));
+    Ok((vec![(name, capture)], value))
 }
 
 /// A failure in one text: what, why, and what to do.
-fn refusal(failure: &Failure) -> Refusal {
+pub(crate) fn refusal(failure: &Failure) -> Refusal {
     let Failure { kind, what, because, next, .. } = failure;
     let lines = std::iter::once(what).chain(because).chain(next).map(String::as_str);
     (*kind, lines.collect::<Vec<_>>().join("; "))

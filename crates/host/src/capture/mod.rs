@@ -3,7 +3,7 @@
 //! [`plan`] finds the TPDOs and what makes them come; [`Wanted::begin`] sets them up, with the way back on the disk, and [`Running`]
 //! collects until a capture is whole. [`Restorer`] leads back, whatever ends it. [`merit`] has the figures of a response.
 
-mod commanded;
+pub(crate) mod commanded;
 mod measurand;
 pub mod merit;
 mod of_log;

@@ -1,4 +1,4 @@
-//! A capture that a session has commanded: under way, and ended.
+//! A capture that a session has commanded, by itself or of a test motion: under way, and ended.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -12,13 +12,16 @@ use crate::parameters::transactions::Refusal;
 
 /// A capture that is under way.
 pub(crate) struct CaptureRun {
-    /// What came until now is enough.
-    pub(crate) ended: Rc<Cell<bool>>,
+    /// What came until now is enough; a test motion is ended by a stop instead.
+    pub(crate) ended: Option<Rc<Cell<bool>>>,
     pub(crate) abort: AbortHandle,
 }
 
 /// What came of a capture.
 pub(crate) struct CaptureOutcome {
     pub(crate) node: NodeId,
-    pub(crate) outcome: Result<(Capture, Value), Refusal>,
+    /// The number of the motion, where it was one.
+    pub(crate) generation: Option<u64>,
+    /// Captures with their names in the report of the node, and the answer.
+    pub(crate) outcome: Result<(Vec<(String, Capture)>, Value), Refusal>,
 }

@@ -65,7 +65,7 @@ impl WayBack {
     }
 
     /// The job was ended. What it could not put back stays with the network, which tries once more when it is closed.
-    pub(super) fn remove_if_done(&self) {
+    pub(crate) fn remove_if_done(&self) {
         if self.own.get().is_some_and(Restorer::is_done) {
             self.remove();
         }

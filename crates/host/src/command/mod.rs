@@ -12,7 +12,7 @@ mod parameters;
 mod pdo;
 mod session;
 
-pub use capture::{CaptureCommand, CaptureOrder};
+pub use capture::{CaptureCommand, CaptureOrder, TestMotionOrder};
 pub use group::{AxisSpeed, AxisTarget, BaseJog, GroupCommand, GroupMove};
 pub use node::NodeCommand;
 pub use parameters::{FileForm, NewValue, ParameterChange, ParameterReading};

@@ -11,11 +11,12 @@ use master::group::AxisLimits;
 use master::units::{Along, Rpm};
 
 use crate::answer::Answer;
-use crate::command::{BaseJog, Command, GroupCommand, NodeCommand};
+use crate::command::{BaseJog, CaptureCommand, Command, GroupCommand, NodeCommand, TestMotionOrder};
 use crate::commands::done;
 use crate::parameters::transactions::Refusal;
 use crate::session::authority::SessionId;
 use crate::state::Host;
+use crate::test_motion::ShapeName;
 use crate::work::{Asked, send};
 
 /// The kind of the refusal, for programs.
@@ -89,6 +90,9 @@ fn fastest(command: &Command, gears: &Gears) -> Speed {
         Command::Node(_, NodeCommand::Jog { rpm }) => Speed::Rpm(*rpm),
         Command::Node(node, NodeCommand::Drive(drive::Command::Motion(motion))) => {
             of_motion(motion, gears.get(node).and_then(|gear| gear.feed_m()))
+        }
+        Command::Node(_, NodeCommand::Capture(CaptureCommand::TestMotion(TestMotionOrder { motion, .. }))) => {
+            Speed::Rpm(if motion.shape == ShapeName::Steps { motion.speed_rpm } else { motion.velocity_rpm })
         }
         Command::Node(..) => Speed::None,
         Command::Group(command) => of_group(command),

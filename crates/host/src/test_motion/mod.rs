@@ -3,6 +3,8 @@
 //!
 //! What moves here is stopped by what stops a group and `velocity`: both note what they have set in motion.
 
+mod commanded;
+mod order;
 mod runs;
 mod shape;
 
@@ -10,6 +12,7 @@ use master::group::{Group, GroupError, Phase, StreamOptions};
 use master::units::Turns;
 use serde::Serialize;
 
+pub use order::{Order, ShapeName};
 pub use runs::{Figures, Motion, Run, Travel, limits, run, steps, usual_quantities};
 pub use shape::{Shape, points};
 

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use can::Instant;
 use futures_util::future::{Either, select};
 use master::cyclic::CyclicOptions;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError};
@@ -84,6 +85,8 @@ pub struct Run {
     pub capture: Capture,
     /// How each of it came.
     pub ways: Vec<Way>,
+    /// When its first row was taken.
+    pub first_at: Instant,
 }
 
 impl Motion {
@@ -281,7 +284,8 @@ pub async fn run(
             let (moved, taken) = once(drive, travel, &mut mover, &mut running).await;
             let failure = moved.as_ref().err().cloned().or(taken.cut_off);
             let figures = Figures::of(moved.ok().flatten(), &taken.capture);
-            runs.push(Run { number, figures, capture: taken.capture, ways: running.ways().to_vec() });
+            let ways = running.ways().to_vec();
+            runs.push(Run { number, figures, capture: taken.capture, ways, first_at: taken.first_at });
             failure.map_or(Ok(()), Err)?;
         }
         Ok(())

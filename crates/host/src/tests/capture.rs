@@ -23,7 +23,7 @@ fn captured(order: CaptureOrder) -> Command {
 
 impl Stage {
     /// How the wheel's first TPDO is set up: objects and event timer.
-    async fn tpdo(&self) -> (u32, u32) {
+    pub(super) async fn tpdo(&self) -> (u32, u32) {
         (self.cell(COUNT).await, self.cell(EVENT_TIMER).await)
     }
 
@@ -32,7 +32,7 @@ impl Stage {
     }
 
     /// Waits until the wheel's TPDO is set up for a capture.
-    async fn is_capturing(&self) {
+    pub(super) async fn is_capturing(&self) {
         for _ in 0..500 {
             if self.cell(COUNT).await != 0 && self.cell(EVENT_TIMER).await != 0 {
                 return;
@@ -42,7 +42,7 @@ impl Stage {
         panic!("the capture did not begin");
     }
 
-    async fn is_put_back(&self, before: (u32, u32)) {
+    pub(super) async fn is_put_back(&self, before: (u32, u32)) {
         for _ in 0..300 {
             if self.tpdo().await == before && self.wheel_nmt() != Some(NmtState::Operational) {
                 return;

@@ -4,10 +4,9 @@ use std::path::PathBuf;
 
 use can::Bitrate;
 use host::capture::{Captured, with_left};
-use host::test_motion::{Figures, Motion, Run, Shape, limits, points, run, usual_quantities};
+use host::test_motion::{Figures, Motion, Order, Run, run, usual_quantities};
 use master::cyclic::CyclicOptions;
 use master::drive::SwitchedOff;
-use master::units::{Ramp, Rpm};
 use pyo3::prelude::*;
 use serde::Serialize;
 use words::failure::Failure;
@@ -76,41 +75,23 @@ struct RunReport {
 }
 
 impl TestMotionOrder {
-    fn motion(&self) -> Result<Motion, String> {
-        let (speed, acceleration) = (Rpm(self.speed_rpm), self.acceleration_rpm_s);
-        let hold = std::time::Duration::try_from_secs_f64(self.time).map_err(|error| error.to_string())?;
-        let limits =
-            limits(Rpm(self.velocity_rpm), acceleration.map(|rate| rate / 60.0), self.following_error_deg / 360.0);
-        let limits = limits.map_err(|failure| failure.what)?;
-        let (amplitude_turns, velocity_turns_s) = (self.by_deg / 360.0, self.speed_rpm / 60.0);
-        let shape = match self.shape.as_str() {
-            "steps" if speed.0.abs() > self.velocity_rpm => {
-                return Err(format!(
-                    "steps of {} r/min, and {} r/min are allowed: velocity_rpm",
-                    speed.0, self.velocity_rpm
-                ));
-            }
-            "steps" => return Ok(Motion::Steps { speed, ramp: acceleration.map(Ramp::RpmPerSecond), hold }),
-            "back-and-forth" => Shape::BackAndForth { by_turns: amplitude_turns },
-            "ramp" => Shape::Ramp { velocity_turns_s, hold_s: self.time },
-            "sine" => Shape::Sine { amplitude_turns, hz: self.frequency_hz, periods: self.periods },
-            "chirp" => Shape::Chirp {
-                amplitude_turns,
-                from_hz: self.frequency_hz,
-                to_hz: self.to_frequency_hz,
-                duration_s: self.time,
-            },
-            "prbs" => Shape::Prbs { velocity_turns_s, bit_s: self.time },
-            "path" => Shape::Path { points: self.path.iter().map(|(at, deg)| (*at, deg / 360.0)).collect() },
-            other => {
-                return Err(format!(
-                    "expected a shape of steps, back-and-forth, ramp, sine, chirp, prbs and path, got {other:?}"
-                ));
-            }
-        };
-        let period = std::time::Duration::try_from_secs_f64(self.period).map_err(|error| error.to_string())?;
-        let points = points(&shape, &limits, self.period)?;
-        Ok(Motion::Points { points, limits, period, cyclic: CyclicOptions::default() })
+    fn order(&self) -> Result<Order, String> {
+        Ok(Order {
+            shape: self.shape.parse()?,
+            by_deg: self.by_deg,
+            speed_rpm: self.speed_rpm,
+            frequency_hz: self.frequency_hz,
+            to_frequency_hz: self.to_frequency_hz,
+            periods: self.periods,
+            time_s: self.time,
+            path: self.path.clone(),
+            count: self.count,
+            velocity_rpm: self.velocity_rpm,
+            acceleration_rpm_s: self.acceleration_rpm_s,
+            travel_turns: self.travel_turns,
+            following_error_deg: self.following_error_deg,
+            period_ms: self.period * 1e3,
+        })
     }
 }
 
@@ -125,8 +106,7 @@ pub(crate) fn test_motion(
 ) -> PyResult<Job> {
     let asked = AskedDrive::of(network.get(), node, model)?;
     let bitrate = network.get().bitrate(py)?.unwrap_or(Bitrate::K500);
-    let motion = order.motion().map_err(bad_value)?;
-    order.travel_turns.map_or(Ok(()), |travel| motion.check_travel(order.count, travel)).map_err(bad_value)?;
+    let motion = order.order().and_then(|order| order.motion(CyclicOptions::default())).map_err(bad_value)?;
     let mut wanted = asked.capturing(bitrate, duration(order.capture_period)?, order.journal);
     wanted.by_sdo = order.sdo;
     let world = network.get().true_values(py)?;
@@ -151,7 +131,7 @@ pub(crate) fn test_motion(
         };
         let moved = moved.await;
         let left = restorer.restore().await;
-        let rows = runs.into_iter().map(|Run { number, figures, capture, ways }| RunReport {
+        let rows = runs.into_iter().map(|Run { number, figures, capture, ways, .. }| RunReport {
             run: number,
             figures,
             capture: Captured::of(&capture, &ways),

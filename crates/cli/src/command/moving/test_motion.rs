@@ -6,11 +6,10 @@ use std::time::Duration;
 use canopen::NodeId;
 use host::capture::Wanted;
 use host::capture::merit::{self, Heating};
-use host::test_motion::{Figures, Followed, Motion, Run, Shape, limits, points, run, usual_quantities};
+use host::test_motion::{Figures, Followed, Motion, Order, Run, limits, run, usual_quantities};
 use machine::group_move::{angle, rate, turning, turns_of};
 use master::Drive;
-use master::group::AxisLimits;
-use master::units::{Angle, Ramp, Rpm, parse_duration};
+use master::units::{Angle, Rpm, parse_duration};
 use recording::{Capture, Kind};
 use serde::Serialize;
 use words::node::node;
@@ -115,6 +114,21 @@ enum ShapeName {
     Path,
 }
 
+impl ShapeName {
+    const fn name(self) -> host::test_motion::ShapeName {
+        use host::test_motion::ShapeName;
+        match self {
+            Self::BackAndForth => ShapeName::BackAndForth,
+            Self::Steps => ShapeName::Steps,
+            Self::Ramp => ShapeName::Ramp,
+            Self::Sine => ShapeName::Sine,
+            Self::Chirp => ShapeName::Chirp,
+            Self::Prbs => ShapeName::Prbs,
+            Self::Path => ShapeName::Path,
+        }
+    }
+}
+
 /// What was moved, and how.
 #[derive(Debug, Serialize)]
 pub(crate) struct TestMotionReport {
@@ -140,7 +154,7 @@ impl TestMotion {
         let drive = context.known_drive(self.node).await?;
         let following = turns_of(&drive, self.following_error).await?.0.abs();
         let limits = limits(self.velocity, self.acceleration, following)?;
-        let motion = self.motion(&drive, &limits).await?;
+        let motion = self.motion(&drive).await?;
         let names = match self.capture.is_empty() {
             true => usual_quantities(&drive).await?,
             false => self.capture.clone(),
@@ -159,54 +173,43 @@ impl TestMotion {
             ShapeName::Steps => AxisLimitValues::of_ramps(&limits, self.acceleration.map(|rate| rate * 60.0)),
             _ => (&limits).into(),
         };
-        Ok(TestMotionReport { node: self.node.raw(), shape: self.shape_name(), limits, guard, runs })
+        Ok(TestMotionReport { node: self.node.raw(), shape: self.shape_name().to_owned(), limits, guard, runs })
     }
 
-    fn shape_name(&self) -> String {
-        let value = clap::ValueEnum::to_possible_value(&self.shape);
-        value.map_or_else(String::new, |value| value.get_name().to_owned())
+    const fn shape_name(&self) -> &'static str {
+        self.shape.name().word()
     }
 
     /// What a run sends.
-    async fn motion(&self, drive: &Drive, limits: &AxisLimits) -> Result<Motion, Failure> {
-        let by = turns_of(drive, self.by).await?.0;
-        let (Rpm(rpm), time_s) = (self.speed, self.time.as_secs_f64());
-        let refused = |why: String| {
+    async fn motion(&self, drive: &Drive) -> Result<Motion, Failure> {
+        let degrees = |turns: f64| turns * 360.0;
+        let order = Order {
+            shape: self.shape.name(),
+            by_deg: degrees(turns_of(drive, self.by).await?.0),
+            speed_rpm: self.speed.0,
+            frequency_hz: self.frequency,
+            to_frequency_hz: self.to_frequency,
+            periods: self.periods,
+            time_s: self.time.as_secs_f64(),
+            path: if self.shape == ShapeName::Path { self.recorded()? } else { Vec::new() },
+            count: self.count,
+            velocity_rpm: self.velocity.0,
+            acceleration_rpm_s: self.acceleration.map(|rate| rate * 60.0),
+            travel_turns: self.travel,
+            following_error_deg: degrees(turns_of(drive, self.following_error).await?.0.abs()),
+            period_ms: self.period.as_secs_f64() * 1e3,
+        };
+        order.motion(self.cycles.options()).map_err(|why| {
             let failure = Failure::new(format!("node {}: {} is not possible", self.node, self.shape_name()));
             failure
                 .of_kind("out_of_limits")
                 .at_node(self.node)
                 .because(why)
                 .next("nothing was moved: change the shape or a limit")
-        };
-        let shape = match self.shape {
-            ShapeName::Steps if rpm.abs() > self.velocity.0 => {
-                return Err(refused(format!("a speed of {rpm} r/min, and {} r/min are allowed", self.velocity.0)));
-            }
-            ShapeName::Steps => {
-                let ramp = self.acceleration.map(|rate| Ramp::RpmPerSecond(rate * 60.0));
-                return Ok(Motion::Steps { speed: self.speed, ramp, hold: self.time });
-            }
-            ShapeName::BackAndForth => Shape::BackAndForth { by_turns: by },
-            ShapeName::Ramp => Shape::Ramp { velocity_turns_s: rpm / 60.0, hold_s: time_s },
-            ShapeName::Sine => Shape::Sine { amplitude_turns: by, hz: self.frequency, periods: self.periods },
-            ShapeName::Chirp => Shape::Chirp {
-                amplitude_turns: by,
-                from_hz: self.frequency,
-                to_hz: self.to_frequency,
-                duration_s: time_s,
-            },
-            ShapeName::Prbs => Shape::Prbs { velocity_turns_s: rpm / 60.0, bit_s: time_s },
-            ShapeName::Path => Shape::Path { points: self.recorded()? },
-        };
-        let points = points(&shape, limits, self.period.as_secs_f64()).map_err(refused)?;
-        let cyclic = self.cycles.options();
-        let motion = Motion::Points { points, limits: limits.clone(), period: self.period, cyclic };
-        self.travel.map_or(Ok(()), |travel| motion.check_travel(self.count, travel)).map_err(refused)?;
-        Ok(motion)
+        })
     }
 
-    /// The position of a capture, in turns.
+    /// The position of a capture, in degrees.
     fn recorded(&self) -> Result<Vec<(f64, f64)>, Failure> {
         let path = self
             .path
@@ -218,7 +221,7 @@ impl TestMotion {
         };
         let capture = read(path).map_err(unusable)?;
         let trace = capture.trace("position_deg").ok_or_else(|| unusable("it has no position_deg".to_owned()))?;
-        Ok(capture.points(trace).map(|(at, deg)| (at, deg / 360.0)).collect())
+        Ok(capture.points(trace).collect())
     }
 
     /// Sets the capture up, makes the runs, and puts everything back; what moves is at rest at its end. Files are written then: a group has
@@ -266,7 +269,7 @@ impl TestMotion {
         Ok(())
     }
 
-    fn row(&self, Run { number, figures, mut capture, ways }: Run) -> (RunRow, Capture) {
+    fn row(&self, Run { number, figures, mut capture, ways, .. }: Run) -> (RunRow, Capture) {
         capture.name = format!("{} {number}", self.shape_name());
         let row = RunRow { run: number, figures, capture: CaptureRow::new(&capture, None, &ways) };
         (row, capture)
