@@ -24,6 +24,8 @@ import { scalePanel } from "./scope_scales.js";
 import { overlaid, panesOf, partnerOf } from "./scope_source.js";
 import { kept, keep } from "./settings.js";
 import { SvgPen } from "./svg_pen.js";
+import { MOST_KEPT } from "./test_motion.js";
+import { testMotionPanel } from "./test_motion_panel.js";
 import { trigger } from "./scope_trigger.js";
 import { inUnit, unitsOf } from "./units.js";
 
@@ -38,7 +40,7 @@ const HIDDEN = ["supply_v", "position_counts", "statusword"];
 
 const cut = (text) => (text.length > LONGEST_MARK ? `${text.slice(0, LONGEST_MARK - 1)}…` : text);
 
-export function scopeView(shared) {
+export function scopeView(shared, report) {
   const before = kept(SETTINGS, {});
   const choose = chooser(shared);
   const canvas = h("canvas", {
@@ -72,6 +74,10 @@ export function scopeView(shared) {
     captures.keep(capture);
     openCapture(capture);
   } });
+  const bench = testMotionPanel(shared, report, { open: openCapture, async taken(made) {
+    for (const capture of made.slice(0, MOST_KEPT)) await captures.keep(capture);
+    if (made.length) openCapture(made[0]);
+  } });
   const scales = new Scales(before.scales);
   /** The units that were chosen, by field; the panes as they are without; what a turn of each node moves. */
   const units = before.units ?? {};
@@ -96,6 +102,7 @@ export function scopeView(shared) {
     readout,
     captures.root,
     fast.root,
+    bench.root,
     computed.root,
     h("div", { class: "bar" }, h("span", { class: "quiet" }, "Save as"), button("scope-save", "CSV", saveCsv, "A record, for ferrodrive plot and spreadsheets"), button("scope-mcap", "MCAP", saveMcap, "For Foxglove, PlotJuggler, Rerun and ferrodrive plot"), button("scope-svg", "SVG", saveSvg)),
     saved,
@@ -447,6 +454,7 @@ export function scopeView(shared) {
   function update(state) {
     choose.update(state);
     fast.update(state);
+    bench.update(state);
     for (const { node, feed_m } of state.nodes) feeds.set(node, feed_m);
     drives = state.nodes.filter((node) => node.drive).map((node) => node.node);
     const more = drives.filter((node) => node !== shared.node);

@@ -10,7 +10,7 @@ import { worldView } from "./world.js";
 
 /** By name: the view. */
 export const laterViews = (shared, report) => ({
-  scope: scopeView(shared),
+  scope: scopeView(shared, report),
   parameters: parametersView(shared, report),
   pdo: pdoView(shared, report),
   trace: traceView(),

@@ -71,6 +71,8 @@ const SOURCES: &[(&str, &str)] = files![
     "series.js",
     "analysis.js",
     "svg_pen.js",
+    "test_motion.js",
+    "test_motion_panel.js",
     "parameters.js",
     "parameter_file.js",
     "pdo.js",

@@ -1,6 +1,6 @@
-//! Fast capture and report in a real browser: a button each, with everything put back.
+//! Fast capture, test motion and report in a real browser: a button each, with everything put back.
 
-use super::Stage;
+use super::{Key, Stage, press};
 
 impl Stage {
     /// Shows the form of a fast capture of the wheel.
@@ -20,8 +20,11 @@ impl Stage {
     async fn has_done(&self, css: &str, status: &str, part: &str) -> String {
         loop {
             self.click(css).await;
-            let is_late =
-                |said: &str| said.contains("Nothing was sent") || said.contains("the page that began it has gone");
+            let is_late = |said: &str| {
+                said.contains("Nothing was sent")
+                    || said.contains("the page that began it has gone")
+                    || said.contains("it was stopped")
+            };
             self.until(part, async || {
                 let said = self.says(status, "").await;
                 said.contains(part) || is_late(&said)
@@ -67,6 +70,7 @@ async fn a_turning_wheel_is_captured_fast_and_reported() {
     stage.shoot("fast_capture").await;
     // Its notes are there after a reload.
     stage.fill(".captures [data-notes]", "belt tight").await;
+    stage.test_motion().await;
     stage.fast_report().await;
     assert!(stage.tpdo().await.contains("nothing is mapped into it"));
     stage.click("#tabs [data-name=scope]").await;
@@ -80,13 +84,43 @@ async fn a_turning_wheel_is_captured_fast_and_reported() {
 }
 
 impl Stage {
+    /// Two runs of steps with their figures, laid over each other; then a motion that its Stop ends.
+    async fn test_motion(&self) {
+        self.client.perform_actions(press(Key::Escape.into())).await.expect("a press");
+        self.client.release_actions().await.expect("a release");
+        self.rests();
+        self.client.execute("document.querySelector('#test-motion').open = true", Vec::new()).await.expect("it opens");
+        self.fill("#test-count", "2").await;
+        self.fill("#test-acceleration_rpm_s", "500").await;
+        self.find("#test-start:not([disabled])").await;
+        let said = self.has_done("#test-start", "#test-status", "The drive stands without power").await;
+        assert!(said.contains("2 runs within 60 r/min, 500 r/min/s"), "{said}");
+        let had = self.says("#test-had", "rise, 0 to 60 r/min").await;
+        for part in ["settling, 60 to 0 r/min", "A r.m.s.", "steps 2"] {
+            assert!(had.contains(part), "{part}: {had}");
+        }
+        self.find(".captures li:nth-child(3)").await;
+        self.shoot("test_motion").await;
+        self.fill("#test-count", "99").await;
+        self.click_for("#test-start", "#test-stop:not([hidden])").await;
+        let stop = "const of = document.querySelector('#test-stop'); if (!of.hidden) of.click()";
+        self.until("a test motion that was stopped", async || {
+            self.client.execute(stop, Vec::new()).await.expect("it runs");
+            self.says("#test-status", "").await.contains("it was stopped")
+        })
+        .await;
+        self.rests();
+        // Everything was put back by then.
+        self.find("#test-start:not([disabled])").await;
+    }
+
     async fn fast_report(&self) {
         self.click("#tabs [data-name=drive]").await;
         // Not typed: while the wheel turns, Space is Stop.
         self.fill("#report-by", "A. Fitter").await;
         self.has_done("#report", "#report-status", "saved as node4.html").await;
         let page = std::fs::read_to_string(self.saved("node4.html").await).expect("text");
-        for part in ["A. Fitter", "zlac8030l", "capture of target_velocity_rpm", "true_velocity", "<svg"] {
+        for part in ["A. Fitter", "zlac8030l", "test motion steps, run 2", "<svg"] {
             assert!(page.contains(part), "{part} is in the report");
         }
         self.shoot("report_button").await;
