@@ -16,12 +16,7 @@ use machine::file::Machine;
 use words::drive::node_model;
 use words::models::Description;
 use words::node::node;
-
-/// A time that is not zero, within which something is to happen.
-pub(crate) fn some_time(text: &str) -> Result<Duration, String> {
-    let time = master::units::parse_duration(text).map_err(|error| error.to_string())?;
-    if time.is_zero() { Err("expected a time above 0, e.g. 500ms".into()) } else { Ok(time) }
-}
+use words::time::some_time;
 
 /// NODE=NUMBER as the record of that server: 1 is the default one, 1200h.
 fn sdo_server(text: &str) -> Result<(NodeId, u16), String> {

@@ -8,13 +8,14 @@ use std::time::Duration;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase};
-use master::units::{Along, Angle, Ramp, Rpm, Turns, parse_duration};
+use master::units::{Along, Angle, Ramp, Rpm, Turns};
 use master::{Drive, cyclic::CyclicOptions};
 
 use crate::file::{CyclePlan, GROUP_PERIOD, GroupPlan, Machine};
 use words::failure::Failure;
 use words::mode::mode;
 use words::node::node;
+use words::time::some_time;
 
 /// A move as it is asked for; what is `None` is that of the machine file, or the default.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -152,19 +153,15 @@ impl FromStr for GroupMove {
                 true => format!("'{word}' has no value; expected: group {}", Self::FORM),
                 false => format!("'{word}' is not a part of group move; expected: group {}", Self::FORM),
             })?;
-            let time = || match parse_duration(value) {
-                Ok(time) if time.is_zero() => Err("expected a time above 0, e.g. 500ms".to_owned()),
-                parsed => parsed.map_err(|error| error.to_string()),
-            };
             match word {
                 "of" => asked.group = Some(value.to_owned()),
                 "at" => asked.velocity = Some(turning(value)?),
                 "acceleration" => asked.acceleration = Some(rate(value)?),
-                "rounding" => asked.rounding = Some(time()?),
+                "rounding" => asked.rounding = Some(some_time(value)?),
                 "following-error" => asked.following_error = Some(angle(value)?),
-                "period" => asked.period = Some(time()?),
+                "period" => asked.period = Some(some_time(value)?),
                 "mode" => asked.mode = Some(mode(value)?),
-                _ => asked.within = Some(time()?),
+                _ => asked.within = Some(some_time(value)?),
             }
         }
         asked.check().map_err(|failure| failure.one_line())?;

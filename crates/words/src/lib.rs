@@ -14,6 +14,7 @@ pub mod node;
 pub mod object;
 pub mod selection;
 pub mod suggest;
+pub mod time;
 pub mod unit;
 pub mod unresolved;
 pub mod value;

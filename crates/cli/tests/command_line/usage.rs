@@ -240,6 +240,10 @@ fn quantities_are_checked() {
     refused(&["home", "4", "--method", "first"], &["expected a whole number, -128 to 127, got 'first'"]);
     refused(&["run", "a.toml", "--jobs", "0"], &["expected 1 to 1024, got 0"]);
     refused(&["--timeout", "2", "scan"], &["no unit", "500ms"]);
+    for words in ["velocity 4 60rpm", "torque 4 1A", "record 4 6064 -o a.csv", "dump"] {
+        let words: Vec<_> = words.split(' ').chain(["--for", "0s"]).collect();
+        refused(&words, &["expected a time above 0"]);
+    }
 }
 
 #[test]

@@ -17,6 +17,7 @@ use crate::guard::{Guard, GuardArgs, GuardReport};
 use plot::Paint;
 use words::models::is_from_file;
 use words::node::node;
+use words::time::some_time;
 
 /// Turn the motor at a speed
 ///
@@ -36,7 +37,7 @@ pub struct Velocity {
     #[command(flatten)]
     ramps: RampArgs,
     /// Keep turning for this long, then stop
-    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time, conflicts_with = "no_wait")]
     duration: Option<Duration>,
 }
 
@@ -74,7 +75,7 @@ pub struct Torque {
     #[arg(allow_hyphen_values = true)]
     current: Amperes,
     /// Apply it for this long, then stop
-    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time, conflicts_with = "no_wait")]
     duration: Option<Duration>,
     /// Accepted for symmetry with the other moving commands: this one never waits
     #[arg(long)]

@@ -28,6 +28,7 @@ use machine::file::Machine;
 use plot::Paint;
 use serve::writing::{CommandLog, Pace};
 use words::counted;
+use words::time::some_time;
 
 /// Show the traffic of the bus decoded: SDO, PDOs, statuswords in words
 ///
@@ -42,7 +43,7 @@ use words::counted;
     ferrodrive --bus can0 dump --object 6041,target_velocity --time absolute")]
 pub(crate) struct Dump {
     /// End after this time; with a log, after this time of the log (default on an embedded virtual bus: 2s)
-    #[arg(long = "for", value_name = "TIME", value_parser = master::units::parse_duration)]
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time)]
     duration: Option<Duration>,
     /// Form of the time before each line (`t` of --json does not change)
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]

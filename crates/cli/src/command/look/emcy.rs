@@ -9,7 +9,6 @@ use devices::faults::FaultRow;
 use host::network::faults::{RememberedError, hexadecimal, meaning, remembered};
 use master::Error;
 use master::decode::Decoded;
-use master::units::parse_duration;
 use serde::Serialize;
 
 use crate::context::Context;
@@ -18,6 +17,7 @@ use crate::frames::stamp::{Stamps, TimeForm};
 use crate::output::{Format, Report};
 use plot::Paint;
 use words::node::{Nodes, node, nodes};
+use words::time::some_time;
 
 /// Show emergency messages as they arrive, or the errors that a node remembers
 #[derive(Debug, clap::Args)]
@@ -43,7 +43,7 @@ struct WatchEmcy {
     #[arg(value_name = "NODE|all", value_parser = nodes, default_value = "all")]
     nodes: Nodes,
     /// End after this time (default on an embedded virtual bus: 1s)
-    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time)]
     duration: Option<Duration>,
     /// Form of the time before each line
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]

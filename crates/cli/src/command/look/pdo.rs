@@ -12,7 +12,6 @@ use devices::Description;
 use master::Drive;
 use master::decode::{Decoded, Decoder};
 use master::pdo::PdoConfig;
-use master::units::parse_duration;
 use serde::Serialize;
 
 use crate::context::Context;
@@ -24,6 +23,7 @@ use plot::Paint;
 use plot::Table;
 use words::decode::{self, decode};
 use words::node::node;
+use words::time::some_time;
 
 /// Show, watch and configure the PDOs of a node
 #[derive(Debug, clap::Args)]
@@ -63,7 +63,7 @@ struct WatchPdo {
     #[arg(value_parser = node)]
     node: NodeId,
     /// End after this time (default on an embedded virtual bus: 1s)
-    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time)]
     duration: Option<Duration>,
     /// Form of the time before each line
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]

@@ -5,7 +5,6 @@ use std::time::Duration;
 use canopen::od::Entry;
 use canopen::{AbortCode, Mux, NodeId};
 use master::decode::{common_name, common_row};
-use master::units::parse_duration;
 use master::{Drive, Error};
 use serde::Serialize;
 
@@ -21,6 +20,7 @@ use plot::Table;
 use words::decode::{Decoded, decode};
 use words::node::node;
 use words::object::{ObjectArg, object};
+use words::time::some_time;
 
 /// Show objects of a node as they change: a live table on a terminal, lines elsewhere
 ///
@@ -43,7 +43,7 @@ pub(crate) struct Watch {
     #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=u64::MAX))]
     count: Option<u64>,
     /// End after this time
-    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, conflicts_with = "count")]
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time, conflicts_with = "count")]
     duration: Option<Duration>,
 }
 

@@ -11,12 +11,13 @@ use master::group::{AxisLimits, AxisSetup, Group, GroupError, StopCause};
 use master::units::{Angle, Rpm, Shown, parse_duration};
 use serde::Serialize;
 use words::mode::mode;
+use words::time::some_time;
 
 use crate::command::cycles::{CycleArgs, refuse_too_full};
 use crate::command::repeat::period;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::global::{Global, some_time};
+use crate::global::Global;
 use crate::output::{Format, Report};
 use crate::session;
 use console::guard::{Guard, GuardArgs, GuardReport};

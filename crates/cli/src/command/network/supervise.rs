@@ -10,7 +10,6 @@ use host::network::boot::BootReport;
 use host::network::supervise::WatchedEvent;
 use master::core::{Event, NodeSet};
 use master::supervise::{EmcyRecord, Supervisor, SupervisorEvent};
-use master::units::parse_duration;
 use tokio::sync::mpsc::{Receiver, channel};
 use words::node::node;
 
@@ -21,6 +20,7 @@ use crate::global::Global;
 use crate::output::{Format, Report};
 use crate::session;
 use plot::Paint;
+use words::time::some_time;
 
 /// Boot the nodes of a network, then watch heartbeats, errors and nodes that come back
 ///
@@ -47,7 +47,7 @@ pub(crate) struct Supervise {
     #[arg(long, value_name = "NODE", value_parser = node, default_value = "127")]
     own_node: NodeId,
     /// End after this time (default on an embedded virtual bus: 1s)
-    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time)]
     duration: Option<Duration>,
 }
 

@@ -24,6 +24,7 @@ use crate::output::{Report, file_path};
 use crate::plain::plain;
 use console::numbers::whole;
 use plot::{Paint, Table};
+use words::time::some_time;
 
 /// Capture quantities of a drive, fast
 ///
@@ -46,7 +47,7 @@ pub(crate) struct Capture {
     #[command(flatten)]
     how: CaptureArgs,
     /// Length of the capture, from its begin or its trigger
-    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, default_value = "1s")]
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time, default_value = "1s")]
     duration: Duration,
     /// Begin when a quantity passes a value: 'velocity > 10' rising, 'velocity < 10' falling
     #[arg(long, value_name = "QUANTITY > NUMBER")]

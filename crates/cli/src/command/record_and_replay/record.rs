@@ -30,6 +30,7 @@ use plot::Paint;
 use serve::files::create_record;
 use serve::messages::Messages;
 use serve::writing::{Pace, RecordFile, RecordOutput};
+use words::time::some_time;
 
 /// Record objects of a node over time
 ///
@@ -57,7 +58,7 @@ pub(crate) struct Record {
     #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = sample_time)]
     every: Duration,
     /// End after this time (default on an embedded virtual bus: 1s)
-    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time)]
     duration: Option<Duration>,
     #[command(flatten)]
     viewers: ViewerOptions,

@@ -20,6 +20,7 @@ use measure::Measurement;
 use plot::Paint;
 use plot::Table;
 use spread::{Bin, Spread};
+use words::time::some_time;
 
 /// Measure response times on this bus, and the regularity of SYNC
 ///
@@ -43,7 +44,7 @@ pub(crate) struct Latency {
     #[arg(long, value_name = "N", default_value = "1000", value_parser = |text: &str| whole(text, 2..=10_000_000_u32))]
     count: u32,
     /// End each of the two measurements after this time, if it has not reached its count
-    #[arg(long = "for", value_name = "TIME", value_parser = master::units::parse_duration)]
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time)]
     duration: Option<Duration>,
     /// Period of the SYNC that this command produces
     #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "10ms")]
