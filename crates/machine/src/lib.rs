@@ -16,6 +16,7 @@
 //! Deliberately absent: clocks, threads and sockets. Files are read where a name of one is the only thing that a user gives,
 //! and only regular ones of bounded size.
 
+pub mod base_drive;
 pub mod check;
 pub mod dbc;
 pub mod file;

@@ -2,13 +2,17 @@
 //!
 //! A host is a CANopen master with intents in physical units (crate `master`); each line is one of them.
 
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
 use can::Frame;
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{NmtCommand, NodeId};
+use host::network::boot::BootOptions;
+use machine::base_drive::BaseDrive;
 use machine::group_move::GroupMove;
+use machine::parameters::Form;
 use master::drive::{self, ParseCommandError};
 use master::pdo::TransmissionType;
 use master::units::parse_duration;
@@ -26,6 +30,8 @@ const FORMS: &[&str] = &[
     "NODE pdo write OBJECT VALUE",
     "NODE pdo read OBJECT",
     "NODE|all nmt start|stop|pre-operational|reset|reset-communication",
+    "NODE params apply [FILE] [save]",
+    "NODE params verify [FILE]",
     "NODE watch TIME (its heartbeat)",
     "heartbeat NODE TIME (its own, under this node-ID)",
     "sync PERIOD|off",
@@ -37,7 +43,8 @@ const FORMS: &[&str] = &[
 /// Every form of a line of a host, for messages and the manual.
 pub fn forms() -> impl Iterator<Item = String> {
     let of_drive = drive::Command::FORMS.iter().map(|form| format!("NODE {form}"));
-    of_drive.chain([format!("group {}", GroupMove::FORM)]).chain(FORMS.iter().map(|form| (*form).to_owned()))
+    let shared = [format!("group {}", GroupMove::FORM), BaseDrive::FORM.to_owned(), BootOptions::FORM.to_owned()];
+    of_drive.chain(shared).chain(FORMS.iter().map(|form| (*form).to_owned()))
 }
 
 /// Those that begin so, as a list in a message.
@@ -55,6 +62,12 @@ pub enum Command {
     Drive(Place, drive::Command),
     /// Several axes as one, to positions.
     Group(GroupMove),
+    /// The base of the machine, by a twist.
+    Base(BaseDrive),
+    /// The boot-up of the machine.
+    Boot(BootOptions),
+    /// The parameters of a node, by a file beside the scenario or without one by the machine file.
+    Parameters(NodeId, ParametersCommand, Option<PathBuf>),
     /// Uploads an object.
     Read(NodeId, ObjectArg),
     /// Downloads an object.
@@ -75,6 +88,18 @@ pub enum Command {
     Wait(Duration),
     /// Waits until something is so.
     WaitFor(Condition, Duration),
+}
+
+/// What is done with parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParametersCommand {
+    /// They are written, all or none, and stored if that is asked for.
+    Apply {
+        /// Whether the drive stores them.
+        save: bool,
+    },
+    /// They are compared.
+    Verify,
 }
 
 /// What is done with process data.
@@ -113,6 +138,8 @@ impl FromStr for Command {
                 Ok(Self::WaitFor(condition.join(" ").parse()?, within))
             }
             ["group", ref rest @ ..] => rest.join(" ").parse().map(Self::Group),
+            ["drive-base", ref rest @ ..] => rest.join(" ").parse().map(Self::Base),
+            ["boot", ref rest @ ..] => rest.join(" ").parse().map(Self::Boot),
             ["wait", duration] => Ok(Self::Wait(time(duration)?)),
             ["all", "nmt", command] => Ok(Self::Nmt(None, nmt(command)?)),
             [place, ref rest @ ..] if place.parse::<Place>().is_ok() => of_node(place, rest),
@@ -128,6 +155,10 @@ fn of_node(place_word: &str, words: &[&str]) -> Result<Command, String> {
         ["nmt", command] => Ok(Command::Nmt(Some(id()?), nmt(command)?)),
         ["watch", period] => Ok(Command::Watch(id()?, time(period)?)),
         ["read", name] => Ok(Command::Read(id()?, object(name)?)),
+        ["params", ref rest @ ..] => {
+            let (what, file) = parameters(rest)?;
+            Ok(Command::Parameters(id()?, what, file))
+        }
         ["pdo", ref rest @ ..] => pdo(rest).map(|command| Ok(Command::Pdo(id()?, command)))?,
         ["write", name, ref value @ ..] if !value.is_empty() => {
             Ok(Command::Write(id()?, object(name)?, value.join(" ")))
@@ -139,6 +170,24 @@ fn of_node(place_word: &str, words: &[&str]) -> Result<Command, String> {
             }
             Err(error) => Err(error.to_string()),
         },
+    }
+}
+
+/// What stands behind `params`.
+fn parameters(words: &[&str]) -> Result<(ParametersCommand, Option<PathBuf>), String> {
+    let (what, file) = match *words {
+        ["apply", ref file @ .., "save"] => (Some(ParametersCommand::Apply { save: true }), file),
+        ["apply", ref file @ ..] => (Some(ParametersCommand::Apply { save: false }), file),
+        ["verify", ref file @ ..] => (Some(ParametersCommand::Verify), file),
+        _ => (None, words),
+    };
+    match (what, file) {
+        (Some(what), []) => Ok((what, None)),
+        (Some(what), [file]) => Form::of(Path::new(file)).map(|_| (what, Some(file.into()))),
+        _ => {
+            let (words, forms) = (words.join(" "), forms_of("NODE params"));
+            Err(format!("'params {words}' is not a host command; expected one of: {forms}"))
+        }
     }
 }
 
@@ -209,6 +258,13 @@ mod tests {
             "4 move 32000",
             "2 home 17 at 60rpm within 5s",
             "group move 1=90deg 2=-45deg within 3s",
+            "drive-base linear 0.3 angular -0.2 for 3s",
+            "boot",
+            "boot node 4 node 5 reset no-start",
+            "4 params apply",
+            "4 params apply save",
+            "4 params apply wheel.toml save",
+            "4 params verify sheets/wheel.dcf",
             "4 write 6060 profile velocity",
             "4 read position_actual_value",
             "4 pdo map tpdo 1 6041 position_actual_value type 1",
@@ -230,6 +286,15 @@ mod tests {
             ("dance", "expected one of"),
             ("4 dance", "NODE enable"),
             ("group dance", "group move [by] NODE=POSITION"),
+            ("drive-base forward", "expected: drive-base [linear M/S]"),
+            ("boot now", "expected: boot [node NODE].."),
+            ("boot node", "'node' has no node-ID"),
+            ("boot node 200", "node-ID"),
+            ("4 params", "NODE params verify [FILE]"),
+            ("4 params frob", "NODE params apply [FILE] [save]"),
+            ("4 params frob wheel.toml", "NODE params apply [FILE] [save]"),
+            ("4 params verify wheel.txt", ".toml"),
+            ("4 params apply a.toml b.toml", "NODE params apply [FILE] [save]"),
             ("4 velocity", "NODE enable"),
             ("4 velocity fast", "does not begin with a number"),
             ("4 velocity 60rpm at 5rpm", "is not an option of velocity"),

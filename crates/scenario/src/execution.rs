@@ -66,9 +66,10 @@ impl Execution {
         let host = world.add_station(network.clone());
         let shared = Rc::new(RefCell::new(HostBoard::default()));
         let machine = Rc::new(scenario.machine.clone());
+        let sheets = Rc::new(scenario.sheets.clone());
         let tasks = scenario.hosts.iter().enumerate().map(|(number, it)| {
-            let (machine, shared) = (Rc::clone(&machine), Rc::clone(&shared));
-            let task = HostTask { number, name: it.name.clone(), network: network.clone(), machine, shared };
+            let (machine, sheets, shared) = (Rc::clone(&machine), Rc::clone(&sheets), Rc::clone(&shared));
+            let task = HostTask { number, name: it.name.clone(), network: network.clone(), machine, sheets, shared };
             let future: HostFuture = Box::pin(run(task, it.start, it.lines.clone()));
             Some(Task::new(future))
         });

@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use canopen::NodeId;
+use host::network::params::source;
 use sim::Place;
 
 use super::command::Command;
 use super::condition::Condition;
 use super::entries::{MOST, Many, bounded, entries, expect, figures, host, kept, single, step};
-use super::plan::{Act, Base, Expect, Figure, Host, HostLine, Measure, ScenarioStep};
+use super::plan::{Act, Base, Expect, Figure, Host, HostLine, Measure, ScenarioStep, Sheets};
 use crate::sweep::file::{SweepAxis, axes};
 use machine::file::Machine;
 use sim::Fidelity;
@@ -67,6 +69,8 @@ pub struct Scenario {
     /// The text of the machine file that it names; empty where its machine stands in it.
     machine_text: String,
     folder: PathBuf,
+    /// The files of parameters that its hosts name.
+    pub(super) sheets: Sheets,
 }
 
 impl Scenario {
@@ -164,10 +168,14 @@ impl Scenario {
             text: text.to_owned(),
             machine_text,
             folder: folder.to_owned(),
+            sheets: Sheets::new(),
         };
         scenario.limit = scenario.limit.max(scenario.end.unwrap_or_default());
         if problems.is_empty() {
             problems = scenario.check(file);
+        }
+        if problems.is_empty() {
+            problems = scenario.read_sheets(file);
         }
         if problems.is_empty() { Ok(scenario) } else { Err(problems) }
     }
@@ -215,27 +223,58 @@ impl Scenario {
             });
             problems.extend(strange.map(|reason| placed(&step.place, file.text(), reason)));
         }
-        problems.extend(self.check_groups(file));
+        problems.extend(self.check_hosts(file));
         if problems.is_empty() {
             problems = self.check_bodies(file);
         }
         problems
     }
 
-    /// Moves of axes that are not there, or not in one group.
-    fn check_groups(&self, file: &Table<'_>) -> Vec<Problem> {
+    /// Moves of axes that are not there, or not in one group; a base that is not there, or cannot do it; nodes that are not there.
+    fn check_hosts(&self, file: &Table<'_>) -> Vec<Problem> {
+        let stranger = |nodes: &[NodeId]| {
+            let node = nodes.iter().find(|node| !self.has_node(node.raw()))?;
+            Some(self.no_such(Place::node(node.raw())))
+        };
         let problem = |line: &HostLine| {
-            let Command::Group(asked) = &line.command else { return None };
-            let what = match asked.axes(Some(&self.machine)) {
-                Err(failure) => failure.one_line(),
-                Ok((nodes, _)) => {
-                    let node = nodes.into_iter().find(|node| !self.has_node(node.raw()))?;
-                    self.no_such(Place::node(node.raw()))
-                }
+            let what = match &line.command {
+                Command::Group(asked) => match asked.axes(Some(&self.machine)) {
+                    Err(failure) => Some(failure.one_line()),
+                    Ok((nodes, _)) => stranger(&nodes),
+                },
+                Command::Base(asked) => match &self.machine.base {
+                    None => Some("the machine has no [base]: give it one (docs/machine-file.md)".to_owned()),
+                    Some(plan) => asked.check(plan, &plan.limits).err().map(|failure| failure.one_line()),
+                },
+                Command::Boot(options) => stranger(&options.nodes),
+                Command::Parameters(node, ..) => stranger(&[*node]),
+                _ => None,
             };
-            Some(placed(&line.place, file.text(), what))
+            Some(placed(&line.place, file.text(), what?))
         };
         self.hosts.iter().flat_map(|host| &host.lines).filter_map(problem).collect()
+    }
+
+    /// Reads the files of parameters that hosts name, beside the scenario. A node of the machine is behind each of these names.
+    fn read_sheets(&mut self, file: &Table<'_>) -> Vec<Problem> {
+        let mut problems = Vec::new();
+        for line in self.hosts.iter().flat_map(|host| &host.lines) {
+            let Command::Parameters(node, _, named) = &line.command else { continue };
+            let model = self.machine.models().find(|(known, _)| known == node).map(|(_, model)| model);
+            let read = match named {
+                Some(path) => source::read(&self.folder.join(path), model, Some(*node)),
+                None => source::of_machine(&self.machine, *node).map(|(parameters, _)| parameters),
+            };
+            match read {
+                Ok(parameters) => drop(self.sheets.insert((*node, named.clone()), parameters)),
+                Err(failure) => {
+                    let reasons = std::iter::once(&failure.what).chain(&failure.because);
+                    let what = reasons.map(String::as_str).collect::<Vec<_>>().join(": ");
+                    problems.push(placed(&line.place, file.text(), what));
+                }
+            }
+        }
+        problems
     }
 
     /// Bodies that are not there, and numbers that they do not have. Only a world knows which these are.

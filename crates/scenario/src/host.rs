@@ -3,6 +3,8 @@
 //! What it waits for beyond the bus (a condition, a time) it asks of the [`HostBoard`], which the stepper of the world
 //! looks at.
 
+mod whole;
+
 use std::cell::RefCell;
 use std::future::{Future, poll_fn};
 use std::rc::Rc;
@@ -15,9 +17,7 @@ use canopen::pdo::MappingRecord;
 use canopen::{Mux, NodeId};
 use devices::Description;
 use master::core::PdoMap;
-use master::cyclic::CyclicOptions;
 use master::drive::{MotionReport, Report};
-use master::group::GroupError;
 use master::pdo::{PdoConfig, TimerUnits};
 use master::units::Shown;
 use master::{Drive, Network};
@@ -25,9 +25,8 @@ use sim::Place;
 
 use super::command::{Command, PdoCommand};
 use super::outcome::{Row, RowKind, Verdict};
-use super::plan::{HostLine, WantedResult};
+use super::plan::{HostLine, Sheets, WantedResult};
 use machine::file::Machine;
-use machine::group_move::GroupMove;
 use words::object::ObjectArg;
 use words::value::{typed_value, value};
 
@@ -63,6 +62,7 @@ pub(super) struct HostTask {
     pub(super) name: String,
     pub(super) network: Network,
     pub(super) machine: Rc<Machine>,
+    pub(super) sheets: Rc<Sheets>,
     pub(super) shared: Rc<RefCell<HostBoard>>,
 }
 
@@ -153,6 +153,9 @@ impl HostTask {
         match command {
             Command::Drive(place, command) => report(self.drive(*place)?.perform(command).await),
             Command::Group(asked) => self.move_group(asked).await,
+            Command::Base(asked) => self.drive_base(asked).await,
+            Command::Boot(options) => self.boot(options).await,
+            Command::Parameters(node, what, file) => self.parameters(*node, *what, file.as_ref()).await,
             Command::Read(node, object) => self.read(*node, object).await,
             Command::Write(node, object, text) => self.write(*node, object, text).await,
             Command::Pdo(node, pdo) => self.exchange(*node, pdo).await,
@@ -193,28 +196,6 @@ impl HostTask {
             }
             Command::WaitFor(_, within) => self.wait_for(line, *within).await,
         }
-    }
-
-    /// Moves axes as one, as `ferrodrive group move` does; afterwards they have no power.
-    async fn move_group(&self, asked: &GroupMove) -> Done {
-        let (nodes, plan) = asked.axes(Some(&self.machine)).map_err(|failure| failure.one_line())?;
-        let drives = nodes.into_iter().map(|node| self.machine.drive(self.network.node(node))).collect();
-        let planned = asked.plan(plan, drives).await.map_err(|error| error.to_string())?;
-        let mut group = planned.open(CyclicOptions::default()).await.map_err(|error| error.to_string())?;
-        let moved = planned.carry_out(&mut group, |_, _| {}).await;
-        let reason = match &moved {
-            Err(GroupError::Stopped(_)) => group.explain_stop().await,
-            _ => None,
-        };
-        let closed = group.close().await;
-        let run = moved.map_err(|error| match reason {
-            Some(reason) => format!("{error}: {reason}"),
-            None => error.to_string(),
-        })?;
-        closed.map_err(|error| error.to_string())?;
-        let largest_deg = run.largest_turns.iter().fold(0.0_f64, |largest, turns| largest.max(turns * 360.0));
-        let (axes, time) = (planned.axes.len(), Shown(run.time.as_secs_f64()));
-        Ok((format!("{axes} axes moved together in {time} s; largest lag {} deg", Shown(largest_deg)), None))
     }
 
     fn resolve(&self, node: NodeId, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), String> {

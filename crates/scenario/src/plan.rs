@@ -1,7 +1,11 @@
 //! What a scenario is made of: steps, hosts and their lines, expectations, figures.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::time::Duration;
 
+use canopen::NodeId;
+use master::parameters::Parameters;
 use sim::recorder::Signal;
 use sim::stimulus::{BodyStimulus, WireFault};
 use sim::{Place, Stimulus};
@@ -63,6 +67,9 @@ pub(super) struct HostLine {
     pub(super) asked: String,
     pub(super) place: Located,
 }
+
+/// Parameters as they were read for a node: of a file, or without one of the machine file.
+pub(super) type Sheets = BTreeMap<(NodeId, Option<PathBuf>), Parameters>;
 
 /// What is to come of a line.
 #[derive(Clone, Debug, Default)]

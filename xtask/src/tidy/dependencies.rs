@@ -32,7 +32,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("machine", &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives", "sim", "master", "words"]),
     ("recording", &["can", "canopen", "plot", "sim", "words"]),
     ("foxglove", &["can", "recording"]),
-    ("scenario", &["can", "canopen", "cia402", "devices", "machine", "master", "sim", "words"]),
+    ("scenario", &["can", "canopen", "cia402", "devices", "host", "machine", "master", "sim", "words"]),
     (
         "host",
         &[

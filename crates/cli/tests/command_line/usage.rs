@@ -240,7 +240,7 @@ fn quantities_are_checked() {
     refused(&["home", "4", "--method", "first"], &["expected a whole number, -128 to 127, got 'first'"]);
     refused(&["run", "a.toml", "--jobs", "0"], &["expected 1 to 1024, got 0"]);
     refused(&["--timeout", "2", "scan"], &["no unit", "500ms"]);
-    for words in ["velocity 4 60rpm", "torque 4 1A", "record 4 6064 -o a.csv", "dump"] {
+    for words in ["velocity 4 60rpm", "torque 4 1A", "record 4 6064 -o a.csv", "dump", "drive-base --linear 0.1"] {
         let words: Vec<_> = words.split(' ').chain(["--for", "0s"]).collect();
         refused(&words, &["expected a time above 0"]);
     }
@@ -258,7 +258,7 @@ fn buses_are_checked() {
     refused(&["--bus", "http://x", "scan"], &["socketcand://HOST:PORT/can0", "slcan://HOST:PORT"]);
     refused(&["--bus", "socketcand://localhost:99999/can0", "scan"], &["'99999' is not a port"]);
     not_taken(&["--bus", "sim:/nowhere/machine.toml", "scan"], &["/nowhere/machine.toml", "[[drive]]"]);
-    refused(&["--bus", "log:trace.log", "scan"], &["no node can answer", "dump"]);
+    refused(&["--bus", "log:trace.log", "scan"], &["no node can answer", "dump", "drive-base --linear 0.1"]);
 }
 
 #[test]

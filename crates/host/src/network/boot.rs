@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Duration;
 
 use canopen::{Mux, NodeId};
 use devices::Description;
 use eds::{Eds, Value};
 use master::Network;
-use master::boot::{self, BootPlan, ErrorStatus, Expectation, Step, Unconfigured, Verdict};
+use master::boot::{self, Assignment, BootPlan, ErrorStatus, Expectation, Startup, Step, Unconfigured, Verdict};
 use serde::Serialize;
 
 use super::read_machine;
@@ -16,6 +17,7 @@ use machine::file::Machine;
 use words::data_sheet;
 use words::document::read_bytes;
 use words::failure::Failure;
+use words::node::node;
 
 /// What came of a boot-up.
 #[derive(Debug, Serialize)]
@@ -132,6 +134,62 @@ impl BootStep {
             },
             next: step.advice(),
         }
+    }
+}
+
+/// Which nodes are booted, and how far.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BootOptions {
+    /// These alone; all of the plan if there are none.
+    pub nodes: Vec<NodeId>,
+    /// Nodes that are operational too: a motor that turns may stop at once, or go on.
+    pub reset: bool,
+    /// They are left pre-operational.
+    pub no_start: bool,
+}
+
+/// How long a network is given after its boot-up before its configuration is read.
+const SETTLING: Duration = Duration::from_millis(50);
+
+impl FromStr for BootOptions {
+    type Err = String;
+
+    /// What stands behind `boot` in a line of a scenario: its [form](BootOptions::FORM).
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut options = Self::default();
+        let mut words = text.split_whitespace();
+        while let Some(word) = words.next() {
+            match word {
+                "node" => options.nodes.push(node(words.next().ok_or("'node' has no node-ID, as in: boot node 4")?)?),
+                "reset" => options.reset = true,
+                "no-start" => options.no_start = true,
+                _ => return Err(format!("'{word}' is not a part of boot; expected: {}", Self::FORM)),
+            }
+        }
+        Ok(options)
+    }
+}
+
+impl BootOptions {
+    /// It as a line of a host has it.
+    pub const FORM: &str = "boot [node NODE].. [reset] [no-start]";
+
+    /// Boots the nodes of a plan, and reads of those that were left as they are whether they have what is planned. No drive is armed to
+    /// stop without this master: that is for who moves it.
+    pub async fn boot(&self, network: &Network, plan: &mut BootPlan) -> BootReport {
+        plan.guard = false;
+        if self.reset {
+            for expectation in plan.nodes.values_mut() {
+                expectation.assignment = expectation.assignment.without(Assignment::KEEP_ALIVE);
+            }
+        }
+        if self.no_start {
+            plan.startup.0 |= Startup::STARTS_NONE;
+        }
+        let report = network.boot(plan).await;
+        network.sleep(SETTLING).await;
+        let unconfigured = network.unconfigured(plan, &report).await;
+        BootReport::new(plan, &report, &unconfigured)
     }
 }
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 use can::{Bitrate, BusFrame};
 use canopen::NodeId;
 use cia402::ModeOfOperation;
-use host::network::boot::{BootReport, Planned};
+use host::network::boot::{BootOptions, Planned};
 use host::network::check::CheckReport;
 use host::network::explain::ExplainReport;
 use host::network::heard::Counted;
@@ -17,11 +17,11 @@ use host::network::params::journal::default_path;
 use host::network::plan::{CYCLE, PlanReport, SHORTEST_CYCLE, traffic};
 use host::network::scan::{ScanReport, ScannedNode, no_node};
 use machine::file::Machine;
+use master::Network as Core;
 use master::decode::Decoder;
 use master::drive::Drive;
 use master::explain::Overheard;
 use master::plan::{ErrorRate, HostQueue, NodeTraffic, Settings};
-use master::{Network as Core, boot as booting};
 use pyo3::prelude::*;
 use sim::recorder::LiveValues;
 use words::failure::Failure;
@@ -37,9 +37,6 @@ use crate::sheets::{model_of, node_id};
 
 /// Longest wait for an answer, as the default of the command line.
 pub(super) const TIMEOUT: Duration = Duration::from_millis(500);
-
-/// Time for a frame without an answer (NMT) to get onto the bus.
-const SETTLING_TIME: Duration = Duration::from_millis(50);
 
 impl Network {
     /// The models that need not be found out.
@@ -138,20 +135,8 @@ pub(crate) fn boot(
     let (core, known) = (network.core.clone(), network.known());
     network.begin_said(py, async move {
         let mut plan = planned.plan(&core, &known, TIMEOUT, &only, |_| ()).await?;
-        // A guard is armed where something is moved.
-        plan.guard = false;
-        if reset {
-            for expectation in plan.nodes.values_mut() {
-                expectation.assignment = expectation.assignment.without(booting::Assignment::KEEP_ALIVE);
-            }
-        }
-        if !start {
-            plan.startup.0 |= booting::Startup::STARTS_NONE;
-        }
-        let report = core.boot(&plan).await;
-        core.sleep(SETTLING_TIME).await;
-        let unconfigured = core.unconfigured(&plan, &report).await;
-        let report = BootReport::new(&plan, &report, &unconfigured);
+        let options = BootOptions { nodes: only, reset, no_start: !start };
+        let report = options.boot(&core, &mut plan).await;
         let value = Value::report(&report);
         report.failure().map_or(Ok(()), |failure| Err(Trouble::Reported(failure, Box::new(Value::report(&report)))))?;
         Ok(value)

@@ -177,3 +177,83 @@ fn a_group_that_is_not_there_is_refused_before_the_run() {
         assert!(refused.contains(said), "{line}: {refused}");
     }
 }
+
+/// A base of two wheels as a machine, and what its host does.
+fn base(rest: &str) -> Result<Scenario, String> {
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    Scenario::parse(&format!("machine = 'base.toml'\n{rest}"), &examples).map_err(|bad| bad.to_string())
+}
+
+/// Ramps up and down take as long: 0.3 m/s for 2 s are 0.6 m, and 0.5 rad/s for 1 s half a radian.
+#[test]
+fn a_base_goes_by_its_twist_and_stands_where_it_says() {
+    let scenario = base(
+        "[[host]]\nname = 'gone'\ndo = ['drive-base linear 0.3 for 2s', 'drive-base angular 0.5 for 1s']\n\
+         [[expect]]\nafter = 'gone'\nthat = 'body base x_m = 0.6 +- 0.01 and body base heading_deg = 28.6 +- 1'\n\
+         [[expect]]\nafter = 'gone'\nalways = '4 velocity = 0 +- 0.5 and 5 velocity = 0 +- 0.5'\n",
+    )
+    .unwrap();
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+    let (_, seen) = row(&outcome, "drive-base linear 0.3");
+    assert!(seen.starts_with("it stands at x 0.6") || seen.starts_with("it stands at x 0.59"), "{seen}");
+}
+
+#[test]
+fn a_wheel_that_is_lost_stops_the_base_and_its_line_fails() {
+    let scenario = base(
+        "[[step]]\nwhen = '4 velocity > 20'\ndo = '5 cable cut'\n\
+         [[host]]\ndo = [{ do = 'drive-base linear 0.3 for 5s', fails = 'node 5' }]\n\
+         [[expect]]\nfrom = '4s'\nuntil = '4.5s'\nalways = '4 velocity = 0 +- 0.5'\n",
+    )
+    .unwrap();
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+}
+
+/// The machine's settings are in the drive after the boot-up (1017h and 6083h as the file has them), and a drive that is not there
+/// fails it.
+#[test]
+fn a_machine_is_booted_as_its_file_says() {
+    let machine =
+        "[machine]\ndrive = [{ model = 'zlac8030l', node = 4, heartbeat = '200ms', start_up = { 6083 = 700 } }]\n";
+    let lines = "[[host]]\ndo = [{ do = '4 read 6083', is = 500 }, 'boot', { do = '4 read 6083', is = 700 }, { do = '4 read 1017', is = 200 }, \
+                 '4 params verify', 'boot', 'boot node 4 reset']\n\
+                 [[step]]\nname = 'off'\nafter = 'host'\ndo = '4 power off'\n\
+                 [[host]]\ndo = ['wait for done off', 'wait 2s', { do = 'boot', fails = 'node 4' }]\n";
+    let scenario = Scenario::parse(&format!("{machine}{lines}"), Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+}
+
+#[test]
+fn parameters_of_a_file_are_written_checked_and_kept() {
+    let folder = std::env::temp_dir().join(format!("ferrodrive-scenario-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("wheel.toml"), "[values]\n2000 = 700\n1017 = 200\n").unwrap();
+    let text = "[machine]\ndrive = [{ model = 'zlac8030l', node = 4 }]\n\
+                [[host]]\ndo = [{ do = '4 params verify wheel.toml', fails = '2000h:00 is 1000 ms, not 700 ms' }, '4 params apply wheel.toml save', \
+                '4 params verify wheel.toml', '4 nmt reset', '4 params verify wheel.toml', '4 params apply wheel.toml', \
+                '4 enable', { do = '4 params apply wheel.toml', fails = 'nothing was written' }]\n";
+    let scenario = Scenario::parse(text, &folder);
+    std::fs::remove_dir_all(&folder).unwrap();
+    let scenario = scenario.unwrap_or_else(|bad| panic!("{bad}"));
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+}
+
+#[test]
+fn a_base_a_node_and_a_file_that_are_not_there_are_refused_before_the_run() {
+    for (line, said) in [
+        ("drive-base linear 0.3 for 2s", "the machine has no [base]"),
+        ("boot node 9", "the machine has no node 9; it has: 1, 2"),
+        ("9 params verify", "the machine has no node 9; it has: 1, 2"),
+        ("1 params apply missing.toml", "cannot read missing.toml as parameters"),
+        ("1 params apply", "the machine file has no settings for node 1"),
+    ] {
+        let refused = arm(&format!("[[host]]\ndo = ['{line}']\n")).err().unwrap_or_default();
+        assert!(refused.contains(said), "{line}: {refused}");
+    }
+    let refused = base("[[host]]\ndo = ['drive-base linear 3 for 2s']\n").err().unwrap_or_default();
+    assert!(refused.contains("beyond the limits of [base]"), "{refused}");
+}

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::time::Duration;
 
-use canopen::NodeId;
-use machine::file::{BASE_PERIOD, BasePlan, CyclePlan, speed_mode};
+use machine::base_drive::{BaseDrive, come_to_rest, cycle, finite, open, wheels};
+use machine::file::{BASE_PERIOD, CyclePlan};
 use master::base::{Base, BaseError, BaseLimits, BaseState, Geometry, StopCause, Twist, WheelSetup};
 use master::units::{Shown, parse_duration};
 use serde::Serialize;
@@ -22,12 +22,10 @@ use crate::session;
 use console::guard::{GuardArgs, GuardReport};
 use plot::Paint;
 use words::failure::SEE_DRIVES;
+use words::time::some_time;
 
 /// How long a line counts on the virtual bus of this command alone, where no time passes between two lines.
 const VIRTUAL_LINE: Duration = Duration::from_millis(100);
-
-/// How long the wheels may take to stand after their last set-point before the pose is reported.
-const SETTLING: Duration = Duration::from_millis(500);
 
 /// How often a person is shown where the base is.
 const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
@@ -57,7 +55,7 @@ pub(crate) struct DriveBase {
     #[arg(long, value_name = "RAD/S", value_parser = finite, allow_negative_numbers = true, requires = "duration")]
     angular: Option<f64>,
     /// How long to drive (default: twists are read from standard input)
-    #[arg(long = "for", id = "duration", value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long = "for", id = "duration", value_name = "TIME", value_parser = some_time)]
     duration: Option<Duration>,
     /// How long a line is valid (default: the file's watchdog, or 300ms)
     #[arg(long, value_name = "TIME", value_parser = parse_duration, conflicts_with = "duration")]
@@ -66,11 +64,6 @@ pub(crate) struct DriveBase {
     cycles: CycleArgs,
     #[command(flatten)]
     guard: GuardArgs,
-}
-
-fn finite(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-    number.ok_or_else(|| "expected a finite number, e.g. 0.3".into())
 }
 
 /// What came of it.
@@ -116,7 +109,7 @@ struct WheelReport {
 
 /// Where twists come from.
 enum TwistSource {
-    For(Twist, Duration),
+    For(BaseDrive),
     Lines(Receiver<String>),
 }
 
@@ -183,23 +176,18 @@ impl DriveBase {
         };
         let watchdog = self.dead_man.unwrap_or(plan.limits.watchdog);
         let limits = BaseLimits { watchdog, ..plan.limits };
-        if self.duration.is_some() {
-            within_limits(self.twist(), &plan, &limits)?;
+        if let Some(asked) = self.asked() {
+            asked.check(&plan, &limits)?;
         }
-        let mut wheels = Vec::new();
-        for (node, turns) in plan.wheels {
-            wheels.push(wheel(context, &plan, node, turns).await?);
-        }
-        let drives: Vec<_> = wheels.iter().map(|wheel| &wheel.drive).collect();
-        refuse_too_full(context, &CyclePlan::from(&plan), &drives).await?;
+        let [(left, _), (right, _)] = plan.wheels;
+        let wheels = wheels(&plan, [context.known_drive(left).await?, context.known_drive(right).await?]);
+        let [left, right] = &wheels;
+        refuse_too_full(context, &CyclePlan::from(&plan), &[&left.drive, &right.drive]).await?;
         let mut guards = Vec::new();
         for wheel in &wheels {
             guards.push(self.guard.begin(context, &wheel.drive).await?);
         }
-        let [left, right] = &wheels[..] else { return Err(Failure::new("a base has two wheels").next(SEE_DRIVES)) };
-        let options = self.cycles.options();
-        let period = plan.period.unwrap_or(BASE_PERIOD);
-        let driven = match Base::open([left, right], plan.geometry, limits, period, options).await {
+        let driven = match open(&plan, &wheels, limits, self.cycles.options()).await {
             Ok(mut base) => {
                 let driven = self.carry_out(context, &mut base, BaseBounds { geometry: plan.geometry, limits }).await;
                 let state = base.state();
@@ -236,59 +224,28 @@ impl DriveBase {
         let mut seen = BaseRun::default();
         let began = context.network.now();
         match self.source() {
-            TwistSource::For(twist, duration) => {
-                while context.network.now() - began < duration {
-                    bounds.say(context, twist, &mut seen);
-                    base.command(twist)?;
-                    cycle(context, base, began).await?;
-                }
+            TwistSource::For(asked) => {
+                asked.carry_out(base, &context.network, |state| show(context, state, began)).await?;
             }
             TwistSource::Lines(lines) if context.is_embedded() => {
                 follow_virtually(context, (base, bounds), &lines, &mut seen).await?
             }
             TwistSource::Lines(lines) => follow_lines(context, (base, bounds), &lines, &mut seen).await?,
         }
-        base.stop().await?;
-        let settled = context.network.now() + SETTLING;
-        while context.network.now() < settled {
-            base.cycle().await?;
-        }
+        come_to_rest(base, &context.network).await?;
         seen.time = context.network.now() - began;
         Ok(seen)
     }
 
     fn source(&self) -> TwistSource {
-        self.duration
-            .map_or_else(|| TwistSource::Lines(lines_of_input()), |duration| TwistSource::For(self.twist(), duration))
+        self.asked().map_or_else(|| TwistSource::Lines(lines_of_input()), TwistSource::For)
     }
 
-    fn twist(&self) -> Twist {
-        Twist { linear_m_s: self.linear.unwrap_or_default(), angular_rad_s: self.angular.unwrap_or_default() }
+    /// The twist of the command line, with its time; lines of a controller are held to the limits as they come.
+    fn asked(&self) -> Option<BaseDrive> {
+        let (linear_m_s, angular_rad_s) = (self.linear.unwrap_or_default(), self.angular.unwrap_or_default());
+        Some(BaseDrive { twist: Twist { linear_m_s, angular_rad_s }, time: self.duration? })
     }
-}
-
-/// A twist on the command line is meant as it stands: one that the base would slow down is refused. Lines of a controller are held
-/// to the limits as they come.
-fn within_limits(asked: Twist, plan: &BasePlan, limits: &BaseLimits) -> Result<(), Failure> {
-    limits.check()?;
-    let driven = plan.geometry.saturate(asked, limits);
-    if driven == asked {
-        return Ok(());
-    }
-    let shown = |twist: Twist| format!("{} m/s and {} rad/s", Shown(twist.linear_m_s), Shown(twist.angular_rad_s));
-    let [linear, angular, wheel] = [limits.linear_m_s, limits.angular_rad_s, limits.wheel_m_s].map(Shown);
-    Err(Failure::new(format!(
-        "{} is beyond the limits of [base]: {linear} m/s, {angular} rad/s and {wheel} m/s at a wheel",
-        shown(asked)
-    ))
-    .of_kind("out_of_limits")
-    .next(format!("give {}, the most in the same direction, or raise the limits in [base]", shown(driven))))
-}
-
-async fn wheel(context: &Context, plan: &BasePlan, node: NodeId, turns: f64) -> Result<WheelSetup, Failure> {
-    let drive = context.known_drive(node).await?;
-    let mode = plan.mode.unwrap_or_else(|| speed_mode(&drive));
-    Ok(WheelSetup { drive, mode, turns })
 }
 
 /// The lines of standard input, read by a thread: a read cannot be waited for beside the cycles. The thread ends with the input
@@ -306,19 +263,12 @@ fn lines_of_input() -> Receiver<String> {
     lines
 }
 
-/// A cycle, with where the base is for a person; an error once a wheel has stopped it.
-async fn cycle(context: &Context, base: &mut Base, began: can::Instant) -> Result<BaseState, BaseError> {
-    let state = base.cycle().await?;
-    if let Some(cause) = state.cause.filter(|cause| cause.wheel().is_some()) {
-        // Both wheels come to rest before it is reported.
-        base.stop().await?;
-        return Err(BaseError::Stopped(cause));
-    }
+/// Where the base is, for a person.
+fn show(context: &Context, state: &BaseState, began: can::Instant) {
     let elapsed = context.network.now() - began;
     if is_progress_due(elapsed) {
-        context.progress.show(format!("after {:.1} s: {}", elapsed.as_secs_f64(), place(&state)));
+        context.progress.show(format!("after {:.1} s: {}", elapsed.as_secs_f64(), place(state)));
     }
-    Ok(state)
 }
 
 /// True in about one cycle of each such period.
@@ -353,7 +303,8 @@ async fn follow_lines(
         if let Some(twist) = newest {
             take(context, (base, bounds), twist, seen)?;
         }
-        let state = cycle(context, base, began).await?;
+        let state = cycle(base).await?;
+        show(context, &state, began);
         let is_late = matches!(state.cause, Some(StopCause::Watchdog { .. }));
         if let Some(cause) = state.cause.filter(|_| is_late && !was_late) {
             seen.dead_man_stops += 1;
@@ -379,7 +330,7 @@ async fn follow_virtually(
         let end = context.network.now() + VIRTUAL_LINE;
         while context.network.now() < end {
             take(context, (base, bounds), twist, seen)?;
-            cycle(context, base, began).await?;
+            show(context, &cycle(base).await?, began);
         }
     }
     Ok(())

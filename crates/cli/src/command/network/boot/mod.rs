@@ -6,7 +6,6 @@ mod report;
 use std::path::PathBuf;
 
 use canopen::NodeId;
-use master::boot::BootPlan;
 use words::node::node;
 
 use crate::context::Context;
@@ -14,7 +13,7 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Format;
 use crate::session;
-use host::network::boot::BootReport;
+use host::network::boot::{BootOptions, BootReport};
 pub(crate) use planned::{Planned, announce, global_of, plan_of, planned_by};
 
 /// Boot the nodes of a network: check their identities, configure and start them
@@ -57,25 +56,8 @@ impl Boot {
 
     async fn boot(&self, context: &Context, planned: &Planned) -> Result<BootReport, Failure> {
         let mut plan = plan_of(planned, context, &self.nodes).await?;
-        // The heartbeat that a drive would watch ends with this command.
-        plan.guard = false;
-        self.apply(&mut plan);
         announce(context, &plan);
-        let report = context.network.boot(&plan).await;
-        context.settle().await;
-        let unconfigured = context.network.unconfigured(&plan, &report).await;
-        Ok(BootReport::new(&plan, &report, &unconfigured))
-    }
-
-    fn apply(&self, plan: &mut BootPlan) {
-        use master::boot::{Assignment, Startup};
-        if self.reset {
-            for expectation in plan.nodes.values_mut() {
-                expectation.assignment = expectation.assignment.without(Assignment::KEEP_ALIVE);
-            }
-        }
-        if self.no_start {
-            plan.startup.0 |= Startup::STARTS_NONE;
-        }
+        let options = BootOptions { nodes: self.nodes.clone(), reset: self.reset, no_start: self.no_start };
+        Ok(options.boot(&context.network, &mut plan).await)
     }
 }
