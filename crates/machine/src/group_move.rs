@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use cia402::ModeOfOperation;
-use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase};
+use master::group::{AxisLimits, AxisSetup, Group, GroupError, PathError, Phase};
 use master::units::{Along, Angle, Ramp, Rpm, Turns};
 use master::{Drive, cyclic::CyclicOptions};
 
@@ -132,6 +132,22 @@ pub async fn turns_of(drive: &Drive, angle: Angle) -> Result<Turns, master::Erro
     }
 }
 
+/// Turns of a drive's shaft that 32 bits surely count to: with up to 2^24 counts for one turn.
+const SURELY_COUNTED_TURNS: f64 = 127.0;
+
+/// A position of the axis of this number, from 1, as the drive reckons it. Positions of CiA 402 (607Ah, 6064h) are INTEGER32. A drive is
+/// asked for its counts only where it may not fit.
+async fn countable(drive: &Drive, angle: Angle, axis: usize) -> Result<Turns, GroupError> {
+    let Turns(to_turns) = turns_of(drive, angle).await?;
+    if (to_turns * drive.gear().ratio()).abs() > SURELY_COUNTED_TURNS {
+        let most_turns = f64::from(i32::MAX) / drive.counts_per_turn().await?;
+        if to_turns.abs() > most_turns {
+            return Err(PathError::BeyondCounts { axis, to_turns, most_turns }.into());
+        }
+    }
+    Ok(Turns(to_turns))
+}
+
 impl FromStr for GroupMove {
     type Err = String;
 
@@ -253,7 +269,7 @@ impl GroupMove {
             let limits = self.limits(&drive, said.map(|axis| &axis.limits)).await?;
             let target = self.targets.iter().find(|(node, _)| *node == drive.node().id());
             planned.targets.push(match target {
-                Some((_, angle)) => Some(turns_of(&drive, *angle).await?),
+                Some((_, angle)) => Some(countable(&drive, *angle, index + 1).await?),
                 None => None,
             });
             planned.axes.push(AxisSetup { drive, mode, limits });

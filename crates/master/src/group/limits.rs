@@ -103,6 +103,19 @@ pub enum PathError {
         /// The upper limit.
         high: f64,
     },
+    /// A position that its drive cannot count to.
+    #[error(
+        "axis {axis} would go to {} deg, and its drive counts positions of 32 bits, up to {} deg either way. Nothing was moved: \
+         choose a position within", degrees(*to_turns), degrees(*most_turns)
+    )]
+    BeyondCounts {
+        /// Which axis.
+        axis: usize,
+        /// The position, or the way to it.
+        to_turns: f64,
+        /// The most that it counts.
+        most_turns: f64,
+    },
     /// The points of a stream are too far apart, or turn too sharply.
     #[error(
         "axis {axis} would need {quantity} of {} {unit}, and its limit is {} {unit}: let the path take \

@@ -165,6 +165,18 @@ fn a_cable_that_is_cut_in_a_move_stops_the_group() {
     assert!(outcome.passed(), "{:#?}", outcome.rows);
 }
 
+/// A joint has 32768 counts for a turn, and 50 turns for one of the output: 2^31 of them are 1310.72 turns, 471859.2 deg.
+#[test]
+fn a_position_that_no_drive_counts_to_is_refused_before_anything_moves() {
+    let scenario = arm("[[host]]\ndo = [{ do = 'group move 1=1e9deg', fails = '471859.2 deg either way' }, \
+                        { do = 'group move by 2=-471860deg', fails = 'axis 2 would go to -471860 deg' }, \
+                        { do = 'group move 2=2147483649counts', fails = 'either way' }]\n\
+                        [[expect]]\nalways = '1 velocity = 0 and not 1 state operation-enabled'\n")
+    .unwrap();
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+}
+
 #[test]
 fn a_group_that_is_not_there_is_refused_before_the_run() {
     for (line, said) in [
