@@ -103,19 +103,25 @@ fn a_base_that_is_driven_by_a_program_prints_json_alone() {
 fn an_error_behind_lines_of_a_log_says_that_they_are_not_all() {
     let directory = scratch("partial");
     let log = directory.join("bad.log");
-    std::fs::write(&log, "no frame\nnor this\n").unwrap();
+    std::fs::write(&log, "(1.5) can0 20000004#0000000000000000\nno frame\n").unwrap();
     let ended = ferrodrive(&["--json", "decode", log.to_str().unwrap()]);
     assert_eq!(ended.status, Some(1));
     let lines: Vec<Value> = ended.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let (last, before) = lines.split_last().unwrap();
-    assert_eq!(before.len(), 2, "{}", ended.out);
+    assert_eq!(before.len(), 1, "{}", ended.out);
     assert_eq!(
         (&last["ok"], &last["partial"], &last["error"]["kind"]),
         (&json!(false), &json!(true), &json!("no_log"))
     );
-    // Where nothing was printed before it, nothing is partial.
-    let missing = ferrodrive(&["--json", "decode", "/no/such/a.log"]);
-    assert!(!missing.out.contains("partial"), "{}", missing.out);
+    // Where nothing was printed before it, nothing is partial: of a file that is not a log its error is all.
+    std::fs::write(&log, "no frame\nnor this\n").unwrap();
+    for (path, kind) in [("/no/such/a.log", "bad_file"), (log.to_str().unwrap(), "no_log")] {
+        let ended = ferrodrive(&["--json", "decode", path]);
+        assert_eq!((ended.status, ended.out.lines().count()), (Some(1), 1), "{}", ended.out);
+        let said = ended.json();
+        assert_eq!((&said["ok"], &said["error"]["kind"]), (&json!(false), &json!(kind)), "{said}");
+        assert!(said.get("partial").is_none(), "{said}");
+    }
 }
 
 #[test]

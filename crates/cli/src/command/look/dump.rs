@@ -134,6 +134,8 @@ struct Sink {
     log: CommandLog,
     /// Places of a log that were not read.
     lines_skipped: u64,
+    /// The first of them for programs, until a frame shows that the file is a log.
+    unsaid: Vec<Skipped>,
     fd_frames: u64,
     /// The form of the log that is shown, if it is one.
     of: Option<LogFormat>,
@@ -272,6 +274,7 @@ impl Sink {
             format,
             log,
             lines_skipped: 0,
+            unsaid: Vec::new(),
             fd_frames: 0,
             of: None,
             keeps_all: global.log.is_some(),
@@ -289,6 +292,9 @@ impl Sink {
 
     /// Shows a record of a log, and copies it to the log of `--log`.
     fn record(&mut self, record: Record) -> Result<(), Failure> {
+        for skipped in std::mem::take(&mut self.unsaid) {
+            self.print_skipped(&skipped)?;
+        }
         self.log.record(&record);
         let at = record.at.unwrap_or(Instant::ZERO);
         match &record.content {
@@ -360,13 +366,21 @@ impl Sink {
                 Place::Line(line) => (Some(line), None),
                 Place::Byte(byte) => (None, Some(byte)),
             };
-            self.has_printed.set(true);
             let skipped = Skipped { line, byte, skipped: finding.text, reason: finding.reason };
-            return self.format.print_json(&skipped).map_err(Failure::of_stdout);
+            if self.counts.frames() == 0 && self.fd_frames == 0 {
+                self.unsaid.push(skipped);
+                return Ok(());
+            }
+            return self.print_skipped(&skipped);
         }
         // The reader may have gone.
         let _ = writeln!(io::stderr(), "warning: {}", plain(&finding.to_string()));
         Ok(())
+    }
+
+    fn print_skipped(&self, skipped: &Skipped) -> Result<(), Failure> {
+        self.has_printed.set(true);
+        self.format.print_json(skipped).map_err(Failure::of_stdout)
     }
 
     /// Reports how much was skipped, if anything was. A file without a single frame is not a log.
