@@ -177,13 +177,13 @@ fn suggest_by_sense(error: &mut clap::Error, command: &clap::Command, words: &[S
         None if is_model => return,
         None => {}
     }
-    let names: Vec<_> = by_spelling.into_iter().filter(|name| senses::may_be_meant(&word, name)).collect();
+    let all = place.and_then(|place| tips::commands(command, &words[..place]));
+    let names = by_spelling.into_iter().filter(|name| senses::may_be_meant(&word, name)).collect();
+    let names = tips::alike(&word, names, all.is_some());
     if !names.is_empty() {
-        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(tips::alike(&word, names)));
-    } else if let Some(place) = place
-        && let Some(tip) = tips::commands(command, &words[..place])
-    {
-        suggest(error, vec![tip]);
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(names));
+    } else if let Some(all) = all {
+        suggest(error, vec![all]);
     }
 }
 

@@ -38,11 +38,12 @@ pub(crate) fn commands(command: &Command, words: &[String]) -> Option<String> {
     (!is_whole).then(|| format!("{} has: {}", parent.get_name(), names.join(", ")))
 }
 
-/// Those of the similar names that begin as the word does, where there are any: `velocty` is not meant as `plot`.
-pub(crate) fn alike(word: &str, names: Vec<String>) -> Vec<String> {
+/// Those of the similar names that begin as the word does, where there are any: `velocty` is not meant as `plot`. The others serve
+/// where the names are too many to name them all instead.
+pub(crate) fn alike(word: &str, names: Vec<String>, are_few: bool) -> Vec<String> {
     let begins = |name: &String| name.chars().next() == word.chars().next().map(|first| first.to_ascii_lowercase());
     let (alike, others): (Vec<_>, Vec<_>) = names.into_iter().partition(begins);
-    if alike.is_empty() { others } else { alike }
+    if alike.is_empty() && !are_few { others } else { alike }
 }
 
 /// The error of the line with its node directly behind its command, where that gets further: `nmt fly 4` has a node, and a word
@@ -83,8 +84,12 @@ mod tests {
 
     #[test]
     fn a_name_that_begins_otherwise_is_not_meant() {
-        assert_eq!(alike("velocty", vec!["plot".into(), "velocity".into()]), ["velocity"]);
-        assert_eq!(alike("kcan", vec!["scan".into()]), ["scan"]);
+        assert_eq!(alike("velocty", vec!["plot".into(), "velocity".into()], false), ["velocity"]);
+        assert_eq!(alike("kcan", vec!["scan".into()], false), ["scan"]);
+        // All of `params` are named.
+        assert!(alike("frob", vec!["rollback".into()], true).is_empty());
+        let all = commands(&command_line(), &words("params frob")).unwrap_or_default();
+        assert!(all.starts_with("params has: backup, diff, plan, apply"), "{all}");
     }
 
     #[test]
