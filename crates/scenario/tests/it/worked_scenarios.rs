@@ -55,7 +55,7 @@ macro_rules! worked {
 
 worked! {
     brown_out host_dies encoder_breaks one_node_id_twice bus_off battery_lost step_loss emergency_stop homing_stuck_switch
-    wrong_wheel machine_with_io
+    wrong_wheel machine_with_io arm_loses_a_joint
 }
 
 #[test]
