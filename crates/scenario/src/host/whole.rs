@@ -126,8 +126,8 @@ fn booted(report: &BootReport) -> String {
         let (letter, meaning) = (node.letter.unwrap_or_default(), node.meaning.unwrap_or_default());
         format!("node {}: {letter}: {meaning}", node.node)
     });
-    let parts: Vec<_> = std::iter::once(format!("{} booted", counted(whole.len(), "node"))).chain(others).collect();
-    parts.join("; ")
+    let whole = (!whole.is_empty()).then(|| format!("{} booted", counted(whole.len(), "node")));
+    whole.into_iter().chain(others).collect::<Vec<_>>().join("; ")
 }
 
 fn applied_as(report: &ApplyReport) -> String {
