@@ -8,7 +8,7 @@ use crate::{AbortCode, Mux, NmtState, NodeId, connection_set};
 
 const NANOS_PER_MILLI: u64 = 1_000_000;
 /// The highest sub-index of 1016h (CiA 301, 7.5.2.19).
-const MAX_CONSUMERS: u8 = 127;
+pub const MAX_CONSUMERS: u8 = 127;
 
 /// A boot-up or heartbeat frame of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -151,6 +151,35 @@ fn the_manufacturers_status_is_what_the_application_sets_and_no_client_writes_it
     assert_eq!(bench.write(0x1002, 0, 4, 0), Some(0x0601_0002));
 }
 
+/// CiA 301, 7.5.2.19: 1016h has up to 127 entries; which of them a host uses is up to it.
+#[test]
+fn eight_nodes_are_watched_by_whichever_of_127_entries() {
+    let mut rows =
+        vec![(0x1000, 0, U32, "ro", 0, false), (0x1014, 0, U32, "rw", 0x89, false), (0x1016, 0, U8, "ro", 127, false)];
+    // Node 100 as delivered.
+    rows.extend((1..=127).map(|sub| (0x1016, sub, U32, "rw", if sub == 100 { 100 << 16 | 100 } else { 0 }, false)));
+    let mut bench = Bench::new(&rows);
+    let watch = |bench: &mut Bench, sub, node: u32, ms| bench.write(0x1016, sub, 4, node << 16 | ms);
+    for (sub, node) in [(127, 1), (126, 2), (9, 3), (10, 4), (11, 5), (12, 6), (1, 7)] {
+        assert_eq!(watch(&mut bench, sub, node, 1000), None, "entry {sub}");
+    }
+    assert_eq!(watch(&mut bench, 50, 8, 1000), Some(0x0604_0043), "a ninth");
+    assert_eq!(watch(&mut bench, 50, 1, 1000), Some(0x0604_0043), "node 1 twice");
+    assert_eq!(watch(&mut bench, 127, 1, 200), None, "another time");
+    assert_eq!(watch(&mut bench, 9, 0, 0), None);
+    assert_eq!(watch(&mut bench, 50, 8, 100), None, "there is room again");
+    let missed = |bench: &mut Bench, node: u32, ms| {
+        bench.send(&format!("{:03X}#05", 0x700 + node));
+        bench.run(ms).iter().any(|frame| frame.starts_with("089#3081"))
+    };
+    assert!(!missed(&mut bench, 3, 2000), "its entry is 0");
+    assert!(missed(&mut bench, 100, 150), "as delivered");
+    assert_eq!(watch(&mut bench, 100, 0, 0), None);
+    assert!(!missed(&mut bench, 1, 150) && missed(&mut bench, 1, 250), "200 ms now");
+    assert_eq!(watch(&mut bench, 127, 0, 0), None);
+    assert!(missed(&mut bench, 8, 150), "in another entry's room");
+}
+
 /// CiA 301, 7.5.2.23: 1020h is 0 once something else than the tool that wrote it has changed what the device starts with.
 #[test]
 fn the_date_of_the_configuration_is_kept_until_another_configuration_is_stored() {

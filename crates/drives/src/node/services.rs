@@ -4,7 +4,7 @@
 
 use can::{Frame, Instant};
 use canopen::guarding::Guarding;
-use canopen::heartbeat::{Consumer, ConsumerEvent};
+use canopen::heartbeat::{Consumer, ConsumerEvent, MAX_CONSUMERS};
 use canopen::node::Via;
 use canopen::object::{
     COB_ID_EMCY, COB_ID_TIME_STAMP_OBJECT, CONFIGURATION_DATE, CONFIGURATION_TIME, EMERGENCY_CONSUMER_OBJECT,
@@ -19,10 +19,8 @@ use super::overheard::Overheard;
 use super::scanner::Scanner;
 use crate::engine::device::Device;
 
-/// Most nodes that are watched.
-const CONSUMERS: u8 = 8;
-/// The first entry of 1016h beyond them.
-const FIRST_UNWATCHED: u8 = CONSUMERS + 1;
+/// Most nodes that are watched at a time, whichever entries of 1016h name them.
+const CONSUMERS: usize = 8;
 
 /// "save" and "load" (CiA 301, 7.5.2.13 and 7.5.2.14).
 const SAVE: u32 = u32::from_le_bytes(*b"save");
@@ -39,9 +37,7 @@ const LAST_TPDO_MAPPING: u16 = TPDO_MAPPING + PdoNumber::MAX - 1;
 /// The services of one device.
 #[derive(Clone, Debug)]
 pub struct Services<S: Storage> {
-    consumers: [Option<Consumer>; CONSUMERS as usize],
-    /// Whose heartbeat has stayed away.
-    lost: [bool; CONSUMERS as usize],
+    watches: [Option<Watch>; CONSUMERS],
     /// None of a device without 100Ch and 100Dh, and while heartbeats are produced: a device does one of the two.
     guarding: Option<Guarding>,
     /// Whose remote frames guard.
@@ -53,6 +49,22 @@ pub struct Services<S: Storage> {
     generation: u32,
     /// A parameter was written after the date of the configuration.
     changed: bool,
+}
+
+/// A node whose heartbeat is watched.
+#[derive(Clone, Copy, Debug)]
+struct Watch {
+    /// Of the entry of 1016h.
+    sub_index: u8,
+    consumer: Consumer,
+    /// The heartbeat has stayed away.
+    is_lost: bool,
+}
+
+impl Watch {
+    fn of(sub_index: u8, raw: u32) -> Option<Self> {
+        Some(Self { sub_index, consumer: Consumer::from_raw(raw)?, is_lost: false })
+    }
 }
 
 /// What a peer's write was to these services.
@@ -71,8 +83,7 @@ impl<S: Storage> Services<S> {
     /// With what is found in the memory at power-on.
     pub fn new(memory: Memory<S>) -> Self {
         Self {
-            consumers: [None; CONSUMERS as usize],
-            lost: [false; CONSUMERS as usize],
+            watches: [None; CONSUMERS],
             guarding: None,
             node_id: NodeId::MIN,
             answer: None,
@@ -125,12 +136,8 @@ impl<S: Storage> Services<S> {
     /// After the device's restart, before it boots: the stored values of the rows that `wanted` names, and the watches.
     pub fn start(&mut self, device: &mut Device<impl Storage>, wanted: fn(&Entry) -> bool) {
         self.memory.load(device.values_mut(), wanted);
-        self.lost = [false; CONSUMERS as usize];
-        let values = device.values();
-        for (consumer, sub_index) in self.consumers.iter_mut().zip(1..) {
-            let entry = values.table().find(Mux::new(WATCH, sub_index));
-            *consumer = entry.ok().and_then(|slot| Consumer::from_raw(values.raw(slot)));
-        }
+        let mut watches = entries(device.values().view());
+        self.watches = core::array::from_fn(|_| watches.next());
         self.node_id = device.node().node_id();
         self.answer = None;
         self.changed = false;
@@ -161,10 +168,8 @@ impl<S: Storage> Services<S> {
         }
         match (mux.index, mux.sub_index) {
             (TIME_COB_ID | EMCY_CONSUMER, _) => self.overheard.configure(device.values()),
-            (WATCH, sub_index @ 1..=CONSUMERS) => {
-                let position = usize::from(sub_index) - 1;
-                self.consumers[position] = Consumer::from_raw(raw);
-                if core::mem::replace(&mut self.lost[position], false) && !self.misses_anybody() {
+            (WATCH, sub_index @ 1..) => {
+                if self.watch(sub_index, raw) && !self.misses_anybody() {
                     return Written::WatchEnded;
                 }
             }
@@ -192,15 +197,25 @@ impl<S: Storage> Services<S> {
         Written::Service
     }
 
+    /// An entry of 1016h has this value now; true if it was the watch over one that is missed.
+    fn watch(&mut self, sub_index: u8, raw: u32) -> bool {
+        let of_entry = |watch: &Option<Watch>| watch.is_some_and(|watch| watch.sub_index == sub_index);
+        let position = self.watches.iter().position(of_entry).or_else(|| self.watches.iter().position(Option::is_none));
+        let Some(position) = position else { return false };
+        let before = core::mem::replace(&mut self.watches[position], Watch::of(sub_index, raw));
+        before.is_some_and(|watch| watch.is_lost)
+    }
+
     /// A monitored heartbeat producer is silent.
     fn misses_anybody(&self) -> bool {
-        self.lost.contains(&true) || self.guarding.is_some_and(|guarding| guarding.is_lost())
+        self.watches.iter().flatten().any(|watch| watch.is_lost)
+            || self.guarding.is_some_and(|guarding| guarding.is_lost())
     }
 
     /// The frame is a heartbeat that is watched, or the master's guarding.
     #[inline]
     pub fn wants(&self, frame: &Frame) -> bool {
-        self.consumers.iter().flatten().any(|consumer| consumer.can_id() == frame.id())
+        self.watches.iter().flatten().any(|watch| watch.consumer.can_id() == frame.id())
             || self.overheard.wants(frame)
             || (self.guarding.is_some() && Guarding::is_request(frame, self.node_id))
     }
@@ -222,10 +237,9 @@ impl<S: Storage> Services<S> {
             self.answer = Some(guarding.answer(self.node_id, state, now));
             heard = guarding.take_return();
         }
-        for (consumer, lost) in self.consumers.iter_mut().zip(&mut self.lost) {
-            let event = consumer.as_mut().and_then(|consumer| consumer.handle_frame(frame, now));
-            if matches!(event, Some(ConsumerEvent::Heard(_))) {
-                *lost = false;
+        for watch in self.watches.iter_mut().flatten() {
+            if matches!(watch.consumer.handle_frame(frame, now), Some(ConsumerEvent::Heard(_))) {
+                watch.is_lost = false;
                 heard = true;
             }
         }
@@ -240,10 +254,9 @@ impl<S: Storage> Services<S> {
     /// Time has reached `now`; true if something that is watched has stayed away.
     pub fn handle_timeout(&mut self, now: Instant) -> bool {
         let mut any = self.guarding.as_mut().is_some_and(|guarding| guarding.handle_timeout(now));
-        for (consumer, lost) in self.consumers.iter_mut().zip(&mut self.lost) {
-            let event = consumer.as_mut().and_then(|consumer| consumer.handle_timeout(now));
-            if event == Some(ConsumerEvent::Lost) {
-                *lost = true;
+        for watch in self.watches.iter_mut().flatten() {
+            if watch.consumer.handle_timeout(now) == Some(ConsumerEvent::Lost) {
+                watch.is_lost = true;
                 any = true;
             }
         }
@@ -253,7 +266,7 @@ impl<S: Storage> Services<S> {
     /// When [`handle_timeout`](Self::handle_timeout) should next be called.
     pub fn poll_timeout(&self) -> Option<Instant> {
         let guarding = self.guarding.as_ref().and_then(Guarding::poll_timeout);
-        self.consumers.iter().flatten().filter_map(Consumer::poll_timeout).chain(guarding).min()
+        self.watches.iter().flatten().filter_map(|watch| watch.consumer.poll_timeout()).chain(guarding).min()
     }
 
     /// A frame was handed to the bus: an EMCY message goes into the error history.
@@ -269,12 +282,13 @@ impl<S: Storage> Services<S> {
 
 /// What a device with these objects refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).
 pub(super) fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
-    table.iter().filter_map(|(slot, row)| {
+    let may_name_more = table.find(Mux::new(WATCH, CONSUMERS as u8 + 1)).is_ok();
+    table.iter().filter_map(move |(slot, row)| {
         let condition = match (row.index, row.sub_index) {
             (HISTORY, 0) => Condition::Check(only_zero),
             (STORE, 1..) => Condition::Check(only_save),
             (RESTORE, 1..) => Condition::Check(only_load),
-            (WATCH, FIRST_UNWATCHED..) => Condition::Check(only_nobody),
+            (WATCH, 1..) if may_name_more => Condition::Change(no_more_than_are_watched),
             (TIME_COB_ID, 0) => Condition::Change(no_time_producer),
             (TPDO_MAPPING..=LAST_TPDO_MAPPING, 0) => Condition::Check(no_destinations),
             _ => return None,
@@ -309,9 +323,20 @@ fn no_destinations(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     }
 }
 
-/// More nodes than can be watched: an entry for one is refused, as it would have no effect.
-fn only_nobody(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
-    if Consumer::from_raw(raw).is_none() { Ok(()) } else { Err(AbortCode::PARAMETER_INCOMPATIBLE) }
+/// Entries of 1016h that name a node.
+fn entries(values: View<'_>) -> impl Iterator<Item = Watch> {
+    (1..=MAX_CONSUMERS).filter_map(move |sub_index| {
+        let raw = values.value(Mux::new(WATCH, sub_index)).ok()?;
+        Watch::of(sub_index, raw as u32)
+    })
+}
+
+/// One node more than can be watched is refused, as it would have no effect. A node that is watched may get another time.
+fn no_more_than_are_watched(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    let Some(wanted) = Consumer::from_raw(raw) else { return Ok(()) };
+    let is_watched = entries(*values).any(|watch| watch.consumer.node() == wanted.node());
+    let has_room = entries(*values).count() < CONSUMERS;
+    if is_watched || has_room { Ok(()) } else { Err(AbortCode::PARAMETER_INCOMPATIBLE) }
 }
 
 fn only_save(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
