@@ -68,7 +68,7 @@ async fn emptied(bench: &mut Bench, base: u16) -> Result<u16, Finding> {
     Ok(index)
 }
 
-/// Ends a case if the device has refused what its description lets nobody write: whether mappings can be changed is up to the device
+/// Ends a case if the device has refused what is read only by its description: whether mappings can be changed is up to the device
 /// (CiA 301, 7.5.2.36 and 7.5.2.38).
 pub(super) fn end_if_constant(bench: &Bench, index: u16, code: AbortCode) -> Result<(), Finding> {
     if !CONSTANT.contains(&code) || is_writable(bench, index) {
