@@ -97,6 +97,7 @@ mod tests {
         CyclicState {
             statusword: None,
             power: None,
+            is_live: false,
             follows: false,
             position: position.map(Turns),
             velocity: velocity.map(Rpm),
