@@ -1,5 +1,6 @@
 """Programs of the handbook: canopen-python by the names of CiA, and its profile of CiA 402, with every model."""
 
+import random
 import time
 
 import canopen
@@ -48,6 +49,21 @@ def test_two_nodes_have_booted(ferrodrive_world):
     with pytest.raises(canopen.nmt.NmtError, match="Timeout"):
         network[4].nmt.wait_for_bootup(5)
     network.disconnect()
+
+
+def test_a_cut_cable_is_named_after_the_time_limit_whenever_it_is_cut(on_bus):
+    node, drive = on_bus("zlac8030l", canopen.RemoteNode)
+    starts = random.Random(4)
+    for _ in range(50):
+        time.sleep(starts.random())
+        drive.cut_cable()
+        began = time.monotonic()
+        with pytest.raises(canopen.SdoCommunicationError, match="No SDO response received"):
+            node.sdo.upload(0x6041, 0)
+        assert time.monotonic() - began == pytest.approx(node.sdo.MAX_RETRIES * node.sdo.RESPONSE_TIMEOUT, abs=1e-6)
+        drive.join_cable()
+        time.sleep(0.1)  # the request is still on its way
+        node.sdo.upload(0x6041, 0)
 
 
 @pytest.mark.parametrize("model", ferrodrive.models())

@@ -4,6 +4,7 @@ import asyncio
 import concurrent.futures
 import os
 import queue
+import random
 import signal
 import subprocess
 import sys
@@ -147,6 +148,57 @@ def test_a_program_that_only_looks_at_the_clock_gets_there(world):
         while time.monotonic() < end:
             pass
         assert time.monotonic() == pytest.approx(0.1, abs=0.001)
+
+
+def odd_lengths(count, seed=1):
+    """Lengths of waits of which floats hold none exactly."""
+    numbers = random.Random(seed)
+    return [numbers.choice((0.1, 0.2, 0.3, numbers.random())) for _ in range(count)]
+
+
+def test_what_rounding_leaves_of_a_wait_is_waited_for(world):
+    """``end - monotonic()`` leaves less than half a nanosecond, which is no reason for the clock to stand still for ever."""
+    items, condition, semaphore = queue.Queue(), threading.Condition(), threading.Semaphore(0)
+
+    def of_queue(length):
+        with pytest.raises(queue.Empty):
+            items.get(timeout=length)
+
+    def of_condition(length):
+        with condition:
+            assert not condition.wait_for(lambda: False, length)
+
+    def of_semaphore(length):
+        assert not semaphore.acquire(timeout=length)
+
+    def of_loop(length):
+        end = time.monotonic() + length
+        while (now := time.monotonic()) < end:
+            time.sleep(end - now)
+
+    with ferrodrive.virtual_time(world):
+        for wait in (of_queue, of_condition, of_semaphore, of_loop):
+            for length in odd_lengths(250):
+                begin = time.monotonic()
+                wait(length)
+                assert time.monotonic() - begin == pytest.approx(length, abs=1e-8)
+        # Where two floats have nothing between them, the shortest wait of all.
+        before = world.now_ns
+        time.sleep(1e-12)
+        assert world.now_ns == before + 1
+
+
+def test_sleeping_for_no_time_again_and_again_takes_time(world):
+    with ferrodrive.virtual_time(world):
+        end = time.monotonic() + 0.1
+        while time.monotonic() < end:
+            time.sleep(0)
+        assert time.monotonic() == pytest.approx(0.1, abs=0.001)
+        # Once in a while it only lets the others have their turns.
+        time.sleep(1)
+        before = world.now_ns
+        time.sleep(0)
+        assert world.now_ns == before
 
 
 def test_waiting_for_what_can_never_come_is_an_error_that_says_who_waits(world):

@@ -14,7 +14,7 @@ from typing import Any, Optional, Union
 
 import can
 
-from . import turns
+from . import stand_ins, turns
 from .pace import Pace
 from .world import World, at_channel
 
@@ -91,7 +91,7 @@ class FerrodriveBus(can.BusABC):
         if self._pace is not None:
             self._pace.hear(self._probe, timeout_s)
         elif (time := turns.taking_part(self.world)) is not None:
-            until_ns = None if timeout_s is None else time.now_ns() + max(0, round(timeout_s * 1e9))
+            until_ns = None if timeout_s is None else time.now_ns() + stand_ins.wait_ns(timeout_s)
             time.hear(self._probe, until_ns)
         else:
             # A thread that takes no part, or the time is over: nothing comes, but nothing spins either.

@@ -71,6 +71,12 @@ def perf_counter() -> float:
     return REAL.perf_counter() if (time := current_time()) is None else time.glance_ns() / 1e9
 
 
+def wait_ns(seconds: float) -> int:
+    """How long a wait of so many seconds is. One that is longer than nothing takes 1 ns at least: programs wait for the rest,
+    ``end - time.monotonic()``, again and again until there is none, and the rounding of floats leaves less than 1 ns of it."""
+    return max(round(seconds * 1e9), 1 if seconds > 0 else 0)
+
+
 def sleep(seconds: float) -> None:
     """Stands in for ``time.sleep``."""
     if (time := current_time()) is None:
@@ -78,7 +84,7 @@ def sleep(seconds: float) -> None:
     elif seconds < 0:
         raise ValueError("sleep length must be non-negative")
     else:
-        time.sleep_ns(round(seconds * 1e9))
+        time.sleep_ns(wait_ns(seconds))
 
 
 class Lock:
@@ -102,7 +108,7 @@ class Lock:
     def _acquire(self, time: VirtualTime, timeout_s: float) -> bool:
         if timeout_s < 0 and timeout_s != -1:
             raise ValueError("timeout value must be a non-negative number")
-        until_ns = None if timeout_s == -1 else time.now_ns() + round(timeout_s * 1e9)
+        until_ns = None if timeout_s == -1 else time.now_ns() + wait_ns(timeout_s)
         while True:
             wait = time.begin("waits for another thread")
             self._waits.append(wait)
@@ -157,7 +163,7 @@ def join(thread: threading.Thread, timeout: Optional[float] = None) -> None:
     if time is None or newcomer is None or thread is threading.current_thread():
         REAL.join(thread, timeout)
     else:
-        time.join(thread, newcomer, None if timeout is None else time.now_ns() + max(0, round(timeout * 1e9)))
+        time.join(thread, newcomer, None if timeout is None else time.now_ns() + wait_ns(timeout))
 
 
 def select(selector: Any, timeout: Optional[float] = None) -> Any:
@@ -169,7 +175,7 @@ def select(selector: Any, timeout: Optional[float] = None) -> Any:
     ready = REAL.select(selector, 0)
     if ready or (timeout is not None and timeout <= 0):
         return ready
-    until_ns = None if timeout is None else time.now_ns() + round(timeout * 1e9)
+    until_ns = None if timeout is None else time.now_ns() + wait_ns(timeout)
 
     def happened() -> bool:
         ready.extend(REAL.select(selector, 0))

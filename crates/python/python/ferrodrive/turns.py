@@ -108,12 +108,19 @@ class VirtualTime:
 
     def glance_ns(self) -> int:
         """What the clock shows to a participant that reads it."""
+        self._glance()
+        return self.now_ns()
+
+    def _glance(self) -> None:
         self._glances += 1
         if self._glances > FREE_GLANCES:
-            glances = self._glances
-            self.sleep_ns(GLANCE_NS)
-            self._glances = glances
-        return self.now_ns()
+            self._go_on(GLANCE_NS)
+
+    def _go_on(self, ns: int) -> None:
+        """Lets the others have their turns, and so much time pass, without being a wait that somebody meant."""
+        glances = self._glances
+        self.wait(self.begin("sleeps"), self.now_ns() + ns)
+        self._glances = glances
 
     def current(self) -> Optional[Participant]:
         """The participant that this thread is; None for one that takes no part, or waits as any thread does."""
@@ -123,7 +130,11 @@ class VirtualTime:
     # Waiting.
 
     def sleep_ns(self, ns: int) -> None:
-        """Waits so long."""
+        """Waits so long. To sleep for no time is to look again whether something has happened."""
+        if ns == 0:
+            self._go_on(0)
+            self._glance()
+            return
         self.wait(self.begin("sleeps"), self.now_ns() + ns)
 
     def begin(self, reason: str) -> Wait:
