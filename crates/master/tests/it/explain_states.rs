@@ -3,7 +3,7 @@
 
 use crate::support::toy::Toy;
 use crate::support::{Bus, node};
-use can::Station;
+use can::{CanId, Frame, Station};
 use canopen::Mux;
 use devices::servo::CIA402;
 use master::Drive;
@@ -115,4 +115,31 @@ fn a_refused_block_transfer_is_named_once_a_long_value_was_transferred_until_the
     assert_eq!(found.weight, Weight::Warning);
     bus.network.handle_frame(&"704#00".parse().unwrap(), bus.now);
     assert!(!has(&explained_on(&mut bus), "no_block_transfer"));
+}
+
+/// RPDO1 with 6040h, event-driven, under its predefined identifier (CiA 301, 7.5.2.35 and 7.5.2.36); others send it with 06h.
+#[test]
+fn frames_with_a_controlword_that_the_node_does_not_have_are_no_cause() {
+    let explained_with = |controlword: u16, frame: &[u8]| {
+        let toy = servo(READY, controlword, VELOCITY)
+            .u8(0x1400, 0, 2)
+            .u32(0x1400, 1, 0x204)
+            .u8(0x1400, 2, 255)
+            .u8(0x1600, 0, 1)
+            .u32(0x1600, 1, 0x6040_0010);
+        let mut bus = Bus::new(vec![toy]);
+        let drive = Drive::new(bus.network.node(node(4)), &CIA402);
+        let mut heard = Overheard::from(bus.now);
+        heard.note(&Frame::new(CanId::standard(0x204), frame), bus.now);
+        bus.block_on(drive.explain(&heard))
+    };
+    // It was pre-operational all along, and sends no heartbeat: 6040h is as it was switched on.
+    let ignored = explained_with(0x00, &[0x06, 0]);
+    assert!(!has(&ignored, "controlword_by_rpdo") && has(&ignored, "not_enabled"), "{ignored:#?}");
+    let finding = ignored.findings.iter().find(|finding| finding.rule == "rpdo_not_taken").unwrap();
+    assert!(finding.follows.contains("pre-operational") && finding.remedy == "ferrodrive nmt 4 start", "{finding:?}");
+    // Nor does the right one do anything there.
+    assert!(has(&explained_with(0x00, &[0x0F, 0]), "rpdo_not_taken"));
+    let taken = explained_with(0x06, &[0x06, 0]);
+    assert!(has(&taken, "controlword_by_rpdo") && !has(&taken, "rpdo_not_taken"), "{taken:#?}");
 }

@@ -8,6 +8,7 @@ use devices::faults::FaultRow;
 
 use super::finding::{Finding, Topic, cause, warning};
 use super::observed::Observed;
+use crate::pdo::PdoConfig;
 
 const TOPIC: Topic = Topic::Power;
 
@@ -24,7 +25,10 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
     if state == PowerState::OperationEnabled {
         return;
     }
-    findings.extend(by_rpdo(seen, state).or_else(|| not_enabled(seen, state, statusword)));
+    let sent = sent_by_rpdo(seen);
+    findings.extend(sent.as_ref().and_then(|sent| rpdo_not_taken(seen, sent)));
+    let by_rpdo = sent.and_then(|sent| by_rpdo(seen, &sent, state));
+    findings.extend(by_rpdo.or_else(|| not_enabled(seen, state, statusword)));
     findings.extend(no_voltage(seen, state, statusword));
 }
 
@@ -91,38 +95,76 @@ fn missing_bits(controlword: Controlword) -> String {
     }
 }
 
-/// A valid RPDO with the controlword that others send: what is written by SDO lasts until its next frame.
-fn by_rpdo(seen: &Observed, state: PowerState) -> Option<Finding> {
-    let controlword = seen.place(CONTROLWORD);
-    let rpdos = seen.pdos.iter().filter(|(config, cob_id)| {
-        config.pdo.direction == Direction::Rpdo && cob_id.is_valid() && config.map.find(controlword).is_some()
-    });
-    let (config, id, heard) = rpdos
-        .filter_map(|(config, cob_id)| {
-            let id = cob_id.can_id().as_standard()?;
-            Some((config, id, seen.heard.under(id)?))
-        })
-        .next()?;
-    let bits = config.map.find(controlword)?;
-    let sent = Controlword((heard.bits >> bits.start) as u16);
-    (sent.command() != PowerCommand::EnableOperation).then(|| {
+/// The controlword that others send by a valid RPDO, and in which frames.
+struct Sent<'a> {
+    controlword: Controlword,
+    config: &'a PdoConfig,
+    id: u16,
+    count: u64,
+}
+
+fn sent_by_rpdo(seen: &Observed) -> Option<Sent<'_>> {
+    let object = seen.place(CONTROLWORD);
+    let mut rpdos =
+        seen.pdos.iter().filter(|(config, cob_id)| config.pdo.direction == Direction::Rpdo && cob_id.is_valid());
+    rpdos.find_map(|(config, cob_id)| {
+        let bits = config.map.find(object)?;
+        let id = cob_id.can_id().as_standard()?;
+        let heard = seen.heard.under(id)?;
+        Some(Sent { controlword: Controlword((heard.bits >> bits.start) as u16), config, id, count: heard.count })
+    })
+}
+
+/// What is written by SDO lasts until the next frame of an RPDO with the controlword. Frames of which the drive has nothing in 6040h
+/// are no cause.
+fn by_rpdo(seen: &Observed, sent: &Sent<'_>, state: PowerState) -> Option<Finding> {
+    let Sent { controlword, config, id, count } = *sent;
+    let acts = seen.controlword().is_none_or(|has| has == controlword);
+    (acts && controlword.command() != PowerCommand::EnableOperation).then(|| {
         cause(
             TOPIC,
             "controlword_by_rpdo",
             [
                 format!("Operation enabled: from here the controlwords {}", path(seen.style, state)),
                 format!(
-                    "{}. Others send {} ({id:03X}h) with the controlword {sent}; the last of {}; {}",
+                    "{}. Others send {} ({id:03X}h) with the controlword {controlword}; the last of {count}; {}",
                     state.name(),
                     config.pdo,
-                    heard.count,
-                    missing_bits(sent)
+                    missing_bits(controlword)
                 ),
                 "Each of these frames overwrites what is written to 6040h by SDO".to_owned(),
                 format!(
                     "Have the program that sends {} enable the drive, or end it, or take 6040h out of the mapping",
                     config.pdo
                 ),
+            ],
+        )
+    })
+}
+
+/// CiA 301, 7.3.2.2.2: a node takes no PDO before it is operational. Where its state is heard, the PDOs are explained by it; a node
+/// that sends no heartbeat and no PDO does not show it.
+fn rpdo_not_taken(seen: &Observed, sent: &Sent<'_>) -> Option<Finding> {
+    let has = seen.controlword()?;
+    let is_operational = seen.pdos.iter().any(|(config, cob_id)| {
+        let id = cob_id.can_id().as_standard();
+        config.pdo.direction == Direction::Tpdo && id.is_some_and(|id| seen.heard.under(id).is_some())
+    });
+    let Sent { controlword, config, id, count } = *sent;
+    (seen.nmt.is_none() && !is_operational && has != controlword).then(|| {
+        cause(
+            TOPIC,
+            "rpdo_not_taken",
+            [
+                format!("6040h has what {} brings it", config.pdo),
+                format!(
+                    "Controlword {has}, where others send {} ({id:03X}h) with {controlword}; the last of {count}",
+                    config.pdo
+                ),
+                "It may be pre-operational: then it takes no PDO (CiA 301, 7.3.2.2.2). Its NMT state is not known, as it sends no \
+                 heartbeat (1017h)"
+                    .to_owned(),
+                format!("ferrodrive nmt {} start", seen.node),
             ],
         )
     })
