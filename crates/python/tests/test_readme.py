@@ -62,3 +62,17 @@ def test_the_client_of_the_handbook_turns_a_drive_that_has_just_been_started():
         while simulator.world("4 get")["position"] < 1000:
             assert time.monotonic() < deadline, "it did not turn"
             time.sleep(0.05)
+
+
+def test_the_recipes_for_ci_keep_wheels_by_version_and_python_and_end_what_hangs():
+    page = (ROOT / "docs" / "handbook" / "ci.md").read_text(encoding="utf-8")
+    recipes = [recipe for recipe in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL) if "pip wheel" in recipe]
+    assert len(recipes) == 2
+    for recipe in recipes:
+        key = re.search(r"^ *key: (.*)$", recipe, re.MULTILINE)[1]
+        # GitLab's reference, cache:key: no "/"; what a variable brings counts.
+        assert "/" not in key and "python" in key and "FERRODRIVE_AT" in key, key
+        assert "FERRODRIVE_AT: main\n" in recipe and "@$FERRODRIVE_AT" in recipe
+        assert re.search(r"^ *timeout(-minutes)?: 20", recipe, re.MULTILINE) and "pytest --timeout" in recipe
+        # Once where it is written, once where it is kept.
+        assert recipe.count("drives.xml") == 2
