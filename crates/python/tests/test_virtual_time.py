@@ -157,7 +157,7 @@ def odd_lengths(count, seed=1):
 
 
 def test_what_rounding_leaves_of_a_wait_is_waited_for(world):
-    """``end - monotonic()`` leaves less than half a nanosecond, which is no reason for the clock to stand still for ever."""
+    """``end - monotonic()`` leaves less than half a nanosecond, for which the clock must not stand still."""
     items, condition, semaphore = queue.Queue(), threading.Condition(), threading.Semaphore(0)
 
     def of_queue(length):

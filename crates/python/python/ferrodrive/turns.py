@@ -117,7 +117,7 @@ class VirtualTime:
             self._go_on(GLANCE_NS)
 
     def _go_on(self, ns: int) -> None:
-        """Lets the others have their turns, and so much time pass, without being a wait that somebody meant."""
+        """Lets the others have their turns, and so much time pass, without being a wait that the program asked for."""
         glances = self._glances
         self.wait(self.begin("sleeps"), self.now_ns() + ns)
         self._glances = glances
