@@ -550,6 +550,10 @@ impl World {
                 decoder.set_model(node, model);
             }
         }
+        match state.world.log().lost_pdo_setup() {
+            Some(setup) => setup.iter().for_each(|frame| decoder.pass(frame)),
+            None => decoder.forget_pdos(),
+        }
         let mut lines = VecDeque::new();
         for event in state.world.log().iter() {
             let WireEvent::Frame { end, frame, .. } = event else { continue };

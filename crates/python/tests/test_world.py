@@ -440,3 +440,23 @@ def test_analogue_channels_are_there_by_their_objects():
     module.apply("set 6401:02 -1200")
     assert module.analogue == {f"{index}:{sub:02X}": 0 for index in ("6401", "6411") for sub in range(1, 5)} | {"6401:02": -1200}
     assert world.add("cia402", node=5).analogue == {}
+
+
+def test_what_is_in_a_pdo_is_known_after_the_frames_that_mapped_it_have_left(world):
+    with ferrodrive.Network(world) as network:
+        network.boot()
+        # CiA 301, 7.5.2.37 and 7.5.2.38: TPDO1 brings statusword and position, event-driven, each 2 ms.
+        network.download(4, 0x1800, 1, (0x8000_0184).to_bytes(4, "little"))
+        network.download(4, 0x1A00, 0, b"\0")
+        network.download(4, 0x1A00, 1, (0x6041_0010).to_bytes(4, "little"))
+        network.download(4, 0x1A00, 2, (0x6064_0020).to_bytes(4, "little"))
+        network.download(4, 0x1A00, 0, b"\2")
+        network.download(4, 0x1800, 2, b"\xff")
+        network.download(4, 0x1800, 5, b"\4\0")
+        network.download(4, 0x1800, 1, (0x184).to_bytes(4, "little"))
+        network.nmt("start")
+        for _ in range(4):
+            world.run_for(5)
+            said = [line for line in world.decoded_frames(20) if "TPDO1" in line]
+            assert said and all("6041h:00" in line and "6064h:00" in line for line in said), said
+    assert world.statistics()[1] > 2 * 4096

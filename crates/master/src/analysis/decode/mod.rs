@@ -134,6 +134,11 @@ impl Decoder {
         self.pdos.set(node, pdo, id, map);
     }
 
+    /// Takes no PDO's identifier and mapping for granted, nor what was seen of them: more was missed than can be made up for.
+    pub fn forget_pdos(&mut self) {
+        self.pdos = PdoBook::default();
+    }
+
     /// What a frame says. Frames must come in the order they were on the bus.
     pub fn decode(&mut self, frame: &Frame) -> Decoded {
         let service = Service::of(frame.id());
