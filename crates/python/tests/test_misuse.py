@@ -4,6 +4,7 @@ import asyncio
 import json
 import pathlib
 
+import can
 import ferrodrive
 import pytest
 from test_reference import SENSOR
@@ -270,3 +271,30 @@ def test_what_a_network_does_as_a_whole_has_coroutines(world):
 
     with ferrodrive.virtual_time(world), ferrodrive.Network(world) as network:
         asyncio.run(main(network))
+
+
+@pytest.mark.parametrize(
+    ("says", "ask"),
+    [
+        ("rpm is '60rpm'", lambda drive, wheel: drive.velocity("60rpm")),
+        ("degrees is '90 deg'", lambda drive, wheel: drive.move("90 deg")),
+        ("speed_rpm is 'fast'", lambda drive, wheel: drive.move(90, speed_rpm="fast")),
+        ("acceleration_rpm_s is '1'", lambda drive, wheel: drive.velocity(60, acceleration_rpm_s="1")),
+        ("current_a is 'x'", lambda drive, wheel: drive.torque("x")),
+        ("within is '5 s'", lambda drive, wheel: drive.home(35, within="5 s")),
+        ("torque_nm is '2Nm'", lambda drive, wheel: wheel.set_load_torque("2Nm")),
+        ("voltage_v is '48V'", lambda drive, wheel: wheel.set_supply("48V")),
+        ("viscous_nm_s is None", lambda drive, wheel: wheel.set_load_friction(0.2, None)),
+        ("probability is '1%'", lambda drive, wheel: wheel._world.corrupt("1%")),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_text_where_a_number_belongs_is_named_with_its_parameter(world, network, says, ask):
+    with pytest.raises(TypeError) as raised:
+        ask(network.drive(4, "zlac8030l"), world[4])
+    assert str(raised.value) == f"{says}; expected a number"
+
+
+def test_a_pace_that_is_none_is_named(world):
+    with pytest.raises(ValueError, match="pace is 'fast'; expected 'virtual', or virtual seconds for each second of the clock"):
+        can.Bus(interface="ferrodrive", channel=world, pace="fast")

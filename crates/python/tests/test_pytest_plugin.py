@@ -332,8 +332,13 @@ def test_the_marker_says_the_timing_and_the_machine(pytester):
         @pytest.mark.ferrodrive(drive=["zlac8030l@4"])
         def test_unknown(ferrodrive_world):
             pass
+
+        @pytest.mark.ferrodrive(drives="zlac8030l@4")
+        def test_text(ferrodrive_world):
+            pass
         """
     )
     result = pytester.runpytest()
-    result.assert_outcomes(passed=3, errors=2)
+    result.assert_outcomes(passed=3, errors=3)
     result.stdout.fnmatch_lines(["*the bit rate is in the machine file*", "*the marker ferrodrive has no drive; expected bitrate, drives*"])
+    result.stdout.fnmatch_lines(["*the marker ferrodrive has drives='zlac8030l@4'; expected a list, drives=?'zlac8030l@4'?*"])

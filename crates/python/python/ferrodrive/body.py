@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Optional
 
-from .words import Number, word
+from .words import Number, number, word
 
 if TYPE_CHECKING:
     from .world import World
@@ -53,25 +53,25 @@ class Body:
 
         >>> body.set_slope(5, uphill_deg=90)
         """
-        self._do("slope", float(degrees), float(uphill_deg))
+        self._do("slope", number("degrees", degrees), number("uphill_deg", uphill_deg))
 
     def set_grip(self, share: Optional[Number]) -> None:
         """The wheels slip beyond this share of the weight on them (``body base grip 0.1``); None: never (``body base grip off``).
 
         >>> body.set_grip(0.1)
         """
-        self._do("grip", None if share is None else float(share))
+        self._do("grip", None if share is None else number("share", share))
 
     def set_mass(self, mass_kg: Number) -> None:
         """Its mass in kg, as when it is loaded (``body base mass 60``).
 
         >>> body.set_mass(60)
         """
-        self._do("mass", float(mass_kg))
+        self._do("mass", number("mass_kg", mass_kg))
 
     def set_payload(self, mass_kg: Number) -> None:
         """So many kg hang at the tool of an arm (``body arm payload 2``).
 
         >>> arm.set_payload(2)
         """
-        self._do("payload", float(mass_kg))
+        self._do("payload", number("mass_kg", mass_kg))

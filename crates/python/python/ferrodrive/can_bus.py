@@ -55,7 +55,7 @@ class FerrodriveBus(can.BusABC):
             if pace == "virtual":
                 self._time = turns.enter(self.world)
             else:
-                self._pace = Pace.of(self.world, float(pace))
+                self._pace = Pace.of(self.world, _speed(pace))
         except BaseException:
             self.world.remove_probe(self._probe)
             raise
@@ -118,3 +118,10 @@ class FerrodriveBus(can.BusABC):
         self.world.remove_probe(self._probe)
         if self._time is not None:
             turns.leave(self._time)
+
+
+def _speed(pace: Union[str, float]) -> float:
+    try:
+        return float(pace)
+    except (TypeError, ValueError):
+        raise ValueError(f"pace is {pace!r}; expected 'virtual', or virtual seconds for each second of the clock, such as 1.0") from None

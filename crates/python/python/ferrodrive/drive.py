@@ -13,6 +13,7 @@ from . import _native
 from ._native import Job, model_name
 from .errors import MasterError
 from .reports import Capture, DriveState, MotionReport, TestMotionRun, Tuning
+from .words import number
 
 if TYPE_CHECKING:
     from .master import Network
@@ -39,7 +40,7 @@ class _Orders:
         return f"<{type(self).__name__} {self.model} at {self.node}>"
 
     def _begin(self, do_: str, **order: Any) -> Job:
-        given = {name: value for name, value in order.items() if value is not None}
+        given = {name: _given(do_, name, value) for name, value in order.items() if value is not None}
         behind = {} if self.gear_ratio is None else {"gear_ratio": self.gear_ratio}
         return self.network._native.drive(self.node, self.model, {"do_": do_, "guessed": self.guessed, **behind, **given})
 
@@ -67,6 +68,16 @@ class _Orders:
     ) -> Job:
         kept = None if journal is None else os.fspath(journal)
         return begin(self.network._native, self.node, self.model, {**order, "journal": kept})
+
+
+#: What the values of an order are called where they are given.
+_ASKED = {("velocity", "value"): "rpm", ("move", "value"): "degrees", ("torque", "value"): "current_a", ("home", "limit_s"): "within"}
+
+
+def _given(do_: str, name: str, value: Any) -> Any:
+    if name in ("value", "limit_s") or name.endswith(("_rpm", "_rpm_s")):
+        return number(_ASKED.get((do_, name), name), value)
+    return value
 
 
 def _runs(report: dict[str, Any]) -> list[TestMotionRun]:

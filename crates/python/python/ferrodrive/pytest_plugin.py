@@ -107,6 +107,8 @@ def marked(request: pytest.FixtureRequest) -> dict[str, Any]:
     wanted: dict[str, Any] = {} if marker is None else marker.kwargs
     if unknown := sorted(set(wanted) - KNOWN):
         raise ValueError(f"the marker ferrodrive has no {', '.join(unknown)}; expected {', '.join(sorted(KNOWN))}")
+    if isinstance(drives := wanted.get("drives", ()), str):
+        raise ValueError(f"the marker ferrodrive has drives={drives!r}; expected a list, drives=[{drives!r}]")
     return wanted
 
 

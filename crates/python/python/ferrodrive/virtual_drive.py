@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Optional, Union
 
-from .words import Number, word
+from .words import Number, number, word
 
 if TYPE_CHECKING:
     from .world import World
@@ -252,14 +252,14 @@ class VirtualDrive:
 
         >>> world[5].set_load_torque(2.5)
         """
-        self._do("load_torque", float(torque_nm))
+        self._do("load_torque", number("torque_nm", torque_nm))
 
     def set_load_inertia(self, inertia_kg_m2: Number) -> None:
         """Inertia added at the output shaft in kg·m² (``load inertia 0.02``).
 
         >>> world[5].set_load_inertia(0.02)
         """
-        self._do("load_inertia", float(inertia_kg_m2))
+        self._do("load_inertia", number("inertia_kg_m2", inertia_kg_m2))
 
     def set_load_friction(
         self,
@@ -278,7 +278,8 @@ class VirtualDrive:
         if coulomb_nm is None:
             self._do("load_off", "friction")
         else:
-            self._do("load_friction", float(coulomb_nm), float(viscous_nm_s), real(static_nm), real(stribeck_rad_s))
+            sliding = number("coulomb_nm", coulomb_nm), number("viscous_nm_s", viscous_nm_s)
+            self._do("load_friction", *sliding, real("static_nm", static_nm), real("stribeck_rad_s", stribeck_rad_s))
 
     def set_load_pulley(self, mass_kg: Optional[Number], radius_m: Number = 0.05) -> None:
         """A weight in kg on a drum of this radius in m, lifted by positive motion, lowered with a negative radius
@@ -289,7 +290,7 @@ class VirtualDrive:
         if mass_kg is None:
             self._do("load_off", "pulley")
         else:
-            self._do("load_pulley", float(mass_kg), float(radius_m))
+            self._do("load_pulley", number("mass_kg", mass_kg), number("radius_m", radius_m))
 
     def set_load_spring(self, stiffness_nm_rad: Optional[Number], rest_deg: Number = 0) -> None:
         """A spring in N·m/rad, at rest so many degrees from where the shaft is now (``load spring 5 90``); None takes it away
@@ -300,7 +301,7 @@ class VirtualDrive:
         if stiffness_nm_rad is None:
             self._do("load_off", "spring")
         else:
-            self._do("load_spring", float(stiffness_nm_rad), float(rest_deg))
+            self._do("load_spring", number("stiffness_nm_rad", stiffness_nm_rad), number("rest_deg", rest_deg))
 
     def set_load_stop(self, low: Optional[int], high: Optional[int]) -> None:
         """End stops at these actual positions in the drive's counts (``load stop -5000 max``); None leaves that side open, and
@@ -322,7 +323,7 @@ class VirtualDrive:
         if torque_nm is None:
             self._do("load_off", "fan")
         else:
-            self._do("load_fan", float(torque_nm), float(speed_rpm))
+            self._do("load_fan", number("torque_nm", torque_nm), number("speed_rpm", speed_rpm))
 
     def set_load_gear(self, ratio: Optional[Number], backlash_deg: Number = 0) -> None:
         """All of these hang behind a gear of this ratio with so many degrees of backlash (``load gear 10 0.5``); None takes it away
@@ -333,7 +334,7 @@ class VirtualDrive:
         if ratio is None:
             self._do("load_off", "gear")
         else:
-            self._do("load_gear", float(ratio), float(backlash_deg))
+            self._do("load_gear", number("ratio", ratio), number("backlash_deg", backlash_deg))
 
     def clear_loads(self) -> None:
         """Takes all loads away (``load none``).
@@ -367,7 +368,7 @@ class VirtualDrive:
 
         >>> world[5].set_supply(36, limit_a=10)
         """
-        self._do("supply", real(voltage_v), real(limit_a), real(resistance_ohm))
+        self._do("supply", real("voltage_v", voltage_v), real("limit_a", limit_a), real("resistance_ohm", resistance_ohm))
 
     def hold_temperature(self, sensor: str, celsius: Optional[Number]) -> None:
         """Holds a temperature in °C (``temperature motor 95``), or gives it back to the model with None. The sensor is ``motor``
@@ -375,7 +376,7 @@ class VirtualDrive:
 
         >>> world[5].hold_temperature("motor", 95)
         """
-        self._do("temperature", word(sensor), real(celsius))
+        self._do("temperature", word(sensor), real("celsius", celsius))
 
     def set_fault(self, component: str, broken: bool = True) -> None:
         """Breaks or mends a component (``fault hall on``): ``hall``, ``encoder``, ``eeprom``, ``reference``, ``phase``, ``short``,
@@ -398,7 +399,7 @@ class VirtualDrive:
 
         >>> joint.send_pulses(8192, hz=10_000)
         """
-        self._do("pulses", int(count), float(hz))
+        self._do("pulses", int(count), number("hz", hz))
 
     def send_quadrature(self, count: int, hz: Number) -> None:
         """Two channels of an encoder (``quadrature -400 1000``): counts, four a line, negative with the second channel ahead, and
@@ -406,21 +407,21 @@ class VirtualDrive:
 
         >>> joint.send_quadrature(-400, hz=1000)
         """
-        self._do("quadrature", int(count), float(hz))
+        self._do("quadrature", int(count), number("hz", hz))
 
     def send_duty(self, percent: Number) -> None:
         """A square wave of this duty cycle in per cent (``duty 40``), for ever.
 
         >>> joint.send_duty(40)
         """
-        self._do("duty", float(percent))
+        self._do("duty", number("percent", percent))
 
     def send_clock(self, hz: Number) -> None:
         """A level on the second input that changes so many times a second (``clock 10000``), for ever.
 
         >>> joint.send_clock(10_000)
         """
-        self._do("clock", float(hz))
+        self._do("clock", number("hz", hz))
 
     def cut_cable(self) -> None:
         """Cuts its bus cable (``cable cut``). It goes on alone.
@@ -453,7 +454,7 @@ class VirtualDrive:
         if min_ms is None:
             self._do("bus_late")
         else:
-            self._do("bus_late", float(min_ms), float(min_ms if max_ms is None else max_ms))
+            self._do("bus_late", number("min_ms", min_ms), number("max_ms", min_ms if max_ms is None else max_ms))
 
     def set_bus_babble(self, frame: Optional[str], gap_ms: Number = 1) -> None:
         """It sends this frame again so many ms after it went out, for ever (``bus babble 080# 1``); None ends it
@@ -464,7 +465,7 @@ class VirtualDrive:
         if frame is None:
             self._do("bus_babble")
         else:
-            self._do("bus_babble", word(frame), float(gap_ms))
+            self._do("bus_babble", word(frame), number("gap_ms", gap_ms))
 
     def set_bus_overrun(self, frames: Optional[int], service_ms: Number = 1) -> None:
         """It holds so many frames and takes so many ms for each; what comes faster is lost (``bus overrun 2 0.5``); None ends it
@@ -475,7 +476,7 @@ class VirtualDrive:
         if frames is None:
             self._do("bus_overrun")
         else:
-            self._do("bus_overrun", int(frames), float(service_ms))
+            self._do("bus_overrun", int(frames), number("service_ms", service_ms))
 
     def set_bus_corruption(self, probability: Optional[Number]) -> None:
         """Each attempt to send a frame fails with this probability, 0 to 1 (``bus corrupt 0.3``), as with a bad plug at this node;
@@ -483,7 +484,7 @@ class VirtualDrive:
 
         >>> world[5].set_bus_corruption(0.3)
         """
-        self._do("bus_corrupt", 0.0 if probability is None else float(probability))
+        self._do("bus_corrupt", 0.0 if probability is None else number("probability", probability))
 
     def set_object(self, index: int, sub_index: int, value: Union[int, float, str]) -> None:
         """Value of an object of a node whose objects are the outer world's (``set 6000:01 FFh``): what its sensor measured.
@@ -493,9 +494,9 @@ class VirtualDrive:
         self._do("object", index, sub_index, value if isinstance(value, (float, str)) else int(value))
 
 
-def real(value: Optional[Number]) -> Optional[float]:
+def real(name: str, value: Optional[Number]) -> Optional[float]:
     """The number, if there is one."""
-    return None if value is None else float(value)
+    return None if value is None else number(name, value)
 
 
 def whole(value: Optional[int]) -> Optional[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Union
+from typing import SupportsFloat, Union
 
 Number = Union[int, float]
 
@@ -12,6 +12,13 @@ def word(text: str) -> str:
     if not text or text.split() != [text]:
         raise ValueError(f"{text!r} is not a name; expected one word")
     return text
+
+
+def number(name: str, value: object) -> float:
+    """The value of a parameter that is a number; its unit is in its name."""
+    if isinstance(value, SupportsFloat) and not isinstance(value, str):
+        return float(value)
+    raise TypeError(f"{name} is {value!r}; expected a number")
 
 
 def setting(name: str, value: Union[int, float, str]) -> str:

@@ -15,6 +15,7 @@ from .errors import Refused
 from .external import ExternalShaft
 from .virtual_drive import VirtualDrive
 from .turns import taking_part
+from .words import number
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -384,7 +385,7 @@ class World(_native.World):
 
         >>> world.corrupt(0.01)
         """
-        self.disturb("corrupt", float(probability))
+        self.disturb("corrupt", number("probability", probability))
 
     def destroy(self, nth_frame: int, bit: int) -> None:
         """The n-th frame from here on is destroyed at this bit of it, counted from 1 at start of frame (``bus destroy 3 20``).
