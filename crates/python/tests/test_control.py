@@ -58,3 +58,15 @@ def test_time_that_is_moved_by_hand_goes_as_far_as_it_is_told():
         control.request("run", **{"for": "1500ms"})
         assert control.request("now")["t"] == pytest.approx(begin + 1.5, abs=1e-9)
         simulator.wait_until_booted(within=5)
+
+
+def test_the_program_is_the_one_that_the_environment_names(monkeypatch, tmp_path):
+    built = tmp_path / "built"
+    built.write_text("#!/bin/sh\nexit 3\n")
+    monkeypatch.setenv("FERRODRIVE_PROGRAM", str(built))
+    with pytest.raises(ferrodrive.SimulatorError, match="FERRODRIVE_PROGRAM is '.*built', where no program is"):
+        ferrodrive.simulator.program()
+    built.chmod(0o755)
+    assert ferrodrive.simulator.program() == str(built)
+    assert ferrodrive.Simulator([]).command_line[:2] == [str(built), "sim"]
+    assert ferrodrive.Simulator([], path="another").command_line[0] == "another"

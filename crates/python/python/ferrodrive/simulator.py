@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import pathlib
 import queue
 import re
@@ -26,13 +27,18 @@ QUIT_TIMEOUT_S = 5
 
 
 def program() -> str:
-    """Path of the command line that came with this package, or of one on PATH."""
+    """Path of the command line: what ``FERRODRIVE_PROGRAM`` names, else the one that came with this package, or one on PATH."""
+    if named := os.environ.get("FERRODRIVE_PROGRAM"):
+        if (chosen := shutil.which(named)) is None:
+            raise SimulatorError(f"FERRODRIVE_PROGRAM is {named!r}, where no program is; name the built program `ferrodrive`, or unset it")
+        return chosen
     beside = pathlib.Path(sysconfig.get_path("scripts")) / "ferrodrive"
     found = shutil.which(str(beside)) or shutil.which("ferrodrive")
     if found is None:
         raise SimulatorError(
             "the program `ferrodrive` was not found: neither beside this Python nor on PATH; "
-            "`cargo install --path crates/cli` in a clone installs it, and so does the wheel of a release"
+            "`cargo install --path crates/cli` in a clone installs it, and so does the wheel of a release; "
+            "one that is elsewhere is named by FERRODRIVE_PROGRAM"
         )
     return found
 
