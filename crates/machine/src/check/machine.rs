@@ -1,6 +1,7 @@
 //! A machine file as the description of a bus: what its master will do, and the traps that no reader of one value alone sees.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use can::Bitrate;
@@ -55,8 +56,8 @@ pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     let machine = Machine::parse_in(text, folder)?;
     // What the world around the drives refuses is reported too.
     machine.build()?;
-    let both = |file: &Table<'_>| Ok::<_, Vec<Problem>>((places(file), periods(file)));
-    let (places, periods) = reader::read(text, &Parameters::new(), "a machine file", both).unwrap_or_default();
+    let all = |file: &Table<'_>| Ok::<_, Vec<Problem>>((places(file), periods(file), radii(file)));
+    let (places, periods, radii) = reader::read(text, &Parameters::new(), "a machine file", all).unwrap_or_default();
     let mut found = Findings::default();
     let mut report = Reporter { found: &mut found, rule: "shape", node: None };
     let intended = intended(&machine, &places, &periods);
@@ -64,6 +65,8 @@ pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
         report.node = Some(*node);
         traps(*node, place, &mut report);
     }
+    report.node = None;
+    radii.iter().for_each(|radius| wheel_radius(*radius, &mut report));
     intended.moved.iter().for_each(|moved| interpolation(moved, &intended.nodes, &mut report));
     let row = |(node, place): (&NodeId, &IntendedNode)| CheckedNode {
         name: place.name.clone(),
@@ -104,6 +107,27 @@ fn periods(file: &Table<'_>) -> Vec<Place> {
         period.as_ref().map_or_else(|| located(field), located)
     };
     groups.iter().chain(&file.get("base")).map(of).collect()
+}
+
+/// Where bodies and the base say the radius of their wheels, and what it is in m.
+fn radii(file: &Table<'_>) -> Vec<(Place, f64)> {
+    let bodies = file.get("body").and_then(|field| field.list("").ok()).unwrap_or_default();
+    let of = |field: &Field<'_>| {
+        let radius = field.table("", "").ok()?.get("wheel_radius_m")?;
+        Some((located(&radius), radius.number("").ok()?))
+    };
+    bodies.iter().chain(&file.get("base")).filter_map(of).collect()
+}
+
+/// Radii of the wheels of vehicles, in m; one in another unit is outside.
+const WHEELS: RangeInclusive<f64> = 0.005..=2.0;
+
+fn wheel_radius((at, radius_m): (Place, f64), report: &mut Reporter<'_>) {
+    report.rule = "wheel-radius";
+    if !WHEELS.contains(&radius_m) {
+        let what = format!("wheels of a radius of {radius_m} m: expected {} to {} m", WHEELS.start(), WHEELS.end());
+        report.say(Severity::Note, at, what, "give `wheel_radius_m` in metres, such as 0.0865 for 86.5 mm");
+    }
 }
 
 fn intended(machine: &Machine, places: &BTreeMap<u8, Places>, periods: &[Place]) -> Intended {

@@ -488,3 +488,34 @@ fn a_joint_that_interpolates_over_its_own_time_wants_that_cycle() {
     }
     assert_eq!(about(group("mode = \"pv\"\n", "10ms")), None, "by speeds it does not interpolate");
 }
+
+#[test]
+fn wheels_of_an_unlikely_size_are_named_where_the_file_says_it() {
+    // Lines 1 to 6 are the drives.
+    let drives = "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n[[drive]]\nmodel = \"zlac8030l\"\nnode = 5\n";
+    let body =
+        "[[body]]\nname = \"b\"\nkind = \"differential-drive\"\ndrives = [4, 5]\nmass_kg = 30\nwheel_base_m = 0.5\n";
+    let base = "[base]\nwheels = [4, 5]\nturns = [1, -1]\nwheel_base_m = 0.5\nlinear_m_s = 0.5\nangular_rad_s = 1\n\
+                wheel_m_s = 0.9\nwheel_m_s2 = 0.7\n";
+    for (table, line, radius, named) in [
+        (body, 13, "86.5", true),
+        (body, 13, "2.1", true),
+        (body, 13, "0.004", true),
+        (body, 13, "0.0865", false),
+        (body, 13, "2", false),
+        (base, 15, "84", true),
+        (base, 15, "0.084", false),
+    ] {
+        let text = format!("{drives}{table}wheel_radius_m = {radius}\n");
+        let checked = of_machine(&text, std::path::Path::new(".")).unwrap_or_else(|bad| panic!("{text}{bad}"));
+        let found: Vec<_> = checked.findings.iter().filter(|finding| finding.rule == "wheel-radius").collect();
+        assert_eq!(!found.is_empty(), named, "{text}: {found:?}");
+        for finding in found {
+            assert_eq!(
+                (finding.severity, finding.at, finding.node),
+                (Severity::Note, Place { line, column: 18 }, None)
+            );
+            assert!(finding.what.contains(&format!("{radius} m")) && finding.next.contains("86.5 mm"), "{finding:?}");
+        }
+    }
+}
