@@ -5,6 +5,8 @@ import concurrent.futures
 import os
 import queue
 import random
+import sched
+import select
 import signal
 import subprocess
 import sys
@@ -186,6 +188,19 @@ def test_what_rounding_leaves_of_a_wait_is_waited_for(world):
         before = world.now_ns
         time.sleep(1e-12)
         assert world.now_ns == before + 1
+
+
+def test_what_waits_for_the_operating_system_takes_no_virtual_time(world):
+    with ferrodrive.virtual_time(world):
+        subprocess.run([sys.executable, "-c", "import time; time.sleep(0.05)"], check=True)
+        reader, writer = os.pipe()
+        select.select([reader], [], [], 0.01)
+        os.close(reader), os.close(writer)
+        assert world.now == 0
+        by_name = sched.scheduler(time.monotonic, time.sleep)
+        by_name.enter(0.7, 1, lambda: None)
+        by_name.run()
+        assert world.now == pytest.approx(0.7)
 
 
 def test_sleeping_for_no_time_again_and_again_takes_time(world):

@@ -405,7 +405,8 @@ def leave(time: VirtualTime, for_good: bool = False) -> None:
 
 @contextlib.contextmanager
 def virtual_time(world: World) -> Iterator[World]:
-    """While in use, ``time.sleep``, ``time.time`` and everything that waits in this program go by the time of `world`.
+    """While in use, ``time.sleep``, ``time.time`` and what waits in ``threading``, ``queue``, ``concurrent.futures``, ``asyncio`` and
+    python-can go by the time of `world`. A program has one such time, and so one world in it.
 
     ::
 
@@ -413,7 +414,8 @@ def virtual_time(world: World) -> Iterator[World]:
             bus = can.Bus(interface="ferrodrive", channel=world)
             ...
 
-    It ends with the block, whatever was left open in it.
+    It ends with the block, whatever was left open in it. What waits for the operating system (``select.select``, sockets,
+    ``subprocess``) takes no virtual time; nor does ``sched.scheduler()``, which keeps the real clock by its defaults.
 
     >>> import time
     >>> with ferrodrive.virtual_time(world):
