@@ -50,6 +50,8 @@ class Base:
                 except canopen.SdoCommunicationError:
                     if time.monotonic() > end:
                         raise Fault(f"wheel {node_id} is silent") from None
+        # What was asked while a wheel booted is answered too, late; canopen drops what came before it asks again.
+        time.sleep(0.1)
 
     def start(self):
         """Sets both drives up for cyclic velocities and enables them."""
