@@ -108,7 +108,7 @@ pub mod units;
 
 pub use analysis::{decode, explain, latency, plan};
 pub use drive::{Drive, MotionOptions};
-pub use error::{Access, Error, Hints};
+pub use error::{Access, Error, HeardNodes, Hints};
 pub use gear::{Gear, GearError};
 pub use models::Models;
 pub use network::{

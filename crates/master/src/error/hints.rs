@@ -1,7 +1,7 @@
 use core::fmt;
 use std::time::Duration;
 
-use canopen::{AbortCode, NmtState};
+use canopen::{AbortCode, NmtState, NodeId};
 
 /// Direction of an SDO request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,8 +30,46 @@ pub struct Hints {
     pub nmt_state: Option<NmtState>,
     /// Time since any frame of the node.
     pub silent_for: Option<Duration>,
-    /// Other nodes have been heard.
-    pub others: bool,
+    /// The other nodes that have been heard.
+    pub others: HeardNodes,
+}
+
+/// How many of the nodes that are heard a message names.
+const MOST_NAMED: usize = 5;
+
+/// Nodes that have been heard: how many, and the lowest node-IDs. As small as that, since every error may have it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HeardNodes {
+    lowest: [u8; MOST_NAMED],
+    count: u8,
+}
+
+impl FromIterator<NodeId> for HeardNodes {
+    /// Of node-IDs in ascending order.
+    fn from_iter<I: IntoIterator<Item = NodeId>>(nodes: I) -> Self {
+        let mut others = Self::default();
+        for node in nodes {
+            if let Some(place) = others.lowest.get_mut(usize::from(others.count)) {
+                *place = node.raw();
+            }
+            others.count = others.count.saturating_add(1);
+        }
+        others
+    }
+}
+
+/// `Node 4`, `Nodes 1, 2, 3, 4, 5 and 2 more`.
+impl fmt::Display for HeardNodes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.count == 1 { "Node" } else { "Nodes" })?;
+        for (position, node) in self.lowest.iter().take(self.count.into()).enumerate() {
+            write!(f, "{} {node}", if position == 0 { "" } else { "," })?;
+        }
+        match usize::from(self.count).saturating_sub(MOST_NAMED) {
+            0 => Ok(()),
+            more => write!(f, " and {more} more"),
+        }
+    }
 }
 
 impl Hints {
@@ -45,7 +83,7 @@ impl Hints {
                 "send NMT pre-operational or start. Some drives' heartbeats show this state in an alarm: then check supply and cable"
             }
             (_, _, Some(_)) => "check whether it has lost its supply or its cable, or is too busy to answer in time",
-            (_, _, None) if self.others => {
+            (_, _, None) if self.others.count > 0 => {
                 "check its node-ID and its supply (a scan shows who is there); if it is in the NMT state stopped, it answers \
                  after NMT start"
             }
@@ -65,8 +103,8 @@ impl fmt::Display for Hints {
                 "By its last heartbeat, or the last NMT command to it, it is stopped, where SDO does not exist",
             )?,
             (_, _, Some(age)) => write!(f, "It was last heard {} ms ago", age.as_millis())?,
-            (_, _, None) if self.others => {
-                f.write_str("Other nodes are on the bus but this one has never been heard")?;
+            (_, _, None) if self.others.count > 0 => {
+                write!(f, "{} can be heard on the bus, but this one has never been", self.others)?;
             }
             (_, _, None) => f.write_str("Nothing at all has been heard on the bus")?,
         }

@@ -17,7 +17,7 @@ use crate::limits::{AskedNumber, Limits, Setting};
 use crate::units::{Shown, Volts};
 use hints::advice;
 
-pub use hints::{Access, Hints};
+pub use hints::{Access, HeardNodes, Hints};
 
 /// Why the master could not do what it was asked.
 #[derive(Clone, Debug, thiserror::Error)]

@@ -249,7 +249,9 @@ impl Node {
             unsent,
             nmt_state: facts.probable_state(None),
             silent_for: facts.seen_at.map(|at| shared.core.now() - at),
-            others: NodeId::all().any(|other| other != self.id && shared.core.facts(other).seen_at.is_some()),
+            others: NodeId::all()
+                .filter(|other| *other != self.id && shared.core.facts(*other).seen_at.is_some())
+                .collect(),
         }
     }
 }

@@ -255,10 +255,24 @@ fn reset_waits_for_the_boot_up_message_and_a_dead_node_is_explained() {
     let error = bus.block_on(network.node(node(5)).reset(Duration::from_secs(1))).unwrap_err();
     assert!(
         error.to_string().starts_with(
-            "node 5 did not boot within 1000 ms. Other nodes are on the bus but this one has never been heard"
+            "node 5 did not boot within 1000 ms. Node 4 can be heard on the bus, but this one has never been: check its node-ID"
         ),
         "{error}"
     );
+}
+
+#[test]
+fn of_a_node_that_is_not_there_the_others_are_named() {
+    let answer = |others: u8| {
+        let mut toys: Vec<_> = (1..=others).map(Toy::new).collect();
+        toys.iter_mut().for_each(|toy| toy.send(0x700, &[0x7F]));
+        let mut bus = Bus::new(toys);
+        let network = bus.network.clone();
+        bus.block_on(network.node(node(50)).read::<u32>(DEVICE_TYPE)).unwrap_err().to_string()
+    };
+    assert!(answer(0).contains("Nothing at all has been heard"), "{}", answer(0));
+    assert!(answer(3).contains("Nodes 1, 2, 3 can be heard"), "{}", answer(3));
+    assert!(answer(10).contains("Nodes 1, 2, 3, 4, 5 and 5 more can be heard"), "{}", answer(10));
 }
 
 #[test]
