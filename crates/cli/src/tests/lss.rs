@@ -88,3 +88,31 @@ fn a_device_is_found_by_its_make_and_a_listener_reads_it_in_words() {
         assert!(reported.contains(words), "{words}: {reported}");
     }
 }
+
+#[test]
+fn only_is_refused_where_more_than_one_device_answers() {
+    let bus = VirtualBus::of(&["cia402@4,1018:04=7", "cia402@5,1018:04=9"]);
+    for words in
+        [&["lss", "inquire", "only"][..], &["lss", "set", "only", "--node-id", "9"], &["lss", "set", "only", "--store"]]
+    {
+        let several = refused(&bus, words);
+        assert_eq!(several.status, Some(1), "{words:?}");
+        assert!(several.out.contains("more than one device answers"), "{words:?}: {}", several.out);
+    }
+    // A reset would have shown a node-ID that was set in spite of it.
+    bus.json(&["nmt", "all", "reset-communication"]);
+    for node in ["4", "5"] {
+        assert_eq!(bus.json(&["read", node, "1018:02"])["value"], json!(402));
+    }
+}
+
+#[test]
+fn a_node_id_that_is_in_use_is_refused_before_anything_is_set() {
+    let bus = VirtualBus::of(&["cia402@4,1018:04=7", "cia402@5,1018:04=9"]);
+    let in_use = refused(&bus, &["lss", "set", "0:192:10000:7", "--node-id", "5", "--reset"]);
+    assert!(in_use.status == Some(1) && in_use.out.contains("node-ID 5 is in use"), "{}", in_use.out);
+    assert_eq!(bus.json(&["read", "4", "1018:04"])["value"], json!(7));
+    // Its own it may keep.
+    let own = bus.json(&["lss", "set", "0:192:10000:7", "--node-id", "4"]);
+    assert_eq!(own["done"], json!(["node-ID 4"]));
+}

@@ -6,6 +6,7 @@ use can::Bitrate;
 use canopen::lss::{
     Address, BIT_RATES_KBIT, Bound, Client, FastScan, Outcome, Part, Reply, Request, Search, UNCONFIGURED,
 };
+use canopen::object::DEVICE_TYPE;
 use canopen::{NmtCommand, NodeId};
 use master::units::parse_duration;
 use serde::Serialize;
@@ -204,13 +205,15 @@ struct FoundDevice {
 struct LssMaster<'a> {
     context: &'a Context,
     client: Client,
+    /// Longest wait for each answer.
+    within: Duration,
 }
 
 impl Lss {
     /// Does it. All devices wait again afterwards.
     pub(crate) async fn run(&self, context: &Context) -> Result<LssReport, Failure> {
         context.traffic.listen();
-        let mut master = LssMaster { context, client: Client::new(self.within) };
+        let mut master = LssMaster { context, client: Client::new(self.within), within: self.within };
         let done = match &self.what {
             LssCommand::Scan => master.scan().await,
             LssCommand::Identify { make } => master.identify(*make).await,
@@ -254,13 +257,17 @@ impl Set {
 }
 
 impl LssMaster<'_> {
+    fn begin(&mut self, request: Request) {
+        self.client.ask(request, self.context.network.now());
+        if let Some(frame) = self.client.poll_transmit() {
+            self.context.network.transmit(frame);
+        }
+    }
+
     /// Asks, and waits for the answer; `None` if there is none, or is to be none.
     async fn ask(&mut self, request: Request) -> Option<Reply> {
+        self.begin(request);
         let network = &self.context.network;
-        self.client.ask(request, network.now());
-        if let Some(frame) = self.client.poll_transmit() {
-            network.transmit(frame);
-        }
         while let Some(due) = self.client.poll_timeout() {
             let now = network.now();
             let left = if due > now { due - now } else { Duration::ZERO };
@@ -278,6 +285,49 @@ impl LssMaster<'_> {
             }
         }
         None
+    }
+
+    /// Asks, and hears everything that comes for as long as an answer may take.
+    async fn ask_all(&mut self, request: Request) -> Vec<Reply> {
+        self.begin(request);
+        let (context, mut replies) = (self.context, Vec::new());
+        let listening = async {
+            loop {
+                let reply = Reply::parse(&context.traffic.next().await.frame);
+                replies.extend(reply.filter(|reply| request.is_answered_by(reply)));
+            }
+        };
+        tokio::select! {
+            () = listening => {}
+            () = context.network.sleep(self.within) => {}
+        }
+        replies
+    }
+
+    /// Refuses where more than one device answers: of a question to all of them the answers differ in one of the five.
+    async fn is_alone(&mut self) -> Result<(), Failure> {
+        for request in Part::ALL.into_iter().rev().map(Request::Inquire).chain([Request::InquireNodeId]) {
+            let mut replies = self.ask_all(request).await;
+            replies.dedup();
+            if replies.len() > 1 {
+                return Err(several());
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a node-ID that another device has: two nodes with one node-ID disturb each other.
+    async fn is_free(&self, new: NodeId) -> Result<(), Failure> {
+        let network = &self.context.network;
+        let answer = self.context.node(new).upload(DEVICE_TYPE).await;
+        // A node that is stopped answers no SDO.
+        if matches!(answer, Err(master::Error::NoAnswer { .. })) && !network.seen().contains(new) {
+            return Ok(());
+        }
+        Err(Failure::new(format!("node-ID {new} is in use: a node {new} is on the bus"))
+            .at_node(new)
+            .because("nothing was set")
+            .next("choose another, or give that node another one first; ferrodrive scan shows the nodes"))
     }
 
     async fn scan(&mut self) -> Result<LssReport, Failure> {
@@ -354,7 +404,7 @@ impl LssMaster<'_> {
         self.ask(Request::SwitchGlobal(false)).await;
         let MeantDevice::At(address) = device else {
             self.ask(Request::SwitchGlobal(true)).await;
-            return Ok(());
+            return self.is_alone().await;
         };
         let mut selected = None;
         for (part, number) in Part::ALL.into_iter().zip(address.numbers) {
@@ -398,6 +448,10 @@ impl LssMaster<'_> {
             Some(Reply::NodeId(node)) => Some(NodeId::new(node)),
             _ => None,
         };
+        let wanted = set.node_id.map(|NodeIdArg(node)| NodeId::new(node));
+        if let Some(new) = wanted.flatten().filter(|new| before.flatten() != Some(*new)) {
+            self.is_free(new).await?;
+        }
         if let Some(NodeIdArg(node)) = set.node_id {
             let what = if node == UNCONFIGURED { "no node-ID".to_owned() } else { format!("node-ID {node}") };
             let answer = self.ask(Request::ConfigureNodeId(node)).await;
@@ -416,7 +470,6 @@ impl LssMaster<'_> {
             self.ask(Request::ActivateBitRate(silence.as_millis() as u16)).await;
             done.push(format!("new bit rate from {} ms on", silence.as_millis()));
         }
-        let wanted = set.node_id.map(|NodeIdArg(node)| NodeId::new(node));
         let change = before.flatten().zip(wanted).filter(|(old, new)| Some(*old) != *new);
         Ok(LssReport { devices: Vec::new(), done, pending: None, change })
     }
@@ -424,6 +477,12 @@ impl LssMaster<'_> {
 
 fn went_away() -> Failure {
     Failure::new("a device stopped answering in the middle of the scan").next("give it more time: --within 200ms")
+}
+
+fn several() -> Failure {
+    Failure::new("more than one device answers")
+        .because("`only` is for a bus with a single LSS device; nothing was set")
+        .next("name one by its address: `ferrodrive lss identify VENDOR:PRODUCT` and `lss scan` list them, and `ferrodrive read NODE 1018:*` reads it")
 }
 
 fn no_answer(who: &str) -> Failure {
