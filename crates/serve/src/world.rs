@@ -329,8 +329,10 @@ impl ServedWorld {
             if let Some(FollowedExecution { execution, .. }) = &mut self.execution {
                 execution.hear(&mut self.world, Occurrence::Wire(&event));
             }
-            if let WireEvent::Error { at, cause, .. } = event
+            // What a node behind a cut cable tries does not reach the wire of the others.
+            if let WireEvent::Error { at, source, cause, .. } = event
                 && self.hears()
+                && (source == self.adapter.index() || !self.world.is_source_cut(source))
             {
                 self.heard.push_back(Heard::Error { error: error_frame(cause), at });
             }

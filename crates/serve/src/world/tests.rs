@@ -64,3 +64,26 @@ fn an_error_on_the_wire_is_heard_by_clients() {
     let errors = heard.iter().filter(|heard| matches!(heard, Heard::Error { .. })).count();
     assert!(errors > 0 && errors as u64 == disturbed, "{errors} of {disturbed}: {heard:?}");
 }
+
+#[test]
+fn what_a_node_behind_a_cut_cable_tries_is_not_heard_by_clients() {
+    let mut world = World::new(Bitrate::K500, 1);
+    world.add_probe();
+    for node in [4, 5] {
+        world.add_drive(node, Box::new(zlac8030l(node, 1))).expect("another");
+    }
+    let pacer = Pacer::new(Clock::Manual, Speed::Times(1.0));
+    let mut served = ServedWorld::new(world, pacer, false, Messages::silent());
+    // It boots alone: its boot-up message is never acknowledged.
+    for command in ["4 cable cut", "4 power cycle"] {
+        assert!(matches!(served.command(command), Commanded::Done(_)), "{command}");
+    }
+    assert!(matches!(served.command("run 3s"), Commanded::Begun));
+    let target = served.target(Instant::from_millis(1));
+    served.advance_to(target);
+    let heard: Vec<_> = std::iter::from_fn(|| served.take_heard()).collect();
+    assert!(!heard.iter().any(|heard| matches!(heard, Heard::Error { .. })), "{heard:?}");
+    // That of the other was.
+    let is_boot_up = |heard: &&Heard| matches!(heard, Heard::Carried { frame, .. } if frame.to_string() == "705#00");
+    assert_eq!(heard.iter().filter(is_boot_up).count(), 1, "{heard:?}");
+}

@@ -183,6 +183,11 @@ impl World {
         self.bus.is_cut(id.0)
     }
 
+    /// True while the cable of the sender of a [`WireEvent`](crate::wire::WireEvent) is cut: the event is on a wire of its own.
+    pub fn is_source_cut(&self, source: usize) -> bool {
+        self.bus.is_cut(source)
+    }
+
     /// True if a station was taken off the bus for good.
     pub fn is_gone(&self, id: StationId) -> bool {
         matches!(self.members[id.0], Member::Gone(_))
