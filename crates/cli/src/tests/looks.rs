@@ -138,3 +138,19 @@ fn what_is_on_a_bus_is_shown_as_it_comes() {
         (&json!(9), &json!(0x2310), &json!(2))
     );
 }
+
+#[test]
+fn a_node_that_is_stopped_and_sends_no_heartbeat_is_explained_with_how_to_start_it() {
+    let bench = VirtualBus::of(&["zlac8030l@4", "m4230e17b50@1"]).with(&["--model", "4=zlac8030l"]);
+    // Pre-operational after its boot-up, and 1017h is 0: no one can hear in which state it is (CiA 301, 7.3.2.2.1: no PDO).
+    bench.done(&["pdo", "apply", "4", "tpdo1=statusword", "--type", "255", "--event", "100ms"]);
+    let silent = bench.done(&["explain", "4"]).out;
+    assert!(silent.contains("pdo_missing") && silent.contains("operational only: ferrodrive nmt 4 start"), "{silent}");
+    bench.done(&["nmt", "4", "start"]);
+    assert!(!bench.done(&["explain", "4"]).out.contains("pdo_missing"));
+    bench.done(&["nmt", "4", "stop"]);
+    let stopped = bench.run(&["explain", "4"]);
+    assert_eq!(stopped.status, Some(1), "{}{}", stopped.out, stopped.err);
+    assert!(stopped.out.contains("in the NMT state stopped and sends no heartbeat"), "{}", stopped.out);
+    assert!(stopped.err.contains("ferrodrive nmt 4 start"), "{}", stopped.err);
+}

@@ -8,9 +8,10 @@ use master::units::parse_duration;
 
 use crate::context::Context;
 use crate::failure::Failure;
-use host::network::explain::ExplainReport;
+use host::network::explain::{ExplainReport, ExplainRow};
 use plot::Paint;
 use plot::Table;
+use serde::Serialize;
 use words::node::node;
 
 /// Explain why a drive does not move, and why its PDOs are silent
@@ -32,7 +33,7 @@ pub struct Explain {
 
 impl Explain {
     /// Listens, reads, concludes.
-    pub async fn run(&self, context: &Context) -> Result<ExplainReport, Failure> {
+    pub async fn run(&self, context: &Context) -> Result<Explanation, Failure> {
         context.show(format!("listening for {} ms", self.watch.as_millis()));
         let heard = context.shell.overhear(self.watch).await;
         context.show(format!("node {}: reading its objects", self.node));
@@ -42,12 +43,35 @@ impl Explain {
             Err(failure) if failure.kind == "no_answer" => Drive::of_unknown_model(context.node(self.node)),
             Err(failure) => return Err(failure),
         };
-        Ok(ExplainReport::from(drive.explain(&heard).await))
+        let report = ExplainReport::from(drive.explain(&heard).await);
+        Ok(Explanation { ok: !report.findings.iter().any(is_silence), report })
     }
 }
 
+/// What was found, and whether the node answered.
+#[derive(Debug, Serialize)]
+pub struct Explanation {
+    ok: bool,
+    #[serde(flatten)]
+    report: ExplainReport,
+}
+
+impl Explanation {
+    /// That the node did not answer: as any command that asks it fails, though this one says more of it.
+    pub fn failure(&self) -> Option<Failure> {
+        let silence = self.report.findings.iter().find(|row| is_silence(row))?;
+        let node = self.report.node;
+        let failure = Failure::new(format!("node {node} did not answer")).of_kind("no_answer").next(&silence.remedy);
+        Some(NodeId::new(node).into_iter().fold(failure, Failure::at_node))
+    }
+}
+
+fn is_silence(row: &ExplainRow) -> bool {
+    row.rule == "no_answer"
+}
+
 /// What was found, as lines for people.
-pub fn text(report: &ExplainReport, paint: Paint) -> String {
+pub fn text(Explanation { report, .. }: &Explanation, paint: Paint) -> String {
     let mut lines = vec![report.headline()];
     if report.causes == 0 {
         lines.push("Nothing found that keeps it from moving.".to_owned());

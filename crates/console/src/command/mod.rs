@@ -7,7 +7,6 @@ pub mod home;
 pub mod motion;
 
 use clap::Subcommand;
-use host::network::explain::ExplainReport;
 use master::drive::{self as master_drive, Motion};
 use plot::Paint;
 use serde::Serialize;
@@ -55,7 +54,7 @@ pub enum Outcome {
     /// What a drive says of itself.
     State(Box<StateReport>),
     /// Why it does not move.
-    Explained(Box<ExplainReport>),
+    Explained(Box<explain::Explanation>),
     /// Of a stop.
     Stopped(StopOutcome),
     /// Of a motion.
@@ -140,7 +139,8 @@ impl Outcome {
     pub fn failure(&self) -> Option<Failure> {
         match self {
             Self::Stopped(outcome) => outcome.failure(),
-            Self::State(_) | Self::Explained(_) | Self::Moved(_) => None,
+            Self::Explained(explanation) => explanation.failure(),
+            Self::State(_) | Self::Moved(_) => None,
         }
     }
 }

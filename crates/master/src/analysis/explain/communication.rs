@@ -39,9 +39,13 @@ fn silent(seen: &Observed) -> Option<Finding> {
                 .to_owned(),
         ),
         _ => (
-            "No node is there, or its bit rate, node-ID or cable is wrong".to_owned(),
-            "Check its supply and cable, the termination (120 ohm at both ends), and who is there: ferrodrive scan"
+            "No node is there, its bit rate, node-ID or cable is wrong, or it is in the NMT state stopped and sends no \
+             heartbeat"
                 .to_owned(),
+            format!(
+                "Check its supply and cable, the termination (120 ohm at both ends), and who is there: ferrodrive scan; \
+                 a node that is stopped answers after: ferrodrive nmt {node} start"
+            ),
         ),
     };
     let expected = "It answers SDO requests".to_owned();

@@ -1,7 +1,5 @@
 //! PDOs one by one: why one is silent, by [`why_silent`], and which of that is a finding.
 
-use std::time::Duration;
-
 use canopen::CobId;
 use canopen::pdo::{Direction, EventTrigger, PdoId};
 
@@ -95,7 +93,7 @@ fn reason(seen: &Observed, config: &PdoConfig, cob_id: CobId) -> Option<Reason> 
         return Some(Reason { rule, is_finding: !rule.is_empty(), why: silence.to_string(), remedy });
     }
     if is_tpdo {
-        return Some(unsent(config, seen.heard.listened()));
+        return Some(unsent(config, seen));
     }
     let (shortest, mapped) = (usize::from(heard?.shortest), config.map.bytes());
     (shortest < mapped).then(|| Reason {
@@ -107,7 +105,8 @@ fn reason(seen: &Observed, config: &PdoConfig, cob_id: CobId) -> Option<Reason> 
 }
 
 /// Why a TPDO that nothing keeps away was not heard: listening was shorter than its period, or it had to come.
-fn unsent(config: &PdoConfig, listened: Duration) -> Reason {
+fn unsent(config: &PdoConfig, seen: &Observed) -> Reason {
+    let listened = seen.heard.listened();
     let as_set_up = |why: String| Reason { rule: "", is_finding: false, why, remedy: String::new() };
     match (config.transmission.0, config.event_time, config.inhibit_time) {
         (every @ 2..=240, ..) => as_set_up(format!("it comes only after every {every}. SYNC")),
@@ -117,6 +116,16 @@ fn unsent(config: &PdoConfig, listened: Duration) -> Reason {
         (.., Some(inhibit)) if inhibit >= listened => {
             as_set_up(format!("its inhibit time of {} ms is longer than was listened", inhibit.as_millis()))
         }
+        // CiA 301, 7.3.2.2.1: PDOs exist in the state operational alone.
+        _ if seen.nmt.is_none() => Reason {
+            rule: "pdo_missing",
+            is_finding: true,
+            why:
+                "it should have come in this time if the node is operational; without a heartbeat its NMT state is not \
+                  known"
+                    .to_owned(),
+            remedy: format!("PDOs run in the NMT state operational only: ferrodrive nmt {} start", seen.node),
+        },
         _ => Reason {
             rule: "pdo_missing",
             is_finding: true,
