@@ -76,7 +76,8 @@ impl TypedLine {
 
     fn bus(&self) -> String {
         let given = self.values("--bus").last().map(str::to_owned);
-        given.or_else(|| std::env::var("FERRODRIVE_BUS").ok()).unwrap_or_else(|| "sim".to_owned())
+        let of_environment = || std::env::var("FERRODRIVE_BUS").ok().filter(|bus| !bus.is_empty());
+        given.or_else(of_environment).unwrap_or_else(|| "sim".to_owned())
     }
 
     /// The node that the command is about, as far as the line says it yet.

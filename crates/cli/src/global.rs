@@ -27,6 +27,16 @@ fn sdo_server(text: &str) -> Result<(NodeId, u16), String> {
     Ok((node(at)?, number.ok_or("expected the number of an SDO server, 1 to 128: 2 is that of 1201h")?))
 }
 
+/// Request and answer together take half a millisecond on the wire at 500 kbit/s.
+fn answer_time(text: &str) -> Result<Duration, String> {
+    let time = some_time(text)?;
+    if time < Duration::from_millis(1) {
+        Err("no node answers in less than 1ms; 500ms is usual".into())
+    } else {
+        Ok(time)
+    }
+}
+
 /// What every command takes.
 #[derive(Clone, clap::Args)]
 #[command(next_help_heading = "On every command")]
@@ -82,7 +92,7 @@ pub(crate) struct Global {
     pub(crate) log: Option<LogPath>,
 
     /// Longest wait for each answer of a node
-    #[arg(long, value_name = "TIME", value_parser = some_time, default_value = "500ms", global = true)]
+    #[arg(long, value_name = "TIME", value_parser = answer_time, default_value = "500ms", global = true)]
     pub(crate) timeout: Duration,
 
     /// What it says.

@@ -98,6 +98,15 @@ fn matches() -> Result<ArgMatches, clap::Error> {
     else {
         return Err(error);
     };
+    if error.kind() == ErrorKind::UnknownArgument
+        && let Some(joined) = word_order::with_negative_values(&words)
+    {
+        match parse(&command, &joined) {
+            Ok(matches) => return Ok(matches),
+            Err(judged) if judged.kind() == ErrorKind::ValueValidation => return Err(judged),
+            Err(_) => {}
+        }
+    }
     if let Some(Err(help)) = help::without_help_of_help(&words).map(|words| parse(&command, &words))
         && !help.use_stderr()
     {
@@ -170,6 +179,9 @@ fn suggest_by_sense(error: &mut clap::Error, command: &clap::Command, words: &[S
         _ => Vec::new(),
     };
     let place = words.iter().position(|other| *other == word);
+    if let Some(meant) = place.and_then(|place| word_order::in_lower_case(command, words, place)) {
+        return suggest(error, vec![format!("did you mean: {}", word_order::text(&meant))]);
+    }
     let by_sense = place.and_then(|place| senses::tips(command, words, place));
     // The spelling of a model has its own suggestion.
     match by_sense {

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use clap::builder::Resettable;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory};
 use transport::BusSpec;
@@ -140,7 +141,17 @@ const INIT_OF_DRIVES: Unheeded = Unheeded {
 
 /// The command line as it is parsed and shown.
 pub(crate) fn command_line() -> clap::Command {
-    help::dressed(heeded())
+    without_empty_variables(help::dressed(heeded()))
+}
+
+/// An environment variable that is empty counts as one that is not set: `FERRODRIVE_BUS= ferrodrive scan`.
+fn without_empty_variables(command: clap::Command) -> clap::Command {
+    let is_empty = |name: &std::ffi::OsStr| std::env::var_os(name).is_some_and(|value| value.is_empty());
+    let command = command.mut_args(|argument| match argument.get_env().is_some_and(is_empty) {
+        true => argument.env(Resettable::Reset),
+        false => argument,
+    });
+    command.mut_subcommands(without_empty_variables)
 }
 
 /// The command line with, of each command, the options that it heeds.

@@ -45,6 +45,9 @@ const LOOKING: &[Row] = &[
         tips: &["scan"],
     },
     Row { words: &["info", "identify", "id", "describe", "node info"], tips: &["scan", "state 4"] },
+    Row { words: &["mode", "modes", "opmode", "set-mode"], tips: &["state 4", "write --help"] },
+    Row { words: &["accel", "acceleration", "ramp", "ramps"], tips: &["objects 4 acceleration"] },
+    Row { words: &["diff", "compare"], tips: &["params diff 4 drive.toml", "eds diff vendor.eds zlac8030l"] },
     Row { words: &["heartbeat", "hb", "alive"], tips: &["scan", "supervise"] },
     Row { words: &["canbusload", "busload", "load"], tips: &["plan", "top"] },
     Row { words: &["nmt-state", "lifecycle"], tips: &["scan", "nmt 4 start --wait"] },
@@ -56,6 +59,7 @@ const LOOKING: &[Row] = &[
     Row {
         words: &[
             "fault",
+            "fix",
             "faults",
             "error",
             "errors",
@@ -242,7 +246,8 @@ const ACTING: &[Row] = &[
     },
     Row { words: &["cansend", "cangen", "transmit", "tx", "pub", "publish"], tips: &["send 604#4041600000000000"] },
     Row { words: &["canplayer", "play", "playback", "bag play"], tips: &["replay trace.log --skip-motion"] },
-    Row { words: &["launch", "bringup", "up", "start"], tips: &["boot", "nmt 4 start"] },
+    Row { words: &["launch", "bringup", "up"], tips: &["boot", "nmt 4 start"] },
+    Row { words: &["start"], tips: &["nmt 4 start"] },
     Row { words: &["on", "arm", "power-on", "torque-on", "closed_loop_control"], tips: &["enable 4"] },
     Row { words: &["jog", "spin", "rotate", "turn"], tips: &["velocity 4 60rpm --for 2s", "move 4 --relative 90deg"] },
     Row { words: &["speed", "vel", "rpm"], tips: &["state 4", "velocity 4 60rpm"] },
@@ -500,6 +505,8 @@ mod tests {
             ("E-STOP", "estop"),
             ("rollback", "params rollback 4"),
             ("flash", "program 4 firmware.bin"),
+            ("diff", "params diff 4 drive.toml"),
+            ("fix", "explain 4"),
         ] {
             assert_eq!(first(line, 0).as_deref(), Some(&*format!("ferrodrive {tip}")), "{line}");
         }
@@ -541,6 +548,10 @@ mod tests {
             ("--bus sim fault 7", 2, "--bus sim explain 7"),
             ("canplayer mine.log", 0, "replay mine.log --skip-motion"),
             ("flash 5 fw.bin", 0, "program 5 fw.bin"),
+            ("mode 5 3", 0, "state 5"),
+            ("start 5", 0, "nmt 5 start"),
+            ("diff a.eds b.eds", 0, "params diff a.eds b.eds"),
+            ("accel 5", 0, "objects 5 acceleration"),
             // What makes no sense there is left out.
             ("get it", 0, "read 4 6064"),
         ] {

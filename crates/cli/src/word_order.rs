@@ -77,6 +77,30 @@ pub(crate) fn mend(command: &Command, words: &[String], error: ErrorKind) -> Opt
     found
 }
 
+/// The line with a command that was typed in capitals as it is spelt: `VELOCITY 4 60rpm`.
+pub(crate) fn in_lower_case(command: &Command, words: &[String], place: usize) -> Option<Vec<String>> {
+    let mut made = words.to_vec();
+    made[place].make_ascii_lowercase();
+    (made != words && parses(command, &made)).then_some(made)
+}
+
+/// The line with each word that begins as a negative number and stands behind an option as its value: `--for -1s` is `--for=-1s`, which
+/// the parser judges as a time.
+pub(crate) fn with_negative_values(words: &[String]) -> Option<Vec<String>> {
+    let is_negative = |word: &str| {
+        word.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.'))
+    };
+    let is_option = |word: &String| word.strip_prefix("--").is_some_and(|name| !name.is_empty() && !name.contains('='));
+    let mut made: Vec<String> = Vec::new();
+    for word in words {
+        match made.last_mut().filter(|before| is_negative(word) && is_option(before)) {
+            Some(option) => *option = format!("{option}={word}"),
+            None => made.push(word.clone()),
+        }
+    }
+    (made != words && !words.iter().any(|word| word == "--")).then_some(made)
+}
+
 /// The words with that at `node` directly behind that at `at`.
 pub(crate) fn node_behind(words: &[String], at: usize, node: usize) -> Vec<String> {
     let mut order: Vec<String> = words.to_vec();
@@ -112,6 +136,18 @@ mod tests {
         assert_eq!(meant("read 6064 4"), Some(("ferrodrive read 4 6064".into(), true)));
         assert_eq!(meant("nmt start all"), Some(("ferrodrive nmt all start".into(), false)));
         assert_eq!(meant("move 90deg 4"), Some(("ferrodrive move 4 90deg".into(), false)));
+    }
+
+    #[test]
+    fn a_negative_value_belongs_to_the_option_before_it() {
+        let meant = |line: &str| {
+            let words: Vec<String> = line.split_whitespace().map(Into::into).collect();
+            with_negative_values(&words).map(|words| words.join(" "))
+        };
+        assert_eq!(meant("velocity 4 60rpm --for -1s").as_deref(), Some("velocity 4 60rpm --for=-1s"));
+        for line in ["velocity 4 -60rpm", "velocity 4 60rpm --for=-1s", "scan --json -v", "read 4 -- --for -1s"] {
+            assert_eq!(meant(line), None, "{line}");
+        }
     }
 
     #[test]

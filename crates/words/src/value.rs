@@ -15,7 +15,7 @@ pub fn value(row: &Entry, text: &str, resolution: i64) -> Result<i64, String> {
     let value = match integer(text) {
         Some(value) => value,
         None if is_decimal(text) => return Err(beyond(text.trim())),
-        None => match split_number(text) {
+        None => match split_number(text).filter(|_| !is_hexadecimal(text)) {
             Some((number, unit)) => with_unit(row, text, number * resolution as f64, unit)?,
             None => word(row, text)?,
         },
@@ -30,6 +30,12 @@ pub fn value(row: &Entry, text: &str, resolution: i64) -> Result<i64, String> {
 fn is_decimal(text: &str) -> bool {
     let digits = text.trim().trim_start_matches(['-', '+']);
     !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Meant as a hexadecimal number, whatever stands behind `0x`: `0xZZ` has digits that are wrong, not a unit.
+fn is_hexadecimal(text: &str) -> bool {
+    let digits = text.trim().trim_start_matches(['-', '+']);
+    digits.get(..2).is_some_and(|begin| begin.eq_ignore_ascii_case("0x"))
 }
 
 /// A value as it was typed.

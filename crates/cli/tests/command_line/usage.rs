@@ -193,6 +193,13 @@ fn words_of_other_tools_are_answered_with_the_command_that_does_it() {
     refused(&["--bus", "sim", "fault", "4"], &["tip: ferrodrive --bus sim explain 4"]);
     refused(&["velocity", "4", "60", "rpm"], &["did you mean: ferrodrive velocity 4 60rpm"]);
     refused(&["sim", "zlac8030l@4"], &["did you mean: ferrodrive sim --drive zlac8030l@4"]);
+    refused(&["mode", "4", "3"], &["tip: ferrodrive state 4"]);
+    refused(&["start", "4"], &["tip: ferrodrive nmt 4 start"]);
+    refused(
+        &["diff", "a.eds", "b.eds"],
+        &["tip: ferrodrive params diff a.eds b.eds", "ferrodrive eds diff a.eds b.eds"],
+    );
+    refused(&["VELOCITY", "4", "60rpm"], &["did you mean: ferrodrive velocity 4 60rpm"]);
     let traced = ferrodrive(&["trace"]).err;
     assert!(traced.contains("tip: ferrodrive dump") && !traced.contains("torque"), "{traced}");
     let json = ferrodrive(&["--json", "get", "4", "6064"]).json();
@@ -241,6 +248,17 @@ fn quantities_are_checked() {
     refused(&["home", "4", "--method", "first"], &["expected a whole number, -128 to 127, got 'first'"]);
     refused(&["run", "a.toml", "--jobs", "0"], &["expected 1 to 1024, got 0"]);
     refused(&["--timeout", "2", "scan"], &["no unit", "500ms"]);
+    for (line, part) in [
+        ("velocity 4 60rpm --for -1s", "a time is between 0 and a year"),
+        ("move 4 90deg --acceleration -5s", "a ramp has no sign"),
+        ("scan --timeout -5ms", "a time is between 0 and a year"),
+        ("explain 4 --watch -1s", "a time is between 0 and a year"),
+        ("move 4 90deg --profile-velocity -60rpm", "expected a profile velocity above 0"),
+        ("scan --timeout 1ns", "no node answers in less than 1ms"),
+        ("write 4 6040 0xZZ", "expected a number"),
+    ] {
+        refused(&line.split(' ').collect::<Vec<_>>(), &[part]);
+    }
     for words in ["velocity 4 60rpm", "torque 4 1A", "record 4 6064 -o a.csv", "dump", "drive-base --linear 0.1"] {
         let words: Vec<_> = words.split(' ').chain(["--for", "0s"]).collect();
         refused(&words, &["expected a time above 0"]);

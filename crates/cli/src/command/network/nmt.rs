@@ -19,7 +19,7 @@ use words::node::{Nodes, nodes};
 /// Send a network management command to one node or to all
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 nmt 4 start\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0 nmt all pre-operational\n  ferrodrive nmt 4 start --wait\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0 nmt all pre-operational\n  ferrodrive nmt 1 start --wait\n  \
     ferrodrive --bus slcan:///dev/ttyACM0 nmt all reset --wait 3s")]
 pub(crate) struct Nmt {
     /// Node-ID, or all
@@ -37,8 +37,10 @@ pub(crate) struct Nmt {
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum NmtWord {
     /// Go to operational: PDOs work
+    #[value(alias = "operational")]
     Start,
     /// Go to stopped: nothing but NMT and heartbeat works
+    #[value(alias = "stopped")]
     Stop,
     /// Go to pre-operational: SDO works, PDOs do not
     PreOperational,
