@@ -1,5 +1,7 @@
 //! Why a command did not do what was asked: [`Failure`], and those that only this program has.
 
+use std::path::Path;
+
 use clap::error::{ContextKind, ErrorKind};
 
 pub(crate) use console::failure::{Failure, FailureBody, FailureReport};
@@ -11,6 +13,21 @@ use words::unresolved::Unresolved;
 /// A signal asked the command to end.
 pub(crate) fn ended_by(signal: Signal) -> Failure {
     Failure { status: signal.status(), ..Failure::new(signal.text()).of_kind("interrupted") }
+}
+
+/// Refuses a file to be written at the end of something long, where its folder is missing; `-` is standard output.
+///
+/// # Errors
+/// As the writing itself would fail.
+pub(crate) fn refuse_missing_folder(what: &str, path: &Path) -> Result<(), Failure> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder.map(std::fs::metadata) {
+        Some(Err(error)) => Err(Failure::of_writing(what, path, &error)),
+        Some(Ok(found)) if !found.is_dir() => {
+            Err(Failure::of_writing(what, path, &std::io::ErrorKind::NotADirectory.into()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What the parser of the command line found, for programs; people get its own text.

@@ -48,6 +48,11 @@ impl LogPath {
         &self.path
     }
 
+    /// In which form it is written.
+    pub(crate) const fn format(&self) -> Format {
+        self.format
+    }
+
     /// Puts down why it is not complete.
     pub(crate) fn lacks(&self, torn: words::failure::Failure) {
         // The first is what went wrong.

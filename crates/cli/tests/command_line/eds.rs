@@ -26,6 +26,18 @@ fn a_models_sheet_is_written_and_has_nothing_wrong_with_it() {
 }
 
 #[test]
+fn files_that_are_wrong_are_not_compared_in_silence_and_one_that_is_unread_has_no_lines_to_correct() {
+    let folder = scratch("eds-wrong");
+    // 7 is VAR; a type 77h there is not (EDS208).
+    let sheet = done(&["eds", "zlim42c"]).out.replacen("ObjectType=0x7\n", "ObjectType=0x77\n", 1);
+    let (wrong, empty) = (file(&folder, "wrong.eds", sheet), file(&folder, "empty.eds", ""));
+    let compared = done(&["eds", "diff", &wrong, "zlim42c"]).out;
+    assert!(compared.contains(&format!("note: {wrong} has 1 error")), "{compared}");
+    let linted = ferrodrive(&["eds", "lint", &empty]).err;
+    assert!(linted.contains("beside the file's name") && !linted.contains("correct the lines"), "{linted}");
+}
+
+#[test]
 fn lint_lists_the_rules_explains_one_and_names_it_in_its_findings() {
     let rules = done(&["eds", "lint", "--list", "--json"]).json()["rules"].clone();
     assert_eq!(rules.as_array().unwrap().len(), eds::Rule::ALL.len());

@@ -58,6 +58,9 @@ fn a_log_goes_through_every_form_and_comes_out_as_it_was() {
         from = to;
     }
     assert_eq!(std::fs::read_to_string(&from).unwrap(), lines);
+    // Without an extension nothing else shows the form.
+    let bare = path("bare");
+    assert!(done(&["convert", &from, &bare]).out.contains(&format!("written as {bare} (candump)")));
 
     let same = ferrodrive(&["convert", &from, &from]);
     assert_eq!(same.status, Some(2), "{}", same.err);

@@ -1,5 +1,5 @@
 //! The exit status by one rule, over all commands: 0 done; 1 it was tried and did not come out, or a file is missing or bad; 2 the
-//! command line itself makes no sense. With it goes one line of JSON of one form.
+//! command line itself makes no sense, to anybody or for the model of its node. With it goes one line of JSON of one form.
 
 use processes::{done, ferrodrive, scratch};
 use serde_json::Value;
@@ -151,7 +151,7 @@ fn a_data_sheet_that_is_none_is_a_1_wherever_it_is_named() {
 
 #[test]
 fn what_a_drive_does_not_take_is_a_1_however_it_is_asked_for() {
-    for line in ["velocity 4 20000rpm", "write 4 60FF 1001", "torque 4 31A"] {
+    for line in ["velocity 4 20000rpm", "write 4 60FF 1001", "torque 4 31A", "move 4 1e15deg"] {
         failed(&line.split(' ').collect::<Vec<_>>(), 1);
     }
 }
@@ -193,6 +193,57 @@ fn words_that_make_no_sense_together_are_a_2() {
         failed(&line.split(' ').collect::<Vec<_>>(), 2);
     }
     assert!(!std::path::Path::new("-").exists());
+}
+
+#[test]
+fn a_file_whose_folder_is_missing_is_a_1_before_anything_is_done() {
+    for line in ["demo -o /no/such/x.svg", "conform 4 --html /no/such/x.html", "conform 4 --junit /no/such/x.xml"] {
+        let line: Vec<_> = line.split(' ').collect();
+        assert_eq!(failed(&line, 1)["kind"], "file", "{line:?}");
+        // Work that has begun is shown on standard error.
+        let shown = ferrodrive(&line).err;
+        assert!(shown.starts_with("error: cannot write"), "{line:?}: {shown}");
+    }
+}
+
+#[test]
+fn a_variable_that_is_empty_counts_as_not_set() {
+    for (variable, line) in
+        [("FERRODRIVE_BUS", "state 4"), ("FERRODRIVE_MACHINE", "state 4"), ("FERRODRIVE_CONTROL", "world now")]
+    {
+        let without = processes::command(&line.split(' ').collect::<Vec<_>>()).output().unwrap();
+        let with = processes::command(&line.split(' ').collect::<Vec<_>>()).env(variable, "").output().unwrap();
+        assert_eq!((with.status, with.stdout, with.stderr), (without.status, without.stdout, without.stderr));
+    }
+}
+
+/// Those that need nothing but the bus of the command's own.
+#[test]
+fn examples_of_the_help_on_the_bus_of_its_own_run() {
+    for command in ["nmt", "emcy", "torque", "home", "velocity", "move", "state", "explain"] {
+        let help = done(&[command, "-h"]).out;
+        let lines = help.lines().filter_map(|line| line.trim().strip_prefix("ferrodrive "));
+        for line in lines.filter(|line| !line.contains("--bus") && !line.contains("  #")) {
+            done(&line.split(' ').collect::<Vec<_>>());
+        }
+    }
+}
+
+/// With the words and the model of a node it is seen: before anything is written.
+#[test]
+fn words_that_the_model_of_a_node_does_not_have_are_a_2() {
+    let directory = scratch("not_of_the_model");
+    let record = directory.join("x.csv");
+    for line in ["write 4 6040 70000", "read 4 statuswort", "record 4 nosuch -o FILE", "pdo plan 4 tpdo9=statusword"] {
+        let line = line.replace("FILE", record.to_str().unwrap());
+        failed(&line.split(' ').collect::<Vec<_>>(), 2);
+    }
+    assert!(!record.exists());
+    // Without a node there is not a model either.
+    for line in ["write 9 6040 70000", "read 9 statuswort", "explain 9", "state 9"] {
+        let error = failed(&line.split(' ').collect::<Vec<_>>(), 1);
+        assert_eq!(error["kind"], "no_answer", "{line}: {error}");
+    }
 }
 
 #[test]

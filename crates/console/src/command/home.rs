@@ -18,7 +18,8 @@ use words::node::node;
 /// Enables the drive and waits until it has found the edge of its switch, which is position zero from then on. The
 /// inputs have to be configured as switches first; a drive that does not find the edge in time is stopped.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  ferrodrive home 2 --method 17\n  ferrodrive home 1 --method 18 --within 5s")]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 home 2 --method 17\n  \
+    ferrodrive --bus can0 home 1 --method 18 --within 5s")]
 pub struct Home {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -66,7 +66,7 @@ pub struct Move {
 ///
 /// Returns at once: what the motor does depends on the load. With --for the torque is removed afterwards.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  ferrodrive torque 4 1.5A --for 2s")]
+#[command(after_help = "Example:\n  ferrodrive torque 4 1A --for 500ms")]
 pub struct Torque {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -18,6 +18,7 @@ pub mod report;
 pub mod scan;
 pub mod supervise;
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use machine::file::{self, Machine};
@@ -33,7 +34,18 @@ pub fn read_machine(path: &Path) -> Result<Machine, Failure> {
 
 /// That a machine file makes no sense.
 pub fn unusable(path: &Path, reason: String) -> Failure {
-    Failure::bad_file(format!("cannot use the machine file {}", path.display())).because(reason).next(file::example())
+    // A pipe would be waited for.
+    let unopened = path.is_file().then(|| std::fs::File::open(path).err()).flatten();
+    let failure = Failure::bad_file(format!("cannot use the machine file {}", path.display())).because(reason);
+    failure.next(remedy(unopened.map(|error| error.kind())))
+}
+
+/// What to do about a machine file, by why it could not be opened.
+fn remedy(unopened: Option<ErrorKind>) -> String {
+    match unopened {
+        Some(ErrorKind::PermissionDenied) => "give this account the right to read it".to_owned(),
+        _ => file::example(),
+    }
 }
 
 /// Who is kept informed while something takes its time.
@@ -51,4 +63,15 @@ impl Progress for () {
     fn show(&self, _: String) {}
     fn count(&self, _: String) {}
     fn note(&self, _: &str) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_may_not_read_a_machine_file_is_not_shown_how_to_write_one() {
+        assert_eq!(remedy(Some(ErrorKind::PermissionDenied)), "give this account the right to read it");
+        assert!(remedy(None).contains("[[drive]]") && remedy(Some(ErrorKind::NotFound)).contains("[[drive]]"));
+    }
 }

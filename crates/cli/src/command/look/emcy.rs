@@ -22,7 +22,7 @@ use words::time::some_time;
 /// Show emergency messages as they arrive, or the errors that a node remembers
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 emcy watch\n  \
-    ferrodrive emcy watch 4 --for 10s\n  ferrodrive emcy show 4")]
+    ferrodrive emcy watch 4 --for 10s\n  ferrodrive --bus can0 emcy show 4")]
 pub(crate) struct Emcy {
     #[command(subcommand)]
     what: EmcyCommand,

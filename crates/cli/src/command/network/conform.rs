@@ -7,7 +7,7 @@ use conform::{Capture, Case, CaseResult, Options, Outcome, Subject, Suite, Suite
 use serde::Serialize;
 
 use crate::context::{Context, Restorer};
-use crate::failure::Failure;
+use crate::failure::{Failure, refuse_missing_folder};
 use crate::global::Global;
 use crate::output::{Format, Report, file_path};
 use crate::session;
@@ -63,6 +63,9 @@ impl Conform {
         let Some(node) = self.node.filter(|_| !self.list) else {
             return format.print(&CaseList::of(&cases)).map_err(Failure::of_stdout);
         };
+        for path in self.html.iter().chain(&self.junit) {
+            refuse_missing_folder("the report", path)?;
+        }
         let report = session::run(global, async |context| self.test(context, node).await)?;
         if let Some(path) = &self.html {
             write(path, &html(&report))?;

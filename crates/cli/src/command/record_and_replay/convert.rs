@@ -49,6 +49,8 @@ pub(crate) struct ConvertReport {
     passed_over: u64,
     #[serde(skip)]
     form: &'static str,
+    #[serde(skip)]
+    new_form: &'static str,
 }
 
 impl Convert {
@@ -62,7 +64,13 @@ impl Convert {
         let mut writer = self.to.create()?;
         let not_written = |error: io::Error| Failure::of_writing("the log", self.to.path(), &error);
         let (from, to) = (self.from.display().to_string(), self.to.path().display().to_string());
-        let mut report = ConvertReport { from, to, form: reader.format().name(), ..ConvertReport::default() };
+        let mut report = ConvertReport {
+            from,
+            to,
+            form: reader.format().name(),
+            new_form: self.to.format().name(),
+            ..ConvertReport::default()
+        };
         while let Some(entry) = reader.next_entry().map_err(|error| unreadable(&self.from, &error))? {
             match entry {
                 Entry::Record(record) => {
@@ -97,8 +105,9 @@ fn same_file(one: &std::path::Path, other: &std::path::Path) -> bool {
 
 impl Report for ConvertReport {
     fn text(&self, paint: Paint) -> String {
-        let Self { from, to, frames, error_frames, fd_frames, passed_over, form } = self;
-        let mut text = format!("{} ({form}) written as {}: {}", from, paint.strong(to), counted(*frames, "frame"));
+        let Self { from, to, frames, error_frames, fd_frames, passed_over, form, new_form } = self;
+        let (to, frames) = (paint.strong(to), counted(*frames, "frame"));
+        let mut text = format!("{from} ({form}) written as {to} ({new_form}): {frames}");
         for (count, what, done) in [
             (error_frames, "error frame", ""),
             (fd_frames, "CAN FD frame", " left out"),

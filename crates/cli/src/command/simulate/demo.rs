@@ -9,7 +9,7 @@ use sim::machine::models;
 use transport::WallClock;
 
 use crate::command::record_and_replay::plot::{svg_path, write_svg};
-use crate::failure::Failure;
+use crate::failure::{Failure, refuse_missing_folder};
 use crate::global::Global;
 use crate::output::Report;
 use crate::progress::Progress;
@@ -34,6 +34,7 @@ pub(crate) struct Demo {
 impl Demo {
     /// Runs it and writes the picture.
     pub(crate) fn run(&self, global: &Global) -> Result<DemoReport, Failure> {
+        refuse_missing_folder("the picture", &self.svg)?;
         exit_on_signal();
         let clock = WallClock::start();
         let progress = Progress::new(global.json);

@@ -10,6 +10,7 @@ use crate::output::Report;
 use crate::plain::plain;
 use plot::Paint;
 use plot::Table;
+use words::counted;
 
 /// Compare two EDS or DCF files, or one with a model: objects, types, access, defaults, limits, PDOs
 ///
@@ -31,6 +32,9 @@ pub(crate) struct DiffReport {
     first: String,
     second: String,
     differences: Vec<DifferenceRow>,
+    /// Files that are wrong in places, where something else is taken: there they may differ without a row.
+    #[serde(skip)]
+    wrong: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -46,8 +50,18 @@ struct DifferenceRow {
 impl Diff {
     /// Reads both and compares them.
     pub(super) fn run(&self) -> Result<DiffReport, Failure> {
-        let (first, second) = (source::sheet(&self.first)?, source::sheet(&self.second)?);
+        let ((first, of_first), (second, of_second)) = (source::sheet(&self.first)?, source::sheet(&self.second)?);
+        let wrong = [(&self.first, of_first), (&self.second, of_second)];
+        let wrong = wrong.into_iter().filter(|(_, errors)| *errors > 0);
         Ok(DiffReport {
+            wrong: wrong
+                .map(|(name, errors)| {
+                    format!(
+                        "{name} has {}, where something else is compared: ferrodrive eds lint {name}",
+                        counted(errors, "error")
+                    )
+                })
+                .collect(),
             first: self.first.clone(),
             second: self.second.clone(),
             differences: diff(&first, &second).into_iter().map(DifferenceRow::of).collect(),
@@ -68,8 +82,9 @@ impl DifferenceRow {
 impl Report for DiffReport {
     fn text(&self, paint: Paint) -> String {
         let (first, second) = (plain(&self.first), plain(&self.second));
+        let notes: String = self.wrong.iter().map(|wrong| format!("\nnote: {}", plain(wrong))).collect();
         if self.differences.is_empty() {
-            return format!("{first} and {second} do not differ");
+            return format!("{first} and {second} do not differ{notes}");
         }
         let mut table = Table::new(&["object", "name", "what", "first", "second"]);
         for row in &self.differences {
@@ -77,6 +92,6 @@ impl Report for DiffReport {
             let object = row.object.clone().unwrap_or_else(|| "device".into());
             table.row([object, plain(&row.name), row.aspect.to_owned(), say(&row.first), say(&row.second)]);
         }
-        format!("first   {first}\nsecond  {second}\n\n{}", table.plain(paint))
+        format!("first   {first}\nsecond  {second}\n\n{}{notes}", table.plain(paint))
     }
 }

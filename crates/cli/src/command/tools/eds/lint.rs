@@ -112,6 +112,12 @@ impl LintReport {
         let what = if strict { "errors or warnings" } else { "errors" };
         let failure = Failure::new(format!("{count} of {} with {what}", counted(of, "file")));
         let next = "correct the lines listed above; CiA 306 defines the format";
+        // Of a file that cannot be read there is no line to correct.
+        let refused = self.files.iter().filter(|file| file.refused.is_some()).count();
+        let next = match refused {
+            all if all == count => "see why beside the file's name: give an EDS or DCF file (CiA 306)",
+            _ => next,
+        };
         (count > 0).then(|| match self.files.iter().find_map(|file| file.unread.as_ref()) {
             None => failure.of_kind("lint").next(next),
             Some(unread) => {

@@ -73,7 +73,7 @@ struct ObjectRow {
 impl Show {
     /// Reads the file and picks the objects.
     pub(super) fn run(&self) -> Result<ShowReport, Failure> {
-        let eds = source::sheet(&self.file)?;
+        let (eds, _) = source::sheet(&self.file)?;
         let wanted =
             |object: &Object, variable: &Variable| self.search.iter().all(|word| matches(object, variable, word));
         let of_object = |object: &Object| -> Vec<ObjectRow> {
