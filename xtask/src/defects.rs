@@ -4,6 +4,7 @@
 //! The copy and what is built of it are below `target/defects`, and stay for the next time. Before the first defect of a test program
 //! it runs without one: what fails by itself notices nothing.
 
+mod defect;
 mod list;
 
 use std::collections::BTreeSet;
@@ -14,7 +15,8 @@ use std::time::{Duration, Instant};
 
 use crate::test_programs::{self, Program};
 use crate::{libtest, process, workspace};
-use list::{Defect, Tests, defects};
+use defect::{Defect, Tests};
+use list::defects;
 
 /// What became of a defect.
 #[derive(Debug, PartialEq, Eq)]

@@ -85,7 +85,7 @@ impl Drive {
     /// From here on the runner keeps the drive content: a drive that watches for silence is asked for its statusword when
     /// no other request is sent to it (whether process data count for it is not known of every drive), and for one that consumes a heartbeat this master produces it, under the node-ID that the
     /// drive watches. A drive that had lost its host, and would go on with an old motion at the first heartbeat, is stopped
-    /// before: this one, and any other on the bus that watches the same node-ID, whoever had set it in motion. Ends with [`release_guard`](Self::release_guard); a program that ends otherwise leaves it to the drive
+    /// before: this one, and any other on the bus that watches the same node-ID. Ends with [`release_guard`](Self::release_guard); a program that ends otherwise leaves it to the drive
     /// to stop.
     ///
     /// One request whose answer is waited for longer than the drive's time leaves it without a frame: timeouts should be

@@ -1,7 +1,7 @@
 //! Motion, physics, firmware and the world around them.
 
-use super::Defect;
-use super::programs::{DRIVES, DRIVES_IT, MOTION_IT, PLANT, PLANT_IT, SIM, SIM_IT, WHEEL};
+use crate::defects::defect::Defect;
+use crate::defects::defect::programs::{DRIVES, DRIVES_IT, MOTION_IT, PLANT, PLANT_IT, SIM, SIM_IT, WHEEL};
 
 pub(super) const DEFECTS: &[Defect] = &[
     Defect {

@@ -1,7 +1,7 @@
 //! CAN, CANopen, CiA 402, tables and EDS.
 
-use super::Defect;
-use super::programs::{CAN, CANOPEN, CANOPEN_IT, CIA402, EDS, TABLES};
+use crate::defects::defect::Defect;
+use crate::defects::defect::programs::{CAN, CANOPEN, CANOPEN_IT, CIA402, EDS, TABLES};
 
 pub(super) const DEFECTS: &[Defect] = &[
     Defect {

@@ -1,9 +1,9 @@
 //! The master, its host, and what people use all day.
 
-use super::Defect;
-use super::programs::{
-    CANLOG, CONFORM_IT, FMU, FOXGLOVE, HOST, HOST_IT, MACHINE_IT, MASTER, MASTER_IT, RECORDING, SCENARIO, SCENARIO_IT,
-    SERVE, SLCAN, TUNE, WORDS,
+use crate::defects::defect::Defect;
+use crate::defects::defect::programs::{
+    CANLOG, CONFORM_IT, FMU, FOXGLOVE, HOST, MACHINE_IT, MASTER, MASTER_IT, RECORDING, SCENARIO, SCENARIO_IT, SERVE,
+    SLCAN, TUNE, WORDS,
 };
 
 pub(super) const DEFECTS: &[Defect] = &[
@@ -32,6 +32,12 @@ pub(super) const DEFECTS: &[Defect] = &[
         noticed_by: MASTER_IT,
     },
     Defect {
+        file: "crates/master/src/drive/power.rs",
+        text: "speed.abs() < self.gear.at_output(STANDSTILL_RPM)",
+        instead: "speed.abs() < STANDSTILL_RPM",
+        noticed_by: MASTER_IT,
+    },
+    Defect {
         file: "crates/master/src/analysis/explain/communication.rs",
         text: "if heard == 0 && listened >= 2 * period",
         instead: "if heard == 0 && listened >= period",
@@ -48,12 +54,6 @@ pub(super) const DEFECTS: &[Defect] = &[
         text: "filter(|time| *time >= LONG)",
         instead: "filter(|time| *time > LONG)",
         noticed_by: MASTER_IT,
-    },
-    Defect {
-        file: "crates/host/src/stopping.rs",
-        text: "rpm.abs() * drive.gear().ratio().abs() < STANDSTILL_RPM",
-        instead: "rpm.abs() < STANDSTILL_RPM",
-        noticed_by: HOST_IT,
     },
     Defect {
         file: "crates/host/src/trace/ring.rs",
