@@ -29,6 +29,10 @@ pub(crate) enum Trigger {
     LostOperation,
     /// The set-point was not acknowledged (bit 12).
     NoAcknowledge,
+    /// The speed of position moves, in this object, is 0.
+    NoProfileVelocity(Mux),
+    /// By the speed of position moves, in this object, the move may take this long.
+    TooSlow { object: Mux, rpm: f64, limit: Duration },
     /// The target was not reached in the time it should take: where it is, where it should be, in `unit`.
     Late { at: f64, target: f64, unit: &'static str, waited: Duration },
     /// The shaft rests away from its target, or turns at another speed; `target` was asked for, in `unit`.
@@ -136,6 +140,8 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
             "The drive did not acknowledge the set-point (statusword bit 12)",
             "An earlier set-point may still be waiting to be run: stop the drive, then move again",
         ),
+        Trigger::NoProfileVelocity(object) => no_profile_velocity(object),
+        Trigger::TooSlow { object, rpm, limit } => too_slow(object, *rpm, *limit),
         Trigger::NotHome { at, waited } => (
             format!("After {:.1} s it is at {at:.0} counts and still looks for its reference", waited.as_secs_f64()),
             "Check that the method's switch is wired, that its input is set to that function, and which way the method \
@@ -148,25 +154,7 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
              direction in which the method looks for it"
                 .to_owned(),
         ),
-        Trigger::Late { at, target, unit, waited } => (
-            format!(
-                "After {:.1} s it is at {} {unit} where {} {unit} was asked for, and reports no fault",
-                waited.as_secs_f64(),
-                Shown(*at),
-                Shown(*target)
-            ),
-            match *unit {
-                "r/min" => {
-                    "The load may be too heavy, the motor blocked, or its supply too low for this speed: look at its current and \
-                     voltage; check its speed limit, current limit and ramp times"
-                }
-                _ => {
-                    "The load may be too heavy or the motor blocked: look at its current; check its speed limit, current limit \
-                     and ramp times"
-                }
-            }
-            .to_owned(),
-        ),
+        Trigger::Late { at, target, unit, waited } => late(*at, *target, unit, *waited),
         Trigger::Elsewhere { at, target, unit, by } => elsewhere(*at, *target, unit, by),
         Trigger::Unseen { sensor, remedy } => unseen(sensor, remedy),
         Trigger::Fault | Trigger::LostOperation | Trigger::HeldUp(_) | Trigger::Silent(_) => text(
@@ -174,6 +162,49 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
             "Read its state again: it changes while it is read",
         ),
     }
+}
+
+fn no_profile_velocity(object: &Mux) -> (String, String) {
+    (
+        format!("Its profile velocity ({object}) is 0: it would never get there. Nothing has moved"),
+        format!("Write the speed of position moves to {object}, or give one with the move (--profile-velocity)"),
+    )
+}
+
+fn too_slow(object: &Mux, rpm: f64, limit: Duration) -> (String, String) {
+    let hours = limit.as_secs_f64() / 3600.0;
+    (
+        format!(
+            "At its profile velocity ({object}) of {} r/min this may take {hours:.1} h. Nothing has moved",
+            Shown(rpm)
+        ),
+        format!(
+            "Write a higher speed to {object}, or give one with the move (--profile-velocity); if it is meant, give a time limit \
+             (--within)"
+        ),
+    )
+}
+
+fn late(at: f64, target: f64, unit: &str, waited: Duration) -> (String, String) {
+    (
+        format!(
+            "After {:.1} s it is at {} {unit} where {} {unit} was asked for, and reports no fault",
+            waited.as_secs_f64(),
+            Shown(at),
+            Shown(target)
+        ),
+        match unit {
+            "r/min" => {
+                "The load may be too heavy, the motor blocked, or its supply too low for this speed: look at its current and \
+                 voltage; check its speed limit, current limit and ramp times"
+            }
+            _ => {
+                "The load may be too heavy or the motor blocked: look at its current; check its speed limit, current limit \
+                 and ramp times"
+            }
+        }
+        .to_owned(),
+    )
 }
 
 fn held_up(time: Duration) -> (String, String) {

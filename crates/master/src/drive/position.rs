@@ -17,13 +17,18 @@ use crate::units::{Angle, Rpm};
 
 const ENABLED: u16 = 0x0F;
 
+/// A move that may take longer than this is waited for where a time limit is given with it only: who has not set the drive up for
+/// that would sit before a shaft that seems to stand.
+const LONGEST_WAIT: Duration = Duration::from_secs(3600);
+
 /// Profile position moves with the set-point handshake. Source: CiA 402-2, clause 10.
 impl Drive {
     /// Turns to an absolute position. Enables the drive first.
     ///
     /// # Errors
     /// [`Error::OutOfLimits`], [`Error::TooFine`] and [`Error::InCycles`] before anything moves; [`Error::NotReached`] with an explanation
-    /// when the drive faults, is stopped, falls silent or does not get there; those of the requests.
+    /// when the drive faults, is stopped, falls silent or does not get there, and before anything moves where its profile velocity is
+    /// 0, or so low that the way takes more than an hour and no time limit says that it may; those of the requests.
     pub async fn move_absolute(&self, to: impl Into<Angle>, options: MotionOptions) -> Result<MotionReport, Error> {
         let target = self.position("position", to.into()).await?;
         self.move_counts(target, false, options).await
@@ -50,9 +55,11 @@ impl Drive {
             commanded.push(speed);
         }
         let speed = self.read_quantity(profile_velocity).await?;
+        if speed == 0.0 {
+            return Err(self.not_reached(INTENT, Trigger::NoProfileVelocity(profile_velocity.object)).await);
+        }
         commanded.extend(self.write_ramps(options.acceleration, options.deceleration, speed).await?);
         let stopped = self.set_mode(ModeOfOperation::PROFILE_POSITION).await?;
-        self.enable().await?;
         let began_at = self.read_number(self.place(POSITION_ACTUAL_VALUE)).await?;
         let target = if relative { began_at.saturating_add(counts) } else { counts };
         let turn = self.counts_per_shaft_turn().await?.max(1.0);
@@ -61,6 +68,11 @@ impl Drive {
             Some(within) => within,
             None => self.time_for(target.abs_diff(began_at) as f64 / of_output, speed).await?,
         };
+        if options.wait && options.within.is_none() && limit > LONGEST_WAIT {
+            let (object, rpm) = (profile_velocity.object, speed);
+            return Err(self.not_reached(INTENT, Trigger::TooSlow { object, rpm, limit }).await);
+        }
+        self.enable().await?;
         self.give_set_point(INTENT, counts, relative).await?;
         let notes = self.notes(stopped).await;
         if !options.wait {
@@ -128,9 +140,8 @@ impl Drive {
     /// Upper bound of a move's duration: the way at full speed plus both ramps, stretched by the margin.
     async fn time_for(&self, turns: f64, speed_rpm: f64) -> Result<Duration, Error> {
         let (up, down) = self.ramp_times_s(speed_rpm).await?;
-        let cruise = if speed_rpm > 0.0 { turns / speed_rpm * 60.0 } else { f64::INFINITY };
+        let cruise = turns / speed_rpm.abs() * 60.0;
         let seconds = (cruise + up + down) * LATE_FACTOR + LATE_MARGIN_S + POLL.as_secs_f64();
-        // A day: the longest move that makes sense to wait for.
-        Ok(Duration::from_secs_f64(seconds.min(86_400.0)))
+        Ok(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
     }
 }

@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use crate::explain::{Bench, NODE};
 use crate::support::{mux, node};
 use can::{Bitrate, Instant};
 use devices::{all, model};
@@ -203,4 +204,35 @@ fn what_a_row_says_of_its_limits_names_objects_of_the_same_model_in_units_that_f
         }
     }
     assert!(found >= 4, "{found}");
+}
+
+/// CiA 402-2, 10.3: 6081h is the speed of a position move. As the servo has it, in increments per second, a quarter of its turn of
+/// 131072 increments takes 9.1 h at 1.
+#[test]
+fn a_move_that_would_not_end_is_refused_before_anything_moves_with_the_object_and_what_to_do() {
+    for (name, raw, why) in [
+        ("cia402", 0, "profile velocity (6081h:00) is 0"),
+        ("m4230e17b50", 0, "profile velocity (6081h:00) is 0"),
+        ("cia402", 1, "profile velocity (6081h:00) of 0.000458 r/min"),
+    ] {
+        let mut bench = Bench::new(name);
+        bench.write(mux(0x6081, 0), raw);
+        let (drive, began) = (bench.drive.clone(), bench.world.now());
+        let mut turn = |options| block_on(&mut bench.world, drive.move_absolute(Degrees(90.0), options)).unwrap();
+        let error = turn(MotionOptions::default()).unwrap_err();
+        let Error::NotReached(refused) = &error else { panic!("{name}: {error}") };
+        assert!(refused.conclusion.contains(why), "{error}");
+        assert!(refused.advice.contains("--profile-velocity"), "{error}");
+        assert!(!drive.node().network().moved().contains(node(NODE)), "{name}");
+        // With a speed of its own, or a time limit, it is not refused.
+        let at = |rpm| MotionOptions { speed: Some(Rpm(rpm)), ..MotionOptions::default() };
+        assert!(turn(at(30.0)).is_ok(), "{name}");
+        assert!(bench.world.now() - began < Duration::from_secs(10), "{name}");
+    }
+    let mut bench = Bench::new("cia402");
+    bench.write(mux(0x6081, 0), 1);
+    let (drive, within) = (bench.drive.clone(), Some(Duration::from_secs(3)));
+    let options = MotionOptions { within, ..MotionOptions::default() };
+    let error = block_on(&mut bench.world, drive.move_absolute(Degrees(90.0), options)).unwrap().unwrap_err();
+    assert!(error.to_string().contains("After 3.0 s"), "{error}");
 }

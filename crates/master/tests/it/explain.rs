@@ -20,7 +20,7 @@ use sim::stimulus::{Place, Stimulus};
 use sim::wire::WireEvent;
 use sim::{World, block_on};
 
-const NODE: u8 = 4;
+pub(crate) const NODE: u8 = 4;
 const ALL: [&str; 4] = ["zlac8030l", "zlim42c", "m4230e17b50", "cia402"];
 
 /// Longer than any heartbeat and watch of these drives that a test leaves on.
@@ -52,21 +52,21 @@ impl Station for Ear {
     }
 }
 
-struct Bench {
-    world: World,
+pub(crate) struct Bench {
+    pub(crate) world: World,
     /// Another program on the same bus.
-    other: Network,
+    pub(crate) other: Network,
     heard: Arc<Mutex<Overheard>>,
-    drive: Drive,
+    pub(crate) drive: Drive,
 }
 
 impl Bench {
-    fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         Self::with(name, &[])
     }
 
     /// A model with these choices of its variations.
-    fn with(name: &str, choices: &[(&str, &str)]) -> Self {
+    pub(crate) fn with(name: &str, choices: &[(&str, &str)]) -> Self {
         let (mut world, network, other) = (World::new(Bitrate::K500, 5), Network::new(), Network::new());
         let heard = Arc::<Mutex<Overheard>>::default();
         world.add_station(Ear { network: network.clone(), heard: heard.clone() });
@@ -82,19 +82,19 @@ impl Bench {
     }
 
     #[track_caller]
-    fn done<T>(&mut self, work: impl Future<Output = Result<T, Error>>) -> T {
+    pub(crate) fn done<T>(&mut self, work: impl Future<Output = Result<T, Error>>) -> T {
         block_on(&mut self.world, work).unwrap().unwrap()
     }
 
     #[track_caller]
-    fn write(&mut self, object: Mux, value: i64) {
+    pub(crate) fn write(&mut self, object: Mux, value: i64) {
         let drive = self.drive.clone();
         let row = drive.description().unwrap().row(object).unwrap();
         let bytes = row.data_type.raw(value).to_le_bytes();
         self.done(drive.node().download(object, &bytes[..row.data_type.size()]));
     }
 
-    fn enable(&mut self, mode: i64) {
+    pub(crate) fn enable(&mut self, mode: i64) {
         self.write(mux(0x6060, 0), mode);
         let drive = self.drive.clone();
         self.done(drive.enable());
@@ -106,7 +106,7 @@ impl Bench {
         self.world.run_for(Duration::from_millis(50));
     }
 
-    fn stimulus(&mut self, words: &str) {
+    pub(crate) fn stimulus(&mut self, words: &str) {
         let stimulus: Stimulus = words.parse().unwrap();
         self.world.apply(Place::node(NODE), &stimulus).unwrap().unwrap();
     }
@@ -124,7 +124,7 @@ impl Bench {
         heard
     }
 
-    fn explain(&mut self) -> Explained {
+    pub(crate) fn explain(&mut self) -> Explained {
         self.explain_while(|_| ())
     }
 
@@ -135,7 +135,7 @@ impl Bench {
     }
 }
 
-fn rules(explained: &Explained) -> Vec<&'static str> {
+pub(crate) fn rules(explained: &Explained) -> Vec<&'static str> {
     explained.findings.iter().map(|finding| finding.rule).collect()
 }
 
