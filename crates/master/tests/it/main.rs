@@ -10,6 +10,7 @@ mod cyclic_unheard;
 mod decode;
 mod drive;
 mod explain;
+mod explain_motion;
 mod explain_states;
 mod gateway;
 mod gear;

@@ -114,6 +114,11 @@ fn position(seen: &Observed) -> Option<Finding> {
     let relative = controlword.has(Controlword::RELATIVE);
     let window = seen.axis_value(POSITION_WINDOW).filter(|window| *window < i64::from(u32::MAX)).unwrap_or(0).max(1);
     let object = seen.named(seen.place(TARGET_POSITION));
+    let reached = statusword.has(Statusword::TARGET_REACHED);
+    let found = format!("Target {target}, position {at} counts, controlword {controlword}, statusword {statusword}");
+    if relative && reached {
+        return Some(relative_reached(seen, &object, found));
+    }
     if !relative && target.abs_diff(at) <= window as u64 {
         return Some(cause(
             TOPIC,
@@ -128,7 +133,6 @@ fn position(seen: &Observed) -> Option<Finding> {
     }
     let handshake = seen.axis.is_none_or(|axis| axis.new_set_point == NewSetPoint::Handshake);
     let asked = controlword.has(Controlword::NEW_SET_POINT);
-    let found = format!("Target {target}, position {at} counts, controlword {controlword}, statusword {statusword}");
     if handshake && asked && statusword.has(Statusword::SET_POINT_ACKNOWLEDGE) {
         return Some(cause(
             TOPIC,
@@ -141,21 +145,42 @@ fn position(seen: &Observed) -> Option<Finding> {
             ],
         ));
     }
-    (!asked && statusword.has(Statusword::TARGET_REACHED)).then(|| {
+    (!asked && reached).then(|| {
         cause(
             TOPIC,
             "set_point_not_started",
             [
                 "A 1 in controlword bit 4 after the target was written".to_owned(),
                 found,
-                "The target is in 607Ah and the move was not started".to_owned(),
+                "The target is in 607Ah and no move to it was started".to_owned(),
                 format!(
-                    "Write the controlword with bit 4: 1Fh, or 5Fh for a relative move; or: ferrodrive move {}",
+                    "If the shaft is to turn to this target now, write the controlword with bit 4, 1Fh; or give the target anew: \
+                     ferrodrive move {} POSITION",
                     seen.node
                 ),
             ],
         )
     })
+}
+
+/// After a relative move 607Ah still has its distance: whether that has been gone or is yet to be started does not show, and to start it
+/// would go it a second time.
+fn relative_reached(seen: &Observed, object: &str, found: String) -> Finding {
+    cause(
+        TOPIC,
+        "at_target",
+        [
+            format!("A relative move (controlword bit 6) under way: the distance is in {object}"),
+            found,
+            "The move that was started last is done (statusword bit 10), and the drive stands where that has led it"
+                .to_owned(),
+            format!(
+                "For a further move give its distance: ferrodrive move {} --relative DISTANCE. To start what is in 607Ah moves the shaft \
+                 by that once more, if it has been gone already",
+                seen.node
+            ),
+        ],
+    )
 }
 
 /// 607Dh (CiA 402-2, 10.4). No limits where the lower one is not below the upper one.
