@@ -3,8 +3,9 @@
 
 use std::time::Duration;
 
-use crate::explain::{Bench, rules};
+use crate::explain::{Bench, NODE, rules};
 use crate::support::mux;
+use canopen::NodeId;
 use master::drive::MotionOptions;
 use master::explain::Weight;
 use master::units::Turns;
@@ -28,4 +29,55 @@ fn after_a_relative_move_the_drive_is_said_to_be_there_and_its_distance_is_not_t
             assert!(!finding.remedy.contains("5Fh") && !finding.remedy.contains("1Fh"), "{name}: {finding:?}");
         }
     }
+}
+
+/// M joint manual, 5.11.2: two seconds without the heartbeat of its host stop it with alarm 20h; the next one has it go on. In mode 7
+/// its target is a position.
+#[test]
+fn a_joint_that_has_lost_its_host_is_not_sent_to_zero_nor_said_to_be_without_power() {
+    [1, 3, 7].into_iter().for_each(lose_host_in);
+}
+
+fn lose_host_in(mode: i64) {
+    let mut bench = Bench::new("m4230e17b50");
+    let heartbeat = |bench: &mut Bench, period| {
+        bench.other.heartbeat(NodeId::MAX, period);
+        bench.world.refresh();
+        bench.world.run_for(Duration::from_secs(3));
+    };
+    bench.enable(mode);
+    heartbeat(&mut bench, Some(Duration::from_millis(500)));
+    bench.write(mux(0x607A, 0), 600_000);
+    if mode == 1 {
+        bench.write(mux(0x6040, 0), 0x1F);
+    }
+    bench.world.run_for(Duration::from_millis(20));
+    heartbeat(&mut bench, None);
+    let explained = bench.explain();
+    assert_eq!(rules(&explained)[..2], ["host_heartbeat_missing", "fault"], "{explained:?}");
+    for finding in &explained.findings {
+        let text = format!("{} {}", finding.follows, finding.remedy);
+        assert!(!text.contains("no power") && !text.contains("to zero"), "{finding:?}");
+    }
+    assert!(explained.findings[..2].iter().all(|finding| finding.remedy.contains("quick-stop 4")), "{explained:?}");
+    // What the remedy says keeps the shaft where it is.
+    let (drive, stands) = (bench.drive.clone(), bench.world.report(NODE).unwrap().position);
+    bench.done(drive.quick_stop());
+    heartbeat(&mut bench, Some(Duration::from_millis(500)));
+    bench.done(drive.enable());
+    bench.world.run_for(Duration::from_secs(2));
+    let moved = bench.world.report(NODE).unwrap().position - stands;
+    assert!(moved.abs() < 100, "mode {mode}: {moved}");
+}
+
+/// CiA 402-2, table of error codes: 2310h is over-current, 8130h the heartbeat. They share bits, and are not sums of faults.
+#[test]
+fn another_fault_of_a_servo_is_not_that_of_its_watch_over_a_host() {
+    let mut bench = Bench::new("cia402");
+    bench.write(mux(0x1016, 1), 127 << 16 | 2000);
+    bench.enable(3);
+    bench.stimulus("supply 10");
+    let explained = bench.explain();
+    assert!(rules(&explained).contains(&"fault"), "{explained:?}");
+    assert!(!rules(&explained).contains(&"host_heartbeat_missing"), "{explained:?}");
 }

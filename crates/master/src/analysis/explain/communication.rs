@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use canopen::NmtState;
 use canopen::pdo::Direction;
+use canopen::{Mux, NmtState, NodeId};
 use devices::HostWatch;
 
 use super::finding::{Finding, Topic, cause, warning};
@@ -195,22 +195,40 @@ fn host_watch(seen: &Observed) -> Option<Finding> {
                 ])
             })
         }
-        HostWatch::Heartbeat { consumer, fault } => {
-            let entry = seen.value(consumer)?;
-            let (host, limit_ms) = (canopen::NodeId::new((entry >> 16) as u8)?, entry & 0xFFFF);
-            let stopped = seen.fault.as_ref().is_some_and(|(code, _)| code & fault != 0);
-            (stopped && limit_ms > 0).then(|| {
-                let heard = seen.heard.heartbeats(host).map_or(0, |heard| heard.count);
-                cause(TOPIC, "host_heartbeat_missing", [
-                    format!("A heartbeat of node {host} at least every {limit_ms} ms ({})", seen.named(consumer)),
-                    format!("{heard} of them in {} ms, and the fault of that watch", listened.as_millis()),
-                    "It takes its host for dead and has stopped; with the next heartbeat it goes on with what was commanded \
-                     before"
-                        .to_owned(),
-                    format!("Set its target to zero, then have node {host} send its heartbeat again"),
-                ])
-            })
-        }
+        HostWatch::Heartbeat { consumer, .. } => heartbeat_of_host(seen, consumer),
         HostWatch::None => None,
     }
+}
+
+/// A drive at the fault of its watch. One whose motor has kept its power goes on with its last command at the next heartbeat, in
+/// whatever mode that was given: a target of zero would be a place to go to in a position mode.
+fn heartbeat_of_host(seen: &Observed, consumer: Mux) -> Option<Finding> {
+    let entry = seen.value(consumer)?;
+    let (host, limit_ms) = (NodeId::new((entry >> 16) as u8)?, entry & 0xFFFF);
+    let (heard, node) = (seen.heard.heartbeats(host).map_or(0, |heard| heard.count), seen.node);
+    let (follows, remedy) = if seen.is_live() {
+        (
+            "It takes its host for dead and has stopped; with the next heartbeat it goes on with what was commanded before",
+            format!(
+                "End its old motion (ferrodrive quick-stop {node}), then have node {host} send its heartbeat again"
+            ),
+        )
+    } else {
+        (
+            "It takes its host for dead and has stopped",
+            format!("Have node {host} send its heartbeat again, then: ferrodrive reset {node}"),
+        )
+    };
+    (seen.has_lost_host() && limit_ms > 0).then(|| {
+        cause(
+            TOPIC,
+            "host_heartbeat_missing",
+            [
+                format!("A heartbeat of node {host} at least every {limit_ms} ms ({})", seen.named(consumer)),
+                format!("{heard} of them in {} ms, and the fault of that watch", seen.heard.listened().as_millis()),
+                follows.to_owned(),
+                remedy,
+            ],
+        )
+    })
 }

@@ -173,6 +173,18 @@ impl Observed {
         self.power == Some(PowerState::OperationEnabled)
     }
 
+    /// True if its statusword shows that its motor has power.
+    pub(super) fn is_live(&self) -> bool {
+        self.statusword.is_some_and(|statusword| self.style.is_live(statusword))
+    }
+
+    /// True if its fault is that of its watch over the heartbeat of a host.
+    pub(super) fn has_lost_host(&self) -> bool {
+        let (Some(model), Some((code, _))) = (self.description, &self.fault) else { return false };
+        let HostWatch::Heartbeat { fault, .. } = model.host_watch else { return false };
+        if model.faults.bit_field { code & fault != 0 } else { *code == fault }
+    }
+
     /// True if the shaft was seen to turn.
     pub(super) fn turns(&self) -> bool {
         self.speed_rpm.is_some_and(|speed| speed.abs() > STANDSTILL_RPM)

@@ -53,7 +53,10 @@ fn fault(seen: &Observed) -> Finding {
         (_, true) => format!("Fault code {code:04X}h, which no table here explains"),
         _ => format!("Fault code {code:04X}h: {}", join(|row| row.name)),
     };
-    let remedy = if rows.is_empty() {
+    // The row's own remedy, to send the heartbeat again, would set an old motion going.
+    let remedy = if seen.has_lost_host() && seen.is_live() {
+        format!("End its old motion: ferrodrive quick-stop {}.", seen.node)
+    } else if rows.is_empty() {
         "Look the code up in the drive's manual and remove the cause".to_owned()
     } else {
         join(|row| row.remedy)
@@ -64,7 +67,12 @@ fn fault(seen: &Observed) -> Finding {
         [
             "No fault".to_owned(),
             found,
-            "The motor has no power until the fault is reset, which takes its cause to be gone first".to_owned(),
+            if seen.is_live() {
+                "The motor has power all the same, and holds its shaft or turns it; the fault is reset when its cause is gone"
+            } else {
+                "The motor has no power until the fault is reset, which takes its cause to be gone first"
+            }
+            .to_owned(),
             format!("{remedy} Then: ferrodrive reset {}", seen.node),
         ],
     )
