@@ -90,6 +90,12 @@ fn a_torque_is_a_motor_current() {
     let pushed = done(&["--json", "torque", "4", "500mA"]).json();
     assert_eq!(pushed["reached"], false);
     assert_eq!(pushed["asked"], "apply 0.5 A");
+    // The example of its help. What holds in this mode is said: no profile of a speed does.
+    let stopped = done(&["--json", "torque", "4", "1.5A", "--for", "2s"]).json();
+    assert!(stopped["before_stop"]["velocity_rpm"].as_f64().unwrap() > 100.0, "{stopped}");
+    assert!(stopped["velocity_rpm"].as_f64().unwrap().abs() < 1.0, "{stopped}");
+    assert!(stopped["limits"]["profile_velocity_rpm"].is_null(), "{stopped}");
+    assert!(stopped["limits"]["current_a"].as_f64().unwrap() >= 1.5, "{stopped}");
 }
 
 #[test]

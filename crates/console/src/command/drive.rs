@@ -54,8 +54,8 @@ pub struct Disable {
 
 /// Stop a drive, or all, with the deceleration ramp; it stays enabled
 ///
-/// Returns when it stands. With all, every drive that answers on the bus is stopped at the same time, and the status is
-/// 0 only when each one was seen to stand.
+/// Returns when it stands. In profile torque it is quick-stopped, since without torque it would coast. With all, every drive
+/// that answers on the bus is stopped at the same time, and the status is 0 only when each one was seen to stand.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 stop 4\n  ferrodrive --bus can0 stop all")]
 pub struct Stop {

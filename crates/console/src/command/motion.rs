@@ -5,6 +5,7 @@ use std::pin::pin;
 use std::time::Duration;
 
 use canopen::NodeId;
+use cia402::ModeOfOperation;
 use devices::{Quantity, Ramps, Scale};
 use master::drive::{Commanded, Drive, Manner, Motion, MotionReport, Note};
 use master::units::{Along, Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
@@ -64,7 +65,8 @@ pub struct Move {
 
 /// Apply a motor current (profile torque)
 ///
-/// Returns at once: what the motor does depends on the load. With --for the torque is removed afterwards.
+/// Returns at once: what the motor does depends on the load, its speed too. With --for a quick stop brings it to rest
+/// afterwards: without torque it would coast.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  ferrodrive torque 4 1A --for 500ms")]
 pub struct Torque {
@@ -74,7 +76,7 @@ pub struct Torque {
     /// Motor current: 1.5A, -800mA
     #[arg(allow_hyphen_values = true)]
     current: Amperes,
-    /// Apply it for this long, then stop
+    /// Apply it for this long, then quick-stop
     #[arg(long = "for", value_name = "TIME", value_parser = some_time, conflicts_with = "no_wait")]
     duration: Option<Duration>,
     /// Accepted for symmetry with the other moving commands: this one never waits
@@ -171,6 +173,11 @@ struct ProfileLimits {
     quick_stop_ms: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     acceleration_rpm_s: Option<f64>,
+    /// In profile torque: what limits the current. Profiles of speed say nothing then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    current_a: Option<f64>,
+    #[serde(skip)]
+    is_torque: bool,
 }
 
 impl Velocity {
@@ -358,6 +365,11 @@ pub async fn outcome(
 /// What limits a motion, as far as the drive has objects for it.
 async fn limits(drive: &Drive) -> ProfileLimits {
     let Some(axis) = drive.axis_description() else { return ProfileLimits::default() };
+    if drive.mode().await.is_ok_and(|mode| mode == ModeOfOperation::PROFILE_TORQUE) {
+        let limit = drive.current_limit().await.ok().flatten();
+        let current_a = limit.map(|Amperes(current)| current);
+        return ProfileLimits { current_a, is_torque: true, ..ProfileLimits::default() };
+    }
     let profile_velocity_rpm = match axis.units.profile_velocity {
         Some(quantity) => drive.read_quantity(quantity).await.ok(),
         None => None,
@@ -387,6 +399,8 @@ impl ProfileLimits {
             self.deceleration_ms.map(|ms| format!("deceleration {ms:.0} ms")),
             self.quick_stop_ms.map(|ms| format!("quick stop {ms:.0} ms")),
             self.acceleration_rpm_s.map(|rate| format!("acceleration {} (r/min)/s", Shown(rate))),
+            self.current_a.map(|current| format!("current {} A", Shown(current))),
+            self.is_torque.then(|| "the speed is as the load lets it".to_owned()),
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }

@@ -190,7 +190,10 @@ impl Drive {
     }
 
     /// The mode that the drive is in.
-    pub(super) async fn mode(&self) -> Result<ModeOfOperation, Error> {
+    ///
+    /// # Errors
+    /// Those of the SDO read.
+    pub async fn mode(&self) -> Result<ModeOfOperation, Error> {
         let display = self.axis_description().map_or(MODES_OF_OPERATION_DISPLAY, |axis| axis.mode_display);
         match self.in_process_data(display, 8) {
             Some(raw) => Ok(ModeOfOperation(raw as i8)),

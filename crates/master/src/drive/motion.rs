@@ -145,7 +145,8 @@ impl Drive {
         Ok(MotionReport { reached_after: None, commanded: vec![commanded], notes: self.notes(stopped).await })
     }
 
-    /// Stops by the drive's deceleration ramp and stays enabled: target zero, or halt (bit 8) in a position move.
+    /// Stops by the drive's deceleration ramp and stays enabled: target zero, or halt (bit 8) in a position move. In profile torque a
+    /// target of zero has a shaft coast: a [quick stop](Self::quick_stop) brings it to rest, after which it is no longer enabled.
     ///
     /// # Errors
     /// As [`velocity`](Self::velocity).
@@ -163,7 +164,11 @@ impl Drive {
                     }
                     self.write_zero(units.target_velocity).await?;
                 }
-                ModeOfOperation::PROFILE_TORQUE => self.write_zero(units.target_current).await?,
+                ModeOfOperation::PROFILE_TORQUE => {
+                    // Zeroed first: who enables it again does not get the old torque.
+                    self.write_zero(units.target_current).await?;
+                    return self.quick_stop().await;
+                }
                 _ => self.write_controlword(Controlword(0x0F | Controlword::HALT)).await?,
             }
         }

@@ -14,6 +14,7 @@ use super::handle::Drive;
 use crate::error::Error;
 use crate::explain::{Explained, Observed, Overheard};
 use crate::gear::Gear;
+use crate::units::Amperes;
 
 /// Limits in thousandths of what is rated (CiA 402-2, torque profile).
 const CURRENT_LIMITS: [Mux; 4] = [MAX_TORQUE, MAX_CURRENT, POSITIVE_TORQUE_LIMIT_VALUE, NEGATIVE_TORQUE_LIMIT_VALUE];
@@ -28,6 +29,26 @@ impl Drive {
         // What the rules compare are objects, whatever stands behind the shaft.
         let seen = Observed::of(&self.clone().behind(Gear::DIRECT), heard).await;
         seen.explained()
+    }
+
+    /// The largest motor current that its limits allow, the least of them, in A; `None` where its model is not known to have one.
+    ///
+    /// # Errors
+    /// [`Error::UnknownModel`]; those of the SDO reads.
+    pub async fn current_limit(&self) -> Result<Option<Amperes>, Error> {
+        let Some(target) = self.motion("find out its limits")?.units.target_current else { return Ok(None) };
+        let named = self.row(target.object, "find out its limits")?.held_to.map(|held| (held.object, held.counts));
+        let is_share = matches!(target.scale, Scale::Rated { .. });
+        let shares = CURRENT_LIMITS.into_iter().filter(|_| is_share).map(|mux| (self.place(mux), 1));
+        let mut least = None::<i64>;
+        for (object, counts) in named.into_iter().chain(shares) {
+            // A drive that refuses the object holds nothing back by it.
+            if let Some(raw) = answered(self.read_number(object).await)? {
+                least = Some(least.map_or(raw * counts, |least| least.min(raw * counts)));
+            }
+        }
+        let Some(least) = least else { return Ok(None) };
+        Ok(Some(Amperes(least as f64 * self.step_of(target).await?)))
     }
 }
 

@@ -236,3 +236,41 @@ fn a_move_that_would_not_end_is_refused_before_anything_moves_with_the_object_an
     let error = block_on(&mut bench.world, drive.move_absolute(Degrees(90.0), options)).unwrap().unwrap_err();
     assert!(error.to_string().contains("After 3.0 s"), "{error}");
 }
+
+/// A free shaft coasts for seconds when its torque is taken away: its friction alone brakes it.
+#[test]
+fn a_free_shaft_in_profile_torque_is_brought_to_rest_by_a_stop_and_its_torque_does_not_come_back() {
+    for (name, current_a) in [("zlac8030l", 1.5), ("cia402", 0.5)] {
+        let mut bench = Bench::new(name);
+        let drive = bench.drive.clone();
+        bench.done(drive.torque(Amperes(current_a)));
+        bench.done(drive.supervise(Duration::from_secs(2)));
+        assert!(bench.world.report(NODE).unwrap().velocity_rpm > 100.0, "{name}");
+        let began = bench.world.now();
+        bench.done(drive.stop());
+        assert!(bench.world.now() - began < Duration::from_secs(2), "{name}");
+        assert!(bench.world.report(NODE).unwrap().velocity_rpm.abs() < 1.0, "{name}");
+        assert!(drive.node().network().moved().is_empty(), "{name}");
+        bench.done(drive.enable());
+        bench.world.run_for(Duration::from_secs(1));
+        assert!(bench.world.report(NODE).unwrap().velocity_rpm.abs() < 1.0, "{name}");
+    }
+}
+
+/// ZLAC8030L: 2015h is the largest current, in 0.1 A. CiA 402-2, torque profile: 6072h and 6073h are thousandths of what is rated.
+#[test]
+fn what_limits_a_current_is_the_least_of_the_objects_that_do() {
+    let limit = |bench: &mut Bench| {
+        let drive = bench.drive.clone();
+        bench.done(drive.current_limit()).map(|Amperes(current)| current)
+    };
+    let mut servo = Bench::new("zlac8030l");
+    servo.write(mux(0x2015, 0), 100);
+    assert_eq!(limit(&mut servo), Some(10.0));
+    let mut cia402 = Bench::new("cia402");
+    cia402.write(mux(0x6072, 0), 1000);
+    let rated = limit(&mut cia402).unwrap();
+    cia402.write(mux(0x6072, 0), 500);
+    assert!((limit(&mut cia402).unwrap() / rated - 0.5).abs() < 1e-9);
+    assert_eq!(limit(&mut Bench::new("zlim42c")), None);
+}
