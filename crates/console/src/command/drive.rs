@@ -143,6 +143,8 @@ pub struct StateReport {
     fault_code: Option<u16>,
     #[serde(skip)]
     is_faulted: bool,
+    #[serde(skip)]
+    is_enabled: bool,
     faults: Vec<FaultReport>,
     /// Where its shaft is and what it does.
     #[serde(flatten)]
@@ -200,7 +202,7 @@ impl Enable {
     pub async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
         let drive = context.drive(self.node).await?;
         drive.enable().await?;
-        StateReport::read(&drive).await
+        StateReport::read(&drive).await?.still_enabled()
     }
 }
 
@@ -262,6 +264,7 @@ impl StateReport {
             bits,
             fault_code: state.fault_code,
             is_faulted: matches!(state.power, Some(PowerState::Fault | PowerState::FaultReactionActive)),
+            is_enabled: state.power == Some(PowerState::OperationEnabled),
             faults: faults.collect(),
             motion: ShaftMotion {
                 position: state.position.map(|counts| counts.0),
@@ -283,6 +286,23 @@ impl StateReport {
                 text: gear.to_string(),
             }),
         })
+    }
+
+    /// A drive that was enabled and is no longer when it is looked at has not been left enabled.
+    fn still_enabled(self) -> Result<Self, Failure> {
+        if self.is_enabled {
+            return Ok(self);
+        }
+        let Self { node, state, statusword, .. } = self;
+        Err(words::failure::Failure::new(format!("node {node}: it did not stay enabled"))
+            .of_kind("not_reached")
+            .about(node)
+            .because(format!("seen: Operation enabled, and right after it {state} (statusword {statusword:04X}h)"))
+            .next(format!(
+                "find out who else commands it (another master, an RPDO, the enable input), or whether its supply dipped: \
+                 ferrodrive explain {node}"
+            ))
+            .into())
     }
 
     /// Faults and what to do about them; nothing without one. `gap` lines the texts up with others.
@@ -362,9 +382,8 @@ pub fn guessed(drive: &Drive) -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_fault_without_a_code_is_not_shown_as_none() {
-        let report = |power: PowerState| StateReport {
+    fn report(power: PowerState) -> StateReport {
+        StateReport {
             node: 4,
             model: None,
             guess: None,
@@ -375,6 +394,7 @@ mod tests {
             bits: Vec::new(),
             fault_code: Some(0),
             is_faulted: power == PowerState::Fault,
+            is_enabled: power == PowerState::OperationEnabled,
             faults: Vec::new(),
             motion: ShaftMotion {
                 position: None,
@@ -390,7 +410,19 @@ mod tests {
             driver_c: None,
             nmt_state: None,
             gear: None,
-        };
+        }
+    }
+
+    #[test]
+    fn a_drive_is_enabled_where_the_state_that_is_reported_is_that() {
+        let failure = report(PowerState::SwitchOnDisabled).still_enabled().unwrap_err();
+        assert_eq!((failure.kind, failure.subject.node.map(NodeId::raw)), ("not_reached", Some(4)));
+        assert!(failure.to_string().contains("right after it Switch on disabled (statusword 0008h)"), "{failure}");
+        assert!(report(PowerState::OperationEnabled).still_enabled().is_ok());
+    }
+
+    #[test]
+    fn a_fault_without_a_code_is_not_shown_as_none() {
         let faulted = report(PowerState::Fault);
         let text = faulted.text(Paint::OFF);
         assert!(
