@@ -29,10 +29,11 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
             findings.extend(zero(seen, "target_zero", target_torque(seen), "A torque"));
         }
         ModeOfOperation::PROFILE_POSITION => {
-            findings.extend(position(seen));
             let own = seen.axis.and_then(|axis| axis.units.profile_velocity).map(|quantity| quantity.object);
             let object = own.unwrap_or_else(|| seen.place(PROFILE_VELOCITY));
-            findings.extend(zero(seen, "profile_velocity_zero", object, "A speed for the way to the target"));
+            // Without a speed neither the target nor its start bit decides anything, nor what bits 10 and 12 say of them.
+            let no_speed = zero(seen, "profile_velocity_zero", object, "A speed for the way to the target");
+            findings.extend(no_speed.or_else(|| position(seen)));
         }
         ModeOfOperation::HOMING => findings.extend(homing(seen)),
         _ => {}
@@ -133,7 +134,8 @@ fn position(seen: &Observed) -> Option<Finding> {
     }
     let handshake = seen.axis.is_none_or(|axis| axis.new_set_point == NewSetPoint::Handshake);
     let asked = controlword.has(Controlword::NEW_SET_POINT);
-    if handshake && asked && statusword.has(Statusword::SET_POINT_ACKNOWLEDGE) {
+    // Bit 12 is 1 as long as bit 4 is, also on the way: it speaks for an edge that is missing only where nothing is left to be done.
+    if handshake && asked && reached && statusword.has(Statusword::SET_POINT_ACKNOWLEDGE) {
         return Some(cause(
             TOPIC,
             "start_bit_left_set",
