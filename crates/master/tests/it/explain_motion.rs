@@ -7,8 +7,9 @@ use crate::explain::{Bench, NODE, rules};
 use crate::support::mux;
 use canopen::NodeId;
 use master::drive::MotionOptions;
-use master::explain::{Explained, Finding, Weight};
+use master::explain::{Explained, Finding, Overheard, Weight};
 use master::units::Turns;
+use sim::block_on;
 
 fn causes(explained: &Explained) -> Vec<Finding> {
     explained.findings.iter().filter(|finding| finding.weight == Weight::Cause).cloned().collect()
@@ -96,4 +97,25 @@ fn a_profile_velocity_of_0_comes_first_and_a_start_bit_that_has_risen_is_not_bla
     let found = causes(&bench.explain());
     assert_eq!(found.first().map(|finding| finding.rule), Some("profile_velocity_zero"), "{found:?}");
     assert!(!found.iter().any(|finding| finding.rule == "start_bit_left_set"), "{found:?}");
+}
+
+/// ZLAC8030L, L083 of its page: 2000h without a request it stops, sets its target to 0 and stays enabled without a fault.
+#[test]
+fn a_drive_that_its_watch_for_silence_has_stopped_is_said_to_be_perhaps_that() {
+    let first = |watch| {
+        let mut bench = Bench::new("zlac8030l");
+        bench.write(mux(0x2000, 0), watch);
+        bench.enable(3);
+        bench.write(mux(0x60FF, 0), if watch == 0 { 0 } else { 60 });
+        bench.world.run_for(Duration::from_secs(3));
+        // It is asked something again: its silence is over.
+        bench.done(bench.drive.clone().state());
+        let drive = bench.drive.clone();
+        let heard = Overheard::from(bench.world.now());
+        let explained = block_on(&mut bench.world, drive.explain(&heard)).unwrap();
+        causes(&explained).into_iter().find(|finding| finding.rule == "target_zero").unwrap()
+    };
+    let (stopped, commanded) = (first(1000), first(0));
+    assert!(stopped.follows.contains("2000h:00") && stopped.remedy.contains("each 1000 ms"), "{stopped:?}");
+    assert!(!commanded.follows.contains("2000h:00"), "{commanded:?}");
 }

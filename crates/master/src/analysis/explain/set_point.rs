@@ -7,7 +7,7 @@ use cia402::object::{
     PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY, VL_TARGET_VELOCITY,
 };
 use cia402::{Controlword, ModeOfOperation, Statusword};
-use devices::{HomingStart, NewSetPoint};
+use devices::{HomingStart, HostWatch, NewSetPoint};
 
 use super::finding::{Finding, Topic, cause};
 use super::observed::Observed;
@@ -19,14 +19,16 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
     findings.extend(halt(seen, mode));
     match mode {
         ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => {
-            findings.extend(zero(seen, "target_zero", target_velocity(seen), "A speed to turn at"));
+            let zero = zero(seen, "target_zero", target_velocity(seen), "A speed to turn at");
+            findings.extend(zero.map(|finding| or_by_host_watch(seen, finding)));
         }
         ModeOfOperation::VELOCITY => {
             findings.extend(zero(seen, "target_zero", seen.place(VL_TARGET_VELOCITY), "A speed to turn at"));
             findings.extend(ramp_held(seen));
         }
         ModeOfOperation::PROFILE_TORQUE | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => {
-            findings.extend(zero(seen, "target_zero", target_torque(seen), "A torque"));
+            let zero = zero(seen, "target_zero", target_torque(seen), "A torque");
+            findings.extend(zero.map(|finding| or_by_host_watch(seen, finding)));
         }
         ModeOfOperation::PROFILE_POSITION => {
             let own = seen.axis.and_then(|axis| axis.units.profile_velocity).map(|quantity| quantity.object);
@@ -70,6 +72,26 @@ fn zero(seen: &Observed, rule: &'static str, object: Mux, expected: &str) -> Opt
             ],
         )
     })
+}
+
+/// A drive that is stopped by its watch for silence stays enabled, has no fault and sets its target to 0: a host that has written that
+/// looks the same.
+fn or_by_host_watch(seen: &Observed, finding: Finding) -> Finding {
+    let watch = seen.description.map(|description| description.host_watch);
+    let Some(HostWatch::Silence { time }) = watch else { return finding };
+    let Some(limit) = seen.value(time).filter(|limit| *limit > 0) else { return finding };
+    let (watch, before) = (seen.named(time), &finding.remedy);
+    Finding {
+        follows: format!(
+            "Its host has commanded it to stand, or has fallen silent for {limit} ms: by its watch ({watch}) it then stops and sets the \
+             target to 0 by itself. Which of the two does not show"
+        ),
+        remedy: format!(
+            "{before}; and send it something more often than each {limit} ms (a read of its statusword), as ferrodrive does while it \
+             moves it"
+        ),
+        ..finding
+    }
 }
 
 /// Controlword bits 4 to 6 of velocity mode: the ramp leads nowhere without them.
