@@ -119,3 +119,20 @@ fn a_drive_that_its_watch_for_silence_has_stopped_is_said_to_be_perhaps_that() {
     assert!(stopped.follows.contains("2000h:00") && stopped.remedy.contains("each 1000 ms"), "{stopped:?}");
     assert!(!commanded.follows.contains("2000h:00"), "{commanded:?}");
 }
+
+/// 1000 increments/s of a turn of 131072 are 0.46 r/min. What CiA 402-2 gives a rate of 0 no meaning for turns the shaft all the same.
+#[test]
+fn a_ramp_of_0_is_a_cause_where_the_shaft_stands_alone() {
+    for (target, rotor, is_cause) in [(1000, "rotor free", false), (1000, "rotor lock", true), (0, "rotor free", true)]
+    {
+        let mut bench = Bench::new("cia402");
+        bench.write(mux(0x6083, 0), 0);
+        bench.stimulus(rotor);
+        bench.enable(3);
+        bench.write(mux(0x60FF, 0), target);
+        bench.world.run_for(Duration::from_secs(1));
+        let found = causes(&bench.explain());
+        assert_eq!(found.iter().any(|finding| finding.rule == "ramp_zero"), is_cause, "{target} {rotor}: {found:?}");
+        assert!(is_cause || found.is_empty(), "{found:?}");
+    }
+}

@@ -44,6 +44,9 @@ const OF_AXIS: [Mux; 17] = [
     NEGATIVE_TORQUE_LIMIT_VALUE,
 ];
 
+/// A speed that differs from its target by less than this part of it follows it.
+const FOLLOWED_SHARE: f64 = 0.5;
+
 /// Everything that the rules look at.
 #[derive(Clone, Debug)]
 pub struct Observed {
@@ -188,6 +191,14 @@ impl Observed {
     /// True if the shaft was seen to turn.
     pub(super) fn turns(&self) -> bool {
         self.speed_rpm.is_some_and(|speed| speed.abs() > STANDSTILL_RPM)
+    }
+
+    /// True if it is to turn at a speed and does so, be it slower than what counts as turning.
+    pub(super) fn follows_speed(&self) -> bool {
+        let by_speed = self.axis.map(AxisDescription::velocity_mode) == self.mode
+            || self.mode == Some(ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY);
+        let (Some(target), Some(speed)) = (self.target_rpm, self.speed_rpm) else { return false };
+        by_speed && target != 0.0 && ((speed - target) / target).abs() < FOLLOWED_SHARE
     }
 
     /// True if the statusword has this bit, and the model gives it no meaning of its own.

@@ -15,7 +15,7 @@ use super::observed::Observed;
 const TOPIC: Topic = Topic::SetPoint;
 
 pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
-    let Some(mode) = seen.mode.filter(|_| seen.is_enabled() && !seen.turns()) else { return };
+    let Some(mode) = seen.mode.filter(|_| seen.is_enabled() && !seen.turns() && !seen.follows_speed()) else { return };
     findings.extend(halt(seen, mode));
     match mode {
         ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => {
