@@ -225,6 +225,9 @@ impl From<GroupError> for Failure {
                 .of_kind("out_of_limits")
                 .next("give a position, velocity, acceleration or rounding within what the axes may do"),
             GroupError::NoMode { node } => group().at_node(node).next(MODES),
+            GroupError::NoPosition { node, .. } => group().at_node(node).next(
+                "choose another mode (the best that the model has is taken without one), or map 6064h to a TPDO that comes each cycle",
+            ),
             GroupError::NotEnabled { node, .. } => group().at_node(node).next(format!(
                 "ferrodrive explain {node} says what keeps it; `ferrodrive plan` whether the bus carries such a cycle"
             )),

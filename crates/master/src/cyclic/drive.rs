@@ -38,6 +38,8 @@ pub struct CyclicDrive {
     pub(super) controlword: ControlwordPath,
     pub(super) target: Target,
     pub(super) position: Option<Signal<Turns>>,
+    /// Its TPDO comes in the exchange of each cycle.
+    pub(super) position_comes: bool,
     pub(super) velocity: Option<Signal<Rpm>>,
     pub(super) current: Option<Signal<Amperes>>,
     /// How often the TPDO with the statusword comes.
@@ -137,6 +139,11 @@ impl CyclicDrive {
     /// True if the drive's position comes by TPDO.
     pub const fn shows_position(&self) -> bool {
         self.position.is_some()
+    }
+
+    /// True if it comes in the exchange of each cycle too: TPDOs that are answers come for the RPDO that is sent alone.
+    pub(crate) const fn shows_position_in_cycles(&self) -> bool {
+        self.position.is_some() && self.position_comes
     }
 
     /// What the drive does when this program dies in the middle of a motion.

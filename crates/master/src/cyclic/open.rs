@@ -159,6 +159,14 @@ impl Drive {
             self.quantity_signal(description, statusword_in, axis.units.actual_velocity).await?,
             self.quantity_signal(description, statusword_in, axis.units.actual_current).await?,
         );
+        // A TPDO that answers another RPDO than that of the cycle does not come.
+        let is_answer = description.pdo.event_trigger == EventTrigger::AnswersRpdo;
+        let actual = self.place(POSITION_ACTUAL_VALUE);
+        let position_comes = !is_answer
+            || self
+                .node()
+                .scaled_signal::<crate::units::Turns>(actual, Some(statusword_in), NumberForm::Signed, 1.0)
+                .is_ok();
         let host_loss = self.begin_cyclic(description, mode, options).await?;
         Ok(CyclicDrive {
             node: self.node().id(),
@@ -169,11 +177,12 @@ impl Drive {
             statusword,
             controlword,
             position,
+            position_comes,
             velocity,
             current,
             target,
             cadence,
-            answers: description.pdo.event_trigger == EventTrigger::AnswersRpdo && statusword_in == number,
+            answers: is_answer && statusword_in == number,
             tolerance: options.tolerance,
             host_loss,
             watch: self.node().network().with_core(|core| core.watch_cycles(rules)),

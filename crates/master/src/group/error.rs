@@ -71,8 +71,8 @@ pub enum GroupError {
     },
     /// The mode has no position or speed as its set-point, or the drive does not show where it is.
     #[error(
-        "axis {axis}, node {node}, cannot follow a path in mode {mode}: choose one for positions or speed, and map the \
-         position actual value to a TPDO that comes each cycle"
+        "axis {axis}, node {node}, cannot follow a path in mode {mode}: that takes a mode for positions or speeds, and a TPDO \
+         with the position actual value that comes each cycle"
     )]
     NoPosition {
         /// Which axis, from 1.

@@ -97,7 +97,7 @@ impl AxisSetup {
             Some((Rpm(most_rpm), bound)) if stated_rpm > most_rpm * (1.0 + 1e-9) => {
                 Err(GroupError::BeyondDrive { axis, node, stated_rpm, most_rpm, bound })
             }
-            Some(_) if drive.shows_position() => {
+            Some(_) if drive.shows_position_in_cycles() => {
                 if drive.set_point().is_none() {
                     let rpm_per_s = self.limits.acceleration_turns_s2 * 60.0;
                     self.drive.write_ramps_of_a_cycle(period, rpm_per_s).await?;

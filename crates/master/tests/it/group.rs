@@ -89,6 +89,16 @@ fn turns(values: &[f64]) -> Vec<Turns> {
     values.iter().map(|value| Turns(*value)).collect()
 }
 
+/// The M joint's TPDOs are answers (its page, 6), and its fixed mapping has the position in none that answers the RPDO with 60FFh.
+#[test]
+fn a_joint_is_not_led_by_speeds_since_its_position_would_not_come() {
+    let mut bench = Bench::new(&[(devices::model("m4230e17b50").unwrap(), PV)]);
+    let refused = bench.try_open().unwrap_err();
+    assert!(matches!(refused, GroupError::NoPosition { axis: 1, mode: PV, .. }), "{refused}");
+    bench.setups[0].mode = IP;
+    assert!(bench.try_open().is_ok());
+}
+
 /// The M joint has no power state machine: its statusword shows by bit 4 whether its motor has power (M joint manual, 5.04).
 #[test]
 fn joints_have_lost_their_power_once_their_group_is_closed() {
