@@ -227,8 +227,13 @@ fn unseen(sensor: &str, remedy: &str) -> (String, String) {
     )
 }
 
+/// Where it is, in place of where it should be.
+pub(super) fn place(at: f64, target: f64, unit: &str) -> String {
+    format!("It is at {} {unit} where {} {unit} was asked for", Shown(at), Shown(target))
+}
+
 fn elsewhere(at: f64, target: f64, unit: &str, by: &Interference) -> (String, String) {
-    let place = format!("It is at {} {unit} where {} {unit} was asked for", Shown(at), Shown(target));
+    let place = place(at, target, unit);
     let find = "Find out who else commands it: another master, a PLC, a pendant, an RPDO. When it is safe, start the motion again";
     match by {
         Interference::Halted => (format!("{place}: another master has halted it (bit 8 of 6040h)"), find.to_owned()),

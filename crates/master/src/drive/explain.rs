@@ -3,9 +3,10 @@ use cia402::object::MODES_OF_OPERATION;
 use devices::Description;
 use devices::faults::FaultRow;
 
-use super::conclude::{Trigger, conclude};
+use super::conclude::{Interference, Trigger, conclude, place};
 use super::handle::Drive;
 use crate::error::{Error, Explanation, Fact};
+use crate::explain::{Finding, Observed, Topic};
 use crate::units::Volts;
 
 /// The faults that a code of this model stands for.
@@ -39,8 +40,37 @@ impl Drive {
             }
         }
         self.recall(&mut facts);
-        let (conclusion, advice) = conclude(&trigger, &facts, self.power_style());
+        let (mut conclusion, mut advice) = conclude(&trigger, &facts, self.power_style());
+        match self.hindrance(&trigger, &facts).await {
+            Some(cause) => {
+                if let Trigger::Elsewhere { at, target, unit, .. } = trigger {
+                    conclusion = place(at, target, unit);
+                }
+                conclusion = format!("{conclusion}. {}; expected: {}", cause.found, cause.expected);
+                advice = cause.remedy;
+            }
+            None if matches!(trigger, Trigger::Late { .. }) => {
+                advice = format!("{advice}; ferrodrive explain {} shows more", self.node.id());
+            }
+            None => {}
+        }
         Error::NotReached(Box::new(Explanation { node: self.node.id(), intent, facts, conclusion, advice }))
+    }
+
+    /// What the drive shows of why a motion does not get there. It is looked for before the caller's stop hides it.
+    async fn hindrance(&self, trigger: &Trigger, facts: &[Fact]) -> Option<Finding> {
+        // A rate of 0 has its own advice.
+        if facts.iter().any(|fact| matches!(fact, Fact::RateOfZero(_))) {
+            return None;
+        }
+        let is_known = match trigger {
+            Trigger::Late { .. } => false,
+            // A drive that an input has stopped may set its target to 0 by itself: that was no other master then.
+            Trigger::Elsewhere { by, .. } => !matches!(by, Interference::Unknown),
+            _ => return None,
+        };
+        let cause = Observed::of_shaft(self).await.hindrance();
+        cause.filter(|cause| !is_known || cause.topic == Topic::Terminals)
     }
 
     /// Turns silence of the drive into an explanation; hands everything else on.

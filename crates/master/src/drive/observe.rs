@@ -55,8 +55,26 @@ impl Drive {
 impl Observed {
     /// Reads what the rules need. A refused object is left out; silence ends the reading and is reported.
     pub async fn of(drive: &Drive, heard: &Overheard) -> Self {
+        let mut seen = Self::unread(drive, heard);
+        seen.silence = seen.read(drive, true).await.err();
+        if let Some(period) = seen.heartbeat_period() {
+            drive.node().look_for_twins(period).await;
+            seen.twins = drive.node().facts().twins;
+        }
+        seen
+    }
+
+    /// The same of what the shaft does, and of what it is commanded to do, alone: some thirty reads.
+    pub(super) async fn of_shaft(drive: &Drive) -> Self {
+        let drive = drive.clone().behind(Gear::DIRECT);
+        let mut seen = Self::unread(&drive, &Overheard::from(drive.node().network().now()));
+        seen.silence = seen.read(&drive, false).await.err();
+        seen
+    }
+
+    fn unread(drive: &Drive, heard: &Overheard) -> Self {
         let (facts, now) = (drive.node().facts(), drive.node().network().now());
-        let mut seen = Self {
+        Self {
             node: drive.node().id(),
             description: drive.description(),
             axis: drive.axis_description(),
@@ -81,16 +99,10 @@ impl Observed {
             refuses_blocks: facts.refuses_blocks,
             heard: heard.clone(),
             values: BTreeMap::new(),
-        };
-        seen.silence = seen.read(drive).await.err();
-        if let Some(period) = seen.heartbeat_period() {
-            drive.node().look_for_twins(period).await;
-            seen.twins = drive.node().facts().twins;
         }
-        seen
     }
 
-    async fn read(&mut self, drive: &Drive) -> Result<(), Error> {
+    async fn read(&mut self, drive: &Drive, with_pdos: bool) -> Result<(), Error> {
         let units = self.axis.map(|axis| &axis.units);
         // Every node answers this one: the first request shows whether one is there.
         answered(drive.node().upload(DEVICE_TYPE).await)?;
@@ -112,7 +124,9 @@ impl Observed {
         let current = units.and_then(|units| units.target_current);
         self.current_limit_a = self.held_to(drive, current, &CURRENT_LIMITS).await?;
         self.rates_of_zero = drive.rates_of_zero().await;
-        self.pdos = drive.pdos().await?;
+        if with_pdos {
+            self.pdos = drive.pdos().await?;
+        }
         drive.node().network().sleep(BETWEEN_LOOKS).await;
         let second = measure(drive, speed).await?;
         self.speed_change_rpm = first.zip(second).map(|(first, second)| second - first);

@@ -6,9 +6,10 @@ use std::time::Duration;
 use crate::explain::{Bench, NODE, rules};
 use crate::support::mux;
 use canopen::NodeId;
+use master::Error;
 use master::drive::MotionOptions;
 use master::explain::{Explained, Finding, Overheard, Weight};
-use master::units::Turns;
+use master::units::{Rpm, Turns};
 use sim::block_on;
 
 fn causes(explained: &Explained) -> Vec<Finding> {
@@ -135,4 +136,47 @@ fn a_ramp_of_0_is_a_cause_where_the_shaft_stands_alone() {
         assert_eq!(found.iter().any(|finding| finding.rule == "ramp_zero"), is_cause, "{target} {rotor}: {found:?}");
         assert!(is_cause || found.is_empty(), "{found:?}");
     }
+}
+
+/// What keeps a motion from its target is looked for before the stop of a program that fails hides it.
+#[test]
+fn a_motion_that_does_not_get_there_names_what_the_drive_shows_of_the_cause() {
+    let why = |name, prepare: fn(&mut Bench), by_speed: bool| {
+        let mut bench = Bench::new(name);
+        prepare(&mut bench);
+        let (drive, within) = (bench.drive.clone(), Some(Duration::from_secs(3)));
+        let options = MotionOptions { within, ..MotionOptions::default() };
+        let ended = match by_speed {
+            true => block_on(&mut bench.world, drive.velocity(Rpm(60.0), options)),
+            false => block_on(&mut bench.world, drive.move_absolute(Turns(2.0), options)),
+        };
+        match ended.unwrap().unwrap_err() {
+            Error::NotReached(why) => format!("{} {}", why.conclusion, why.advice),
+            error => panic!("{name}: {error}"),
+        }
+    };
+    let no_torque = |bench: &mut Bench| bench.write(mux(0x6072, 0), 0);
+    let limited = |bench: &mut Bench| {
+        bench.write(mux(0x607D, 1), -1000);
+        bench.write(mux(0x607D, 2), 1000);
+    };
+    // ZLIM42-C, 5.4: function 2 of an input is the positive limit switch. ZLAC8030L, 2030h:02: X0 is the emergency stop as delivered.
+    let at_limit = |bench: &mut Bench| {
+        bench.write(mux(0x2030, 3), 2);
+        bench.write(mux(0x2030, 1), 0b10);
+    };
+    let stopped = |bench: &mut Bench| bench.stimulus("input X0 1");
+    let blocked = |bench: &mut Bench| bench.stimulus("rotor lock");
+    for (name, prepare, by_speed, part) in [
+        ("cia402", no_torque as fn(&mut Bench), true, "6072h"),
+        ("cia402", limited, false, "607Dh"),
+        ("zlim42c", at_limit, true, "X1"),
+        ("zlac8030l", stopped, true, "X0"),
+    ] {
+        let text = why(name, prepare, by_speed);
+        assert!(text.contains(part), "{name}: {text}");
+        assert!(!text.contains("another master") && !text.contains("blocked"), "{name}: {text}");
+    }
+    let text = why("cia402", blocked, true);
+    assert!(text.contains("blocked") && text.contains("ferrodrive explain 4"), "{text}");
 }

@@ -59,7 +59,20 @@ type Rule = fn(&Observed, &mut Vec<Finding>);
 const RULES: [Rule; 7] =
     [communication::look, terminals::look, power::look, mode::look, set_point::look, load::look, pdos::look];
 
+/// What a motion that is under way has brought about itself, and what says no more than that it does not come forward.
+const OF_THE_MOTION: [&str; 4] = ["at_target", "set_point_not_started", "start_bit_left_set", "shaft_held"];
+
 impl Observed {
+    /// The first cause for which a shaft that was set in motion does not get there: an input, its commands and limits, its load.
+    pub(crate) fn hindrance(&self) -> Option<Finding> {
+        let mut findings = Vec::new();
+        for rule in [terminals::look, mode::look, set_point::look, load::look] {
+            rule(self, &mut findings);
+        }
+        let stops = |finding: &Finding| finding.weight == Weight::Cause && !OF_THE_MOTION.contains(&finding.rule);
+        findings.into_iter().find(stops)
+    }
+
     /// What follows from this.
     pub fn explained(&self) -> Explained {
         let mut findings = Vec::new();

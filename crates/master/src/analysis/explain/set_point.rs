@@ -33,15 +33,19 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
         ModeOfOperation::PROFILE_POSITION => {
             let own = seen.axis.and_then(|axis| axis.units.profile_velocity).map(|quantity| quantity.object);
             let object = own.unwrap_or_else(|| seen.place(PROFILE_VELOCITY));
-            // Without a speed neither the target nor its start bit decides anything, nor what bits 10 and 12 say of them.
+            // What keeps it from getting there comes first: without it the start bit decides nothing, nor what bits 10 and 12 say of it.
             let no_speed = zero(seen, "profile_velocity_zero", object, "A speed for the way to the target");
-            findings.extend(no_speed.or_else(|| position(seen)));
+            findings.extend(no_speed);
+            findings.extend(software_limit(seen));
+            limits(seen, mode, findings);
+            if findings.iter().all(|finding| finding.topic != TOPIC) {
+                findings.extend(position(seen));
+            }
+            return ramps(seen, mode, findings);
         }
+        ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => findings.extend(software_limit(seen)),
         ModeOfOperation::HOMING => findings.extend(homing(seen)),
         _ => {}
-    }
-    if matches!(mode, ModeOfOperation::PROFILE_POSITION | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION) {
-        findings.extend(software_limit(seen));
     }
     limits(seen, mode, findings);
     ramps(seen, mode, findings);
@@ -211,7 +215,9 @@ fn relative_reached(seen: &Observed, object: &str, found: String) -> Finding {
 fn software_limit(seen: &Observed) -> Option<Finding> {
     let (low, high) = (seen.axis_value(MIN_POSITION_LIMIT)?, seen.axis_value(MAX_POSITION_LIMIT)?);
     let target = seen.axis_value(TARGET_POSITION)?;
-    (low < high && !(low..=high).contains(&target)).then(|| {
+    // A distance is none of the positions that are limited.
+    let relative = seen.controlword().is_some_and(|controlword| controlword.has(Controlword::RELATIVE));
+    (!relative && low < high && !(low..=high).contains(&target)).then(|| {
         cause(
             TOPIC,
             "software_limit",
