@@ -220,6 +220,8 @@ pub enum HostWatch {
 pub struct ParameterStorage {
     /// The write that stores all parameters, where there is one.
     pub save: Option<Write>,
+    /// What the object of `save` reads once the store is done, of a device that says the end of it there; else its answer says it.
+    pub saved: Option<u32>,
     /// The write that restores factory settings, where there is one.
     pub restore: Option<Write>,
     /// The object and value that make each write be stored by itself, and whether it is so as delivered.
@@ -232,8 +234,14 @@ pub struct ParameterStorage {
 
 impl ParameterStorage {
     /// None: nothing is kept without supply.
-    pub const NONE: Self =
-        Self { save: None, restore: None, save_on_write: None, effective_after_restart: &[], address: &[] };
+    pub const NONE: Self = Self {
+        save: None,
+        saved: None,
+        restore: None,
+        save_on_write: None,
+        effective_after_restart: &[],
+        address: &[],
+    };
 
     /// 1010h:01 and 1011h:01 with their signatures "save" and "load" (CiA 301, 7.5.2.13 and 7.5.2.14).
     pub const CIA_301: Self = Self {

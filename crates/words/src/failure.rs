@@ -279,6 +279,9 @@ fn remedy(error: &master::Error) -> Option<&'static str> {
         Error::NoParameterStore { .. } => {
             "write them after each start: ferrodrive params apply NODE FILE, or boot by a machine file"
         }
+        Error::NotStored { .. } => {
+            "look for what keeps its memory from answering: ferrodrive faults NODE; then save again"
+        }
         Error::NoFactorySettings { .. } => "write each object instead: ferrodrive params apply NODE FILE",
         Error::NoSuchMode { mode: ModeOfOperation::HOMING, .. } => {
             "move it to its reference, and set the position to zero there: ferrodrive objects NODE position"

@@ -145,6 +145,8 @@ const LOOPS: Loops = Loops {
 
 const STORAGE: ParameterStorage = ParameterStorage {
     save: Some(Write { object: Mux::new(0x2614, 0), value: 1 }),
+    // "1: Save the parameters. 2: Finish storage." (5.04)
+    saved: Some(2),
     restore: None,
     save_on_write: None,
     effective_after_restart: &[Mux::new(0x2615, 0), Mux::new(0x2619, 0)],

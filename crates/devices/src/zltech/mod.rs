@@ -74,6 +74,7 @@ const fn parameter_storage(
 ) -> ParameterStorage {
     ParameterStorage {
         save: Some(Write { object: Mux::new(register, 0), value: SAVE }),
+        saved: None,
         restore: Some(Write { object: Mux::new(register, 0), value: RESTORE }),
         save_on_write: Some((Write { object: Mux::new(save_on_write, 0), value: 0 }, true)),
         effective_after_restart,

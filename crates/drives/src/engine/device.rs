@@ -334,7 +334,13 @@ impl<S: Storage> Device<S> {
     /// A value waits for the next [`commit`](Self::commit), which will write it: the EEPROM answers and can be read.
     #[inline]
     pub fn is_storing(&self) -> bool {
-        self.running && self.eeprom_ok && self.store.has_pending()
+        self.takes_stores() && self.store.has_pending()
+    }
+
+    /// It has power, and the EEPROM answers.
+    #[inline]
+    pub fn takes_stores(&self) -> bool {
+        self.running && self.eeprom_ok
     }
 
     /// Stores what is marked. While the EEPROM does not answer it waits.

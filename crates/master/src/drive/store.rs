@@ -1,8 +1,9 @@
 use std::time::Duration;
 
+use canopen::Mux;
 use devices::Write;
 
-use super::handle::Drive;
+use super::handle::{Drive, POLL};
 use crate::error::Error;
 
 /// How long a drive may take to write its whole parameter memory before it answers: EEPROMs take 5 to 10 ms a page.
@@ -18,14 +19,35 @@ impl Drive {
         self.save_write().await.map(|_| ())
     }
 
-    /// Stores all parameters.
+    /// Stores all parameters. It is done when the drive has answered, or, of a model that has
+    /// [`saved`](devices::ParameterStorage::saved), when the object reads that.
     ///
     /// # Errors
-    /// [`Error::NoParameterStore`]; [`Error::UnknownModel`], [`Error::GuessedModel`], [`Error::WrongModel`], [`Error::OtherModel`], and nothing is
+    /// [`Error::NoParameterStore`]; [`Error::NotStored`]; [`Error::UnknownModel`], [`Error::GuessedModel`], [`Error::WrongModel`], [`Error::OtherModel`], and nothing is
     /// written: what means "save" to one model may be anything to another of the same identity. Those of the SDO write.
     pub async fn save(&self) -> Result<(), Error> {
         let save = self.save_write().await?;
-        self.command(save).await
+        self.command(save).await?;
+        match self.description().and_then(|description| description.storage.saved) {
+            Some(done) => self.stored(save.object, i64::from(done)).await,
+            None => Ok(()),
+        }
+    }
+
+    /// Waits until `object` reads `done`.
+    async fn stored(&self, object: Mux, done: i64) -> Result<(), Error> {
+        let network = self.node.network();
+        let begun = network.now();
+        loop {
+            let found = self.patient().read_number(object).await?;
+            if found == done {
+                return Ok(());
+            }
+            if network.now() - begun >= STORE_TIMEOUT {
+                return Err(Error::NotStored { node: self.node.id(), mux: object, found, done, waited: STORE_TIMEOUT });
+            }
+            network.sleep(POLL).await;
+        }
     }
 
     async fn save_write(&self) -> Result<Write, Error> {
@@ -49,7 +71,10 @@ impl Drive {
     }
 
     async fn command(&self, write: Write) -> Result<(), Error> {
-        let patient = Self { node: self.node.clone().with_timeout(STORE_TIMEOUT), ..self.clone() };
-        patient.write_number(write.object, i64::from(write.value)).await
+        self.patient().write_number(write.object, i64::from(write.value)).await
+    }
+
+    fn patient(&self) -> Self {
+        Self { node: self.node.clone().with_timeout(STORE_TIMEOUT), ..self.clone() }
     }
 }

@@ -206,6 +206,20 @@ pub enum Error {
         /// The model's name.
         model: &'static str,
     },
+    /// The drive took the command to store its parameters, and never said that it had done so.
+    #[error("node {node}: {mux} was set to store the parameters, and still reads {found} after {waited:?}, not {done}")]
+    NotStored {
+        /// The node.
+        node: NodeId,
+        /// The object that starts the store and says its end.
+        mux: Mux,
+        /// What it reads.
+        found: i64,
+        /// What it reads after a store.
+        done: i64,
+        /// How long was waited.
+        waited: Duration,
+    },
     /// The model has no command that restores factory settings.
     #[error("node {node}: the {model} cannot restore its factory settings: write each object instead")]
     NoFactorySettings {
@@ -289,6 +303,7 @@ impl Error {
             Self::NoFeed { .. } => "no_feed",
             Self::InCycles { .. } => "in_cycles",
             Self::NoParameterStore { .. } => "no_parameter_store",
+            Self::NotStored { .. } => "not_stored",
             Self::NoFactorySettings { .. } => "no_factory_settings",
             Self::NoSuchMode { .. } => "no_such_mode",
             Self::OutOfLimits { .. } => "out_of_limits",
@@ -315,6 +330,7 @@ impl Error {
             | Self::NoFeed { node }
             | Self::InCycles { node, .. }
             | Self::NoParameterStore { node, .. }
+            | Self::NotStored { node, .. }
             | Self::NoFactorySettings { node, .. }
             | Self::NoSuchMode { node, .. }
             | Self::OutOfLimits { node, .. }
@@ -327,6 +343,7 @@ impl Error {
     pub fn object(&self) -> Option<Mux> {
         match self {
             Self::NoAnswer { mux, .. }
+            | Self::NotStored { mux, .. }
             | Self::Aborted { mux, .. }
             | Self::BadAnswer { mux, .. }
             | Self::WrongLength { mux, .. }

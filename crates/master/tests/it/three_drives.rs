@@ -10,8 +10,9 @@ use drives::mjoint::Model;
 use master::drive::{Fact, HomingOptions, HostLoss, MotionOptions, Note};
 use master::units::{Amperes, Degrees, Ramp, Rpm, Turns};
 use master::{Drive, Error, Network};
+use sim::machine::TimingMode;
 use sim::machine::{mjoint, zlac8030l, zlim42c};
-use sim::{SwitchRange, World, block_on};
+use sim::{Place, SwitchRange, World, block_on};
 
 const JOINT: u8 = 1;
 const STEPPER: u8 = 2;
@@ -398,6 +399,31 @@ fn every_drive_saves_by_its_own_command_and_restores_where_it_can() {
     // A joint taken for a servo says another identity.
     let mistaken = Drive::new(joint.node().clone(), model("zlac8030l").unwrap());
     assert!(matches!(block_on(&mut world, mistaken.save()).unwrap(), Err(Error::WrongModel { .. })));
+}
+
+/// "After the parameter is saved and sent 1, it will display 2 to indicate that the save is successful" ("M Robot Joint Motor CanOpen
+/// Manual", 5.01).
+#[test]
+fn a_joint_has_saved_when_2614h_reads_2_and_what_it_has_saved_outlives_a_reset() {
+    for seed in 1..=8 {
+        let mut world = World::new(Bitrate::M1, seed);
+        let network = Network::new();
+        world.add_station(network.clone());
+        let joint = Model::named("m4230e17b50").unwrap();
+        world.add_drive(JOINT, Box::new(mjoint(joint, JOINT, Bitrate::M1))).unwrap();
+        world.set_timing(TimingMode::Device);
+        world.run_until(Instant::from_secs(2));
+        let drive = Drive::new(network.node(node(JOINT)), model("m4230e17b50").unwrap());
+        let amplitude = mux(0x2618, 0);
+        block_on(&mut world, drive.node().write(amplitude, 305_u16)).unwrap().unwrap();
+        block_on(&mut world, drive.save()).unwrap().unwrap();
+        block_on(&mut world, drive.node().reset(Duration::from_secs(2))).unwrap().unwrap();
+        assert_eq!(block_on(&mut world, drive.node().read::<u16>(amplitude)).unwrap().unwrap(), 305, "seed {seed}");
+
+        world.apply(Place::node(JOINT), &"fault eeprom on".parse().unwrap()).unwrap().unwrap();
+        let error = block_on(&mut world, drive.save()).unwrap().unwrap_err();
+        assert!(matches!(error, Error::NotStored { found: 1, done: 2, .. }), "{error}");
+    }
 }
 
 #[test]

@@ -280,6 +280,18 @@ fn a_store_takes_its_time_its_answer_waits_for_it_and_a_cut_in_it_leaves_the_old
     }
 }
 
+/// A joint stores with the next run of its communication task, after it has taken 2614h = 1.
+#[test]
+fn the_answer_to_a_save_of_a_joint_waits_for_its_store() {
+    let model = devices::model("m4230e17b50").unwrap();
+    let span = model.timing.store;
+    for seed in 1..=8 {
+        let (answer, ns) = Bench::booted(model, seed).answer_time("605#2B14260001000000");
+        assert!(answer.starts_with("585#601426"), "{answer}");
+        assert!(ns >= u64::from(span.least_us) * 1000, "seed {seed}: {ns} ns");
+    }
+}
+
 #[test]
 fn an_answer_that_waits_for_its_store_is_not_sent_after_a_reset() {
     for (name, write, _, _, _) in STORED {

@@ -320,7 +320,7 @@ impl Firmware for MJoint {
     }
 
     fn is_storing(&self) -> bool {
-        self.device.is_storing()
+        self.device.is_storing() || (self.save_asked && self.device.takes_stores())
     }
 
     fn report(&self, _axis: AxisId) -> Report {
