@@ -83,6 +83,12 @@ def test_what_breaks_a_limit_moves_nothing(world, network):
                 group.move(wrong)
         with pytest.raises(ferrodrive.MasterError, match="give more time"):
             group.move([180, 0], within=0.1)
+        rest = [[0.0, 0.0]] * 20
+        for wrong, said in [([0.0], "2 axes"), ([90.0, 0.0], "would need a velocity"), ([math.nan, 0.0], "finite number")]:
+            with pytest.raises(ferrodrive.MasterError, match=said):
+                group.follow([*rest, wrong, *rest])
+            state = group.state()
+            assert (state["phase"], state["cause"]) == ("holding", None)
         group.move([90, 0])
     with pytest.raises(ferrodrive.MasterError, match="it was closed"):
         group.move([0, 0])

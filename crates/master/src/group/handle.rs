@@ -213,6 +213,16 @@ impl Group {
         Ok(())
     }
 
+    /// Checks that a stream would take these points from where the group is: for a path that is known as a whole.
+    ///
+    /// # Errors
+    /// As [`push`](Self::push), for the first point that is refused. Nothing changes.
+    pub fn check_path<P: AsRef<[Turns]>>(&self, points: impl IntoIterator<Item = P>) -> Result<(), GroupError> {
+        let runner = &self.runner;
+        let mut stream = Stream::new(&runner.points, runner.period_s, StreamOptions::default());
+        points.into_iter().try_for_each(|point| stream.check_next(point.as_ref(), &runner.limits)).map_err(Into::into)
+    }
+
     /// The stream, while there is one: how many points wait, for how many there is room.
     pub const fn stream(&self) -> Option<&Stream> {
         if let Activity::Streaming(stream) = &self.runner.activity { Some(stream) } else { None }

@@ -129,18 +129,24 @@ impl Stream {
 
     /// Takes a point, or nothing of it.
     pub(super) fn push(&mut self, point: &[Turns], limits: &[AxisLimits]) -> Result<Result<(), Full>, PathError> {
+        if point.len() == self.axes && self.room() == 0 {
+            return Ok(Err(Full));
+        }
+        self.check_next(point, limits)?;
+        self.queue.extend(point.iter().map(|Turns(at)| *at));
+        Ok(Ok(()))
+    }
+
+    /// Holds a point to the limits, as the one behind the last; one that breaks them changes nothing.
+    pub(super) fn check_next(&mut self, point: &[Turns], limits: &[AxisLimits]) -> Result<(), PathError> {
         if point.len() != self.axes {
             return Err(PathError::Count { given: point.len(), axes: self.axes });
-        }
-        if self.room() == 0 {
-            return Ok(Err(Full));
         }
         for (index, (Turns(at), limits)) in point.iter().zip(limits).enumerate() {
             self.next[index] = self.check(index, *at, limits)?;
         }
-        self.queue.extend(point.iter().map(|Turns(at)| *at));
         self.last.copy_from_slice(&self.next);
-        Ok(Ok(()))
+        Ok(())
     }
 
     fn check(&self, index: usize, at_turns: f64, limits: &AxisLimits) -> Result<PathPoint, PathError> {

@@ -409,6 +409,11 @@ fn bad_input_is_refused_before_anything_moves() {
     }
     assert!(matches!(refused(&mut group, &[0.0, 3.5]), GroupError::Path(PathError::OutOfRange { axis: 2, .. })));
     assert!(matches!(group.push(&turns(&from)), Err(GroupError::Phase { phase: Phase::Holding, .. })));
+    let far = [from[0] + 0.5, from[1]];
+    for (last, is_refused) in [(&from[..], false), (&from[..1], true), (&far, true)] {
+        let path = [turns(&from), turns(&from), turns(last)];
+        assert_eq!(group.check_path(&path).is_err(), is_refused, "{last:?}");
+    }
     bench.cycle(&mut group);
     assert_eq!((group.state().phase, group.state().cause), (Phase::Holding, None));
     drop(group);

@@ -199,7 +199,7 @@ class Group(_Open):
         """Along these points, and to rest after the last. Speeds and accelerations between them are held to the limits.
 
         :param points_deg: for each cycle a position of each axis in degrees
-        :raises MasterError: a point breaks a limit: what was given before it is moved, and the group rests
+        :raises MasterError: a point breaks a limit or has another number of axes, and nothing moves; or what stopped the group on its way
 
         >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
         ...     group.follow([[0.0]] * 20)

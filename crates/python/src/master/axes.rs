@@ -189,16 +189,19 @@ impl Group {
     fn follow(&self, py: Python<'_>, points_deg: Vec<Vec<f64>>) -> PyResult<Job> {
         let (slot, core) = (self.slot.clone(), self.core.clone());
         self.network.get().begin_said(py, async move {
+            let points: Vec<_> = points_deg.iter().map(|point| turns(point)).collect();
             let options =
-                StreamOptions { capacity: 2 * AHEAD, prefill: AHEAD.min(points_deg.len()), ..StreamOptions::default() };
-            slot.with(|group| Ok(group.start_stream(options)?))?;
+                StreamOptions { capacity: 2 * AHEAD, prefill: AHEAD.min(points.len()), ..StreamOptions::default() };
+            slot.with(|group| {
+                group.check_path(&points)?;
+                Ok(group.start_stream(options)?)
+            })?;
             let _stop = slot.stop_on_drop();
-            let mut left = points_deg.iter();
+            let mut left = points.iter();
             let moved = rest(&core, &slot, |group| {
                 while group.stream().is_some_and(|stream| stream.room() > 0) {
                     match left.next() {
-                        // A point that breaks a limit ends the path: what was given before it is moved, and the group rests.
-                        Some(point) => group.push(&turns(point)).inspect_err(|_| group.end_stream())?,
+                        Some(point) => group.push(point)?,
                         None => {
                             group.end_stream();
                             break;
