@@ -35,7 +35,7 @@ fn axes_that_are_named_go_where_they_are_sent_in_the_time_that_is_given() {
 
 #[test]
 fn the_limits_of_the_command_line_are_those_of_the_path() {
-    let limits = ["--velocity", "60rpm", "--acceleration", "300rpm/s", "--rounding", "100ms"];
+    let limits = ["--velocity", "360deg/s", "--acceleration", "1800deg/s2", "--rounding", "100ms"];
     let moved = done(&[&["--json", "group", "move", "4=1turn"], &limits[..]].concat()).json();
     // v = 1 turn/s, a = 5 turns/s^2, j = 50 turns/s^3: L/v + v/a + a/j.
     assert!((number(&moved["time_s"]) - 1.3).abs() < 1e-6, "{moved}");

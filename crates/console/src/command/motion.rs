@@ -89,7 +89,7 @@ pub struct Torque {
 /// How a motion is to be made, where the drive's own settings are not wanted.
 #[derive(Debug, clap::Args)]
 struct RampArgs {
-    /// Acceleration, or the time to speed up: 500ms, 120rpm/s, 12.6rad/s2; 500mm/s2 with a feed constant
+    /// Acceleration, or the time to speed up: 500ms, 120rpm/s, 720deg/s2, 12.6rad/s2; 500mm/s2 with a feed constant
     #[arg(long, value_name = "RAMP")]
     acceleration: Option<Along<Ramp>>,
     /// Deceleration, in the same forms

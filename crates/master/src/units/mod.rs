@@ -163,7 +163,7 @@ pub enum ParseUnitError {
 const SPEED: &str = "a speed such as 60rpm, 6.28rad/s, 360deg/s or 1turn/s (a bare number is r/min)";
 const ANGLE: &str = "an angle such as 90deg, 0.5turn, 1.57rad or 32000 (a bare number is counts)";
 const CURRENT: &str = "a current such as 1.5A or 1500mA";
-const RAMP: &str = "a ramp such as 500ms, 0.5s, 120rpm/s or 12.6rad/s2";
+const RAMP: &str = "a ramp such as 500ms, 0.5s, 120rpm/s, 12.6rad/s2, 720deg/s2 or 2turn/s2";
 const NO_SIGN: &str = "a ramp has no sign";
 const NO_RATE: &str = "at a rate of zero no speed is ever reached; without a ramp it is 0ms";
 
@@ -172,14 +172,27 @@ impl FromStr for Rpm {
 
     fn from_str(text: &str) -> Result<Self, ParseUnitError> {
         let (number, unit) = split(text, SPEED)?;
-        Ok(match unit {
-            "" | "rpm" | "r/min" | "1/min" => Self(number),
-            "rad/s" => RadiansPerSecond(number).into(),
-            "deg/s" | "°/s" => Self(number / 6.0),
-            "turn/s" | "turns/s" | "rps" | "r/s" => Self(number * 60.0),
-            _ => return Err(wrong_unit(text, unit, SPEED)),
-        })
+        let unit = if unit.is_empty() { "rpm" } else { unit };
+        speed(number, unit).ok_or_else(|| wrong_unit(text, unit, SPEED))
     }
+}
+
+/// A number of a unit of speed.
+fn speed(number: f64, unit: &str) -> Option<Rpm> {
+    Some(match unit {
+        "rpm" | "r/min" | "1/min" => Rpm(number),
+        "rad/s" => RadiansPerSecond(number).into(),
+        "deg/s" | "°/s" => Rpm(number / 6.0),
+        "turn/s" | "turns/s" | "rps" | "r/s" => Rpm(number * 60.0),
+        _ => return None,
+    })
+}
+
+/// A number of a unit of speed in a second, as a speed in r/min gained in one: `rpm/s`, `deg/s2`.
+fn rate(number: f64, unit: &str) -> Option<f64> {
+    let squared = ["^2", "2", "²"].into_iter().find_map(|power| unit.strip_suffix(power));
+    let unit = squared.filter(|unit| unit.ends_with("/s")).or_else(|| unit.strip_suffix("/s"))?;
+    speed(number, unit).map(|Rpm(gained)| gained)
 }
 
 impl FromStr for Angle {
@@ -224,13 +237,17 @@ impl FromStr for Ramp {
         if number < 0.0 {
             return Err(out_of_range(text, NO_SIGN));
         }
-        match unit {
-            "rpm/s" | "r/min/s" | "rad/s2" | "rad/s²" | "rad/s^2" if number == 0.0 => Err(out_of_range(text, NO_RATE)),
-            "rpm/s" | "r/min/s" => Ok(Self::RpmPerSecond(number)),
-            "rad/s2" | "rad/s²" | "rad/s^2" => Ok(Self::RpmPerSecond(Rpm::from(RadiansPerSecond(number)).0)),
-            "" => Err(ParseUnitError::NoUnit { text: text.to_owned(), expected: RAMP }),
-            _ => match parse_duration(text) {
-                Err(ParseUnitError::WrongUnit { .. }) => Err(wrong_unit(text, unit, RAMP)),
+        if unit.is_empty() {
+            return Err(ParseUnitError::NoUnit { text: text.to_owned(), expected: RAMP });
+        }
+        match rate(number, unit) {
+            Some(0.0) => Err(out_of_range(text, NO_RATE)),
+            Some(rpm_per_s) => Ok(Self::RpmPerSecond(rpm_per_s)),
+            None => match parse_duration(text) {
+                // It begins with a number, whatever a time makes of what follows.
+                Err(ParseUnitError::WrongUnit { .. } | ParseUnitError::NoNumber { .. }) => {
+                    Err(wrong_unit(text, unit, RAMP))
+                }
                 time => time.map(Self::Time),
             },
         }
@@ -378,6 +395,16 @@ mod tests {
         assert_eq!("500000µs".parse(), Ok(Ramp::Time(Duration::from_millis(500))));
         assert_eq!("120rpm/s".parse(), Ok(Ramp::RpmPerSecond(120.0)));
         assert!("-120rpm/s".parse::<Ramp>().is_err());
+        // A turn is 360 degrees, a minute 60 seconds.
+        for same in ["720deg/s2", "720 °/s²", "720deg/s^2", "2turn/s2", "2turns/s2", "2r/s2", "2rps/s", "120r/min/s"]
+        {
+            assert_eq!(same.parse(), Ok(Ramp::RpmPerSecond(120.0)), "{same}");
+        }
+        for wrong in ["100deg", "100deg/s", "100deg2", "100rpm2", "100rpm", "100/s2", "100s2", "100deg/s3", "0deg/s2"] {
+            let error = wrong.parse::<Ramp>().unwrap_err().to_string();
+            let is_said = error.contains("a ramp such as") || error.contains("rate of zero");
+            assert!(is_said && !error.contains("begin with a number"), "{wrong}: {error}");
+        }
     }
 
     #[test]

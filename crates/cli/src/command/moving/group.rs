@@ -70,7 +70,7 @@ struct Move {
     /// Highest speed of each axis
     #[arg(long, value_name = "SPEED", value_parser = turning)]
     velocity: Option<Rpm>,
-    /// Highest acceleration of each axis: 120rpm/s, 12.6rad/s2
+    /// Highest acceleration of each axis: 120rpm/s, 720deg/s2, 12.6rad/s2
     #[arg(long, value_name = "RATE", value_parser = rate)]
     acceleration: Option<f64>,
     /// Time in which the acceleration reaches its highest value, which limits the jerk
