@@ -53,6 +53,10 @@ pub struct PlannedMove {
     within: Option<Duration>,
 }
 
+/// What becomes of drives whose power a group has taken at its end.
+pub const PULLING_LOAD: &str =
+    "a load that pulls (an arm, a slope) moves a motor without power, unless a brake holds it";
+
 /// What was seen of a move; of the axes in the order of their group, in turns.
 pub struct GroupRun {
     /// How long the path takes.

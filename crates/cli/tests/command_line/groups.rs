@@ -34,6 +34,13 @@ fn axes_that_are_named_go_where_they_are_sent_in_the_time_that_is_given() {
 }
 
 #[test]
+fn the_end_says_that_a_load_may_turn_a_shaft_whose_power_is_gone() {
+    let said = done(&["group", "move", "1=2deg", "4=2deg", "--period", "4ms"]).out;
+    assert!(said.contains("the drives are without power"), "{said}");
+    assert!(said.contains("a load that pulls (an arm, a slope) moves a motor without power"), "{said}");
+}
+
+#[test]
 fn the_limits_of_the_command_line_are_those_of_the_path() {
     let limits = ["--velocity", "360deg/s", "--acceleration", "1800deg/s2", "--rounding", "100ms"];
     let moved = done(&[&["--json", "group", "move", "4=1turn"], &limits[..]].concat()).json();

@@ -12,7 +12,7 @@ use std::time::Duration;
 use can::Instant;
 use canopen::NodeId;
 use machine::file::speed_mode;
-use machine::group_move;
+use machine::group_move::{self, PULLING_LOAD};
 use master::Drive;
 use master::base::{Base, BaseError, BaseLimits, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
@@ -270,7 +270,7 @@ async fn move_together(drives: Vec<Drive>, asked: GroupMove) -> GroupOutcome {
         let lags = axes.iter().zip(&run.largest_turns);
         let lags: Vec<_> = lags.map(|(axis, turns)| format!("node {} {:.1} deg", axis.node, turns * 360.0)).collect();
         let time = format!("{} drives moved together in {:.3} s", axes.len(), run.time.as_secs_f64());
-        vec![format!("{time}; largest lag: {}. They are disabled now", lags.join(", "))]
+        vec![format!("{time}; largest lag: {}. They are disabled now: {PULLING_LOAD}", lags.join(", "))]
     });
     close(group, moved).await
 }

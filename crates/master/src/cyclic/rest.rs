@@ -15,8 +15,8 @@ const REST_LIMIT: Duration = Duration::from_secs(2);
 pub enum NotAtRest {
     /// It turns.
     #[error(
-        "node {node} still turns at {} r/min, {limit:?} after it was to stand: its load drives it, or it does not follow. Take its power by \
-         the emergency stop if it must not move", Shown(*rpm)
+        "node {node} still turns at {} r/min, {limit:?} after it was to stand: its load drives it, as one that pulls does without power, or \
+         it does not follow. Without power a brake alone holds it, or `enable {node}`; with power the emergency stop takes it", Shown(*rpm)
     )]
     StillTurns {
         /// The node.

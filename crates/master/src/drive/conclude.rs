@@ -108,6 +108,19 @@ fn without_ramp((conclusion, advice): (String, String), facts: &[Fact]) -> (Stri
     (conclusion, format!("{first}. {advice}"))
 }
 
+/// What to do about a shaft that does not come to rest. The quick stop option belongs to the state machine.
+const fn still_turning(style: PowerStyle) -> &'static str {
+    match style {
+        PowerStyle::Cia402 => {
+            "Something may be driving the shaft, as a load that pulls does without power: check the load, its brake, the ramp times and, \
+             where the drive has it, the quick stop option 605Ah"
+        }
+        PowerStyle::EchoesControlword { .. } => {
+            "Something may be driving the shaft, as a load that pulls does without power: check the load, its brake and the ramp times"
+        }
+    }
+}
+
 /// For a drive that answers, is in a known state and not at fault.
 fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
     match trigger {
@@ -134,7 +147,7 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
         ),
         Trigger::StillTurning(speed) => (
             format!("The shaft still turns at {speed:.1} r/min after the time that the drive's ramps should take"),
-            "Something may be driving the shaft: check the load, the ramp times and the quick stop option 605Ah".to_owned(),
+            still_turning(style).to_owned(),
         ),
         Trigger::NoAcknowledge => text(
             "The drive did not acknowledge the set-point (statusword bit 12)",

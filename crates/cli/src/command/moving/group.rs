@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use cia402::ModeOfOperation;
-use machine::group_move::{GroupMove, GroupRun, PlannedMove, angle, rate, target, turning};
+use machine::group_move::{GroupMove, GroupRun, PULLING_LOAD, PlannedMove, angle, rate, target, turning};
 use master::Drive;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, StopCause};
 use master::units::{Angle, Rpm, Shown, parse_duration};
@@ -30,7 +30,8 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
 /// Move several axes as one
 ///
 /// All start with one SYNC and end together, on paths limited in speed, acceleration and jerk. When one drive faults,
-/// is lost or lags, all come to rest. Afterwards the drives have no power.
+/// is lost or lags, all come to rest. Afterwards the drives have no power: a load that pulls (an arm, a slope) moves a motor
+/// without power, unless a brake holds it. `ferrodrive move` leaves one drive powered and holding.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive group move 1=90deg 4=0.5turn --within 3s           # default limits\n  \
@@ -335,6 +336,7 @@ impl Report for GroupMoved {
         let guards = self.axes.iter().map(|axis| format!("  guard   node {}: {}", axis.node, axis.guard.text));
         let mut lines = vec![head, table.plain(paint)];
         lines.extend(guards);
+        lines.push(format!("  note    {PULLING_LOAD}; ferrodrive move leaves a drive holding"));
         lines.join("\n")
     }
 }
