@@ -14,6 +14,8 @@ use crate::core::{Event, NodeSet};
 pub enum SupervisorEvent {
     /// As the network reports it.
     Event(Event),
+    /// The heartbeat of a node says that it is in alarm: 04h, of a model with which that does not mean stopped.
+    Alarm(NodeId),
     /// An emergency message.
     Emcy(EmcyRecord),
     /// A drive that this master's heartbeat keeps content is out of reach: the heartbeat is held back, so that nothing
@@ -35,7 +37,7 @@ impl SupervisorEvent {
     pub const fn kind(&self) -> &'static str {
         match self {
             Self::Event(Event::BootUp(_)) => "boot_up",
-            Self::Event(Event::NmtState(..)) => "nmt_state",
+            Self::Event(Event::NmtState(..)) | Self::Alarm(_) => "nmt_state",
             Self::Event(Event::HeartbeatLost(..)) => "heartbeat_lost",
             Self::Event(Event::HeartbeatBack(_)) => "heartbeat_back",
             Self::Event(Event::TwoDevices(..)) => "node_twice",
@@ -62,6 +64,7 @@ impl SupervisorEvent {
                 | Event::CyclicStopped(node, _)
                 | Event::Unguarded(node, _),
             )
+            | Self::Alarm(node)
             | Self::NotStopped(node, _)
             | Self::Foreign(Foreign::SdoRequest(node)) => Some(*node),
             Self::Emcy(record) => Some(record.node),
@@ -79,6 +82,7 @@ impl fmt::Display for SupervisorEvent {
                 write!(f, "{event}: check its supply and its cable; it is booted again when it comes back")
             }
             Self::Event(event) => event.fmt(f),
+            Self::Alarm(node) => write!(f, "node {node} is in alarm (heartbeat 04h; it does not mean stopped)"),
             Self::Emcy(record) => record.fmt(f),
             Self::Held(nodes) => {
                 f.write_str(

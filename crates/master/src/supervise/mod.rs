@@ -17,7 +17,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use can::{Frame, Instant};
-use canopen::{NmtCommand, NodeId};
+use canopen::{NmtCommand, NmtState, NodeId};
 
 use crate::Drive;
 use crate::boot::{Assignment, BootPlan, Expectation, NodeReport, Startup};
@@ -142,6 +142,7 @@ impl Supervisor {
                 self.note_return(node, Return::Booted);
             }
             Event::HeartbeatBack(node) => self.note_return(node, Return::HeartbeatBack),
+            Event::NmtState(node, state) if self.tells_alarm(node, state) => return Some(SupervisorEvent::Alarm(node)),
             // Those are about this program's own questions.
             Event::NoAnswer(..) | Event::Aborted(..) => return None,
             _ => {}
@@ -162,6 +163,11 @@ impl Supervisor {
             self.plan.nodes.keys().filter(|node| self.watches_heartbeat(**node)).for_each(|node| nodes.insert(*node));
             self.to_tell.push_back((at, SupervisorEvent::Held(nodes)));
         }
+    }
+
+    fn tells_alarm(&self, node: NodeId, said: NmtState) -> bool {
+        let model = self.plan.nodes.get(&node).and_then(|expectation| expectation.description);
+        model.is_some_and(|model| model.tells_alarm(said))
     }
 
     fn watches_heartbeat(&self, node: NodeId) -> bool {

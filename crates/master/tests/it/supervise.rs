@@ -127,6 +127,10 @@ fn a_joint_whose_cable_is_joined_again_stands_until_it_is_moved() {
     for (kind, id) in [("heartbeat_back", Some(JOINT)), ("recovered", Some(JOINT)), ("heartbeat_released", None)] {
         assert!(bench.kinds().contains(&(kind, id)), "{kind}: {said:#?}");
     }
+    // M Robot Joint Motor CanOpen Manual, 5.11.1: 04h is an alarm.
+    let words = "node 1 is in alarm (heartbeat 04h; it does not mean stopped)";
+    assert!(said.iter().any(|line| line == words), "{said:#?}");
+    assert!(!said.iter().any(|line| line.ends_with("is stopped")), "{said:#?}");
     bench.resume(JOINT);
     bench.watch(Duration::from_secs(5));
     assert!(bench.speed(JOINT) < 1.0, "what it did before does not come back");
