@@ -348,8 +348,9 @@ fn bus_with(
         (config, cob_id)
     });
     let event_trigger = model.pdo.event_trigger;
-    let timing = model.timing;
-    let traffic = NodeTraffic { node, pdos: pdos.collect(), in_cycle: None, event_trigger, heartbeat: None, timing };
+    let (emcy, timing) = (model.sends_emcy(), model.timing);
+    let traffic =
+        NodeTraffic { node, pdos: pdos.collect(), in_cycle: None, event_trigger, heartbeat: None, emcy, timing };
     let own = (pace == Pace::OwnSync).then_some(period);
     let sync = own.or(match pace {
         Pace::Sync(every) => Some(period / u32::from(every)),

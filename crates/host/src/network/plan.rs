@@ -7,7 +7,7 @@ use can::Bitrate;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
 use master::Drive;
-use master::plan::{NodeTraffic, Plan, PlannedFrame, Settings, most_nodes, plan, shortest_cycle};
+use master::plan::{NodeTraffic, Plan, PlannedFrame, Purpose, Settings, most_nodes, plan, shortest_cycle};
 use master::units::Shown;
 use serde::Serialize;
 
@@ -131,7 +131,8 @@ fn late_below_full(all: &Plan, cycle: &Plan, settings: &Settings) -> Option<Stri
         Duration::ZERO => String::new(),
         jitter => format!(", from a host that is up to {} ms late", ms(jitter)),
     };
-    let beside = match (settings.sdo, settings.emcy) {
+    let has_emcy = all.frames.iter().any(|frame| frame.purpose == Purpose::Emcy);
+    let beside = match (settings.sdo, settings.emcy.filter(|_| has_emcy)) {
         (None, None) => "",
         (Some(_), None) => ", and an SDO request with its answer may come just then",
         (None, Some(_)) => ", and an EMCY of each node may come just then",

@@ -6,7 +6,7 @@ use canopen::CobId;
 use canopen::object::PRODUCER_HEARTBEAT_TIME;
 use canopen::pdo::{Direction, EventTrigger};
 use cia402::ModeOfOperation;
-use devices::Timing;
+use devices::{Description, Timing};
 
 use super::open::CyclicError;
 use crate::drive::Drive;
@@ -27,8 +27,9 @@ impl NodeTraffic {
         };
         let timing = drive.description().map_or(Timing::GUESSED, |model| model.timing);
         let event_trigger = drive.description().map_or(EventTrigger::Change, |model| model.pdo.event_trigger);
+        let emcy = drive.description().is_none_or(Description::sends_emcy);
         let pdos = drive.pdos().await?;
-        Ok(Self { node: drive.node().id(), pdos, in_cycle: None, event_trigger, heartbeat, timing })
+        Ok(Self { node: drive.node().id(), pdos, in_cycle: None, event_trigger, heartbeat, emcy, timing })
     }
 
     /// The same once the drive is moved cycle by cycle in this mode: with the PDOs that [`Drive::configure_cyclic`] maps, or, if `position`,

@@ -331,6 +331,7 @@ async fn set_up(network: Network) -> Result<(Vec<CyclicDrive>, Vec<NodeTraffic>)
             in_cycle: Some(cyclic.rpdo()),
             event_trigger: model.pdo.event_trigger,
             heartbeat: Some(Duration::from_millis(heartbeat.into())).filter(|time| !time.is_zero()),
+            emcy: model.sends_emcy(),
             timing: model.timing,
         });
         drives.push(cyclic);

@@ -35,6 +35,8 @@ pub struct NodeTraffic {
     pub event_trigger: EventTrigger,
     /// Its heartbeat producer time (1017h); `None`: it has none, or it is off.
     pub heartbeat: Option<Duration>,
+    /// It sends EMCY.
+    pub emcy: bool,
     /// How fast it answers.
     pub timing: Timing,
 }
@@ -366,7 +368,7 @@ fn of_node(
     let mut add = |purpose, frame: Queued, deadline| {
         drafts.push(Draft { purpose, node: Some(id), frame, deadline, by_host: false });
     };
-    if let Some(period) = settings.emcy {
+    if let Some(period) = settings.emcy.filter(|_| node.emcy) {
         add(Purpose::Emcy, queued(connection_set::emcy(id), EMCY_BYTES, period), period);
     }
     for (config, cob_id) in &node.pdos {
@@ -471,7 +473,7 @@ mod tests {
         let config = set(PdoConfig::new(TPDO1, PdoMap(map.to_vec())));
         let timing = devices::model("zlac8030l").expect("a model").timing;
         let (node, pdos) = (NodeId::new(4).expect("a node"), vec![(config, CobId(0x184))]);
-        let node = NodeTraffic { node, pdos, in_cycle: None, event_trigger, heartbeat: None, timing };
+        let node = NodeTraffic { node, pdos, in_cycle: None, event_trigger, heartbeat: None, emcy: true, timing };
         let plan = plan(&[node], &Settings::new(10 * MS).cycle_alone(), Bitrate::K500);
         (plan.load, !plan.remarks.is_empty())
     }

@@ -206,7 +206,8 @@ impl PlanPdos {
         let timing: Timing = model.timing;
         let event_trigger = model.pdo.event_trigger;
         let node = drive.node().id();
-        let traffic = NodeTraffic { node, pdos, in_cycle: None, event_trigger, heartbeat: None, timing };
+        let emcy = model.sends_emcy();
+        let traffic = NodeTraffic { node, pdos, in_cycle: None, event_trigger, heartbeat: None, emcy, timing };
         let settings = Settings { sdo: None, emcy: None, nmt: None, ..Settings::new(self.cycle) };
         let load = plan(&[traffic], &settings, self.bitrate).load;
         (load * 1e4).round() / 1e4
