@@ -118,10 +118,13 @@ impl Failure {
         self
     }
 
-    /// Adds advice.
+    /// Adds advice; what is there already, as of another node with the same trouble, is not said twice.
     #[must_use]
     pub fn next(mut self, advice: impl fmt::Display) -> Self {
-        self.next.push(advice.to_string());
+        let advice = advice.to_string();
+        if !self.next.contains(&advice) {
+            self.next.push(advice);
+        }
         self
     }
 }
@@ -231,7 +234,14 @@ impl From<GroupError> for Failure {
             GroupError::NotEnabled { node, .. } => group().at_node(node).next(format!(
                 "ferrodrive explain {node} says what keeps it; `ferrodrive plan` whether the bus carries such a cycle"
             )),
-            GroupError::Cyclic(_) => group().next(MODES),
+            // What the drive said in it, unless that is about the mode.
+            GroupError::Cyclic(error) => match error.of_drive() {
+                None | Some(master::Error::NoSuchMode { .. }) => group().next(MODES),
+                Some(said) => {
+                    let Self { kind, subject, next, .. } = Self::from(said.clone());
+                    Self { kind, subject, next, ..group() }
+                }
+            },
             GroupError::NotAtRest(why) => group().at_node(why.node()).next(SEE_DRIVES),
             _ => group().next(SEE_DRIVES),
         }
@@ -317,6 +327,25 @@ mod tests {
         let text = "cannot read 6064h:00 of node 9\n  because: no answer\n  next:    ferrodrive scan";
         assert_eq!(failure.to_string(), text);
         assert!(Failure::usage("x").is_usage && !failure.is_usage);
+    }
+
+    #[test]
+    fn advice_for_several_nodes_is_said_once() {
+        let nodes = ["node 1: no answer", "node 2: no answer"];
+        let failure = nodes.iter().fold(Failure::new("not booted"), |it, why| it.because(why).next("check the cable"));
+        assert_eq!((failure.because.len(), failure.next), (2, vec!["check the cable".to_owned()]));
+    }
+
+    #[test]
+    fn a_drive_that_is_silent_while_a_group_is_opened_is_not_asked_for_its_modes() {
+        let node = NodeId::MIN;
+        let silent = master::Error::QueueFull { node };
+        let error = |error: master::Error| Failure::from(GroupError::Cyclic(error.into()));
+        assert_eq!(
+            (error(silent.clone()).kind, error(silent.clone()).next),
+            ("queue_full", Failure::from(silent).next)
+        );
+        assert_eq!(error(master::Error::UnknownModel { node, intent: "move it" }).kind, "unknown_model");
     }
 
     #[test]

@@ -96,6 +96,12 @@ impl Expectation {
         }
     }
 
+    /// Nothing is written to the node, restored or loaded: one that is operational already has all that it is to have.
+    pub(super) fn asks_for_nothing(&self) -> bool {
+        let steps = Assignment::RESTORE | Assignment::VERIFY_SOFTWARE;
+        self.configuration.is_empty() && self.assignment.0 & steps == 0
+    }
+
     /// Guard time and life time factor of the node guarding that it is to be watched by, if it is: of 1F81h, or of the 100Ch and 100Dh
     /// that it is given.
     pub fn guarding(&self) -> Option<(Duration, u8)> {

@@ -85,6 +85,8 @@ fn all_three_drives_boot_at_once_and_each_says_what_stops_it() {
     let operational = Some(NmtState::Operational);
     // The joint starts operational by itself (M joint manual, 4.2): it is left so, which is L.
     assert_eq!(states, [(JOINT, Some('L'), operational), (STEPPER, None, operational), (SERVO, None, operational)]);
+    // Nothing is to be configured, so nothing is advised.
+    assert_eq!(report.nodes[0].remarks().map(ToString::to_string).collect::<Vec<_>>(), [""; 0]);
     let watch = |at: usize| {
         let step = report.nodes[at].steps.iter().find(|step| step.kind == StepKind::HostWatch).unwrap();
         (step.verdict, step.to_string())
@@ -317,6 +319,7 @@ fn a_node_that_was_left_operational_without_its_configuration_is_reported() {
     let plan = BootPlan::new(others.chain([(node(JOINT), of_joint)]));
     let report = bench.boot(&plan);
     assert!(report.is_whole());
+    assert!(report.nodes[0].to_string().contains("to configure it, stop it and reset it"), "{}", report.nodes[0]);
     let missing = bench.unconfigured(&plan, &report);
     assert_eq!(missing, [Unconfigured { node: node(JOINT), objects: vec![heartbeat] }]);
     // Reset and booted it is configured; and left so the next time, nothing is missing.
