@@ -27,7 +27,7 @@ pub struct Home {
     /// Homing method of CiA 402, e.g. 17 (negative limit switch)
     #[arg(long, value_parser = |text: &str| whole(text, i8::MIN..=i8::MAX), allow_hyphen_values = true)]
     method: i8,
-    /// Speed of the search, where the drive has an object for it
+    /// Speed of the search (6099h:01); refused where the drive has no object for it, as a joint, which has it in 6083h
     #[arg(long, value_name = "SPEED", value_parser = speed)]
     profile_velocity: Option<Along<Rpm>>,
     /// Longest time to wait for the reference

@@ -64,7 +64,7 @@ pub enum Motion {
     Home {
         /// The method of CiA 402.
         method: i8,
-        /// Speed of the search, where the model has an object for it; else, and with `None`, as the drive has it.
+        /// Speed of the search, of a model that has an object for it; `None` leaves it as the drive has it.
         speed: Option<Along<Rpm>>,
         /// Wait until it is found, and watch the drive meanwhile.
         wait: bool,

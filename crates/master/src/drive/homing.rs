@@ -20,7 +20,7 @@ const ENABLED: u16 = 0x0F;
 /// How to find the reference position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HomingOptions {
-    /// Speed of the search, where the model has an object for it; else, and with `None`, as the drive has it.
+    /// Speed of the search, of a model that has an object for it; `None` leaves it as the drive has it.
     pub speed: Option<Rpm>,
     /// Longest time that it may take.
     pub limit: Duration,
@@ -42,7 +42,7 @@ impl Drive {
     /// A drive that does not find it in time is quick-stopped.
     ///
     /// # Errors
-    /// [`Error::NoSuchMode`] for a model without homing; [`Error::OutOfLimits`] for a method that it does not have, and
+    /// [`Error::NoSuchMode`] for a model without homing; [`Error::NoSuchQuantity`] for a speed where the model has no object for it; [`Error::OutOfLimits`] for a method that it does not have, and
     /// [`Error::InCycles`], before anything moves; [`Error::NotReached`] with an explanation; those of the requests.
     pub async fn home(&self, method: i8, options: HomingOptions) -> Result<MotionReport, Error> {
         self.check_unclaimed(INTENT)?;
@@ -53,9 +53,13 @@ impl Drive {
     pub(crate) async fn home_claimed(&self, method: i8, options: HomingOptions) -> Result<MotionReport, Error> {
         let axis = self.motion(INTENT)?;
         let rules = axis.homing.ok_or_else(|| self.no_such_mode(axis, ModeOfOperation::HOMING))?;
+        // At another speed than was asked for it does not search.
+        let search =
+            options.speed.map(|speed| Ok::<_, Error>((self.has(rules.search_speed, "a search speed")?, speed)));
+        let search = search.transpose()?;
         self.write_number(rules.method, method.into()).await?;
         let mut commanded = Vec::new();
-        if let (Some(search), Some(Rpm(speed))) = (rules.search_speed, options.speed) {
+        if let Some((search, Rpm(speed))) = search {
             let speed = self.quantity(("search speed", "r/min"), search, speed.abs()).await?;
             self.write_number(speed.object, speed.raw).await?;
             commanded.push(speed);

@@ -272,6 +272,11 @@ fn homing_that_fails_or_finds_nothing_is_explained_and_stopped() {
     assert!(matches!(error, Error::NoSuchMode { mode: ModeOfOperation::HOMING, .. }), "{error}");
     let error = block_on(&mut world, joint.home(24, HomingOptions::default())).unwrap().unwrap_err();
     assert!(matches!(&error, Error::OutOfLimits { limits, .. } if (limits.low, limits.high) == (17, 22)), "{error}");
+    // A joint has its speed of the search in the ones digit of 6083h ("M Robot Joint Motor CanOpen Manual", 5.01), and in no object of its own.
+    let slowly = HomingOptions { speed: Some(Rpm(2.0)), ..HomingOptions::default() };
+    let error = block_on(&mut world, joint.home(17, slowly)).unwrap().unwrap_err();
+    assert!(matches!(error, Error::NoSuchQuantity { .. }), "{error}");
+    assert!(world.report(JOINT).unwrap().velocity_rpm == 0.0, "nothing moves");
     // Method 0 is accepted and fails at once ("ZLIM42-C user manual V1.03", 5.3.6: bit 8 off, 10 on, 14 off).
     let error = block_on(&mut world, stepper.home(0, HomingOptions::default())).unwrap().unwrap_err();
     assert!(error.to_string().contains("ended homing with method 0"), "{error}");

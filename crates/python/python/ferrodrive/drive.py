@@ -315,7 +315,7 @@ class Drive(_Orders):
         """Finds its reference position (homing).
 
         :param method: of CiA 402-2 (6098h), -128 to 127
-        :param speed_rpm: in r/min; None leaves it as the drive has it
+        :param speed_rpm: of the search, in r/min; refused by a drive without an object for it. None leaves it as the drive has it
         :param within: longest time in s; 60 without it
         :param wait: until it is done
         :raises NotReached: it was not done in this time

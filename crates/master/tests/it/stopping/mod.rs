@@ -162,8 +162,9 @@ impl Bench {
     fn start_homing(&mut self, drive: &Drive) -> Result<(), Error> {
         // Looks for a switch that is not there, as long as it is let.
         let method = drive.axis_description().and_then(|axis| axis.homing).map_or(17, |_| 17);
-        self.run(drive.home(method, HomingOptions { wait: false, speed: Some(Rpm(60.0)), ..HomingOptions::default() }))
-            .map(drop)
+        let homing = drive.axis_description().and_then(|axis| axis.homing);
+        let speed = homing.and_then(|homing| homing.search_speed).map(|_| Rpm(60.0));
+        self.run(drive.home(method, HomingOptions { wait: false, speed, ..HomingOptions::default() })).map(drop)
     }
 
     fn group(&mut self, motion: Motion) -> Option<Group> {
