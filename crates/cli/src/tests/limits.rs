@@ -47,4 +47,15 @@ fn what_a_tuning_is_asked_for_is_checked_before_a_bus_is_looked_for() {
     let refused = without_bus(&["--bus", "bus_of_nobody", "tune", "4", "--travel", "0"]);
     assert_eq!(refused.status, Some(2), "{}", refused.err);
     assert!(refused.err.contains("expected a travel from 0.1 to 10000 turns, got 0"), "{}", refused.err);
+    // A turn is 360 degrees.
+    for (travel, said) in [
+        ("18deg", "expected a travel from 0.1 to 10000 turns, got 0.05"),
+        ("3.6e6deg", ""),
+        ("100counts", "expected an angle in turns or degrees"),
+        ("far", "does not begin with a number"),
+    ] {
+        let refused = without_bus(&["--bus", "bus_of_nobody", "tune", "4", "--travel", travel]);
+        assert!(refused.err.contains(said), "{travel}: {}", refused.err);
+        assert_eq!(refused.status == Some(2), !said.is_empty(), "{travel}: {}", refused.err);
+    }
 }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use host::network::params::journal::default_path;
 use host::tune::{Bounds, RampReport, RampRequest, Request, TuneReport};
-use master::units::{Amperes, Rpm, parse_duration};
+use master::units::{Amperes, Angle, Rpm, parse_duration};
 use words::node::node;
 
 use super::params::journal::note_kept;
@@ -65,8 +65,8 @@ pub(crate) struct Tune {
     /// Most current that the speed loop may ask for meanwhile
     #[arg(long, value_name = "CURRENT", default_value = "15A")]
     current: Amperes,
-    /// Farthest that the shaft may turn from where it stands, in turns
-    #[arg(long, value_name = "TURNS", default_value = "40")]
+    /// Farthest that the motor's shaft may turn from where it stands, before a reducer: 20turn, 90deg; a number alone is turns
+    #[arg(long, value_name = "ANGLE", default_value = "40turn", value_parser = turns)]
     travel: f64,
     /// Time from one sample to the next
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = period)]
@@ -102,6 +102,15 @@ pub(crate) struct Tune {
     cycles: CycleArgs,
     #[command(flatten)]
     guard: GuardArgs,
+}
+
+/// An angle in turns, which a number alone is too.
+fn turns(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>().map_or_else(|_| text.parse(), |turns| Ok(Angle::Turns(turns))) {
+        Ok(Angle::Turns(turns)) => Ok(turns),
+        Ok(Angle::Counts(_)) => Err("expected an angle in turns or degrees, e.g. 20turn or 90deg".into()),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 impl Tune {
