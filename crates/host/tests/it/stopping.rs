@@ -214,12 +214,12 @@ fn stood_after(name: &str, what: Moved, end: End) -> Option<Duration> {
     let mut moving = Some(Box::pin(what.go(&drive)));
     let began = block_on_for(&mut bench.world, Duration::from_secs(3), moving.as_mut().unwrap());
     assert!(began.is_err(), "{said}: {began:?}");
-    // A measurement goes both ways: until it turns.
-    for _ in 0..200 {
+    // A measurement goes both ways, and a joint may rest between two points: until it turns.
+    for _ in 0..2000 {
         if bench.world.report(NODE).unwrap().velocity_rpm.abs() > 20.0 {
             break;
         }
-        let goes_on = block_on_for(&mut bench.world, PERIOD, moving.as_mut().unwrap());
+        let goes_on = block_on_for(&mut bench.world, PERIOD / 10, moving.as_mut().unwrap());
         assert!(goes_on.is_err(), "{said}: {goes_on:?}");
     }
     let before = bench.world.report(NODE).unwrap().velocity_rpm.abs();

@@ -1,3 +1,5 @@
+use std::time::Duration;
+
 use cia402::ModeOfOperation;
 use cia402::object::MODES_OF_OPERATION;
 use devices::Description;
@@ -8,6 +10,9 @@ use super::handle::Drive;
 use crate::error::{Error, Explanation, Fact};
 use crate::explain::{Finding, Observed, Topic};
 use crate::units::Volts;
+
+/// How long a motion that does not get there is looked at before it is stopped: some thirty answers, and 100 ms between two looks at its speed.
+const LOOK: Duration = Duration::from_millis(300);
 
 /// The faults that a code of this model stands for.
 pub fn faults_in(description: &Description, code: u16) -> Vec<&'static FaultRow> {
@@ -69,7 +74,9 @@ impl Drive {
             Trigger::Elsewhere { by, .. } => !matches!(by, Interference::Unknown),
             _ => return None,
         };
-        let cause = Observed::of_shaft(self).await.hindrance();
+        let network = self.node.network();
+        let look = network.within(LOOK, Observed::of_shaft(self));
+        let cause = look.await.and_then(|seen| seen.hindrance());
         cause.filter(|cause| !is_known || cause.topic == Topic::Terminals)
     }
 

@@ -1,6 +1,6 @@
 use core::fmt;
-use core::future::Future;
-use core::pin::Pin;
+use core::future::{Future, poll_fn};
+use core::pin::{Pin, pin};
 use core::task::{Context, Poll};
 use std::time::Duration;
 
@@ -98,6 +98,16 @@ impl Network {
     /// Waits this long, in the time of the bus.
     pub fn sleep(&self, duration: Duration) -> Sleep {
         Sleep(Pending::timer(self.clone(), duration))
+    }
+
+    /// Awaits something for at most this long, in the time of the bus; `None` if it takes longer, and it is given up then.
+    pub(crate) async fn within<T>(&self, time: Duration, what: impl Future<Output = T>) -> Option<T> {
+        let (mut what, mut end) = (pin!(what), pin!(self.sleep(time)));
+        poll_fn(|context| match what.as_mut().poll(context) {
+            Poll::Ready(output) => Poll::Ready(Some(output)),
+            Poll::Pending => end.as_mut().poll(context).map(|()| None),
+        })
+        .await
     }
 }
 
