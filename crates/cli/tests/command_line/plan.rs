@@ -71,9 +71,9 @@ fn a_bus_that_is_too_full_ends_with_1_and_says_what_is_late() {
 fn late_frames_on_a_bus_that_is_not_full_are_explained() {
     let directory = scratch("plan_late");
     let file = directory.join("arm.toml");
-    let drives: String = (1..=6).map(|node| format!("[[drive]]\nmodel = 'm8025e25b50'\nnode = {node}\n")).collect();
+    let drives: String = (1..=6).map(|node| format!("[[drive]]\nmodel = 'cia402'\nnode = {node}\n")).collect();
     std::fs::write(&file, format!("bitrate = '1M'\n{drives}")).unwrap();
-    let words = ["--json", "plan", file.to_str().unwrap(), "--cycle", "2ms", "--mode", "ip"];
+    let words = ["--json", "plan", file.to_str().unwrap(), "--cycle", "2ms", "--mode", "csp"];
     let ended = ferrodrive(&words);
     let report = ended.json();
     assert_eq!((ended.status, &report["fits"]), (Some(1), &false.into()));
@@ -85,10 +85,10 @@ fn late_frames_on_a_bus_that_is_not_full_are_explained() {
     let shortest: f64 = named.parse().unwrap();
     for (cycle_ms, status) in [(shortest, 0), (shortest - 0.5, 1)] {
         let cycle = format!("{cycle_ms}ms");
-        let words = ["plan", file.to_str().unwrap(), "--cycle", &cycle, "--mode", "ip"];
+        let words = ["plan", file.to_str().unwrap(), "--cycle", &cycle, "--mode", "csp"];
         assert_eq!(ferrodrive(&words).status, Some(status), "{cycle}");
     }
-    let alone = ["plan", file.to_str().unwrap(), "--cycle", "2ms", "--mode", "ip", "--sdo", "0s", "--emcy", "0s"];
+    let alone = ["plan", file.to_str().unwrap(), "--cycle", "2ms", "--mode", "csp", "--sdo", "0s", "--emcy", "0s"];
     assert_eq!(ferrodrive(&alone).status, Some(0));
 }
 

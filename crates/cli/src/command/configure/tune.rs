@@ -65,7 +65,9 @@ pub(crate) struct Tune {
     /// Most current that the speed loop may ask for meanwhile
     #[arg(long, value_name = "CURRENT", default_value = "15A")]
     current: Amperes,
-    /// Farthest that the motor's shaft may turn from where it stands, before a reducer: 20turn, 90deg; a number alone is turns
+    /// Farthest that the motor's shaft, before a reducer, may turn from where it stands: 20turn, 90deg
+    ///
+    /// A number alone is turns.
     #[arg(long, value_name = "ANGLE", default_value = "40turn", value_parser = turns)]
     travel: f64,
     /// Time from one sample to the next
