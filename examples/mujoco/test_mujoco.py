@@ -87,7 +87,8 @@ def mean(a, b):
 
 
 def test_an_arm_is_led_by_our_master_every_2_ms():
-    world, engine = arm()
+    # At its end the group takes the power: brakes hold the arm then.
+    world, engine = arm(**BRAKED)
     axes = [
         ferrodrive.Axis(node, "m4230e17b50", mode="ip", velocity_rpm=10, acceleration_rpm_s=60, gear_ratio=50) for node in NODES
     ]

@@ -62,6 +62,7 @@ export function orderOf(node, { shape, texts, quantities, path }) {
   const has = [...SHAPES.find(({ value }) => value === shape).fields, ...LIMITS, "count"];
   const of = (name) => valueOf(name, has.includes(name) ? texts[name] : FIELDS[name].usual);
   const names = ["by_deg", "speed_rpm", "frequency_hz", "to_frequency_hz", "periods", "time_s", "count", ...LIMITS];
+  /** @type {Record<string, any>} */
   const motion = { shape, ...Object.fromEntries(names.map((name) => [name, of(name)])), path: [] };
   for (const name of ["periods", "count"]) {
     if (!Number.isInteger(motion[name]) || motion[name] < 1) throw new Error(`${FIELDS[name].label}: expected a whole number from 1 on, got ${motion[name]}`);

@@ -220,7 +220,7 @@ fn a_drive_that_is_enabled_takes_no_program_and_one_without_its_program_is_not_e
 #[test]
 fn a_download_that_was_cut_is_done_by_the_same_command_again() {
     let mut bench = Bench::new();
-    let data: Vec<u8> = (0..20_000_u32).map(|at| (at * 13 >> 4) as u8).collect();
+    let data: Vec<u8> = (0..20_000_u32).map(|at| ((at * 13) >> 4) as u8).collect();
     for ms in [2, 20, 50, 100] {
         let (id, limit) = (bench.node.id(), Duration::from_millis(ms));
         let cut = sim::block_on_for(&mut bench.world, limit, program(&bench.network, id, 1, &data, &()));
