@@ -1,7 +1,7 @@
 //! Motion, physics, firmware and the world around them.
 
 use crate::defects::defect::Defect;
-use crate::defects::defect::programs::{DRIVES, DRIVES_IT, MOTION_IT, PLANT, PLANT_IT, SIM, SIM_IT, WHEEL};
+use crate::defects::defect::programs::{DRIVES, DRIVES_IT, MOTION_IT, PLANT, PLANT_IT, SIM, WHEEL};
 
 pub(super) const DEFECTS: &[Defect] = &[
     Defect {
@@ -20,30 +20,6 @@ pub(super) const DEFECTS: &[Defect] = &[
         file: "crates/motion/src/foc.rs",
         text: "let centre = 0.5 - (highest(phases)",
         instead: "let centre = 0.5 + (highest(phases)",
-        noticed_by: MOTION_IT,
-    },
-    Defect {
-        file: "crates/motion/src/profile.rs",
-        text: "0.5 * (start * start - end * end) * down",
-        instead: "0.5 * (start * start + end * end) * down",
-        noticed_by: MOTION_IT,
-    },
-    Defect {
-        file: "crates/motion/src/jerk.rs",
-        text: "if to.abs() > relaxed.velocity.abs() { up }",
-        instead: "if to.abs() < relaxed.velocity.abs() { up }",
-        noticed_by: MOTION_IT,
-    },
-    Defect {
-        file: "crates/motion/src/field_weakening.rs",
-        text: "        -gains.most_a * self.depth",
-        instead: "        gains.most_a * self.depth",
-        noticed_by: MOTION_IT,
-    },
-    Defect {
-        file: "crates/motion/src/foc.rs",
-        text: "current_a.d + self.flux_linkage_wb)",
-        instead: "current_a.d - self.flux_linkage_wb)",
         noticed_by: MOTION_IT,
     },
     Defect {
@@ -71,27 +47,9 @@ pub(super) const DEFECTS: &[Defect] = &[
         noticed_by: PLANT,
     },
     Defect {
-        file: "crates/plant/src/cogging.rs",
-        text: "        -self.amplitude_nm * self.phase",
-        instead: "        self.amplitude_nm * self.phase",
-        noticed_by: PLANT,
-    },
-    Defect {
         file: "crates/plant/src/pmsm.rs",
         text: "alpha_v: u * (2.0 * third_v) -",
         instead: "alpha_v: u * third_v -",
-        noticed_by: PLANT_IT,
-    },
-    Defect {
-        file: "crates/plant/src/current_loop.rs",
-        text: "- omega * inductance_q_h * current_a.q,",
-        instead: "+ omega * inductance_q_h * current_a.q,",
-        noticed_by: PLANT_IT,
-    },
-    Defect {
-        file: "crates/plant/src/gear.rs",
-        text: "known_nm + 0.5 * coupling * rate_after;",
-        instead: "known_nm - 0.5 * coupling * rate_after;",
         noticed_by: PLANT_IT,
     },
     Defect {
@@ -131,12 +89,6 @@ pub(super) const DEFECTS: &[Defect] = &[
         noticed_by: DRIVES,
     },
     Defect {
-        file: "crates/drives/src/mjoint/encoder.rs",
-        text: "if difference >= COUNTS_PER_TURN as u16 / 2",
-        instead: "if difference >= COUNTS_PER_TURN as u16 / 4",
-        noticed_by: DRIVES,
-    },
-    Defect {
         file: "crates/drives/src/zlac8030l/protection.rs",
         text: "[u, v, u + v].iter()",
         instead: "[u, v, u - v].iter()",
@@ -146,24 +98,6 @@ pub(super) const DEFECTS: &[Defect] = &[
         file: "crates/drives/src/zlac8030l/protection.rs",
         text: "matches!(sensors.hall & 7, 0 | 7)",
         instead: "matches!(sensors.hall & 7, 7)",
-        noticed_by: DRIVES_IT,
-    },
-    Defect {
-        file: "crates/drives/src/engine/cia402/status.rs",
-        text: "deviation.unsigned_abs() <= tolerances.position",
-        instead: "deviation.unsigned_abs() < tolerances.position",
-        noticed_by: DRIVES_IT,
-    },
-    Defect {
-        file: "crates/drives/src/node/io.rs",
-        text: "bit(1, now < of(LOWER_LIMIT))",
-        instead: "bit(1, now <= of(LOWER_LIMIT))",
-        noticed_by: DRIVES_IT,
-    },
-    Defect {
-        file: "crates/drives/src/engine/cia402/set_points.rs",
-        text: "if !new_set_point && self.waiting.is_none()",
-        instead: "if !new_set_point",
         noticed_by: DRIVES_IT,
     },
     Defect {
@@ -189,24 +123,6 @@ pub(super) const DEFECTS: &[Defect] = &[
         text: "(nanos as f64 / self.speed).ceil()",
         instead: "(nanos as f64 * self.speed).ceil()",
         noticed_by: SIM,
-    },
-    Defect {
-        file: "crates/sim/src/stimulus/range.rs",
-        text: "self.high.is_none_or(|high| position <= high)",
-        instead: "self.high.is_none_or(|high| position < high)",
-        noticed_by: SIM,
-    },
-    Defect {
-        file: "crates/sim/src/machine/models/zlim42c.rs",
-        text: "if node <= 15 { node } else { 0 }",
-        instead: "if node <= 16 { node } else { 0 }",
-        noticed_by: SIM_IT,
-    },
-    Defect {
-        file: "crates/sim/src/world/watch.rs",
-        text: "if first && before.generation != after.generation",
-        instead: "if before.generation != after.generation",
-        noticed_by: SIM_IT,
     },
     Defect {
         file: "crates/drives/src/engine/cia402/stopping.rs",

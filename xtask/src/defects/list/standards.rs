@@ -92,7 +92,7 @@ pub(super) const DEFECTS: &[Defect] = &[
         file: "crates/canopen/src/guarding.rs",
         text: "let lost = now >= self.until;",
         instead: "let lost = now > self.until;",
-        noticed_by: CANOPEN_IT,
+        noticed_by: CANOPEN,
     },
     Defect {
         file: "crates/canopen/src/sdo/block/receiver.rs",
@@ -101,27 +101,9 @@ pub(super) const DEFECTS: &[Defect] = &[
         noticed_by: CANOPEN_IT,
     },
     Defect {
-        file: "crates/canopen/src/sdo/block/sender.rs",
-        text: "if sequence == 0 { self.stalled + 1 } else { 0 };",
-        instead: "if sequence == 0 { self.stalled + 1 } else { self.stalled };",
-        noticed_by: CANOPEN_IT,
-    },
-    Defect {
         file: "crates/canopen/src/sdo/server/block.rs",
         text: "values.view().length(slot) <= usize::from(switch_threshold)",
         instead: "values.view().length(slot) < usize::from(switch_threshold)",
-        noticed_by: CANOPEN_IT,
-    },
-    Defect {
-        file: "crates/canopen/src/lss/server.rs",
-        text: "Bound::HighestRevision => self.number(Part::RevisionNumber) <= number",
-        instead: "Bound::HighestRevision => self.number(Part::RevisionNumber) < number",
-        noticed_by: CANOPEN_IT,
-    },
-    Defect {
-        file: "crates/canopen/src/lss/server.rs",
-        text: "(own ^ number) >> bit != 0",
-        instead: "(own ^ number) >> bit > 1",
         noticed_by: CANOPEN_IT,
     },
     Defect {
@@ -134,12 +116,6 @@ pub(super) const DEFECTS: &[Defect] = &[
         file: "crates/canopen/src/pdo/rpdo.rs",
         text: "if frame.dlc() < mapping.length()",
         instead: "if frame.dlc() != mapping.length()",
-        noticed_by: CANOPEN_IT,
-    },
-    Defect {
-        file: "crates/canopen/src/pdo/multiplex.rs",
-        text: "offset < count.max(1)",
-        instead: "offset <= count.max(1)",
         noticed_by: CANOPEN_IT,
     },
     Defect {
@@ -201,18 +177,6 @@ pub(super) const DEFECTS: &[Defect] = &[
         file: "crates/eds/src/diff.rs",
         text: "(Some(a), Some(b)) => a.min(b),",
         instead: "(Some(a), Some(b)) => a.max(b),",
-        noticed_by: EDS,
-    },
-    Defect {
-        file: "crates/eds/src/read/compact.rs",
-        text: "filter(|sub_index| *sub_index > 0);",
-        instead: "filter(|_| true);",
-        noticed_by: EDS,
-    },
-    Defect {
-        file: "crates/eds/src/read/objects.rs",
-        text: "&& is_above(&variable.low, &variable.high)",
-        instead: "&& is_above(&variable.high, &variable.low)",
         noticed_by: EDS,
     },
     Defect {
