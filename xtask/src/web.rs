@@ -159,6 +159,10 @@ fn index(page: &str, own: &Path) -> Result<String, String> {
         let text = read(path)?;
         let title =
             text.lines().find_map(|line| line.strip_prefix("title = ")).map(|title| title.trim_matches('"').to_owned());
+        // A page has no machine file beside a scenario.
+        if text.lines().any(|line| line.starts_with("machine =")) {
+            continue;
+        }
         scenarios.push(json!({ "title": title.unwrap_or_else(|| name(path)), "text": text }));
     }
     let given = json!({ "machines": machines, "scenarios": scenarios }).to_string();
