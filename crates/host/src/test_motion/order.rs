@@ -47,6 +47,19 @@ impl ShapeName {
             Self::Path => "path",
         }
     }
+
+    /// What it is, for people.
+    pub const fn what(self) -> &'static str {
+        match self {
+            Self::BackAndForth => "There and back, at rest at both ends",
+            Self::Steps => "Velocity at once, and off again",
+            Self::Ramp => "Velocity up, kept, down, and backwards",
+            Self::Sine => "Periods of a cosine",
+            Self::Chirp => "A cosine of rising frequency",
+            Self::Prbs => "Velocity of pseudo-random sign",
+            Self::Path => "The position of a capture",
+        }
+    }
 }
 
 impl std::str::FromStr for ShapeName {

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use host::capture::Wanted;
 use host::capture::merit::{self, Heating};
-use host::test_motion::{Figures, Followed, Motion, Order, Run, limits, run, usual_quantities};
+use host::test_motion::{Figures, Followed, Motion, Order, Run, ShapeName, limits, run, usual_quantities};
 use machine::group_move::{angle, rate, turning, turns_of};
 use master::Drive;
 use master::units::{Angle, Rpm, parse_duration};
@@ -40,7 +41,7 @@ pub(crate) struct TestMotion {
     #[arg(value_parser = node)]
     node: NodeId,
     /// Shape of the motion
-    #[arg(value_name = "SHAPE")]
+    #[arg(value_name = "SHAPE", value_parser = shape_names())]
     shape: ShapeName,
     /// Distance, or amplitude of sine and chirp
     #[arg(long, value_name = "ANGLE", value_parser = angle, default_value = "90deg")]
@@ -95,38 +96,10 @@ pub(crate) struct TestMotion {
     guard: GuardArgs,
 }
 
-/// The shapes by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum ShapeName {
-    /// There and back, at rest at both ends
-    BackAndForth,
-    /// Velocity at once, and off again
-    Steps,
-    /// Velocity up, kept, down, and backwards
-    Ramp,
-    /// Periods of a cosine
-    Sine,
-    /// A cosine of rising frequency
-    Chirp,
-    /// Velocity of pseudo-random sign
-    Prbs,
-    /// The position of a capture
-    Path,
-}
-
-impl ShapeName {
-    const fn name(self) -> host::test_motion::ShapeName {
-        use host::test_motion::ShapeName;
-        match self {
-            Self::BackAndForth => ShapeName::BackAndForth,
-            Self::Steps => ShapeName::Steps,
-            Self::Ramp => ShapeName::Ramp,
-            Self::Sine => ShapeName::Sine,
-            Self::Chirp => ShapeName::Chirp,
-            Self::Prbs => ShapeName::Prbs,
-            Self::Path => ShapeName::Path,
-        }
-    }
+/// The shapes by their words, each with what it is.
+fn shape_names() -> impl TypedValueParser<Value = ShapeName> {
+    let values = ShapeName::ALL.map(|shape| PossibleValue::new(shape.word()).help(shape.what()));
+    PossibleValuesParser::new(values).try_map(|word| word.parse::<ShapeName>())
 }
 
 /// What was moved, and how.
@@ -177,14 +150,14 @@ impl TestMotion {
     }
 
     const fn shape_name(&self) -> &'static str {
-        self.shape.name().word()
+        self.shape.word()
     }
 
     /// What a run sends.
     async fn motion(&self, drive: &Drive) -> Result<Motion, Failure> {
         let degrees = |turns: f64| turns * 360.0;
         let order = Order {
-            shape: self.shape.name(),
+            shape: self.shape,
             by_deg: degrees(turns_of(drive, self.by).await?.0),
             speed_rpm: self.speed.0,
             frequency_hz: self.frequency,
