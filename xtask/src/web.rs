@@ -20,8 +20,8 @@ use crate::{debian, page, program, wasm_order, workspace};
 const TARGET: Target = Target {
     name: "wasm32-unknown-unknown",
     crates: "std,panic_abort",
-    features: "",
-    opt_level: "\"s\"",
+    features: "optimize_for_size",
+    opt_level: "\"z\"",
     panic: "abort",
 };
 
