@@ -2,8 +2,8 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::command::configure::{dcf, init, lss, params, program, sdo, store, tune};
-use crate::command::look::{dump, emcy, objects, pdo, read, report, scan, studio, top, watch};
+use crate::command::configure::{dcf, init, lss, params, program, store, tune};
+use crate::command::look::{dump, emcy, objects, pdo, read, report, studio, top, watch};
 use crate::command::moving::{drive_base, group, test_motion};
 use crate::command::network::{boot, check, conform, gateway, latency, nmt, plan, send, supervise, sync, time};
 use crate::command::record_and_replay::{capture, convert, decode, plot, record, replay};
@@ -29,11 +29,9 @@ pub(crate) enum Command {
     Run(run::Run),
     World(world::World),
     Events(events::Events),
-    Scan(scan::Scan),
     Boot(boot::Boot),
     Supervise(supervise::Supervise),
     Read(read::Read),
-    Write(sdo::Write),
     Objects(objects::Objects),
     Plot(plot::Plot),
     Readings(readings::Readings),

@@ -10,11 +10,11 @@ use std::time::Duration;
 
 use can::BusFrame;
 use canopen::NodeId;
-use console::context::{Context as OnBus, Holding, Shell, Stated};
-use master::decode::Decoder;
+use console::context::{Context as OnBus, Holding, Others, Shell, Stated};
 use master::explain::Overheard;
 use master::{Gear, Network};
 use sim::recorder::LiveValues;
+use tokio::sync::broadcast::error::TryRecvError;
 use transport::BusSpec;
 
 use crate::failure::Failure;
@@ -103,6 +103,20 @@ impl Shell for Terminal {
         self.remembered.borrow_mut().is_new(key)
     }
 
+    fn others(&self) -> Others {
+        let mut others = self.traffic.of_others();
+        Box::new(move |counted, decoder| {
+            loop {
+                match others.try_recv() {
+                    Ok(passed) => counted.note(decoder, &passed.frame),
+                    // What was missed is of the kinds that come again.
+                    Err(TryRecvError::Lagged(_)) => {}
+                    Err(TryRecvError::Empty | TryRecvError::Closed) => return,
+                }
+            }
+        })
+    }
+
     fn overhear(&self, time: Duration) -> Pin<Box<dyn Future<Output = Overheard> + '_>> {
         self.traffic.listen();
         Box::pin(async move {
@@ -187,15 +201,6 @@ impl Context {
     /// The bus as it was named.
     pub(crate) const fn bus(&self) -> &BusSpec {
         &self.bus
-    }
-
-    /// A decoder that knows the stated models.
-    pub(crate) fn decoder(&self) -> Decoder {
-        let mut decoder = Decoder::knowing(self.network.models());
-        for (node, stated) in &self.models {
-            decoder.set_model(*node, stated.description());
-        }
-        decoder
     }
 
     /// Listens for this long, or without end, but on an embedded bus for `embedded`: in virtual time Ctrl-C does not come.

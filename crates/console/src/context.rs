@@ -9,6 +9,8 @@ use std::time::Duration;
 use canopen::NodeId;
 use cia402::object::{CONTROLWORD, STATUSWORD};
 use cia402::{PowerCommand, PowerState, Statusword};
+use host::network::heard::Counted;
+use master::decode::Decoder;
 use master::drive::Drive;
 use master::explain::Overheard;
 use master::identify::Knowledge;
@@ -23,6 +25,9 @@ const SETTLING_TIME: Duration = Duration::from_millis(50);
 /// How long a quick stop may be held up by a look at the statusword: drives answer within a few milliseconds.
 const GLANCE: Duration = Duration::from_millis(50);
 
+/// Counts the frames that others have sent since it was called last.
+pub type Others = Box<dyn FnMut(&mut Counted, &mut Decoder)>;
+
 /// What is around a command.
 pub trait Shell {
     /// Shows what is going on, in place of what was shown before.
@@ -36,6 +41,9 @@ pub trait Shell {
 
     /// Whether a note, by its key, has not been made yet where it would be seen still.
     fn is_new(&self, key: &str) -> bool;
+
+    /// The frames that others send from now on.
+    fn others(&self) -> Others;
 
     /// What others send within a time.
     fn overhear(&self, time: Duration) -> Pin<Box<dyn Future<Output = Overheard> + '_>>;
@@ -103,6 +111,15 @@ impl Context {
     /// A node, to be waited for as long as the command line says.
     pub fn node(&self, id: NodeId) -> Node {
         self.network.node(id).with_timeout(self.timeout)
+    }
+
+    /// A decoder that knows the stated models.
+    pub fn decoder(&self) -> Decoder {
+        let mut decoder = Decoder::knowing(self.network.models());
+        for (node, stated) in &self.models {
+            decoder.set_model(*node, stated.description());
+        }
+        decoder
     }
 
     /// Shows what is going on.

@@ -4,17 +4,21 @@
 use std::cell::RefCell;
 use std::pin::Pin;
 use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
+use host::command::{NewValue, ParameterChange};
 use host::console::{Hands, Order, Said, Work};
 use host::{Command as Asked, NodeCommand};
 use master::explain::Overheard;
 use plot::Paint;
 use words::plain;
 
+use crate::command::object::ObjectReport;
+use crate::command::read::Read;
 use crate::command::{Command, Effect};
-use crate::context::{Context, Holding, Shell, Stated};
+use crate::context::{Context, Holding, Others, Shell, Stated};
 use crate::guard::GuardArgs;
 
 /// How often a line that listens looks at the frames that have come: a full bus has some 10 000 in that time.
@@ -30,7 +34,16 @@ const OVERHEARING: Duration = Duration::from_secs(1);
 )]
 struct Line {
     #[command(subcommand)]
-    command: Command,
+    command: LineCommand,
+}
+
+/// What a line asks for.
+#[derive(Debug, clap::Subcommand)]
+enum LineCommand {
+    // Of the command line this one writes files too.
+    Read(Read),
+    #[command(flatten)]
+    OnBus(Command),
 }
 
 /// Reads lines for a host.
@@ -44,9 +57,20 @@ impl host::console::Reader for Reader {
         let words = words.strip_prefix(&["ferrodrive".to_owned()][..]).unwrap_or(&words);
         let matches = parser().try_get_matches_from(words).map_err(|error| said(&error))?;
         let Line { command } = Line::from_arg_matches(&matches).map_err(|error| said(&error))?;
-        command.guard().map_or(Ok(()), GuardArgs::check_for_host).map_err(|failure| Said::failed(&failure))?;
-        let asked = match command.effect() {
+        let effect = match &command {
+            LineCommand::Read(_) => Effect::None,
+            LineCommand::OnBus(command) => {
+                check(command)?;
+                command.effect()
+            }
+        };
+        let asked = match effect {
             Effect::None => None,
+            Effect::Writes(node, object, value) => {
+                let values = vec![NewValue { object, value }];
+                let write = ParameterChange::WriteParameters { values, file: None };
+                Some(NodeCommand::Change(write).to(node))
+            }
             Effect::OnDrive(node, command) => Some(NodeCommand::from(command).to(node)),
             Effect::StopAll => Some(Asked::STOP_ALL),
             Effect::StopAllByRamp => {
@@ -59,12 +83,29 @@ impl host::console::Reader for Reader {
     }
 }
 
+/// Whether a page can do it.
+fn check(command: &Command) -> Result<(), Said> {
+    if let Command::Write(write) = command
+        && write.is_from_file()
+    {
+        let text = "error: a page reads no files\n  next:    give the value, e.g. write 4 6083 600; the Parameters view opens parameter files";
+        return Err(Said::senseless(text.to_owned()));
+    }
+    command.guard().map_or(Ok(()), GuardArgs::check_for_host).map_err(|failure| Said::failed(&failure))
+}
+
+/// Options that a line does not have.
+const HIDDEN: [&str; 2] = ["guard", "from"];
+
 /// The parser of the command line; its help names nothing that a line does not have.
 fn parser() -> clap::Command {
     Line::command().mut_subcommands(|command| {
         let examples = command.get_after_help().map(ToString::to_string).unwrap_or_default();
         let mut lines: Vec<String> = Vec::new();
-        for line in examples.lines().filter(|line| !line.contains(" -v ") && !line.contains("stop all")) {
+        for line in examples
+            .lines()
+            .filter(|line| ![" -v ", "stop all", "--model ", "--from "].iter().any(|of| line.contains(of)))
+        {
             let line = [" --bus can0", " --machine machine.toml", " --json"]
                 .iter()
                 .fold(line.to_owned(), |line, of| line.replace(of, ""));
@@ -72,7 +113,9 @@ fn parser() -> clap::Command {
                 lines.push(line);
             }
         }
-        let guards = |arg: clap::Arg| if arg.get_id().as_str().ends_with("guard") { arg.hide(true) } else { arg };
+        let guards = |arg: clap::Arg| {
+            if HIDDEN.iter().any(|id| arg.get_id().as_str().ends_with(id)) { arg.hide(true) } else { arg }
+        };
         command.after_help(lines.join("\n")).mut_args(guards)
     })
 }
@@ -84,7 +127,7 @@ fn said(error: &clap::Error) -> Said {
     if error.use_stderr() { Said::senseless(text) } else { Said::done(text) }
 }
 
-async fn carry_out(command: &Command, hands: Hands) -> Said {
+async fn carry_out(command: &LineCommand, hands: Hands) -> Said {
     let notes = Rc::new(RefCell::new(Vec::new()));
     let context = Context {
         network: hands.network.clone(),
@@ -96,9 +139,22 @@ async fn carry_out(command: &Command, hands: Hands) -> Said {
         holding: Holding::Host { in_control: hands.in_control },
         shell: Rc::new(Page { hands, notes: Rc::clone(&notes) }),
     };
-    let (printed, failure) = match command.run(&context).await {
-        Ok(outcome) => (Some(outcome.text(Paint::OFF)), outcome.failure()),
-        Err(failure) => (None, Some(failure)),
+    let mut printed = Vec::new();
+    let failure = match command {
+        LineCommand::Read(read) => {
+            let show = |report: &ObjectReport| {
+                printed.push(report.text(Paint::OFF));
+                Ok(())
+            };
+            read.run(&context, show).await.err()
+        }
+        LineCommand::OnBus(command) => match command.run(&context).await {
+            Ok(outcome) => {
+                printed.push(outcome.text(Paint::OFF));
+                outcome.failure()
+            }
+            Err(failure) => Some(failure),
+        },
     };
     let said = failure.map_or_else(|| Said::done(String::new()), |failure| Said::failed(&of_a_page(failure.reason)));
     let complaint = said.trouble.is_some().then(|| said.text.clone());
@@ -158,6 +214,14 @@ impl Shell for Page {
 
     fn is_new(&self, _: &str) -> bool {
         true
+    }
+
+    fn others(&self) -> Others {
+        let trace = Arc::clone(&self.hands.trace);
+        let mut number = trace.next();
+        Box::new(move |counted, decoder| {
+            number = trace.others_from(number, |passed| counted.note(decoder, &passed.frame));
+        })
     }
 
     fn overhear(&self, time: Duration) -> Pin<Box<dyn Future<Output = Overheard> + '_>> {

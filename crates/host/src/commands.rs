@@ -80,7 +80,7 @@ impl Host {
         }
     }
 
-    fn take_node(&mut self, node: NodeId, command: NodeCommand, asked: Asked) {
+    pub(crate) fn take_node(&mut self, node: NodeId, command: NodeCommand, asked: Asked) {
         match command {
             NodeCommand::Explain => self.listen_for(node, asked),
             NodeCommand::Homing => self.look_at_homing(node, asked),

@@ -67,6 +67,9 @@ impl Host {
             Some(Command::Node(node, NodeCommand::Drive(command))) => {
                 return self.begin_line_on(node, command, (seq, said), work(hands));
             }
+            Some(Command::Node(node, command)) => {
+                return self.begin_line_after(node, command, (seq, said), work(hands));
+            }
             Some(_) => self.stop_everything("stopped by a line of a console"),
             None => {}
         }
@@ -134,6 +137,26 @@ impl Host {
                 (Err(_), Err(_)) => Said::refused("over", "the host is ending"),
             };
             let _ = said.send(text);
+            Done::Nothing
+        }));
+    }
+
+    /// A line whose command is the host's own: what it says comes after that.
+    fn begin_line_after(
+        &mut self,
+        node: NodeId,
+        command: NodeCommand,
+        (seq, said): (u64, oneshot::Sender<Said>),
+        line: Work,
+    ) {
+        let (answer, answered) = oneshot::channel();
+        self.take_node(node, command, (seq, answer));
+        self.work.push(Box::pin(async move {
+            let _ = said.send(match answered.await.as_ref().map(Answer::trouble) {
+                Ok(None) => line.await,
+                Ok(Some(trouble)) => Said::refused(trouble.kind, &trouble.message),
+                Err(_) => Said::refused("over", "the host is ending"),
+            });
             Done::Nothing
         }));
     }

@@ -19,7 +19,6 @@ pub(crate) mod look {
     pub(crate) mod pdo;
     pub(crate) mod read;
     pub(crate) mod report;
-    pub(crate) mod scan;
     pub(crate) mod studio;
     pub(crate) mod top;
     pub(crate) mod watch;
@@ -37,7 +36,6 @@ pub(crate) mod configure {
     pub(crate) mod lss;
     pub(crate) mod params;
     pub(crate) mod program;
-    pub(crate) mod sdo;
     pub(crate) mod store;
     pub(crate) mod tune;
 }

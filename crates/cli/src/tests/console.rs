@@ -159,6 +159,14 @@ fn a_line_says_in_a_page_what_it_says_in_a_shell() {
         "estop",
         "state 9",
         "velocity 4 60mm/s",
+        "scan",
+        "read 4 6041",
+        "read 4 1018:* device_type 6083",
+        "read 1 1000..1018",
+        "read 4 5FFF",
+        "read 9 6041",
+        "write 4 6083 600ms",
+        "write 2 profile_acceleration 0x258",
     ] {
         // As long as a page waits.
         let words: Vec<_> = ["--bus", &bus, "--timeout", "200ms"].into_iter().chain(line.split(' ')).collect();
@@ -173,7 +181,17 @@ fn a_line_says_in_a_page_what_it_says_in_a_shell() {
 #[test]
 fn a_line_that_makes_no_sense_is_refused_in_the_words_of_the_command_line() {
     let mut page = Page::new();
-    for line in ["fly 4", "move 4", "move 400 90deg", "velocity 4 60deg", "stop", "home 4", "move 4 90deg --speed 5"] {
+    for line in [
+        "fly 4",
+        "read 4",
+        "write 4 6083",
+        "move 4",
+        "move 400 90deg",
+        "velocity 4 60deg",
+        "stop",
+        "home 4",
+        "move 4 90deg --speed 5",
+    ] {
         let shell = without_bus(&line.split(' ').collect::<Vec<_>>());
         let (text, status) = page.line(line);
         assert_eq!((status, shell.status), (2, Some(2)), "{line}: {text}");
@@ -192,7 +210,7 @@ fn a_line_that_makes_no_sense_is_refused_in_the_words_of_the_command_line() {
 fn a_line_moves_a_drive_for_the_session_in_control_alone_and_within_its_speed_limit() {
     let mut page = Page::new();
     page.must(json!({ "do": "release_control" }));
-    for line in ["move 4 90deg", "velocity 4 60rpm", "enable 4", "stop 4", "reset 4"] {
+    for line in ["move 4 90deg", "velocity 4 60rpm", "enable 4", "stop 4", "reset 4", "write 4 6083 600"] {
         let (text, status) = page.line(line);
         assert!(status == 1 && text.contains("take control first"), "{line}: {text}");
     }
@@ -244,6 +262,33 @@ fn a_line_that_is_stopped_or_replaced_says_so() {
         let said = &answer["result"];
         assert!(said["status"] == 1 && said["text"].as_str().is_some_and(|text| text.contains(says)), "{answer}");
     }
+}
+
+/// What a line writes is written as the Parameters view does it: planned first, at rest, nothing that commands a motion, and it can be
+/// taken back.
+#[test]
+fn a_line_writes_a_parameter_by_the_rules_of_the_parameters_view() {
+    let mut page = Page::new();
+    let value = |page: &mut Page| page.line("read 4 6083").0;
+    let before = value(&mut page);
+    assert_eq!(page.line("write 4 6083 600").1, 0);
+    assert!(value(&mut page).contains("= 600"), "{before}");
+    page.must(json!({ "do": "roll_back", "node": 4 }));
+    assert_eq!(value(&mut page), before);
+    for (line, status) in [
+        ("write 4 6040 0x0F", 1),
+        ("write 4 60FF 60rpm", 1),
+        ("write 4 6083 --from x.bin", 2),
+        ("write 4 6083 much", 1),
+    ] {
+        let said = page.line(line);
+        assert!(said.1 == status && said.0.starts_with("error: "), "{line}: {said:?}");
+    }
+    assert_eq!(page.line("velocity 4 60rpm").1, 0);
+    let (text, status) = page.line("write 4 6083 700");
+    assert!(status == 1 && (page.speed(4) - 60.0).abs() < 3.0, "{text}");
+    assert_eq!(page.line("quick-stop 4").1, 0);
+    assert_eq!(value(&mut page), before);
 }
 
 /// The stop of a line does not go on behind the command that has taken its place, and what that moves is stopped with the page.
@@ -363,10 +408,13 @@ fn a_speed_along_a_way_is_held_to_the_limit_by_the_feed_of_the_machine_file() {
 #[test]
 fn a_line_is_advised_of_nothing_that_it_does_not_have() {
     let mut page = Page::new();
-    for command in ["state", "enable", "move", "explain", "torque", "home", "estop"] {
+    for command in ["state", "enable", "move", "explain", "torque", "home", "estop", "scan", "read", "write"] {
         let (text, status) = page.line(&format!("help {command}"));
         assert!(
-            status == 0 && !["--bus", "--machine", "--json", "-v ", "guard"].iter().any(|not| text.contains(not)),
+            status == 0
+                && !["--bus", "--machine", "--model", "--json", "--from", "-v ", "guard"]
+                    .iter()
+                    .any(|not| text.contains(not)),
             "{text}"
         );
     }

@@ -1,12 +1,18 @@
 //! The commands: commands that share everything but a word share a file.
 
 pub mod drive;
+mod effect;
 pub mod estop;
 pub mod explain;
 pub mod home;
 pub mod motion;
+pub mod object;
+pub mod read;
+pub mod scan;
+pub mod write;
 
 use clap::Subcommand;
+use host::network::scan::ScanReport;
 use master::drive::{self as master_drive, Motion};
 use plot::Paint;
 use serde::Serialize;
@@ -16,12 +22,18 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::GuardArgs;
 use drive::{StateReport, StopOutcome};
+pub use effect::Effect;
 use motion::MotionOutcome;
+use object::ObjectReport;
 
 /// Commands on a bus.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     #[allow(missing_docs, reason = "it would be the help in place of that of the command")]
+    Scan(scan::Scan),
+    #[allow(missing_docs, reason = "as above")]
+    Write(write::Write),
+    #[allow(missing_docs, reason = "as above")]
     State(drive::State),
     #[allow(missing_docs, reason = "as above")]
     Explain(explain::Explain),
@@ -51,6 +63,10 @@ pub enum Command {
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Outcome {
+    /// Who is on the bus.
+    Scanned(Box<ScanReport>),
+    /// An object that was written.
+    Written(Box<ObjectReport>),
     /// What a drive says of itself.
     State(Box<StateReport>),
     /// Why it does not move.
@@ -61,19 +77,6 @@ pub enum Outcome {
     Moved(Box<MotionOutcome>),
 }
 
-/// What a command does to drives, as far as a host has to know it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Effect {
-    /// It reads.
-    None,
-    /// It commands a drive.
-    OnDrive(canopen::NodeId, master_drive::Command),
-    /// It stops every drive at once.
-    StopAll,
-    /// It stops every drive by its ramp.
-    StopAllByRamp,
-}
-
 impl Command {
     /// Does it.
     ///
@@ -81,6 +84,8 @@ impl Command {
     /// Why it was not done.
     pub async fn run(&self, context: &Context) -> Result<Outcome, Failure> {
         Ok(match self {
+            Self::Scan(command) => Outcome::Scanned(Box::new(command.run(context).await?)),
+            Self::Write(command) => Outcome::Written(Box::new(command.run(context).await?)),
             Self::State(command) => Outcome::State(Box::new(command.run(context).await?)),
             Self::Explain(command) => Outcome::Explained(Box::new(command.run(context).await?)),
             Self::Enable(command) => Outcome::State(Box::new(command.run(context).await?)),
@@ -112,7 +117,8 @@ impl Command {
         use master_drive::Command as Of;
         let moves = |(node, motion): (_, Motion)| Effect::OnDrive(node, motion.into());
         match self {
-            Self::State(_) | Self::Explain(_) => Effect::None,
+            Self::Scan(_) | Self::State(_) | Self::Explain(_) => Effect::None,
+            Self::Write(command) => command.effect(),
             Self::Enable(command) => Effect::OnDrive(command.node, Of::Enable),
             Self::Disable(command) => Effect::OnDrive(command.node, Of::Disable),
             Self::Reset(command) => Effect::OnDrive(command.node, Of::ResetFault),
@@ -140,7 +146,7 @@ impl Outcome {
         match self {
             Self::Stopped(outcome) => outcome.failure(),
             Self::Explained(explanation) => explanation.failure(),
-            Self::State(_) | Self::Moved(_) => None,
+            Self::Scanned(_) | Self::Written(_) | Self::State(_) | Self::Moved(_) => None,
         }
     }
 }
@@ -149,6 +155,8 @@ impl Outcome {
     /// As lines for people.
     pub fn text(&self, paint: Paint) -> String {
         match self {
+            Self::Scanned(report) => scan::text(report, paint),
+            Self::Written(report) => report.text(paint),
             Self::State(report) => report.text(paint),
             Self::Explained(report) => explain::text(report, paint),
             Self::Stopped(report) => report.text(paint),

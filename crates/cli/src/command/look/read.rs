@@ -1,19 +1,15 @@
-//! `ferrodrive read`: objects of a node by SDO upload (CiA 301, clause 7.2.4), one, several or a range.
+//! `ferrodrive read`: objects of a node by SDO upload, shown or put into a file.
 
 use std::path::{Path, PathBuf};
 
-use canopen::{AbortCode, Mux, NodeId};
-use master::decode::common_row;
-use master::{Drive, Error};
+use console::command::object::ObjectReport;
+use console::command::read;
 
 use crate::command::configure::dcf::{is_stdout, keep, new_file};
-use crate::command::configure::sdo::{ObjectReport, moving_limits, resolve};
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::{Format, print};
-use words::node::node;
-use words::object::ObjectArg;
-use words::selection::{Selection, selection};
+use crate::output::{Format, Report, print};
+use plot::Paint;
 
 /// Read objects of a node, decoded with unit and meaning
 #[derive(Debug, clap::Args)]
@@ -23,12 +19,8 @@ use words::selection::{Selection, selection};
     Examples:\n  ferrodrive read 4 6064 606C statusword\n  ferrodrive read 4 1018:*\n  ferrodrive read 5 1021 -o device.eds"
 )]
 pub(crate) struct Read {
-    /// Node-ID
-    #[arg(value_parser = node)]
-    node: NodeId,
-    /// Indices, index:sub-index, names or ranges
-    #[arg(value_name = "OBJECT", required = true, value_parser = selection)]
-    objects: Vec<Selection>,
+    #[command(flatten)]
+    what: read::Read,
     /// Write the bytes of the one object, as they are, to a new file, or as - to standard output
     #[arg(long = "output", short = 'o', alias = "to", value_name = "FILE")]
     to: Option<PathBuf>,
@@ -40,136 +32,18 @@ pub(crate) struct Read {
 impl Read {
     /// Reads, decodes and shows one after the other.
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
-        let one = match &self.objects[..] {
-            [Selection::One(object)] => Some(object),
-            _ => None,
-        };
-        if let Some(path) = &self.to {
-            self.check_file(path, one.is_some(), format.json)?;
-        }
         let show = |report: &ObjectReport| format.print(report).map_err(Failure::of_stdout);
-        if let Some(object) = one {
-            let report = self.one(context, object).await?;
-            // The bytes are there already, and nothing else is to be among them.
-            return if self.to.as_deref().is_some_and(is_stdout) { Ok(()) } else { show(&report) };
+        let Some(path) = &self.to else { return self.what.run(context, show).await };
+        self.check_file(path, self.what.one().is_some(), format.json)?;
+        let Some(object) = self.what.one() else { return Ok(()) };
+        let (mut report, payload) = self.what.read_one(context, object).await?;
+        if is_stdout(path) {
+            // Nothing else is to be among them.
+            return print(payload.as_bytes()).map_err(Failure::of_stdout);
         }
-        let drive = context.drive(self.node).await?;
-        for selection in &self.objects {
-            let mut found = 0;
-            let mut last = None;
-            for mux in self.candidates(&drive, selection)? {
-                // Of an index that is not there no other sub-index is either.
-                if mux.sub_index > 0 && last == Some((mux.index, false)) {
-                    continue;
-                }
-                context.progress.show(format!("node {}: {mux}", self.node));
-                let (reports, is_there) = self.all_of(&drive, mux).await?;
-                last = Some((mux.index, is_there));
-                found += reports.len();
-                reports.iter().try_for_each(&show)?;
-            }
-            if found == 0 {
-                return Err(self.nothing(selection));
-            }
-        }
-        Ok(())
-    }
-
-    /// One object. A number is asked for before the model, so that an absent node is blamed for the object that was wanted.
-    async fn one(&self, context: &Context, object: &ObjectArg) -> Result<ObjectReport, Failure> {
-        let early = match object {
-            ObjectArg::Mux(mux) => Some(context.node(self.node).upload(*mux).await?),
-            ObjectArg::Name(_) => None,
-        };
-        let drive = context.drive(self.node).await?;
-        let (mux, row) = resolve(&drive, object)?;
-        let payload = match early {
-            Some(payload) => payload,
-            None => drive.node().upload(mux).await?,
-        };
-        let row = if drive.description().is_some() { row } else { common_row(mux) };
-        let limits = moving_limits(&drive, row).await?;
-        let mut report = ObjectReport::new(&drive, mux, row, payload.as_bytes(), limits.as_ref(), false);
-        if let Some(path) = &self.to {
-            if is_stdout(path) {
-                print(payload.as_bytes()).map_err(Failure::of_stdout)?;
-                return Ok(report);
-            }
-            keep(path, payload.as_bytes(), self.force)?;
-            report.file = Some(path.display().to_string());
-        }
-        Ok(report)
-    }
-
-    /// The objects to ask for: those of the model's table, else sub-index 0 of each index, from which others follow.
-    fn candidates(&self, drive: &Drive, selection: &Selection) -> Result<Vec<Mux>, Failure> {
-        let (first, last, subs) = match selection {
-            Selection::One(object) => return Ok(vec![resolve(drive, object)?.0]),
-            Selection::SubIndices(index, Some((from, to))) => {
-                return Ok((*from..=*to).map(|sub| Mux::new(*index, sub)).collect());
-            }
-            Selection::SubIndices(index, None) => (*index, *index, true),
-            Selection::Indices(first, last) => (*first, *last, false),
-        };
-        let rows = drive.description().map(|model| model.dictionary.rows());
-        let listed = rows.into_iter().flatten().filter(|row| (first..=last).contains(&row.index));
-        let listed: Vec<Mux> = listed.map(|row| row.mux()).collect();
-        // A device may have what its model's table lacks; for one named index this is reported.
-        let named = subs && listed.is_empty();
-        Ok(match drive.description() {
-            Some(_) if !named => listed,
-            _ => (first..=last).map(|index| Mux::new(index, 0)).collect(),
-        })
-    }
-
-    /// The object, and where no table lists sub-indices those that follow from sub-index 0. False if it is not there.
-    async fn all_of(&self, drive: &Drive, mux: Mux) -> Result<(Vec<ObjectReport>, bool), Failure> {
-        let Some(first) = self.look(drive, mux).await? else { return Ok((Vec::new(), false)) };
-        let is_listed = drive.description().is_some_and(|model| model.row(mux).is_some());
-        let count = first.number().filter(|_| mux.sub_index == 0 && !is_listed).unwrap_or(0);
-        let mut reports = vec![first];
-        for sub_index in 1..=u8::try_from(count).unwrap_or(0).min(254) {
-            match self.look(drive, Mux::new(mux.index, sub_index)).await? {
-                Some(report) => reports.push(report),
-                // The value of a variable is not a count of sub-indices.
-                None if sub_index == 1 => break,
-                None => {}
-            }
-        }
-        Ok((reports, true))
-    }
-
-    /// Reads an object; `None` if there is none. A refusal is something to show.
-    async fn look(&self, drive: &Drive, mux: Mux) -> Result<Option<ObjectReport>, Failure> {
-        let row = match drive.description() {
-            Some(model) => model.row(mux),
-            None => common_row(mux),
-        };
-        match drive.node().upload(mux).await {
-            Ok(payload) => {
-                let limits = moving_limits(drive, row).await?;
-                Ok(Some(ObjectReport::new(drive, mux, row, payload.as_bytes(), limits.as_ref(), false)))
-            }
-            Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => Ok(None),
-            Err(Error::Aborted { code, .. }) => {
-                let mut report = ObjectReport::new(drive, mux, row, &[], None, false);
-                report.refused = Some(code.to_string());
-                Ok(Some(report))
-            }
-            Err(error) => Err(error.into()),
-        }
-    }
-
-    fn nothing(&self, selection: &Selection) -> Failure {
-        let what = match selection {
-            Selection::One(_) => "it has no such object".to_owned(),
-            Selection::SubIndices(index, _) => format!("it has nothing of {index:04X}h"),
-            Selection::Indices(first, last) => format!("it has nothing from {first:04X}h to {last:04X}h"),
-        };
-        Failure::new(format!("node {}: {what}", self.node))
-            .of_kind("aborted")
-            .at_node(self.node)
-            .next(format!("ferrodrive objects {} lists what it has", self.node))
+        keep(path, payload.as_bytes(), self.force)?;
+        report.file = Some(path.display().to_string());
+        show(&report)
     }
 
     fn check_file(&self, path: &Path, is_one: bool, json: bool) -> Result<(), Failure> {
@@ -182,5 +56,11 @@ impl Read {
                 .next("give --output FILE, or omit --json"));
         }
         new_file(Some(path), self.force).map(drop)
+    }
+}
+
+impl Report for ObjectReport {
+    fn text(&self, paint: Paint) -> String {
+        self.text(paint)
     }
 }

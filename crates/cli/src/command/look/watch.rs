@@ -8,12 +8,12 @@ use master::decode::{common_name, common_row};
 use master::{Drive, Error};
 use serde::Serialize;
 
-use crate::command::configure::sdo::resolve;
 use crate::command::repeat::{Pace, Repeat, period};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
 use crate::progress::Screen;
+use console::command::object::resolve;
 use console::numbers::whole;
 use plot::Paint;
 use plot::Table;

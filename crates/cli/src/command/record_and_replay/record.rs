@@ -21,7 +21,8 @@ use words::node::node;
 use words::object::{ObjectArg, object};
 
 use crate::command::configure::dcf::is_stdout;
-use crate::command::configure::sdo::resolve;
+use console::command::object::resolve;
+
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;

@@ -15,12 +15,12 @@ use words::drive::{DriveSpec, drive_spec};
 use words::unresolved::Unresolved;
 
 use super::dcf::{keep, new_file};
-use crate::command::look::scan::look;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Report;
 use crate::plain::plain;
 use crate::session;
+use console::command::scan::look;
 
 /// Write a first machine file, from the drives on a bus or those that --drive names
 ///

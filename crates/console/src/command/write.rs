@@ -1,26 +1,20 @@
-//! `ferrodrive write`: an object of a node by SDO download (CiA 301, clause 7.2.4), and objects as they are shown.
+//! `ferrodrive write`: an object of a node by SDO download (CiA 301, clause 7.2.4).
 
 use std::path::{Path, PathBuf};
 
-use canopen::od::Entry;
 use canopen::{AbortCode, Mux, NodeId};
-use master::decode::{common_name, common_type, standard_row};
+use master::decode::standard_row;
 use master::drive::Limits;
 use master::{Drive, Error};
-use serde::Serialize;
-
-use console::command::drive::guessed;
-
-use crate::context::Context;
-use crate::failure::Failure;
-use crate::output::Report;
-use plot::Paint;
-use words::counted;
-use words::decode::{Decoded, decode};
 use words::document::read_bytes;
 use words::node::node;
 use words::object::{ObjectArg, object};
 use words::value::{Typed, typed_alone, typed_for};
+
+use super::effect::Effect;
+use super::object::{ObjectReport, counts_per_unit, moving_limits, resolve};
+use crate::context::Context;
+use crate::failure::Failure;
 
 /// Write an object of a node
 #[derive(Debug, clap::Args)]
@@ -29,7 +23,7 @@ use words::value::{Typed, typed_alone, typed_for};
     ferrodrive write 5 1008 'left wheel'\n  ferrodrive write 5 1F50:01 --from firmware.bin\n\
     An object of CiA 301 or CiA 402 has the standard's type where the model is not known:\n  ferrodrive write 32 6060 6\n\
     Any object that no known table has takes its type with the value: u16:15, i32:-100, text:'left wheel', hex:01AAFF")]
-pub(crate) struct Write {
+pub struct Write {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
@@ -44,33 +38,26 @@ pub(crate) struct Write {
     from: Option<PathBuf>,
 }
 
-/// An object and its value.
-#[derive(Debug, Serialize)]
-pub(crate) struct ObjectReport {
-    node: u8,
-    object: String,
-    name: Option<&'static str>,
-    /// The model by whose table it is read, if that is a guess.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    guess: Option<&'static str>,
-    #[serde(flatten)]
-    value: Decoded,
-    /// What to know about what was written.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    note: Option<String>,
-    /// The file that the bytes went into or came from.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::command) file: Option<String>,
-    /// Why it was not read, where several objects were asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::command) refused: Option<String>,
-    #[serde(skip)]
-    written: bool,
-}
-
 impl Write {
-    /// Reads what was typed, and writes it.
-    pub(crate) async fn run(&self, context: &Context) -> Result<ObjectReport, Failure> {
+    /// What it does to drives.
+    pub(crate) fn effect(&self) -> Effect {
+        let object = match &self.object {
+            ObjectArg::Mux(mux) => format!("{mux:X}"),
+            ObjectArg::Name(name) => name.clone(),
+        };
+        Effect::Writes(self.node, object, self.value.clone().unwrap_or_default())
+    }
+
+    /// Whether the value is in a file.
+    pub(crate) const fn is_from_file(&self) -> bool {
+        self.from.is_some()
+    }
+
+    /// Reads what was typed, and writes it. A host has written it already, by its own rules: then it is read back.
+    ///
+    /// # Errors
+    /// What was typed makes no sense; the drive refuses it; those of the master.
+    pub async fn run(&self, context: &Context) -> Result<ObjectReport, Failure> {
         let content = self.from.as_deref().map(content).transpose()?;
         let drive = context.drive_without_note(self.node).await?;
         let (mux, row) = resolve(&drive, &self.object)?;
@@ -93,11 +80,13 @@ impl Write {
         // Bytes may be a number that means something else on another model.
         drive.check_write(mux, value.number().unwrap_or_else(|| low_bytes(&value.bytes())))?;
         context.note_guess(&drive);
-        let bytes = value.bytes();
+        let mut bytes = value.bytes();
         if bytes.len() > LONG {
-            context.progress.show(format!("node {}: writing {} bytes to {mux}", self.node, bytes.len()));
+            context.show(format!("node {}: writing {} bytes to {mux}", self.node, bytes.len()));
         }
-        if let Err(error) = drive.node().download(mux, &bytes).await {
+        if context.in_control().is_some() {
+            bytes = drive.node().upload(mux).await?.as_bytes().to_vec();
+        } else if let Err(error) = drive.node().download(mux, &bytes).await {
             return Err(with_limits(&drive, error, value.number()).await);
         }
         let mut report = ObjectReport::new(&drive, mux, row, &bytes, limits.as_ref(), true);
@@ -139,18 +128,6 @@ fn low_bytes(bytes: &[u8]) -> i64 {
     bytes.iter().take(4).rev().fold(0, |number, byte| number << 8 | i64::from(*byte))
 }
 
-/// What the object takes now, where other objects have a say in it.
-pub(in crate::command) async fn moving_limits(drive: &Drive, row: Option<&Entry>) -> Result<Option<Limits>, Failure> {
-    match row.filter(|row| drive.description().is_some() && (row.resolution.is_some() || row.held_to.is_some())) {
-        Some(row) => Ok(Some(drive.limits(row.mux()).await?)),
-        None => Ok(None),
-    }
-}
-
-fn counts_per_unit(limits: Option<&Limits>) -> i64 {
-    limits.map_or(1, Limits::counts_per_unit)
-}
-
 /// What to know about a value that the drive has taken.
 fn note(drive: &Drive, mux: Mux, number: Option<i64>, limits: Option<&Limits>) -> Option<String> {
     let storage = drive.description().map(|profile| profile.storage);
@@ -183,65 +160,6 @@ async fn with_limits(drive: &Drive, error: Error, number: Option<i64>) -> Failur
             setting.object
         )),
         None => failure,
-    }
-}
-
-/// The multiplexor, and the row if the node's model is known and has it.
-pub(in crate::command) fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), Failure> {
-    let found = object.resolve(drive.description().map(|model| model.dictionary));
-    found.map_err(|reason| {
-        let node = drive.node().id();
-        Failure::usage(reason)
-            .at_node(node)
-            .next(format!("look for it: ferrodrive objects {node} WORD, or give its index, e.g. 6064"))
-    })
-}
-
-impl ObjectReport {
-    /// The object's number.
-    pub(in crate::command) const fn number(&self) -> Option<i64> {
-        self.value.value
-    }
-
-    pub(in crate::command) fn new(
-        drive: &Drive,
-        mux: Mux,
-        row: Option<&'static Entry>,
-        bytes: &[u8],
-        limits: Option<&Limits>,
-        written: bool,
-    ) -> Self {
-        let unknown = row.is_none() && drive.description().is_none();
-        let data_type = common_type(mux, bytes.len()).filter(|_| unknown);
-        let value = decode(drive.description(), row, bytes).typed(data_type);
-        Self {
-            node: drive.node().id().raw(),
-            object: mux.to_string(),
-            name: row.map(|row| row.name).or_else(|| common_name(mux).filter(|_| drive.description().is_none())),
-            guess: guessed(drive),
-            value: value.at_resolution(counts_per_unit(limits)),
-            note: None,
-            file: None,
-            refused: None,
-            written,
-        }
-    }
-}
-
-impl Report for ObjectReport {
-    fn text(&self, paint: Paint) -> String {
-        let name = self.name.map(|name| format!(" {name}")).unwrap_or_default();
-        if let Some(why) = &self.refused {
-            return format!("node {} {}{name}: refused: {why}", self.node, self.object);
-        }
-        if let Some(file) = &self.file {
-            let (bytes, to) = (self.value.length(), if self.written { "from" } else { "to" });
-            return format!("node {} {}{name}: {} {to} {file}", self.node, self.object, counted(bytes, "byte"));
-        }
-        let verb = if self.written { " written:" } else { " =" };
-        let cut = (self.value.is_cut() && !self.written).then(|| "-o FILE writes all of them into a file".to_owned());
-        let note = self.note.as_ref().or(cut.as_ref()).map(|note| format!("\n  note    {note}")).unwrap_or_default();
-        format!("node {} {}{name}{verb} {}{note}", self.node, self.object, self.value.text(paint))
     }
 }
 

@@ -1,0 +1,19 @@
+//! What commands do to drives.
+
+use canopen::NodeId;
+use master::drive::Command;
+
+/// What a command does to drives, as far as a host has to know it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Effect {
+    /// It reads.
+    None,
+    /// It commands a drive.
+    OnDrive(NodeId, Command),
+    /// It writes an object of a node: object and value, as typed.
+    Writes(NodeId, String, String),
+    /// It stops every drive at once.
+    StopAll,
+    /// It stops every drive by its ramp.
+    StopAllByRamp,
+}
