@@ -62,6 +62,7 @@ pub use drive::{
 pub use drives::{Fidelity, RegisterError};
 pub use mechanics::Mechanics;
 pub use plant::attachment::OUTPUT_WHEEL_SHARE;
+pub use plant::coupled::{ExternalModel, Rule};
 pub use plant::gear::GearModel;
 pub use plant::mechanics::RotorModel;
 pub use plant::physics::Physics;
@@ -71,5 +72,6 @@ pub use stimulus::{
     BodyStimulus, Component, LoadPart, Place, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor,
 };
 pub use world::{
-    AnyStation, Digest, ExchangeError, ExternalShaft, FrameLog, Given, StationId, StoredImage, World, WorldError,
+    AnyStation, Digest, ExchangeError, ExternalShaft, FrameLog, Given, LoneShaft, StationId, StoredImage, World,
+    WorldError,
 };

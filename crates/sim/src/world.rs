@@ -2,6 +2,7 @@
 
 mod access;
 mod ahead;
+mod alone;
 mod bodies;
 mod body;
 mod crew;
@@ -22,6 +23,7 @@ use core::time::Duration;
 
 use can::{Bitrate, Frame, Instant, Station};
 
+pub use alone::LoneShaft;
 pub use digest::Digest;
 pub use external::{ExchangeError, ExternalShaft, Given};
 pub use log::FrameLog;

@@ -41,21 +41,27 @@ pub enum Rule {
 }
 
 impl Rule {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Hold, Self::Interpolate, Self::Integrate, Self::Torque];
     /// The words of the rules.
     pub const NAMES: &'static str = "hold, interpolate, integrate or torque";
+
+    /// As people type it.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Hold => "hold",
+            Self::Interpolate => "interpolate",
+            Self::Integrate => "integrate",
+            Self::Torque => "torque",
+        }
+    }
 }
 
 impl core::str::FromStr for Rule {
     type Err = ();
 
     fn from_str(text: &str) -> Result<Self, ()> {
-        match text {
-            "hold" => Ok(Self::Hold),
-            "interpolate" => Ok(Self::Interpolate),
-            "integrate" => Ok(Self::Integrate),
-            "torque" => Ok(Self::Torque),
-            _ => Err(()),
-        }
+        Self::ALL.into_iter().find(|rule| rule.word() == text).ok_or(())
     }
 }
 

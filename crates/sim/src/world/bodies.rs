@@ -1,15 +1,14 @@
 //! Machines that several drives of a world move together.
 
 use can::Instant;
-use plant::shaft::{Motion, Push};
 
 use super::World;
 use super::body::{CoupledBody, Shaft};
 use super::member::Member;
-use crate::Refused;
 use crate::coupling::{self, BodyState, CoupledShaft, Coupling, CouplingError};
 use crate::mechanics::Mechanics;
 use crate::stimulus::{BodyStimulus, Place};
+use crate::{Refused, VirtualDrive};
 
 impl World {
     /// Joins drives to a machine that they move together, under a name, for ever. Their shafts are those of the machine from now
@@ -27,25 +26,11 @@ impl World {
             return Err(CouplingError::Count { kind: coupling.kind(), least, most, given });
         }
         let period = self.check_shafts(shafts)?;
-        let mut coupled = CoupledBody {
-            name: name.to_owned(),
-            body,
-            shafts: Vec::new(),
-            turns: Vec::new(),
-            pushes: vec![Push::default(); given],
-            motions: vec![Motion::default(); given],
-            stations: Vec::new(),
-            next: period.0,
-            period_ns: period.1,
-        };
+        let mut coupled = CoupledBody::new(name, body, period, given);
         for CoupledShaft { place, turns } in shafts {
             let Some((station, mechanics)) = self.mechanics_of(place.node) else { continue };
             let own = mechanics.couple(place.axis)?;
-            coupled.turns.push(turns * own);
-            coupled.shafts.push(Shaft { station, axis: place.axis });
-            if !coupled.stations.contains(&station) {
-                coupled.stations.push(station);
-            }
+            coupled.join(Shaft { station, axis: place.axis }, turns * own);
         }
         self.bodies.push(coupled);
         Ok(())
@@ -56,21 +41,15 @@ impl World {
         let mut common = None;
         for (i, CoupledShaft { place, turns }) in shafts.iter().enumerate() {
             coupling::check_turns(*turns)?;
-            let now = self.now;
             let station = self.drive_id(place.node).ok_or(CouplingError::NoSuchDrive(place.node))?.index();
             let taken = self.bodies.iter().any(|body| body.stations.contains(&station))
                 || shafts[..i].iter().any(|other| other.place == *place);
             if taken {
                 return Err(CouplingError::Taken(*place));
             }
-            self.with_drive(place.node, |drive, _| {
-                drive.check_axis(place.axis)?;
-                drive.advance(now);
-                drive.check_couple(place.axis)
-            })
-            .map_err(|_| CouplingError::NoSuchDrive(place.node))??;
-            let (_, mechanics) = self.mechanics_of(place.node).ok_or(CouplingError::NoShaft(*place))?;
-            let period = mechanics.next_period();
+            let period = self
+                .with_drive(place.node, |drive, now| next_period(drive, *place, now))
+                .map_err(|_| CouplingError::NoSuchDrive(place.node))??;
             if *common.get_or_insert(period) != period {
                 return Err(CouplingError::Period(*place));
             }
@@ -141,14 +120,23 @@ impl World {
     }
 
     fn bring_up(&mut self, i: usize) {
-        let (body, members, now) = (&mut self.bodies[i], &mut self.members, self.now);
-        while body.next <= now {
-            body.run_period(members);
-        }
+        self.bodies[i].bring_up(self.members.as_mut_slice(), self.now);
     }
 
     /// The machines' states as bits, for the digest.
     pub(super) fn body_bits(&self) -> impl Iterator<Item = u64> + '_ {
         self.bodies.iter().flat_map(CoupledBody::bits)
     }
+}
+
+/// The next control period of a drive whose shaft can be handed over, and its length in ns; it is brought up to `now`.
+pub(super) fn next_period(
+    drive: &mut dyn VirtualDrive,
+    place: Place,
+    now: Instant,
+) -> Result<(Instant, u64), CouplingError> {
+    drive.check_axis(place.axis)?;
+    drive.advance(now);
+    drive.check_couple(place.axis)?;
+    Ok(drive.mechanics().ok_or(CouplingError::NoShaft(place))?.next_period())
 }

@@ -6,6 +6,7 @@ use plant::coupled::Body;
 use plant::shaft::{Motion, Push};
 
 use super::member::Member;
+use crate::VirtualDrive;
 use crate::mechanics::Mechanics;
 
 /// A machine and the drives that move it.
@@ -32,16 +33,47 @@ pub(super) struct Shaft {
 }
 
 impl CoupledBody {
+    /// A machine without drives, whose first control period begins at the first of `period`; it takes `count` shafts.
+    pub(super) fn new(name: &str, body: Body, period: (Instant, u64), count: usize) -> Self {
+        Self {
+            name: name.to_owned(),
+            body,
+            shafts: Vec::new(),
+            turns: Vec::new(),
+            pushes: vec![Push::default(); count],
+            motions: vec![Motion::default(); count],
+            stations: Vec::new(),
+            next: period.0,
+            period_ns: period.1,
+        }
+    }
+
+    /// The next shaft; `turns` of its coordinate per turn of its motor.
+    pub(super) fn join(&mut self, shaft: Shaft, turns: f64) {
+        self.turns.push(turns);
+        self.shafts.push(shaft);
+        if !self.stations.contains(&shaft.station) {
+            self.stations.push(shaft.station);
+        }
+    }
+
+    /// All control periods that begin up to `now`.
+    pub(super) fn bring_up(&mut self, drives: &mut (impl Drives + ?Sized), now: Instant) {
+        while self.next <= now {
+            self.run_period(drives);
+        }
+    }
+
     /// One control period of all its drives, and the motion that comes of it.
-    pub(super) fn run_period(&mut self, members: &mut [Member]) {
+    fn run_period(&mut self, drives: &mut (impl Drives + ?Sized)) {
         for station in &self.stations {
-            if let Some(mechanics) = mechanics(&mut members[*station]) {
+            if let Some(mechanics) = drives.mechanics(*station) {
                 mechanics.run_period();
             }
         }
         for (i, shaft) in self.shafts.iter().enumerate() {
             // A drive that was taken away leaves its shaft behind, without torque.
-            self.pushes[i] = match mechanics(&mut members[shaft.station]) {
+            self.pushes[i] = match drives.mechanics(shaft.station) {
                 Some(mechanics) => mechanics.push(shaft.axis),
                 None => {
                     let velocity_rad_s = self.motions[i].velocity_rad_s;
@@ -52,7 +84,7 @@ impl CoupledBody {
         let dt_s = self.period_ns as f64 * 1e-9;
         self.body.step(dt_s, &self.turns, &self.pushes, &mut self.motions);
         for (shaft, motion) in self.shafts.iter().zip(&self.motions) {
-            if let Some(mechanics) = mechanics(&mut members[shaft.station]) {
+            if let Some(mechanics) = drives.mechanics(shaft.station) {
                 mechanics.follow(shaft.axis, motion);
             }
         }
@@ -70,9 +102,25 @@ impl CoupledBody {
     }
 }
 
-fn mechanics(member: &mut Member) -> Option<&mut dyn Mechanics> {
-    match member {
-        Member::Drive { drive, .. } => drive.mechanics(),
-        _ => None,
+/// Where a machine finds its drives.
+pub(super) trait Drives {
+    /// The mechanics of the drive that is this station; `None` where there is none.
+    fn mechanics(&mut self, station: usize) -> Option<&mut dyn Mechanics>;
+}
+
+impl Drives for [Member] {
+    #[inline]
+    fn mechanics(&mut self, station: usize) -> Option<&mut dyn Mechanics> {
+        match &mut self[station] {
+            Member::Drive { drive, .. } => drive.mechanics(),
+            _ => None,
+        }
+    }
+}
+
+/// A drive that is in no world.
+impl Drives for dyn VirtualDrive + '_ {
+    fn mechanics(&mut self, _: usize) -> Option<&mut dyn Mechanics> {
+        VirtualDrive::mechanics(self)
     }
 }

@@ -4,8 +4,10 @@
 //! and how far off it is then, is said in [`plant::coupled::external`]. Time that passes outside of an exchange finds the shafts held
 //! fast: nothing moves on while the engine stands.
 
+use core::ops::Range;
 use core::time::Duration;
 
+use can::Instant;
 use plant::coupled::{Body, ExternalData, ExternalModel, Rule};
 
 use super::body::CoupledBody;
@@ -160,21 +162,12 @@ impl World {
     /// [`ExchangeError`]; nothing is stored then.
     pub fn begin_exchange(&mut self, dt: Duration, given: Given<'_>) -> Result<(), ExchangeError> {
         self.check_exchange(dt, given)?;
-        let (mut at, dt_s) = (0, dt.as_secs_f64());
-        for (model, data, period) in self.externals_mut() {
-            let step = (dt_s, (dt.as_nanos() / period.as_nanos()) as u32);
-            let own = at..at + model.count();
-            match given {
-                Given::Motion(angle_rad, velocity_rad_s) => {
-                    let mut joints = [(0.0, 0.0); plant::coupled::MOST];
-                    for (joint, at) in joints.iter_mut().zip(own.clone()) {
-                        *joint = (angle_rad[at], velocity_rad_s[at]);
-                    }
-                    model.begin_motion(data, step, &joints[..model.count()]);
-                }
-                Given::Torque(torque_nm) => model.begin_torque(data, step, &torque_nm[own.clone()]),
+        let mut at = 0;
+        for body in &mut self.bodies {
+            if let Some(own) = body.own_shafts(at) {
+                at = own.end;
+                body.begin_exchange(dt, given.of(own));
             }
-            at = own.end;
         }
         Ok(())
     }
@@ -201,6 +194,12 @@ impl World {
     /// How many shafts are moved from outside.
     pub fn external_shaft_count(&self) -> usize {
         self.externals().map(|(_, model, _)| model.count()).sum()
+    }
+
+    /// Of the first machine of such shafts: when its next control period begins, and how long each is.
+    pub fn next_external_period(&self) -> Option<(Instant, Duration)> {
+        let (body, ..) = self.externals().next()?;
+        Some((body.next, Duration::from_nanos(body.period_ns)))
     }
 
     /// The shafts that are moved from outside, in the order of the exchange.
@@ -270,38 +269,16 @@ impl World {
             Given::Motion(angle_rad, velocity_rad_s) => {
                 self.same_length(angle_rad.len())?;
                 self.same_length(velocity_rad_s.len())?;
-                check_values("the angle", angle_rad, JOINT_ANGLE.greatest)?;
-                check_values("the velocity", velocity_rad_s, FASTEST_RAD_S)?;
             }
-            Given::Torque(torque_nm) => {
-                self.same_length(torque_nm.len())?;
-                check_values("the torque", torque_nm, STRONGEST_NM)?;
-            }
+            Given::Torque(torque_nm) => self.same_length(torque_nm.len())?,
         }
+        given.check()?;
         let mut at = 0;
-        for (body, model, data) in self.externals() {
-            let period = Duration::from_nanos(body.period_ns);
-            if dt.is_zero() || !dt.as_nanos().is_multiple_of(period.as_nanos()) || dt > Duration::from_secs(MOST_S) {
-                return Err(ExchangeError::Step { dt, period });
+        for body in &self.bodies {
+            if let Some(own) = body.own_shafts(at) {
+                body.check_exchange(dt, given.of(own.clone()), at)?;
+                at = own.end;
             }
-            if data.periods_left() > 0 {
-                return Err(ExchangeError::UnderWay { left: period * data.periods_left() });
-            }
-            match (given, model.rule() == Rule::Torque) {
-                (Given::Motion(angle_rad, velocity_rad_s), false) => {
-                    for joint in 0..model.count() {
-                        let motion = (angle_rad[at + joint], velocity_rad_s[at + joint]);
-                        let beyond_rad = model.unexplained_rad(data, dt.as_secs_f64(), joint, motion);
-                        if beyond_rad > JUMP_RAD {
-                            return Err(ExchangeError::Jump { joint: at + joint + 1, angle_rad: motion.0, beyond_rad });
-                        }
-                    }
-                }
-                (Given::Torque(_), true) => {}
-                (_, true) => return Err(ExchangeError::Form { takes: "a torque" }),
-                (_, false) => return Err(ExchangeError::Form { takes: "an angle and a velocity" }),
-            }
-            at += model.count();
         }
         Ok(())
     }
@@ -312,12 +289,84 @@ impl World {
             _ => None,
         })
     }
+}
 
-    fn externals_mut(&mut self) -> impl Iterator<Item = (&ExternalModel, &mut ExternalData, Duration)> {
-        self.bodies.iter_mut().filter_map(|coupled| match &mut coupled.body {
-            Body::External(model, data) => Some((&*model, data, Duration::from_nanos(coupled.period_ns))),
+impl CoupledBody {
+    /// Its shafts among those of all external bodies, of which `at` come before it; `None` for another machine.
+    fn own_shafts(&self, at: usize) -> Option<Range<usize>> {
+        match &self.body {
+            Body::External(model, _) => Some(at..at + model.count()),
             _ => None,
-        })
+        }
+    }
+
+    /// Whether an exchange of its own shafts, as many as it has, could begin; `before` shafts are counted before its own.
+    pub(super) fn check_exchange(&self, dt: Duration, given: Given<'_>, before: usize) -> Result<(), ExchangeError> {
+        let Body::External(model, data) = &self.body else { return Err(ExchangeError::NoShafts) };
+        let period = Duration::from_nanos(self.period_ns);
+        if dt.is_zero() || !dt.as_nanos().is_multiple_of(period.as_nanos()) || dt > Duration::from_secs(MOST_S) {
+            return Err(ExchangeError::Step { dt, period });
+        }
+        if data.periods_left() > 0 {
+            return Err(ExchangeError::UnderWay { left: period * data.periods_left() });
+        }
+        match (given, model.rule() == Rule::Torque) {
+            (Given::Motion(angle_rad, velocity_rad_s), false) => {
+                for joint in 0..model.count() {
+                    let motion = (angle_rad[joint], velocity_rad_s[joint]);
+                    let beyond_rad = model.unexplained_rad(data, dt.as_secs_f64(), joint, motion);
+                    if beyond_rad > JUMP_RAD {
+                        return Err(ExchangeError::Jump { joint: before + joint + 1, angle_rad: motion.0, beyond_rad });
+                    }
+                }
+                Ok(())
+            }
+            (Given::Torque(_), true) => Ok(()),
+            (_, true) => Err(ExchangeError::Form { takes: "a torque" }),
+            (_, false) => Err(ExchangeError::Form { takes: "an angle and a velocity" }),
+        }
+    }
+
+    /// Begins an exchange of its own shafts that was checked.
+    pub(super) fn begin_exchange(&mut self, dt: Duration, given: Given<'_>) {
+        let Body::External(model, data) = &mut self.body else { return };
+        let step = (dt.as_secs_f64(), (dt.as_nanos() / u128::from(self.period_ns)) as u32);
+        match given {
+            Given::Motion(angle_rad, velocity_rad_s) => {
+                let mut joints = [(0.0, 0.0); plant::coupled::MOST];
+                for (joint, motion) in
+                    joints.iter_mut().zip(angle_rad.iter().copied().zip(velocity_rad_s.iter().copied()))
+                {
+                    *joint = motion;
+                }
+                model.begin_motion(data, step, &joints[..model.count()]);
+            }
+            Given::Torque(torque_nm) => model.begin_torque(data, step, torque_nm),
+        }
+    }
+}
+
+impl Given<'_> {
+    /// Whether the values are numbers that can be.
+    ///
+    /// # Errors
+    /// [`ExchangeError::Value`] of the first that cannot.
+    pub fn check(&self) -> Result<(), ExchangeError> {
+        match self {
+            Self::Motion(angle_rad, velocity_rad_s) => {
+                check_values("the angle", angle_rad, JOINT_ANGLE.greatest)?;
+                check_values("the velocity", velocity_rad_s, FASTEST_RAD_S)
+            }
+            Self::Torque(torque_nm) => check_values("the torque", torque_nm, STRONGEST_NM),
+        }
+    }
+
+    /// Those of some of the shafts.
+    fn of(&self, own: Range<usize>) -> Self {
+        match *self {
+            Self::Motion(angle_rad, velocity_rad_s) => Self::Motion(&angle_rad[own.clone()], &velocity_rad_s[own]),
+            Self::Torque(torque_nm) => Self::Torque(&torque_nm[own]),
+        }
     }
 }
 
