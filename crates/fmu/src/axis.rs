@@ -14,11 +14,12 @@ use can::{Bitrate, Instant};
 use master::{Drive, Network};
 use sim::machine::{TimingMode, order};
 use sim::task::Task;
-use sim::{Report, VirtualDrive, World};
+use sim::{CoupledShaft, Coupling, Given, Place, Report, Rule, VirtualDrive, World};
 use words::drive::DriveSpec;
 
 use crate::config::{AxisConfig, ConfigError, TargetKind, bitrate};
-use crate::surroundings::{OUTPUTS, Surroundings, measured};
+use crate::joint;
+use crate::surroundings::{Surroundings, measured};
 use crate::variable::{Causality, Reference, Value, Variable};
 use lead::{Led, Shared, lead, mode_of};
 
@@ -52,6 +53,7 @@ pub struct AxisUnit {
     spec: DriveSpec,
     kind: TargetKind,
     bitrate: Bitrate,
+    rule: Rule,
     /// Until time begins.
     idle: Box<dyn VirtualDrive>,
     surroundings: Surroundings,
@@ -83,21 +85,22 @@ impl AxisUnit {
         if mode_of(spec.description(), config.mode).is_none() {
             return Err(ConfigError::NoMode(spec.model.name, config.mode.word()));
         }
-        Self::of(spec, config.mode, bitrate(config.drive.bitrate)?)
+        Self::of(spec, config.mode, bitrate(config.drive.bitrate)?, config.drive.rule)
     }
 
-    fn of(spec: DriveSpec, kind: TargetKind, bitrate: Bitrate) -> Result<Self, ConfigError> {
+    fn of(spec: DriveSpec, kind: TargetKind, bitrate: Bitrate, rule: Rule) -> Result<Self, ConfigError> {
         let ordered = order(spec.model, &spec.order(bitrate));
         let idle = ordered.map_err(|error| ConfigError::Drive(error.to_string()))?;
-        let (surroundings, report) = (Surroundings::of(&*idle), idle.report());
+        let surroundings = Surroundings::of(&*idle, rule).map_err(|error| ConfigError::Drive(error.to_string()))?;
+        let report = idle.report();
         let (live, looked_at, now) = (None, None, Instant::ZERO);
         let (period_s, shared) = (0.002, Arc::default());
-        Ok(Self { spec, kind, bitrate, idle, surroundings, period_s, shared, live, report, looked_at, now })
+        Ok(Self { spec, kind, bitrate, rule, idle, surroundings, period_s, shared, live, report, looked_at, now })
     }
 
     /// One like this before anything was done to it.
     pub(crate) fn anew(&self) -> Self {
-        let Ok(anew) = Self::of(self.spec.clone(), self.kind, self.bitrate) else {
+        let Ok(anew) = Self::of(self.spec.clone(), self.kind, self.bitrate, self.rule) else {
             unreachable!("it was made of the same")
         };
         anew
@@ -124,7 +127,7 @@ impl AxisUnit {
             Variable::new(RESET_FAULT, "reset_fault", Input, Value::Boolean(false), reset),
             Variable::new(TARGET, target, Input, Value::Float64(0.0), what).in_unit(unit),
         ];
-        rows.extend(Surroundings::variables(&*self.idle, &self.report));
+        rows.extend(self.surroundings.variables(&*self.idle, &self.report));
         let rest = Led::default();
         for (reference, (name, unit, what, read)) in (LED..).zip(self.said()) {
             rows.push(Variable::new(reference, name, Output, read(&rest), what).in_unit(unit));
@@ -151,8 +154,11 @@ impl AxisUnit {
             RESET_FAULT => Value::Boolean(wishes.reset_fault),
             TARGET => Value::Float64(wishes.target),
             LED.. => self.said().nth((reference - LED) as usize)?.3(&self.shared().led),
-            OUTPUTS.. => measured(reference, self.seen())?,
-            _ => self.surroundings.get(reference, &self.report)?,
+            joint::TORQUE if self.surroundings.joint.is_some() => Value::Float64(self.torque_nm()),
+            _ => match self.surroundings.get(reference, &self.report) {
+                None => measured(reference, self.seen())?,
+                Some(known) => known,
+            },
         })
     }
 
@@ -207,7 +213,7 @@ impl AxisUnit {
     /// Time begins: the drive gets its power, and its master waits for it to boot.
     ///
     /// # Errors
-    /// Never: the world is empty before.
+    /// Its shaft cannot be taken over, as is known before.
     pub fn begin(&mut self) -> Result<(), String> {
         let mut world = World::new(self.bitrate, self.surroundings.seed);
         world.set_timing(self.spec.timing.unwrap_or(TimingMode::Device));
@@ -218,6 +224,12 @@ impl AxisUnit {
         if !self.surroundings.supply_on {
             world.set_power(number, false).map_err(|error| error.to_string())?;
         }
+        if let Some(joint) = &mut self.surroundings.joint {
+            let shaft = CoupledShaft::direct(Place::node(number));
+            let coupled = world.couple("external", &Coupling::External(joint.model()), &[shaft]);
+            coupled.map_err(|error| error.to_string())?;
+            world.next_external_period().into_iter().for_each(|period| joint.begin(period));
+        }
         let drive = Drive::new(network.node(self.spec.node), self.spec.description());
         let period = Duration::from_secs_f64(self.period_s);
         let task = Task::new(Box::pin(lead(drive, self.kind, period, Arc::clone(&self.shared))) as Pin<Box<_>>);
@@ -226,12 +238,45 @@ impl AxisUnit {
         Ok(())
     }
 
+    /// Whether time may pass up to `to` in one step.
+    ///
+    /// # Errors
+    /// The importer moves the joint, and it cannot be where it was said to be; or the step is too long for that.
+    pub fn check_step(&mut self, to: Instant) -> Result<(), String> {
+        let (Some(live), Some(joint)) = (&mut self.live, &self.surroundings.joint) else { return Ok(()) };
+        let Some((dt, angle, velocity)) = joint.exchange(self.now, to) else { return Ok(()) };
+        live.world.check_exchange(dt, Given::Motion(&angle, &velocity)).map_err(|error| error.to_string())
+    }
+
     /// Lets time pass up to `to`.
-    pub fn advance(&mut self, to: Instant) {
-        self.now = to;
+    ///
+    /// # Errors
+    /// As of [`check_step`](Self::check_step); no time passes then.
+    pub fn advance(&mut self, to: Instant) -> Result<(), String> {
         if let Some(live) = &mut self.live {
+            if let Some(joint) = &self.surroundings.joint
+                && let Some((dt, angle, velocity)) = joint.exchange(self.now, to)
+            {
+                let begun = live.world.begin_exchange(dt, Given::Motion(&angle, &velocity));
+                begun.map_err(|error| error.to_string())?;
+            }
             live.run_until(to);
         }
+        self.now = to;
+        Ok(())
+    }
+
+    pub(crate) const fn counts_steps(&self) -> bool {
+        self.surroundings.joint.is_some()
+    }
+
+    /// Of the drive at its joint, the mean of the last step.
+    fn torque_nm(&mut self) -> f64 {
+        let mut torque_nm = [0.0];
+        if let Some(live) = &mut self.live {
+            live.world.read_torques(&mut torque_nm);
+        }
+        torque_nm[0]
     }
 
     /// Looks at it now. True if that changed when something next happens.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use can::Bitrate;
 use serde::{Deserialize, Serialize};
+use sim::Rule;
 use words::drive::{DriveSpec, drive_spec_in};
 
 /// The name of the file in the FMU's resources.
@@ -33,6 +34,33 @@ pub struct DriveConfig {
     pub bitrate: u32,
     /// How it announces what it has to send.
     pub clock: TxClock,
+    /// What crosses its shaft: with [`Rule::Torque`] its load's torque comes in and its motion goes out; else the importer moves the joint,
+    /// and the drive's torque goes out.
+    #[serde(default = "torque_in", skip_serializing_if = "is_torque_in", with = "rule")]
+    pub rule: Rule,
+}
+
+const fn torque_in() -> Rule {
+    Rule::Torque
+}
+
+fn is_torque_in(rule: &Rule) -> bool {
+    *rule == Rule::Torque
+}
+
+/// A rule by its word.
+mod rule {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+    use sim::Rule;
+
+    pub(super) fn serialize<S: Serializer>(rule: &Rule, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(rule.word())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Rule, D::Error> {
+        let word = String::deserialize(deserializer)?;
+        word.parse().map_err(|()| D::Error::custom(format!("rule {word:?}: expected {}", Rule::NAMES)))
+    }
 }
 
 /// A drive and its master.
@@ -152,6 +180,11 @@ impl Config {
 }
 
 impl DriveConfig {
+    /// A drive as the command line takes it, at 500 kbit/s, with frames at the end of each step and a torque at its shaft.
+    pub fn new(drive: impl Into<String>) -> Self {
+        Self { drive: drive.into(), bitrate: 500_000, clock: TxClock::Triggered, rule: Rule::Torque }
+    }
+
     /// The drive that is meant; files are looked for in `resources`.
     ///
     /// # Errors

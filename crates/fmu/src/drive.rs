@@ -5,12 +5,13 @@ use std::path::Path;
 use can::{Bitrate, Frame, Instant};
 use sim::machine::{TimingMode, order};
 use sim::wire::{BUS_OFF_SEQUENCES, ErrorCounters, ErrorState};
-use sim::{Report, VirtualDrive, seeds};
+use sim::{Given, LoneShaft, Report, VirtualDrive, seeds};
 use words::drive::DriveSpec;
 
 use crate::config::{ConfigError, DriveConfig, bitrate};
+use crate::joint;
 use crate::operation::{BusError, NodeStatus, Operation};
-use crate::surroundings::{OUTPUTS, Surroundings, measured};
+use crate::surroundings::{Surroundings, measured};
 use crate::variable::{Causality, Reference, Terminal, Value, Variable};
 
 /// Transmit mailboxes of its controller: as many frames wait for a bus that confirms them.
@@ -29,6 +30,10 @@ const NOTIFICATIONS: Reference = 5;
 pub struct DriveUnit {
     spec: DriveSpec,
     drive: Box<dyn VirtualDrive>,
+    /// Its shaft, where the importer moves it.
+    shaft: Option<LoneShaft>,
+    /// When the drive wants to be called, as of the last call.
+    due: Option<Instant>,
     report: Report,
     /// When the report was taken, to be taken again when it is asked for later.
     looked_at: Option<Instant>,
@@ -58,10 +63,14 @@ impl DriveUnit {
         let spec = config.spec(resources)?;
         let ordered = order(spec.model, &spec.order(bitrate(config.bitrate)?));
         let drive = ordered.map_err(|error| ConfigError::Drive(error.to_string()))?;
-        let (surroundings, report) = (Surroundings::of(&*drive), drive.report());
+        let surroundings =
+            Surroundings::of(&*drive, config.rule).map_err(|error| ConfigError::Drive(error.to_string()))?;
+        let report = drive.report();
         Ok(Self {
             spec,
             drive,
+            shaft: None,
+            due: None,
             report,
             looked_at: None,
             now: Instant::ZERO,
@@ -88,7 +97,7 @@ impl DriveUnit {
         let notified = "the bus confirms frames and tells of errors; false where nodes are joined directly";
         let (name, value) = ("CAN.BusNotifications", Value::Boolean(false));
         let mut rows = vec![Variable::new(NOTIFICATIONS, name, Causality::Parameter, value, notified)];
-        rows.extend(Surroundings::variables(&*self.drive, &self.report));
+        rows.extend(self.surroundings.variables(&*self.drive, &self.report));
         rows
     }
 
@@ -96,8 +105,13 @@ impl DriveUnit {
     pub fn get(&mut self, reference: Reference) -> Option<Value> {
         match reference {
             NOTIFICATIONS => Some(Value::Boolean(self.notified)),
-            OUTPUTS.. => measured(reference, self.seen()),
-            _ => self.surroundings.get(reference, &self.report),
+            joint::TORQUE if self.surroundings.joint.is_some() => {
+                Some(Value::Float64(self.shaft.as_ref().map_or(0.0, LoneShaft::torque_nm)))
+            }
+            _ => match self.surroundings.get(reference, &self.report) {
+                None => measured(reference, self.seen()),
+                known => known,
+            },
         }
     }
 
@@ -118,6 +132,7 @@ impl DriveUnit {
         if let (NOTIFICATIONS, Value::Boolean(notified)) = (reference, value) {
             self.notified = *notified;
         }
+        self.settle();
         self.surroundings.set((reference, value), &mut *self.drive, self.has_begun, self.now)?;
         if self.has_begun {
             self.not_before = Instant::ZERO;
@@ -127,7 +142,10 @@ impl DriveUnit {
     }
 
     /// Time begins: the drive gets its power.
-    pub fn begin(&mut self) {
+    ///
+    /// # Errors
+    /// Its shaft cannot be taken over, as is known before.
+    pub fn begin(&mut self) -> Result<(), String> {
         (self.has_begun, self.looked_at) = (true, None);
         if self.spec.timing.unwrap_or(TimingMode::Device) == TimingMode::Device {
             let seed = seeds::timing_seed(self.surroundings.seed, self.spec.node.raw());
@@ -136,9 +154,20 @@ impl DriveUnit {
         if self.surroundings.supply_on {
             self.drive.set_power(true, self.now);
         }
+        if let Some(joint) = &mut self.surroundings.joint {
+            let shaft = LoneShaft::couple(&mut *self.drive, joint.model(), self.now);
+            let shaft = shaft.map_err(|error| error.to_string())?;
+            joint.begin(shaft.next_period());
+            self.shaft = Some(shaft);
+        }
         // A controller without power takes no part.
         self.say_status(NodeStatus::BusOff);
         self.after_call();
+        Ok(())
+    }
+
+    pub(crate) const fn counts_steps(&self) -> bool {
+        self.surroundings.joint.is_some()
     }
 
     /// When it next has something to do.
@@ -148,17 +177,45 @@ impl DriveUnit {
 
     /// When it next has something to do but to send.
     fn next_deadline(&self) -> Option<Instant> {
-        let next = self.back_at.into_iter().chain(self.drive.poll_timeout()).min()?;
+        let next = self.back_at.into_iter().chain(self.due).min()?;
         Some(next.max(self.not_before).max(self.now))
     }
 
+    /// Whether time may pass up to `to` in one step.
+    ///
+    /// # Errors
+    /// The importer moves the joint, and it cannot be where it was said to be; or the step is too long for that.
+    pub fn check_step(&self, to: Instant) -> Result<(), String> {
+        let (Some(shaft), Some(joint)) = (&self.shaft, &self.surroundings.joint) else { return Ok(()) };
+        let Some((dt, angle, velocity)) = joint.exchange(self.now, to) else { return Ok(()) };
+        shaft.check_exchange(dt, Given::Motion(&angle, &velocity)).map_err(|error| error.to_string())
+    }
+
     /// Lets time pass up to `to`: what is due before is done, what is due then is left to [`serve`](Self::serve).
-    pub fn advance(&mut self, to: Instant) {
+    ///
+    /// # Errors
+    /// As of [`check_step`](Self::check_step); no time passes then.
+    pub fn advance(&mut self, to: Instant) -> Result<(), String> {
+        if let (Some(shaft), Some(joint)) = (&mut self.shaft, &self.surroundings.joint)
+            && let Some((dt, angle, velocity)) = joint.exchange(self.now, to)
+        {
+            let begun = shaft.begin_exchange(dt, Given::Motion(&angle, &velocity));
+            begun.map_err(|error| error.to_string())?;
+        }
         while let Some(at) = self.next_deadline().filter(|at| *at < to) {
             self.now = at;
             self.serve();
         }
         self.now = to;
+        self.settle();
+        Ok(())
+    }
+
+    /// Brings a shaft that the importer moves up to now, before anything is let into the drive.
+    fn settle(&mut self) {
+        if let Some(shaft) = &mut self.shaft {
+            shaft.settle(&mut *self.drive, self.now);
+        }
     }
 
     /// Does what is due now; nothing if nothing is.
@@ -167,6 +224,7 @@ impl DriveUnit {
             return;
         }
         self.looked_at = None;
+        self.settle();
         if self.back_at.is_some_and(|at| at <= self.now) {
             self.back_at = None;
             self.counters = ErrorCounters::default();
@@ -184,6 +242,7 @@ impl DriveUnit {
     /// Takes operations in.
     pub fn receive(&mut self, operation: Result<Operation, &[u8]>) {
         let now = self.now;
+        self.settle();
         (self.not_before, self.looked_at) = (Instant::ZERO, None);
         match operation {
             Ok(Operation::Transmit(frame)) if self.is_on_bus() => {
@@ -232,6 +291,7 @@ impl DriveUnit {
     fn seen(&mut self) -> &Report {
         if self.looked_at != Some(self.now) && self.has_begun {
             self.looked_at = Some(self.now);
+            self.settle();
             self.drive.advance(self.now);
             self.report = self.drive.report();
             // It may have finished booting in this period: that is seen now, and not at its next deadline.
@@ -266,9 +326,10 @@ impl DriveUnit {
             }
         }
         while self.is_on_bus() && self.offered.len() < MAILBOXES {
-            let Some(frame) = self.drive.poll_transmit() else { return };
+            let Some(frame) = self.drive.poll_transmit() else { break };
             self.offer(frame);
         }
+        self.due = self.drive.poll_timeout();
     }
 
     fn offer(&mut self, frame: Frame) {

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use can::Instant;
 use serde::{Deserialize, Serialize};
 
 use crate::call::{CallError, Called, refused};
@@ -228,7 +229,8 @@ impl Instance {
     /// Time passes from `from_s` by `step_s`.
     ///
     /// # Errors
-    /// The wrong mode, a step that does not begin where time stands, or is not forward.
+    /// The wrong mode, a step that does not begin where time stands, or is not forward; where the importer moves the joint, one that it
+    /// cannot have moved so. Nothing is changed then.
     pub fn step(&mut self, from_s: f64, step_s: f64) -> Called<Stepped> {
         self.expect(&[Mode::Step], "DoStep")?;
         let to_s = from_s + step_s;
@@ -244,6 +246,8 @@ impl Instance {
                 "the step begins at {from_s} s, but time stands at {now_s} s; it does not go back"
             ));
         }
+        // Before anything is done of it: a step that is refused is not one by half.
+        self.journal.unit.check_step(Instant::from_nanos(to_ns)).map_err(CallError)?;
         self.clear_ticks();
         self.hand_over()?;
         self.act(Action::Serve)?;

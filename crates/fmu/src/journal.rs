@@ -56,7 +56,7 @@ impl Journal {
             (
                 Action::Advance(_),
                 [before @ .., Action::Advance(_)] | [before @ .., Action::Advance(_), Action::Serve],
-            ) => {
+            ) if !self.unit.counts_steps() => {
                 let before = before.len();
                 actions.truncate(before);
             }
@@ -162,7 +162,7 @@ mod tests {
     /// A state of it that was not whole would be of another drive.
     #[test]
     fn a_drive_with_its_master_is_not_copied_by_half() {
-        let drive = DriveConfig { drive: "zlac8030l@4".to_owned(), bitrate: 500_000, clock: TxClock::Triggered };
+        let drive = DriveConfig::new("zlac8030l@4");
         let mut axis = journal(&Config::Axis(AxisConfig { mode: TargetKind::Velocity, drive }), 1 << 10);
         assert!(axis.copy().is_ok());
         for target in 0..100 {

@@ -4,11 +4,11 @@
 //! stands in [`instance`] without a pointer, what they compute in [`drive`] and [`bus`]. `ferrodrive fmu` packs the archive.
 //!
 //! ```
-//! use ferrodrive_fmu::config::{Config, DriveConfig, TxClock};
+//! use ferrodrive_fmu::config::{Config, DriveConfig};
 //! use ferrodrive_fmu::instance::Instance;
 //! use ferrodrive_fmu::variable::Value;
 //!
-//! let config = DriveConfig { drive: "zlac8030l@4".into(), bitrate: 500_000, clock: TxClock::Triggered };
+//! let config = DriveConfig::new("zlac8030l@4");
 //! let mut drive = Instance::of(Config::Drive(config), ".".as_ref(), false)?;
 //! drive.enter_initialization(0.0)?;
 //! drive.exit_initialization()?;
@@ -28,6 +28,7 @@ pub mod config;
 pub mod drive;
 pub mod fmi2;
 pub mod instance;
+mod joint;
 mod journal;
 pub mod operation;
 pub mod package;

@@ -3,8 +3,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use can::Instant;
-use sim::{Brake, Report, VirtualDrive};
+use sim::{Brake, CouplingError, Report, Rule, VirtualDrive};
 
+use crate::joint::Joint;
 use crate::variable::{Causality, Reference, Value, Variable};
 
 const SEED: Reference = 6;
@@ -61,20 +62,26 @@ pub(crate) struct Surroundings {
     supply_v: Option<f64>,
     pub(crate) supply_on: bool,
     inputs: Vec<bool>,
+    /// Where the importer owns the motion of the shaft.
+    pub(crate) joint: Option<Joint>,
     /// A drive like it, which is never switched on: it is asked what such a drive takes.
     asked: Arc<Mutex<Box<dyn VirtualDrive>>>,
 }
 
 impl Surroundings {
     /// Those of a drive that nothing was done to.
-    pub(crate) fn of(drive: &dyn VirtualDrive) -> Self {
+    ///
+    /// # Errors
+    /// The importer is to move its shaft, and it has none that can be taken over.
+    pub(crate) fn of(drive: &dyn VirtualDrive, rule: Rule) -> Result<Self, CouplingError> {
+        let joint = Joint::of(drive, rule)?;
         let inputs = vec![false; drive.inputs().len()];
         let asked = Arc::new(Mutex::new(drive.clone_box()));
-        Self { seed: 1, load_torque_nm: 0.0, supply_v: None, supply_on: true, inputs, asked }
+        Ok(Self { seed: 1, load_torque_nm: 0.0, supply_v: None, supply_on: true, inputs, joint, asked })
     }
 
     /// The variables of a drive that shows `report` now.
-    pub(crate) fn variables(drive: &dyn VirtualDrive, report: &Report) -> Vec<Variable> {
+    pub(crate) fn variables(&self, drive: &dyn VirtualDrive, report: &Report) -> Vec<Variable> {
         use Causality::{Input, Output, Parameter};
         let supply_v = report.physics.as_ref().map_or(0.0, |physics| physics.source_v);
         let load = "torque of the load at the output shaft; positive opposes positive motion";
@@ -82,10 +89,15 @@ impl Surroundings {
         let jitter = "decides the jitter of the drive's own times";
         let mut rows = vec![
             Variable::new(SEED, "seed", Parameter, Value::UInt64(1), jitter),
-            Variable::new(LOAD_TORQUE, "load_torque", Input, Value::Float64(0.0), load).in_unit("N.m"),
             Variable::new(SUPPLY, "supply_voltage", Input, Value::Float64(supply_v), supply).in_unit("V"),
             Variable::new(SUPPLY_ON, "supply_on", Input, Value::Boolean(true), "the switch between supply and drive"),
         ];
+        match &self.joint {
+            None => {
+                rows.push(Variable::new(LOAD_TORQUE, "load_torque", Input, Value::Float64(0.0), load).in_unit("N.m"))
+            }
+            Some(joint) => rows.extend(joint.variables()),
+        }
         for (place, name) in (INPUTS..).zip(drive.inputs()) {
             rows.push(Variable::new(place, &format!("input.{name}"), Input, Value::Boolean(false), "digital input"));
         }
@@ -98,11 +110,14 @@ impl Surroundings {
         rows
     }
 
-    /// A parameter or an input.
+    /// What of the drive does not change by itself: a parameter, an input, an inertia.
     pub(crate) fn get(&self, reference: Reference, report: &Report) -> Option<Value> {
+        if let Some(value) = self.joint.as_ref().and_then(|joint| joint.get(reference)) {
+            return Some(value);
+        }
         Some(match reference {
             SEED => Value::UInt64(self.seed),
-            LOAD_TORQUE => Value::Float64(self.load_torque_nm),
+            LOAD_TORQUE if self.joint.is_none() => Value::Float64(self.load_torque_nm),
             SUPPLY => Value::Float64(self.supply_v.or(report.physics.as_ref().map(|it| it.source_v)).unwrap_or(0.0)),
             SUPPLY_ON => Value::Boolean(self.supply_on),
             INPUTS..OUTPUTS => Value::Boolean(*self.inputs.get((reference - INPUTS) as usize)?),
@@ -115,6 +130,9 @@ impl Surroundings {
     /// # Errors
     /// What the drive does not take.
     pub(crate) fn check(&self, variable: (Reference, &Value)) -> Result<(), String> {
+        if let (Some(joint), (reference, Value::Float64(number))) = (&self.joint, variable) {
+            joint.check(reference, *number)?;
+        }
         let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
         let taken = match variable {
             (LOAD_TORQUE, Value::Float64(torque_nm)) => asked.set_load_torque(*torque_nm, Instant::ZERO),
@@ -135,6 +153,9 @@ impl Surroundings {
         is_on: bool,
         now: Instant,
     ) -> Result<(), String> {
+        if let (Some(joint), Value::Float64(number)) = (&mut self.joint, value) {
+            joint.set(reference, *number)?;
+        }
         match (reference, value) {
             (SEED, Value::UInt64(seed)) => self.seed = *seed,
             (LOAD_TORQUE, Value::Float64(torque_nm)) if *torque_nm != self.load_torque_nm => {

@@ -105,10 +105,31 @@ impl Unit {
         }
     }
 
+    /// Whether time may pass up to `to` in one step.
+    ///
+    /// # Errors
+    /// The importer moves a joint, and it cannot be where it was said to be; or the step is too long for that.
+    pub fn check_step(&mut self, to: Instant) -> Result<(), String> {
+        match self {
+            Self::Drive(drive) => drive.check_step(to),
+            Self::Axis(axis) => axis.check_step(to),
+            Self::Bus(_) => Ok(()),
+        }
+    }
+
+    /// Whether it makes a difference in how many steps the same time passes: each step is an exchange with the importer's joint.
+    pub(crate) fn counts_steps(&self) -> bool {
+        match self {
+            Self::Drive(drive) => drive.counts_steps(),
+            Self::Axis(axis) => axis.counts_steps(),
+            Self::Bus(_) => false,
+        }
+    }
+
     /// Does an action. Operations that are taken come back.
     ///
     /// # Errors
-    /// A value that is not taken, a network that it does not have.
+    /// A value that is not taken, a network that it does not have, a step as of [`check_step`](Self::check_step).
     pub fn act(&mut self, action: &Action) -> Result<Vec<u8>, String> {
         if let Action::Receive(place, _) | Action::Take(place) = action
             && *place >= self.terminals().len()
@@ -120,13 +141,13 @@ impl Unit {
             (Self::Bus(bus), Action::Set(reference, value)) => bus.set(*reference, value)?,
             (Self::Axis(axis), Action::Set(reference, value)) => axis.set(*reference, value)?,
             (Self::Axis(axis), Action::Begin) => axis.begin()?,
-            (Self::Axis(axis), Action::Advance(nanos)) => axis.advance(Instant::from_nanos(*nanos)),
+            (Self::Axis(axis), Action::Advance(nanos)) => axis.advance(Instant::from_nanos(*nanos))?,
             (Self::Axis(axis), Action::Look) => {
                 axis.look();
             }
             // It has no network.
             (Self::Axis(_), Action::Serve | Action::Receive(..) | Action::Take(_)) => {}
-            (Self::Drive(drive), Action::Begin) => drive.begin(),
+            (Self::Drive(drive), Action::Begin) => drive.begin()?,
             (Self::Bus(bus), Action::Begin) => bus.begin(),
             (Self::Drive(drive), Action::Receive(_, bytes)) => {
                 operations(bytes).for_each(|operation| drive.receive(operation));
@@ -137,7 +158,7 @@ impl Unit {
             (Self::Drive(drive), Action::Serve) => drive.serve(),
             (Self::Drive(drive), Action::Take(_)) => return Ok(drive.take_outbox()),
             (Self::Bus(bus), Action::Take(node)) => return Ok(bus.take_outbox(*node)),
-            (Self::Drive(drive), Action::Advance(nanos)) => drive.advance(Instant::from_nanos(*nanos)),
+            (Self::Drive(drive), Action::Advance(nanos)) => drive.advance(Instant::from_nanos(*nanos))?,
             (Self::Bus(bus), Action::Advance(nanos)) => bus.advance(Instant::from_nanos(*nanos)),
             (Self::Drive(drive), Action::Look) => {
                 drive.look();

@@ -97,19 +97,27 @@ pub struct Variable {
     pub unit: &'static str,
     /// What it is.
     pub description: String,
+    /// An output of the last step, which no input changes before the next one.
+    pub is_of_last_step: bool,
 }
 
 impl Variable {
     /// A row without a unit.
     pub fn new(reference: Reference, name: &str, causality: Causality, value: Value, description: &str) -> Self {
         let (name, description) = (name.to_owned(), description.to_owned());
-        Self { reference, name, causality, value, unit: "", description }
+        Self { reference, name, causality, value, unit: "", description, is_of_last_step: false }
     }
 
     /// The same in a unit.
     #[must_use]
     pub fn in_unit(self, unit: &'static str) -> Self {
         Self { unit, ..self }
+    }
+
+    /// The same as an output of the last step.
+    #[must_use]
+    pub(crate) fn of_last_step(self) -> Self {
+        Self { is_of_last_step: true, ..self }
     }
 }
 

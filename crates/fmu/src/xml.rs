@@ -11,7 +11,7 @@ use words::escaped;
 use crate::config::{Config, TxClock};
 use crate::unit::Unit;
 use crate::variable::{Causality, Reference, Terminal, Variable};
-use parts::{LOG_CATEGORIES, units};
+use parts::{LOG_CATEGORIES, dependencies, units};
 pub use parts::{MODEL_IDENTIFIER, token};
 
 /// The value reference of time.
@@ -49,7 +49,7 @@ pub fn model_description(config: &Config, resources: &Path, unit: &Unit) -> Stri
     let outputs = variables.iter().filter(|variable| variable.causality == Causality::Output);
     let calculated = |variable: &&Variable| !notifies(variable);
     for variable in outputs.clone() {
-        let _ = writeln!(xml, "    <Output valueReference=\"{}\"/>", variable.reference);
+        let _ = writeln!(xml, "    <Output valueReference=\"{}\"{}/>", variable.reference, dependencies(variable));
     }
     for terminal in &terminals {
         if config.clock() == TxClock::Triggered {
@@ -108,7 +108,7 @@ pub fn manifest(config: &Config) -> String {
 
 /// One variable; a constant has its value as its start.
 fn element(xml: &mut String, variable: &Variable, notifications: bool) {
-    let Variable { reference, name, causality, value, unit, description } = variable;
+    let Variable { reference, name, causality, value, unit, description, .. } = variable;
     let kind = value.type_name();
     let variability = match (causality, kind) {
         (Causality::Parameter, _) => "fixed",

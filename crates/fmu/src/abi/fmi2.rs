@@ -221,7 +221,7 @@ mod tests {
     use super::super::states;
     use super::super::status::{ERROR, FATAL, OK};
     use super::*;
-    use crate::config::{AxisConfig, DriveConfig, FILE, TargetKind, TxClock};
+    use crate::config::{AxisConfig, DriveConfig, FILE, TargetKind};
 
     /// A folder of resources that is removed at the end.
     struct Resources(std::path::PathBuf);
@@ -233,8 +233,7 @@ mod tests {
     }
 
     fn resources(name: &str) -> (Resources, CString, CString) {
-        let drive = "zlac8030l@4,timing=ideal,fidelity=mechanical".to_owned();
-        let drive = DriveConfig { drive, bitrate: 500_000, clock: TxClock::Triggered };
+        let drive = DriveConfig::new("zlac8030l@4,timing=ideal,fidelity=mechanical");
         let config = Config::Axis(AxisConfig { mode: TargetKind::Velocity, drive });
         let folder = std::env::temp_dir().join(format!("ferrodrive fmi2 {name} {}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();

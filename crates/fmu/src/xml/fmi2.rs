@@ -5,7 +5,7 @@ use std::path::Path;
 
 use words::escaped;
 
-use super::parts::{LOG_CATEGORIES, MODEL_IDENTIFIER, token, units};
+use super::parts::{LOG_CATEGORIES, MODEL_IDENTIFIER, dependencies, token, units};
 use crate::config::{AxisConfig, Config};
 use crate::fmi2::Kind;
 use crate::variable::{Causality, Variable};
@@ -35,8 +35,8 @@ pub(super) fn model_description(
     for list in ["Outputs", "InitialUnknowns"] {
         let _ = writeln!(xml, "    <{list}>");
         // Variables are counted from 1, in the order in which they stand.
-        for (index, _) in (1..).zip(variables).filter(is_output) {
-            let _ = writeln!(xml, "      <Unknown index=\"{index}\"/>");
+        for (index, variable) in (1..).zip(variables).filter(is_output) {
+            let _ = writeln!(xml, "      <Unknown index=\"{index}\"{}/>", dependencies(variable));
         }
         let _ = writeln!(xml, "    </{list}>");
     }
@@ -45,7 +45,7 @@ pub(super) fn model_description(
 }
 
 fn element(xml: &mut String, variable: &Variable) {
-    let Variable { reference, name, causality, value, unit, description } = variable;
+    let Variable { reference, name, causality, value, unit, description, .. } = variable;
     let kind = Kind::of(value);
     let (variability, initial) = match (causality, kind) {
         (Causality::Parameter, _) => ("fixed", " initial=\"exact\""),

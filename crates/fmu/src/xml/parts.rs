@@ -3,20 +3,27 @@
 use std::path::Path;
 
 use crate::config::{Config, DriveConfig};
+use crate::variable::Variable;
 
 /// The name of the library in the FMU, without its ending.
 pub const MODEL_IDENTIFIER: &str = "ferrodrive_fmu";
 
 /// Units by the exponents of SI's base units (FMI 3.0, 2.4.3).
-const UNITS: [(&str, &str); 7] = [
+const UNITS: [(&str, &str); 8] = [
     ("rad", r#"rad="1""#),
     ("rad/s", r#"rad="1" s="-1""#),
     ("s", r#"s="1""#),
     ("N.m", r#"kg="1" m="2" s="-2""#),
+    ("kg.m2", r#"kg="1" m="2""#),
     ("A", r#"A="1""#),
     ("V", r#"kg="1" m="2" s="-3" A="-1""#),
     ("degC", r#"K="1" offset="273.15""#),
 ];
+
+/// That an output is of the last step: no input changes it, so that importers see no loop of torque and motion.
+pub(super) const fn dependencies(variable: &Variable) -> &'static str {
+    if variable.is_of_last_step { " dependencies=\"\"" } else { "" }
+}
 
 /// What messages are about (FMI 2.0.5 and 3.0, 2.2.4).
 pub(super) const LOG_CATEGORIES: &str = "  <LogCategories>\n    <Category name=\"logStatusError\"/>\n    <Category \

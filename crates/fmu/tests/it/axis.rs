@@ -6,7 +6,7 @@ use std::time::Duration;
 use can::{Bitrate, Instant};
 use canopen::NodeId;
 use cia402::ModeOfOperation;
-use ferrodrive_fmu::config::{AxisConfig, Config, ConfigError, DriveConfig, TargetKind, TxClock};
+use ferrodrive_fmu::config::{AxisConfig, Config, ConfigError, DriveConfig, TargetKind};
 use ferrodrive_fmu::instance::{Instance, Mode};
 use ferrodrive_fmu::state::SavedState;
 use ferrodrive_fmu::variable::{Causality, Value};
@@ -17,9 +17,10 @@ use master::{Drive, Network};
 use sim::machine::{Order, TimingMode, order};
 use sim::{BlockOnError, World, block_on, block_on_for};
 
+use crate::importer::named;
+
 pub(crate) fn axis(spec: &str, mode: TargetKind) -> Config {
-    let drive = DriveConfig { drive: spec.to_owned(), bitrate: 500_000, clock: TxClock::Triggered };
-    Config::Axis(AxisConfig { mode, drive })
+    Config::Axis(AxisConfig { mode, drive: DriveConfig::new(spec) })
 }
 
 /// An axis that is stepped by 1 ms, its variables by their names.
@@ -37,7 +38,7 @@ impl Stepped {
     }
 
     fn reference(&self, name: &str) -> u32 {
-        self.instance.variables().iter().find(|it| it.name == name).unwrap_or_else(|| panic!("{name}")).reference
+        named(&self.instance, name)
     }
 
     pub(crate) fn set(&mut self, name: &str, value: Value) {

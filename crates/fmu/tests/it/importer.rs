@@ -7,7 +7,12 @@ use ferrodrive_fmu::operation::{Operation, operations};
 use ferrodrive_fmu::variable::{Terminal, Value};
 
 pub(crate) fn drive(spec: &str, clock: TxClock) -> Config {
-    Config::Drive(DriveConfig { drive: spec.to_owned(), bitrate: 500_000, clock })
+    Config::Drive(DriveConfig { clock, ..DriveConfig::new(spec) })
+}
+
+/// The reference of a variable.
+pub(crate) fn named(instance: &Instance, name: &str) -> u32 {
+    instance.variables().iter().find(|it| it.name == name).unwrap_or_else(|| panic!("{name}")).reference
 }
 
 pub(crate) fn bus(nodes: u8, clock: TxClock) -> Config {
@@ -40,27 +45,39 @@ const DRIVE: [u32; 4] = [1, 2, 3, 4];
 
 impl Importer {
     pub(crate) fn new(specs: &[&str], frames: Vec<(u64, Frame)>) -> Self {
-        let mut bus = instance(bus(specs.len() as u8 + 1, TxClock::Countdown));
-        let mut drives: Vec<_> = specs.iter().map(|spec| instance(drive(spec, TxClock::Countdown))).collect();
+        Self::of(&specs.iter().map(|spec| DriveConfig::new(*spec)).collect::<Vec<_>>(), frames)
+    }
+
+    /// With the drives of these configurations, but for their clocks.
+    pub(crate) fn of(configs: &[DriveConfig], frames: Vec<(u64, Frame)>) -> Self {
+        let mut bus = instance(bus(configs.len() as u8 + 1, TxClock::Countdown));
+        let drive = |config: &DriveConfig| Config::Drive(DriveConfig { clock: TxClock::Countdown, ..config.clone() });
+        let mut drives: Vec<_> = configs.iter().map(|config| instance(drive(config))).collect();
         for drive in &mut drives {
             drive.set(5, Value::Boolean(true)).unwrap();
             drive.exit_initialization().unwrap();
         }
         bus.exit_initialization().unwrap();
-        let terminals = (0..=specs.len()).map(|node| Terminal::new("", 1000 + 5 * node as u32)).collect();
+        let terminals = (0..=configs.len()).map(|node| Terminal::new("", 1000 + 5 * node as u32)).collect();
         Self { bus, drives, script: Script { frames, heard: Vec::new() }, terminals, now_ns: 0 }
     }
 
     /// Lets time pass up to `until`, events there included.
     pub(crate) fn run(&mut self, until: Instant) {
+        self.run_with(until, u64::MAX, |_, _| {});
+    }
+
+    /// The same in steps of at most `most_ns`; `model` is what else the importer steps, after the drives, by as many ns.
+    pub(crate) fn run_with(&mut self, until: Instant, most_ns: u64, mut model: impl FnMut(&mut [Instance], u64)) {
         while self.now_ns < until.as_nanos() {
-            let next = self.event().min(until.as_nanos());
+            let next = self.event().min(until.as_nanos()).min(self.now_ns.saturating_add(most_ns));
             let (from_s, to_s) = (self.now_ns as f64 / 1e9, next as f64 / 1e9);
             for instance in self.drives.iter_mut().chain([&mut self.bus]) {
                 instance.enter_step().unwrap();
                 instance.step(from_s, to_s - from_s).unwrap();
                 instance.enter_event().unwrap();
             }
+            model(&mut self.drives, next - self.now_ns);
             self.now_ns = next;
         }
     }

@@ -3,6 +3,7 @@
 mod against_world;
 mod axis;
 mod importer;
+mod joint;
 mod rules;
 mod states;
 mod wrong_input;

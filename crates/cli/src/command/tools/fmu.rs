@@ -8,6 +8,7 @@ use fmu::config::{AxisConfig, BusConfig, Config, ConfigError, DriveConfig, MAX_N
 use fmu::package::{Entry, entries, platform, platform_of_fmi2};
 use plot::Paint;
 use serde::Serialize;
+use sim::Rule;
 use words::counted;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
@@ -29,6 +30,7 @@ const LIBRARY: &str = "ferrodrive_fmu";
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive fmu zlac8030l@4 -o wheel.fmu\n  \
     ferrodrive fmu vendor.eds@5 -o servo.fmu\n  \
+    ferrodrive fmu zlac8030l@4 --rule integrate -o wheel.fmu\n  \
     ferrodrive fmu zlac8030l@4 --fmi 2 --mode torque -o wheel.fmu\n  \
     ferrodrive fmu bus --nodes 3 --bitrate 500k -o bus.fmu")]
 pub(crate) struct Fmu {
@@ -44,6 +46,10 @@ pub(crate) struct Fmu {
     /// With --fmi 2, what the drive follows: velocity, position or torque (its motor current) [default: velocity]
     #[arg(long, value_name = "MODE", value_parser = mode)]
     mode: Option<TargetKind>,
+    /// What crosses the drive's shaft: torque, its load's, for its motion; or with integrate, hold or interpolate the motion of the
+    /// importer's joint for the drive's torque, by the rules of a body of the kind external [default: torque]
+    #[arg(long, value_name = "RULE", value_parser = rule)]
+    rule: Option<Rule>,
     /// How many nodes can be joined to the bus
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=i64::from(MAX_NODES)))]
     nodes: Option<u8>,
@@ -72,6 +78,10 @@ fn clock(text: &str) -> Result<TxClock, String> {
         "triggered" => Ok(TxClock::Triggered),
         _ => Err("expected countdown or triggered".into()),
     }
+}
+
+fn rule(text: &str) -> Result<Rule, String> {
+    text.parse().map_err(|()| format!("expected {}", Rule::NAMES))
 }
 
 fn mode(text: &str) -> Result<TargetKind, String> {
@@ -147,6 +157,11 @@ impl Fmu {
             return Err(Failure::usage("a bus needs FMI 3.0: FMI 2.0 has neither clocks nor binary variables")
                 .next("omit --fmi 2"));
         }
+        if let (Some(rule), "bus") = (self.rule, self.what.as_str()) {
+            let word = rule.word();
+            return Err(Failure::usage(format!("--rule {word} is about the shaft of a drive, and a bus has none"))
+                .next("omit it"));
+        }
         let (bitrate, clock) = (self.bitrate.bits_per_second(), self.clock.unwrap_or_default());
         if self.what == "bus" {
             let nodes = self.nodes.ok_or_else(|| {
@@ -168,7 +183,7 @@ impl Fmu {
             }
             _ => (Path::new(""), self.what.clone()),
         };
-        let drive = DriveConfig { drive, bitrate, clock };
+        let drive = DriveConfig { drive, bitrate, clock, rule: self.rule.unwrap_or(Rule::Torque) };
         Ok(match self.fmi {
             2 => (Config::Axis(AxisConfig { mode: self.mode.unwrap_or_default(), drive }), folder),
             _ => (Config::Drive(drive), folder),
