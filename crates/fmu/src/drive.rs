@@ -44,6 +44,8 @@ pub struct DriveUnit {
     surroundings: Surroundings,
     /// The bus tells what becomes of a frame (`BusNotifications`).
     notified: bool,
+    /// At the first start.
+    first_rate: Bitrate,
     bitrate: Option<Bitrate>,
     counters: ErrorCounters,
     status: NodeStatus,
@@ -61,7 +63,8 @@ impl DriveUnit {
     /// What of it is not known.
     pub fn new(config: &DriveConfig, resources: &Path) -> Result<Self, ConfigError> {
         let spec = config.spec(resources)?;
-        let ordered = order(spec.model, &spec.order(bitrate(config.bitrate)?));
+        let first_rate = bitrate(config.bitrate)?;
+        let ordered = order(spec.model, &spec.order(first_rate));
         let drive = ordered.map_err(|error| ConfigError::Drive(error.to_string()))?;
         let surroundings =
             Surroundings::of(&*drive, config.rule).map_err(|error| ConfigError::Drive(error.to_string()))?;
@@ -78,6 +81,7 @@ impl DriveUnit {
             has_begun: false,
             surroundings,
             notified: false,
+            first_rate,
             bitrate: None,
             counters: ErrorCounters::default(),
             status: NodeStatus::Active,
@@ -160,6 +164,8 @@ impl DriveUnit {
             joint.begin(shaft.next_period());
             self.shaft = Some(shaft);
         }
+        // Before any frame, as the standard advises ("Configuration of Bus Simulation"): a bus may wait for the rates of all its nodes.
+        Operation::Baudrate(self.first_rate.bits_per_second()).write(&mut self.outbox);
         // A controller without power takes no part.
         self.say_status(NodeStatus::BusOff);
         self.after_call();

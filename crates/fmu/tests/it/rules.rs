@@ -102,6 +102,7 @@ fn a_drive_says_when_it_joins_the_bus() {
         drive.enter_event().unwrap();
     }
     let expected = [
+        Operation::Baudrate(500_000),
         Operation::Status(NodeStatus::BusOff),
         Operation::Baudrate(500_000),
         Operation::Status(NodeStatus::Active),
