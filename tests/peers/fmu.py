@@ -20,7 +20,7 @@ from fmpy.validation import validate_fmu
 from checks import check, equal, near, true
 from drive import ZLAC8030L
 
-TRANSMIT, CONFIRM, BAUDRATE, STATUS = 0x10, 0x20, 0x40, 0x41
+TRANSMIT, CONFIRM, CONFIGURATION, STATUS = 0x10, 0x20, 0x40, 0x41
 
 
 def transmit(identifier, data):
@@ -95,7 +95,8 @@ class Instance(Slave):
 @check("FMPy finds nothing wrong with the FMUs of drives and buses", ZLAC8030L)
 def valid(bench):
     with tempfile.TemporaryDirectory() as folder:
-        for words in (["zlac8030l@4"], ["m4230e17b50@5", "--clock", "triggered"], ["bus", "--nodes", "3"]):
+        joint = ["m4230e17b50@5", "--rule", "hold", "--clock", "triggered"]
+        for words in (["zlac8030l@4"], joint, ["bus", "--nodes", "3"]):
             equal(validate_fmu(pack(bench, folder, *words)), [], f"problems of {words}")
 
 
@@ -108,7 +109,7 @@ def turned(bench):
             drive.step(1e-3)
             said += drive.sent()
         codes = list(operations(said))
-        true((BAUDRATE, b"\x01" + struct.pack("<I", 500_000)) in codes, "it states its bit rate")
+        true((CONFIGURATION, b"\x01" + struct.pack("<I", 500_000)) in codes, "it states its bit rate")
         true((TRANSMIT, struct.pack("<IBBH", 0x704, 0, 0, 1) + b"\0") in codes, "it boots up")
         for index, data in ((0x6060, b"\3"), (0x6040, b"\6\0"), (0x6040, b"\7\0"), (0x6040, b"\x0f\0"), (0x60FF, b"\x3c\0\0\0")):
             drive.send(download(4, index, data))
@@ -174,6 +175,38 @@ def alike(bench):
         true(of_python.statusword & 0x4F == 0x40 and abs(of_python.velocity_rpm) > 10, "it has booted, and turns")
 
 
+@check("a joint that FMPy's importer moves gets the torque that Python's exchange gives, to the last bit", ZLAC8030L)
+def joint(bench):
+    inertia_kg_m2, stiffness_nm_rad, step_s = 0.1, 4.0, 1e-3
+    world = ferrodrive.World()
+    world.add("zlac8030l", node=4)
+    world.external([4])
+    with tempfile.TemporaryDirectory() as folder, Instance(pack(bench, folder, "zlac8030l@4", "--rule", "integrate"), folder) as drive:
+        drive.begin()
+        equal(drive.real("joint_inertia"), world.external_shafts()[0].inertia_kg_m2, "inertia of the drive at the joint")
+        angle, velocity, most = 0.0, 0.0, 0.0
+        inputs = [drive.reference[name] for name in ("joint_angle", "joint_velocity")]
+        for step in range(600):
+            drive.fmu.setFloat64(inputs, [angle, velocity])
+            drive.step(step_s)
+            torque = drive.real("joint_torque")
+            equal(torque, world.exchange(step_s, [angle], [velocity])[0], f"torque, step {step}")
+            # A spring to 0.5 rad, by semi-implicit Euler.
+            velocity += (torque + stiffness_nm_rad * (0.5 - angle)) / inertia_kg_m2 * step_s
+            angle += velocity * step_s
+            most = max(most, abs(angle))
+        # Twice 0.5 rad, less dry friction of 0.1 N·m on the way out (closed form), and half a step of the importer's own.
+        near(most, 1.0 - 2 * 0.099 / stiffness_nm_rad, 0.02, "the furthest in rad")
+        for value in (math.nan, math.inf, 1e7):
+            refused(lambda value=value: drive.fmu.setFloat64(inputs[:1], [value]), f"an angle of {value}")
+        refused(lambda: drive.fmu.setFloat64([drive.reference["load_inertia"]], [1.0]), "a parameter while it runs")
+        refused(lambda: drive.fmu.doStep(0.0, step_s), "a step backwards")
+        drive.fmu.setFloat64(inputs, [angle + 3.0, 0.0])
+        refused(lambda: drive.step(step_s), "a joint that was put elsewhere")
+        drive.fmu.setFloat64(inputs, [angle, velocity])
+        drive.step(step_s)
+
+
 @check("a state that FMPy takes back, also from bytes, goes on alike", ZLAC8030L)
 def states(bench):
     with tempfile.TemporaryDirectory() as folder, Instance(pack(bench, folder, "zlac8030l@4"), folder) as drive:
@@ -233,7 +266,8 @@ def refused(call, what):
 class Network:
     """A bus and its nodes, stepped from event to event by their countdowns (FMI 3.0, 4.2; fmi-ls-bus, "Time-based Tx Clocks")."""
 
-    def __init__(self, bus, nodes):
+    def __init__(self, bus, nodes, script=None):
+        self.script = script
         self.heard = [[] for _ in nodes]
         self.ends = [(bus, f"Node{number}", node, "CAN") for number, node in enumerate(nodes, 1)]
         self.instances = [*nodes, bus]
@@ -286,6 +320,14 @@ class Network:
                         moves.append((sink, other, data))
                     if data and source is bus:
                         self.heard[place] += [(self.now, *operation) for operation in operations(data)]
+            if self.script:
+                data, left = self.taken(self.instances[-1], self.script.terminal)
+                lefts += [left, self.script.left(self.now)]
+                if data is not None:
+                    moves.append((None, "", b""))
+                    self.script.receive(self.now, data)
+                if data := self.script.due(self.now):
+                    moves.append((self.instances[-1], self.script.terminal, data))
             if not moves:
                 return self.now + min([left for left in lefts if left is not None], default=10**9)
             for sink, terminal, data in moves:
@@ -295,6 +337,102 @@ class Network:
             for instance in self.instances:
                 instance.fmu.updateDiscreteStates()
         raise AssertionError(f"the event at {self.now} ns has no end")
+
+
+class Script:
+    """A node of the test's own, from the layered standard's text: it states its bit rate, sends frames at their instants (ns, identifier,
+    data), and keeps each operation that it receives with its instant."""
+
+    def __init__(self, terminal, bitrate, frames):
+        self.terminal = terminal
+        self.operations = [(0, struct.pack("<IIBI", CONFIGURATION, 13, 1, bitrate))]
+        self.operations += [(at, transmit(identifier, data)) for at, identifier, data in frames]
+        self.received = []
+
+    def left(self, now):
+        return self.operations[0][0] - now if self.operations else None
+
+    def due(self, now):
+        due = b"".join(operation for at, operation in self.operations if at == now)
+        self.operations = [(at, operation) for at, operation in self.operations if at > now]
+        return due
+
+    def receive(self, now, data):
+        self.received += [(now, code, content) for code, content in operations(data)]
+
+    def frames(self):
+        """What it heard as a frame: instant, identifier, data."""
+        plain = ((at, *struct.unpack_from("<I", content), content[8:]) for at, code, content in self.received if code == TRANSMIT)
+        return list(plain)
+
+
+#: At which ms who gets what: node 4 turns at 60 r/min, is asked for its identity, and is halted; node 5 is reset meanwhile.
+TALK = [
+    (1600, 0x604, "2F60600003000000"), (1610, 0x604, "2B40600006000000"), (1620, 0x604, "2B40600007000000"),
+    (1630, 0x604, "2B4060000F000000"), (1640, 0x604, "23FF60003C000000"), (1650, 0x605, "4041600000000000"),
+    (1700, 0x000, "0104"), (1701, 0x080, ""), (1710, 0x604, "4018100100000000"), (1900, 0x604, "2B4060000F010000"),
+    (1950, 0x000, "8105"), (2100, 0x604, "4064600000000000"),
+]  # fmt: skip
+
+TALKED = """
+title = "what a host says to two drives"
+end = "2201ms"
+[machine]
+drive = [{ model = "zlac8030l", node = 4 }, { model = "m4230e17b50", node = 5 }]
+bitrate = "500k"
+[[host]]
+start = "1600ms"
+do = [%s]
+[figures]
+velocity = "last 4 velocity"
+current = "last 4 current"
+supply = "last 4 supply"
+"""
+
+
+@check("frames, shafts and voltages of FMUs on a bus, of a scenario and of a world of Python are the same to the last bit", ZLAC8030L)
+def same_bus(bench):
+    frames = [(ms * 1_000_000, identifier, bytes.fromhex(data)) for ms, identifier, data in TALK]
+    end_ms = 2200
+    world = ferrodrive.World(bitrate=500_000, timing="ideal")
+    of_python = [world.add("zlac8030l", node=4), world.add("m4230e17b50", node=5)]
+    probe = world.add_probe()
+    for at, identifier, data in frames:
+        world.run_ns(at - world.now_ns)
+        world.send(probe, (identifier, False, False, len(data), data))
+    world.run_ns(end_ms * 1_000_000 - world.now_ns)
+    expected = []
+    while heard := world.poll(probe):
+        expected.append((heard[0], heard[1][0], bytes(heard[1][4])))
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        words = (["bus", "--nodes", "3"], ["zlac8030l@4,timing=ideal"], ["m4230e17b50@5,timing=ideal"])
+        paths = [pack(bench, folder, *each) for each in words]
+        bus, *drives = [stack.enter_context(Instance(path, folder, events=True)) for path in paths]
+        script = Script("Node3", 500_000, frames)
+        network = Network(bus, drives, script)
+        network.run(end_ms * 1_000_000)
+        equal(script.frames(), expected, "frames with their instants")
+        true(len(expected) > 12, f"{len(expected)} frames")
+        confirmed = [content for _, code, content in script.received if code == CONFIRM]
+        equal(confirmed, [struct.pack("<I", identifier) for _, identifier, _ in frames], "confirmations of what was sent")
+        for drive, other in zip(drives, of_python):
+            got = [drive.real(name) for name in ("angle", "current", "bus_voltage")]
+            equal(got, [other.shaft_angle_rad, other.current_a, other.supply_v], f"node {other.node_id}")
+        true(drives[0].real("angle") > 1.0, "it has turned")
+        # The last sample of the scenario is 1 ms before its end: here.
+        (path := pathlib.Path(folder) / "talk.toml").write_text(TALKED % said())
+        figures = ferrodrive.run(path).figures
+        equal(drives[0].real("velocity"), figures["velocity"] * math.pi / 30, "speed in a scenario")
+        equal([drives[0].real(name) for name in ("current", "bus_voltage")], [figures["current"], figures["supply"]], "in a scenario")
+
+
+def said():
+    """The same frames as lines of a scenario's host."""
+    lines, before = [], TALK[0][0]
+    for ms, identifier, data in TALK:
+        lines += [f'"wait {ms - before}ms"'] * (ms > before) + [f'"send {identifier:03X}#{data}"']
+        before = ms
+    return ", ".join(lines)
 
 
 @check("two drives on a bus hear each other's boot-up, stepped by FMPy from countdown to countdown", ZLAC8030L)
@@ -325,11 +463,11 @@ def page(bench):
     text = (pathlib.Path(__file__).resolve().parents[2] / "docs/handbook/fmu.md").read_text()
     programs = [block.split("```")[0] for block in text.split("```python\n")[1:]]
     with tempfile.TemporaryDirectory() as folder:
-        for name, words in (("wheel", []), ("driven", ["--fmi", "2"])):
+        for name, words in (("wheel", []), ("moved", ["--rule", "integrate"]), ("driven", ["--fmi", "2"])):
             pathlib.Path(pack(bench, folder, "zlac8030l@4", *words)).rename(pathlib.Path(folder) / f"{name}.fmu")
         said = []
         for program in programs:
             done = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, timeout=120)
             equal(done.returncode, 0, f"its exit status ({done.stderr})")
             said.append(done.stdout.splitlines()[-1])
-        equal(said, ["48 V", "6.3 rad/s"], "what they print")
+        equal(said, ["48 V", "0.95 rad", "6.3 rad/s"], "what they print")

@@ -51,7 +51,7 @@ class Instance(Slave):
 @check("FMPy finds nothing wrong with the FMUs of drives with a master (FMI 2.0)", ZLAC8030L)
 def valid(bench):
     with tempfile.TemporaryDirectory() as folder:
-        for words in (READY, [*READY, "--mode", "torque"], ["m4230e17b50@5", *FMI2, "--mode", "position"]):
+        for words in (READY, [*READY, "--mode", "torque"], [*READY, "--rule", "integrate"], ["m4230e17b50@5", *FMI2, "--mode", "position"]):
             equal(validate_fmu(pack(bench, folder, *words)), [], f"problems of {words}")
 
 
@@ -76,6 +76,26 @@ def turned(bench):
         true("enable has been false" in drive.text("refusal"), drive.text("refusal"))
         equal(drive.fmu.getInteger([drive.reference["statusword"]])[0] & 0x6F, 0x07, "Quick stop active (CiA 402-2, table 29)")
         drive.fmu.terminate()
+
+
+@check("a drive with a master turns a joint that FMPy's importer moves, and stops it (FMI 2.0)", ZLAC8030L)
+def joint(bench):
+    with tempfile.TemporaryDirectory() as folder, Instance(pack(bench, folder, *READY, "--rule", "integrate"), folder) as drive:
+        drive.begin()
+        inertia = 0.05 + drive.real("joint_inertia")
+        angle, velocity = 0.0, 0.0
+        drive.set(target_velocity=2 * math.pi)
+        for step in range(3000):
+            if step in (500, 2000):
+                near(velocity, 0.0 if step == 500 else 2 * math.pi, 0.1, "speed of the joint in rad/s")
+                drive.set(enable=step == 500)
+            drive.set(joint_angle=angle, joint_velocity=velocity)
+            drive.run(1)
+            velocity += drive.real("joint_torque") / inertia * 1e-3
+            angle += velocity * 1e-3
+        near(velocity, 0.0, 0.01, "speed after enable was taken away in rad/s")
+        refused(lambda: drive.set(joint_angle=math.nan), "not a number")
+        refused(lambda: drive.fmu.doStep(0.0, 1e-3), "a step backwards")
 
 
 @check("a state that FMPy takes back, also from bytes, goes on alike (FMI 2.0)", ZLAC8030L)
