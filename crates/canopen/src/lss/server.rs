@@ -188,6 +188,21 @@ mod tests {
         );
     }
 
+    /// CiA 305, 6.5.3: bits 31 down to the one that is checked are compared, and no lower one.
+    #[test]
+    fn a_fastscan_compares_the_bit_that_it_is_at_and_those_above() {
+        for (bit, own) in (0..32).flat_map(|bit| [0, 0x8000_0001, 0xFFFF_FFFF].map(|own| (bit, own))) {
+            let mut device = Server::new(Address { numbers: [own; 4] }, None);
+            let mut answers = |number| {
+                device.handle(Request::FastScan { number: 0, bit: 128, part: 0, next: 0 });
+                device.handle(Request::FastScan { number, bit, part: 0, next: 0 }).0.is_some()
+            };
+            let (itself, lower) = (1 << bit, (1 << bit) - 1);
+            assert!(answers(own) && answers(own ^ lower) && !answers(own ^ itself), "{own:X}h, bit {bit}");
+            assert!(bit == 31 || !answers(own ^ itself << 1), "{own:X}h, bit {bit}");
+        }
+    }
+
     #[test]
     fn who_is_selected_is_asked_and_configured_and_who_waits_says_nothing() {
         let mut device = Server::new(ADDRESS, NodeId::new(4));

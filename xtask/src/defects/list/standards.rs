@@ -131,6 +131,24 @@ pub(super) const DEFECTS: &[Defect] = &[
         noticed_by: CANOPEN_IT,
     },
     Defect {
+        file: "crates/canopen/src/sdo/block/sender.rs",
+        text: "if sequence == 0 { self.stalled + 1 } else { 0 };",
+        instead: "if sequence == 0 { self.stalled + 1 } else { self.stalled };",
+        noticed_by: CANOPEN_IT,
+    },
+    Defect {
+        file: "crates/canopen/src/lss/server.rs",
+        text: "(own ^ number) >> bit != 0",
+        instead: "(own ^ number) >> bit > 1",
+        noticed_by: CANOPEN,
+    },
+    Defect {
+        file: "crates/canopen/src/pdo/multiplex.rs",
+        text: "offset < count.max(1)",
+        instead: "offset <= count.max(1)",
+        noticed_by: CANOPEN_IT,
+    },
+    Defect {
         file: "crates/cia402/src/power.rs",
         text: "matches!(state, PowerState::FaultReactionActive | PowerState::Fault);",
         instead: "matches!(state, PowerState::Fault);",

@@ -399,6 +399,12 @@ fn a_client_sees_what_is_wrong_with_a_server_and_reports_it_with_the_code_of_the
         std::iter::once("584#A40920007F000000").chain([["584#A2007F0000000000"; 16]].concat()).collect();
     let stalled = downloading(&stalls);
     assert_eq!(stalled, (Some(Err(Failure::Stalled { mux: TEXT, confirmed: 0 })), reported("00000008")));
+    // CiA 301, 7.2.4.3.10: a confirmation of 0 has the block sent again; one that goes on begins their count anew.
+    let often = ["584#A2007F0000000000"; 15];
+    let goes_on = ["584#A2017F0000000000"];
+    let slow = [&["584#A40920007F000000"][..], &often, &goes_on, &often, &goes_on].concat();
+    let [low, high] = checksum(0, &data).to_le_bytes();
+    assert_eq!(downloading(&slow), (None, Some(format!("604#C1{low:02X}{high:02X}0000000000"))));
 
     let uploading = |frames: &[&str]| {
         let (mut client, mut buffer, mut result) = (client(), [0; 32], None);

@@ -87,14 +87,15 @@ fn in_source_address_mode_the_dispatching_list_leads_to_the_object() {
     let entry = |count: u64, here: u64, sub_index: u64, first: u64, node: u64| {
         count << 56 | here << 40 | sub_index << 32 | 0x6000 << 16 | first << 8 | node
     };
-    let list = [entry(2, 0x2001, 1, 3, 7), entry(0, 0x2000, 0, 1, 8)];
+    let list = [entry(2, 0x2001, 1, 3, 7), entry(0, 0x2000, 0, 1, 8), entry(1, 0x2001, 1, 1, 10)];
     let mut node = operational(rows(0xFE, 0, &[], &list));
     assert_eq!(events(&mut node, "0700600344332211").len(), 1);
     assert_eq!(events(&mut node, "0700600405000000").len(), 1);
     assert_eq!(events(&mut node, "08006001CDAB0000").len(), 1);
     assert_eq!((value(&node, 0x2001, 1), value(&node, 0x2001, 2), value(&node, 0x2000, 0)), (0x1122_3344, 5, 0xABCD));
     // Below and above the block, another index, another node, the other mode; and a value that is refused is not reported.
-    for other in ["07006002", "07006005", "07016003", "09006003", "87006003", "00006003"] {
+    // Of node 10 one sub-index is listed: the next one is not, though there is an object where it would lead.
+    for other in ["07006002", "07006005", "07016003", "09006003", "87006003", "00006003", "0A006002"] {
         assert_eq!(events(&mut node, &format!("{other}01000000")), [], "{other}");
     }
     assert_eq!(events(&mut node, "070060040A000000"), []);
