@@ -5,7 +5,8 @@
 //! [`Node`] is what a firmware owns. Frames and time go in as [`can::Station`] says. Out come frames, a deadline, and
 //! [`NodeEvent`]s: which entries a peer wrote, NMT changes, reset requests. The node never acts on the application;
 //! its owner polls events, reads and writes the dictionary, and carries out resets by calling [`Node::boot`] again.
-//! What differs between devices is data: [`NodeProfile`].
+//! What differs between devices is data: [`NodeProfile`]. Beside it an owner has an [`SdoClient`] for each other node that it reads or
+//! writes.
 //!
 //! ```
 //! use can::{Instant, Station};
@@ -35,6 +36,7 @@
 
 mod channel;
 mod channels;
+mod client;
 mod cycle;
 mod event;
 mod identifiers;
@@ -51,6 +53,7 @@ mod transmit;
 use can::{CanId, Frame, Instant, Station};
 
 use channel::Channel;
+pub use client::SdoClient;
 use event::EventQueue;
 pub use event::{NodeEvent, Ticket, Via};
 pub use profile::NodeProfile;

@@ -144,6 +144,11 @@ impl Client {
         }
     }
 
+    /// The identifiers of requests and replies.
+    pub const fn channel(&self) -> (CanId, CanId) {
+        (self.request_id, self.reply_id)
+    }
+
     /// Time allowed for each reply, from the next request on.
     pub const fn set_timeout(&mut self, timeout: Duration) {
         self.timeout = timeout;

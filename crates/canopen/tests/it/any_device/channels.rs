@@ -1,8 +1,11 @@
 //! SDO servers beside the default one (CiA 301, 7.5.2.33) against frames that are written out.
 
+use std::time::Duration;
+
 use can::{Instant, Station};
-use canopen::node::Via;
+use canopen::node::{SdoClient, Via};
 use canopen::od::{Condition, Conditions, DataType, Entry};
+use canopen::sdo::client::{Failure, Outcome};
 use canopen::{AbortCode, Mux, Node, NodeEvent, NodeProfile};
 
 use crate::any_device::device::{Boxed, answer, drain, node, node_of, rw, table, talk, upload, written};
@@ -206,24 +209,110 @@ fn no_server_answers_a_stopped_node_and_a_reset_brings_the_defaults_back() {
     talk(&mut node, &[("680#4000200000000000", "690#4B00200007000000")]);
 }
 
-/// CiA 301, 7.5.2.34. No more than the record: what it would ask for is the application's.
+/// CiA 301, 7.5.2.34: identifiers as those of a server, and the default server of a node may be asked (table 41).
 #[test]
 fn the_record_of_a_client_follows_the_same_rules() {
     let mut rows = server(0x1280, 4).to_vec();
     rows.push(rw(0x2000, 0, DataType::Unsigned16));
     let mut node = node(rows);
+    let (taken, refused) = ("584#6080120100000000", "584#8080120130000906");
     talk(
         &mut node,
         &[
-            ("604#2380120185060000", "584#8080120130000906"),
-            ("604#2380120184060080", "584#6080120100000000"),
-            ("604#2380120185060000", "584#6080120100000000"),
+            // Valid: another identifier. Bits 11 and 29. Not valid: NMT, replies for requests, another service; in the end one that is.
+            ("604#2380120185060000", refused),
+            ("604#23801201840E0000", refused),
+            ("604#2380120184060020", refused),
+            ("604#2380120105060000", refused),
+            ("604#2380120184060080", taken),
+            ("604#2380120100000000", refused),
+            ("604#2380120185050000", refused),
+            ("604#2380120105070000", refused),
+            ("604#2380120185060000", taken),
+            ("604#2380120185060080", taken),
+            ("604#2380120105060000", taken),
+            ("604#2380120106060000", refused),
             ("604#2F80120380000000", "584#8080120330000906"),
+            ("604#2F8012037F000000", "584#6080120300000000"),
         ],
     );
-    for id in ["684", "685", "694"] {
+    for id in ["684", "685", "694", "605", "585"] {
         assert_eq!(answer(&mut node, &format!("{id}#4000200000000000")), [""; 0]);
     }
+}
+
+/// Node 4 with a client, which has asked node 5 for a text that comes in three segments, and has its first reply.
+fn asking() -> (Node<Boxed>, SdoClient, Vec<u8>) {
+    let mut rows = server(0x1280, 0x8000_0000).to_vec();
+    rows.extend(server(0x1281, 4));
+    let mut node = node(rows);
+    let mut client = SdoClient::new(0x1280, Duration::from_millis(50));
+    assert_eq!(client.on(&node).err(), Some(AbortCode::RESOURCE_NOT_AVAILABLE));
+    talk(
+        &mut node,
+        &[("604#2380120105060000", "584#6080120100000000"), ("604#2380120285050000", "584#6080120200000000")],
+    );
+    let mut buffer = vec![0; 40];
+    client.on(&node).unwrap().upload(Mux::new(0x2001, 0), Instant::ZERO);
+    assert_eq!(sent(&mut client, &node, &buffer), ["605#4001200000000000"]);
+    for foreign in ["586#4101200011000000", "605#4101200011000000", "694#4101200011000000"] {
+        assert!(!client.hears(&foreign.parse().unwrap()));
+    }
+    let reply = "585#4101200011000000".parse().unwrap();
+    assert!(client.hears(&reply));
+    assert_eq!(client.on(&node).unwrap().handle_frame(&reply, &mut buffer, Instant::ZERO), None);
+    assert_eq!(sent(&mut client, &node, &buffer), ["605#6000000000000000"]);
+    (node, client, buffer)
+}
+
+fn sent(client: &mut SdoClient, node: &Node<Boxed>, buffer: &[u8]) -> Vec<String> {
+    let client = client.on(node).unwrap();
+    std::iter::from_fn(|| client.poll_transmit(buffer).map(|frame| frame.to_string())).collect()
+}
+
+#[test]
+fn a_client_asks_the_server_that_its_record_names() {
+    let (node, mut client, mut buffer) = asking();
+    let mut result = None;
+    for reply in ["585#0061207465787420", "585#106F66206C657474", "585#0965727300000000"] {
+        assert_eq!(result, None);
+        result = client.on(&node).unwrap().handle_frame(&reply.parse().unwrap(), &mut buffer, Instant::ZERO);
+        sent(&mut client, &node, &buffer);
+    }
+    let mux = Mux::new(0x2001, 0);
+    assert_eq!(result, Some(Ok(Outcome::Uploaded { mux, length: 17 })));
+    assert_eq!(&buffer[..17], b"a text of letters");
+    assert!(client.poll_timeout().is_none() && !client.hears(&"585#0965727300000000".parse().unwrap()));
+
+    client.on(&node).unwrap().download(mux, b"abcd", Instant::ZERO);
+    assert_eq!(sent(&mut client, &node, b"abcd"), ["605#2301200061626364"]);
+    let silent = Instant::ZERO.plus_nanos(50_000_000);
+    assert_eq!(client.poll_timeout(), Some(silent));
+    assert_eq!(client.on(&node).unwrap().handle_timeout(silent), Some(Failure::TimedOut { mux }));
+    assert_eq!(sent(&mut client, &node, b"abcd"), ["605#8001200000000405"]);
+}
+
+#[test]
+fn a_client_whose_channel_changes_under_a_transfer_says_so_once() {
+    let changes = [
+        &["604#2380120105060080"][..],
+        &["604#2380120105060080", "604#2380120184060000"],
+        &["000#0204"],
+        &["604#2380120285050080", "604#2380120286050000"],
+    ];
+    for (change, is_there_after) in changes.into_iter().zip([false, true, false, true]) {
+        let (mut node, mut client, _) = asking();
+        change.iter().for_each(|frame| drop(answer(&mut node, frame)));
+        assert_eq!(client.on(&node).err(), Some(AbortCode::RESOURCE_NOT_AVAILABLE), "{change:?}");
+        assert_eq!(client.on(&node).is_ok(), is_there_after, "{change:?}");
+        assert!(client.on(&node).map_or(true, |client| !client.is_busy()));
+    }
+    // Another record does not concern it, nor does 1280h:03.
+    let (mut node, mut client, _) = asking();
+    for frame in ["604#2381120184060080", "604#2F8012037F000000"] {
+        assert_eq!(answer(&mut node, frame).len(), 1);
+    }
+    assert!(client.on(&node).unwrap().is_busy());
 }
 
 #[test]
