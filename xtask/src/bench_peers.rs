@@ -67,7 +67,8 @@ fn blocks(nodes: &Path) -> Result<(), String> {
         println!("| {name} | {instructions:.1} | {:.0} | {:.1} % |", ns / 1000.0, least / bits * 100.0);
         Ok(())
     };
-    row("upload, ours", nodes, &["ours", "blocks"])?;
+    row("upload, ours", nodes, &["ours", "upload-blocks"])?;
+    row("download, ours", nodes, &["ours", "download-blocks"])?;
     match compiled_blocks() {
         Ok(lely) => {
             row("upload, Lely core 2.3", &lely, &["upload"])?;

@@ -3,8 +3,8 @@
 //! `peer_costs NODE EXCHANGE COUNT` makes the same exchange that many times and prints the processor time of one in
 //! nanoseconds. Each is the whole way of a frame: in, what it does, and every frame that comes of it out.
 //!
-//! `peer_costs ours blocks COUNT` reads 64 KiB in blocks by our SDO client that many times; it prints the time of both sides,
-//! the bits of the frames on the wire, and the bits of the data in segments of blocks alone.
+//! `peer_costs ours upload-blocks COUNT` reads 64 KiB in blocks by our SDO client that many times, `download-blocks` writes them; it
+//! prints the time of both sides, the bits of the frames on the wire, and the bits of the data in segments of blocks alone.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -18,7 +18,7 @@ use zencan_node::Callbacks;
 use zencan_node::common::messages::{CanId as ZencanId, CanMessage};
 
 use Access::{Const, ReadOnly, ReadWrite};
-use DataType::{Unsigned8, Unsigned16, Unsigned32, VisibleString};
+use DataType::{Domain, Unsigned8, Unsigned16, Unsigned32, VisibleString};
 
 mod zencan {
     zencan_node::include_modules!(ZENCAN_CONFIG);
@@ -89,8 +89,8 @@ const LONG: &str = {
     }
 };
 
-/// The objects of stack.eds, the identifier of SYNC, without which a node of ours hears none, and an object that is long.
-static ROWS: [Entry; 30] = [
+/// The objects of stack.eds, the identifier of SYNC, without which a node of ours hears none, and two objects that are long.
+static ROWS: [Entry; 31] = [
     row(0x1000, 0, Unsigned32, ReadOnly),
     row(0x1001, 0, Unsigned8, ReadOnly),
     row(0x1005, 0, Unsigned32, ReadWrite).default(0x80),
@@ -121,12 +121,13 @@ static ROWS: [Entry; 30] = [
     row(0x2002, 0, Unsigned8, Access::WriteOnly),
     row(0x2003, 0, Unsigned16, ReadOnly).default(7).mappable(),
     row(0x2004, 0, VisibleString, Const).text(LONG),
+    row(0x2005, 0, Domain, ReadWrite).capacity(LENGTH as u32),
 ];
-static INDEX: Index<30> = Index::of(&ROWS);
+static INDEX: Index<31> = Index::of(&ROWS);
 static TABLE: Table = Table::new(&ROWS, &INDEX);
 static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
 
-struct Ours(canopen::Node<Fixed<30, { TABLE.byte_count() }, 1, 8>>);
+struct Ours(canopen::Node<Fixed<31, { TABLE.byte_count() }, 1, 8>>);
 
 impl Peer for Ours {
     fn exchange(&mut self, id: u16, data: &[u8], out: &mut dyn FnMut(u16, &[u8])) {
@@ -218,14 +219,14 @@ fn ready(name: &str) -> Box<dyn Peer> {
     node
 }
 
-/// A whole upload in blocks; each frame is shown to `on_the_wire`.
-fn upload_in_blocks(node: &mut Ours, buffer: &mut [u8], mut on_the_wire: impl FnMut(&Frame)) {
+/// A whole transfer in blocks, which `begin` begins; each frame is shown to `on_the_wire`.
+fn in_blocks(node: &mut Ours, begin: &Begin, buffer: &mut [u8], mut on_the_wire: impl FnMut(&Frame)) {
     let now = Instant::from_micros(1);
     let server = NodeId::new(5).expect("a node-ID");
     let mut client = Client::new(server, Duration::from_secs(1));
-    client.upload_blocks(Mux::new(0x2004, 0), 0, now);
+    begin(&mut client, buffer, now);
     loop {
-        while let Some(frame) = client.poll_transmit(&[]) {
+        while let Some(frame) = client.poll_transmit(buffer) {
             on_the_wire(&frame);
             node.0.handle_frame(&frame, now);
         }
@@ -233,36 +234,49 @@ fn upload_in_blocks(node: &mut Ours, buffer: &mut [u8], mut on_the_wire: impl Fn
             on_the_wire(&frame);
             node.0.handle_transmitted(&frame, now);
             if let Some(outcome) = client.handle_frame(&frame, buffer, now) {
-                outcome.expect("the upload");
-                while let Some(frame) = client.poll_transmit(&[]) {
+                outcome.expect("the transfer");
+                while let Some(frame) = client.poll_transmit(buffer) {
                     on_the_wire(&frame);
                     node.0.handle_frame(&frame, now);
                 }
+                while node.0.poll_event().is_some() {}
                 return;
             }
         }
     }
 }
 
-fn blocks(count: u32) {
+/// Begins a transfer in blocks.
+type Begin = dyn Fn(&mut Client, &[u8], Instant);
+
+const UPLOADED: Mux = Mux::new(0x2004, 0);
+const DOWNLOADED: Mux = Mux::new(0x2005, 0);
+
+fn blocks(is_upload: bool, count: u32) {
     let mut node = canopen::Node::new(&PROFILE, NodeId::new(5).expect("a node-ID"));
     node.boot(Instant::ZERO);
     let mut node = Ours(node);
     node.exchange(0x7FF, &[], &mut |_, _| ());
-    let mut buffer = vec![0; LENGTH];
+    let (begin, mut buffer): (&Begin, _) = if is_upload {
+        (&|client, _, now| client.upload_blocks(UPLOADED, 0, now), vec![0; LENGTH])
+    } else {
+        (&|client, data, now| client.download_blocks(DOWNLOADED, data, now), LONG.as_bytes().to_vec())
+    };
     let mut bits = 0;
-    upload_in_blocks(&mut node, &mut buffer, |frame| bits += frame_bits(frame) + INTERFRAME_SPACE_BITS);
-    assert_eq!(buffer, LONG.as_bytes());
+    in_blocks(&mut node, begin, &mut buffer, |frame| bits += frame_bits(frame) + INTERFRAME_SPACE_BITS);
+    let stored = node.0.dictionary().view().long_bytes(TABLE.find(DOWNLOADED).expect("it is of the table"));
+    assert_eq!(if is_upload { &buffer } else { stored }, LONG.as_bytes());
     let began = processor_time();
     for _ in 0..count {
-        upload_in_blocks(black_box(&mut node), &mut buffer, |frame| _ = black_box(frame));
+        in_blocks(black_box(&mut node), begin, &mut buffer, |frame| _ = black_box(frame));
     }
     let taken = processor_time() - began;
+    let sender = CanId::standard(if is_upload { 0x585 } else { 0x605 });
     let segments = LONG.as_bytes().chunks(7).enumerate().map(|(number, part)| {
         let mut raw = [0; 8];
         raw[0] = (number % 127 + 1) as u8;
         raw[1..=part.len()].copy_from_slice(part);
-        frame_bits(&Frame::full(CanId::standard(0x585), raw)) + INTERFRAME_SPACE_BITS
+        frame_bits(&Frame::full(sender, raw)) + INTERFRAME_SPACE_BITS
     });
     println!("{:.0} {bits} {}", taken.as_nanos() as f64 / f64::from(count.max(1)), segments.sum::<u32>());
 }
@@ -277,8 +291,8 @@ fn processor_time() -> Duration {
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [name, exchange, count] = &arguments[..] else { panic!("expected NODE EXCHANGE COUNT") };
-    if exchange == "blocks" {
-        return blocks(count.parse().expect("a count"));
+    if let "upload-blocks" | "download-blocks" = exchange.as_str() {
+        return blocks(exchange == "upload-blocks", count.parse().expect("a count"));
     }
     let (_, id, data, _) = EXCHANGES.iter().find(|(name, ..)| name == exchange).expect("an exchange");
     let count: u32 = count.parse().expect("a count");
