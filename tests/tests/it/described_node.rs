@@ -114,9 +114,9 @@ fn a_default_beyond_ascii_goes_over_the_bus_byte_for_byte() {
     assert_eq!(Bench::new().send("609#4008100000000000"), ["589#430810005072FC66"]);
 }
 
-/// CiA 301, 7.5.2.33 and 7.5.2.34: what would have no effect is refused with 0609 0030h.
+/// CiA 301, 7.5.2.33 and 7.5.2.34: a further server is made, and what would have no effect is refused with 0609 0030h.
 #[test]
-fn a_further_sdo_channel_cannot_be_made_valid() {
+fn a_further_sdo_channel_of_a_server_is_made_and_none_of_a_client() {
     let channel = |index: &str| {
         format!(
             "[{index}]\nParameterName=SDO\nObjectType=9\nSubNumber=3\n[{index}sub0]\nParameterName=n\nDataType=5\nAccessType=ro\n\
@@ -125,9 +125,16 @@ fn a_further_sdo_channel_cannot_be_made_valid() {
         )
     };
     let mut bench = Bench::of(&[SHEET, channel("1201").as_bytes(), channel("1280").as_bytes()].concat());
-    for object in ["011201", "011202", "801201", "801202"] {
-        assert_eq!(bench.send(&format!("609#23{object}40060000")), [format!("589#80{object}30000906")]);
-        assert_eq!(bench.send(&format!("609#23{object}40060080")), [format!("589#60{object}00000000")]);
+    for (object, is_server) in [("011201", true), ("011202", true), ("801201", false), ("801202", false)] {
+        let (taken, refused) = ([format!("589#60{object}00000000")], [format!("589#80{object}30000906")]);
+        assert_eq!(bench.send(&format!("609#23{object}40060000")), refused, "restricted (table 41)");
+        assert_eq!(
+            bench.send(&format!("609#23{object}90060000")) == taken,
+            is_server,
+            "no application asks as a client"
+        );
+        assert_eq!(bench.send(&format!("609#23{object}90060080")) == taken, is_server);
+        assert_eq!(bench.send(&format!("609#23{object}00000080")), taken, "as delivered");
     }
 }
 

@@ -6,7 +6,7 @@ use canopen::od::{Access, Conditions, Kind, condition_numbers};
 use canopen::time_stamp::TimeOfDay;
 use canopen::{Mux, NodeId, NodeProfile};
 use drives::communication::communication;
-use drives::node::{DescribedNode, Memory, acts_on, conditions, takes};
+use drives::node::{DescribedNode, Memory, acts_on, conditions};
 use ferrodrive_tests::sheet::{SheetRow, U8, U16, U32, U64, sheet};
 use sim::machine::Boxed;
 
@@ -23,7 +23,7 @@ impl Bench {
         let list: &'static _ = conditions(model.dictionary).collect::<Vec<_>>().leak();
         let numbers: &'static [u16; 256] = Box::leak(Box::new(condition_numbers(list)));
         let conditions: &'static Conditions = Box::leak(Box::new(Conditions::new(list, numbers)));
-        let profile = NodeProfile { conditions, acts_on: takes, ..communication(model) };
+        let profile = NodeProfile { conditions, acts_on, ..communication(model) };
         let node = NodeId::new(9).expect("a node-ID");
         let node = DescribedNode::new(model, Box::leak(Box::new(profile)), node, Bitrate::M1);
         let mut bench = Self { node, memory: Memory::empty(model.dictionary), now: Instant::ZERO };
@@ -294,9 +294,16 @@ fn what_has_no_effect_takes_its_own_value_and_no_other() {
     const AT_ONCE: usize = 500;
     const SUBS: [u8; 8] = [0, 1, 2, 3, 4, 8, 0x7F, 0xFE];
     let all = (0x1000..=0x1FFF_u16).flat_map(|index| SUBS.map(|sub| Mux::new(index, sub)));
-    let others = all.filter(|mux| !takes(*mux)).collect::<Vec<_>>();
+    let others = all.filter(|mux| !acts_on(*mux)).collect::<Vec<_>>();
     let has = |index, sub| others.contains(&Mux::new(index, sub));
-    assert!(others.len() > 8000 && has(0x1013, 0) && has(0x1F81, 0x7F) && has(0x1029, 2) && !has(0x1029, 1));
+    assert!(
+        others.len() > 8000
+            && has(0x1013, 0)
+            && has(0x1F81, 0x7F)
+            && has(0x1280, 1)
+            && has(0x1029, 2)
+            && !has(0x1029, 1)
+    );
     for objects in others.chunks(AT_ONCE) {
         let mut rows = vec![(0x1000, 0, U32, "ro", 0, false)];
         rows.extend(objects.iter().map(|mux| (mux.index, mux.sub_index, U32, "rw", 5, false)));
@@ -345,7 +352,7 @@ fn the_built_in_servo_acts_on_every_communication_object_that_can_be_written() {
     let rows = devices::servo::CIA402.dictionary.rows().iter();
     let writable = rows.filter(|row| row.is_communication() && !matches!(row.access, Access::ReadOnly | Access::Const));
     for row in writable.filter(|row| row.data_type.kind() != Kind::Bytes) {
-        assert!(takes(row.mux()), "{}", row.mux());
+        assert!(acts_on(row.mux()), "{}", row.mux());
     }
 }
 

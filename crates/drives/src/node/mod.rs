@@ -33,7 +33,8 @@ pub fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Conditio
     services::conditions(table).chain(program::conditions(table))
 }
 
-/// Whether these services do something with an object.
+/// Whether these services do something with an object. The SDO channels on which the device is the client (1280h to 12FFh) are not among
+/// them: what it would ask for there is its application's, which no description knows.
 pub const fn acts_on(mux: Mux) -> bool {
     let has_effect = match mux.index {
         0x1029 => mux.sub_index <= 1,
@@ -79,12 +80,6 @@ pub const fn acts_on(mux: Mux) -> bool {
 /// Whether a device that is not a drive does something with an object, by CiA 301 or by its profile.
 pub fn device_acts_on(description: &devices::Description, mux: Mux) -> bool {
     acts_on(mux) || profile::acts_on(description, mux)
-}
-
-/// Which communication objects take a value from a client: those that have an effect here, and the SDO channels on which the device
-/// is the client (CiA 301, 7.5.2.34). What it would ask for there is its application's, which no description knows.
-pub const fn takes(mux: Mux) -> bool {
-    acts_on(mux) || matches!(mux.index, 0x1280..=0x12FF)
 }
 
 /// 1029h:01, where the device has it (CiA 301, 7.5.2.32): 0 to pre-operational, 1 no change, 2 stopped.

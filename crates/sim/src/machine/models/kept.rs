@@ -19,7 +19,7 @@ pub(super) fn profile(
     let mut kept = PROFILES.lock().unwrap_or_else(PoisonError::into_inner);
     kept.entry(std::ptr::from_ref(model).addr()).or_insert_with(|| {
         let conditions = keep(conditions.collect(), model.dictionary.rows().len());
-        Box::leak(Box::new(NodeProfile { conditions, acts_on: drives::node::takes, ..communication(model) }))
+        Box::leak(Box::new(NodeProfile { conditions, acts_on: drives::node::acts_on, ..communication(model) }))
     })
 }
 
