@@ -42,6 +42,14 @@ impl AddressMode {
         }
     }
 
+    /// The reverse of [`from_count`](Self::from_count).
+    pub const fn count(self) -> u8 {
+        match self {
+            Self::Source => 0xFE,
+            Self::Destination => 0xFF,
+        }
+    }
+
     /// Whether a device with these objects has MPDOs of this mode and direction: those of the source address mode need their list.
     ///
     /// # Errors
@@ -162,6 +170,7 @@ mod tests {
     #[test]
     fn only_feh_and_ffh_are_address_modes() {
         let modes = (0..=u8::MAX).filter_map(|count| Some((count, AddressMode::from_count(count)?)));
-        assert!(modes.eq([(0xFE, AddressMode::Source), (0xFF, AddressMode::Destination)]));
+        assert!(modes.clone().eq([(0xFE, AddressMode::Source), (0xFF, AddressMode::Destination)]));
+        assert!(modes.into_iter().all(|(count, mode)| mode.count() == count));
     }
 }

@@ -33,10 +33,11 @@ pub fn record_of_log(
         let Decoded::Pdo(pdo) = decoder.decode(&frame) else { continue };
         unmapped += usize::from(pdo.mapped_bytes.is_none());
         let is_sent = pdo.pdo.direction == Direction::Tpdo;
+        let Some(node) = pdo.object_node() else { continue };
         for (record, raw) in &pdo.fields {
-            let kept = match found.entry((pdo.node.raw(), record.mux, is_sent)) {
+            let kept = match found.entry((node.raw(), record.mux, is_sent)) {
                 Entry::Occupied(kept) => kept.into_mut(),
-                Entry::Vacant(place) => place.insert(series(pdo.model(), pdo.node, record.mux, is_sent)),
+                Entry::Vacant(place) => place.insert(series(pdo.model(), node, record.mux, is_sent)),
             };
             let Some((quantity, series)) = kept else { continue };
             count += 1;

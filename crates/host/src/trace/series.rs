@@ -117,7 +117,11 @@ impl Collected {
         keeps: bool,
         is_wanted: impl Fn(&(NodeId, Mux)) -> bool,
     ) -> usize {
-        let Some(node) = decoded.node() else { return 0 };
+        let node = match decoded {
+            Decoded::Pdo(pdo) => pdo.object_node(),
+            _ => decoded.node(),
+        };
+        let Some(node) = node else { return 0 };
         let mut added = 0;
         for Number { mux, name, value, unit } in decoded.numbers() {
             if !is_wanted(&(node, mux)) {

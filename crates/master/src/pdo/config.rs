@@ -4,7 +4,7 @@ use canopen::Mux;
 use devices::Description;
 
 use crate::core::PdoMap;
-use canopen::pdo::PdoId;
+use canopen::pdo::{AddressMode, PdoId};
 
 /// When a PDO is sent or taken over. Source: CiA 301, tables 64 and 68.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +59,8 @@ pub struct PdoConfig {
     pub pdo: PdoId,
     /// What it carries.
     pub map: PdoMap,
+    /// Whose objects the frames name, of a multiplexed PDO (CiA 301, 7.2.3), which has no mapping.
+    pub multiplexed: Option<AddressMode>,
     /// When it is sent or taken over.
     pub transmission: TransmissionType,
     /// Shortest time between two; `None` leaves the device's value.
@@ -73,7 +75,7 @@ impl PdoConfig {
     /// A PDO that carries `map`, event-driven, with the device's own identifier and timers.
     pub const fn new(pdo: PdoId, map: PdoMap) -> Self {
         let transmission = TransmissionType::EVENT_PROFILE;
-        Self { pdo, map, transmission, inhibit_time: None, event_time: None, id: None }
+        Self { pdo, map, multiplexed: None, transmission, inhibit_time: None, event_time: None, id: None }
     }
 
     /// With another transmission type.

@@ -3,15 +3,13 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use canopen::pdo::MappingRecord;
+use canopen::pdo::{AddressMode, MappingRecord};
 use canopen::{CobId, Mux};
 use devices::Description;
 
 use super::config::{PdoConfig, TimerUnits, TransmissionType};
+use super::transaction::entries;
 use crate::core::PdoMap;
-
-/// Most entries of a mapping. Source: CiA 301, 7.5.2.36.
-const MOST_ENTRIES: u32 = 64;
 
 impl PdoConfig {
     /// This PDO, which has `cob_id`, with the values that its objects in a device of this model get; objects of others are
@@ -35,12 +33,13 @@ impl PdoConfig {
         config.inhibit_time = time(3, units.inhibit).or(config.inhibit_time);
         config.event_time = time(5, units.event).or(config.event_time);
         if let Some(count) = number(self.mapping(0)) {
+            config.multiplexed = AddressMode::from_count(count as u8);
             // An entry that is not written is what it was.
             let entry = |entry: u8| {
                 let before = || self.map.0.get(usize::from(entry) - 1).copied();
                 number(self.mapping(entry)).map(MappingRecord::from_raw).or_else(before)
             };
-            config.map = PdoMap((1..=count.min(MOST_ENTRIES) as u8).filter_map(entry).collect());
+            config.map = PdoMap(entries(count).filter_map(entry).collect());
         }
         (config, number(self.parameter(1)).map_or(cob_id, CobId))
     }

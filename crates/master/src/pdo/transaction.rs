@@ -1,5 +1,6 @@
 //! The steps of a PDO configuration and the way back.
 
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use canopen::{AbortCode, CobId, Mux};
@@ -9,8 +10,7 @@ use super::error::PdoError;
 use crate::core::PdoMap;
 use crate::error::Error;
 use crate::network::Node;
-use canopen::pdo::MappingRecord;
-use canopen::pdo::PdoId;
+use canopen::pdo::{AddressMode, MappingRecord, PdoId};
 
 /// Most objects in one PDO. Source: CiA 301, 7.5.2.36.
 const MAX_OBJECTS: usize = 64;
@@ -61,8 +61,9 @@ pub(super) async fn read(node: &Node, pdo: PdoId, units: TimerUnits) -> Result<(
     let mut config = PdoConfig::new(pdo, PdoMap::default());
     let cob_id = CobId(cell(node, config.parameter(1)).await?);
     config.transmission = TransmissionType(cell(node, config.parameter(2)).await? as u8);
-    let count = cell(node, config.mapping(0)).await?.min(MAX_OBJECTS as u32) as u8;
-    for sub_index in 1..=count {
+    let count = cell(node, config.mapping(0)).await?;
+    config.multiplexed = AddressMode::from_count(count as u8);
+    for sub_index in entries(count) {
         let record = cell(node, config.mapping(sub_index)).await?;
         config.map.0.push(MappingRecord::from_raw(record));
     }
@@ -70,6 +71,12 @@ pub(super) async fn read(node: &Node, pdo: PdoId, units: TimerUnits) -> Result<(
     config.inhibit_time = cell(node, config.parameter(3)).await.ok().map(|raw| units.inhibit * raw);
     config.event_time = cell(node, config.parameter(5)).await.ok().map(|raw| units.event * raw);
     Ok((config, cob_id))
+}
+
+/// The entries of a mapping with this sub-index 00h: a multiplexed PDO has none.
+pub(super) fn entries(count: u32) -> RangeInclusive<u8> {
+    let is_multiplexed = AddressMode::from_count(count as u8).is_some();
+    1..=if is_multiplexed { 0 } else { count.min(MAX_OBJECTS as u32) as u8 }
 }
 
 /// Everything between invalidation and validation, in the standard's order.
@@ -87,7 +94,7 @@ fn plan(node: &Node, config: &PdoConfig, units: TimerUnits) -> Result<Vec<NamedW
     writes.push(NamedWrite {
         step: "set the number of objects",
         mux: config.mapping(0),
-        raw: objects as u32,
+        raw: config.multiplexed.map_or(objects as u32, |mode| mode.count().into()),
         bytes: 1,
     });
     let transmission = u32::from(config.transmission.0);
@@ -121,7 +128,7 @@ async fn snapshot(node: &Node, config: &PdoConfig, writes: &[NamedWrite]) -> Res
     let cob_id = CobId(cell(node, config.parameter(1)).await?);
     let count = cell(node, config.mapping(0)).await?;
     let mut old = vec![NamedWrite { step: "clear the mapping", mux: config.mapping(0), raw: 0, bytes: 1 }];
-    for sub_index in 1..=count.min(MAX_OBJECTS as u32) as u8 {
+    for sub_index in entries(count) {
         let mux = config.mapping(sub_index);
         old.push(NamedWrite { step: "map an object", mux, raw: cell(node, mux).await?, bytes: 4 });
     }

@@ -1,6 +1,6 @@
 //! When a PDO is sent or takes effect, in words.
 
-use canopen::pdo::Direction;
+use canopen::pdo::{AddressMode, Direction};
 
 use super::config::PdoConfig;
 
@@ -8,6 +8,8 @@ impl PdoConfig {
     /// When it is sent, or takes effect. Source: CiA 301, tables 66 and 71.
     pub fn when(&self) -> String {
         match (self.pdo.direction, self.transmission.0) {
+            _ if self.multiplexed == Some(AddressMode::Source) => "multiplexed, by source address".into(),
+            _ if self.multiplexed == Some(AddressMode::Destination) => "multiplexed, by destination address".into(),
             (Direction::Tpdo, 0) => "after SYNC, if changed".into(),
             (Direction::Tpdo, 1) => "after every SYNC".into(),
             (Direction::Tpdo, every @ 2..=240) => format!("after every {every}. SYNC"),

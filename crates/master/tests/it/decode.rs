@@ -5,7 +5,8 @@ use canopen::NodeId;
 use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
 use devices::model;
 use master::core::PdoMap;
-use master::decode::Decoder;
+use master::decode::{Decoded, Decoder};
+use master::pdo::PdoConfig;
 
 const TPDO1: PdoId = PdoId { direction: Direction::Tpdo, number: PdoNumber::FIRST };
 
@@ -125,6 +126,65 @@ fn pdos_are_split_by_the_mapping_that_went_over_the_bus() {
     );
 }
 
+/// CiA 301, 7.2.3: bit 7 and node-ID, index, sub-index, four bytes; FFh in sub-index 00h of the mapping is the destination address mode,
+/// FEh the source address mode. Names are those of the node that has the object.
+#[test]
+fn a_multiplexed_pdo_is_shown_with_the_object_that_its_frame_names() {
+    let mut decoder = Decoder::new();
+    decoder.set_model(NodeId::new(7).unwrap(), model("zlac8030l").unwrap());
+    for (count, id) in [("FF", "184"), ("FE", "284")] {
+        let mapping = if id == "184" { "001A00" } else { "011A00" };
+        lines(&mut decoder, &[&format!("604#2F{mapping}{count}000000"), &format!("584#60{mapping}00000000")]);
+    }
+    let frames = [
+        (
+            "184#8740600006000000",
+            "TPDO1 node 4, multiplexed, to node 7: 6040h:00 controlword = 0006h (shutdown)",
+            Some(7),
+        ),
+        (
+            "184#8040600006000000",
+            "TPDO1 node 4, multiplexed, to all nodes: 6040h:00 controlword = 0006h (shutdown)",
+            None,
+        ),
+        (
+            "184#8783600064000000",
+            "TPDO1 node 4, multiplexed, to node 7: 6083h:00 profile_acceleration = 100 [ms]",
+            Some(7),
+        ),
+        (
+            "284#0464600078563412",
+            "TPDO2 node 4, multiplexed, of node 4: 6064h:00 position_actual_value = 305419896",
+            Some(4),
+        ),
+        ("284#04002003FFFF0000", "TPDO2 node 4, multiplexed, of node 4: 2000h:03 = 0000FFFFh (65535)", Some(4)),
+    ];
+    for (frame, text, node) in &frames {
+        let decoded = decoder.decode(&frame.parse().unwrap());
+        assert_eq!(decoded.to_string(), *text);
+        let Decoded::Pdo(pdo) = &decoded else { panic!("{decoded}") };
+        assert_eq!((pdo.object_node().map(NodeId::raw), decoded.node()), (*node, NodeId::new(4)), "{frame}");
+        assert_eq!(decoded.concerns(NodeId::new(7).unwrap()), node.is_none() || *node == Some(7), "{frame}");
+    }
+    let short = decoder.decode(&"284#04646000785634".parse().unwrap());
+    assert_eq!(short.to_string(), "TPDO2 node 4: (too short: 7 of 8 bytes, the receiver ignores it)");
+    // What it may move is the drive that it names.
+    let may = |decoder: &mut Decoder, frame: &str| {
+        let decoded = decoder.decode(&frame.parse().unwrap());
+        decoded.may_move().map(|why| (why, decoded.may_move_node().map(NodeId::raw)))
+    };
+    assert_eq!(may(&mut decoder, "184#8740600006000000"), Some(("a controlword", Some(7))));
+    assert_eq!(may(&mut decoder, "184#80FF600006000000"), Some(("a target", None)));
+    assert_eq!(may(&mut decoder, "184#8717100006000000"), None);
+    assert!(may(&mut decoder, "284#0464600078563412").is_some_and(|(_, node)| node.is_none()));
+    // Mapped again, it is an ordinary one.
+    lines(
+        &mut decoder,
+        &["604#23001A0110004160", "584#60001A0100000000", "604#2F001A0001000000", "584#60001A0000000000"],
+    );
+    assert!(lines(&mut decoder, &["184#3702"])[0].starts_with("TPDO1 node 4: 6041h:00 statusword = 0237h"));
+}
+
 /// CiA 301, 7.3.3: the identifiers of node 4 by their function codes; and that of a PDO once it has been moved.
 #[test]
 fn the_identifiers_of_a_node_are_the_predefined_ones_and_those_of_its_moved_pdos() {
@@ -211,7 +271,7 @@ fn a_pdo_has_the_number_of_cia_301_and_that_of_its_manual_where_it_differs() {
 fn a_refused_mapping_changes_nothing() {
     let mut decoder = Decoder::new();
     let map = PdoMap(vec![MappingRecord::from_raw(0x6041_0010)]);
-    decoder.set_pdo(NodeId::new(4).unwrap(), TPDO1, 0x184, &map);
+    decoder.set_pdo(NodeId::new(4).unwrap(), &PdoConfig::new(TPDO1, map), 0x184);
     lines(&mut decoder, &["604#2F001A0000000000", "584#80001A0022000008"]);
     assert_eq!(lines(&mut decoder, &["184#3702"]), ["TPDO1 node 4: 6041h:00 statusword = 0237h (Operation enabled)"]);
 }
@@ -336,7 +396,7 @@ fn numbers_are_those_of_pdos_and_of_transfers_that_are_done() {
     let mut decoder = Decoder::new();
     decoder.set_model(NodeId::new(4).unwrap(), model("zlac8030l").unwrap());
     let map = PdoMap(vec![MappingRecord::from_raw(0x6041_0010), MappingRecord::from_raw(0x606C_0020)]);
-    decoder.set_pdo(NodeId::new(4).unwrap(), TPDO1, 0x184, &map);
+    decoder.set_pdo(NodeId::new(4).unwrap(), &PdoConfig::new(TPDO1, map), 0x184);
     let mut numbers = |frame: &str| -> Vec<_> {
         let decoded = decoder.decode(&frame.parse::<Frame>().unwrap());
         decoded.numbers().iter().map(|number| (number.mux.index, number.value, number.unit)).collect()

@@ -5,7 +5,7 @@ use std::time::Duration;
 use crate::support::toy::Toy;
 use crate::support::{Bus, mux, node};
 use canopen::AbortCode;
-use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
+use canopen::pdo::{AddressMode, Direction, MappingRecord, PdoId, PdoNumber};
 use master::core::PdoMap;
 use master::pdo::{PdoConfig, PdoError, TimerUnits, TransmissionType};
 
@@ -58,6 +58,29 @@ fn a_tpdo_is_set_up_in_the_legal_order_and_then_received() {
     let received = network.received(node.id(), mux(0x606C, 0)).unwrap();
     assert_eq!(received.raw, 0xFFFF_FFFF);
     assert_eq!(received.at, bus.now);
+}
+
+/// CiA 301, 7.5.2.38: FEh and FFh in sub-index 00h count no entries. What was there is read, written over, and put back when that fails.
+#[test]
+fn a_multiplexed_pdo_is_read_and_another_mapping_takes_its_place_or_leaves_it() {
+    let multiplexed = || drive().u8(0x1A00, 0, 0xFE);
+    let mut bus = Bus::new(vec![multiplexed()]);
+    let node = bus.network.node(node(4));
+    let (read, _) = bus.block_on(node.pdo_config(TPDO1, HALF_MS)).unwrap();
+    assert_eq!(read.when(), "multiplexed, by source address");
+    assert_eq!((read.multiplexed, read.map), (Some(AddressMode::Source), PdoMap::default()));
+    let config = PdoConfig::new(TPDO1, position_and_speed());
+    bus.block_on(node.configure_pdo(&config, HALF_MS)).unwrap();
+    assert_eq!(bus.block_on(node.pdo_config(TPDO1, HALF_MS)).unwrap().0.map, position_and_speed());
+    let back = PdoConfig { multiplexed: Some(AddressMode::Destination), ..PdoConfig::new(TPDO1, PdoMap::default()) };
+    bus.block_on(node.configure_pdo(&back, HALF_MS)).unwrap();
+    assert_eq!(bus.toys[0].objects[&(0x1A00, 0)], [0xFF]);
+
+    let mut bus = Bus::new(vec![multiplexed()]);
+    bus.toys[0].aborts.insert((0x1A00, 2), AbortCode::NOT_MAPPABLE.0);
+    let node = bus.network.node(self::node(4));
+    assert!(bus.block_on(node.configure_pdo(&config, HALF_MS)).is_err());
+    assert_eq!(bus.toys[0].objects[&(0x1A00, 0)], [0xFE]);
 }
 
 #[test]

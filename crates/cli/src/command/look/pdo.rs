@@ -8,9 +8,8 @@ use std::time::Duration;
 use can::BusFrame;
 use canopen::pdo::Direction;
 use canopen::{CobId, NmtState, NodeId};
-use devices::Description;
 use master::Drive;
-use master::decode::{Decoded, Decoder};
+use master::decode::{Decoded, Value};
 use master::pdo::PdoConfig;
 use serde::Serialize;
 
@@ -156,8 +155,9 @@ impl WatchPdo {
         let mut sends = 0;
         for (config, cob_id) in drive.pdos().await? {
             if let Some(id) = cob_id.can_id().as_standard().filter(|_| cob_id.is_valid()) {
-                sends += usize::from(config.pdo.direction == Direction::Tpdo && !config.map.0.is_empty());
-                decoder.set_pdo(self.node, config.pdo, id, &config.map);
+                let is_used = !config.map.0.is_empty() || config.multiplexed.is_some();
+                sends += usize::from(config.pdo.direction == Direction::Tpdo && is_used);
+                decoder.set_pdo(self.node, &config, id);
             }
         }
         self.note_why_silent(context, &drive, sends);
@@ -169,7 +169,7 @@ impl WatchPdo {
                 let BusFrame { at, frame, .. } = context.traffic.next().await;
                 let Decoded::Pdo(pdo) = decoder.decode(&frame) else { continue };
                 if pdo.node == self.node {
-                    let line = PdoLine::new(&decoder, drive.description(), &pdo, at.as_secs_f64(), stamps.text(at));
+                    let line = PdoLine::new(&pdo, at.as_secs_f64(), stamps.text(at));
                     format.print(&line).map_err(Failure::of_stdout)?;
                 }
             }
@@ -190,20 +190,15 @@ impl WatchPdo {
 }
 
 impl PdoLine {
-    fn new(
-        decoder: &Decoder,
-        model: Option<&'static Description>,
-        pdo: &master::decode::Pdo,
-        t: f64,
-        stamp: String,
-    ) -> Self {
+    fn new(pdo: &master::decode::Pdo, t: f64, stamp: String) -> Self {
+        let model = pdo.model();
         let values = pdo.fields.iter().map(|(record, raw)| {
             let bytes = raw.to_le_bytes();
             let length = usize::from(record.bits).div_ceil(8).min(bytes.len());
             let row = model.map_or_else(|| master::decode::common_row(record.mux), |model| model.row(record.mux));
             Field {
                 object: record.mux.to_string(),
-                name: decoder.name(pdo.node, record.mux),
+                name: Value::new(record.mux, &bytes[..length], model).name(),
                 value: decode(model, row, &bytes[..length]),
             }
         });

@@ -31,9 +31,9 @@ use canopen::{Mux, NmtState, NodeId};
 use devices::Description;
 use devices::faults::FaultRow;
 
-use crate::core::PdoMap;
 use crate::identify::Model;
 use crate::models::Models;
+use crate::pdo::PdoConfig;
 use node_models::NodeModels;
 use pdo::PdoBook;
 use sdo::Conversations;
@@ -129,9 +129,9 @@ impl Decoder {
         }
     }
 
-    /// Takes a PDO's identifier and mapping for granted.
-    pub fn set_pdo(&mut self, node: NodeId, pdo: PdoId, id: u16, map: &PdoMap) {
-        self.pdos.set(node, pdo, id, map);
+    /// Takes for granted that a PDO has this identifier, and what it carries.
+    pub fn set_pdo(&mut self, node: NodeId, config: &PdoConfig, id: u16) {
+        self.pdos.set(node, config, id);
     }
 
     /// Takes no PDO's identifier and mapping for granted, nor what was seen of them: more was missed than can be made up for.

@@ -4,10 +4,10 @@
 //! identifier of its own carries.
 
 use canopen::nmt::NmtRequest;
-use canopen::pdo::Direction;
+use canopen::pdo::{AddressMode, Direction, Mpdo};
 use canopen::{Mux, NmtCommand, NodeId};
 
-use super::{Decoded, SdoStep, Side};
+use super::{Decoded, Pdo, SdoStep, Side};
 
 impl Decoded {
     /// Why sending this frame may set a drive in motion; `None` if it cannot on its own.
@@ -15,6 +15,10 @@ impl Decoded {
         match self {
             // It makes process data count, what is in them by then included.
             Self::Nmt(NmtRequest { command: NmtCommand::Start, .. }) => Some("NMT start"),
+            Self::Pdo(Pdo { multiplexed: Some(mpdo), .. }) => match mpdo.mode {
+                AddressMode::Destination => object_may_move(mpdo.object),
+                AddressMode::Source => Some("a multiplexed PDO, whose object its receivers lead to one of theirs"),
+            },
             Self::Pdo(pdo) if pdo.pdo.direction == Direction::Rpdo => Some("an RPDO"),
             Self::Sdo(sdo) if sdo.from == Side::Client => match &sdo.step {
                 SdoStep::Write(mux, _) | SdoStep::Begin(mux, _) | SdoStep::Segment(mux, _) => object_may_move(*mux),
@@ -30,7 +34,8 @@ impl Decoded {
     pub fn may_move_node(&self) -> Option<NodeId> {
         match self {
             Self::Nmt(NmtRequest { target: canopen::nmt::NmtTarget::Node(node), .. }) => Some(*node),
-            Self::Pdo(pdo) => Some(pdo.node),
+            Self::Pdo(Pdo { multiplexed: Some(Mpdo { mode: AddressMode::Source, .. }), .. }) => None,
+            Self::Pdo(pdo) => pdo.object_node(),
             Self::Sdo(sdo) => Some(sdo.node),
             _ => None,
         }

@@ -119,10 +119,14 @@ impl Decoded {
         }
     }
 
-    /// True if it is about this node: from it, for it, or an NMT command for all.
+    /// True if it is about this node: from it, for it, or an NMT command or a multiplexed PDO for all.
     pub fn concerns(&self, node: NodeId) -> bool {
-        let for_all = matches!(self, Self::Nmt(request) if request.target == NmtTarget::All);
-        for_all || self.node() == Some(node)
+        let is_for = match self {
+            Self::Nmt(request) => request.target == NmtTarget::All,
+            Self::Pdo(pdo) => pdo.object_node().is_none_or(|other| other == node),
+            _ => false,
+        };
+        is_for || self.node() == Some(node)
     }
 
     /// The objects that it carries or is part of a transfer of.
