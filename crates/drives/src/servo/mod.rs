@@ -2,8 +2,9 @@
 //! drive ([`devices::servo`]) or of a file.
 //!
 //! Objects are looked up once, when the firmware starts: what the table lacks is not there. What it has beyond [`acts_on`] has no
-//! effect: of the profile it is answered and keeps its value, of the maker it is stored and answered. Values as delivered, limits
-//! and modes are the table's. The motor comes with the hardware.
+//! effect: of the profile it is answered and keeps its value, of the maker, and where the profile leaves it to the maker
+//! ([`is_left_to_makers`]), it is stored and answered. Values as delivered, limits and modes are the table's. The motor comes with the
+//! hardware.
 
 mod drive;
 mod faults;
@@ -79,7 +80,8 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
     });
     let without_effect = table.iter().filter(move |(_, row)| {
         let is_taken = row.access.is_writable() && !acts_on(description, row.mux());
-        is_of_profile(row) && is_taken && (row.index % 0x800, row.sub_index) != SIZE_OF_DATA_RECORD
+        let is_stored = is_left_to_makers(row.mux()) || (row.index % 0x800, row.sub_index) == SIZE_OF_DATA_RECORD;
+        is_of_profile(row) && is_taken && !is_stored
     });
     let without_effect = without_effect.map(|(slot, _)| (slot, Condition::Change(node::refused)));
     let others = stops.chain(factors).chain(without_effect).chain(node::conditions(table));
@@ -91,6 +93,19 @@ type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
 /// Index within the block of an axis, and sub-index, of what hosts write as they set the buffer of interpolated position up and
 /// cannot read (60C4h:05): a set-point has the bytes of 60C1h whatever they say.
 const SIZE_OF_DATA_RECORD: (u16, u8) = (0x60C4 % 0x800, 5);
+
+/// Objects of the profile whose content CiA 402-2 leaves to makers: parameters of the loops of torque, velocity and position and of the
+/// power stage, data of motor and drive, and the texts that name these two. As the maker's own objects (2000h to 5FFFh) they are stored
+/// and answered, and no loop of this firmware uses them: the lists with which makers' drives are started write them.
+pub const fn is_left_to_makers(mux: Mux) -> bool {
+    let first_axis = 0x6000 + mux.index % 0x800;
+    let is_of_profile = matches!(mux.index, 0x6000..=0x9FFF);
+    is_of_profile
+        && matches!(
+            first_axis,
+            0x60F6 | 0x60F7 | 0x60F9 | 0x60FB | 0x6403..=0x6405 | 0x6410 | 0x6503..=0x6505 | 0x6510
+        )
+}
 
 /// Of the blocks of the axes (CiA 402-1).
 fn is_of_profile(row: &Entry) -> bool {

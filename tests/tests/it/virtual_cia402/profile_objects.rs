@@ -2,11 +2,12 @@
 
 use canopen::od::{Access, DataType, Entry};
 use canopen::{AbortCode, Mux};
+use devices::Description;
 use devices::servo::CIA402;
 use drives::servo::acts_on;
 use sim::VirtualDrive;
 
-use crate::virtual_cia402::bench::{Bench, changed, of_rows};
+use crate::virtual_cia402::bench::{Bench, TURN, changed, of_rows};
 
 #[test]
 fn supported_homing_methods_are_those_that_are_taken() {
@@ -107,25 +108,60 @@ fn a_fraction_takes_no_0_but_the_one_that_a_file_delivers() {
     }
 }
 
-/// A maker's gains and motor data among them, which no loop of this firmware uses.
-#[test]
-fn a_servo_by_its_file_takes_no_change_of_what_it_does_not_act_on() {
-    let entry = |index, sub, data_type| Entry::new(index, sub, data_type, Access::ReadWrite, "", "");
-    let further = [
-        entry(0x2100, 0, DataType::Unsigned16).default(1),
-        entry(0x606A, 0, DataType::Integer16).default(-1),
-        entry(0x60F9, 1, DataType::Unsigned16).default(500),
-        entry(0x6410, 1, DataType::Unsigned16).default(2000),
-    ];
+fn entry(index: u16, sub: u8, data_type: DataType) -> Entry {
+    Entry::new(index, sub, data_type, Access::ReadWrite, "", "")
+}
+
+/// The standard's servo with these objects in place of its own.
+fn cia402_with(further: &[Entry]) -> &'static Description {
     let are_further = |row: &Entry| further.iter().any(|other| other.mux() == row.mux());
     let own = CIA402.dictionary.rows().iter().copied().filter(|row| !are_further(row));
-    let mut bench = Bench::of(of_rows(own.chain(further).collect()));
-    for (index, sub, own) in [(0x606A, 0, -1), (0x60F9, 1, 500), (0x6410, 1, 2000)] {
-        assert_eq!(bench.write(index, sub, own), Ok(()), "{index:04X}h:{sub:02X} has it");
-        assert_eq!(bench.write(index, sub, 77), Err(AbortCode::READ_ONLY), "{index:04X}h:{sub:02X}");
-        assert_eq!(bench.read(index, sub), own);
+    of_rows(own.chain(further.iter().copied()).collect())
+}
+
+#[test]
+fn a_servo_by_its_file_takes_no_change_of_what_it_does_not_act_on() {
+    let further = [
+        entry(0x606A, 0, DataType::Integer16).default(-1),
+        entry(0x60F2, 0, DataType::Unsigned16).default(2),
+        entry(0x6402, 0, DataType::Unsigned16).default(10),
+    ];
+    let mut bench = Bench::of(cia402_with(&further));
+    for (index, own) in [(0x606A, -1), (0x60F2, 2), (0x6402, 10)] {
+        assert_eq!(bench.write(index, 0, own), Ok(()), "{index:04X}h has it");
+        assert_eq!(bench.write(index, 0, 77), Err(AbortCode::READ_ONLY), "{index:04X}h");
+        assert_eq!(bench.read(index, 0), own);
     }
-    assert_eq!((bench.write(0x2100, 0, 77), bench.read(0x2100, 0)), (Ok(()), 77), "the maker's own are stored");
+}
+
+/// Gains and motor data of makers go through, as the lists with which their drives are started write them, also of a second axis, and a
+/// move is the same with them: no loop uses them. The last one is an object of the maker's own part.
+#[test]
+fn what_the_profile_leaves_to_makers_is_stored_and_changes_no_motion() {
+    let places =
+        [(0x60F6, 1), (0x60F7, 1), (0x60F9, 2), (0x60FB, 5), (0x6410, 3), (0x6510, 2), (0x68F9, 1), (0x2100, 0)];
+    let further: Vec<Entry> = places
+        .iter()
+        .map(|&(index, sub)| entry(index, sub, DataType::Unsigned16).default(500).range(1, 1000))
+        .collect();
+    let moved = |bench: &mut Bench| {
+        bench.enable(1);
+        bench.set(&[(0x607A, 0, TURN), (0x6040, 0, 0x1F)]);
+        let mut after_10_ms = || {
+            bench.run_ms(10);
+            bench.position()
+        };
+        (0..100).map(|_| after_10_ms()).collect::<Vec<_>>()
+    };
+    let mut untouched = Bench::of(cia402_with(&further));
+    let mut bench = Bench::of(cia402_with(&further));
+    for (index, sub) in places {
+        assert_eq!((bench.write(index, sub, 77), bench.read(index, sub)), (Ok(()), 77), "{index:04X}h:{sub:02X}");
+        assert_eq!(bench.write(index, sub, 1001), Err(AbortCode::VALUE_TOO_HIGH), "{index:04X}h:{sub:02X}");
+    }
+    let positions = moved(&mut bench);
+    assert!(positions[0] < TURN / 2 && (positions[99] - TURN).abs() < 100, "{positions:?}");
+    assert_eq!(positions, moved(&mut untouched));
 }
 
 /// Objects that masters write as they set a drive up, whatever its maker (Lely, ros2_canopen, makers' start-up lists).

@@ -5,6 +5,7 @@ use canopen::od::{DefaultValue, Dictionary, Entry};
 use canopen::pdo::{Direction, Mapping, PdoId, PdoNumber};
 use canopen::{Mux, NodeId};
 use devices::Description;
+use drives::servo::is_left_to_makers;
 use sim::machine::{Boxed, is_built_in, without_effect};
 
 /// Profile number of drives in the low half of 1000h.
@@ -20,6 +21,7 @@ pub(super) fn notes(node: NodeId, model: &'static Description, verbose: bool) ->
     let all = model.dictionary.rows().len();
     let of_all = format!("of its {all} objects are answered, and have no effect");
     notes.extend(list(node, &quiet, &of_all, verbose));
+    notes.extend(left_to_makers(node, model));
     let odd: Vec<_> = model.dictionary.rows().iter().filter_map(beyond_limits).collect();
     notes.extend(list(node, &odd, "of its values as delivered are outside of their own limits", verbose));
     let unmapped: Vec<_> = unmapped(model, node);
@@ -51,6 +53,21 @@ fn list(node: NodeId, objects: &[String], what: &str, named: bool) -> Option<Str
         (_, true) => Some(format!("note: {node}: {count} {what}: {}", objects.join(", "))),
         (_, false) => Some(format!("note: {node}: {count} {what}; -v names them")),
     }
+}
+
+/// A file of a servo with objects that a start-up may well write as if a loop used them.
+fn left_to_makers(node: NodeId, model: &Description) -> Option<String> {
+    let rows = model.dictionary.rows().iter().filter(|row| !model.axes.is_empty() && row.access.is_writable());
+    let mut objects: Vec<_> =
+        rows.filter(|row| is_left_to_makers(row.mux())).map(|row| format!("{:04X}h", row.index)).collect();
+    objects.dedup();
+    let names = objects.join(", ");
+    (!objects.is_empty()).then(|| {
+        format!(
+            "note: {node}: {names}: gains and data that CiA 402 leaves to makers are stored and answered; no loop and no limit uses \
+             them"
+        )
+    })
 }
 
 fn named(model: &Description, mux: Mux) -> String {
@@ -116,6 +133,37 @@ mod tests {
                 || row.limits.and_then(ValueRange::integers).is_some_and(|(low, high)| low == high);
             assert!(fixed || !row.access.is_writable(), "{mux}");
         }
+    }
+
+    #[test]
+    fn of_a_servo_by_its_file_the_gains_that_no_loop_uses_are_named() {
+        let row = |index: &str, sub: &str, access: &str| {
+            format!(
+                "[{index}{sub}]\nParameterName={index}{sub}\nObjectType=7\nDataType=6\nAccessType={access}\nDefaultValue=0\n"
+            )
+        };
+        let record = |index: &str| {
+            format!(
+                "[{index}]\nParameterName=Gains\nObjectType=9\nSubNumber=3\n{}{}{}",
+                row(index, "sub0", "ro"),
+                row(index, "sub1", "rw"),
+                row(index, "sub2", "rw")
+            )
+        };
+        let text = ODD.replace(
+            "SupportedObjects=2\n1=0x1A00\n2=0x2000",
+            "SupportedObjects=7\n1=0x1A00\n2=0x2000\n3=0x6040\n4=0x6041\n5=0x60F9\n6=0x6410\n7=0x60F7",
+        );
+        let text =
+            [text, row("6040", "", "rw"), row("6041", "", "ro"), record("60F9"), record("6410"), row("60F7", "", "ro")]
+                .concat();
+        let description = keep(&Eds::load(text.as_bytes()).expect("it is read").eds).expect("it is kept");
+        let said = notes(NodeId::MIN, description, false).join("\n");
+        assert!(
+            said.contains("a servo") && said.contains("\nnote: 1: 60F9h, 6410h: gains and data that CiA 402 leaves"),
+            "{said}"
+        );
+        assert!(!self::said(false).contains("CiA 402 leaves"));
     }
 
     #[test]
