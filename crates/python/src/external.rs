@@ -21,6 +21,9 @@ type Row<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
 type Rows<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
+/// So many milliseconds of a drive's time are worth a thread: they take some 50 µs, and to start and join it takes 15 µs.
+const LEAST_DRIVE_MS: u128 = 16;
+
 /// That NumPy is there: its arrays cannot be asked for without it.
 fn need_numpy(py: Python<'_>) -> PyResult<()> {
     static FOUND: PyOnceLock<()> = PyOnceLock::new();
@@ -39,8 +42,14 @@ fn step(dt_s: f64) -> PyResult<Duration> {
     Err(bad_value(format!("expected a step of more than 0 s, got {dt_s}")))
 }
 
-/// One row of numbers.
+/// One row of numbers. An engine hands over its own array of 64-bit numbers as a rule, which is copied as it stands; everything else is
+/// made one first.
 fn row<'py>(what: &str, values: &Bound<'py, PyAny>) -> PyResult<Vec<f64>> {
+    if let Ok(array) = values.cast::<PyArray1<f64>>()
+        && let Ok(row) = array.to_vec()
+    {
+        return Ok(row);
+    }
     let array: Row<'py> = values
         .extract()
         .map_err(|_| bad_value(format!("{what}: expected an array of numbers with one dimension, got {values}")))?;
@@ -84,7 +93,7 @@ pub(crate) fn exchange<'py>(
         state.keep_record();
         done.map(|()| torque_nm)
     })?;
-    Ok(PyArray1::from_vec(py, torque_nm.map_err(bad_value)?))
+    Ok(PyArray1::from_slice(py, &torque_nm.map_err(bad_value)?))
 }
 
 /// The other form: torques in, angles and velocities out.
@@ -104,7 +113,7 @@ pub(crate) fn exchange_torque<'py>(
         done.map(|()| (angle_rad, velocity_rad_s))
     })?;
     let (angle_rad, velocity_rad_s) = moved.map_err(bad_value)?;
-    Ok((PyArray1::from_vec(py, angle_rad), PyArray1::from_vec(py, velocity_rad_s)))
+    Ok((PyArray1::from_slice(py, &angle_rad), PyArray1::from_slice(py, &velocity_rad_s)))
 }
 
 /// The half of a step before its time passes, for a thread that takes part in the virtual time; its length in ns.
@@ -138,8 +147,8 @@ pub(crate) fn exchanged<'py>(
     let (mut torque_nm, mut angle_rad, mut velocity_rad_s) = (none.clone(), none.clone(), none);
     world.read_torques(&mut torque_nm);
     world.read_motions(&mut angle_rad, &mut velocity_rad_s);
-    let array = |values| PyArray1::from_vec(py, values);
-    Ok((array(torque_nm), array(angle_rad), array(velocity_rad_s)))
+    let array = |values: &[f64]| PyArray1::from_slice(py, values);
+    Ok((array(&torque_nm), array(&angle_rad), array(&velocity_rad_s)))
 }
 
 /// For each shaft: place, turns, inertia, dry friction, torque, angle, velocity.
@@ -203,13 +212,22 @@ impl Worlds {
 impl Worlds {
     /// Rows of numbers one after the other, and how many rows and columns.
     fn rows<'py>(&self, what: &str, values: &Bound<'py, PyAny>) -> PyResult<(Vec<f64>, [usize; 2])> {
-        let expected = format!("{what}: expected an array with a row for each of {} worlds", self.worlds.len());
-        let array: Rows<'py> = values.extract().map_err(|_| bad_value(&expected))?;
-        let [rows, columns] = [array.shape()[0], array.shape()[1]];
-        if rows != self.worlds.len() {
-            return Err(bad_value(format!("{expected}, got {rows} rows")));
+        let expected = || format!("{what}: expected an array with a row for each of {} worlds", self.worlds.len());
+        let shape = |shape: &[usize]| match *shape {
+            [rows, columns] if rows == self.worlds.len() => Ok([rows, columns]),
+            [rows, ..] => Err(bad_value(format!("{}, got {rows} rows", expected()))),
+            [] => Err(bad_value(expected())),
+        };
+        // As of one row.
+        if let Ok(array) = values.cast::<PyArray2<f64>>()
+            && array.is_c_contiguous()
+            && let Ok(numbers) = array.to_vec()
+        {
+            return Ok((numbers, shape(array.shape())?));
         }
-        Ok((array.as_array().iter().copied().collect(), [rows, columns]))
+        let array: Rows<'py> = values.extract().map_err(|_| bad_value(expected()))?;
+        let shape = shape(array.shape())?;
+        Ok((array.as_array().iter().copied().collect(), shape))
     }
 
     /// All worlds or none: what is wrong with one is found before any of them moves.
@@ -229,7 +247,9 @@ impl Worlds {
             return Ok(torque_nm);
         }
         let cores = thread::available_parallelism().map_or(1, usize::from);
-        let share = states.len().div_ceil(cores);
+        let drive_ms = width as u128 * states.len() as u128 * dt.as_micros() / 1000;
+        let threads = cores.min((drive_ms / LEAST_DRIVE_MS) as usize).max(1);
+        let share = states.len().div_ceil(threads);
         let angles = given.0.chunks(share * width).zip(given.1.chunks(share * width));
         let parts = states.chunks_mut(share).zip(angles).zip(torque_nm.chunks_mut(share * width));
         let parts: Vec<_> = parts.map(|part| Mutex::new(Some(part))).collect();

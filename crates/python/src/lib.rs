@@ -12,6 +12,7 @@ mod failure;
 mod frames;
 mod live;
 mod master;
+mod process;
 mod scenario;
 mod sheets;
 mod world;
@@ -22,6 +23,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    process::watch(module)?;
     module.add_class::<world::World>()?;
     module.add_class::<external::Worlds>()?;
     module.add_function(wrap_pyfunction!(external::couple_external, module)?)?;

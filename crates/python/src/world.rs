@@ -8,7 +8,6 @@ mod stimulus;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
-use std::process;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -30,6 +29,7 @@ use words::drive::{DriveSpec, drive_spec};
 
 use crate::failure::{bad_value, named, refused, wrong_use};
 use crate::frames::{Plain, frame, plain};
+use crate::process;
 use crate::sheets::{model_of, node_id};
 use happened::Happened;
 pub(crate) use jobs::{Job, Jobs};
@@ -78,7 +78,7 @@ pub(crate) struct World {
 
 /// What a world's handles share.
 pub(crate) struct Shared {
-    /// A child of `fork` has the worlds of its parent in its memory, and perhaps the lock of one held for ever.
+    /// Of the process that has made it.
     process: u32,
     state: Mutex<WorldState>,
 }
@@ -119,7 +119,7 @@ impl Shared {
     }
 
     pub(crate) fn check_process(&self) -> PyResult<()> {
-        if process::id() == self.process {
+        if process::generation() == self.process {
             return Ok(());
         }
         Err(wrong_use(
@@ -225,7 +225,7 @@ impl World {
 
     fn holding(world: sim::World) -> Self {
         let state = Mutex::new(WorldState::new(world));
-        Self { shared: Arc::new(Shared { process: process::id(), state }) }
+        Self { shared: Arc::new(Shared { process: process::generation(), state }) }
     }
 
     /// Puts a drive onto the bus that is built as described, of the world's fidelity unless it has its own.

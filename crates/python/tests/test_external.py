@@ -93,6 +93,27 @@ def test_worlds_side_by_side_are_to_the_bit_what_each_is_alone():
     assert worlds[3].now_ns == 130_000_000
 
 
+@pytest.mark.parametrize(
+    "kind",
+    [
+        numpy.asfortranarray,
+        lambda numbers: numbers.astype(">f8"),
+        lambda numbers: numbers.astype(numpy.float32),
+        lambda numbers: numpy.repeat(numbers, 2, axis=1)[:, ::2],
+        lambda numbers: numbers[::-1][::-1],
+        numpy.ndarray.tolist,
+    ],
+)
+def test_rows_are_the_same_in_any_layout(kind):
+    # Exact in 32 bits, too.
+    speed = numpy.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
+    angle = speed / 1024
+    plain, other = (ferrodrive.Worlds([wheels() for _ in angle]) for _ in range(2))
+    expected = plain.exchange(0.001, angle, speed)
+    assert numpy.array_equal(other.exchange(0.001, kind(angle), kind(speed)), expected)
+    assert numpy.array_equal(expected[1], wheels().exchange(0.001, kind(angle)[1], kind(speed)[1]))
+
+
 def test_of_several_worlds_all_are_exchanged_or_none():
     worlds = ferrodrive.Worlds([wheels(), wheels()])
     good = numpy.zeros((2, 2))
