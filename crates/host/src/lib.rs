@@ -23,6 +23,7 @@ mod commands;
 pub mod console;
 pub mod control;
 pub mod events;
+pub mod group_follow;
 mod help;
 mod lines;
 mod motion;

@@ -40,6 +40,8 @@ pub struct GroupMove {
     pub period: Option<Duration>,
     /// Mode of operation of each axis.
     pub mode: Option<ModeOfOperation>,
+    /// For so long the axes keep their power afterwards.
+    pub hold: Option<Duration>,
 }
 
 /// The axes, and where each is to go; `None` for one that stays.
@@ -141,7 +143,10 @@ const SURELY_COUNTED_TURNS: f64 = 127.0;
 
 /// A position of the axis of this number, from 1, as the drive reckons it. Positions of CiA 402 (607Ah, 6064h) are INTEGER32. A drive is
 /// asked for its counts only where it may not fit.
-async fn countable(drive: &Drive, angle: Angle, axis: usize) -> Result<Turns, GroupError> {
+///
+/// # Errors
+/// It does not fit, or the drive does not answer.
+pub async fn countable(drive: &Drive, angle: Angle, axis: usize) -> Result<Turns, GroupError> {
     let Turns(to_turns) = turns_of(drive, angle).await?;
     if (to_turns * drive.gear().ratio()).abs() > SURELY_COUNTED_TURNS {
         let most_turns = f64::from(i32::MAX) / drive.counts_per_turn().await?;
@@ -162,28 +167,13 @@ impl FromStr for GroupMove {
             return Err(format!("'group {text}' is not a command of a group; expected: group {}", Self::FORM));
         }
         let mut asked = Self { relative: words.next_if_eq(&"by").is_some(), ..Self::default() };
-        while let Some(word) = words.next() {
-            if word.contains('=') {
+        asked.take_words(Self::FORM, words, |asked, word| {
+            let is_target = word.contains('=');
+            if is_target {
                 asked.targets.push(target(word)?);
-                continue;
             }
-            let is_option =
-                Self::FORM.split('[').any(|part| part.split_once(' ').is_some_and(|(name, _)| name == word));
-            let value = words.next_if(|_| is_option).ok_or_else(|| match is_option {
-                true => format!("'{word}' has no value; expected: group {}", Self::FORM),
-                false => format!("'{word}' is not a part of group move; expected: group {}", Self::FORM),
-            })?;
-            match word {
-                "of" => asked.group = Some(value.to_owned()),
-                "at" => asked.velocity = Some(turning(value)?),
-                "acceleration" => asked.acceleration = Some(rate(value)?),
-                "rounding" => asked.rounding = Some(some_time(value)?),
-                "following-error" => asked.following_error = Some(angle(value)?),
-                "period" => asked.period = Some(some_time(value)?),
-                "mode" => asked.mode = Some(mode(value)?),
-                _ => asked.within = Some(some_time(value)?),
-            }
-        }
+            Ok(is_target)
+        })?;
         asked.check().map_err(|failure| failure.one_line())?;
         Ok(asked)
     }
@@ -192,7 +182,45 @@ impl FromStr for GroupMove {
 impl GroupMove {
     /// It as a line of a host has it, behind `group`.
     pub const FORM: &str = "move [by] NODE=POSITION.. [of GROUP] [at SPEED] [acceleration RATE] [rounding TIME] \
-                            [following-error ANGLE] [period TIME] [mode MODE] [within TIME]";
+                            [following-error ANGLE] [period TIME] [mode MODE] [within TIME] [hold TIME]";
+
+    /// Takes the words of a line: options of its form with their values, and words that stand `alone` and that this takes.
+    ///
+    /// # Errors
+    /// A word that is neither, or a bad value.
+    pub fn take_words<'a>(
+        &mut self,
+        form: &str,
+        words: impl Iterator<Item = &'a str>,
+        mut alone: impl FnMut(&mut Self, &str) -> Result<bool, String>,
+    ) -> Result<(), String> {
+        let mut words = words.peekable();
+        while let Some(word) = words.next() {
+            if alone(self, word)? {
+                continue;
+            }
+            let is_option = form
+                .split('[')
+                .any(|part| part.split_once(' ').is_some_and(|(name, rest)| name == word && rest.contains(']')));
+            let what = form.split(' ').next().unwrap_or_default();
+            let value = words.next_if(|_| is_option).ok_or_else(|| match is_option {
+                true => format!("'{word}' has no value; expected: group {form}"),
+                false => format!("'{word}' is not a part of group {what}; expected: group {form}"),
+            })?;
+            match word {
+                "of" => self.group = Some(value.to_owned()),
+                "at" => self.velocity = Some(turning(value)?),
+                "acceleration" => self.acceleration = Some(rate(value)?),
+                "rounding" => self.rounding = Some(some_time(value)?),
+                "following-error" => self.following_error = Some(angle(value)?),
+                "period" => self.period = Some(some_time(value)?),
+                "mode" => self.mode = Some(mode(value)?),
+                "hold" => self.hold = Some(some_time(value)?),
+                _ => self.within = Some(some_time(value)?),
+            }
+        }
+        Ok(())
+    }
 
     fn check(&self) -> Result<(), Failure> {
         if self.targets.is_empty() {
@@ -361,6 +389,22 @@ impl PlannedMove {
         group.settle().await?;
         let at = group.axes().iter().zip(&to).map(|(state, to)| state.position.map_or(*to, |Turns(at)| at)).collect();
         Ok(GroupRun { time, from, to, at, largest_turns, missed_cycles: group.state().missed_cycles })
+    }
+}
+
+/// Has the axes of a group that rests hold until `ended`, which is asked in each cycle with the time since; that time.
+///
+/// # Errors
+/// What stopped the group meanwhile.
+pub async fn hold(group: &mut Group, mut ended: impl FnMut(Duration) -> bool) -> Result<Duration, GroupError> {
+    let began = group.network().now();
+    loop {
+        group.cycle().await?;
+        group.rest().await?;
+        let held = group.network().now() - began;
+        if ended(held) {
+            return Ok(held);
+        }
     }
 }
 

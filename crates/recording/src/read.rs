@@ -66,7 +66,7 @@ impl<'a> CsvLines<'a> {
         let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
         let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..whole]);
         let header = reader.headers().map_err(|error| format!("not a CSV file: {error}"))?.clone();
-        if header.get(0) != Some("t_s") {
+        if !matches!(header.get(0), Some("t_s" | "time_s")) {
             return Err("its first column is not t_s, the time in s".into());
         }
         let marks_at = header.iter().position(|name| name == "mark");

@@ -8,9 +8,11 @@ mod order;
 mod runs;
 mod shape;
 
-use master::group::{Group, GroupError, Phase, StreamOptions};
+use master::group::{Group, GroupError};
 use master::units::Turns;
 use serde::Serialize;
+
+use crate::group_follow::stream;
 
 pub use order::{Order, ShapeName};
 pub use runs::{Figures, Motion, Run, Travel, limits, run, steps, usual_quantities};
@@ -36,27 +38,17 @@ pub async fn follow(group: &mut Group, points: &[f64]) -> Result<Followed, Group
     let from = group.points().first().map_or(0.0, |point| point.position_turns);
     // At the end twice the same point: velocity and acceleration are zero then, and there is nothing left to be brought to rest.
     let at_rest = points.last().into_iter().cycle().take(2);
-    group.start_stream(StreamOptions { capacity: points.len() + 2, prefill: 0, ..StreamOptions::default() })?;
-    for point in points.iter().chain(at_rest) {
-        group.push(&[Turns(from + point)])?;
-    }
-    group.end_stream();
+    let path = points.iter().chain(at_rest).map(|point| [Turns(from + point)]);
     let began = network.now();
     let (mut most, mut squares, mut cycles) = (0.0_f64, 0.0, 0_u32);
-    loop {
-        let state = group.cycle().await?;
-        if let Some(cause) = state.cause {
-            return Err(GroupError::Stopped(cause));
-        }
+    stream(group, path, |group| {
         if let Some(Some(error)) = group.following_errors().next() {
             most = most.max(error.abs());
             squares += error * error;
             cycles += 1;
         }
-        if !matches!(state.phase, Phase::Streaming | Phase::Stopping) {
-            break;
-        }
-    }
+    })
+    .await?;
     let took_s = (network.now() - began).as_secs_f64();
     let rms = (squares / f64::from(cycles.max(1))).sqrt();
     Ok(Followed { took_s, most_deg: most * 360.0, rms_deg: rms * 360.0 })

@@ -4,6 +4,7 @@
 mod capture;
 mod clients;
 mod control;
+mod follow;
 mod init;
 mod params;
 mod stopping;

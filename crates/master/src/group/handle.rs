@@ -220,7 +220,7 @@ impl Group {
     pub fn check_path<P: AsRef<[Turns]>>(&self, points: impl IntoIterator<Item = P>) -> Result<(), GroupError> {
         let runner = &self.runner;
         let mut stream = Stream::new(&runner.points, runner.period_s, StreamOptions::default());
-        points.into_iter().try_for_each(|point| stream.check_next(point.as_ref(), &runner.limits)).map_err(Into::into)
+        stream.check_all(points, &runner.limits).map_err(|refused| refused.error.into())
     }
 
     /// The stream, while there is one: how many points wait, for how many there is room.

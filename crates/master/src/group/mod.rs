@@ -25,5 +25,5 @@ pub use home::{AxisHoming, HomingOrder, home};
 pub use limits::{AxisLimits, PathError, PathPoint, Quantity};
 pub use open::AxisSetup;
 pub use state::{GroupState, Phase, StopCause};
-pub use stream::{Stream, StreamOptions};
+pub use stream::{RefusedPoint, Stream, StreamOptions, check_path};
 pub use trajectory::Trajectory;

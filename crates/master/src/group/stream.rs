@@ -5,6 +5,7 @@
 //! points of cycles that have passed are left out, so that the path keeps its time; a path that cannot be joined again within the
 //! limits is not.
 
+use core::time::Duration;
 use std::collections::VecDeque;
 
 use super::error::GroupError;
@@ -94,6 +95,31 @@ pub(super) enum Due {
     End,
 }
 
+/// Which point of a path its group would not take, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RefusedPoint {
+    /// Its number, from 0.
+    pub point: usize,
+    /// Why.
+    pub error: PathError,
+}
+
+/// Holds a path that is known as a whole to the limits of its axes, before there is a group: a point for each of these cycles, the first
+/// of them where the axes stand.
+///
+/// # Errors
+/// The first point that breaks one.
+pub fn check_path<P: AsRef<[Turns]>>(
+    points: impl IntoIterator<Item = P>,
+    limits: &[AxisLimits],
+    period: Duration,
+) -> Result<(), RefusedPoint> {
+    let mut points = points.into_iter().peekable();
+    let rest = |Turns(at): &Turns| PathPoint { position_turns: *at, ..PathPoint::default() };
+    let from: Vec<_> = points.peek().into_iter().flat_map(|first| first.as_ref()).map(rest).collect();
+    Stream::new(&from, period.as_secs_f64(), StreamOptions::default()).check_all(points, limits)
+}
+
 /// The queue has no room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Full;
@@ -147,6 +173,19 @@ impl Stream {
         }
         self.last.copy_from_slice(&self.next);
         Ok(())
+    }
+
+    /// Holds all these points to the limits, one after the other.
+    pub(super) fn check_all<P: AsRef<[Turns]>>(
+        &mut self,
+        points: impl IntoIterator<Item = P>,
+        limits: &[AxisLimits],
+    ) -> Result<(), RefusedPoint> {
+        let mut points = (0..).zip(points);
+        let refused = |(point, at): (usize, P)| {
+            self.check_next(at.as_ref(), limits).map_err(|error| RefusedPoint { point, error })
+        };
+        points.try_for_each(refused)
     }
 
     fn check(&self, index: usize, at_turns: f64, limits: &AxisLimits) -> Result<PathPoint, PathError> {
