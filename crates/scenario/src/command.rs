@@ -9,6 +9,7 @@ use std::time::Duration;
 use can::Frame;
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{NmtCommand, NodeId};
+use host::group_follow::FollowLine;
 use host::network::boot::BootOptions;
 use machine::base_drive::BaseDrive;
 use machine::group_move::GroupMove;
@@ -43,8 +44,9 @@ const FORMS: &[&str] = &[
 /// Every form of a line of a host, for messages and the manual.
 pub fn forms() -> impl Iterator<Item = String> {
     let of_drive = drive::Command::FORMS.iter().map(|form| format!("NODE {form}"));
-    let shared = [format!("group {}", GroupMove::FORM), BaseDrive::FORM.to_owned(), BootOptions::FORM.to_owned()];
-    of_drive.chain(shared).chain(FORMS.iter().map(|form| (*form).to_owned()))
+    let groups = [GroupMove::FORM, FollowLine::FORM].map(|form| format!("group {form}"));
+    let shared = [BaseDrive::FORM.to_owned(), BootOptions::FORM.to_owned()];
+    of_drive.chain(groups).chain(shared).chain(FORMS.iter().map(|form| (*form).to_owned()))
 }
 
 /// Those that begin so, as a list in a message.
@@ -62,6 +64,8 @@ pub enum Command {
     Drive(Place, drive::Command),
     /// Several axes as one, to positions.
     Group(GroupMove),
+    /// Several axes as one, along a recorded path beside the scenario.
+    Follow(FollowLine),
     /// The base of the machine, by a twist.
     Base(BaseDrive),
     /// The boot-up of the machine.
@@ -137,6 +141,7 @@ impl FromStr for Command {
                 };
                 Ok(Self::WaitFor(condition.join(" ").parse()?, within))
             }
+            ["group", "follow", ..] => words[1..].join(" ").parse().map(Self::Follow),
             ["group", ref rest @ ..] => rest.join(" ").parse().map(Self::Group),
             ["drive-base", ref rest @ ..] => rest.join(" ").parse().map(Self::Base),
             ["boot", ref rest @ ..] => rest.join(" ").parse().map(Self::Boot),
@@ -257,7 +262,9 @@ mod tests {
             "2 velocity -5mm/s deceleration 100mm/s2",
             "4 move 32000",
             "2 home 17 at 60rpm within 5s",
-            "group move 1=90deg 2=-45deg within 3s",
+            "group move 1=90deg 2=-45deg within 3s hold 2s",
+            "group follow arm/path.csv by period 2ms of arm",
+            "group follow path.csv approach hold 1s",
             "drive-base linear 0.3 angular -0.2 for 3s",
             "boot",
             "boot node 4 node 5 reset no-start",
@@ -286,6 +293,11 @@ mod tests {
             ("dance", "expected one of"),
             ("4 dance", "NODE enable"),
             ("group dance", "group move [by] NODE=POSITION"),
+            ("group follow", "expected: group follow FILE.csv"),
+            ("group follow path.txt", "expected: group follow FILE.csv"),
+            ("group follow path.csv within 2s", "'within' is not a part of group follow"),
+            ("group follow path.csv 1=90deg", "'1=90deg' is not a part of group follow"),
+            ("group follow path.csv period", "'period' has no value"),
             ("drive-base forward", "expected: drive-base [linear M/S]"),
             ("boot now", "expected: boot [node NODE].."),
             ("boot node", "'node' has no node-ID"),

@@ -67,9 +67,11 @@ impl Execution {
         let shared = Rc::new(RefCell::new(HostBoard::default()));
         let machine = Rc::new(scenario.machine.clone());
         let sheets = Rc::new(scenario.sheets.clone());
+        let paths = Rc::new(scenario.paths.clone());
         let tasks = scenario.hosts.iter().enumerate().map(|(number, it)| {
             let (machine, sheets, shared) = (Rc::clone(&machine), Rc::clone(&sheets), Rc::clone(&shared));
-            let task = HostTask { number, name: it.name.clone(), network: network.clone(), machine, sheets, shared };
+            let (paths, network) = (Rc::clone(&paths), network.clone());
+            let task = HostTask { number, name: it.name.clone(), network, machine, sheets, paths, shared };
             let future: HostFuture = Box::pin(run(task, it.start, it.lines.clone()));
             Some(Task::new(future))
         });

@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
+use host::group_follow::RecordedPath;
 use host::network::params::source;
 use sim::Place;
 
 use super::command::Command;
 use super::condition::Condition;
 use super::entries::{MOST, Many, bounded, entries, expect, figures, host, kept, single, step};
-use super::plan::{Act, Base, Expect, Figure, Host, HostLine, Measure, ScenarioStep, Sheets};
+use super::plan::{Act, Base, Expect, Figure, Host, HostLine, Measure, Paths, ScenarioStep, Sheets};
 use crate::sweep::file::{SweepAxis, axes};
 use machine::file::Machine;
 use sim::Fidelity;
@@ -71,6 +72,8 @@ pub struct Scenario {
     folder: PathBuf,
     /// The files of parameters that its hosts name.
     pub(super) sheets: Sheets,
+    /// The recorded paths that its hosts name.
+    pub(super) paths: Paths,
 }
 
 impl Scenario {
@@ -169,6 +172,7 @@ impl Scenario {
             machine_text,
             folder: folder.to_owned(),
             sheets: Sheets::new(),
+            paths: Paths::new(),
         };
         scenario.limit = scenario.limit.max(scenario.end.unwrap_or_default());
         if problems.is_empty() {
@@ -176,6 +180,7 @@ impl Scenario {
         }
         if problems.is_empty() {
             problems = scenario.read_sheets(file);
+            problems.extend(scenario.read_paths(file));
         }
         if problems.is_empty() { Ok(scenario) } else { Err(problems) }
     }
@@ -273,6 +278,30 @@ impl Scenario {
                     problems.push(placed(&line.place, file.text(), what));
                 }
             }
+        }
+        problems
+    }
+
+    /// Reads the paths that hosts name, beside the scenario, and looks whether their axes are there and of one group.
+    fn read_paths(&mut self, file: &Table<'_>) -> Vec<Problem> {
+        let mut problems = Vec::new();
+        for line in self.hosts.iter().flat_map(|host| &host.lines) {
+            let Command::Follow(asked) = &line.command else { continue };
+            let path = RecordedPath::read(&self.folder.join(&asked.file));
+            let nodes = path.and_then(|path| {
+                self.paths.insert(asked.file.clone(), path.clone());
+                asked.of(path).axes(Some(&self.machine)).map(|(nodes, _)| nodes)
+            });
+            let what = match nodes {
+                Err(failure) => {
+                    std::iter::once(&failure.what).chain(&failure.because).cloned().collect::<Vec<_>>().join(": ")
+                }
+                Ok(nodes) => match nodes.iter().find(|node| !self.has_node(node.raw())) {
+                    Some(node) => self.no_such(Place::node(node.raw())),
+                    None => continue,
+                },
+            };
+            problems.push(placed(&line.place, file.text(), what));
         }
         problems
     }

@@ -25,7 +25,7 @@ use sim::Place;
 
 use super::command::{Command, PdoCommand};
 use super::outcome::{Row, RowKind, Verdict};
-use super::plan::{HostLine, Sheets, WantedResult};
+use super::plan::{HostLine, Paths, Sheets, WantedResult};
 use machine::file::Machine;
 use words::object::ObjectArg;
 use words::value::{typed_value, value};
@@ -63,6 +63,7 @@ pub(super) struct HostTask {
     pub(super) network: Network,
     pub(super) machine: Rc<Machine>,
     pub(super) sheets: Rc<Sheets>,
+    pub(super) paths: Rc<Paths>,
     pub(super) shared: Rc<RefCell<HostBoard>>,
 }
 
@@ -153,6 +154,7 @@ impl HostTask {
         match command {
             Command::Drive(place, command) => report(self.drive(*place)?.perform(command).await),
             Command::Group(asked) => self.move_group(asked).await,
+            Command::Follow(asked) => self.follow(asked).await,
             Command::Base(asked) => self.drive_base(asked).await,
             Command::Boot(options) => self.boot(options).await,
             Command::Parameters(node, what, file) => self.parameters(*node, *what, file.as_ref()).await,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use canopen::NodeId;
+use host::group_follow::RecordedPath;
 use master::parameters::Parameters;
 use sim::recorder::Signal;
 use sim::stimulus::{BodyStimulus, WireFault};
@@ -70,6 +71,9 @@ pub(super) struct HostLine {
 
 /// Parameters as they were read for a node: of a file, or without one of the machine file.
 pub(super) type Sheets = BTreeMap<(NodeId, Option<PathBuf>), Parameters>;
+
+/// Recorded paths by the names that lines give them.
+pub(super) type Paths = BTreeMap<PathBuf, RecordedPath>;
 
 /// What is to come of a line.
 #[derive(Clone, Debug, Default)]

@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use canopen::NodeId;
+use host::group_follow::FollowLine;
 use host::network::boot::{BootOptions, BootReport, Planned};
 use host::network::params::{ApplyReport, LeftOut, Transaction, VerifyReport, source, verify_node};
 use machine::base_drive::{self, BaseDrive, come_to_rest};
-use machine::group_move::GroupMove;
+use machine::group_move::{self, GroupMove, GroupRun, PlannedMove};
 use master::base::BaseError;
 use master::cyclic::CyclicOptions;
-use master::group::GroupError;
+use master::group::{Group, GroupError};
 use master::units::Shown;
 use words::counted;
 use words::failure::Failure;
@@ -31,18 +32,23 @@ impl HostTask {
         let (nodes, plan) = asked.axes(Some(&self.machine)).map_err(|failure| failure.one_line())?;
         let drives = nodes.into_iter().map(|node| self.machine.drive(self.network.node(node))).collect();
         let planned = asked.plan(plan, drives).await.map_err(|error| error.to_string())?;
-        let mut group = planned.open(CyclicOptions::default()).await.map_err(|error| error.to_string())?;
-        let moved = planned.carry_out(&mut group, |_, _| {}).await;
-        let reason = match &moved {
-            Err(GroupError::Stopped(_)) => group.explain_stop().await,
-            _ => None,
-        };
-        let closed = group.close().await;
-        let run = moved.map_err(|error| with_reason(&error, reason))?;
-        closed.map_err(|error| error.to_string())?;
-        let largest_deg = run.largest_turns.iter().fold(0.0_f64, |largest, turns| largest.max(turns * 360.0));
+        let run = carry_out(&planned, asked.hold, async |group| planned.carry_out(group, |_, _| {}).await).await?;
         let (axes, time) = (planned.axes.len(), Shown(run.time.as_secs_f64()));
-        Ok((format!("{axes} axes moved together in {time} s; largest lag {} deg", Shown(largest_deg)), None))
+        Ok((format!("{axes} axes moved together in {time} s; largest lag {}", largest_lag(&run)), None))
+    }
+
+    /// Moves axes along a recorded path, as `ferrodrive group follow` does; afterwards they have no power.
+    pub(super) async fn follow(&self, asked: &FollowLine) -> Done {
+        // Read with the scenario.
+        let path = self.paths.get(&asked.file).ok_or("this path was not read")?;
+        let follow = asked.of(path.clone());
+        let (nodes, plan) = follow.axes(Some(&self.machine)).map_err(|failure| failure.one_line())?;
+        let drives = nodes.into_iter().map(|node| self.machine.drive(self.network.node(node))).collect();
+        let planned = follow.plan(plan, drives).await.map_err(|failure| said(&failure))?;
+        let moved = async |group: &mut Group| planned.carry_out(group, |_, _| {}).await;
+        let run = carry_out(&planned.start, asked.options.hold, moved).await?;
+        let (axes, time) = (planned.start.axes.len(), Shown(run.time.as_secs_f64()));
+        Ok((format!("{axes} axes followed the path in {time} s; largest lag {}", largest_lag(&run)), None))
     }
 
     /// Drives the base of the machine by a twist, as `ferrodrive drive-base` does; afterwards its drives have no power.
@@ -107,6 +113,33 @@ impl HostTask {
             }
         }
     }
+}
+
+/// Opens a group, has it moved and held, and takes its power.
+async fn carry_out(
+    planned: &PlannedMove,
+    hold: Option<Duration>,
+    moved: impl AsyncFnOnce(&mut Group) -> Result<GroupRun, GroupError>,
+) -> Result<GroupRun, String> {
+    let mut group = planned.open(CyclicOptions::default()).await.map_err(|error| error.to_string())?;
+    let mut done = moved(&mut group).await;
+    if let (Ok(_), Some(time)) = (&done, hold)
+        && let Err(error) = group_move::hold(&mut group, |held| held >= time).await
+    {
+        done = Err(error);
+    }
+    let reason = match &done {
+        Err(GroupError::Stopped(_)) => group.explain_stop().await,
+        _ => None,
+    };
+    let closed = group.close().await;
+    let run = done.map_err(|error| with_reason(&error, reason))?;
+    closed.map_err(|error| error.to_string())?;
+    Ok(run)
+}
+
+fn largest_lag(run: &GroupRun) -> String {
+    format!("{} deg", Shown(run.largest_turns.iter().fold(0.0_f64, |largest, turns| largest.max(turns * 360.0))))
 }
 
 /// What has stopped several drives, with what one of them says of it.

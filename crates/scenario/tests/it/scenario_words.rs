@@ -177,6 +177,45 @@ fn a_position_that_no_drive_counts_to_is_refused_before_anything_moves() {
     assert!(outcome.passed(), "{:#?}", outcome.rows);
 }
 
+/// By 9 and -4.5 deg in 2 s as t - sin(t): a set-point in each cycle of 2 ms between points of 20 ms.
+#[test]
+fn a_recorded_path_is_followed_and_one_that_is_not_usable_is_refused_before_the_run() {
+    let folder = std::env::temp_dir().join(format!("ferrodrive-path-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let part = |time_s: f64| (time_s / 2.0) - (std::f64::consts::PI * time_s).sin() / std::f64::consts::TAU;
+    let rows = (0..=100).map(|row| {
+        let time_s = f64::from(row) * 0.02;
+        format!("{time_s:.2},{},{}\n", 9.0 * part(time_s), -4.5 * part(time_s))
+    });
+    let path = format!("t_s,1.angle_deg,2.angle_deg\n{}", rows.collect::<String>());
+    let file = |name: &str| folder.join(name).display().to_string();
+    std::fs::write(file("path.csv"), &path).unwrap();
+    std::fs::write(file("strange.csv"), path.replace("2.angle", "9.angle")).unwrap();
+    std::fs::write(file("torn.csv"), path.trim_end()).unwrap();
+    let lines = |lines: &str| arm(&format!("[[host]]\nname = 'moved'\ndo = [{lines}]\n{BOTH_STAND}"));
+    let path = file("path.csv");
+    let followed = lines(&format!("'group follow {path} by hold 1s'")).unwrap();
+    let away = lines(&format!("'group move 1=3deg 2=0deg', {{ do = 'group follow {path}', fails = 'node 1 stands at 3' }}, 'group follow {path} approach'")).unwrap();
+    let refused = [
+        ("strange.csv", "these nodes are not in one [[group]]"),
+        ("torn.csv", "its last line has no end"),
+        ("none.csv", "cannot be followed"),
+    ]
+    .map(|(name, said)| (lines(&format!("'group follow {} by'", file(name))).err().unwrap_or_default(), said));
+    std::fs::remove_dir_all(&folder).unwrap();
+    for scenario in [&followed, &away] {
+        let outcome = Runner::new(scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+        assert!(outcome.passed(), "{:#?}", outcome.rows);
+        let (_, seen) = row(&outcome, "group follow");
+        assert!(seen.starts_with("2 axes followed the path in 2 s") || seen.contains("does not begin"), "{seen}");
+    }
+    for (what, said) in refused {
+        assert!(what.contains(said), "{what}");
+    }
+}
+
+const BOTH_STAND: &str = "[[expect]]\nafter = 'moved'\nthat = '1 velocity = 0 +- 0.5 and 2 velocity = 0 +- 0.5'\n";
+
 #[test]
 fn a_group_that_is_not_there_is_refused_before_the_run() {
     for (line, said) in [
