@@ -256,7 +256,10 @@ const ACTING: &[Row] = &[
         words: &["calibrate", "calibration", "zero", "set-zero", "homing", "reference"],
         tips: &["home 4 --method 35", "state 4"],
     },
-    Row { words: &["follow", "trajectory", "path", "interpolate"], tips: &["group move 1=90deg"] },
+    Row {
+        words: &["follow", "trajectory", "path", "interpolate"],
+        tips: &["group follow path.csv --approach", "group move 1=90deg"],
+    },
     Row { words: &["drive", "cmd_vel", "twist"], tips: &["drive-base examples/base.toml --linear 0.2 --for 2s"] },
 ];
 
@@ -501,7 +504,7 @@ mod tests {
             ("calibrate", "home 4 --method 35"),
             ("gains", "objects 4 gain"),
             ("autotune", "tune 4"),
-            ("follow", "group move 1=90deg"),
+            ("follow", "group follow path.csv --approach"),
             ("E-STOP", "estop"),
             ("rollback", "params rollback 4"),
             ("flash", "program 4 firmware.bin"),

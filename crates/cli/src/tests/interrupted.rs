@@ -50,6 +50,26 @@ fn ctrl_c_stops_every_drive_before_it_ends_with_130() {
     }
 }
 
+/// Axes that are held have their power until the time is over or the command is ended.
+#[test]
+fn held_axes_keep_their_power_until_the_time_is_over_or_ctrl_c() {
+    let bench = VirtualBus::of(&["zlac8030l@4", "cia402@5"]).with(&["--model", "4=zlac8030l", "--model", "5=cia402"]);
+    let group = ["group", "move", "--relative", "4=30deg", "5=-30deg", "--within", "1s"];
+    let is_powered = |node| bench.report(node).statusword.is_some_and(|word| word & 0x6F == 0x27);
+    let held = bench.done(&[&group[..], &["--hold", "2s"]].concat());
+    assert!(held.err.contains("2 axes hold for 2 s, then their power is taken"), "{}", held.err);
+    assert!(held.out.contains("and held for 2.0") && held.out.contains("the drives are without power"), "{}", held.out);
+    assert!(!is_powered(4) && !is_powered(5));
+    let ended =
+        bench.run_until(&[&group[..], &["--hold", "1h"]].concat(), &[(Duration::from_secs(8), Signal::Interrupt)]);
+    assert_eq!(ended.status, Some(130), "{}", ended.err);
+    assert!(ended.err.contains("2 axes hold for 3600 s"), "{}", ended.err);
+    for node in [4, 5] {
+        assert!(ended.err.contains(&format!("node {node} was moving and has been quick-stopped")), "{}", ended.err);
+        assert!(!is_powered(node), "node {node}");
+    }
+}
+
 /// A conformance test writes many objects; whenever it is interrupted, they have again what they had.
 #[test]
 fn a_conformance_test_that_is_interrupted_puts_back_what_it_wrote() {

@@ -33,6 +33,34 @@ fn axes_that_are_named_go_where_they_are_sent_in_the_time_that_is_given() {
     }
 }
 
+/// The drawn path ends where it begins, after 3 s; at each of its points the axes are where it has them.
+#[test]
+fn a_recorded_path_is_followed_in_its_time_and_a_bad_one_is_refused_before_there_is_a_bus() {
+    let (file, path) = (example("two_axes.toml"), example("two_axes.csv"));
+    let followed = done(&["--json", "group", "follow", &file, &path, "--relative", "--hold", "500ms"]).json();
+    assert_eq!((number(&followed["time_s"]), &followed["missed_cycles"]), (3.0, &serde_json::json!(0)));
+    assert!(number(&followed["held_s"]) >= 0.5, "{followed}");
+    let axes = followed["axes"].as_array().unwrap();
+    assert_eq!(axes.len(), 2);
+    for axis in axes {
+        assert!((number(&axis["to_deg"]) - number(&axis["from_deg"])).abs() < 0.01, "{axis}");
+        assert!((number(&axis["at_deg"]) - number(&axis["to_deg"])).abs() < 1.0, "{axis}");
+    }
+    refused(&["group", "follow", &file, &path, "--relative", "--group", "legs"], 1, "the machine file has: pair");
+    refused(
+        &["group", "follow", &file, &path, "--relative", "--acceleration", "6deg/s2"],
+        1,
+        "let the path take more time",
+    );
+    refused(&["group", "follow", &file, &path, "--relative", "--approach"], 2, "cannot be used with");
+    refused(&["group", "follow", &file, &path, "--hold"], 2, "--hold needs a time");
+    refused(&["group", "follow", &file], 2, "expected the path to follow");
+    refused(&["group", "follow", &path, &path], 2, "two paths");
+    refused(&["group", "follow", &file, &file, &path], 2, "two machine files");
+    refused(&["group", "follow", "path.txt"], 2, "expected a path, NAME.csv");
+    refused(&["group", "follow", "/no/such/path.csv"], 1, "/no/such/path.csv cannot be followed");
+}
+
 #[test]
 fn the_end_says_that_a_load_may_turn_a_shaft_whose_power_is_gone() {
     let said = done(&["group", "move", "1=2deg", "4=2deg", "--period", "4ms"]).out;

@@ -1,11 +1,15 @@
 //! `ferrodrive group`: several axes as one motion.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use canopen::NodeId;
 use cia402::ModeOfOperation;
-use machine::group_move::{GroupMove, GroupRun, PULLING_LOAD, PlannedMove, angle, rate, target, turning};
+use host::group_follow::{GroupFollow, PlannedFollow, RecordedPath};
+use machine::file::GroupPlan;
+use machine::group_move::{GroupMove, GroupRun, PULLING_LOAD, PlannedMove, angle, hold, rate, target, turning};
 use master::Drive;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, StopCause};
 use master::units::{Angle, Rpm, Shown, parse_duration};
@@ -29,14 +33,15 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
 
 /// Move several axes as one
 ///
-/// All start with one SYNC and end together, on paths limited in speed, acceleration and jerk. When one drive faults,
-/// is lost or lags, all come to rest. Afterwards the drives have no power: a load that pulls (an arm, a slope) moves a motor
-/// without power, unless a brake holds it. `ferrodrive move` leaves one drive powered and holding.
+/// All start with one SYNC, to positions (move) or along a recorded path (follow), within limits of speed and acceleration.
+/// When one drive faults, is lost or lags, all come to rest. Afterwards the drives have no power: a load that pulls (an arm,
+/// a slope) moves a motor without power, unless a brake holds it; --hold keeps them powered and holding.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive group move 1=90deg 4=0.5turn --within 3s           # default limits\n  \
     ferrodrive group move examples/machine.toml 1=90deg 2=-45deg  # its [[group]]\n  \
-    ferrodrive --bus can0 group move machine.toml --relative 1=10deg 2=10deg")]
+    ferrodrive --bus can0 group move machine.toml --relative 1=10deg 2=10deg --hold\n  \
+    ferrodrive --bus can0 group follow machine.toml path.csv --approach")]
 pub(crate) struct GroupCommand {
     #[command(subcommand)]
     what: GroupAction,
@@ -45,6 +50,7 @@ pub(crate) struct GroupCommand {
 #[derive(Debug, clap::Subcommand)]
 enum GroupAction {
     Move(Move),
+    Follow(Follow),
 }
 
 /// Move axes to positions, together
@@ -59,22 +65,48 @@ struct Move {
     /// Machine file, and the positions of the nodes: 1=90deg 4=0.5turn 2=-3000counts
     #[arg(value_name = "FILE.toml|NODE=POSITION", required = true, value_parser = word)]
     words: Vec<Word>,
-    /// Name of the [[group]] of the file (default: the one that has the nodes)
-    #[arg(long, value_name = "NAME")]
-    group: Option<String>,
-    /// Turn by this much from the present position of each axis, instead of to a position
-    #[arg(long)]
-    relative: bool,
     /// Duration of the move (default: the shortest within the limits)
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     within: Option<Duration>,
+    #[command(flatten)]
+    options: GroupOptions,
+}
+
+/// Move axes along a recorded path, in its time
+///
+/// The path is CSV: its first line names the columns, t_s and the position of each axis by its node (t_s,1.angle_deg,2.angle_deg),
+/// in s and in degrees, radians or counts of the drive; a record or a capture with positions is one too. It is led through its points
+/// by a cubic spline at rest at both ends, a set-point for each cycle. All set-points are held to the limits before anything moves.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive group follow path.csv --approach\n  \
+    ferrodrive --bus can0 group follow machine.toml path.csv --hold")]
+struct Follow {
+    /// Machine file, and the path
+    #[arg(value_name = "FILE.toml|PATH.csv", required = true, value_parser = followed)]
+    files: Vec<PathBuf>,
+    /// Lead axes that stand elsewhere to the first point before, by a move within the limits
+    #[arg(long, conflicts_with = "relative")]
+    approach: bool,
+    #[command(flatten)]
+    options: GroupOptions,
+}
+
+/// What every motion of a group takes.
+#[derive(Debug, clap::Args)]
+struct GroupOptions {
+    /// Name of the [[group]] of the file (default: the one that has the nodes)
+    #[arg(long, value_name = "NAME")]
+    group: Option<String>,
+    /// Positions count from where each axis is
+    #[arg(long)]
+    relative: bool,
     /// Highest speed of each axis
     #[arg(long, value_name = "SPEED", value_parser = turning)]
     velocity: Option<Rpm>,
     /// Highest acceleration of each axis: 120rpm/s, 720deg/s2, 12.6rad/s2
     #[arg(long, value_name = "RATE", value_parser = rate)]
     acceleration: Option<f64>,
-    /// Time in which the acceleration reaches its highest value, which limits the jerk
+    /// Time in which the acceleration of a move reaches its highest value, which limits the jerk
     #[arg(long, value_name = "TIME", value_parser = some_time)]
     rounding: Option<Duration>,
     /// Largest distance of a shaft from its set-point, beyond which all axes are stopped
@@ -86,6 +118,9 @@ struct Move {
     /// Mode of operation of each axis (default: the file's, or the first of csp, ip, csv, pv that its model has)
     #[arg(long, value_name = "MODE", value_parser = mode)]
     mode: Option<ModeOfOperation>,
+    /// Keep the axes powered and holding at the end: for TIME, or until standard input ends or Ctrl-C
+    #[arg(long, value_name = "TIME", value_parser = some_time)]
+    hold: Option<Option<Duration>>,
     #[command(flatten)]
     cycles: CycleArgs,
     #[command(flatten)]
@@ -109,7 +144,15 @@ fn word(text: &str) -> Result<Word, String> {
     }
 }
 
-/// What came of a move.
+/// The file of a machine or of a path.
+fn followed(text: &str) -> Result<PathBuf, String> {
+    let is_known = Path::new(text)
+        .extension()
+        .is_some_and(|ending| ["toml", "csv"].iter().any(|known| ending.eq_ignore_ascii_case(known)));
+    is_known.then(|| text.into()).ok_or_else(|| "expected a path, NAME.csv, or a machine file, FILE.toml".to_owned())
+}
+
+/// What came of a move, or of a path.
 #[derive(Debug, Serialize)]
 pub(crate) struct GroupMoved {
     /// How long the path takes.
@@ -117,6 +160,8 @@ pub(crate) struct GroupMoved {
     period_ms: f64,
     /// Cycles that the path was late for.
     missed_cycles: u64,
+    /// How long the axes were held at the end; `null` without --hold.
+    held_s: Option<f64>,
     axes: Vec<AxisMoved>,
 }
 
@@ -187,85 +232,181 @@ fn note_uneven(context: &Context, planned: &PlannedMove) {
 impl GroupCommand {
     /// Does what is asked for, and prints it.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
-        let GroupAction::Move(command) = &self.what;
-        let report = session::run(&command.global(global)?, async |context| command.run(context).await)?;
+        let report = match &self.what {
+            GroupAction::Move(command) => {
+                let global = with_machine(global, &command.files())?;
+                session::run(&global, async |context| command.run(context).await)?
+            }
+            GroupAction::Follow(command) => {
+                let (machine, path) = command.machine_and_path()?;
+                let global = with_machine(global, &machine)?;
+                let follow = command.asked(RecordedPath::read(path)?);
+                session::run(&global, async |context| command.run(context, &follow).await)?
+            }
+        };
         format.print(&report).map_err(Failure::of_stdout)
     }
 }
 
-impl Move {
-    fn global(&self, global: &Global) -> Result<Global, Failure> {
-        let mut files =
-            self.words.iter().filter_map(|word| if let Word::File(path) = word { Some(path) } else { None });
-        let Some(path) = files.next() else { return Ok(global.clone()) };
-        if let Some(other) = files.next() {
-            return Err(Failure::usage(format!("two machine files: {} and {}", path.display(), other.display()))
-                .next("name one: the axes of a group are in one file"));
+/// The options of every command, with the machine file that this one names.
+fn with_machine(global: &Global, files: &[&Path]) -> Result<Global, Failure> {
+    match files {
+        [] => Ok(global.clone()),
+        [path] => global.on_machine(path, &session::read_machine(path)?),
+        [path, other, ..] => {
+            Err(Failure::usage(format!("two machine files: {} and {}", path.display(), other.display()))
+                .next("name one: the axes of a group are in one file"))
         }
-        global.on_machine(path, &session::read_machine(path)?)
+    }
+}
+
+/// A motion of a group that has been planned.
+enum Planned<'a> {
+    Move(&'a PlannedMove),
+    Follow(&'a PlannedFollow),
+}
+
+impl Planned<'_> {
+    /// Its axes and their cycle.
+    const fn start(&self) -> &PlannedMove {
+        match self {
+            Self::Move(planned) => planned,
+            Self::Follow(planned) => &planned.start,
+        }
+    }
+}
+
+impl Move {
+    fn files(&self) -> Vec<&Path> {
+        self.words.iter().filter_map(|word| if let Word::File(path) = word { Some(&**path) } else { None }).collect()
     }
 
     fn asked(&self) -> GroupMove {
         let target = |word: &Word| if let Word::Target(node, angle) = word { Some((*node, *angle)) } else { None };
+        let targets = self.words.iter().filter_map(target).collect();
+        GroupMove { targets, within: self.within, ..self.options.asked() }
+    }
+
+    async fn run(&self, context: &Context) -> Result<GroupMoved, Failure> {
+        let asked = self.asked();
+        let (nodes, plan) = asked.axes(context.machine.as_ref())?;
+        let planned = asked.plan(plan, drives(context, nodes).await?).await?;
+        self.options.carry_out(context, &Planned::Move(&planned)).await
+    }
+}
+
+impl Follow {
+    fn machine_and_path(&self) -> Result<(Vec<&Path>, &Path), Failure> {
+        let (paths, machines): (Vec<&Path>, Vec<&Path>) = self
+            .files
+            .iter()
+            .map(|file| &**file)
+            .partition(|file| file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv")));
+        match paths[..] {
+            [path] => Ok((machines, path)),
+            [] => Err(Failure::usage("expected the path to follow").next("name its file: path.csv")),
+            [one, other, ..] => {
+                let what = format!("two paths: {} and {}", one.display(), other.display());
+                Err(Failure::usage(what).next("name one; it has a column for each axis"))
+            }
+        }
+    }
+
+    fn asked(&self, path: RecordedPath) -> GroupFollow {
+        GroupFollow { path, approach: self.approach, options: self.options.asked() }
+    }
+
+    async fn run(&self, context: &Context, asked: &GroupFollow) -> Result<GroupMoved, Failure> {
+        let (nodes, plan): (_, Option<&GroupPlan>) = asked.axes(context.machine.as_ref())?;
+        let planned = asked.plan(plan, drives(context, nodes).await?).await?;
+        self.options.carry_out(context, &Planned::Follow(&planned)).await
+    }
+}
+
+async fn drives(context: &Context, nodes: Vec<NodeId>) -> Result<Vec<Drive>, Failure> {
+    let mut drives = Vec::new();
+    for node in nodes {
+        drives.push(context.known_drive(node).await?);
+    }
+    Ok(drives)
+}
+
+impl GroupOptions {
+    fn asked(&self) -> GroupMove {
         GroupMove {
-            targets: self.words.iter().filter_map(target).collect(),
+            targets: Vec::new(),
             relative: self.relative,
             group: self.group.clone(),
-            within: self.within,
+            within: None,
             velocity: self.velocity,
             acceleration: self.acceleration,
             rounding: self.rounding,
             following_error: self.following_error,
             period: self.period,
             mode: self.mode,
+            hold: self.hold.flatten(),
         }
     }
 
-    async fn run(&self, context: &Context) -> Result<GroupMoved, Failure> {
-        let asked = self.asked();
-        let (nodes, plan) = asked.axes(context.machine.as_ref())?;
-        let mut drives = Vec::new();
-        for node in nodes {
-            drives.push(context.known_drive(node).await?);
+    /// Opens the group, moves it, holds it if that is asked for, and takes its power.
+    async fn carry_out(&self, context: &Context, planned: &Planned<'_>) -> Result<GroupMoved, Failure> {
+        if self.hold == Some(None) && context.is_embedded() {
+            return Err(Failure::usage(
+                "--hold needs a time on a bus of this command's own, whose time does not pass with the clock",
+            )
+            .next("give one: --hold 2s"));
         }
-        let planned = asked.plan(plan, drives).await?;
-        let drives: Vec<_> = planned.axes.iter().map(|axis| &axis.drive).collect();
-        refuse_too_full(context, &planned.cycle(), &drives).await?;
-        note_uneven(context, &planned);
+        let start = planned.start();
+        let drives: Vec<_> = start.axes.iter().map(|axis| &axis.drive).collect();
+        refuse_too_full(context, &start.cycle(), &drives).await?;
+        note_uneven(context, start);
         let mut guards = Vec::new();
-        for axis in &planned.axes {
+        for axis in &start.axes {
             guards.push(self.guard.begin(context, &axis.drive).await?);
         }
-        let opened = planned.open(self.cycles.options()).await;
+        let opened = start.open(self.cycles.options()).await;
         let moved = match opened {
             Ok(mut group) => {
-                let moved = self.carry_out(context, &mut group, &planned).await;
+                let moved = self.move_and_hold(context, &mut group, planned).await;
                 let closed = group.close().await.map_err(Failure::from);
                 moved.and_then(|seen| closed.map(|()| seen))
             }
             Err(error) => Err(error.into()),
         };
-        let guards = end_guards(context, guards, planned.axes.iter().map(|axis| &axis.drive)).await;
-        Ok(GroupMoved::new(&planned, moved?, guards?))
+        let guards = end_guards(context, guards, start.axes.iter().map(|axis| &axis.drive)).await;
+        let (run, held) = moved?;
+        Ok(GroupMoved::new(start, run, held, guards?))
     }
 
     /// Enables, moves and lets the shafts settle. What stops it is reported in the words of its drive.
-    async fn carry_out(
+    async fn move_and_hold(
         &self,
         context: &Context,
         group: &mut Group,
-        planned: &PlannedMove,
-    ) -> Result<GroupRun, Failure> {
-        context.progress.show(format!("enabling {} axes", planned.axes.len()));
+        planned: &Planned<'_>,
+    ) -> Result<(GroupRun, Option<Duration>), Failure> {
+        let axes = planned.start().axes.len();
+        context.progress.show(format!("enabling {axes} axes"));
         let mut shown = Duration::ZERO;
         let progress = |gone: Duration, whole: Duration| {
             if gone >= shown + PROGRESS_PERIOD {
                 shown = gone;
                 let (gone, whole) = (gone.as_secs_f64(), whole.as_secs_f64());
-                context.progress.show(format!("moving {} axes: {gone:.1} of {whole:.1} s", planned.axes.len()));
+                context.progress.show(format!("moving {axes} axes: {gone:.1} of {whole:.1} s"));
             }
         };
-        match planned.carry_out(group, progress).await {
+        let moved = async {
+            let run = match planned {
+                Planned::Move(planned) => planned.carry_out(group, progress).await?,
+                Planned::Follow(planned) => planned.carry_out(group, progress).await?,
+            };
+            let held = match self.hold {
+                Some(time) => Some(keep(context, group, time).await?),
+                None => None,
+            };
+            Ok::<_, GroupError>((run, held))
+        };
+        match moved.await {
             Ok(seen) => Ok(seen),
             Err(error) => {
                 let cause = if let GroupError::Stopped(cause) = error { Some(cause) } else { None };
@@ -278,6 +419,33 @@ impl Move {
             }
         }
     }
+}
+
+/// Holds for so long, or until standard input ends.
+async fn keep(context: &Context, group: &mut Group, time: Option<Duration>) -> Result<Duration, GroupError> {
+    const POWER: &str = "Ctrl-C quick-stops the drives";
+    let axes = group.axes().len();
+    let Some(time) = time else {
+        context.note(&format!(
+            "{axes} axes hold; the end of standard input (Ctrl-D) takes their power, {POWER}: {PULLING_LOAD}"
+        ));
+        let input = end_of_input();
+        return hold(group, |_| input.load(Ordering::Relaxed)).await;
+    };
+    context.note(&format!("{axes} axes hold for {} s, then their power is taken; {POWER}", Shown(time.as_secs_f64())));
+    hold(group, |held| held >= time).await
+}
+
+/// Whether standard input has ended, as a thread finds out: a read cannot be waited for beside the cycles. The thread ends with the input
+/// or with the process.
+fn end_of_input() -> Arc<AtomicBool> {
+    let ended = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&ended);
+    std::thread::spawn(move || {
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        seen.store(true, Ordering::Relaxed);
+    });
+    ended
 }
 
 /// Releases what was guarded, whatever became of the motion.
@@ -294,7 +462,7 @@ pub(in crate::command) async fn end_guards<'a>(
 }
 
 impl GroupMoved {
-    fn new(planned: &PlannedMove, seen: GroupRun, guards: Vec<GuardReport>) -> Self {
+    fn new(planned: &PlannedMove, seen: GroupRun, held: Option<Duration>, guards: Vec<GuardReport>) -> Self {
         let axes = planned.axes.iter().zip(guards).enumerate().map(|(index, (axis, guard))| AxisMoved {
             node: axis.drive.node().id().raw(),
             mode: axis.mode.name().unwrap_or("manufacturer-specific").to_owned(),
@@ -309,6 +477,7 @@ impl GroupMoved {
             time_s: seen.time.as_secs_f64(),
             period_ms: planned.period.as_secs_f64() * 1e3,
             missed_cycles: seen.missed_cycles,
+            held_s: held.map(|time| time.as_secs_f64()),
             axes: axes.collect(),
         }
     }
@@ -324,7 +493,8 @@ impl Report for GroupMoved {
             0 => String::new(),
             missed => format!(", later by {missed} missed cycles"),
         };
-        let head = format!("{}{missed}; the drives are without power", paint.good(&moved));
+        let held = self.held_s.map_or(String::new(), |time_s| format!(" and held for {time_s:.3} s"));
+        let head = format!("{}{missed}{held}; the drives are without power", paint.good(&moved));
         let mut table = Table::new(&["node", "mode", "from", "to", "at", "largest lag", "limits"]);
         for axis in &self.axes {
             let deg = |value: f64| format!("{} deg", Shown(value));
@@ -336,7 +506,7 @@ impl Report for GroupMoved {
         let guards = self.axes.iter().map(|axis| format!("  guard   node {}: {}", axis.node, axis.guard.text));
         let mut lines = vec![head, table.plain(paint)];
         lines.extend(guards);
-        lines.push(format!("  note    {PULLING_LOAD}; ferrodrive move leaves a drive holding"));
+        lines.push(format!("  note    {PULLING_LOAD}; --hold keeps the axes holding"));
         lines.join("\n")
     }
 }

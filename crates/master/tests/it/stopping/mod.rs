@@ -337,7 +337,7 @@ impl Motion {
             Self::Torque => "`torque`",
             Self::Home => "`home`",
             Self::GroupMove => "`group move`",
-            Self::GroupFollow => "a stream of points",
+            Self::GroupFollow => "`group follow`, a stream of points",
             Self::Base => "`drive-base`",
         }
     }
