@@ -11,9 +11,11 @@ use std::time::Duration;
 use can::Bitrate;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
+use host::group_follow::{GroupFollow, RecordedPath, stream};
+use machine::group_move::GroupMove;
 use master::cyclic::CyclicOptions;
-use master::group::{AxisLimits, AxisSetup, Group, Phase, StreamOptions};
-use master::units::Turns;
+use master::group::{AxisLimits, AxisSetup, Group};
+use master::units::{Angle, Turns};
 use master::{Drive, Network};
 use sim::World;
 use sim::machine::{Order, order};
@@ -29,20 +31,6 @@ fn limits(from: f64) -> AxisLimits {
     }
 }
 
-const RECORDED: &str = include_str!("arm/path.csv");
-
-/// Rows of joint angles in turns.
-fn recorded() -> Result<Vec<[f64; 3]>, Box<dyn Error>> {
-    let mut rows = Vec::new();
-    for (number, line) in (1..).zip(RECORDED.lines()).skip(1) {
-        let values: Result<Vec<f64>, _> = line.split(',').map(str::parse).collect();
-        let values = values.map_err(|error| format!("path.csv, line {number}: {error}"))?;
-        let row: [f64; 3] = values.try_into().map_err(|_| format!("path.csv, line {number}: not three angles"))?;
-        rows.push(row.map(|degrees| degrees / 360.0));
-    }
-    Ok(rows)
-}
-
 /// A swing of three joints from rest: the sine's beginning is eased in within a second.
 fn sine(time_s: f64) -> [f64; 3] {
     let ease = {
@@ -53,34 +41,12 @@ fn sine(time_s: f64) -> [f64; 3] {
 }
 
 /// Streams points relative to where the arm is; the largest following error in turns.
-async fn follow(group: &mut Group, path: impl Iterator<Item = [f64; 3]>) -> Result<f64, Box<dyn Error>> {
+async fn swing(group: &mut Group, path: impl Iterator<Item = [f64; 3]>) -> Result<f64, Box<dyn Error>> {
     let from: Vec<_> = group.points().iter().map(|point| point.position_turns).collect();
-    let mut path = path.fuse();
+    let points = path.map(|point| point.iter().zip(&from).map(|(by, from)| Turns(from + by)).collect::<Vec<_>>());
     let mut largest: f64 = 0.0;
-    group.start_stream(StreamOptions::default())?;
-    loop {
-        // A producer of a real machine is another task; here points are made as there is room.
-        while group.stream().is_some_and(|stream| stream.queued() < 50) {
-            match path.next() {
-                Some(point) => {
-                    let point: Vec<_> = point.iter().zip(&from).map(|(by, from)| Turns(from + by)).collect();
-                    group.push(&point)?;
-                }
-                None => {
-                    group.end_stream();
-                    break;
-                }
-            }
-        }
-        let state = group.cycle().await?;
-        if let Some(cause) = state.cause {
-            return Err(cause.to_string().into());
-        }
-        largest = group.following_errors().flatten().fold(largest, f64::max);
-        if state.phase == Phase::Holding {
-            return Ok(largest);
-        }
-    }
+    stream(group, points, |group| largest = group.following_errors().flatten().fold(largest, f64::max)).await?;
+    Ok(largest)
 }
 
 async fn run(drives: &[Drive]) -> Result<(), Box<dyn Error>> {
@@ -97,7 +63,7 @@ async fn run(drives: &[Drive]) -> Result<(), Box<dyn Error>> {
     let time = group.start_move(&to, None)?;
     group.rest().await?;
     println!("moved together by 36, -18 and 7.2 degrees in {:.2} s, limited in jerk", time.as_secs_f64());
-    let error = follow(&mut group, (1..=2000).map(|cycle| sine(f64::from(cycle) * 0.002))).await?;
+    let error = swing(&mut group, (1..=2000).map(|cycle| sine(f64::from(cycle) * 0.002))).await?;
     println!("4 s of a sine at 2 ms: at most {:.3} degrees from the set-points", error * 360.0);
     if error > 0.005 || group.state().missed_cycles > 0 {
         return Err("the sine was not followed".into());
@@ -106,14 +72,26 @@ async fn run(drives: &[Drive]) -> Result<(), Box<dyn Error>> {
     group.move_to(&back, Some(Duration::from_secs(2))).await?;
     group.close().await?;
 
-    let mut group = Group::open(&setups, Duration::from_millis(10), CyclicOptions::default()).await?;
-    group.enable().await?;
-    let error = follow(&mut group, recorded()?.into_iter()).await?;
+    // The recorded path, from where the arm is, within the limits that a move has too: as `ferrodrive group follow --relative`.
+    let path = RecordedPath::parse("arm/path.csv", include_bytes!("arm/path.csv")).map_err(|bad| bad.to_string())?;
+    let options = GroupMove {
+        relative: true,
+        period: Some(Duration::from_millis(10)),
+        acceleration: Some(4.0),
+        following_error: Some(Angle::Turns(0.01)),
+        ..GroupMove::default()
+    };
+    let follow = GroupFollow { path, approach: false, options };
+    let planned = follow.plan(None, drives.to_vec()).await.map_err(|failure| failure.to_string())?;
+    let mut group = planned.start.open(CyclicOptions::default()).await?;
+    let followed = planned.carry_out(&mut group, |_, _| {}).await;
+    group.close().await?;
+    let followed = followed?;
+    let error = followed.largest_turns.iter().copied().fold(0.0, f64::max);
     println!("4 s of the recorded path at 10 ms: at most {:.3} degrees from the set-points", error * 360.0);
-    if error > 0.005 || group.state().missed_cycles > 0 {
+    if error > 0.005 || followed.missed_cycles > 0 {
         return Err("the recorded path was not followed".into());
     }
-    group.close().await?;
     Ok(())
 }
 
