@@ -13,6 +13,7 @@ use master::boot::{BootPlan, Expectation};
 
 use super::finding::{Findings, Place, Reporter, Severity};
 use super::generated::Planned;
+use super::groups;
 use super::intended::{Intended, IntendedNode, MovedAt};
 use super::predict::CYCLE;
 use super::{Checked, CheckedNode};
@@ -68,6 +69,7 @@ pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     report.node = None;
     radii.iter().for_each(|radius| wheel_radius(*radius, &mut report));
     intended.moved.iter().for_each(|moved| interpolation(moved, &intended.nodes, &mut report));
+    groups::limits(&machine, &intended.nodes, &periods, &mut report);
     let row = |(node, place): (&NodeId, &IntendedNode)| CheckedNode {
         name: place.name.clone(),
         node: Some(node.raw()),

@@ -8,6 +8,7 @@ mod bus_yml;
 mod device;
 mod finding;
 mod generated;
+mod groups;
 mod intended;
 mod live;
 mod machine;

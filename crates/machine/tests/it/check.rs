@@ -489,6 +489,42 @@ fn a_joint_that_interpolates_over_its_own_time_wants_that_cycle() {
     assert_eq!(about(group("mode = \"pv\"\n", "10ms")), None, "by speeds it does not interpolate");
 }
 
+/// The ZLAC8030L does 1000 r/min (60FFh, object table of its manual), or what 6080h is set to.
+#[test]
+fn what_a_group_states_and_its_drives_do_not_do_or_do_not_know_is_said() {
+    let text = |limits: &str, units: &str, axis: &str, more: &str| {
+        format!(
+            "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n{limits}{units}[[group]]\nname = \"arm\"\nperiod = \"10ms\"\n[[group.axis]]\n\
+             node = 4\n{axis}acceleration_deg_s2 = 600\njerk_deg_s3 = 6000\nfollowing_error_deg = 20\n{more}"
+        )
+    };
+    let found = |text: &str| -> Vec<Finding> {
+        let all = of_machine(text, &PathBuf::new()).unwrap_or_else(|bad| panic!("{text}{bad}")).findings;
+        all.into_iter().filter(|finding| finding.rule == "group-limits").collect()
+    };
+    assert_eq!(found(&text("", "", "velocity_deg_s = 6000\n", "")), []);
+    // 6001 deg/s are 1000.17 r/min; behind a gear of 10 the output does a tenth.
+    for (units, speed, most) in
+        [("", "6001", "6000 deg/s (1000 r/min)"), ("units = { gear_ratio = 10 }\n", "601", "600 deg/s (100 r/min)")]
+    {
+        let said = found(&text("", units, &format!("velocity_deg_s = {speed}\n"), ""));
+        assert_eq!((said.len(), said[0].severity, said[0].node), (1, Severity::Warning, Some(4)), "{said:?}");
+        assert!(said[0].what.contains(most) && said[0].next.contains("lower its `velocity_deg_s`"), "{said:?}");
+    }
+    let range = "range_deg = [-90, 45.5]\nvelocity_deg_s = 60\n";
+    let said = found(&text("", "", range, ""));
+    assert_eq!((said.len(), said[0].severity), (1, Severity::Note), "{said:?}");
+    assert!(
+        said[0].what.contains("`range_deg = [-90, 45.5]` binds the group 'arm' alone: `ferrodrive move 4`"),
+        "{said:?}"
+    );
+    let other = "[[group]]\nname = \"two\"\n[[group.axis]]\nnode = 4\nvelocity_deg_s = 61\nacceleration_deg_s2 = 600\njerk_deg_s3 = 6000\n\
+                 following_error_deg = 20\n";
+    let said = found(&text("", "", "velocity_deg_s = 60\n", other));
+    assert_eq!((said.len(), said[0].at.line), (1, 13), "{said:?}");
+    assert!(said[0].what.contains("the groups 'arm' and 'two' state other limits"), "{said:?}");
+}
+
 #[test]
 fn wheels_of_an_unlikely_size_are_named_where_the_file_says_it() {
     // Lines 1 to 6 are the drives.
