@@ -109,6 +109,10 @@ fn where_there_is_no_terminal_nothing_is_asked_and_the_status_says_what_is_open(
     let file = std::fs::read_to_string(&made).unwrap();
     assert!(file.contains("model = \"zlim42c\"  # or zlim42c-82") && file.contains("#node = 1"), "{file}");
     assert!(file.contains("\n#bitrate = "), "a server does not say its bit rate: {file}");
+    for (typed, written) in [(&[][..], "\nbitrate = \"500k\"\n"), (&["--bitrate", "1M"], "\nbitrate = \"1M\"\n")] {
+        let named = done(&[&["init", "--drive", "zlac8030l@4"], typed].concat()).out;
+        assert!(named.contains(written), "{named}");
+    }
     let json = ferrodrive(&["--json", "--bus", &bus, "init"]);
     assert_eq!((json.status, &json.json()["error"]["kind"]), (Some(1), &"unknown_model".into()));
     let said = ["--model", "2=zlim42c-82", "--model", "1=m8025e25b50"];

@@ -243,7 +243,8 @@ fn machine_file(nodes: &[InitNode], bitrate: Option<Bitrate>) -> String {
         Some(rate) => writeln!(text, "bitrate = \"{rate}\""),
         None => writeln!(
             text,
-            "# The bit rate of the bus: nothing here shows it, and without this line it is 500k.\n#bitrate = \"500k\""
+            "# The bit rate of the bus: nothing here shows it, and without this line it is 500k (`init --bitrate RATE` writes it).\n\
+             #bitrate = \"500k\""
         ),
     };
     nodes.iter().for_each(|node| drive(&mut text, node));

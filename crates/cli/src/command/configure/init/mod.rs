@@ -32,12 +32,15 @@ use console::command::scan::look;
 /// is 1.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 init -o machine.toml\n  \
-    ferrodrive --bus can0 init --model 4=zlac8030l -o machine.toml\n  \
+    ferrodrive --bus can0 init --bitrate 1M --model 4=zlac8030l -o machine.toml\n  \
     ferrodrive init --drive zlac8030l@4 --drive m4230e17b50@1 -o machine.toml")]
 pub(crate) struct Init {
     /// A drive and its node-ID, as for `sim`, e.g. zlac8030l@4, instead of asking a bus; may be repeated
     #[arg(long = "drive", value_name = "MODEL@NODE[,KEY=VALUE..]", value_parser = named_drive)]
     drives: Vec<NamedDrive>,
+    /// Bit rate of the bus, where it does not show it, as a CAN interface or a server (default with --drive: 500k)
+    #[arg(long, value_name = "RATE")]
+    bitrate: Option<Bitrate>,
     /// Write to this file (default, and -: write to standard output)
     #[arg(long, short, value_name = "FILE.toml", value_parser = machine_path)]
     output: Option<PathBuf>,
@@ -45,6 +48,9 @@ pub(crate) struct Init {
     #[arg(long, requires = "output")]
     force: bool,
 }
+
+/// That of drives that are named, as of the world that `sim` makes of them.
+const BITRATE: Bitrate = Bitrate::K500;
 
 /// A drive as it was typed, and what that means.
 #[derive(Clone)]
@@ -76,7 +82,7 @@ impl Init {
         // Before anything is asked for: what cannot be kept is not worth the wait.
         let output = new_file(self.output.as_deref(), self.force)?;
         let (mut nodes, bitrate) = if self.is_without_bus() {
-            (self.named()?, None)
+            (self.named()?, Some(BITRATE))
         } else if is_bus_typed || global.bus != (BusSpec::Sim { file: None }) {
             let nodes = session::run(global, async |context| {
                 let (found, _) = look(context).await?;
@@ -100,7 +106,7 @@ impl Init {
             })?;
         }
         nodes.iter_mut().for_each(|node| node.with_file(|path| seen_from(path, output)));
-        let mut report = InitReport::new(nodes, bitrate);
+        let mut report = InitReport::new(nodes, self.bitrate.or(bitrate));
         if let Some(path) = output {
             keep(path, report.toml.as_bytes(), self.force)?;
             report.file = Some(path.display().to_string());
